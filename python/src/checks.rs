@@ -7,7 +7,9 @@ use metalith::cell::cache_folder;
 use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
 use metalith::extract::GdsPillars;
 use metalith::gds::ReadLimits;
-use metalith::{Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, SimulationCases, cell_models};
+use metalith::{
+    Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, SimulationCases, WidthRows as _, cell_models,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::Design;
@@ -73,6 +75,9 @@ pub fn verify(
         let model = model.as_deref().map(CalibratedModel::read).transpose()?;
         let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
         let made = model.as_ref().map(chip).transpose()?;
+        if let Some(chip) = &made {
+            chip.check_drawn(array.classes.iter().map(|class| class.widths.histogram()))?;
+        }
         let cells = match &made {
             None => cell_models(design, &[design.verify.fidelity])?,
             Some(_) => Vec::new(),

@@ -6,7 +6,9 @@ use metalith::cell::{LitStack, PolarisedLight};
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
-use metalith::{Accuracy, Error, MadeChip, PillarShape, Progress, Result, Wedge, WidthMap, cell_models};
+use metalith::{
+    Accuracy, Error, MadeChip, PillarShape, Progress, Result, Wedge, WidthMap, WidthRows as _, cell_models,
+};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -259,7 +261,12 @@ pub fn psf_of_array<'py>(
             .extend(wavelengths_nm.iter().map(|nm| nm * 1e-3));
         let (cells, made) = match &wanted {
             Wanted::Cell(fidelity) => (cell_models(&design, &[*fidelity])?, None),
-            Wanted::Model(model) => (Vec::new(), Some(MadeChip::in_light(&design.lit_stack()?, model)?)),
+            Wanted::Model(model) => {
+                let chip = MadeChip::in_light(&design.lit_stack()?, model)?;
+                let classes = chosen.iter().map(|k| &array.array.classes[placed[*k].class]);
+                chip.check_drawn(classes.map(|class| class.widths.histogram()))?;
+                (Vec::new(), Some(chip))
+            }
         };
         let lit = chosen.iter().map(|k| Lit {
             name: placed[*k].element.label(),
@@ -342,7 +349,9 @@ pub fn psf_of_widths<'py>(
                     polarised: light,
                     stack,
                 };
-                (None, Some(MadeChip::in_light(&stated, model)?))
+                let chip = MadeChip::in_light(&stated, model)?;
+                chip.check_drawn(maps.iter().map(WidthMap::histogram))?;
+                (None, Some(chip))
             }
         };
         let lit = maps.into_iter().zip(names).zip(centres_nm);

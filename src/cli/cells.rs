@@ -55,9 +55,6 @@ pub struct CellsArgs {
 pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let design = standard_input::design_without_library(&args.design)?;
-    if args.steered {
-        design.square_lattice("--steered")?;
-    }
     let folder = args
         .out
         .clone()
@@ -127,11 +124,16 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
             .iter()
             .map(|l| l.supercells.map(|share| fixed(share, 3)).join(" to "));
         print_line!(
-            "steered by {} and {} steps: first order {} ({} times)",
+            "steered by {} and {} steps: first order {} ({} times{})",
             study.steps.0,
             study.steps.1,
             light.collect::<Vec<_>>().join(", "),
-            fixed(study.gain(), 3)
+            fixed(study.gain(), 3),
+            if study.is_better() {
+                ""
+            } else {
+                "; the common mapping stays"
+            }
         );
     }
     print_line!("report: {}", folder.join("cells.html").display());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::ReadLimits;
-use metalith::{Error, Layout, Result, WholeFile};
+use metalith::{Error, Layout, PillarShape, Result, WholeFile};
 
 use super::compensated::CompensatedFor;
 use super::output::is_standard_output;
@@ -100,6 +100,7 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     let named = args.rules.as_deref().map(Deck::read).transpose()?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
     let mut design = args.design.as_deref().map(standard_input::design).transpose()?;
+    let unnamed = named.is_none() && design.is_none();
     let deck = named.unwrap_or_else(|| Deck::for_design(design.as_ref()));
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
@@ -120,6 +121,14 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let report = drc::check(&layout, &deck, &input, terminal)?;
     terminal.clear();
+    if unnamed && report.shape != PillarShape::Square {
+        let own = Deck::for_shape(report.shape);
+        terminal.say(&format!(
+            "the pillars are {}, and the rules in force are those of squares: give `--design DESIGN.toml`, or `--rules {}`",
+            report.shape.plural(),
+            own.source().0.display()
+        ));
+    }
     let mut text: Form = if args.json { json } else { drc::text };
     for (path, form) in args.outputs() {
         if is_standard_output(path) {

@@ -60,7 +60,7 @@ pub struct CompareArgs {
     field_deg: f64,
 
     /// Cut each photograph to the square of so many pixels in its middle.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(16..=4096))]
+    #[arg(long, value_name = "N", value_parser = images::scored_sides())]
     pixels: Option<u16>,
 
     /// Weights of learnt last stages that `metalith train --stage` wrote, separated by commas: each gives the camera that it was

@@ -1,8 +1,10 @@
-//! Images that are given as files, or as a folder of them.
+//! Images that are given as files, or as a folder of them, and how many pixels are asked for.
 
 use std::path::PathBuf;
 
+use clap::builder::RangedI64ValueParser;
 use metalith::Result;
+use metalith::picture::SCORED_SIDES;
 use metalith::picture::scene::images_in;
 
 /// Several files, and the images of folders, in the order in which they are given.
@@ -18,4 +20,9 @@ pub fn of_all(given: &[PathBuf]) -> Result<Vec<PathBuf>> {
         }
     }
     Ok(all)
+}
+
+/// Reads the side of a scene whose pictures are scored (pixels).
+pub fn scored_sides() -> RangedI64ValueParser<u16> {
+    clap::value_parser!(u16).range(*SCORED_SIDES.start() as i64..=*SCORED_SIDES.end() as i64)
 }

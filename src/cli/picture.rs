@@ -55,7 +55,7 @@ pub struct PictureArgs {
     wavelengths_nm: Option<Vec<f64>>,
 
     /// Pixels an axis of a built-in scene; 800 if left out.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(64..=4096))]
+    #[arg(long, value_parser = super::images::scored_sides())]
     pixels: Option<u16>,
 
     /// Ways to restore: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs); the picture of the page is that of the first.
@@ -314,6 +314,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let small = folder.path().join("small.png").display().to_string();
         metalith::picture::write_picture(small.as_ref(), &ndarray::Array3::from_elem((32, 40, 3), 0.5)).unwrap();
+        let tiny = folder.path().join("tiny.png").display().to_string();
+        metalith::picture::write_picture(tiny.as_ref(), &ndarray::Array3::from_elem((8, 8, 3), 0.5)).unwrap();
         let scene = |of: &[&str]| {
             let files = [
                 "picture",
@@ -327,11 +329,12 @@ mod tests {
             alone.picture.scene().map(|scene| scene.view.rows)
         };
         assert_eq!(scene(&["star"]).unwrap(), 800);
-        assert_eq!(scene(&["edge", "--pixels", "64"]).unwrap(), 64);
+        assert_eq!(scene(&["edge", "--pixels", "33"]).unwrap(), 33);
         for (of, words) in [
             (&["star", "--wavelengths-nm", "400,500"][..], "spectral cubes"),
             (&["scene.png", "--pixels", "64"], "built-in scenes"),
-            (&[&small], "33 pixels"),
+            (&[&small], "33 to 4096 pixels"),
+            (&[&tiny], "33 to 4096 pixels"),
         ] {
             let error = scene(of).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");

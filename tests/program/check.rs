@@ -41,6 +41,38 @@ fn the_program_answers_with_exit_codes() {
     assert!(sarif.contains("pillar.width.min"));
 }
 
+/// Pillars that are no squares are judged by rules of squares where nothing else is named, and the rules of their own are told.
+#[test]
+fn pillars_that_are_no_squares_are_told_with_their_rules() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = metalith_testing::design("geometric_phase_532");
+    let text = std::fs::read_to_string(&design).unwrap();
+    let name = text.lines().find_map(|l| l.strip_prefix("name = \"")).unwrap();
+    let out = folder.path().join("out");
+    let program = |args: &[&std::ffi::OsStr]| {
+        let mut program = assert_cmd::Command::new(env!("CARGO_BIN_EXE_metalith"));
+        let output = program.args(args).output().unwrap();
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    program(&["layout".as_ref(), design.as_ref(), "--out".as_ref(), out.as_ref()]);
+    let layout = out.join(format!("{}_pillars.gds", name.trim_end_matches('"')));
+    assert!(layout.exists(), "{}", layout.display());
+    let rules = Path::new(env!("CARGO_MANIFEST_DIR")).join("rules/rectangles.toml");
+    const TOLD: &str = "the pillars are rectangles, and the rules in force are those of squares";
+    let said = program(&["check".as_ref(), layout.as_ref()]);
+    assert!(
+        said.contains(TOLD) && said.contains("--rules rules/rectangles.toml"),
+        "{said}"
+    );
+    for own in [
+        ["--rules".as_ref(), rules.as_os_str()],
+        ["--design".as_ref(), design.as_os_str()],
+    ] {
+        let said = program(&["check".as_ref(), layout.as_ref(), own[0], own[1]]);
+        assert!(!said.contains(TOLD), "{said}");
+    }
+}
+
 /// `-` is what is piped in, and what is printed; both are as with files.
 #[test]
 fn a_dash_is_standard_input_or_output() {

@@ -54,6 +54,13 @@ fn steered_toml(study: &CellStudy) -> String {
     for study in &study.steered {
         let coefficients: Vec<String> = study.coefficients.iter().map(|c| format!("{c}")).collect();
         let SteeringSteps(first, second) = study.steps;
+        if !study.is_better() {
+            text += &format!(
+                "\n# Steps [{first}, {second}]: the common mapping stays, supercells find {} times its light with the best that the sum over pairs found.\n",
+                fixed(study.gain(), 3)
+            );
+            continue;
+        }
         text += &format!(
             "\n[[mapping.steered]]\nsteps = [{first}, {second}]\ncoefficients = [{}]   # {} times the light of the common mapping\n",
             coefficients.join(", "),

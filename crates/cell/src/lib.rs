@@ -35,6 +35,7 @@ pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
 pub use neighbour_band::{BandNode, BandResponse};
 pub use neighbours::{
     FittedNeighbours, NEIGHBOUR_DEGREE, NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteResponse,
+    neighbours,
 };
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};

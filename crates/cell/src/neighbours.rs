@@ -9,9 +9,10 @@
 //! Chebyshev's polynomials as terms. b_d is zero on the mean over the widths that are drawn: a neighbour that is not there
 //! counts with that mean. Resonances that need many equal pillars in a row are not in it.
 
+use metalith_core::LatticeKind;
 use num_complex::Complex64;
 
-/// Offsets of the neighbours that count (pitches along x and y).
+/// Offsets of the neighbours that count on a square lattice (pitches along x and y).
 pub const NEIGHBOURS: [[i32; 2]; 12] = [
     [1, 0],
     [-1, 0],
@@ -26,6 +27,31 @@ pub const NEIGHBOURS: [[i32; 2]; 12] = [
     [0, 2],
     [0, -2],
 ];
+
+/// The same on a hexagonal lattice, in places of its grid: half pitches along x, rows along y. The six nearest, then the six behind
+/// their gaps.
+const NEIGHBOURS_OF_HEXAGONAL: [[i32; 2]; NEIGHBOURS.len()] = [
+    [2, 0],
+    [-2, 0],
+    [1, 1],
+    [1, -1],
+    [-1, 1],
+    [-1, -1],
+    [3, 1],
+    [3, -1],
+    [-3, 1],
+    [-3, -1],
+    [0, 2],
+    [0, -2],
+];
+
+/// Offsets of the neighbours that count, in places of the grid of a [`Lattice`](metalith_core::Lattice) of this kind.
+pub fn neighbours(kind: LatticeKind) -> &'static [[i32; 2]; NEIGHBOURS.len()] {
+    match kind {
+        LatticeKind::Square => &NEIGHBOURS,
+        LatticeKind::Hexagonal => &NEIGHBOURS_OF_HEXAGONAL,
+    }
+}
 
 /// Highest polynomial in the own width, of a(w) and of b_d.
 const OWN_DEGREE: usize = 12;

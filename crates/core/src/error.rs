@@ -96,7 +96,9 @@ fn at_line(line: Option<usize>) -> String {
 fn io_hint(source: &std::io::Error) -> &'static str {
     match source.kind() {
         std::io::ErrorKind::NotFound => "\n  help: check the path; relative paths count from the file that names them",
-        std::io::ErrorKind::PermissionDenied => "\n  help: choose a folder that you may write to with --out",
+        std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem => {
+            "\n  help: choose a folder that you may write to with --out"
+        }
         std::io::ErrorKind::StorageFull => {
             "\n  help: free space or choose another folder with --out; nothing was replaced"
         }

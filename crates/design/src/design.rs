@@ -283,23 +283,6 @@ impl Design {
         ))
     }
 
-    /// Nothing, if the pillars stand on a square lattice.
-    ///
-    /// # Errors
-    /// If they do not; `who` knows square lattices alone.
-    pub fn square_lattice(&self, who: &str) -> Result<()> {
-        if self.cell.lattice.is_square() {
-            return Ok(());
-        }
-        Err(Error::invalid(
-            format!(
-                "{who} knows square lattices alone, and {} is a design on a hexagonal one",
-                self.path.display()
-            ),
-            "use a design on a square lattice",
-        ))
-    }
-
     /// The outline of an element as it stands on the chip, from its middle; none where it is a circle.
     pub fn outline_of(&self, element: &Element) -> Option<LensOutline> {
         let outline = self.lens_of(element).outline.as_ref()?;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use metalith_core::PillarShape;
 use serde::Serialize;
 
 use super::deck::Deck;
@@ -48,6 +49,9 @@ pub struct DrcReport {
     /// Shapes with all references followed.
     pub shapes: u64,
     pub elements: usize,
+    /// What pillars are: as the design says, or as they were found.
+    #[serde(skip)]
+    pub shape: PillarShape,
     pub pillars_on_lattices: u64,
     /// Every rule of the deck, in its order.
     pub rules: Vec<RuleReport>,
@@ -123,6 +127,7 @@ pub(super) fn assemble(
         bytes: layout.bytes(),
         shapes: layout.flat_shapes(),
         elements: flat.elements.len(),
+        shape: flat.shape,
         pillars_on_lattices: flat.pillars_on_lattices(),
         rules,
         warnings,

@@ -6,11 +6,26 @@ use metalith_cell::CellStack;
 use metalith_core::{Error, Result};
 use metalith_rcwa::{Incidence, Orders, Side, SiteLattice, Supercell, SupercellResponse, solve_supercell};
 
+use crate::SiteGrid;
+use crate::sites::transmissions_on;
+
 /// Highest order of a single cell that supercells keep along each axis: -2..=2. With widths corrected by
 /// [`CoarseCell::shift_nm`] the first order of blazed rows of 3 to 18 pillars differs by 0.010 rms in share and
 /// 0.010 rad in phase from that with 3 to 7 (`examples/blazed_rows.rs`). With highest order 3 it is about 0.006 and
 /// 0.008, at (7/5)^6, about eight times the cost.
 pub const COARSE: usize = 2;
+
+/// The same on a hexagonal lattice, whose pillars are of silicon for the most part: with 2 the first order of blazed rows of these
+/// differs by up to 0.17 in share from that with 5, with 3 by 0.02 (`hexagonal_supercells` in the tests of the solver).
+const COARSE_OF_HEXAGONAL: usize = 3;
+
+/// Highest order of a single cell that supercells keep along each axis on such a lattice.
+pub(crate) fn coarse(grid: SiteGrid) -> usize {
+    match grid.is_square() {
+        true => COARSE,
+        false => COARSE_OF_HEXAGONAL,
+    }
+}
 
 /// Orders along an axis of the single cells that coarse ones are compared with. Their error is about 0.005 rad.
 const FINE: usize = 13;
@@ -22,11 +37,12 @@ const SHIFT_STEPS: i32 = 12;
 /// Widths at which coarse and fine cells are compared, so many that no single resonance decides.
 const COMPARED_WIDTHS: usize = 21;
 
-/// A pillar of any width at one wavelength, solved with [`COARSE`] orders and a width corrected for that.
+/// A pillar of any width at one wavelength, solved with few orders, [`COARSE`] on a square lattice, and a width corrected for that.
 #[derive(Clone, Debug)]
 pub struct CoarseCell<'a> {
     stack: &'a CellStack,
     wavelength_um: f64,
+    highest: usize,
     shift_nm: f64,
 }
 
@@ -36,6 +52,7 @@ impl<'a> CoarseCell<'a> {
     /// # Errors
     /// If the widths do not rise, do not fit the pitch, or the solver refuses the cell.
     pub fn new(stack: &'a CellStack, wavelength_um: f64, widths_nm: (f64, f64)) -> Result<Self> {
+        let highest = coarse(SiteGrid::of(stack));
         let (low, high) = widths_nm;
         if !(low > 0.0 && low <= high) {
             return Err(Error::invalid(
@@ -46,7 +63,8 @@ impl<'a> CoarseCell<'a> {
         Ok(Self {
             stack,
             wavelength_um,
-            shift_nm: shift_nm(stack, wavelength_um, widths_nm)?,
+            highest,
+            shift_nm: shift_nm(stack, wavelength_um, widths_nm, highest)?,
         })
     }
 
@@ -55,7 +73,7 @@ impl<'a> CoarseCell<'a> {
         self.wavelength_um
     }
 
-    /// By how much wider a pillar is solved than it is (nm), so that [`COARSE`] orders transmit as many orders do, in
+    /// By how much wider a pillar is solved than it is (nm), so that few orders transmit as many do, in
     /// the mean square over the widths, along the normal. Too few orders act mostly like a pillar that is a little too
     /// thin.
     pub fn shift_nm(&self) -> f64 {
@@ -65,6 +83,21 @@ impl<'a> CoarseCell<'a> {
     /// Wavelength over pitch: the sine of one turn for each site.
     pub fn wavelength_over_pitch(&self) -> f64 {
         self.wavelength_um * 1e3 / self.stack.pitch_nm
+    }
+
+    /// How its pillars stand.
+    pub(crate) fn grid(&self) -> SiteGrid {
+        SiteGrid::of(self.stack)
+    }
+
+    /// What every site of a solved supercell transmits, as [`site_transmissions`](crate::site_transmissions) has it.
+    pub(crate) fn transmissions(
+        &self,
+        lattice: &SiteLattice,
+        response: &SupercellResponse,
+        full: f64,
+    ) -> [Vec<Complex64>; 2] {
+        transmissions_on(self.grid(), lattice, response, self.wavelength_over_pitch(), full)
     }
 
     /// |t| where all power goes on in the zero order.
@@ -93,13 +126,13 @@ impl<'a> CoarseCell<'a> {
             .collect::<Result<Vec<_>>>()?;
         let supercell = Supercell::of_cells(lattice, &cells)?;
         let incidence = Incidence::of_sines(self.wavelength_um, Side::Below, sines);
-        Ok(solve_supercell(&supercell, &incidence, COARSE)?)
+        Ok(solve_supercell(&supercell, &incidence, self.highest)?)
     }
 }
 
 /// The correction of the width: see [`CoarseCell::shift_nm`].
-fn shift_nm(stack: &CellStack, wavelength_um: f64, (low, high): (f64, f64)) -> Result<f64> {
-    let (fine, coarse) = (Orders::new(FINE)?, Orders::new(2 * COARSE + 1)?);
+fn shift_nm(stack: &CellStack, wavelength_um: f64, (low, high): (f64, f64), highest: usize) -> Result<f64> {
+    let (fine, coarse) = (Orders::new(FINE)?, Orders::new(2 * highest + 1)?);
     let widths: Vec<f64> = (0..COMPARED_WIDTHS)
         .map(|i| low + (high - low) * i as f64 / (COMPARED_WIDTHS - 1) as f64)
         .collect();

@@ -7,8 +7,8 @@ use metalith_cell::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourRespon
 use metalith_core::{Error, Result};
 use metalith_rcwa::SiteLattice;
 
+use crate::SiteGrid;
 use crate::linear;
-use crate::table::images;
 use crate::training::TrainingCell;
 
 /// Added to the mean square of each term, as a part of it: sites are a few for each weight, and widths of neighbours are
@@ -30,30 +30,41 @@ pub(crate) struct SiteSample {
     /// As so many sites does it count.
     pub weight: f64,
     pub own_nm: f64,
-    /// In the order of [`NEIGHBOURS`].
+    /// In the order of [`SiteGrid::neighbours`].
     pub neighbours_nm: [f64; NEIGHBOURS.len()],
     /// For s and p.
     pub transmitted: [Complex64; 2],
 }
 
 /// The sites of a supercell with their neighbours.
-pub(crate) fn samples(supercell: usize, cell: &TrainingCell, transmitted: &[Vec<Complex64>; 2]) -> Vec<SiteSample> {
+pub(crate) fn samples(
+    grid: SiteGrid,
+    supercell: usize,
+    cell: &TrainingCell,
+    transmitted: &[Vec<Complex64>; 2],
+) -> Vec<SiteSample> {
     let (lattice, widths_nm) = (&cell.lattice, &cell.widths_nm);
     (0..lattice.len())
         .map(|i| SiteSample {
             supercell,
             weight: cell.weight,
             own_nm: widths_nm[i],
-            neighbours_nm: neighbours_nm(lattice, widths_nm, i),
+            neighbours_nm: neighbours_nm(grid, lattice, widths_nm, i),
             transmitted: [transmitted[0][i], transmitted[1][i]],
         })
         .collect()
 }
 
-/// Widths of the neighbours of a site of a supercell (nm), in the order of [`NEIGHBOURS`].
-pub(crate) fn neighbours_nm(lattice: &SiteLattice, widths_nm: &[f64], site: usize) -> [f64; NEIGHBOURS.len()] {
+/// Widths of the neighbours of a site of a supercell (nm), in the order of [`SiteGrid::neighbours`].
+pub(crate) fn neighbours_nm(
+    grid: SiteGrid,
+    lattice: &SiteLattice,
+    widths_nm: &[f64],
+    site: usize,
+) -> [f64; NEIGHBOURS.len()] {
     let here = lattice.site(site);
-    NEIGHBOURS.map(|offset| {
+    grid.neighbours().map(|offset| {
+        let offset = grid.steps(offset);
         // All lattices repeat after as many steps as they have sites.
         let period = 2 * lattice.len() as i32;
         let [x, y] = [0, 1].map(|axis| (here[axis] as i32 + offset[axis] + period) as usize);
@@ -130,8 +141,8 @@ pub(crate) struct Fitted {
 }
 
 /// The responses for light whose direction has these sines; its symmetry makes several samples of each.
-pub(crate) fn fit(basis: NeighbourBasis, sines: [f64; 2], samples: &[SiteSample]) -> Result<Fitted> {
-    let symmetries = symmetries(sines);
+pub(crate) fn fit(grid: SiteGrid, basis: NeighbourBasis, sines: [f64; 2], samples: &[SiteSample]) -> Result<Fitted> {
+    let symmetries = symmetries(grid, sines);
     let mut parts = vec![Sums::zero(); PARTS];
     for sample in samples {
         for symmetry in &symmetries {
@@ -159,7 +170,7 @@ pub(crate) fn fit(basis: NeighbourBasis, sines: [f64; 2], samples: &[SiteSample]
     })
 }
 
-/// A mirror of the square lattice that leaves the direction of the light.
+/// A mirror of the lattice that leaves the direction of the light.
 struct Symmetry {
     /// Where the neighbour of each number goes.
     to: [usize; NEIGHBOURS.len()],
@@ -178,13 +189,14 @@ impl Symmetry {
     }
 }
 
-fn symmetries(sines: [f64; 2]) -> Vec<Symmetry> {
-    let of = NEIGHBOURS.map(|offset| images(sines, offset.map(f64::from)));
+fn symmetries(grid: SiteGrid, sines: [f64; 2]) -> Vec<Symmetry> {
+    let neighbours = grid.neighbours();
+    let of = neighbours.map(|offset| grid.images(sines, offset.map(f64::from)));
     (0..of[0].len())
         .map(|number| Symmetry {
             to: std::array::from_fn(|k| {
                 let image = of[k][number].0.map(|v| v as i32);
-                let found = NEIGHBOURS.iter().position(|offset| *offset == image);
+                let found = neighbours.iter().position(|offset| *offset == image);
                 found.expect("the neighbours are symmetric")
             }),
             swapped: of[0][number].1,
@@ -225,7 +237,7 @@ mod tests {
             .enumerate()
             .flat_map(|(number, cell)| {
                 let none = [0, 1].map(|_| vec![Complex64::ZERO; cell.lattice.len()]);
-                let mut sites = samples(number, cell, &none);
+                let mut sites = samples(SiteGrid::SQUARE, number, cell, &none);
                 for site in &mut sites {
                     let terms = basis.terms(site.own_nm, &site.neighbours_nm);
                     let sum = |r: &NeighbourResponse| r.weights.iter().zip(terms).map(|(w, t)| w * t).sum();
@@ -235,7 +247,7 @@ mod tests {
             })
             .collect();
         // No symmetry: the weights above have none.
-        let fitted = fit(basis, [0.3, 0.1], &all).unwrap();
+        let fitted = fit(SiteGrid::SQUARE, basis, [0.3, 0.1], &all).unwrap();
         assert!(fitted.left_out < KEPT_BACK, "{}", fitted.left_out);
         for pol in [0, 1] {
             let (found, wanted) = (&fitted.responses[pol], &wanted[pol]);
@@ -257,9 +269,11 @@ mod tests {
                 each.map(|(i, w)| Complex64::cis(w * (0.02 + 0.01 * pol as f64) + i as f64))
                     .collect()
             });
-            all.extend(samples(number, cell, &t));
+            all.extend(samples(SiteGrid::SQUARE, number, cell, &t));
         }
-        let found = fit(basis(&mapping), [0.0; 2], &all).unwrap().responses;
+        let found = fit(SiteGrid::SQUARE, basis(&mapping), [0.0; 2], &all)
+            .unwrap()
+            .responses;
         const ROUNDING: f64 = 1e-6;
         for (k, offset) in NEIGHBOURS.iter().enumerate() {
             let turned = [offset[1], offset[0]];
@@ -267,8 +281,8 @@ mod tests {
             let (s, p) = (found[0].pair(k, 150.0, 210.0), found[1].pair(k2, 150.0, 210.0));
             assert!((s - p).norm() < ROUNDING, "{offset:?}: {s} {p}");
         }
-        assert_eq!(symmetries([0.2, 0.0]).len(), 2);
-        assert_eq!(symmetries([0.2, 0.2]).len(), 2);
-        assert_eq!(symmetries([0.2, 0.1]).len(), 1);
+        assert_eq!(symmetries(SiteGrid::SQUARE, [0.2, 0.0]).len(), 2);
+        assert_eq!(symmetries(SiteGrid::SQUARE, [0.2, 0.2]).len(), 2);
+        assert_eq!(symmetries(SiteGrid::SQUARE, [0.2, 0.1]).len(), 1);
     }
 }

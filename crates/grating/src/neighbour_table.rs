@@ -11,10 +11,11 @@ use metalith_cell::{CellStack, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourRespons
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::SiteLattice;
 
+use crate::cell::coarse;
 use crate::fit::{Fitted, fit, neighbours_nm, samples};
 use crate::shipped;
 use crate::training::{self, TrainingCell};
-use crate::{COARSE, CoarseCell, Mapping, site_transmissions};
+use crate::{CoarseCell, Mapping, SiteGrid};
 
 /// Raised whenever the supercells or the fit change: kept tables are then of no use.
 const VERSION: u32 = 3;
@@ -88,7 +89,7 @@ impl NeighbourTable {
         })
     }
 
-    /// What the sites of a supercell transmit by the sum over pairs, `[polarisation][site]`, where |t| of a site that
+    /// What the sites of a supercell on a square lattice transmit by the sum over pairs, `[polarisation][site]`, where |t| of a site that
     /// passes all its light is `full`; one width (nm) for each site.
     pub fn sites(&self, lattice: &SiteLattice, widths_nm: &[f64], full: f64) -> [Vec<Complex64>; 2] {
         self.responses(full).map(|r| sites_by(&r, lattice, widths_nm))
@@ -101,9 +102,9 @@ impl NeighbourTable {
     }
 }
 
-/// What the sites of a supercell transmit by a sum over pairs; one width (nm) for each site.
+/// What the sites of a supercell on a square lattice transmit by a sum over pairs; one width (nm) for each site.
 pub fn sites_by(response: &impl SiteResponse, lattice: &SiteLattice, widths_nm: &[f64]) -> Vec<Complex64> {
-    let site = |i: usize| response.among(widths_nm[i], &neighbours_nm(lattice, widths_nm, i));
+    let site = |i: usize| response.among(widths_nm[i], &neighbours_nm(SiteGrid::SQUARE, lattice, widths_nm, i));
     (0..lattice.len()).map(site).collect()
 }
 
@@ -135,7 +136,8 @@ fn solve(
     progress: &dyn Progress,
 ) -> Result<Fitted> {
     let step = spec.wavelength_um * 1e3 / stack.pitch_nm;
-    let cells = training::cells(mappings, spec.sines.map(|sine| -sine / step))?;
+    let grid = SiteGrid::of(stack);
+    let cells = training::cells(grid, mappings, spec.sines.map(|sine| -sine / step))?;
     progress.begin(
         &format!("solving unlike neighbours at {:.0} nm", spec.wavelength_um * 1e3),
         cells.len() as u64,
@@ -152,12 +154,12 @@ fn solve(
             }
             let TrainingCell { lattice, widths_nm, .. } = cell;
             let response = coarse.solve(*lattice, widths_nm, spec.sines)?;
-            let t = site_transmissions(lattice, &response, coarse.wavelength_over_pitch(), 1.0);
+            let t = coarse.transmissions(lattice, &response, 1.0);
             progress.advance(1);
-            Ok(samples(number, cell, &t))
+            Ok(samples(grid, number, cell, &t))
         })
         .collect::<Result<Vec<_>>>()?;
-    fit(basis, spec.sines, &sites.concat())
+    fit(grid, basis, spec.sines, &sites.concat())
 }
 
 /// The inputs as text: equal if and only if the table is the same.
@@ -176,7 +178,7 @@ fn inputs(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping]) ->
         solver: kept::solver_of(stack.shape),
         version: VERSION,
         terms: NEIGHBOUR_TERMS,
-        coarse: COARSE,
+        coarse: coarse(SiteGrid::of(stack)),
         spec,
         stack,
         widths_nm: mappings.iter().map(Mapping::samples_nm).collect(),

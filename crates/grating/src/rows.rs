@@ -9,15 +9,21 @@ use metalith_core::{Error, Result};
 use metalith_rcwa::SiteLattice;
 
 use crate::table::images;
-use crate::{CoarseCell, Orientation, site_transmissions};
+use crate::{CoarseCell, Orientation, SiteGrid};
 
 /// Pillars of a row along x, where a mirror plane halves the unknowns, and of others.
 const PILLARS: usize = 20;
 const PILLARS_ACROSS: usize = 12;
 
+/// The same of a row along x of a hexagonal lattice, whose pillars are half a pitch from one to the next.
+const PILLARS_OF_HALVES: usize = 14;
+
 /// Pillars at either end that do not count where a row is closed to a ring only to be solved: they stand beside a jump that the
 /// element does not have. The neighbours that matter most are within two pitches.
 const ENDS: usize = 3;
+
+/// The same of a row whose pillars are half a pitch from one to the next.
+const ENDS_OF_HALVES: usize = 4;
 
 /// The axes and diagonals.
 const AROUND: [[i32; 2]; 8] = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]];
@@ -26,6 +32,9 @@ const AROUND: [[i32; 2]; 8] = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1
 ///
 /// To be solved the row is closed to a ring, and repeated across: along y for a row along x, and along (1, -1) for one along (1, 1).
 /// Its supercell has as many sites as the row.
+///
+/// On a hexagonal lattice rows are along the axes, in places of its grid: along x of two rows of the lattice, half a pitch from one
+/// pillar to the next, along y of one pillar of each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RealRow {
     /// Direction: along an axis or a diagonal, such as (1, 0), (0, -1) or (-1, 1).
@@ -64,10 +73,12 @@ pub struct ElementRow {
 }
 
 impl ElementRow {
-    /// Rows that stand for an element: one for each radius (um) and direction, 20 pillars long along x and 12 in others.
+    /// Rows that stand for an element: one for each radius (um) and direction, 20 pillars long along x (14 on a hexagonal lattice) and 12
+    /// in others.
     /// `turns` gives the phases of consecutive sites from a radius on in a direction, nothing where the element ends before:
     /// such rows are left out. `width_nm` draws a phase.
     pub fn of_element(
+        grid: SiteGrid,
         radii_um: &[f64],
         directions: &[[i32; 2]],
         turns: impl Fn(f64, [i32; 2], usize) -> Option<Vec<f64>>,
@@ -76,7 +87,11 @@ impl ElementRow {
         let places = radii_um.iter().flat_map(|r| directions.iter().map(|d| (*r, *d)));
         places
             .filter_map(|(radius_um, direction)| {
-                let pillars = if direction[1] == 0 { PILLARS } else { PILLARS_ACROSS };
+                let pillars = match (direction[1], grid.is_square()) {
+                    (0, true) => PILLARS,
+                    (0, false) => PILLARS_OF_HALVES,
+                    _ => PILLARS_ACROSS,
+                };
                 let turns = turns(radius_um, direction, pillars)?;
                 let widths_nm = turns.iter().map(|u| width_nm(*u)).collect();
                 Some(Self {
@@ -154,13 +169,31 @@ impl RealRow {
         distinct
     }
 
+    /// The axes from the middle of an element of a hexagonal lattice on which its pillars differ, by mirrors of these axes.
+    pub fn axes(wedge: [f64; 2]) -> Vec<[i32; 2]> {
+        let there = AROUND.into_iter().filter(|direction| direction.contains(&0));
+        let differs = |direction: &[i32; 2]| {
+            let backwards = direction.iter().any(|step| *step < 0);
+            !backwards || (0..2).any(|axis| direction[axis] != 0 && wedge[axis] != 0.0)
+        };
+        there.filter(differs).collect()
+    }
+
+    /// Pillars at either end that do not count, where the row does not repeat.
+    fn ends(&self, grid: SiteGrid) -> usize {
+        match self.direction[1] == 0 && !grid.is_square() {
+            true => ENDS_OF_HALVES,
+            false => ENDS,
+        }
+    }
+
     /// Numbers of the pillars that count in sums.
-    fn counted(&self) -> Range<usize> {
-        let pillars = self.widths_nm.len();
+    fn counted(&self, grid: SiteGrid) -> Range<usize> {
+        let (pillars, ends) = (self.widths_nm.len(), self.ends(grid));
         if self.repeats {
             0..pillars
         } else {
-            ENDS..pillars.saturating_sub(ENDS)
+            ends..pillars.saturating_sub(ends)
         }
     }
 
@@ -187,24 +220,29 @@ impl RealRow {
     /// If the direction makes fewer sites than there are pillars, if none of them counts, or as the solver.
     pub fn solve(&self, cell: &CoarseCell<'_>, sines: [f64; 2]) -> Result<SolvedRow> {
         let pillars = self.widths_nm.len();
-        let lattice = SiteLattice::of_grating(self.direction, pillars)?;
+        let grid = cell.grid();
+        let turns = grid.turns_of_places(self.direction);
+        let lattice = SiteLattice::of_grating(turns, pillars)?;
         if lattice.len() != pillars {
             return Err(Error::invalid(
                 format!("a row of {pillars} pillars in the direction {:?}", self.direction),
                 "use a direction along an axis or a diagonal, such as (1, 0) or (-1, 1)",
             ));
         }
-        let counted = self.counted();
+        let counted = self.counted(grid);
         if counted.is_empty() {
             return Err(Error::invalid(
                 format!("a row of {pillars} pillars that does not repeat"),
-                format!("give more than {}: {ENDS} at either end do not count", 2 * ENDS),
+                {
+                    let ends = self.ends(grid);
+                    format!("give more than {}: {ends} at either end do not count", 2 * ends)
+                },
             ));
         }
         let order: Vec<usize> = (0..pillars)
             .map(|i| {
                 let [x, y] = lattice.site(i).map(|v| v as i64);
-                let [p, q] = self.direction.map(i64::from);
+                let [p, q] = turns.map(i64::from);
                 (p * x + q * y).rem_euclid(pillars as i64) as usize
             })
             .collect();
@@ -212,7 +250,7 @@ impl RealRow {
         let full = cell.full_transmission()?;
         let response = cell.solve(lattice, &widths, sines)?;
         Ok(SolvedRow {
-            transmitted: site_transmissions(&lattice, &response, cell.wavelength_over_pitch(), full),
+            transmitted: cell.transmissions(&lattice, &response, full),
             lattice,
             widths_nm: widths,
             pillars: order,
@@ -249,7 +287,7 @@ mod tests {
             pillars: (0..pillars).collect(),
             transmitted: [0, 1].map(|_| (0..pillars).map(t).collect()),
             full: 2.0,
-            counted: row.counted(),
+            counted: row.counted(SiteGrid::SQUARE),
             widths_nm: row.widths_nm,
         }
     }
@@ -282,6 +320,18 @@ mod tests {
             ([-0.5, -0.25], AROUND.to_vec()),
         ] {
             assert_eq!(RealRow::directions(wedge), wanted, "{wedge:?}");
+        }
+    }
+
+    #[test]
+    fn axes_of_a_hexagonal_lattice_are_those_that_no_mirror_exchanges() {
+        for (wedge, wanted) in [
+            ([0.0, 0.0], vec![[1, 0], [0, 1]]),
+            ([-0.25, 0.0], vec![[1, 0], [-1, 0], [0, 1]]),
+            ([0.0, 0.25], vec![[1, 0], [0, 1], [0, -1]]),
+            ([0.2, 0.2], vec![[1, 0], [-1, 0], [0, 1], [0, -1]]),
+        ] {
+            assert_eq!(RealRow::axes(wedge), wanted, "{wedge:?}");
         }
     }
 

@@ -6,7 +6,9 @@ use num_complex::Complex64;
 
 use metalith_rcwa::{SiteLattice, SupercellOrder, SupercellResponse};
 
-/// Transmission of every site of a supercell, for s and p incident, `[polarisation][site]`: the samples on the lattice
+use crate::SiteGrid;
+
+/// Transmission of every site of a supercell on a square lattice, for s and p incident, `[polarisation][site]`: the samples on the lattice
 /// of sites whose diffraction orders are those of the supercell. A lattice of samples tells apart only directions with
 /// |sine| below half the wavelength over the pitch; orders beyond are left out.
 ///
@@ -19,14 +21,22 @@ pub fn site_transmissions(
     wavelength_over_pitch: f64,
     full: f64,
 ) -> [Vec<Complex64>; 2] {
+    transmissions_on(SiteGrid::SQUARE, lattice, response, wavelength_over_pitch, full)
+}
+
+/// As [`site_transmissions`], of sites that lie so.
+pub(crate) fn transmissions_on(
+    grid: SiteGrid,
+    lattice: &SiteLattice,
+    response: &SupercellResponse,
+    wavelength_over_pitch: f64,
+    full: f64,
+) -> [Vec<Complex64>; 2] {
     let sites = lattice.len() as f64;
     let orders: Vec<_> = response
         .orders
         .iter()
-        .filter(|order| {
-            let within = |s: &f64| (-0.5..0.5).contains(&(s / wavelength_over_pitch));
-            order.sines.iter().all(within)
-        })
+        .filter(|order| grid.tells(order.sines.map(|sine| sine / wavelength_over_pitch)))
         .collect();
     [0, 1].map(|polarisation| {
         let amplitudes: Vec<_> = orders

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use metalith_core::Result;
 use metalith_rcwa::SiteLattice;
 
-use crate::{Blaze, Mapping};
+use crate::{Blaze, Mapping, SiteGrid};
 
 /// Supercells drawn by chance along the normal, where each of their sites counts for eight by symmetry, and for other
 /// directions. With half as many, what is left over grows by a tenth.
@@ -63,11 +63,12 @@ pub(crate) struct TrainingCell {
 ///
 /// # Errors
 /// None, as all are within what lattices allow.
-pub(crate) fn cells(mappings: &[Mapping], straight: [f64; 2]) -> Result<Vec<TrainingCell>> {
+pub(crate) fn cells(grid: SiteGrid, mappings: &[Mapping], straight: [f64; 2]) -> Result<Vec<TrainingCell>> {
     let oblique = straight != [0.0; 2];
-    let mut all = random(mappings, RANDOM[usize::from(oblique)], straight[1] == 0.0)?;
+    let mirror = grid.is_square() && straight[1] == 0.0;
+    let mut all = random(mappings, RANDOM[usize::from(oblique)], mirror)?;
     all.extend(equal_pillars(mappings)?);
-    all.extend(blazed(mappings, straight)?);
+    all.extend(blazed(grid, mappings, straight)?);
     Ok(all)
 }
 
@@ -128,9 +129,9 @@ fn equal_pillars(mappings: &[Mapping]) -> Result<Vec<TrainingCell>> {
 }
 
 /// Blazed gratings that repeat exactly, drawn by the mappings in turn; where the phase starts is drawn by chance.
-fn blazed(mappings: &[Mapping], straight: [f64; 2]) -> Result<Vec<TrainingCell>> {
+fn blazed(grid: SiteGrid, mappings: &[Mapping], straight: [f64; 2]) -> Result<Vec<TrainingCell>> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    gratings(straight)?
+    gratings(grid, straight)?
         .into_iter()
         .enumerate()
         .map(|(number, (turns, sites))| {
@@ -151,7 +152,7 @@ fn blazed(mappings: &[Mapping], straight: [f64; 2]) -> Result<Vec<TrainingCell>>
 }
 
 /// Turns and sites of blazed gratings whose supercell has no fewer sites.
-fn gratings(straight: [f64; 2]) -> Result<Vec<([i32; 2], usize)>> {
+fn gratings(grid: SiteGrid, straight: [f64; 2]) -> Result<Vec<([i32; 2], usize)>> {
     let all = |sites: usize| {
         let most = sites as i32;
         (-most..=most).flat_map(move |p| (-most..=most).map(move |q| [p, q]))
@@ -172,7 +173,8 @@ fn gratings(straight: [f64; 2]) -> Result<Vec<([i32; 2], usize)>> {
     }
     for sites in BLAZED_SITES {
         for turns in all(sites) {
-            let off = [0, 1].map(|axis| f64::from(turns[axis]) / sites as f64 - straight[axis]);
+            let vector = grid.vector(turns.map(|turns| f64::from(turns) / sites as f64));
+            let off = [0, 1].map(|axis| vector[axis] - straight[axis]);
             if off[0].hypot(off[1]) <= ABOUT && whole(turns, sites)? {
                 found.push((turns, sites));
             }
@@ -211,19 +213,19 @@ mod tests {
     #[test]
     fn blazed_gratings_are_about_the_vector_that_straightens_the_light() {
         for straight in [[0.17, 0.0], [0.3, -0.3], [-0.43, 0.2]] {
-            let found = gratings(straight).unwrap();
+            let found = gratings(SiteGrid::SQUARE, straight).unwrap();
             assert_eq!(found.len(), BLAZED);
             for ([p, q], sites) in found {
                 let off = [p, q].map(|t| f64::from(t) / sites as f64);
                 assert!((off[0] - straight[0]).hypot(off[1] - straight[1]) <= ABOUT);
             }
         }
-        let rows = gratings([0.0; 2]).unwrap();
+        let rows = gratings(SiteGrid::SQUARE, [0.0; 2]).unwrap();
         assert!(rows.contains(&([1, 0], 3)) && rows.contains(&([2, 0], 5)));
         assert!(rows.iter().all(|(turns, _)| turns[1] == 0));
         // Light that no grating straightens has none.
-        assert!(gratings([3.0, 0.0]).unwrap().is_empty());
-        let all = cells(&[mapping()], [0.17, 0.0]).unwrap();
+        assert!(gratings(SiteGrid::SQUARE, [3.0, 0.0]).unwrap().is_empty());
+        let all = cells(SiteGrid::SQUARE, &[mapping()], [0.17, 0.0]).unwrap();
         assert_eq!(all.len(), RANDOM[1] + EQUAL + BLAZED);
     }
 }

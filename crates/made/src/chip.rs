@@ -73,7 +73,8 @@ impl MadeChip {
     pub fn new(stated: &CellStack, model: &CalibratedModel) -> Result<Self> {
         let faults = model.perturbation.faults();
         if !faults.is_empty() {
-            return Err(Error::invalid(faults.join("\n"), "correct the calibrated model"));
+            let all: Vec<String> = faults.iter().map(ToString::to_string).collect();
+            return Err(Error::invalid(all.join("\n"), "correct the calibrated model"));
         }
         let perturbation = &model.perturbation;
         Ok(Self {

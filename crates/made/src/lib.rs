@@ -21,6 +21,7 @@
 //! [`MadeElement::aperture`] gives a [`metalith_wave::Aperture`], so that every propagator runs from it.
 
 mod bank;
+mod bounds;
 mod camera;
 mod case;
 mod cells;
@@ -42,6 +43,7 @@ mod stitching;
 pub mod zernike;
 
 pub use bank::{BankRange, CellBank};
+pub use bounds::PerturbationFault;
 pub use camera::{KernelFilter, blur, veiled};
 pub use case::SimulationCase;
 pub use cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};

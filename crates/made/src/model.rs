@@ -4,16 +4,14 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::Perturbation;
+use super::{Perturbation, PerturbationFault};
 use metalith_cell::CellStack;
+use metalith_core::document::{self, Fault, Faults};
 use metalith_core::text::quoted;
-use metalith_core::{Error, Result, WholeFile, document};
+use metalith_core::{Error, Result, WholeFile};
 
 /// Version of the format that is written. The first called its perturbation `departure`; it is still read.
 const SCHEMA: u32 = 2;
-
-/// Faults of a file that are told; the rest is counted.
-const MOST_FAULTS: usize = 50;
 
 /// What a session has taught, in a file that later designs are simulated and compensated with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -89,31 +87,32 @@ impl CalibratedModel {
     /// # Errors
     /// If it is not such a file; all numbers that cannot be at once.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        let fault_at = |line, what| Error::Table {
-            path: path.to_owned(),
-            line,
-            what,
-            hint: "give the `model.toml` that `metalith calibrate` has written".into(),
-        };
-        let fault = |what| fault_at(None, what);
+        let written = "give the `model.toml` that `metalith calibrate` has written";
         let model: Self = toml::from_str(text).map_err(|e| {
-            let line = e.span().map(|at| text[..at.start].lines().count().max(1));
-            fault_at(line, quoted(e.message()))
+            let fault = Fault {
+                span: e.span().unwrap_or(0..0),
+                what: quoted(e.message()),
+                hint: written.into(),
+            };
+            Error::Text(Box::new(Faults::new(path, text, vec![fault], 1)))
         })?;
         if !(1..=SCHEMA).contains(&model.schema) {
-            return Err(fault(format!(
-                "this is a model of schema {}, 1 to {SCHEMA} are known",
-                model.schema
-            )));
+            let what = format!("this is a model of schema {}, 1 to {SCHEMA} are known", model.schema);
+            return Err(Error::Text(Box::new(Faults::at_keys(
+                path,
+                text,
+                vec![("schema".into(), what, written.into())],
+            ))));
         }
-        let mut faults = model.perturbation.faults();
-        if faults.len() > MOST_FAULTS {
-            let more = faults.len() - MOST_FAULTS;
-            faults.truncate(MOST_FAULTS);
-            faults.push(format!("and {more} more"));
-        }
+        let faults = model.perturbation.faults();
         if !faults.is_empty() {
-            return Err(fault(faults.join("\n")));
+            let section = match text.contains("[perturbation") {
+                true => "perturbation",
+                false => "departure",
+            };
+            let placed = |fault: PerturbationFault| (format!("{section}.{}", fault.key), fault.what, fault.hint);
+            let faults = faults.into_iter().map(placed).collect();
+            return Err(Error::Text(Box::new(Faults::at_keys(path, text, faults))));
         }
         Ok(Self {
             schema: SCHEMA,
@@ -149,7 +148,8 @@ mod tests {
         model().write(&path).unwrap();
         assert_eq!(CalibratedModel::read(&path).unwrap(), model());
         std::fs::write(&path, "schema = 7").unwrap();
-        assert!(CalibratedModel::read(&path).is_err());
+        let error = CalibratedModel::read(&path).unwrap_err().to_string();
+        assert!(error.contains("model.toml:1:1: missing field"), "{error}");
     }
 
     #[test]
@@ -186,11 +186,15 @@ mod tests {
         let wrong = text
             .replace("stray_light = 0.0", "stray_light = 7.0")
             .replace("missing_pillars = 0.0", "missing_pillars = nan");
-        std::fs::write(&path, wrong).unwrap();
-        let error = CalibratedModel::read(&path).unwrap_err().to_string();
-        assert!(
-            error.contains("stray_light") && error.contains("missing_pillars"),
-            "{error}"
-        );
+        std::fs::write(&path, &wrong).unwrap();
+        let error = CalibratedModel::read(&path).unwrap_err();
+        let place = |key: &str| {
+            let line = wrong.lines().position(|line| line.starts_with(key)).unwrap();
+            format!("model.toml:{}:{}: `{key}` cannot be ", line + 1, key.len() + 4)
+        };
+        for key in ["stray_light", "missing_pillars"] {
+            assert!(error.to_string().contains(&place(key)), "{error}");
+        }
+        assert_eq!(error.exit_code(), 2);
     }
 }

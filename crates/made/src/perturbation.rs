@@ -1,11 +1,10 @@
 //! What may differ from what is stated: the numbers that every effect sets, all zero for a perfect chip.
 
-use metalith_core::text::quoted;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::declared::{CompiledTerm, DeclaredQuantity, DeclaredTerm, compiled};
-use super::stitching::{self, Stitching};
+use super::stitching::Stitching;
 use super::zernike;
 
 /// How chip and bench differ from what was drawn and stated. The default differs in nothing.
@@ -243,12 +242,6 @@ pub fn legendre(coefficients: &[f64], x: f64) -> f64 {
     sum
 }
 
-/// What a number of a model file must lie within.
-struct Bound {
-    name: &'static str,
-    range: (f64, f64),
-}
-
 impl Perturbation {
     /// Whether what is made of an element depends on where on the chip it stands, or on which way it is turned by
     /// boundaries of write fields and declared terms, of which it may.
@@ -283,125 +276,11 @@ impl Perturbation {
         let (light, camera) = (&self.light.declared, &self.camera.declared);
         [geometry, path, light, camera].into_iter().flatten()
     }
-
-    /// Every number that is outside of what can be simulated, in words; none for a sound perturbation. The
-    /// limits are several times what any process or bench does, and keep work and memory bounded.
-    pub fn faults(&self) -> Vec<String> {
-        let (g, c, p, l, k) = (&self.geometry, &self.cell, &self.path, &self.light, &self.camera);
-        let bound = |name, low, high| Bound {
-            name,
-            range: (low, high),
-        };
-        let one = |v: f64| vec![v];
-        let checked: [(Bound, Vec<f64>); 24] = [
-            (bound("geometry.cd_bias_nm", -500.0, 500.0), one(g.cd_bias_nm)),
-            (
-                bound("geometry.cd_bias_density_nm", -500.0, 500.0),
-                one(g.cd_bias_density_nm),
-            ),
-            (bound("geometry.missing_pillars", 0.0, 1.0), one(g.missing_pillars)),
-            (bound("geometry.zero_order", 0.0, 2.0), one(g.zero_order)),
-            (
-                bound("geometry.zero_order_phase", -100.0, 100.0),
-                one(g.zero_order_phase),
-            ),
-            (
-                bound("geometry.aperture_offset_um", -1e4, 1e4),
-                g.aperture_offset_um.to_vec(),
-            ),
-            (bound("geometry.wavefront_nm", -1e5, 1e5), g.wavefront_nm.clone()),
-            (bound("geometry.transmission", -10.0, 10.0), g.transmission.clone()),
-            (
-                bound("geometry.transmission_phase_rad", -100.0, 100.0),
-                g.transmission_phase_rad.clone(),
-            ),
-            (
-                bound("geometry.transmission_range_nm", 0.0, 1e5),
-                g.transmission_range_nm.to_vec(),
-            ),
-            (bound("cell.height_nm", -1e4, 1e4), one(c.height_nm)),
-            (bound("cell.rim_height_nm", -1e4, 1e4), one(c.rim_height_nm)),
-            (bound("cell.index", -2.0, 2.0), one(c.index)),
-            (bound("cell.taper_deg", -30.0, 30.0), one(c.taper_deg)),
-            (bound("cell.corner_rounding_nm", 0.0, 1e4), one(c.corner_rounding_nm)),
-            (bound("cell.residual_mask_nm", 0.0, 1e4), one(c.residual_mask_nm)),
-            (bound("path.gap_um", -1e5, 1e5), one(p.gap_um)),
-            (bound("path.tilt_mrad", -1000.0, 1000.0), p.tilt_mrad.to_vec()),
-            (bound("path.source_per_m", -1e4, 1e4), one(p.source_per_m)),
-            (
-                bound("path.sensor_tilt_mrad", -1000.0, 1000.0),
-                p.sensor_tilt_mrad.to_vec(),
-            ),
-            (bound("path.sensor_pivot_um", -1e6, 1e6), p.sensor_pivot_um.to_vec()),
-            (bound("light.led_shift_nm", -500.0, 500.0), l.led_shift_nm.clone()),
-            (bound("camera.pixel_blur_um", 0.0, 1e3), one(k.pixel_blur_um)),
-            (bound("camera.stray_light", 0.0, 1.0), one(k.stray_light)),
-        ];
-        let mut faults: Vec<String> = checked
-            .iter()
-            .filter_map(|(b, values)| Some((b, values.iter().find(|v| !(b.range.0..=b.range.1).contains(*v))?)))
-            .map(|(b, v)| format!("`{}` is {v}, not within {} to {}", b.name, b.range.0, b.range.1))
-            .collect();
-        for (name, v) in [("light.led_width", l.led_width), ("light.source_size", l.source_size)] {
-            if !(-1.0..=100.0).contains(&v) {
-                faults.push(format!("`{name}` is {v}, not within -1 to 100"));
-            }
-        }
-        let terms = [&g.wavefront_nm, &g.transmission, &g.transmission_phase_rad];
-        if terms.iter().any(|t| t.len() > MOST_TERMS) {
-            faults.push(format!(
-                "`geometry.wavefront_nm`, `transmission` and `transmission_phase_rad` have at most {MOST_TERMS} terms"
-            ));
-        }
-        let reach = |s: &Stitching| s.by_nm.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        let sound = |s: &Stitching| {
-            s.axis < 2 && s.at_um.abs() <= 1e4 && s.by_nm.iter().all(|v| v.is_finite()) && reach(s) <= 1e4
-        };
-        if g.stitching.len() > stitching::MOST || !g.stitching.iter().all(sound) {
-            faults.push(format!(
-                "`geometry.stitching` has at most {} boundaries, each with an axis of 0 or 1, within 10 mm of the middle, and a displacement of at most 10 um",
-                stitching::MOST
-            ));
-        }
-        for term in self.declared() {
-            if let Err(fault) = term.compiled() {
-                faults.push(format!(
-                    "the expression of `{}`, column {}: {}",
-                    quoted(&term.name),
-                    fault.at + 1,
-                    quoted(&fault.what)
-                ));
-            }
-        }
-        let [narrow, wide] = g.transmission_range_nm;
-        if !(g.transmission.is_empty() && g.transmission_phase_rad.is_empty()) && wide - narrow < 1.0 {
-            faults.push("`geometry.transmission` has no `transmission_range_nm = [narrowest, widest]`".into());
-        }
-        faults
-    }
 }
-
-/// Most polynomials of a free term: the radial order of Zernike's is then below 8.
-const MOST_TERMS: usize = 36;
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_number_that_cannot_be_is_named() {
-        assert_eq!(Perturbation::default().faults(), Vec::<String>::new());
-        let mut bad = Perturbation::default();
-        bad.geometry.cd_bias_nm = f64::NAN;
-        bad.geometry.transmission = vec![0.1];
-        bad.path.tilt_mrad[1] = 1e9;
-        bad.light.source_size = -3.0;
-        let faults = bad.faults();
-        for name in ["cd_bias_nm", "transmission_range_nm", "tilt_mrad", "source_size"] {
-            assert!(faults.iter().any(|f| f.contains(name)), "{name} is not in {faults:?}");
-        }
-        assert_eq!(faults.len(), 4);
-    }
 
     #[test]
     fn legendre_polynomials_are_those_of_the_closed_form() {

@@ -64,7 +64,7 @@ pub use rehearsal::Rehearsal;
 pub use report::{Assumption, ChannelBudget, FrameStatement, HomographyResidual, PictureReport, RestorationReport};
 pub use resolution::{ContrastCurve, contrast_curves};
 pub use restored_page::{RestoredPicture, RestoredReport};
-pub use score::{MOST_DB, Zone, ZoneScore, check_scored, psnr_words, scores};
+pub use score::{MOST_DB, SCORED_SIDES, Zone, ZoneScore, check_scored, psnr_words, scores};
 pub use studio::Studio;
 pub use thumbnail::thumbnail;
 pub use veil::{LightShares, Veil};

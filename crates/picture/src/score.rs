@@ -1,5 +1,7 @@
 //! How near a restored picture comes to its scene.
 
+use std::ops::RangeInclusive;
+
 use metalith_core::srgb::encoded;
 use metalith_core::{Error, Result, part};
 use metalith_wave::restore::{psnr_db, ssim_colour};
@@ -7,9 +9,21 @@ use ndarray::Array3;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::SceneView;
+use crate::scene::SIDES;
 
-/// Least side of a scene whose pictures are scored (pixels): a third of it holds the window of the similarity, 11 pixels wide.
-pub(crate) const LEAST_SIDE: usize = 33;
+/// Least and longest side of a scene whose pictures are scored (pixels): a third of the least holds the window of the similarity,
+/// 11 pixels wide.
+pub const SCORED_SIDES: RangeInclusive<usize> = 33..=4096;
+
+/// How many pixels scenes have, for messages.
+pub(crate) fn sides_words() -> String {
+    format!(
+        "{} to {} pixels a side; where pictures are not scored (`dataset`, `train`, `denoise`) {} are enough",
+        SCORED_SIDES.start(),
+        SCORED_SIDES.end(),
+        SIDES.start()
+    )
+}
 
 /// PSNR of pictures that are equal (dB). It stands for infinity, which JSON does not know; rounding in single precision leaves 140.
 pub const MOST_DB: f64 = 200.0;
@@ -98,7 +112,7 @@ pub fn psnr_words(db: f64) -> String {
 /// # Errors
 /// If it is too small for the zones of the field.
 pub fn check_scored(view: &SceneView) -> Result<()> {
-    if view.rows.min(view.columns) >= LEAST_SIDE {
+    if view.rows.min(view.columns) >= *SCORED_SIDES.start() {
         return Ok(());
     }
     Err(Error::invalid(
@@ -106,7 +120,7 @@ pub fn check_scored(view: &SceneView) -> Result<()> {
             "a scene of {} x {} pixels is too small for the similarity of its pictures, which is taken in nine parts of it",
             view.columns, view.rows
         ),
-        format!("give a scene of at least {LEAST_SIDE} pixels a side"),
+        format!("give a scene of {}", sides_words()),
     ))
 }
 
@@ -188,7 +202,8 @@ mod tests {
 
     #[test]
     fn a_scene_that_is_accepted_can_be_scored() {
-        for side in [LEAST_SIDE - 1, LEAST_SIDE, LEAST_SIDE + 1, 64] {
+        let least = *SCORED_SIDES.start();
+        for side in [least - 1, least, least + 1, 64] {
             let view = SceneView {
                 rows: side,
                 columns: 80,
@@ -198,7 +213,7 @@ mod tests {
             let truth = Array3::from_elem((side, 80, 3), 0.3);
             let accepted = check_scored(&view);
             assert_eq!(accepted.is_ok(), scores(&truth, &truth).is_ok(), "{side}");
-            assert_eq!(accepted.is_ok(), side >= LEAST_SIDE);
+            assert_eq!(accepted.is_ok(), side >= least);
         }
     }
 }

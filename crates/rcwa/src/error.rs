@@ -61,8 +61,6 @@ pub enum Error {
     /// Layers count from one, the lowest.
     #[error("layer {layer} of a cell of staggered rows has a pillar that is no circle")]
     StaggeredOutline { layer: usize },
-    #[error("a supercell of cells of staggered rows")]
-    StaggeredSites,
     #[error("a medium with the index {} + {} i", index.re, index.im)]
     Index { index: Complex64 },
     /// Layers count from one, the lowest.
@@ -173,7 +171,6 @@ impl Error {
             Self::Pitch { .. } => "use a positive number of nanometres".into(),
             Self::Row { .. } => "use a positive number of nanometres".into(),
             Self::StaggeredOutline { .. } => "use circles, or a square lattice".into(),
-            Self::StaggeredSites => "use a square lattice: supercells know no other".into(),
             Self::Index { .. } => "use n >= 0 and k >= 0, not both zero; gain is not supported".into(),
             Self::Height { .. } => "give a positive thickness, or leave the layer out".into(),
             Self::Width { .. } => {

@@ -219,8 +219,12 @@ fn what_staggered_rows_cannot_is_refused() {
         let bad = stack(CellLattice::Staggered { row_nm }, 800.0, Outline::circle(100.0));
         assert!(matches!(fails(bad), Error::Row { .. }));
     }
+    let unlike = [
+        hexagonal(800.0, 300.0),
+        stack(CellLattice::Square, 800.0, Outline::circle(300.0)),
+    ];
     assert!(matches!(
-        Supercell::of_cells(SiteLattice::row(1).unwrap(), &[hexagonal(800.0, 300.0)]),
-        Err(Error::StaggeredSites)
+        Supercell::of_cells(SiteLattice::row(2).unwrap(), &unlike),
+        Err(Error::UnlikeCells { cell: 2 })
     ));
 }

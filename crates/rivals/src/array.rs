@@ -103,6 +103,10 @@ impl Contender for ArrayCamera<'_> {
         self.studio.camera.channel_names()
     }
 
+    fn limits(&self) -> Option<String> {
+        self.error.note(&self.channel_names())
+    }
+
     fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
         self.studio.record(&self.simulation, scene, seed)
     }

@@ -39,6 +39,9 @@ pub struct ComparedCamera {
     pub ways: Vec<WayScores>,
     /// To simulate a frame (s), if the system tells.
     pub frame_cpu_s: Option<f64>,
+    /// What limits its restorations, in words, if something but its frames does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<String>,
     /// The first photograph; it is not kept with the scores.
     #[serde(skip)]
     pub shown: Option<Shown>,
@@ -88,6 +91,10 @@ pub fn compare(
     let first = photographs
         .first()
         .ok_or_else(|| Error::invalid("no photographs", "give at least one"))?;
+    let limits = contender.limits();
+    if let Some(limits) = &limits {
+        progress.warn(&format!("{name}: {limits}"));
+    }
     let ways = contender.ways();
     let mut bare = Judged::default();
     let mut found: Vec<Judged> = ways.iter().map(|_| Judged::default()).collect();
@@ -159,6 +166,7 @@ pub fn compare(
         field_deg: first.view.field_deg,
         ways: frames.into_iter().chain(restored).collect(),
         frame_cpu_s: each(frame_s),
+        limits,
         shown,
     })
 }

@@ -36,6 +36,11 @@ pub trait Contender {
     /// Names of its channels, in the order of the planes of a frame without a colour filter array.
     fn channel_names(&self) -> Vec<String>;
 
+    /// What limits its restorations, for a person; nothing where that is the light and the noise of its frames alone.
+    fn limits(&self) -> Option<String> {
+        None
+    }
+
     /// The frame that its sensor records of a scene, noise drawn from a seed.
     ///
     /// # Errors

@@ -106,6 +106,9 @@ fn one(page: &mut Page, camera: &ComparedCamera) {
         "{} Its scenes fill {} degrees.",
         camera.words, camera.field_deg
     ));
+    if let Some(limits) = &camera.limits {
+        page.note(limits);
+    }
     let Some(pictures) = &camera.shown else {
         return;
     };

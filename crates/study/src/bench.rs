@@ -13,6 +13,7 @@ use metalith_gds::{Layout, ReadLimits};
 use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, Perturbation, bank_orders};
 use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um};
 
+use crate::bias::check_biases;
 use crate::draw::Drawer;
 use crate::manifest::another_plan;
 use crate::picture::{KnownChip, PictureBench, TakenPicture};
@@ -172,6 +173,13 @@ impl Bench {
         let path: &Path = &self.files.layouts[number as usize];
         let opened = Layout::open_with(path, ReadLimits::default(), progress)?;
         let layout = ReadLayout::of(&design, &array, &opened, progress)?;
+        check_biases(
+            &self.drawer,
+            self.key,
+            number,
+            &design.cell_stack()?,
+            layout.extraction(),
+        )?;
         let mut range = self.made.range(&design, &layout)?;
         if let Some(picture) = &self.picture {
             range.colours.extend(picture.colours(&design)?);

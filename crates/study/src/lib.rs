@@ -15,6 +15,7 @@
 //! | `tolerance` | the file of a study, and its quantities as effects of the calibration |
 //! | `designs` | keys of the design that vary over a grid |
 //! | `draw` | the numbers of one draw |
+//! | `bias` | whether pillars can be as all draws make them |
 //! | `bench` | what draws are judged with: designs, layouts as read back, tables of cells |
 //! | `picture` | the picture that each draw takes |
 //! | `record` | what is kept of one draw |
@@ -27,6 +28,7 @@
 //! | `slurm` | job arrays |
 
 mod bench;
+mod bias;
 mod columns;
 mod comparison;
 mod cut;

@@ -124,6 +124,9 @@ fn page(result: &StudyResult) -> Page {
                     fixed(whole.psnr_db, 1),
                     fixed(whole.ssim, 2)
                 )));
+                if let Some(note) = &taken.note {
+                    page.note(format!("Draw {k}: {note}"));
+                }
             }
             let Some(element) = draw.found.distinct.first() else {
                 continue;

@@ -12,8 +12,8 @@ use metalith_made::{MadeChip, SimulationCase};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, SceneImage, chart, read_far_scene};
 use metalith_picture::{
-    Frame, FrameOperator, OperatorError, Rehearsal, ScenePower, Studio, Zone, ZoneScore, check_scored, sampling_of,
-    scores,
+    Frame, FrameOperator, OperatorError, Rehearsal, SCORED_SIDES, ScenePower, Studio, Zone, ZoneScore, check_scored,
+    sampling_of, scores,
 };
 use ndarray::Array3;
 
@@ -57,7 +57,11 @@ pub enum KnownKernels {
 
 /// The `[picture]` of a file.
 pub(crate) fn picture_spec(s: &Section<'_, '_>) -> PictureSpec {
-    let pixels = s.optional_integer("pixels", 64..=4096, "pixels");
+    let pixels = s.optional_integer(
+        "pixels",
+        *SCORED_SIDES.start() as i64..=*SCORED_SIDES.end() as i64,
+        "pixels",
+    );
     let scene = match s.text("scene").parse() {
         Ok(kind) => SceneChoice::BuiltIn(kind, pixels.unwrap_or(PIXELS) as usize),
         Err(_) => {
@@ -123,6 +127,8 @@ pub struct TakenPicture {
     pub scores: Vec<ZoneScore>,
     /// Expected PSNR of linear light of natural scenes (dB), by zone; none of methods without a forecast.
     pub forecast_db: Vec<f64>,
+    /// What to say of the restoration, if its operator limits it.
+    pub note: Option<String>,
     /// Names of the channels of the camera.
     pub channels: Vec<String>,
 }
@@ -221,13 +227,15 @@ impl PictureBench {
             _ => Vec::new(),
         };
         let truth = studio.truth(&self.scene);
+        let channels = self.camera.channel_names();
         Ok(TakenPicture {
             scores: scores(&restored, &truth)?,
             truth,
             frame,
             restored,
             forecast_db,
-            channels: self.camera.channel_names(),
+            note: rehearsal.operator_error.note(&channels),
+            channels,
         })
     }
 }

@@ -8,6 +8,7 @@ use std::path::Path;
 use common::{SMALL_CAMERA, tolerance};
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
+use metalith_made::{CalibratedModel, Perturbation};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, chart};
 use metalith_picture::{Rehearsal, Studio, scores};
@@ -61,6 +62,29 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
         assert!(written.unwrap_err().to_string().contains("--features parquet"));
         assert!(!table.exists());
     }
+}
+
+/// A draw whose bias leaves nothing of the pillars is told when the study is planned, and not in the middle of it.
+#[test]
+fn a_bias_that_pillars_cannot_have_is_refused_before_any_draw() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = tolerance(folder.path(), 1);
+    let text = fs::read_to_string(&path).unwrap();
+    let mut made = Perturbation::default();
+    made.geometry.cd_bias_nm = -150.0;
+    let model = CalibratedModel::new("chip".into(), "too thin".into(), made);
+    model.write(&folder.path().join("model.toml")).unwrap();
+    let other = text
+        .replacen("effect = \"cd_bias\"", "effect = \"film_height\"", 1)
+        .replacen("draws = 1\n", "draws = 1\nmodel = \"model.toml\"\n", 1);
+    fs::write(&path, other).unwrap();
+    let error = plan(&path, &folder.path().join("study"), PlanSettings::default(), &Silent).unwrap_err();
+    let error = error.to_string();
+    assert!(
+        error.contains("draw 0 of the study: `cd_bias_nm` = -150")
+            && error.contains("vary `cd_bias` over less, or set it in"),
+        "{error}"
+    );
 }
 
 /// Without anything random, a design of a grid and the same design in a file of its own have the same figures to the bit.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use metalith_cell::CellStack;
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_grating::{CoarseCell, ElementRow, RealRow};
+use metalith_grating::{CoarseCell, ElementRow, RealRow, SiteGrid};
 
 /// Where rows begin, over the radius of the lens.
 const RADII: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.88];
@@ -25,10 +25,17 @@ pub(super) fn judge(
 ) -> Result<f64> {
     let (wavelength_um, sines) = light;
     let phase = ElementPhase::new(lens, wedge);
-    let half_um = lens.lattice().sites() as f64 * lens.lattice().pitch_um() / 2.0;
+    let half_um = lens.lattice().sites() as f64 * lens.lattice().steps_um()[0] / 2.0;
+    let grid = SiteGrid::of(stack);
+    let wedge_sines = [wedge.sin_x, wedge.sin_y];
+    let directions = match grid.is_square() {
+        true => RealRow::directions(wedge_sines),
+        false => RealRow::axes(wedge_sines),
+    };
     let rows = ElementRow::of_element(
+        grid,
         &RADII.map(|radius| radius * half_um),
-        &RealRow::directions([wedge.sin_x, wedge.sin_y]),
+        &directions,
         |radius_um, direction, pillars| phase.row(radius_um, direction, pillars),
         width_nm,
     );

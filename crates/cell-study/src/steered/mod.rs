@@ -50,6 +50,12 @@ impl SteeredStudy {
         let sum = |k: usize| self.light.iter().map(|l| l.supercells[k]).sum::<f64>();
         sum(1) / sum(0)
     }
+
+    /// Whether supercells find more light with the element's own mapping. The sum over pairs that it was chosen by errs by a few hundredths,
+    /// and may promise what is not there.
+    pub fn is_better(&self) -> bool {
+        self.gain() > 1.0
+    }
 }
 
 /// Find a mapping for each distinct steered element of a design; tables of neighbours are kept in the folder `cache`.
@@ -77,18 +83,20 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
     let lens = LensPhase::new(design.lattice(), design.lens.diameter_nm, &design.lens.phase);
     steered(design)
         .into_iter()
-        .map(|(steps, wedge)| study(design, &stack, &lens, steps, &wedge, cache, progress))
+        .map(|(steps, wedges)| study(design, &stack, &lens, steps, &wedges, cache, progress))
         .collect()
 }
 
-/// The wedge of each pair of steps but none, the least first, turned so that light arrives as tables have it: from +x more than
-/// from +y.
-fn steered(design: &Design) -> Vec<(SteeringSteps, Wedge)> {
+/// The wedges of each pair of steps but none, the least first, turned so that light arrives from +x and +y, and on a square lattice as
+/// tables have it, from +x more than from +y: that has one wedge for each pair. On a hexagonal one x and y are not alike.
+fn steered(design: &Design) -> Vec<(SteeringSteps, Vec<Wedge>)> {
+    let is_square = design.cell.lattice.is_square();
     let turned = |element: Element| {
-        let sines = [element.wedge.sin_x, element.wedge.sin_y].map(f64::abs);
+        let [x, y] = [element.wedge.sin_x, element.wedge.sin_y].map(f64::abs);
+        let [x, y] = if is_square { [x.max(y), x.min(y)] } else { [x, y] };
         let wedge = Wedge {
-            sin_x: -sines[0].max(sines[1]),
-            sin_y: -sines[0].min(sines[1]),
+            sin_x: -x,
+            sin_y: -y,
             ..element.wedge
         };
         Some((SteeringSteps::of(&design.array, element.index)?, wedge))
@@ -96,8 +104,58 @@ fn steered(design: &Design) -> Vec<(SteeringSteps, Wedge)> {
     let mut elements: Vec<_> = design.elements().into_iter().filter_map(turned).collect();
     elements.retain(|(steps, _)| *steps != SteeringSteps::NONE);
     elements.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    elements.dedup_by_key(|(steps, _)| *steps);
-    elements
+    let mut all: Vec<(SteeringSteps, Vec<Wedge>)> = Vec::new();
+    for (steps, wedge) in elements {
+        match all.last_mut().filter(|(known, _)| *known == steps) {
+            None => all.push((steps, vec![wedge])),
+            Some((_, wedges)) if is_square || wedges.contains(&wedge) => {}
+            Some((_, wedges)) => wedges.push(wedge),
+        }
+    }
+    all
+}
+
+/// Elements with one wedge: a sample of their sites, and the tables of neighbours in their light, by wavelength.
+struct LitSample {
+    sample: SiteSample,
+    tables: Vec<[NeighbourResponse; 2]>,
+}
+
+impl LitSample {
+    fn new(
+        design: &Design,
+        stack: &CellStack,
+        lens: &LensPhase,
+        wedge: &Wedge,
+        cache: Option<&Path>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        // Any width that may be written, whatever mapping is found.
+        let writable: Vec<u16> = design.cell.widths_nm().collect();
+        let mapping = Mapping::new(|u| writable[(u * writable.len() as f64) as usize]);
+        let table = |&um: &f64| {
+            let spec = NeighbourTableSpec {
+                wavelength_um: um,
+                sines: wedge.looks_at(um).into(),
+            };
+            let table = NeighbourTable::obtain(&spec, stack, std::slice::from_ref(&mapping), cache, progress)?;
+            Ok(table.responses(1.0))
+        };
+        Ok(Self {
+            sample: SiteSample::new(lens, wedge),
+            tables: design.compared_um().iter().map(table).collect::<Result<_>>()?,
+        })
+    }
+
+    /// Shares of the light in the first order, mean over elements with several wedges, by wavelength.
+    fn shares(all: &[Self], width_nm: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
+        let mut sums = vec![0.0; all[0].tables.len()];
+        for lit in all {
+            let shares = lit.sample.shares(&width_nm, &lit.tables);
+            sums.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share);
+        }
+        sums.iter().map(|sum| sum / all.len() as f64).collect()
+    }
 }
 
 fn study(
@@ -105,27 +163,12 @@ fn study(
     stack: &CellStack,
     lens: &LensPhase,
     steps: SteeringSteps,
-    wedge: &Wedge,
+    wedges: &[Wedge],
     cache: Option<&Path>,
     progress: &dyn Progress,
 ) -> Result<SteeredStudy> {
-    let sines = |um: f64| <[f64; 2]>::from(wedge.looks_at(um));
-    // Any width that may be written, whatever mapping is found.
-    let writable: Vec<u16> = design.cell.widths_nm().collect();
-    let mapping = Mapping::new(|u| writable[(u * writable.len() as f64) as usize]);
-    let tables = design
-        .compared_um()
-        .iter()
-        .map(|&um| {
-            let spec = NeighbourTableSpec {
-                wavelength_um: um,
-                sines: sines(um),
-            };
-            let table = NeighbourTable::obtain(&spec, stack, std::slice::from_ref(&mapping), cache, progress)?;
-            Ok(table.responses(1.0))
-        })
-        .collect::<Result<Vec<[NeighbourResponse; 2]>>>()?;
-    let sample = SiteSample::new(lens, wedge);
+    let lit = |wedge| LitSample::new(design, stack, lens, wedge, cache, progress);
+    let lit = wedges.iter().map(lit).collect::<Result<Vec<_>>>()?;
     let common = &design.mapping.polynomial;
     progress.begin(
         &format!("mapping of elements {} and {} steps off", steps.0, steps.1),
@@ -134,7 +177,7 @@ fn study(
     let found: Vec<InversePolynomial> = starts(design)
         .into_par_iter()
         .map(|start| {
-            let best = best(design, &start, &sample, &tables);
+            let best = best(design, &start, &lit);
             progress.advance(1);
             best
         })
@@ -142,7 +185,7 @@ fn study(
     if progress.stopped() {
         return Err(Error::Interrupted);
     }
-    let shares = |polynomial: &InversePolynomial| sample.shares(|u| width_nm(design, polynomial, u), &tables);
+    let shares = |polynomial: &InversePolynomial| LitSample::shares(&lit, |u| width_nm(design, polynomial, u));
     let mean = |polynomial: &InversePolynomial| shares(polynomial).iter().sum::<f64>();
     let best = found
         .into_iter()
@@ -151,15 +194,18 @@ fn study(
     let pairs = [shares(common), shares(&best)];
     let mut light = Vec::new();
     for (k, &um) in design.compared_um().iter().enumerate() {
-        let judged = [common, &best].map(|polynomial| {
+        let judged = |polynomial: &InversePolynomial| -> Result<f64> {
             let width_nm = |u| width_nm(design, polynomial, u);
-            judge(stack, lens, wedge, (um, sines(um)), &width_nm, progress)
-        });
-        let [before, after] = judged;
+            let mut sum = 0.0;
+            for wedge in wedges {
+                sum += judge(stack, lens, wedge, (um, wedge.looks_at(um).into()), &width_nm, progress)?;
+            }
+            Ok(sum / wedges.len() as f64)
+        };
         light.push(SteeredLight {
             wavelength_um: um,
             pairs: [pairs[0][k], pairs[1][k]],
-            supercells: [before?, after?],
+            supercells: [judged(common)?, judged(&best)?],
         });
     }
     Ok(SteeredStudy {
@@ -188,12 +234,7 @@ fn starts(design: &Design) -> [InversePolynomial; STARTS] {
     [common, even]
 }
 
-fn best(
-    design: &Design,
-    start: &InversePolynomial,
-    sample: &SiteSample,
-    tables: &[[NeighbourResponse; 2]],
-) -> InversePolynomial {
+fn best(design: &Design, start: &InversePolynomial, lit: &[LitSample]) -> InversePolynomial {
     let rounded = |coefficients: &[f64]| coefficients.iter().map(|c| (c * ROUNDED).round() as i64).collect();
     let with = |rounded: &[i64]| InversePolynomial {
         coefficients: rounded.iter().map(|c| *c as f64 / ROUNDED).collect(),
@@ -207,7 +248,7 @@ fn best(
         let outside = (f64::from(low) - narrow * pitch_nm)
             .max(wide * pitch_nm - f64::from(high))
             .max(0.0);
-        let shares = sample.shares(|u| width_nm(design, polynomial, u), tables);
+        let shares = LitSample::shares(lit, |u| width_nm(design, polynomial, u));
         outside - shares.iter().sum::<f64>() / shares.len() as f64
     };
     // The simplex shrinks below what coefficients are rounded to: most of its steps ask for what is known.
@@ -268,10 +309,33 @@ mod tests {
             steps("elements = [2, 3]"),
             [SteeringSteps(0.5, 0.0), SteeringSteps(1.0, 0.5)]
         );
-        for (SteeringSteps(first, second), wedge) in steered(&mini("elements = [2, 3]")) {
+        for (SteeringSteps(first, second), wedges) in steered(&mini("elements = [2, 3]")) {
+            let [wedge] = wedges[..] else { panic!("{wedges:?}") };
             let sine = |steps: f64| (15.0 * steps).to_radians().sin();
             assert_eq!([-wedge.sin_x, -wedge.sin_y], [sine(first), sine(second)]);
         }
+    }
+
+    /// Those that are steered along x and along y have one mapping, found for both.
+    #[test]
+    fn x_and_y_of_a_hexagonal_lattice_are_not_alike() {
+        let design = changed("hexagonal_1550", |text| {
+            text.replacen("elements = [1, 1]", "elements = [3, 3]\nsteering_deg = 10", 1)
+                .replacen("size_um = [300, 300]", "size_um = [900, 900]", 1)
+        });
+        let all = steered(&design);
+        let sines: Vec<Vec<[bool; 2]>> = all
+            .iter()
+            .map(|(_, wedges)| {
+                wedges
+                    .iter()
+                    .map(|w| [w.sin_x, w.sin_y].map(|sine| sine < 0.0))
+                    .collect()
+            })
+            .collect();
+        assert_eq!(sines.len(), 2);
+        assert_eq!(sines[1], [[true, true]]);
+        assert!(sines[0].len() == 2 && sines[0].contains(&[true, false]) && sines[0].contains(&[false, true]));
     }
 
     #[test]

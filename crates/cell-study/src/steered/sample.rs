@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use metalith_cell::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourResponse};
+use metalith_cell::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourResponse, neighbours};
 use metalith_core::Wedge;
 use metalith_design::phase::{ElementPhase, LensPhase};
 
@@ -15,7 +15,7 @@ const SITES: usize = 4096;
 /// Steps of the two-dimensional golden ratio (M. Roberts, 2018): places that fill a square evenly.
 const GOLDEN: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
 
-/// Phases (turns, 0 to 1) of a site and of its neighbours, in the order of [`NEIGHBOURS`].
+/// Phases (turns, 0 to 1) of a site and of its neighbours, in the order of [`neighbours`].
 #[derive(Clone, Copy, Debug)]
 struct SitePhases {
     own: f64,
@@ -33,6 +33,7 @@ impl SiteSample {
     pub fn new(lens: &LensPhase, wedge: &Wedge) -> Self {
         let phase = ElementPhase::new(lens, wedge);
         let n = lens.lattice().sites();
+        let offsets = neighbours(lens.lattice().kind());
         let at = |k: usize| {
             let [x, y] = GOLDEN.map(|step| ((k as f64 * step).fract() * n as f64) as usize);
             let wrapped = |offset: [i32; 2]| {
@@ -41,17 +42,19 @@ impl SiteSample {
                 (x < n && y < n).then(|| phase.wrapped(x, y))?
             };
             let mut neighbours = [0.0; NEIGHBOURS.len()];
-            for (to, offset) in neighbours.iter_mut().zip(NEIGHBOURS) {
-                *to = wrapped(offset)?;
+            for (to, offset) in neighbours.iter_mut().zip(offsets) {
+                *to = wrapped(*offset)?;
             }
             Some(SitePhases {
                 own: wrapped([0, 0])?,
                 neighbours,
             })
         };
+        // A circle fills more than half of its square; on a hexagonal lattice every other place is a site, and rows are farther from one
+        // another than columns.
+        let places = if lens.lattice().is_square() { 2 } else { 8 };
         Self {
-            // A circle fills more than half of its square.
-            sites: (0..2 * SITES).filter_map(at).take(SITES).collect(),
+            sites: (0..places * SITES).filter_map(at).take(SITES).collect(),
         }
     }
 

@@ -5,7 +5,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use toml::de::DeTable;
 
+use super::scalar::nearest_span;
 use crate::text::{is_printable, printable};
 
 /// One mistake: what, where in the text (bytes), and what to do.
@@ -63,6 +65,21 @@ impl Faults {
             total,
             single,
         }
+    }
+
+    /// Mistakes by the keys of the text that they are at, as [`with_values`](super::with_values) names them, each with what and what
+    /// to do. One whose key is not there is placed at the last part of its key that is.
+    pub fn at_keys(path: &Path, text: &str, faults: Vec<(String, String, String)>) -> Self {
+        let table = DeTable::parse(text).ok();
+        let placed = faults.into_iter().map(|(key, what, hint)| Fault {
+            span: table.as_ref().map_or(0..0, |table| nearest_span(table.get_ref(), &key)),
+            what,
+            hint,
+        });
+        let mut placed: Vec<_> = placed.collect();
+        placed.sort_by_key(|fault| fault.span.start);
+        let total = placed.len();
+        Self::new(path, text, placed, total)
     }
 
     /// How many mistakes there are, listed or not.

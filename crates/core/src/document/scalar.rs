@@ -1,6 +1,7 @@
 //! Single values of a text file, and the text with others in their places.
 
 use std::fmt;
+use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -163,6 +164,23 @@ fn find<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Result<&'v Spanned<DeValue
         )),
         _ => Ok(value),
     }
+}
+
+/// The bytes of what stands at a key, or at as much of it from the top of the file as is there.
+pub(super) fn nearest_span(table: &DeTable<'_>, key: &str) -> Range<usize> {
+    let mut parts = key.split('.');
+    let mut at = parts.next().and_then(|first| table.get(first));
+    let mut span = at.map_or(0..0, Spanned::span);
+    for part in parts {
+        at = match at.map(Spanned::get_ref) {
+            Some(DeValue::Table(inner)) => inner.get(part),
+            Some(DeValue::Array(items)) => part.parse().ok().and_then(|place: usize| items.get(place)),
+            _ => None,
+        };
+        let Some(found) = at else { break };
+        span = found.span();
+    }
+    span
 }
 
 #[cfg(test)]

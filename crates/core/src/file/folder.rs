@@ -82,7 +82,7 @@ impl WholeFolder {
                 "name a folder with --out, or remove what lies there",
             ));
         }
-        let parent = parent(target);
+        let parent = part::folder_of(target);
         fs::create_dir_all(parent).map_err(Error::io("create the folder", parent))?;
         let lock = part::open(&places.lock, target)?;
         let mut this = Self {
@@ -129,11 +129,6 @@ impl Drop for WholeFolder {
             part::remove_own(&lock, &self.places.lock);
         }
     }
-}
-
-fn parent(path: &Path) -> &Path {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
-    parent.unwrap_or(Path::new("."))
 }
 
 /// Whether something is there; links are not followed.
@@ -201,7 +196,7 @@ impl Places {
 
     /// Remove unfinished folders of runs that were killed: this run holds the lock.
     fn remove_unfinished(&self) -> Result<()> {
-        let parent = parent(&self.folder);
+        let parent = part::folder_of(&self.folder);
         let begin = self.ready.with_extension("");
         let begin = format!("{}.", begin.file_name().unwrap_or_default().to_string_lossy());
         for entry in fs::read_dir(parent).map_err(Error::io("read the folder", parent))? {

@@ -35,11 +35,7 @@ pub(super) fn reach(part: &Path) -> Result<File> {
         use std::os::unix::fs::OpenOptionsExt;
         options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
     }
-    let refused = |error| match fs::symlink_metadata(part) {
-        Ok(there) if !there.is_file() => not_ordinary(part),
-        _ => Error::io("create", part)(error),
-    };
-    let file = options.open(part).map_err(refused)?;
+    let file = options.open(part).map_err(|error| refused(part, error))?;
     let there = file.metadata().map_err(Error::io("read", part))?;
     if there.is_file() && !has_other_names(&there) {
         Ok(file)
@@ -48,6 +44,20 @@ pub(super) fn reach(part: &Path) -> Result<File> {
         Ok(file)
     } else {
         Err(not_ordinary(part))
+    }
+}
+
+/// Why nothing could be opened at `part`. A folder that may not be written to is told by its own name: the user knows nothing of the
+/// unfinished file.
+fn refused(part: &Path, error: io::Error) -> Error {
+    let no_rights = matches!(
+        error.kind(),
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
+    );
+    match fs::symlink_metadata(part) {
+        Ok(there) if !there.is_file() => not_ordinary(part),
+        Err(_) if no_rights => Error::io("write into the folder", folder_of(part))(error),
+        _ => Error::io("create", part)(error),
     }
 }
 
@@ -121,12 +131,17 @@ fn has_other_names(_: &Metadata) -> bool {
     false
 }
 
+/// The folder that a file is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
 /// Bring the folder of a file to the disk, so that a renamed file is found there after a loss of power.
 pub(super) fn flush_folder_of(path: &Path) -> io::Result<()> {
     #[cfg(unix)]
     {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        match File::open(folder.unwrap_or(Path::new("."))).and_then(|f| f.sync_all()) {
+        match File::open(folder_of(path)).and_then(|f| f.sync_all()) {
             // Some file systems do not know this, and some folders may be written but not read.
             Err(e)
                 if matches!(
@@ -143,5 +158,33 @@ pub(super) fn flush_folder_of(path: &Path) -> io::Result<()> {
     {
         let _ = path;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_without_rights_is_told_by_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let part = folder.path().join(".lens.gds.part");
+        for kind in [io::ErrorKind::PermissionDenied, io::ErrorKind::ReadOnlyFilesystem] {
+            let words = refused(&part, kind.into()).to_string();
+            let begin = format!("cannot write into the folder {}: ", folder.path().display());
+            assert!(words.starts_with(&begin) && words.contains("--out"), "{words}");
+        }
+        // Another fault is one of the file, and so is one that is there and may not be written.
+        assert!(
+            refused(&part, io::ErrorKind::InvalidInput.into())
+                .to_string()
+                .contains(".part")
+        );
+        fs::write(&part, "").unwrap();
+        assert!(
+            refused(&part, io::ErrorKind::PermissionDenied.into())
+                .to_string()
+                .contains(".part")
+        );
     }
 }

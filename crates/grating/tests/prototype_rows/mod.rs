@@ -7,7 +7,7 @@ use metalith_cell::{CellModel, PointwiseCell};
 use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, WidthRule};
-use metalith_grating::{Blaze, CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, RealRow};
+use metalith_grating::{Blaze, CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, RealRow, SiteGrid};
 use num_complex::Complex64;
 
 /// Where rows begin, from the middle of the element (um).
@@ -104,7 +104,9 @@ impl Prototype {
         );
         let phase = ElementPhase::new(&lens, &wedge);
         let turns = |radius: f64, direction: [i32; 2], pillars: usize| phase.row(radius, direction, pillars);
-        let all = ElementRow::of_element(&RADII_UM, &directions, turns, |u| f64::from(rule.width_nm(u)));
+        let all = ElementRow::of_element(SiteGrid::SQUARE, &RADII_UM, &directions, turns, |u| {
+            f64::from(rule.width_nm(u))
+        });
         assert_eq!(all.len(), RADII_UM.len() * directions.len(), "rows within the lens");
         for ElementRow { radius_um, turns, row } in all {
             let direction = row.direction;

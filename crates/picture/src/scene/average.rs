@@ -4,7 +4,7 @@ use ndarray::{Array2, Axis};
 
 use super::SceneImage;
 use crate::SceneView;
-use crate::score::LEAST_SIDE;
+use crate::score::SCORED_SIDES;
 
 /// Of a number of pixels that fit: a view is no finer than its own pixels.
 const ROUNDING: f64 = 1e-9;
@@ -17,7 +17,7 @@ impl SceneView {
     pub fn no_finer(&self, tangent: f64) -> Self {
         let shorter = self.rows.min(self.columns).max(1);
         let fitting = (self.columns as f64 * self.pixel() / tangent + ROUNDING).floor() as usize;
-        let columns = fitting.max((LEAST_SIDE * self.columns).div_ceil(shorter));
+        let columns = fitting.max((SCORED_SIDES.start() * self.columns).div_ceil(shorter));
         match columns < self.columns {
             true => Self {
                 rows: self.rows * columns / self.columns,

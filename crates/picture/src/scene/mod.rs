@@ -25,6 +25,7 @@ pub use chart::{BuiltIn, chart};
 pub(crate) use chart::{LEAN_DEG, SPOKES, STAR};
 pub use depth::read_depth;
 pub use folder::images_in;
+pub(crate) use read::SIDES;
 pub use read::{SceneFile, read_far_scene, read_picture, read_scene};
 
 /// A scene: planes of light, each with the spectrum of its reflectance.

@@ -13,9 +13,10 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::{SceneImage, cube};
 use crate::SceneView;
+use crate::score::{SCORED_SIDES, sides_words};
 
-/// Shortest and longest side of a picture of a scene (pixels).
-const SIDES: std::ops::RangeInclusive<usize> = 16..=4096;
+/// Shortest and longest side of a picture that is read (pixels): not all are scored.
+pub(crate) const SIDES: std::ops::RangeInclusive<usize> = 16..=*SCORED_SIDES.end();
 /// Longest file (bytes): a cube of 1024 x 1024 with 31 bands in double precision, and some more.
 pub(super) const LONGEST: u64 = 512 << 20;
 
@@ -129,9 +130,8 @@ fn fault(path: &Path, what: impl Into<String>) -> Error {
         line: None,
         what: what.into(),
         hint: format!(
-            "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths; {} to {} pixels a side",
-            SIDES.start(),
-            SIDES.end()
+            "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
+            sides_words()
         ),
     }
 }

@@ -7,6 +7,9 @@ mod moments;
 mod normal;
 mod upright;
 
+pub(super) use moments::disc_moments;
+pub(super) use normal::PillarTensor;
+
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;
 use faer::{Accum, Mat, Par};

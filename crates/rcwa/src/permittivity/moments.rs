@@ -97,14 +97,9 @@ impl Moments {
     /// one in the middle, one at the corners. Where the sum of both orders is odd they cancel, and all is zero.
     fn of_staggered_circle(duty: f64, row: f64, highest: [usize; 2]) -> Self {
         let [mut pillar, mut cosine, mut sine, mut fourth] = [(); 4].map(|()| Coefficients::new(highest));
-        let filling = PI * duty * duty / (4.0 * row);
         for m in 0..=highest[0] as i32 {
             for n in (m % 2..=highest[1] as i32).step_by(2) {
-                // The wave vector times the pitch, over one turn.
-                let [x, y] = [f64::from(m), f64::from(n) / (2.0 * row)];
-                let square = x * x + y * y;
-                let [disc, twice, r4] = disc_integrals(filling, PI * duty * square.sqrt(), square);
-                let (c, s) = (twice * (x * x - y * y), twice * 2.0 * x * y);
+                let [disc, c, s, r4] = disc_moments(duty, row, [f64::from(m), f64::from(n) / (2.0 * row)]);
                 for (p, q, mirror) in [(m, n, 1.0), (-m, n, -1.0), (m, -n, -1.0), (-m, -n, 1.0)] {
                     let place = pillar.place(p, q);
                     pillar.values[place] = disc;
@@ -151,6 +146,14 @@ impl Moments {
             square,
         }
     }
+}
+
+/// Moments of a circle of which there is one on a row of this share of the pitch, its diameter `duty` of it: of the pillar, of c and
+/// s, and of c c + s s in it, at a wave vector times the pitch, over one turn.
+pub(crate) fn disc_moments(duty: f64, row: f64, [x, y]: [f64; 2]) -> [f64; 4] {
+    let square = x * x + y * y;
+    let [disc, twice, r4] = disc_integrals(PI * duty * duty / (4.0 * row), PI * duty * square.sqrt(), square);
+    [disc, twice * (x * x - y * y), twice * 2.0 * x * y, r4]
 }
 
 /// Integrals over a disc with this share of the cell, with g = k R for the wave vector k and the radius R, and the square of k in

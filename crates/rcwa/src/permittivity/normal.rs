@@ -28,6 +28,51 @@ use crate::basis::FieldBasis;
 use crate::outline::SlantedForm;
 use crate::scalar::Scalar;
 
+/// A tensor over the cell: `uniform`, and in the pillar also `mean` + `part` f R + `square` f f.
+#[derive(Clone, Copy)]
+pub(crate) struct PillarTensor {
+    pub uniform: Complex64,
+    pub mean: Complex64,
+    pub part: Complex64,
+    pub square: Complex64,
+}
+
+impl PillarTensor {
+    /// C, for permittivities in the pillar and outside of it.
+    pub fn stretch(inside: Complex64, outside: Complex64) -> Self {
+        let half = 0.5 * (outside / inside - 1.0);
+        Self {
+            uniform: Complex64::ONE,
+            mean: half,
+            part: half,
+            square: Complex64::ZERO,
+        }
+    }
+
+    /// C S.
+    pub fn energy(inside: Complex64, outside: Complex64) -> Self {
+        let contrast = inside - outside;
+        let quarter = 0.25 * contrast * contrast / inside;
+        Self {
+            uniform: outside,
+            mean: quarter,
+            part: 2.0 * quarter - contrast,
+            square: quarter,
+        }
+    }
+
+    /// S.
+    fn direct(inside: Complex64, outside: Complex64) -> Self {
+        let half = 0.5 * (inside - outside);
+        Self {
+            uniform: outside,
+            mean: half,
+            part: -half,
+            square: Complex64::ZERO,
+        }
+    }
+}
+
 /// The permittivity matrices of the pillar of a section.
 pub(super) fn permittivity<T: Scalar>(
     section: &CrossSection<'_>,
@@ -39,8 +84,13 @@ pub(super) fn permittivity<T: Scalar>(
     let (inside, outside) = (section.inside, section.outside);
     let split = basis.rows.of_x;
     let size = basis.rows.len();
-    // uniform + (mean + part f R + square f f) in the pillar.
-    let tensor = |uniform: Complex64, mean: Complex64, part: Complex64, square: Complex64| -> Mat<T> {
+    let matrix_of = |tensor: PillarTensor| -> Mat<T> {
+        let PillarTensor {
+            uniform,
+            mean,
+            part,
+            square,
+        } = tensor;
         let mut matrix = Mat::<T>::zeros(size, size);
         let mut fill = |target: usize, source: usize, sum: &[(Complex64, &Coefficients)], uniform: Complex64| {
             let block = multiplication::<T>(basis, [target, source], sum, uniform);
@@ -58,13 +108,10 @@ pub(super) fn permittivity<T: Scalar>(
         fill(1, 0, &[(part, &moments.sine)], Complex64::ZERO);
         matrix
     };
-    let contrast = inside - outside;
-    let stretch = 0.5 * (outside / inside - 1.0);
-    let stretched = tensor(Complex64::ONE, stretch, stretch, Complex64::ZERO).partial_piv_lu();
+    let stretched = matrix_of(PillarTensor::stretch(inside, outside)).partial_piv_lu();
     let transverse = match form {
         SlantedForm::Circle { .. } => {
-            let energy = 0.25 * contrast * contrast / inside;
-            let mut half = tensor(outside, energy, 2.0 * energy - contrast, energy);
+            let mut half = matrix_of(PillarTensor::energy(inside, outside));
             stretched.solve_in_place(&mut half);
             let mut transverse = half.transpose().to_owned();
             stretched.solve_in_place(&mut transverse);
@@ -72,7 +119,7 @@ pub(super) fn permittivity<T: Scalar>(
         }
         // Both are symmetric: C^-1 S is the transpose of S C^-1.
         SlantedForm::Rectangle { .. } => {
-            let mut transverse = tensor(outside, 0.5 * contrast, -0.5 * contrast, Complex64::ZERO);
+            let mut transverse = matrix_of(PillarTensor::direct(inside, outside));
             stretched.solve_in_place(&mut transverse);
             transverse
         }

@@ -1,11 +1,14 @@
 //! Supercells: different pillars side by side that repeat as a whole, such as one period of a blazed grating.
 //!
 //! The lateral reference is the middle of site 0. The theory is that of one cell (see `layer`). What differs: there
-//! are more plane waves, as many for each site as a single cell has, and the permittivity couples all of them.
+//! are more plane waves, as many for each site as a single cell has, and the permittivity couples all of them. Circles on staggered
+//! rows are met as in one cell of these (`staggered`), other pillars by strips (`permittivity`).
 
 mod permittivity;
+mod placed;
 mod response;
 mod sites;
+mod staggered;
 mod waves;
 
 use std::f64::consts::TAU;
@@ -21,6 +24,7 @@ use crate::layer::Modes;
 use crate::propagate::{Ends, propagate_wave};
 use crate::{CellLattice, Incidence, Layer, LayerStack, MOST_UNKNOWNS, Orders, Outline, Side, off_cutoff};
 use permittivity::permittivity;
+use placed::Placed;
 use waves::Waves;
 
 /// Different pillars side by side between two half-spaces.
@@ -28,7 +32,9 @@ use waves::Waves;
 pub struct Supercell {
     /// Pitch of the sites (nm).
     pub pitch_nm: f64,
-    /// How the sites repeat.
+    /// Where the sites stand; those of staggered rows have circles.
+    pub sites: CellLattice,
+    /// How they repeat.
     pub lattice: SiteLattice,
     /// Complex index of the half-space below, where the substrate is.
     pub below: Complex64,
@@ -55,7 +61,7 @@ impl Supercell {
     /// Cells side by side, one for each site. They share all but the cross-sections of their pillars.
     ///
     /// # Errors
-    /// If their number is not that of the sites, they differ in more than the cross-sections, or are of staggered rows.
+    /// If their number is not that of the sites, or they differ in more than the cross-sections.
     pub fn of_cells(lattice: SiteLattice, cells: &[LayerStack]) -> Result<Self> {
         let Some(first) = cells.first().filter(|_| cells.len() == lattice.len()) else {
             return Err(Error::CellCount {
@@ -63,18 +69,16 @@ impl Supercell {
                 sites: lattice.len(),
             });
         };
-        if cells.iter().any(|cell| cell.lattice != CellLattice::Square) {
-            return Err(Error::StaggeredSites);
-        }
         for (number, cell) in cells.iter().enumerate() {
-            let same_media = cell.pitch_nm == first.pitch_nm && cell.below == first.below && cell.above == first.above;
+            let same_lattice = cell.pitch_nm == first.pitch_nm && cell.lattice == first.lattice;
+            let same_media = cell.below == first.below && cell.above == first.above;
             let same_layers = cell.layers.len() == first.layers.len()
                 && cell
                     .layers
                     .iter()
                     .zip(&first.layers)
                     .all(|(a, b)| a.height_nm == b.height_nm && a.inside == b.inside && a.outside == b.outside);
-            if !(same_media && same_layers) {
+            if !(same_lattice && same_media && same_layers) {
                 return Err(Error::UnlikeCells { cell: number + 1 });
             }
         }
@@ -91,6 +95,7 @@ impl Supercell {
             .collect();
         let supercell = Self {
             pitch_nm: first.pitch_nm,
+            sites: first.lattice,
             lattice,
             below: first.below,
             layers,
@@ -123,7 +128,7 @@ impl Supercell {
             });
             let cell = LayerStack {
                 pitch_nm: self.pitch_nm,
-                lattice: CellLattice::Square,
+                lattice: self.sites,
                 below: self.below,
                 layers: layers.collect(),
                 above: self.above,
@@ -147,7 +152,7 @@ impl Supercell {
 ///
 /// `highest` is the highest order of a single cell that is kept along each axis: 3 keeps -3..=3 for a cell and
 /// -3 n..=3 n along a row of n cells. For a row along x that is lit in the x-z plane, only fields of the
-/// symmetry of the incident one are solved for.
+/// symmetry of the incident one are solved for. Of staggered rows the waves of a circle are kept, as of a single cell of them.
 ///
 /// # Errors
 /// As [`crate::solve`].
@@ -164,7 +169,7 @@ pub fn solve_supercell(cell: &Supercell, incidence: &Incidence, highest: usize) 
 fn solve_once(cell: &Supercell, incidence: &Incidence, highest: usize) -> Result<SupercellResponse> {
     let problem = SupercellProblem::new(cell, incidence, highest)?;
     let unit = [[Complex64::ONE, Complex64::ZERO], [Complex64::ZERO, Complex64::ONE]];
-    let parts = if cell.lattice.is_row() && incidence.sines[1] == 0.0 {
+    let parts = if Placed::of(cell).is_mirrored_row() && incidence.sines[1] == 0.0 {
         vec![
             problem.part(Space::Even, &unit[..1])?,
             problem.part(Space::Odd, &unit[1..])?,
@@ -217,7 +222,8 @@ impl SupercellProblem {
 
     fn part(&self, y: Space, incident: &[[Complex64; 2]]) -> Result<SupercellPart> {
         let Supercell { lattice, pitch_nm, .. } = &self.cell;
-        let unknowns = Waves::unknowns(lattice, self.highest, y);
+        let placed = Placed::of(&self.cell);
+        let unknowns = Waves::unknowns(&placed, self.highest, y);
         if unknowns > MOST_UNKNOWNS {
             return Err(Error::SupercellTooLarge {
                 sites: lattice.len(),
@@ -226,14 +232,18 @@ impl SupercellProblem {
                 most: MOST_UNKNOWNS,
             });
         }
-        let waves = Waves::new(lattice, self.highest, y, self.k, self.step);
+        let waves = Waves::new(&placed, self.highest, y, self.k, self.step);
         let rows = &waves.rows;
         let layers = self.cell.layers.iter().map(|layer| {
             let plain = layer.inside == layer.outside || layer.outlines.iter().all(Outline::is_empty);
             let modes = if plain {
                 Modes::uniform(layer.outside * layer.outside, rows)
             } else {
-                Modes::structured(&permittivity(layer, *pitch_nm, lattice, &waves), rows)?
+                let permittivity = match placed.staggered {
+                    None => permittivity(layer, *pitch_nm, lattice, &waves),
+                    Some(row) => staggered::permittivity(layer, *pitch_nm, row, &placed, &waves),
+                };
+                Modes::structured(&permittivity, rows)?
             };
             Ok((modes, layer.height_nm))
         });

@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::placed::Placed;
 use super::{SupercellPart, SupercellProblem};
 use crate::Incidence;
 use crate::error::Result;
@@ -21,8 +22,9 @@ pub struct SupercellResponse {
 /// One order of a supercell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupercellOrder {
-    /// Its wave vector less that of the incident wave along x and y, in units of 2 pi / (pitch times the number of
-    /// sites): (1, 0) is one turn over the length of a row.
+    /// Its wave vector less that of the incident wave, by the turns over both steps of a [`SiteLattice`](crate::SiteLattice), in parts
+    /// of the number of sites: (1, 0) is one turn over the length of a row. On a square lattice these are its components along x and
+    /// y in units of 2 pi / (pitch times the number of sites).
     pub wave: [i32; 2],
     /// Components of its wave vector over that in vacuum.
     pub sines: [f64; 2],
@@ -81,9 +83,9 @@ impl SupercellResponse {
         // A wave of unit power along the normal has Ex^2 + Ey^2 = 1 / n above.
         let unit = cell.above.re;
         let mut orders = Vec::new();
-        for wave in cell.lattice.waves(problem.highest) {
-            let part = problem.step / cell.lattice.len() as f64;
-            let sines = [0, 1].map(|axis| problem.k[axis] + f64::from(wave[axis]) * part);
+        let placed = Placed::of(cell);
+        for wave in placed.waves(problem.highest) {
+            let sines = placed.sines(wave, problem.k, problem.step);
             let square = sines[0] * sines[0] + sines[1] * sines[1];
             let travels = |index: Complex64| (index * index).re > square;
             if !travels(cell.above) && !travels(cell.below) {

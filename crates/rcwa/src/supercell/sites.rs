@@ -1,10 +1,12 @@
-//! The sites of a supercell: a lattice of translations, oblique if need be, on the square lattice of sites.
+//! The sites of a supercell: a lattice of translations, oblique if need be, on the lattice of sites.
 
+use crate::basis::Kept;
 use crate::error::{Error, Result};
 
-/// Translations that leave a supercell as it is, in pitches: (`row`, 0) and (`shift`, `rows`).
+/// Translations that leave a supercell as it is, in steps: (`row`, 0) and (`shift`, `rows`). The first step is one pitch along x; the
+/// second is one pitch along y, or of staggered rows from a site to the one of the next row that is half a pitch further along x.
 ///
-/// A grating whose phase rises by p / n turns for each site along x and by q / n along y has a cell of n sites,
+/// A grating whose phase rises by p / n turns for each of the first steps and by q / n for each of the second has a cell of n sites,
 /// whatever its direction, not of n x n.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SiteLattice {
@@ -25,7 +27,7 @@ impl SiteLattice {
         Self::of_grating([1, 0], sites)
     }
 
-    /// The smallest cell of a grating that turns its phase by `turns / sites` at a step along x and y.
+    /// The smallest cell of a grating that turns its phase by `turns / sites` at each of the two steps.
     ///
     /// # Errors
     /// If there are no sites, or more than [`SiteLattice::MOST`].
@@ -57,12 +59,12 @@ impl SiteLattice {
         false
     }
 
-    /// Place of a site (pitches).
+    /// Place of a site (steps).
     pub fn site(&self, index: usize) -> [usize; 2] {
         [index % self.row, index / self.row]
     }
 
-    /// The site of the cell that stands for a place (pitches).
+    /// The site of the cell that stands for a place (steps).
     pub fn index(&self, x: usize, y: usize) -> usize {
         // `rows` steps along y are `shift` steps along x, counted on the ring of `row` sites.
         let back = (y / self.rows % self.row) * self.shift % self.row;
@@ -87,16 +89,35 @@ impl SiteLattice {
         }
     }
 
-    /// Waves of the square that holds the orders `-highest..=highest` of a single cell and half a step more,
-    /// so that as many fall to each site; (x, y) in parts of `len` a pitch.
+    /// Waves of a square lattice: those of the square that holds the orders `-highest..=highest` of a single cell and half a step more,
+    /// so that as many fall to each site; turns of both steps, in parts of `len`.
     pub(super) fn waves(&self, highest: usize) -> Vec<[i32; 2]> {
-        let sites = self.len() as i32;
-        let most = ((2 * highest as i32 + 1) * sites - 1) / 2;
+        let most = ((2 * highest as i32 + 1) * self.len() as i32 - 1) / 2;
+        self.waves_within(most, |_| [-most, most])
+    }
+
+    /// Waves of staggered rows: those of the circle that holds the orders that a single cell keeps with `-highest..=highest` along an
+    /// axis. Where all pillars are equal the orders of the single cell are coupled to no others, and are the same.
+    pub(super) fn staggered_waves(&self, highest: usize) -> Vec<[i32; 2]> {
+        let Kept::Circle(most) = Kept::circle(2 * highest + 1) else {
+            unreachable!("orders of staggered rows are kept in a circle");
+        };
+        // Orders of a rectangle of one pitch by two rows are (x, 2 y - x) over the number of sites.
+        let most = (most * self.len() * self.len()) as i32;
+        let reach = |square: i32| f64::from(square).sqrt() as i32;
+        self.waves_within(reach(most / 3), |x| {
+            let reach = reach(most - 3 * x * x);
+            [-(reach - x).div_euclid(2), (reach + x).div_euclid(2)]
+        })
+    }
+
+    /// Waves with turns of the first step up to `most`, and of the second within what `within` gives for these.
+    fn waves_within(&self, most: i32, within: impl Fn(i32) -> [i32; 2]) -> Vec<[i32; 2]> {
         let (row, rows, shift) = (self.row as i32, self.rows as i32, self.shift as i32);
         let mut waves = Vec::new();
         for m in -most / rows..=most / rows {
             // y = row n - shift m.
-            let (low, high) = (-most + shift * m, most + shift * m);
+            let [low, high] = within(rows * m).map(|y| y + shift * m);
             for n in -(-low).div_euclid(row)..=high.div_euclid(row) {
                 waves.push([rows * m, row * n - shift * m]);
             }

@@ -184,7 +184,11 @@ fn unknowns_are_counted_ahead() {
         ([2, 2], 4, Space::Full),
     ] {
         let lattice = SiteLattice::of_grating(turns, sites).unwrap();
-        let waves = Waves::new(&lattice, 2, y, [0.1, 0.0], 1.5);
-        assert_eq!(waves.rows.len(), Waves::unknowns(&lattice, 2, y));
+        let placed = Placed {
+            lattice,
+            staggered: None,
+        };
+        let waves = Waves::new(&placed, 2, y, [0.1, 0.0], 1.5);
+        assert_eq!(waves.rows.len(), Waves::unknowns(&placed, 2, y));
     }
 }

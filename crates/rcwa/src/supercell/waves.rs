@@ -5,14 +5,14 @@ use std::collections::HashMap;
 use faer::Mat;
 use num_complex::Complex64;
 
-use super::sites::SiteLattice;
+use super::placed::Placed;
 use crate::basis::{FieldRow, Rows, Space};
 
 /// The transverse field of a supercell: all plane waves, or for a row along x the combinations that are
 /// even or odd in y. Ex and Ez are in the space `y`, Ey in its derived space.
 pub(super) struct Waves {
     pub rows: Rows,
-    /// Wave vector of each row, in parts of the number of sites a pitch; of Ex, Ey and Ez.
+    /// Wave of each row, as turns of both steps in parts of the number of sites; of Ex, Ey and Ez.
     pub of: [Vec<[i32; 2]>; 3],
     /// Their functions of y.
     pub spaces: [Space; 3],
@@ -22,15 +22,15 @@ pub(super) struct Waves {
 impl Waves {
     /// How many components of the field there are. Of a row, the rows of Ex and Ey in one symmetry about the x axis
     /// are together as many as there are plane waves.
-    pub fn unknowns(lattice: &SiteLattice, highest: usize, y: Space) -> usize {
-        let waves = lattice.waves(highest).len();
+    pub fn unknowns(placed: &Placed, highest: usize, y: Space) -> usize {
+        let waves = placed.waves(highest).len();
         if y == Space::Full { 2 * waves } else { waves }
     }
 
     /// `k` is the wave vector of the zero order over k0, `step` the wavelength over the pitch.
-    pub fn new(lattice: &SiteLattice, highest: usize, y: Space, k: [f64; 2], step: f64) -> Self {
+    pub fn new(placed: &Placed, highest: usize, y: Space, k: [f64; 2], step: f64) -> Self {
         let spaces = [y, y.derived(), y];
-        let all = lattice.waves(highest);
+        let all = placed.waves(highest);
         let of = spaces.map(|space| -> Vec<[i32; 2]> {
             let first = match space {
                 Space::Full => i32::MIN,
@@ -41,7 +41,6 @@ impl Waves {
         });
         let place = [0, 1, 2].map(|c: usize| of[c].iter().enumerate().map(|(i, &wave)| (wave, i)).collect());
         let of_x = of[0].len();
-        let part = step / lattice.len() as f64;
         let mut list = Vec::with_capacity(of_x + of[1].len());
         for component in [0, 1] {
             for wave in &of[component] {
@@ -51,7 +50,7 @@ impl Waves {
                 };
                 list.push(FieldRow {
                     component,
-                    k: [0, 1].map(|axis| k[axis] + f64::from(wave[axis]) * part),
+                    k: placed.sines(*wave, k, step),
                     partner: find(1 - component).map(|p| if component == 0 { of_x + p } else { p }),
                     z: find(2),
                 });

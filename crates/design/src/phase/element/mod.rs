@@ -326,20 +326,29 @@ impl<'a> ElementPhase<'a> {
         })
     }
 
-    /// Phases modulo one turn of consecutive sites of a square lattice from a distance to the middle (um) on; the direction is along an axis
-    /// or a diagonal, where there is a site at every step along either axis. None if the lens ends before.
+    /// Phases modulo one turn of consecutive sites from a distance to the middle (um) on; the direction is along an axis or a diagonal, where
+    /// there is a site at every step along either axis. On a hexagonal lattice it is along an axis, and every other site stands one place of
+    /// the grid beside it. None if the lens ends before, or there is no such row.
     pub fn row(&self, radius_um: f64, direction: [i32; 2], sites: usize) -> Option<Vec<f64>> {
         let lattice = self.lattice();
         let [dx, dy] = direction;
-        let steps = radius_um / lattice.pitch_um() / f64::from(dx).hypot(f64::from(dy));
+        let slanted = dx != 0 && dy != 0;
+        if slanted && !lattice.is_square() {
+            return None;
+        }
+        let steps = match lattice.is_square() {
+            true => radius_um / lattice.pitch_um() / f64::from(dx).hypot(f64::from(dy)),
+            false => radius_um / lattice.steps_um()[usize::from(dx == 0)],
+        };
         let middle = lattice.sites() as i32 / 2;
         let [x, y] = direction.map(|d| middle + (steps * f64::from(d)) as i32);
         (0..sites as i32)
             .map(|k| {
-                let (x, y) = if dx != 0 && dy != 0 {
+                let beside = i32::from(!lattice.is_square() && (x + y + k) % 2 != 0);
+                let (x, y) = if slanted {
                     (x + dx * ((k + 1) / 2), y + dy * (k / 2))
                 } else {
-                    (x + dx * k, y + dy * k)
+                    (x + dx * k + beside * dy.abs(), y + dy * k + beside * dx.abs())
                 };
                 self.wrapped(usize::try_from(x).ok()?, usize::try_from(y).ok()?)
             })
