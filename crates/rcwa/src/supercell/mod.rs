@@ -9,6 +9,7 @@ mod sites;
 mod waves;
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use num_complex::Complex64;
 
@@ -235,7 +236,7 @@ impl SupercellProblem {
             } else {
                 Modes::structured(&permittivity(layer, *pitch_nm, lattice, &waves), rows)?
             };
-            Ok((modes, layer.height_nm))
+            Ok((Arc::new(modes), layer.height_nm))
         });
         let indices = [self.cell.below, self.cell.above];
         let ends = propagate_wave(rows, indices, layers, self.k0_per_nm, incident, |component| {
