@@ -35,6 +35,7 @@ mod model;
 mod not_applied;
 mod perturbation;
 mod pupil;
+mod rational;
 mod rectangles;
 mod shifted_aperture;
 mod stack;
