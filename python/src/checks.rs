@@ -7,7 +7,7 @@ use metalith::cell::cache_folder;
 use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
 use metalith::extract::GdsPillars;
 use metalith::gds::ReadLimits;
-use metalith::{Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, SimulationCases, cell_models};
+use metalith::{Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, Result, SimulationCases, cell_models};
 use pyo3::prelude::*;
 
 use crate::arrays::Design;
@@ -71,7 +71,9 @@ pub fn verify(
     work(py, progress, |p| {
         let array = PillarArray::build(design, p)?;
         let model = model.as_deref().map(CalibratedModel::read).transpose()?;
-        let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
+        let chip = |model| -> Result<MadeChip> {
+            Ok(MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+        };
         let made = model.as_ref().map(chip).transpose()?;
         let cells = match &made {
             None => cell_models(design, &[design.verify.fidelity])?,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use metalith::cell::{LitStack, PolarisedLight};
+use metalith::cell::{LitStack, PolarisedLight, cache_folder};
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
@@ -259,7 +259,10 @@ pub fn psf_of_array<'py>(
             .extend(wavelengths_nm.iter().map(|nm| nm * 1e-3));
         let (cells, made) = match &wanted {
             Wanted::Cell(fidelity) => (cell_models(&design, &[*fidelity])?, None),
-            Wanted::Model(model) => (Vec::new(), Some(MadeChip::in_light(&design.lit_stack()?, model)?)),
+            Wanted::Model(model) => (
+                Vec::new(),
+                Some(MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref())),
+            ),
         };
         let lit = chosen.iter().map(|k| Lit {
             name: placed[*k].element.label(),
@@ -342,7 +345,10 @@ pub fn psf_of_widths<'py>(
                     polarised: light,
                     stack,
                 };
-                (None, Some(MadeChip::in_light(&stated, model)?))
+                (
+                    None,
+                    Some(MadeChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref())),
+                )
             }
         };
         let lit = maps.into_iter().zip(names).zip(centres_nm);
