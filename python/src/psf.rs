@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use metalith::cell::{LitStack, PolarisedLight};
+use metalith::cell::{LitStack, PolarisedLight, cache_folder};
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
@@ -262,7 +262,7 @@ pub fn psf_of_array<'py>(
         let (cells, made) = match &wanted {
             Wanted::Cell(fidelity) => (cell_models(&design, &[*fidelity])?, None),
             Wanted::Model(model) => {
-                let chip = MadeChip::in_light(&design.lit_stack()?, model)?;
+                let chip = MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
                 let classes = chosen.iter().map(|k| &array.array.classes[placed[*k].class]);
                 chip.check_drawn(classes.map(|class| class.widths.histogram()))?;
                 (Vec::new(), Some(chip))
@@ -349,7 +349,7 @@ pub fn psf_of_widths<'py>(
                     polarised: light,
                     stack,
                 };
-                let chip = MadeChip::in_light(&stated, model)?;
+                let chip = MadeChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());
                 chip.check_drawn(maps.iter().map(WidthMap::histogram))?;
                 (None, Some(chip))
             }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::camera::Camera;
-use metalith::cell::{PublishedCell, oblique_refused};
+use metalith::cell::{PublishedCell, cache_folder, oblique_refused};
 use metalith::design::{CellIncidence, LatticeOrders};
 use metalith::picture::thumbnail;
 use metalith::report::{Figure, sig};
@@ -202,7 +202,9 @@ impl Judging {
             }
         }
         let model = self.model()?;
-        let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
+        let chip = |model| -> Result<MadeChip> {
+            Ok(MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+        };
         let made = model.as_ref().map(chip).transpose()?;
         // A made chip judges, and cells of the pillars as drawn stand beside it.
         let judge = if made.is_some() { Fidelity::Rigorous } else { judge };

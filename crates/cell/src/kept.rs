@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
+use num_complex::Complex64;
 use sha2::{Digest, Sha256};
 
 use metalith_core::text::hex;
@@ -293,6 +294,23 @@ impl KeptTable {
             progress.warn(&format!("the table of {} is not kept: {error}", self.what));
         }
     }
+}
+
+/// Bytes of numbers: real and imaginary parts (f64, little-endian).
+pub fn bytes_of(numbers: impl IntoIterator<Item = Complex64>) -> Vec<u8> {
+    let parts = numbers.into_iter().flat_map(|z| [z.re, z.im]);
+    parts.flat_map(f64::to_le_bytes).collect()
+}
+
+/// The numbers that [`bytes_of`] has made such bytes of; none if the bytes are of something else, or a number is not finite.
+pub fn complex_of(bytes: &[u8]) -> Option<Vec<Complex64>> {
+    let (pairs, rest) = bytes.as_chunks::<16>();
+    let part = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().expect("eight bytes"));
+    let numbers = pairs
+        .iter()
+        .map(|pair| Complex64::new(part(&pair[..8]), part(&pair[8..])));
+    let numbers: Vec<Complex64> = numbers.collect();
+    (rest.is_empty() && numbers.iter().all(|z| z.is_finite())).then_some(numbers)
 }
 
 /// Sixteen hexadecimal digits that name a file by the inputs of its content.

@@ -51,4 +51,4 @@ pub use rotated::{RotatedCell, RotationSamples, Truncation};
 pub use rotation::RotationMapping;
 pub use stack::{CellStack, MOST_SUBSTRATE_K, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};
-pub use upright::{Along, UPRIGHT_ORDERS, UprightCell, birefringent_pillars};
+pub use upright::{Along, UPRIGHT_ORDERS, UprightCell, birefringent_pillars, birefringent_stacks};

@@ -103,11 +103,15 @@ impl CellStack {
         if self.shape.rectangles().is_some() {
             return Err(Error::invalid(
                 "rectangular pillars, where those of a width are asked for",
-                "use squares or circles here: `photographs` and calibration know no rectangles, `optimise` and `study` no upright ones; the other \
-                 commands do",
+                "use squares or circles here: `photographs` and calibration know no rectangles, `optimise` no upright ones; the other commands do",
             ));
         }
         self.layers_of(wavelength_um, |wider_nm| self.outline((width_nm + wider_nm).max(0.0)))
+    }
+
+    /// How many cross-sections stand for the walls of a pillar: one where they are upright.
+    pub fn slices(&self) -> usize {
+        if self.taper == 0.0 { 1 } else { TAPER_SLICES }
     }
 
     /// Layers of a pillar with these cross-sections, each by how much wider than the top it is (nm).
@@ -123,7 +127,7 @@ impl CellStack {
                 outside: ambient,
             }
         };
-        let slices = if self.taper == 0.0 { 1 } else { TAPER_SLICES };
+        let slices = self.slices();
         let slope = 2.0 * self.taper.tan();
         let mut layers = Vec::new();
         for under in self.under.iter().filter(|u| u.height_nm > 0.0) {

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables};
+use metalith_cell::{CellModel, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder};
 use metalith_core::{Error, PillarShape, Progress, Rectangles, Result, WidthMap};
 use metalith_design::Design;
 use metalith_made::{CalibratedModel, MadeChip, Perturbation};
@@ -61,10 +61,11 @@ impl Line {
             ));
         }
         let lit = design.lit_stack()?;
+        let kept = cache_folder();
         let nothing = CalibratedModel::new(String::new(), String::new(), Perturbation::default());
         let mut line = Self {
-            stated: MadeChip::in_light(&lit, &nothing)?,
-            chip: MadeChip::in_light(&lit, model)?,
+            stated: MadeChip::in_light(&lit, &nothing)?.kept_in(kept.as_deref()),
+            chip: MadeChip::in_light(&lit, model)?.kept_in(kept.as_deref()),
             colours: Vec::new(),
             drawn,
             aperture_radius_um: design.aperture_radius_um(),

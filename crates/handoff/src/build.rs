@@ -11,7 +11,7 @@ use super::manifest::{Manifest, entry_of, files_below};
 use super::options::HandoffOptions;
 use super::sources::Sources;
 use super::{documents, front, layouts, manifest, rules, zip};
-use metalith_cell::Fidelity;
+use metalith_cell::{Fidelity, cache_folder};
 use metalith_core::{Error, Progress, Result, WholeFolder};
 use metalith_design::array::PillarArray;
 use metalith_design::cell_models;
@@ -135,7 +135,9 @@ fn verification(
         wanted.push(Fidelity::Published);
     }
     let models = cell_models(design, &wanted)?;
-    let chip = |model| MadeChip::in_light(&design.lit_stack()?, model);
+    let chip = |model| -> Result<MadeChip> {
+        Ok(MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+    };
     let made = sources.model.as_ref().map(chip).transpose()?;
     let cases = match &made {
         Some(chip) => SimulationCases::judged_by(chip).with_cells(&models),

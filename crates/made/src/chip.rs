@@ -1,6 +1,7 @@
 //! The chip as made: a stated cell and a perturbation, for any layout and light.
 
 use std::cell::RefCell;
+use std::path::Path;
 use std::sync::Arc;
 
 use num_complex::Complex64;
@@ -96,6 +97,16 @@ impl MadeChip {
             rectangles: rectangles.transpose()?,
             ..made
         })
+    }
+
+    /// The same whose rectangles, which take longer to solve than pillars of one width, are kept in a folder from one run to the next: see
+    /// [`metalith_cell::cache_folder`].
+    #[must_use]
+    pub fn kept_in(self, folder: Option<&Path>) -> Self {
+        Self {
+            rectangles: self.rectangles.map(|rectangles| rectangles.kept_in(folder)),
+            ..self
+        }
     }
 
     /// The same with all cells from a bank of the stated pillar: nothing is solved.

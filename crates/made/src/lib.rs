@@ -36,6 +36,7 @@ mod model;
 mod not_applied;
 mod perturbation;
 mod pupil;
+mod rational;
 mod rectangles;
 mod shifted_aperture;
 mod stack;

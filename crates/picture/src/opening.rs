@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use metalith_camera::Camera;
+use metalith_cell::cache_folder;
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
@@ -129,7 +130,7 @@ impl Studio {
                 let made;
                 let case = match model {
                     Some(model) => {
-                        made = MadeChip::in_light(&design.lit_stack()?, model)?;
+                        made = MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
                         SimulationCase::Made(&made)
                     }
                     None => {

@@ -3,6 +3,7 @@
 mod basis;
 mod error;
 mod jones;
+mod known_modes;
 mod layer;
 mod material;
 mod outline;
@@ -20,6 +21,7 @@ use num_complex::Complex64;
 
 use basis::{Family, FieldBasis, Space};
 pub use jones::circular;
+use known_modes::{KnownModes, Section};
 use layer::Modes;
 pub use material::Material;
 pub use outline::Outline;
@@ -133,27 +135,53 @@ const MOST_UNKNOWNS: usize = 6000;
 /// If a number of the stack or the incidence is not physical, the incident wave does not propagate in
 /// a medium without loss, or the problem is too large.
 pub fn solve(stack: &LayerStack, incidence: &Incidence, orders: Orders) -> Result<Response> {
-    solve_with(stack, incidence, orders, true)
+    solve_with(stack, incidence, orders, true, &mut KnownModes::default())
+}
+
+/// The answers of several stacks. Those after one another that differ in the heights of their layers alone have their modes in common, which
+/// are most of the work; the answers are those of [`solve`].
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_each(stacks: &[LayerStack], incidence: &Incidence, orders: Orders) -> Result<Vec<Response>> {
+    let layers = stacks.iter().map(|stack| stack.layers.len()).max();
+    let mut known = KnownModes::of_layers(layers.unwrap_or(0));
+    let solved = stacks.iter();
+    solved
+        .map(|stack| solve_with(stack, incidence, orders, true, &mut known))
+        .collect()
 }
 
 /// Without use of symmetry: the slow way, which the fast one is tested against. A wave along the normal
 /// is turned off it by a millionth, where the modes still differ.
 #[doc(hidden)]
 pub fn solve_without_symmetry(stack: &LayerStack, incidence: &Incidence, orders: Orders) -> Result<Response> {
-    solve_with(stack, incidence, orders, false)
+    solve_with(stack, incidence, orders, false, &mut KnownModes::default())
 }
 
-fn solve_with(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetric: bool) -> Result<Response> {
+fn solve_with(
+    stack: &LayerStack,
+    incidence: &Incidence,
+    orders: Orders,
+    symmetric: bool,
+    known: &mut KnownModes,
+) -> Result<Response> {
     off_cutoff(incidence.wavelength_um, |wavelength_um| {
         let incidence = Incidence {
             wavelength_um,
             ..*incidence
         };
-        solve_once(stack, &incidence, orders, symmetric)
+        solve_once(stack, &incidence, orders, symmetric, known)
     })
 }
 
-fn solve_once(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetric: bool) -> Result<Response> {
+fn solve_once(
+    stack: &LayerStack,
+    incidence: &Incidence,
+    orders: Orders,
+    symmetric: bool,
+    known: &mut KnownModes,
+) -> Result<Response> {
     let mut problem = Problem::new(stack, incidence, orders)?;
     let [kx, ky] = incidence.sines;
     let along_normal = kx == 0.0 && ky == 0.0;
@@ -161,13 +189,13 @@ fn solve_once(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetr
     let mirrored = symmetric && problem.stack.is_mirrored();
     let parts = match (mirrored && kx == 0.0, mirrored && ky == 0.0) {
         (false, false) if symmetric && along_normal && !problem.stack.has_upright() => {
-            vec![problem.part(Family::Alike, &unit)?]
+            vec![problem.part(Family::Alike, &unit, known)?]
         }
         (false, false) => {
             if along_normal {
                 problem.k[0] = ALONG_AXIS;
             }
-            vec![problem.part(Family::Product(Space::Full, Space::Full), &unit)?]
+            vec![problem.part(Family::Product(Space::Full, Space::Full), &unit, known)?]
         }
         (split_x, split_y) => {
             let space = |split: bool, even: bool| match (split, even) {
@@ -177,11 +205,11 @@ fn solve_once(stack: &LayerStack, incidence: &Incidence, orders: Orders, symmetr
             };
             let family = |even: bool| Family::Product(space(split_x, even), space(split_y, even));
             // A wave polarised along x has Ex even about both axes; along y, Ey is, and Ex is odd.
-            let along_x = problem.part(family(true), &unit[..1])?;
+            let along_x = problem.part(family(true), &unit[..1], known)?;
             let along_y = if split_x && split_y && problem.stack.is_square() {
                 along_x.turned()
             } else {
-                problem.part(family(false), &unit[1..])?
+                problem.part(family(false), &unit[1..], known)?
             };
             vec![along_x, along_y]
         }
@@ -209,7 +237,7 @@ pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orde
             let space = [Space::Even, Space::Odd][axis];
             let mut arriving = [Complex64::ZERO; 2];
             arriving[axis] = Complex64::ONE;
-            let part = problem.part(Family::Product(space, space), &[arriving])?;
+            let part = problem.part(Family::Product(space, space), &[arriving], &mut KnownModes::default())?;
             response::finite(part.amplitude(&part.ends.transmitted, 0, 0, 0)[axis])
         };
         match polarisations {
@@ -221,12 +249,13 @@ pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orde
 
 /// Where a mode or an order is at its very cutoff the formulas divide zero by zero. The field itself is finite: it is
 /// the limit of those at the wavelengths beside it, which are tried then.
-fn off_cutoff<T>(wavelength_um: f64, solve: impl Fn(f64) -> Result<T>) -> Result<T> {
+fn off_cutoff<T>(wavelength_um: f64, mut solve: impl FnMut(f64) -> Result<T>) -> Result<T> {
     /// Relative, the closest that works. What vanishes at the cutoff goes with the root of the distance: 1e-6 of the
     /// answer for the first.
     const BESIDE: [f64; 3] = [1e-12, 1e-10, 1e-8];
-    let at = |share: f64| solve(wavelength_um * (1.0 + share));
-    BESIDE.into_iter().fold(at(0.0), |found, share| match found {
+    let mut at = |share: f64| solve(wavelength_um * (1.0 + share));
+    let first = at(0.0);
+    BESIDE.into_iter().fold(first, |found, share| match found {
         Err(Error::Cutoff) => at(share),
         found => found,
     })
@@ -271,7 +300,7 @@ impl Problem {
         })
     }
 
-    fn part(&self, family: Family, incident: &[[Complex64; 2]]) -> Result<Part> {
+    fn part(&self, family: Family, incident: &[[Complex64; 2]], known: &mut KnownModes) -> Result<Part> {
         let basis = FieldBasis::new(self.stack.kept(self.orders), family, self.k, self.steps);
         if basis.rows.len() > MOST_UNKNOWNS {
             return Err(Error::TooLarge {
@@ -288,7 +317,18 @@ impl Problem {
                 pitch_nm: self.stack.pitch_nm,
                 lattice: self.stack.lattice,
             };
-            Ok((Modes::of(&section, &basis)?, layer.height_nm))
+            let place = Section {
+                family,
+                kept: self.stack.kept(self.orders),
+                k: self.k,
+                steps: self.steps,
+                pitch_nm: section.pitch_nm,
+                lattice: section.lattice,
+                outline: layer.outline.clone(),
+                inside: section.inside,
+                outside: section.outside,
+            };
+            Ok((known.of(place, || Modes::of(&section, &basis))?, layer.height_nm))
         });
         let indices = [self.stack.below, self.stack.above];
         let ends = propagate_wave(&basis.rows, indices, layers, self.k0_per_nm, incident, |component| {

@@ -5,6 +5,8 @@
 //! is too large. What decays to nothing on the way across the layer does not couple its two ends: those
 //! columns are left out, to rounding.
 
+use std::sync::Arc;
+
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Accum, Mat, Par};
@@ -20,7 +22,7 @@ const GONE: f64 = 1e-15;
 
 /// A layer with its modes, and its thickness times k0.
 struct Slab {
-    modes: Modes,
+    modes: Arc<Modes>,
     depth: f64,
 }
 
@@ -56,7 +58,7 @@ struct Crossed<'a> {
 pub(super) fn propagate_wave(
     rows: &Rows,
     indices: [Complex64; 2],
-    layers: impl Iterator<Item = Result<(Modes, f64)>>,
+    layers: impl Iterator<Item = Result<(Arc<Modes>, f64)>>,
     k0_per_nm: f64,
     incident: &[[Complex64; 2]],
     zero_order: impl Fn(usize) -> Option<(usize, f64)>,
@@ -136,7 +138,7 @@ type Through = Vec<(usize, Complex64)>;
 /// One layer before its load: the modes that reach through, their backward waves at the far end, and
 /// E = p a, G = q a at the near end, for forward waves a there.
 fn cross(rows: &Rows, slab: &Slab, load: &Load<'_>) -> (Through, Mat<Complex64>, Mat<Complex64>, Mat<Complex64>) {
-    let Modes { w, v, gamma } = &slab.modes;
+    let Modes { w, v, gamma } = &*slab.modes;
     let n = rows.len();
     let through: Through = gamma
         .iter()

@@ -2,7 +2,7 @@
 
 use metalith_rcwa::{
     CellLattice, Error, Incidence, Layer, LayerStack, Orders, Outline, Response, Side, SiteLattice, Supercell,
-    circular, solve, solve_without_symmetry, transmit,
+    circular, solve, solve_each, solve_without_symmetry, transmit,
 };
 use num_complex::Complex64;
 
@@ -83,6 +83,37 @@ fn an_upright_rectangle_by_either_rule() {
     let turned = along_normal(Outline::rotated_rectangle(120.0, 230.0, 0.0), 25).jones;
     assert!(largest(&upright, &turned) < APART, "{upright:?} {turned:?}");
     assert!(turned[0][1].norm() < ROUNDING && turned[1][0].norm() < ROUNDING);
+}
+
+/// Stacks that are solved together, of which some differ in heights alone, have the answers that each has by itself, bit by bit.
+#[test]
+fn stacks_that_are_solved_together_are_those_solved_one_by_one() {
+    let of = |width_nm: f64, height_nm: f64, mask_nm: f64| {
+        let mut stack = stack(Outline::rectangle(width_nm, 230.0));
+        stack.layers[0].height_nm = height_nm;
+        let mask = Layer {
+            height_nm: mask_nm,
+            inside: Complex64::new(1.8, 0.01),
+            ..stack.layers[0].clone()
+        };
+        stack.layers.extend((mask_nm > 0.0).then_some(mask));
+        stack
+    };
+    let stacks = [
+        of(120.0, 600.0, 0.0),
+        of(120.0, 610.0, 0.0),
+        of(120.0, 610.0, 20.0),
+        of(120.0, 590.0, 30.0),
+        of(121.0, 590.0, 30.0),
+    ];
+    for sines in [[0.0, 0.0], [0.2, 0.1]] {
+        let incidence = Incidence::of_sines(0.532, Side::Below, sines);
+        let together = solve_each(&stacks, &incidence, orders(7)).unwrap();
+        assert_eq!(together.len(), stacks.len());
+        for (found, stack) in together.iter().zip(&stacks) {
+            assert_eq!(found.jones, solve(stack, &incidence, orders(7)).unwrap().jones);
+        }
+    }
 }
 
 #[test]

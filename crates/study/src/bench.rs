@@ -283,12 +283,6 @@ fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Re
 
 /// Check that rectangles, if the pillars of a design are such, can be made like that.
 fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Result<()> {
-    if design.cell.shape.upright().is_some() {
-        return Err(Error::invalid(
-            "a study of upright rectangles",
-            "use squares, circles or rotated rectangles; `metalith run --model` judges upright ones as made by one process",
-        ));
-    }
     if design.cell.shape.rectangles().is_none() {
         return Ok(());
     }

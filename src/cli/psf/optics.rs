@@ -220,7 +220,7 @@ impl PsfArgs {
             polarised: self.polarised_light(shape),
         };
         model.check_drawn(&stated.stack, found.elements.iter().map(|e| e.widths.histogram()))?;
-        MadeChip::in_light(&stated, model)
+        Ok(MadeChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref()))
     }
 
     /// What solves it for the pillars as drawn.

@@ -7,13 +7,10 @@ use serde::Serialize;
 
 use super::Along;
 use crate::CellStack;
-use crate::kept::{KeptTable, solver_of};
+use crate::kept::{KeptTable, bytes_of, complex_of, solver_of};
 use metalith_core::{PillarShape, UprightRectangles};
 
 const MAGIC: [u8; 8] = *b"MLUPRT\0\x01";
-
-/// Bytes of a pillar: real and imaginary part along x and along y.
-const EACH: usize = 32;
 
 /// The table of all pillars at a wavelength (um) with so many orders an axis.
 pub(super) fn table(
@@ -42,24 +39,20 @@ pub(super) fn table(
     KeptTable::new(folder, "upright", MAGIC, inputs, "upright rectangles")
 }
 
-/// Along x and along y by pillar (f64, little-endian), from the first on.
+/// Along x and along y by pillar, from the first on.
 pub(super) fn encode(along: &Along) -> Vec<u8> {
     let pairs = along[0].iter().zip(&along[1]).skip(1);
-    let numbers = pairs.flat_map(|(x, y)| [x.re, x.im, y.re, y.im]);
-    numbers.flat_map(f64::to_le_bytes).collect()
+    bytes_of(pairs.flat_map(|(x, y)| [*x, *y]))
 }
 
 /// Those of so many pillars; none if the bytes are not of so many, or not finite.
 pub(super) fn decode(content: &[u8], pillars: usize) -> Option<Along> {
-    let (numbers, rest) = content.as_chunks::<8>();
-    let numbers: Vec<f64> = numbers.iter().map(|b| f64::from_le_bytes(*b)).collect();
-    if content.len() != pillars * EACH || !rest.is_empty() || numbers.iter().any(|v| !v.is_finite()) {
-        return None;
-    }
+    let numbers = complex_of(content).filter(|numbers| numbers.len() == 2 * pillars)?;
     let of = |axis: usize| {
-        let each = numbers.as_chunks::<4>().0.iter();
-        let each = each.map(|n| Complex64::new(n[2 * axis], n[2 * axis + 1]));
-        std::iter::once(Complex64::ZERO).chain(each).collect()
+        let each = numbers.as_chunks::<2>().0.iter();
+        std::iter::once(Complex64::ZERO)
+            .chain(each.map(|pair| pair[axis]))
+            .collect()
     };
     Some([0, 1].map(of))
 }

@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use metalith_core::{Error, Progress, Result, Silent, UprightRectangles};
-use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
+use metalith_rcwa::{Incidence, LayerStack, Orders, Outline, Side, solve_each};
 
 use crate::pointwise::BAND_ORDERS;
 use crate::{AxisTables, CellModel, CellStack, Fidelity, ObliqueTables, PolarisationAxis, PolarisedTables};
@@ -42,6 +42,11 @@ impl CellStack {
     /// If corners are rounded, an edge is not a positive number, the foot is wider than the pitch, or the wavelength (um) is outside
     /// the range of a material.
     pub fn birefringent(&self, edges_nm: [f64; 2], wavelength_um: f64, orders: Orders) -> Result<[Complex64; 2]> {
+        let solved = birefringent_stacks(&[(self, edges_nm)], wavelength_um, orders)?;
+        Ok(solved[0])
+    }
+
+    fn birefringent_layers(&self, edges_nm: [f64; 2], wavelength_um: f64) -> Result<LayerStack> {
         let [x, y] = edges_nm;
         if edges_nm.iter().any(|edge| !(edge.is_finite() && *edge > 0.0)) {
             return Err(Error::invalid(
@@ -50,17 +55,33 @@ impl CellStack {
             ));
         }
         self.check_sharp()?;
-        let layers = self.layers_of(wavelength_um, |wider_nm| {
+        self.layers_of(wavelength_um, |wider_nm| {
             let [x, y] = edges_nm.map(|edge| (edge + wider_nm).max(0.0));
             if x <= 0.0 || y <= 0.0 {
                 Outline::empty()
             } else {
                 Outline::rectangle(x, y)
             }
-        })?;
-        let jones = solve(&layers, &Incidence::normal(wavelength_um, Side::Below), orders)?.jones;
-        Ok([jones[0][0], jones[1][1]])
+        })
     }
+}
+
+/// [`CellStack::birefringent`] of several stacks, each with the edges of its pillar (nm): where only the height differs from one to the next, most of the
+/// work is done once.
+///
+/// # Errors
+/// As [`CellStack::birefringent`].
+pub fn birefringent_stacks(
+    pillars: &[(&CellStack, [f64; 2])],
+    wavelength_um: f64,
+    orders: Orders,
+) -> Result<Vec<[Complex64; 2]>> {
+    let stacks = pillars.iter();
+    let stacks = stacks.map(|(stack, edges)| stack.birefringent_layers(*edges, wavelength_um));
+    let stacks = stacks.collect::<Result<Vec<_>>>()?;
+    let solved = solve_each(&stacks, &Incidence::normal(wavelength_um, Side::Below), orders)?;
+    let along = solved.iter().map(|answer| [answer.jones[0][0], answer.jones[1][1]]);
+    Ok(along.collect())
 }
 
 /// Transmissions of light along x and along y of pillars with these edges along x and y (nm), in their order. A pillar that is exchanged

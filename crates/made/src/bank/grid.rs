@@ -1,11 +1,43 @@
-//! The grid that a bank is solved on, and what stands between its nodes.
+//! The grid of the quantities of a pillar that vary, and what stands between its nodes.
 
 use num_complex::Complex64;
 
+use crate::CellChange;
 use crate::cells::lagrange;
+use crate::rational::{around, rational};
 
 /// Nodes of an axis at the least: a cubic takes four.
 const FEWEST: usize = 4;
+
+/// Largest distance of the nodes of height (nm), index, taper (deg), corners and mask (nm), in the order of
+/// [`quantities`]: a twentieth of a turn or so.
+const STEPS: [f64; QUANTITIES] = [5.0, 0.02, 0.75, 10.0, 5.0];
+
+const QUANTITIES: usize = 5;
+
+/// The quantities of a pillar that may vary: height (nm), index, taper (deg), corner rounding (nm), mask (nm).
+fn quantities(change: &CellChange) -> [f64; QUANTITIES] {
+    [
+        change.height_nm,
+        change.index,
+        change.taper_deg,
+        change.corner_rounding_nm,
+        change.residual_mask_nm,
+    ]
+}
+
+pub(super) fn change_of(
+    [height_nm, index, taper_deg, corner_rounding_nm, residual_mask_nm]: [f64; QUANTITIES],
+) -> CellChange {
+    CellChange {
+        height_nm,
+        index,
+        taper_deg,
+        corner_rounding_nm,
+        residual_mask_nm,
+        ..CellChange::default()
+    }
+}
 
 /// Nodes of one quantity of the pillar: one if it does not vary.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,14 +68,22 @@ impl Axis {
         self.first + k as f64 * self.step
     }
 
-    /// Nodes and weights for a value; none if it is outside.
-    pub fn weights(&self, value: f64) -> Option<Vec<(usize, f64)>> {
+    /// All nodes, rising.
+    pub fn all(&self) -> Vec<f64> {
+        (0..self.nodes).map(|k| self.node(k)).collect()
+    }
+
+    /// Where a value is in steps from the first node; none if it is outside.
+    fn steps_to(&self, value: f64) -> Option<f64> {
         let x = (value - self.first) / self.step;
         // Rounding of sums and products at the ends.
         const SLACK: f64 = 1e-6;
-        if !(-SLACK..=(self.nodes - 1) as f64 + SLACK).contains(&x) {
-            return None;
-        }
+        (-SLACK..=(self.nodes - 1) as f64 + SLACK).contains(&x).then_some(x)
+    }
+
+    /// Nodes and weights for a value; none if it is outside.
+    pub fn weights(&self, value: f64) -> Option<Vec<(usize, f64)>> {
+        let x = self.steps_to(value)?;
         if self.nodes == 1 {
             return Some(vec![(0, 1.0)]);
         }
@@ -52,29 +92,62 @@ impl Axis {
     }
 }
 
-/// One wavelength of a bank.
-#[derive(Debug, PartialEq)]
-pub(super) struct Colour {
-    /// Widths that are solved (nm), rising.
-    pub widths_nm: Vec<f64>,
-    /// By stack, width and number of a pillar; the last of each row is a site without pillar.
-    pub t: Vec<Complex64>,
-}
+/// Stacks that are solved: all combinations of the nodes of what varies.
+pub(super) struct StackGrid([Axis; QUANTITIES]);
 
-impl Colour {
-    /// Weights of four widths for any between them; none outside.
-    pub fn weights(&self, width_nm: f64) -> Option<[(usize, f64); 4]> {
-        let (first, last) = (self.widths_nm.first()?, self.widths_nm.last()?);
-        if !(*first..=*last).contains(&width_nm) {
-            return None;
-        }
-        let above = self.widths_nm.partition_point(|w| *w <= width_nm);
-        let from = above.clamp(2, self.widths_nm.len() - 2) - 2;
-        let at = |k: usize| self.widths_nm[from + k];
-        // Lagrange's polynomial through four points at any distances.
-        Some(std::array::from_fn(|k| {
-            let others = (0..4).filter(|j| *j != k);
-            (from + k, others.map(|j| (width_nm - at(j)) / (at(k) - at(j))).product())
+impl StackGrid {
+    /// Over all changes between the least and the most of each number.
+    pub fn over([least, most]: &[CellChange; 2]) -> Self {
+        let (least, most) = (quantities(least), quantities(most));
+        Self(std::array::from_fn(|k| Axis::over(least[k], most[k], STEPS[k])))
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.0.iter().map(|a| a.nodes).product()
+    }
+
+    /// The change of a stack of the grid.
+    pub fn change(&self, mut stack: usize) -> CellChange {
+        change_of(self.0.each_ref().map(|axis| {
+            let k = stack % axis.nodes;
+            stack /= axis.nodes;
+            axis.node(k)
         }))
+    }
+
+    /// Stacks and weights of the cubics along every axis; none if a number is outside.
+    pub fn weights(&self, change: &CellChange) -> Option<Vec<(usize, f64)>> {
+        let mut stacks = vec![(0, 1.0)];
+        let mut stride = 1;
+        for (axis, value) in self.0.iter().zip(quantities(change)) {
+            let nodes = axis.weights(value)?;
+            let pairs = stacks
+                .iter()
+                .flat_map(|(s, w)| nodes.iter().map(move |(k, v)| (s + k * stride, w * v)));
+            stacks = pairs.collect();
+            stride *= axis.nodes;
+        }
+        Some(stacks)
+    }
+
+    /// Whether a change is between the nodes.
+    pub fn holds(&self, change: &CellChange) -> bool {
+        let mut axes = self.0.iter().zip(quantities(change));
+        axes.all(|(axis, value)| axis.steps_to(value).is_some())
+    }
+
+    /// What a change that the grid holds has, by rational functions along every axis, of the values of all stacks.
+    pub fn between(&self, change: &CellChange, of_stacks: impl Iterator<Item = Complex64>) -> Complex64 {
+        let mut values: Vec<Complex64> = of_stacks.collect();
+        for (axis, value) in self.0.iter().zip(quantities(change)) {
+            let nodes = axis.all();
+            let near = around(&nodes, value);
+            let along = values.chunks_exact(axis.nodes);
+            values = along
+                .map(|own| rational(&nodes[near.clone()], &own[near.clone()], value))
+                .collect();
+        }
+        values[0]
     }
 }

@@ -1,9 +1,12 @@
 //! Transmissions over width, wavelength and the quantities of a pillar that vary, solved once for many chips.
 //!
 //! A study judges thousands of chips whose pillars differ a little. To solve the cells of each anew costs more than its
-//! light does; a bank solves them on a grid, and chips take from it by cubic interpolation along every axis.
+//! light does; a bank solves them on a grid, and chips take from it by cubic interpolation along every axis, or of upright
+//! rectangles, which are of many sizes, by rational functions.
 
 mod grid;
+mod sizes;
+mod widths;
 
 use std::path::Path;
 
@@ -11,68 +14,31 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 pub(crate) use self::grid::Axis;
-use self::grid::Colour;
-use super::rectangles::{RowOrders, RowsOfBiases, bare_row, row_length, solve_row};
+use self::grid::StackGrid;
+use self::sizes::{Along, SizeTables, Sizes};
+use self::widths::{Colour, between, coarse, merged};
+use super::rectangles::{RowsOfBiases, bare_row, row_length, solve_rotated, solve_upright};
 use super::stack::{off_cutoff, perturbed, possible_width_nm};
 use super::{CellChange, SolvedWidths};
-use metalith_cell::{CellStack, kept};
-use metalith_core::{Error, Progress, Rectangles, Result};
+use metalith_cell::{CellStack, UPRIGHT_ORDERS, kept};
+use metalith_core::{Error, Progress, Rectangles, Result, RotatedRectangles};
 use metalith_rcwa::Orders;
 
 /// Version of the kept file.
-const MAGIC: [u8; 8] = *b"MLBANK\0\x01";
+const MAGIC: [u8; 8] = *b"MLBANK\0\x02";
 
 /// Longest file that is read.
 const LONGEST: u64 = 1 << 32;
 
-/// Distance of the widths of a bank (nm) where transmission is smooth.
-const WIDTH_STEP_NM: f64 = 1.0;
-
-/// Parts that a step is divided into where it is not: guided-mode resonances are a fraction of a nanometre wide.
-const FINE_PARTS: usize = 8;
-
-/// Where a width is farther than this from the cubic through its four neighbours, transmission is not smooth.
-const ROUGH: f64 = 0.01;
-
-/// Steps on either side of such a width that are divided too: a resonance moves with the pillar.
-const BESIDE: usize = 2;
-
-/// Widths that are solved beyond both ends, so that a cubic has its four points.
-const BEYOND: usize = 2;
-
-/// Largest distance of the nodes of height (nm), index, taper (deg), corners and mask (nm), in the order of
-/// [`quantities`]: a twentieth of a turn or so.
-const STACK_STEPS: [f64; QUANTITIES] = [5.0, 0.02, 0.75, 10.0, 5.0];
-
 /// Stacks that are solved at the most. At some 15 CPU s each that is an hour and a half.
 const MOST_STACKS: usize = 400;
 
-/// Upright rectangles that are solved at the most, before widths between: at some 0.08 CPU s each that is an hour and a half.
-const MOST_UPRIGHT: usize = 70_000;
+/// CPU time that tables of upright rectangles may take (s): an hour and a half.
+const MOST_UPRIGHT_S: f64 = 5400.0;
 
-const QUANTITIES: usize = 5;
-
-/// The quantities of a pillar that may vary: height (nm), index, taper (deg), corner rounding (nm), mask (nm).
-fn quantities(change: &CellChange) -> [f64; QUANTITIES] {
-    [
-        change.height_nm,
-        change.index,
-        change.taper_deg,
-        change.corner_rounding_nm,
-        change.residual_mask_nm,
-    ]
-}
-
-fn change_of([height_nm, index, taper_deg, corner_rounding_nm, residual_mask_nm]: [f64; QUANTITIES]) -> CellChange {
-    CellChange {
-        height_nm,
-        index,
-        taper_deg,
-        corner_rounding_nm,
-        residual_mask_nm,
-        ..CellChange::default()
-    }
-}
+/// CPU time of one of them with [`UPRIGHT_ORDERS`] (s), and the share of it that another height takes, whose modes are known.
+const UPRIGHT_S: f64 = 0.1;
+const KNOWN_SHARE: f64 = 0.05;
 
 /// What a bank covers.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,9 +57,16 @@ pub struct BankRange {
 pub struct CellBank {
     stated: CellStack,
     range: BankRange,
-    widths: Axis,
-    axes: [Axis; QUANTITIES],
-    colours: Vec<Colour>,
+    grid: StackGrid,
+    tables: Tables,
+}
+
+/// Tables of each wavelength.
+enum Tables {
+    /// Over one width.
+    Widths(Vec<Colour>),
+    /// Of upright rectangles of many sizes.
+    Sizes(Sizes, Vec<SizeTables>),
 }
 
 impl CellBank {
@@ -103,33 +76,59 @@ impl CellBank {
     /// If it would be too large, a cell cannot be solved, or the user stopped it.
     pub fn solve(stated: &CellStack, range: BankRange, progress: &dyn Progress) -> Result<Self> {
         let mut bank = Self::empty(stated, range)?;
-        let (colours, stacks) = (bank.range.colours.len(), bank.stacks());
-        let coarse: Vec<f64> = (0..bank.widths.nodes).map(|k| bank.widths.node(k)).collect();
-        progress.begin("solving the tables of cells", (colours * (stacks + 1)) as u64);
-        for colour in 0..colours {
-            let rows = bank.solve_rows(colour, &coarse, progress)?;
-            let added = between(&coarse, &rows, bank.each(), bank.alike());
-            let fine = bank.solve_rows(colour, &added, &Unwatched(progress))?;
-            bank.colours
-                .push(merged((&coarse, &rows), (&added, &fine), bank.each()));
-            progress.advance(1);
-        }
+        let colours = 0..bank.range.colours.len();
+        bank.tables = match &bank.tables {
+            Tables::Widths(_) => {
+                let widths = coarse(bank.range.widths_nm);
+                let steps = colours.len() * (bank.grid.count() + 1);
+                progress.begin("solving the tables of cells", steps as u64);
+                let solved = colours.map(|colour| bank.solve_widths(colour, &widths, progress));
+                Tables::Widths(solved.collect::<Result<_>>()?)
+            }
+            Tables::Sizes(sizes, _) => {
+                let solved = colours.map(|colour| bank.solve_sizes(colour, sizes, progress));
+                Tables::Sizes(sizes.clone(), solved.collect::<Result<_>>()?)
+            }
+        };
         Ok(bank)
+    }
+
+    fn solve_widths(&self, colour: usize, coarse: &[f64], progress: &dyn Progress) -> Result<Colour> {
+        let rows = self.solve_rows(colour, coarse, progress)?;
+        let added = between(coarse, &rows, self.each());
+        let fine = self.solve_rows(colour, &added, &Unwatched(progress))?;
+        progress.advance(1);
+        Ok(merged((coarse, &rows), (&added, &fine), self.each()))
     }
 
     /// One row for each stack: these widths, then a site without pillar.
     fn solve_rows(&self, colour: usize, widths_nm: &[f64], progress: &dyn Progress) -> Result<Vec<Vec<Complex64>>> {
-        (0..self.stacks())
+        (0..self.grid.count())
             .into_par_iter()
             .map(|stack| {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let row = self.solve_row(colour, stack, widths_nm, &Unwatched(progress));
+                let row = self.solve_row(colour, stack, widths_nm);
                 progress.advance(1);
                 row
             })
             .collect()
+    }
+
+    fn solve_sizes(&self, colour: usize, sizes: &Sizes, progress: &dyn Progress) -> Result<SizeTables> {
+        let (um, orders) = self.range.colours[colour];
+        let orders = Orders::new(orders)?;
+        let etched: Vec<CellStack> = (0..self.grid.count()).map(|stack| self.etched(stack)).collect();
+        let solve = |edges: [f64; 2]| -> Result<Vec<Along>> { solve_upright(&etched, edges, um, orders) };
+        let what = format!(
+            "solving upright rectangles in {} at {:.1} nm, some {:.1} minutes of CPU time",
+            counted(etched.len()),
+            um * 1e3,
+            self.sizes_s(colour, sizes) / 60.0
+        );
+        progress.begin(&what, sizes.first() as u64);
+        sizes.solve(&solve, progress)
     }
 
     /// Read the bank that was kept for these inputs.
@@ -154,11 +153,19 @@ impl CellBank {
             return Err(unusable("it holds what is no number".into()));
         }
         let mut rest = numbers.as_slice();
-        for _ in 0..bank.range.colours.len() {
-            let colour =
-                take(&mut rest, bank.stacks() * bank.each()).ok_or_else(|| unusable("numbers are missing".into()))?;
-            bank.colours.push(colour);
-        }
+        let (stacks, each) = (bank.stacks(), bank.each());
+        let colours = 0..bank.range.colours.len();
+        let is_whole = match &mut bank.tables {
+            Tables::Widths(all) => colours
+                .map(|_| Colour::take(&mut rest, stacks * each))
+                .collect::<Option<_>>()
+                .map(|colours| *all = colours),
+            Tables::Sizes(sizes, all) => colours
+                .map(|_| SizeTables::take(&mut rest, sizes, stacks))
+                .collect::<Option<_>>()
+                .map(|colours| *all = colours),
+        };
+        is_whole.ok_or_else(|| unusable("numbers are missing".into()))?;
         Ok(bank)
     }
 
@@ -167,19 +174,24 @@ impl CellBank {
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut numbers: Vec<f64> = Vec::new();
-        for colour in &self.colours {
-            numbers.push(colour.widths_nm.len() as f64);
-            numbers.extend(&colour.widths_nm);
-            numbers.extend(colour.t.iter().flat_map(|z| [z.re, z.im]));
-        }
-        let bytes: Vec<u8> = numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let bytes: Vec<u8> = match &self.tables {
+            Tables::Widths(colours) => colours
+                .iter()
+                .flat_map(Colour::numbers)
+                .flat_map(f64::to_le_bytes)
+                .collect(),
+            Tables::Sizes(_, colours) => colours
+                .iter()
+                .flat_map(SizeTables::numbers)
+                .flat_map(f64::to_le_bytes)
+                .collect(),
+        };
         kept::write(path, MAGIC, &self.inputs(), &bytes)
     }
 
     /// Number of stacks that are solved at every wavelength.
     pub fn stacks(&self) -> usize {
-        self.axes.iter().map(|a| a.nodes).product()
+        self.grid.count()
     }
 
     /// The pillar that changes are counted from.
@@ -188,33 +200,16 @@ impl CellBank {
     }
 
     fn empty(stated: &CellStack, range: BankRange) -> Result<Self> {
-        let [low, high] = range.widths_nm;
-        // A whole number of steps below the narrowest.
-        let first = (low / WIDTH_STEP_NM).floor() * WIDTH_STEP_NM - BEYOND as f64 * WIDTH_STEP_NM;
-        let nodes = ((high - first) / WIDTH_STEP_NM).ceil() as usize + 1 + BEYOND;
-        let [least, most] = range.changes.each_ref().map(quantities);
-        let axes: [Axis; QUANTITIES] = std::array::from_fn(|k| Axis::over(least[k], most[k], STACK_STEPS[k]));
+        let tables = match stated.shape.upright() {
+            Some(pillars) => Tables::Sizes(Sizes::new(pillars, &range.numbers, range.widths_nm), Vec::new()),
+            None => Tables::Widths(Vec::new()),
+        };
         let bank = Self {
             stated: stated.clone(),
-            widths: Axis {
-                first,
-                step: WIDTH_STEP_NM,
-                nodes,
-            },
+            grid: StackGrid::over(&range.changes),
             range,
-            axes,
-            colours: Vec::new(),
+            tables,
         };
-        let upright = bank.stated.shape.upright().is_some();
-        let pillars = bank.stacks() * bank.widths.nodes * bank.range.numbers.len();
-        if upright && pillars > MOST_UPRIGHT {
-            return Err(Error::invalid(
-                format!("{pillars} upright rectangles would have to be solved for every wavelength"),
-                format!(
-                    "vary fewer of bias, height, index, taper and mask at once, or less: at most {MOST_UPRIGHT} are solved"
-                ),
-            ));
-        }
         if bank.stacks() > MOST_STACKS {
             return Err(Error::invalid(
                 format!(
@@ -226,29 +221,40 @@ impl CellBank {
                 ),
             ));
         }
+        if let Tables::Sizes(sizes, _) = &bank.tables {
+            let seconds: f64 = (0..bank.range.colours.len())
+                .map(|colour| bank.sizes_s(colour, sizes))
+                .sum();
+            if seconds > MOST_UPRIGHT_S {
+                return Err(Error::invalid(
+                    format!(
+                        "tables of {} upright rectangles, each in {}, would take {:.1} hours of CPU time",
+                        sizes.first(),
+                        counted(bank.stacks()),
+                        seconds / 3600.0
+                    ),
+                    "vary fewer of height, index, taper and mask at once, or less; of these, height costs least and taper most",
+                ));
+            }
+        }
         Ok(bank)
     }
 
-    /// The change of a stack of the grid.
-    fn change(&self, mut stack: usize) -> CellChange {
-        change_of(self.axes.each_ref().map(|axis| {
-            let k = stack % axis.nodes;
-            stack /= axis.nodes;
-            axis.node(k)
-        }))
+    /// CPU time that the sizes take at one wavelength (s), about.
+    fn sizes_s(&self, colour: usize, sizes: &Sizes) -> f64 {
+        let etched: Vec<CellStack> = (0..self.stacks()).map(|stack| self.etched(stack)).collect();
+        sizes.first() as f64 * upright_s(&etched, self.range.colours[colour].1)
     }
 
-    fn solve_row(
-        &self,
-        colour: usize,
-        stack: usize,
-        widths_nm: &[f64],
-        progress: &dyn Progress,
-    ) -> Result<Vec<Complex64>> {
+    /// A stack of the grid.
+    fn etched(&self, stack: usize) -> CellStack {
+        perturbed(&self.stated, &self.grid.change(stack))
+    }
+
+    fn solve_row(&self, colour: usize, stack: usize, widths_nm: &[f64]) -> Result<Vec<Complex64>> {
         let (um, orders) = self.range.colours[colour];
-        let etched = perturbed(&self.stated, &self.change(stack));
-        let Some(pillars) = self.stated.shape.rectangles() else {
-            let orders = Orders::new(orders)?;
+        let (etched, orders) = (self.etched(stack), Orders::new(orders)?);
+        let Some(pillars) = self.rotated() else {
             let at = |width: f64| {
                 let width = possible_width_nm(&etched, width);
                 off_cutoff(width, |w| etched.transmission(w, um, orders))
@@ -256,13 +262,19 @@ impl CellBank {
             let widths = widths_nm.iter().map(|w| at(*w));
             return widths.chain([etched.transmission(0.0, um, orders)]).collect();
         };
-        let (numbers, orders) = (&self.range.numbers, RowOrders::Given(orders));
         let mut row = Vec::new();
         for bias in widths_nm {
-            row.extend(solve_row(&etched, pillars, numbers, *bias, um, orders, progress)?);
+            row.extend(solve_rotated(&etched, pillars, *bias, um, Some(orders))?);
         }
-        row.extend(bare_row(&etched, pillars, numbers.len(), um)?);
+        row.extend(bare_row(&etched, pillars.into(), 1, um)?);
         Ok(row)
+    }
+
+    fn rotated(&self) -> Option<RotatedRectangles> {
+        match self.stated.shape.rectangles()? {
+            Rectangles::Rotated(pillars) => Some(pillars),
+            Rectangles::Upright(_) => None,
+        }
     }
 
     /// Transmissions of pillars of these widths (nm) with a change, along the normal.
@@ -276,7 +288,7 @@ impl CellBank {
         widths_nm: &[f64],
         wavelength_um: f64,
     ) -> Result<SolvedWidths> {
-        let (pillars, bare) = self.numbers(change, orders, widths_nm, wavelength_um)?;
+        let (pillars, bare) = self.of_widths(change, (wavelength_um, orders), widths_nm)?;
         Ok(SolvedWidths {
             pillars: vec![pillars.into_iter().map(|t| t[0]).collect()],
             bare,
@@ -297,19 +309,17 @@ impl CellBank {
         biases_nm: &[f64],
         numbers: &[u16],
     ) -> Result<RowsOfBiases> {
-        let (mut rows, bare) = self.numbers(change, orders, biases_nm, wavelength_um)?;
-        if let Some(pillars) = self.stated.shape.upright() {
-            let place = |number: &u16| {
-                let place = self.range.numbers.binary_search(number);
-                let [x, y] = pillars.edges_nm(*number);
-                place.map_err(|_| Self::outside(format!("pillar of {x} x {y} nm")))
-            };
-            let places: Vec<usize> = numbers.iter().map(place).collect::<Result<_>>()?;
-            for row in &mut rows {
-                *row = places.iter().flat_map(|k| [row[2 * k], row[2 * k + 1]]).collect();
+        match &self.tables {
+            Tables::Widths(_) => self.of_widths(change, (wavelength_um, orders), biases_nm),
+            Tables::Sizes(sizes, tables) => {
+                let tables = &tables[self.colour((wavelength_um, orders))?];
+                let row = |bias: &f64| self.of_sizes(change, (sizes, tables), numbers, *bias);
+                let rows = biases_nm.iter().map(row).collect::<Result<_>>()?;
+                let pillars = self.stated.shape.rectangles().expect("sizes are of rectangles");
+                let bare = bare_row(&perturbed(&self.stated, change), pillars, numbers.len(), wavelength_um)?;
+                Ok((rows, bare))
             }
         }
-        Ok((rows, bare))
     }
 
     fn outside(what: String) -> Error {
@@ -319,62 +329,59 @@ impl CellBank {
         )
     }
 
-    /// The numbers of pillars of these widths (nm), of rectangles by what their edges are off by, and of a site without pillar.
-    fn numbers(
+    fn colour(&self, colour: (f64, usize)) -> Result<usize> {
+        let place = self.range.colours.iter().position(|c| *c == colour);
+        place.ok_or_else(|| Self::outside(format!("wavelength of {} nm", colour.0 * 1e3)))
+    }
+
+    fn outside_stack(change: &CellChange) -> Error {
+        Self::outside(format!("pillar like {change:?}"))
+    }
+
+    /// The row of upright rectangles with these numbers whose edges are off by `bias_nm`.
+    fn of_sizes(
         &self,
         change: &CellChange,
-        orders: usize,
-        widths_nm: &[f64],
-        wavelength_um: f64,
-    ) -> Result<(Vec<Vec<Complex64>>, Vec<Complex64>)> {
-        let outside = Self::outside;
-        let colour = self.range.colours.iter().position(|c| *c == (wavelength_um, orders));
-        let colour = colour.ok_or_else(|| outside(format!("wavelength of {} nm", wavelength_um * 1e3)))?;
-        let mut stacks = vec![(0, 1.0)];
-        let mut stride = 1;
-        for (axis, value) in self.axes.iter().zip(quantities(change)) {
-            let nodes = axis
-                .weights(value)
-                .ok_or_else(|| outside(format!("pillar like {change:?}")))?;
-            let pairs = stacks
-                .iter()
-                .flat_map(|(s, w)| nodes.iter().map(move |(k, v)| (s + k * stride, w * v)));
-            stacks = pairs.collect();
-            stride *= axis.nodes;
+        (sizes, tables): (&Sizes, &SizeTables),
+        numbers: &[u16],
+        bias_nm: f64,
+    ) -> Result<Vec<Complex64>> {
+        if !self.grid.holds(change) {
+            return Err(Self::outside_stack(change));
         }
+        let mut row = Vec::with_capacity(2 * numbers.len());
+        for number in numbers {
+            let along = self.range.numbers.binary_search(number).ok();
+            let along = along.and_then(|_| sizes.of_stacks(tables, *number, bias_nm));
+            let along = along.ok_or_else(|| Self::outside(sizes.words(*number, bias_nm)))?;
+            row.extend(along.map(|of_stacks| self.grid.between(change, of_stacks)));
+        }
+        Ok(row)
+    }
+
+    /// The numbers of pillars of these widths (nm), of rotated rectangles by what their edges are off by, and of a site without pillar.
+    fn of_widths(&self, change: &CellChange, colour: (f64, usize), widths_nm: &[f64]) -> Result<RowsOfBiases> {
+        let Tables::Widths(colours) = &self.tables else {
+            return Err(Self::outside("pillar of one width".into()));
+        };
+        let (colour, each) = (&colours[self.colour(colour)?], self.each());
+        let stacks = self.grid.weights(change).ok_or_else(|| Self::outside_stack(change))?;
         // One row for this pillar; widths are then taken from it.
-        let (colour, each) = (&self.colours[colour], self.each());
-        let length = (colour.widths_nm.len() + 1) * each;
-        let mut row = vec![Complex64::ZERO; length];
-        for (stack, weight) in stacks {
-            for (sum, t) in row.iter_mut().zip(&colour.t[stack * length..]) {
-                *sum += t * weight;
-            }
-        }
+        let row = colour.row(&stacks, each);
         let at = |width: &f64| -> Result<Vec<Complex64>> {
             let weights = colour
                 .weights(*width)
-                .ok_or_else(|| outside(format!("width of {width} nm")))?;
+                .ok_or_else(|| Self::outside(format!("width of {width} nm")))?;
             let sum = |number: usize| weights.iter().map(|(k, w)| row[k * each + number] * w).sum();
             Ok((0..each).map(sum).collect())
         };
         let pillars = widths_nm.iter().map(at).collect::<Result<_>>()?;
-        Ok((pillars, row[length - each..].to_vec()))
+        Ok((pillars, row[row.len() - each..].to_vec()))
     }
 
-    /// Numbers of each pillar.
+    /// Numbers of each width.
     fn each(&self) -> usize {
-        let pillars = self.stated.shape.rectangles();
-        pillars.map_or(1, |pillars| row_length(pillars, self.range.numbers.len()))
-    }
-
-    /// Numbers of a pillar that are judged together: of upright rectangles those of all, because a resonance is of one size among
-    /// hundreds, and what it does to the light of an element is what it does to the sum over all.
-    fn alike(&self) -> usize {
-        match self.stated.shape.rectangles() {
-            Some(Rectangles::Upright(_)) => self.each().max(1),
-            _ => 1,
-        }
+        self.rotated().map_or(1, |pillars| row_length(pillars.into(), 1))
     }
 
     /// What the numbers follow from.
@@ -389,65 +396,30 @@ impl CellBank {
     }
 }
 
-/// Widths between these where any of the rows, which have `each` numbers a width, is not smooth, rms over each `alike` of them.
-fn between(widths_nm: &[f64], rows: &[Vec<Complex64>], each: usize, alike: usize) -> Vec<f64> {
-    let last = widths_nm.len() - 1;
-    let mut divided = vec![false; last];
-    for (row, first) in rows
-        .iter()
-        .flat_map(|row| (0..each).step_by(alike).map(move |first| (row, first)))
-    {
-        for k in 2..last - 1 {
-            let off = |number: usize| {
-                let [a, b, c, d, e] = [k - 2, k - 1, k, k + 1, k + 2].map(|k| row[k * each + number]);
-                ((b + d) * (2.0 / 3.0) - (a + e) / 6.0 - c).norm_sqr()
-            };
-            let mean = (first..first + alike).map(off).sum::<f64>() / alike as f64;
-            if mean.sqrt() > ROUGH {
-                divided[k.saturating_sub(1 + BESIDE)..(k + 1 + BESIDE).min(last)].fill(true);
-            }
-        }
+/// So many stacks, in words.
+fn counted(stacks: usize) -> String {
+    match stacks {
+        1 => "one stack".into(),
+        _ => format!("{stacks} stacks"),
     }
-    let parts = |k: usize| {
-        let (low, high) = (widths_nm[k], widths_nm[k + 1]);
-        (1..FINE_PARTS).map(move |p| low + (high - low) * p as f64 / FINE_PARTS as f64)
-    };
-    (0..last).filter(|k| divided[*k]).flat_map(parts).collect()
 }
 
-/// Two sets of widths of one wavelength, each with its rows, as one.
-fn merged(
-    (coarse, rows): (&[f64], &[Vec<Complex64>]),
-    (added, fine): (&[f64], &[Vec<Complex64>]),
-    each: usize,
-) -> Colour {
-    let mut order: Vec<(f64, bool, usize)> = coarse.iter().enumerate().map(|(k, w)| (*w, false, k)).collect();
-    order.extend(added.iter().enumerate().map(|(k, w)| (*w, true, k)));
-    order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let whole = rows.iter().zip(fine).flat_map(|(row, fine)| {
-        let widths = order.iter().flat_map(move |(_, is_fine, k)| {
-            let from = if *is_fine { fine } else { row };
-            from[k * each..][..each].iter().copied()
+/// CPU time that one upright rectangle takes in all of these stacks (s), about.
+fn upright_s(etched: &[CellStack], orders: usize) -> f64 {
+    let is_known = |k: usize| {
+        let before = k.checked_sub(1).map(|before| CellStack {
+            height_nm: etched[k].height_nm,
+            ..etched[before].clone()
         });
-        widths.chain(row[coarse.len() * each..].iter().copied())
+        etched[k].slices() == 1 && before.as_ref() == Some(&etched[k])
+    };
+    let sections = (0..etched.len()).map(|k| match is_known(k) {
+        true => KNOWN_SHARE,
+        false => etched[k].slices() as f64,
     });
-    Colour {
-        t: whole.collect(),
-        widths_nm: order.iter().map(|o| o.0).collect(),
-    }
-}
-
-/// One wavelength from the front of the numbers of a file: `rows` for a width.
-fn take(rest: &mut &[f64], rows: usize) -> Option<Colour> {
-    let (count, after) = rest.split_first()?;
-    let count = *count as usize;
-    let (widths, after) = after.split_at_checked(count)?;
-    let (t, after) = after.split_at_checked(2 * rows.checked_mul(count + 1)?)?;
-    *rest = after;
-    (count >= 4).then(|| Colour {
-        widths_nm: widths.to_vec(),
-        t: t.chunks_exact(2).map(|z| Complex64::new(z[0], z[1])).collect(),
-    })
+    // Of a matrix as wide as there are orders over the plane, its cube.
+    let share = orders as f64 / UPRIGHT_ORDERS as f64;
+    UPRIGHT_S * share.powi(6) * sections.sum::<f64>()
 }
 
 /// Hears that the user wants to stop, and counts nothing.

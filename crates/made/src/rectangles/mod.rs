@@ -1,14 +1,17 @@
 //! Rectangles as made: light of both polarisations that they tell apart, and what of it reaches the sensor.
 
+mod kept;
 mod rows;
 mod solved;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use num_complex::Complex64;
 
-pub(crate) use rows::{RowOrders, bare_row, row_length, solve_row};
+use rows::RowOrders;
+pub(crate) use rows::{bare_row, row_length, solve_rotated, solve_upright};
 
 use self::solved::SolvedRectangles;
 use super::cells::SolvedWidths;
@@ -115,6 +118,14 @@ impl MadeRectangles {
             polarised,
             source: RowSource::Solved(Box::new(SolvedRectangles::new(stated.clone(), pillars))),
         })
+    }
+
+    /// The same, whose solved rows are kept in a folder from one run to the next.
+    pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
+        if let RowSource::Solved(solved) = &mut self.source {
+            solved.folder = folder.map(Path::to_owned);
+        }
+        self
     }
 
     /// The same with all rows from a bank of the same pillars.

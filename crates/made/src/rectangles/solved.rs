@@ -1,22 +1,26 @@
 //! Rectangles of one chip as made, solved where they are needed.
 
 use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use num_complex::Complex64;
 
+use super::kept;
 use super::rows::{RowOrders, bare_row, row_length, solve_row};
 use super::{RectangleColour, RowsOfBiases};
 use crate::bank::Axis;
+use crate::rational::{around, rational};
 use crate::{CellChange, perturbed};
+use metalith_cell::kept::bytes_of;
 use metalith_cell::{BAND_ORDERS, CellStack};
 use metalith_core::{Progress, Rectangles, Result};
 
 /// Biases of one element that are solved themselves at the most; of more, those a step apart are.
 const MOST_BIASES: usize = 4;
 
-/// Distance of the biases between which a cubic is taken (nm), as of a bank where transmission is smooth.
-const STEP_NM: f64 = 1.0;
+/// Distance of the biases between which rational functions are taken (nm): they follow resonances that are a nanometre wide to some thousandths.
+const STEP_NM: f64 = 2.0;
 
 /// Pillars of one bias in one light: height of the change, wavelength and bias, bit by bit, and the orders.
 type Place = (u64, u64, u64, RowOrders);
@@ -25,6 +29,8 @@ type Place = (u64, u64, u64, RowOrders);
 pub(crate) struct SolvedRectangles {
     stated: CellStack,
     pillars: Rectangles,
+    /// Where what is solved is kept from one run to the next.
+    pub folder: Option<PathBuf>,
     /// By the number of the pillar: of rotated ones, which one solution is for all of, zero.
     known: Mutex<BTreeMap<u16, HashMap<Place, Vec<Complex64>>>>,
 }
@@ -34,6 +40,7 @@ impl SolvedRectangles {
         Self {
             stated,
             pillars,
+            folder: None,
             known: Mutex::default(),
         }
     }
@@ -63,14 +70,15 @@ impl SolvedRectangles {
         let least = biases_nm.iter().copied().fold(f64::INFINITY, f64::min);
         let most = biases_nm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let axis = Axis::over(least, most, STEP_NM);
-        let nodes: Vec<f64> = (0..axis.nodes).map(|k| axis.node(k)).collect();
-        let nodes = nodes.iter().map(row).collect::<Result<Vec<_>>>()?;
-        let between = |bias: &f64| {
-            let mut sum = vec![Complex64::ZERO; row_length(self.pillars, numbers.len())];
-            for (node, weight) in axis.weights(*bias).unwrap_or_default() {
-                sum.iter_mut().zip(&nodes[node]).for_each(|(to, t)| *to += t * weight);
-            }
-            sum
+        let nodes = axis.all();
+        let rows = nodes.iter().map(row).collect::<Result<Vec<_>>>()?;
+        let between = |bias: &f64| -> Vec<Complex64> {
+            let near = around(&nodes, *bias);
+            let at = |number: usize| {
+                let values: Vec<Complex64> = rows[near.clone()].iter().map(|row| row[number]).collect();
+                rational(&nodes[near.clone()], &values, *bias)
+            };
+            (0..bare.len()).map(at).collect()
         };
         Ok((biases_nm.iter().map(between).collect(), bare))
     }
@@ -97,7 +105,7 @@ impl SolvedRectangles {
             numbers.iter().copied().filter(|number| !is_known(number)).collect()
         };
         if !missing.is_empty() {
-            let solved = solve_row(etched, self.pillars, &missing, bias_nm, um, orders, progress)?;
+            let solved = self.kept_or_solved(etched, (um, orders), bias_nm, &missing, progress)?;
             let each = solved.len() / missing.len();
             let mut known = known();
             for (number, own) in missing.into_iter().zip(solved.chunks_exact(each)) {
@@ -109,5 +117,25 @@ impl SolvedRectangles {
             .iter()
             .flat_map(|number| known[number][&place].clone())
             .collect())
+    }
+
+    /// The row of one bias of the pillars with these numbers, from the folder if it is there.
+    fn kept_or_solved(
+        &self,
+        etched: &CellStack,
+        (um, orders): (f64, RowOrders),
+        bias_nm: f64,
+        numbers: &[u16],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Complex64>> {
+        let length = row_length(self.pillars, numbers.len());
+        let folder = self.folder.as_deref();
+        let table = kept::table(folder, etched, self.pillars, numbers, bias_nm, (um, orders));
+        if let Some(row) = table.read(|content| kept::decode(content, length), progress) {
+            return Ok(row);
+        }
+        let row = solve_row(etched, self.pillars, numbers, bias_nm, um, orders, progress)?;
+        table.write(&bytes_of(row.iter().copied()), progress);
+        Ok(row)
     }
 }

@@ -1,3 +1,5 @@
+use std::path::PathBuf;
+
 use super::*;
 use crate::{BankRange, DeclaredTerm, perturbed};
 use metalith_cell::{Analyser, Polarisation};
@@ -150,6 +152,53 @@ fn upright_rectangles_between_the_nodes_are_those_solved_exactly_along_both_axes
     // Of a size that was not drawn when the bank was made.
     let said = tables(&banked, &[class(1, 0.0)]).unwrap_err().to_string();
     assert!(said.contains("no pillar of 100 x 100 nm"), "{said}");
+}
+
+/// What was kept is taken in place of what would be solved, to the last bit; what is damaged is made anew, and other pillars, biases and stacks have
+/// files of their own.
+#[test]
+fn rows_that_are_kept_are_those_that_were_solved() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = || -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder.path()).unwrap();
+        let mut files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        files
+    };
+    let mut expected = 0;
+    for (pillars, light, number) in [(UPRIGHT.into(), ALONG_X, 3), (ROTATED.into(), HAND, 20)] {
+        let kept = || made(pillars, light).kept_in(Some(folder.path()));
+        let classes = [class(number, 0.3)];
+        let first = tables(&kept(), &classes).unwrap();
+        assert_eq!(first, tables(&made(pillars, light), &classes).unwrap());
+        expected += 1;
+        assert_eq!(files().len(), expected);
+        assert_eq!(tables(&kept(), &classes).unwrap(), first);
+        // The number of a rotated one is its rotation, and one solution is for all of them.
+        tables(&kept(), &[class(number, 0.4)]).unwrap();
+        kept()
+            .tables(&of_height(1.4), &classes, RectangleColour::OfBand(UM), &Silent)
+            .unwrap();
+        expected += 2;
+        assert_eq!(files().len(), expected);
+        for file in files() {
+            let bytes = std::fs::read(&file).unwrap();
+            std::fs::write(&file, &bytes[..bytes.len() - 1]).unwrap();
+        }
+        assert_eq!(tables(&kept(), &classes).unwrap(), first);
+        assert_eq!(files().len(), expected);
+    }
+    // A row that is there is not solved: other numbers under the same inputs are believed.
+    let etched = perturbed(&stack(UPRIGHT.into()), &of_height(1.3));
+    let orders = RowOrders::Given(BAND_ORDERS);
+    let table = kept::table(Some(folder.path()), &etched, UPRIGHT.into(), &[2], 0.0, (UM, orders));
+    let told = [Complex64::new(0.25, 0.5), Complex64::ONE];
+    table.write(&metalith_cell::kept::bytes_of(told), &Silent);
+    let chip = made(UPRIGHT.into(), ALONG_X).kept_in(Some(folder.path()));
+    let PolarisedTables::Axes(found) = tables(&chip, &[class(2, 0.0)]).unwrap() else {
+        panic!("upright rectangles keep both axes apart")
+    };
+    assert_eq!(found.along.map(|along| along[0]), told);
 }
 
 #[test]

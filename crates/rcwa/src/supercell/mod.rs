@@ -12,6 +12,7 @@ mod staggered;
 mod waves;
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use num_complex::Complex64;
 
@@ -245,7 +246,7 @@ impl SupercellProblem {
                 };
                 Modes::structured(&permittivity, rows)?
             };
-            Ok((modes, layer.height_nm))
+            Ok((Arc::new(modes), layer.height_nm))
         });
         let indices = [self.cell.below, self.cell.above];
         let ends = propagate_wave(rows, indices, layers, self.k0_per_nm, incident, |component| {
