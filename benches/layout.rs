@@ -1,7 +1,7 @@
 //! One full-size lens, 6.4 million pillars: widths from the design, and bytes in each hierarchy.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use metalith::array::WidthRule;
+use metalith::array::PillarRule;
 use metalith::phase::{ElementPhase, LensPhase};
 use metalith::{Design, Hierarchy, PillarArray, Silent, write_pillars};
 
@@ -19,7 +19,7 @@ fn layout(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("layout");
     group.sample_size(10).throughput(Throughput::Elements(array.pillars()));
     let lens = LensPhase::new(array.lattice, design.lens.diameter_nm, &design.lens.phase);
-    let rule = WidthRule::new(&design.cell, &design.mapping);
+    let rule = PillarRule::new(&design.cell, &design.mapping);
     let wedge = design.elements()[0].wedge;
     group.bench_function("widths", |b| {
         b.iter(|| rule.widths(&ElementPhase::new(&lens, &wedge), None))

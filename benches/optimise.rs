@@ -2,7 +2,7 @@
 //! the expected image error. The published cell, so that no table is needed.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use metalith::array::WidthRule;
+use metalith::array::PillarRule;
 use metalith::cell::PublishedCell;
 use metalith::optimise::{
     Exchange, FabricationError, FieldProblem, Lens, Mapping, MeritKind, Objective, PixelWindow, Pupil, Rings, Schedule,
@@ -19,7 +19,7 @@ fn optimise(c: &mut Criterion) {
     };
     let cell = PublishedCell::new(350);
     let cells: [&dyn CellModel; 1] = [&cell];
-    let mapping = Mapping::new(&WidthRule::new(&design.cell, &design.mapping));
+    let mapping = Mapping::new(&PillarRule::new(&design.cell, &design.mapping));
     let band = wavelengths(400.0, 700.0, 1.0);
     let rows = || lens.focal_rows(&band, FabricationError::default(), &cells).unwrap();
     let problem = FieldProblem::new(vec![(MeritKind::Log, 1.0, rows())], &cells, mapping, 1 << 30).unwrap();

@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use metalith::wave::{Fold, Matched, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
-use metalith::{Accuracy, Lattice, WidthMap};
+use metalith::{Accuracy, Lattice, PillarMap};
 use num_complex::Complex64;
 
 /// A hyperbolic lens for 550 nm in widths of 100 to 300 nm.
-fn lens(sites: usize, radius_um: f64, focal_um: f64) -> WidthMap {
+fn lens(sites: usize, radius_um: f64, focal_um: f64) -> PillarMap {
     let lattice = Lattice::new(350, sites).expect("a lattice");
-    let mut map = WidthMap::empty(lattice);
-    for ((iy, ix), width) in map.width_nm.indexed_iter_mut() {
+    let mut map = PillarMap::empty(lattice);
+    for ((iy, ix), width) in map.number.indexed_iter_mut() {
         let [x, y] = [ix, iy].map(|i| lattice.coordinate_um(i));
         let r2 = x * x + y * y;
         if r2 <= radius_um * radius_um {

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use std::time::Instant;
 
 use metalith::wave::{Aperture, Fold, PhaseFunction, PillarFunction, Pillars, PlaneWave, Propagator, Scratch, Window};
-use metalith::{Accuracy, Lattice, WidthMap};
+use metalith::{Accuracy, Lattice, PillarMap};
 use num_complex::Complex64;
 
 fn main() {
@@ -42,8 +42,8 @@ fn main() {
     let formed = PillarFunction::new(lattice, 500.0, &table, steered_nm);
     report("steered, formed", &formed, &wave, 2400.0, accuracy, repeats, truth);
 
-    let mut widths = WidthMap::empty(lattice);
-    for ((iy, ix), width) in widths.width_nm.indexed_iter_mut() {
+    let mut widths = PillarMap::empty(lattice);
+    for ((iy, ix), width) in widths.number.indexed_iter_mut() {
         let [x, y] = [ix, iy].map(|i| lattice.coordinate_um(i));
         if x * x + y * y <= 250_000.0 {
             *width = steered_nm(x, y);

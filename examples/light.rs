@@ -39,7 +39,7 @@ fn main() -> Result<()> {
         // Sums of exp(-2 pi i m u) over the pillars of each width, for m = 0 and 1.
         let mut by_width = vec![[Complex64::ZERO; 2]; design.cell.pitch_nm as usize + 1];
         let mut pillars = 0.0;
-        for ((iy, ix), &width) in found.widths.width_nm.indexed_iter() {
+        for ((iy, ix), &width) in found.widths.number.indexed_iter() {
             if let (Some(u), true) = (phase.wrapped(ix, iy), width > 0) {
                 let entry = &mut by_width[usize::from(width)];
                 entry[0] += 1.0;

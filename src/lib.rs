@@ -5,7 +5,7 @@
 //! what is simulated is what is sent to the writer, never what it was meant to be:
 //!
 //! ```text
-//! design text -> Design -> LensPhase -> WidthRule -> PillarArray -> layout bytes
+//! design text -> Design -> LensPhase -> PillarRule -> PillarArray -> layout bytes
 //! layout bytes -> Layout -> Extraction -> Field -> Psf -> Verification -> report
 //! ```
 //!
@@ -111,8 +111,8 @@ pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
 pub use metalith_core::{
-    ElementSite, Error, Fault, Faults, FolderTurn, Lattice, LatticeKind, PillarShape, Progress, Rectangles, Result,
-    RotatedRectangles, Silent, UprightRectangles, Wedge, WholeFile, WidthMap, WidthRows, text,
+    ElementSite, Error, Fault, Faults, FolderTurn, Lattice, LatticeKind, PillarMap, PillarRows, PillarShape, Progress,
+    Rectangles, Result, RotatedRectangles, Silent, UprightRectangles, Wedge, WholeFile, text,
 };
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;

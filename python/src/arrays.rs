@@ -6,7 +6,7 @@ use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
 use metalith::{
-    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarShape, Wedge, WidthMap,
+    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarMap, PillarShape, Wedge,
     extract,
 };
 use numpy::ndarray::Array2;
@@ -172,7 +172,7 @@ impl Array {
             ))
         })?;
         let widths = py.detach(|| self.array.widths(placed).into_owned());
-        Ok(PyArray2::from_owned_array(py, widths.width_nm))
+        Ok(PyArray2::from_owned_array(py, widths.number))
     }
 
     /// Write the pillar layout, as GDSII or OASIS by the ending of the name. Returns the number of bytes.
@@ -243,7 +243,7 @@ pub fn array_of_widths(
         )));
     }
     let kind = kind_of(lattice).map_err(error)?;
-    let maps: Vec<WidthMap> = widths
+    let maps: Vec<PillarMap> = widths
         .iter()
         .map(|w| width_map(w.as_array().to_owned(), pitch_nm, kind, shape))
         .collect::<metalith::Result<_>>()
@@ -262,7 +262,7 @@ pub fn width_map(
     pitch_nm: u32,
     kind: LatticeKind,
     shape: PillarShape,
-) -> metalith::Result<WidthMap> {
+) -> metalith::Result<PillarMap> {
     check_shape(kind, shape)?;
     let lattice = lattice_of(kind, pitch_nm, width_nm.dim(), "map")?;
     let widest_nm = kind.widest_nm(pitch_nm);
@@ -292,7 +292,10 @@ pub fn width_map(
         ));
     }
     check_places(lattice, &width_nm, |w| *w != 0)?;
-    Ok(WidthMap { lattice, width_nm })
+    Ok(PillarMap {
+        lattice,
+        number: width_nm,
+    })
 }
 
 /// What a layout holds: names, centres (nm) and widths (nm) of its elements, pitch (nm) and kind of their lattices, number of
@@ -345,7 +348,7 @@ pub fn read_layout<'py>(
         names.push(site.name);
         centres_nm.push(site.centre_nm);
         // The memory that it was read into becomes the array's: nothing is copied.
-        widths_nm.push(PyArray2::from_owned_array(py, widths.width_nm));
+        widths_nm.push(PyArray2::from_owned_array(py, widths.number));
     }
     let kind = kind.to_string();
     Ok((

@@ -8,7 +8,7 @@ use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
 use metalith::extract::GdsPillars;
 use metalith::gds::ReadLimits;
 use metalith::{
-    Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, Result, SimulationCases, WidthRows as _, cell_models,
+    Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, PillarRows as _, Result, SimulationCases, cell_models,
 };
 use pyo3::prelude::*;
 

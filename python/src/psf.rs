@@ -7,7 +7,7 @@ use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
 use metalith::{
-    Accuracy, Error, MadeChip, PillarShape, Progress, Result, Wedge, WidthMap, WidthRows as _, cell_models,
+    Accuracy, Error, MadeChip, PillarMap, PillarRows as _, PillarShape, Progress, Result, Wedge, cell_models,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -53,7 +53,7 @@ struct Lit {
     /// Radius of the opening in the metal around it (um); that of the circle around the pillars if none is given.
     aperture_radius_um: Option<f64>,
     shape: PillarShape,
-    widths: WidthMap,
+    widths: PillarMap,
     wedge: Wedge,
     /// From the pillars to the plane that is looked at (um).
     distance_um: f64,
@@ -350,7 +350,7 @@ pub fn psf_of_widths<'py>(
                     stack,
                 };
                 let chip = MadeChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());
-                chip.check_drawn(maps.iter().map(WidthMap::histogram))?;
+                chip.check_drawn(maps.iter().map(PillarMap::histogram))?;
                 (None, Some(chip))
             }
         };

@@ -8,7 +8,7 @@ use metalith::cell::{
 };
 use metalith::design::band_about;
 use metalith::grating::{Mapping, NeighbourCell};
-use metalith::{CalibratedModel, CellModel, Error, Fidelity, LatticeKind, PillarShape, Rectangles, Result, WidthMap};
+use metalith::{CalibratedModel, CellModel, Error, Fidelity, LatticeKind, PillarMap, PillarShape, Rectangles, Result};
 
 /// What pillars are simulated as.
 pub enum Wanted {
@@ -106,7 +106,7 @@ pub fn refuse(wanted: Fidelity, shape: PillarShape, kind: LatticeKind) -> Result
 pub fn cell_of(
     wanted: Fidelity,
     stack: CellStack,
-    maps: &[WidthMap],
+    maps: &[PillarMap],
     light: PolarisedLight,
     wavelengths_nm: &[f64],
 ) -> Result<Box<dyn CellModel>> {
@@ -121,7 +121,7 @@ pub fn cell_of(
         }
         (Fidelity::Published, ..) => Box::new(PublishedCell::new(stack.pitch_nm as u32)),
         (Fidelity::Neighbours, ..) => {
-            let mapping = Mapping::of_widths(maps.iter().map(WidthMap::histogram))?;
+            let mapping = Mapping::of_widths(maps.iter().map(PillarMap::histogram))?;
             Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder()))
         }
         (Fidelity::Fitted, ..) => {
@@ -134,7 +134,7 @@ pub fn cell_of(
 }
 
 /// The widths that are drawn (nm), rising.
-fn drawn(maps: &[WidthMap]) -> Vec<u16> {
+fn drawn(maps: &[PillarMap]) -> Vec<u16> {
     let mut widths: Vec<u16> = Vec::new();
     for map in maps {
         let histogram = map.histogram();

@@ -9,8 +9,8 @@ use metalith::design::{CellIncidence, LatticeOrders};
 use metalith::picture::thumbnail;
 use metalith::report::{Figure, sig};
 use metalith::{
-    Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, Result, SimulationCases, Verification,
-    WidthRows, cell_models, verify,
+    Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, PillarRows, Result, SimulationCases,
+    Verification, cell_models, verify,
     verify::{Simulation, verify_in_parts, verify_pillars},
     write_report,
 };

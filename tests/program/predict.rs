@@ -310,7 +310,7 @@ fn a_compensated_layout_reads_back_as_compensated() {
     let plan = ExtractionPlan::discover(design.layout.layers.pillars.number());
     let found: Extraction = extract(&Layout::open(&file).unwrap(), &plan, &Silent).unwrap();
     assert_eq!(found.pillars, array.pillars());
-    let narrowest = |widths: &metalith::WidthMap| widths.width_nm.iter().copied().filter(|w| *w > 0).min();
+    let narrowest = |widths: &metalith::PillarMap| widths.number.iter().copied().filter(|w| *w > 0).min();
     let drawn = found.elements.iter().filter_map(|e| narrowest(&e.widths)).min();
     let meant = done
         .array

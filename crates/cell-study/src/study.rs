@@ -11,7 +11,7 @@ use metalith_cell::{
 };
 use metalith_core::{Error, Result};
 use metalith_design::Design;
-use metalith_design::array::WidthRule;
+use metalith_design::array::PillarRule;
 
 use crate::SteeredStudy;
 
@@ -214,7 +214,7 @@ fn mappings(
         let mut mapping = design.mapping.clone();
         mapping.polynomial = polynomial.clone();
         mapping.table = None;
-        let rule = WidthRule::new(&design.cell, &mapping);
+        let rule = PillarRule::new(&design.cell, &mapping);
         MappingTable::sampled(|u| rule.width_nm(u))
     };
     let curve = PhaseCurve::new(cell, design.mapping.wavelength_um, writable)?;

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Compensated;
 use super::line::Line;
 use metalith_cell::{PolarisationAxis, PolarisedLight};
-use metalith_core::{Error, Progress, Result, WidthMap};
+use metalith_core::{Error, PillarMap, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_layout::read_pillars;
@@ -69,7 +69,7 @@ fn of_element(
     design: &Design,
     line: &Line,
     element: &Element,
-    [plain, corrected]: [&WidthMap; 2],
+    [plain, corrected]: [&PillarMap; 2],
     progress: &dyn Progress,
 ) -> Result<Vec<CompensationCase>> {
     let lens = &design.lens;
@@ -79,7 +79,7 @@ fn of_element(
         amplitude: 1.0,
         phase_rad: |_, _| 0.0,
     };
-    let chips: [(&'static str, &MadeChip, &WidthMap); CHIPS] = [
+    let chips: [(&'static str, &MadeChip, &PillarMap); CHIPS] = [
         ("intended", &line.stated, plain),
         ("made, uncorrected", &line.chip, plain),
         ("made, corrected", &line.chip, corrected),

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::line::{ColourTransmissions, Line};
-use metalith_core::WidthMap;
+use metalith_core::PillarMap;
 
 /// Rounds of choosing widths and then the free phases; both converge in a few.
 const ROUNDS: usize = 6;
@@ -32,8 +32,8 @@ pub struct DrawnWidths {
 
 impl Kinds {
     /// Count the pillars of an element that stands for `copies`.
-    pub fn count(&mut self, widths: &WidthMap, steps: &[i32], copies: u64) {
-        for (&w, &step) in widths.width_nm.iter().zip(steps) {
+    pub fn count(&mut self, widths: &PillarMap, steps: &[i32], copies: u64) {
+        for (&w, &step) in widths.number.iter().zip(steps) {
             if w > 0 {
                 *self.0.entry((w, step)).or_default() += copies;
             }

@@ -95,7 +95,7 @@ pub fn compensate(
         error[1] = choice.after;
         for ((to, class), steps) in drawn.classes.iter_mut().zip(&array.classes).zip(&steps) {
             let (to, from) = (to.widths.map_mut(), class.widths.map());
-            for ((to, &w), &step) in to.width_nm.iter_mut().zip(&from.width_nm).zip(steps) {
+            for ((to, &w), &step) in to.number.iter_mut().zip(&from.number).zip(steps) {
                 if w > 0 {
                     *to = choice.drawn[&(w, step)];
                 }
@@ -113,7 +113,7 @@ pub fn compensate(
     let (mut moved, mut pillars, mut at_limit) = (0.0, 0, 0);
     for (k, (new, old)) in drawn.classes.iter_mut().zip(&array.classes).enumerate() {
         let (drawn, intended) = (new.widths.map_mut(), old.widths.map());
-        for (&d, &w) in drawn.width_nm.iter().zip(&intended.width_nm) {
+        for (&d, &w) in drawn.number.iter().zip(&intended.number) {
             if w > 0 {
                 let pairs = edges(d).into_iter().zip(edges(w));
                 moved += copies(k) as f64 * 0.5 * pairs.clone().map(|(d, w)| (d - w).powi(2)).sum::<f64>();

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use metalith_cell::{CellModel, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder};
-use metalith_core::{Error, PillarShape, Progress, Rectangles, Result, WidthMap};
+use metalith_core::{Error, PillarMap, PillarShape, Progress, Rectangles, Result};
 use metalith_design::Design;
 use metalith_made::{CalibratedModel, MadeChip, Perturbation};
 
@@ -109,10 +109,10 @@ impl Line {
     }
 
     /// Steps that density adds to the width at every site of a layout as drawn, row by row.
-    pub fn steps(&self, drawn: &WidthMap) -> Vec<i32> {
+    pub fn steps(&self, drawn: &PillarMap) -> Vec<i32> {
         let element = self.chip.drawn(drawn, self.aperture_radius_um);
         let steps = element.site_steps(&self.chip.perturbation().geometry);
-        steps.unwrap_or_else(|| vec![0; drawn.width_nm.len()])
+        steps.unwrap_or_else(|| vec![0; drawn.number.len()])
     }
 
     /// Solve all pillars that may be drawn as made, for these steps of density at the least and at the most.

@@ -66,7 +66,7 @@ fn upright_rectangles_are_drawn_longer_where_they_come_out_short() {
     let (drawn, was) = (&compensated.array.classes[0], &intended.classes[0]);
     let (drawn, was) = (drawn.widths.map(), was.widths.map());
     let (mut pillars, mut ends) = (0, 0);
-    for (&to, &from) in drawn.width_nm.iter().zip(&was.width_nm) {
+    for (&to, &from) in drawn.number.iter().zip(&was.number) {
         assert_eq!(to == 0, from == 0);
         if to > 0 {
             let [to, from] = [to, from].map(|number| design.cell.shape.edges_nm(number));

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use crate::{Lattice, WidthRows};
+use crate::{Lattice, PillarRows};
 
 /// Sites along the side of a tile of 2 kB: whoever goes along a row meets each memory page of it once, not one at every
 /// site beyond the diagonal.
 const TILE: usize = 32;
 
 /// Pillar widths of one element, one for each set of sites that mirrors and quarter turns take into one another: an
-/// eighth of the memory of a [`WidthMap`](crate::WidthMap).
+/// eighth of the memory of a [`PillarMap`](crate::PillarMap).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EighthMap {
     lattice: Lattice,
@@ -41,7 +41,7 @@ impl EighthMap {
     }
 
     /// The pillars of an element that all eight symmetries leave as it is.
-    pub fn of(rows: &(impl WidthRows + ?Sized)) -> Self {
+    pub fn of(rows: &(impl PillarRows + ?Sized)) -> Self {
         let mut map = Self::empty(rows.lattice());
         let (n, mut room) = (map.lattice.sites(), Vec::new());
         for iy in n / 2..n {
@@ -107,12 +107,12 @@ impl EighthMap {
     }
 }
 
-impl WidthRows for EighthMap {
+impl PillarRows for EighthMap {
     fn lattice(&self) -> Lattice {
         self.lattice
     }
 
-    fn width(&self, ix: usize, iy: usize) -> u16 {
+    fn number(&self, ix: usize, iy: usize) -> u16 {
         self.width_nm[self.place(ix, iy)]
     }
 
@@ -167,7 +167,7 @@ impl WidthRows for EighthMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::WidthMap;
+    use crate::PillarMap;
 
     /// Even and odd lattices: rows, single sites, counts and the whole agree with a map that is held in full.
     #[test]
@@ -175,12 +175,12 @@ mod tests {
         for n in [1, 2, 3, 8, 13, 130, 197] {
             let lattice = Lattice::new(350, n).unwrap();
             let mut eighth = EighthMap::empty(lattice);
-            let mut whole = WidthMap::empty(lattice);
+            let mut whole = PillarMap::empty(lattice);
             for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
                 let radius = lattice.half_radius2(ix, iy) as u16;
                 let width = if radius.is_multiple_of(5) { 0 } else { radius };
                 *eighth.at(ix, iy) = width;
-                whole.width_nm[[iy, ix]] = width;
+                whole.number[[iy, ix]] = width;
                 let copies = (0..n * n)
                     .map(|k| [lattice.half_index(k % n).abs(), lattice.half_index(k / n).abs()])
                     .filter(|[x, y]| {
@@ -192,14 +192,14 @@ mod tests {
             assert_eq!(eighth.whole(), whole);
             assert_eq!(EighthMap::of(&whole), eighth);
             assert_eq!(eighth.histogram(), whole.histogram());
-            assert_eq!(WidthRows::pillars(&eighth), whole.pillars());
+            assert_eq!(PillarRows::pillars(&eighth), whole.pillars());
             let mut room = Vec::new();
             for iy in 0..n {
                 assert_eq!(
                     eighth.row(iy, n / 3..n, &mut room),
-                    &whole.width_nm.row(iy).to_vec()[n / 3..]
+                    &whole.number.row(iy).to_vec()[n / 3..]
                 );
-                assert!((0..n).all(|ix| eighth.width(ix, iy) == whole.width_nm[[iy, ix]]));
+                assert!((0..n).all(|ix| eighth.number(ix, iy) == whole.number[[iy, ix]]));
             }
         }
     }

@@ -6,7 +6,7 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::{PillarShape, WidthRows};
+use crate::{PillarRows, PillarShape};
 
 /// How the sites of a lattice lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
@@ -343,41 +343,43 @@ impl Lattice {
     }
 }
 
-/// Pillar widths of one element on its lattice: the array that a layout is written from, and that is
+/// The pillars of one element on its lattice: the array that a layout is written from, and that is
 /// read back from one.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct WidthMap {
+pub struct PillarMap {
     /// Where the sites are.
     pub lattice: Lattice,
-    /// Width of the pillar at each site (nm), zero where there is none. Shape `[sites, sites]`, row
-    /// index along +y, column index along +x. The width is its own index into tables of the cell.
-    pub width_nm: Array2<u16>,
+    /// What tells the pillar at each site from others of its shape, zero where there is none: the width of a square or a circle (nm),
+    /// the number of a rectangle. Shape `[sites, sites]`, row index along +y, column index along +x. It is its own index into tables of
+    /// the cell.
+    pub number: Array2<u16>,
 }
 
-impl WidthMap {
+impl PillarMap {
     /// A lattice without pillars.
     pub fn empty(lattice: Lattice) -> Self {
         let n = lattice.sites();
         Self {
             lattice,
-            width_nm: Array2::zeros((n, n)),
+            number: Array2::zeros((n, n)),
         }
     }
 
     /// Number of sites with a pillar.
     pub fn pillars(&self) -> u64 {
-        WidthRows::pillars(self)
+        PillarRows::pillars(self)
     }
 
     /// Radius of the circle about the element's centre that holds the centres of all of its pillars (um); zero
     /// without pillars.
     pub fn circle_um(&self) -> f64 {
-        WidthRows::circle_um(self)
+        PillarRows::circle_um(self)
     }
 
-    /// Number of pillars of each width; index is the width (nm), the first entry counts empty sites.
+    /// How many pillars there are of each width (nm), or of each number of a rectangle, which is the index; the first entry counts empty
+    /// sites.
     pub fn histogram(&self) -> Vec<u64> {
-        WidthRows::histogram(self)
+        PillarRows::histogram(self)
     }
 }
 

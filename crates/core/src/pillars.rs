@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use crate::{Lattice, LayerNumber, PillarShape, Progress, Result, WidthMap};
+use crate::{Lattice, LayerNumber, PillarMap, PillarShape, Progress, Result};
 
 /// Where an element is and which lattice its pillars should stand on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,7 +66,7 @@ pub trait PillarReader: Sync {
         shape: PillarShape,
         elements: &[ElementSite],
         progress: &dyn Progress,
-    ) -> Result<Vec<WidthMap>>;
+    ) -> Result<Vec<PillarMap>>;
 }
 
 #[cfg(test)]

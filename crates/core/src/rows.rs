@@ -1,27 +1,27 @@
-//! Widths of an element, row by row: held, or made when they are asked for.
+//! The pillars of an element, row by row: held, or made when they are asked for.
 
 use std::ops::Range;
 
-use crate::{Lattice, WidthMap};
+use crate::{Lattice, PillarMap};
 
-/// Pillar widths of one element. An element of 10 mm has 800 million sites: who reads it row by row needs none but a row
+/// The pillars of one element, each told by a number: the width of a square or a circle (nm), the number of a rectangle. An element of 10 mm has 800 million sites: who reads it row by row needs none but a row
 /// of them in memory.
-pub trait WidthRows: Sync {
+pub trait PillarRows: Sync {
     /// Where the sites are.
     fn lattice(&self) -> Lattice;
 
-    /// Width of the pillar in column `ix` of row `iy` (nm), zero where there is none.
-    fn width(&self, ix: usize, iy: usize) -> u16;
+    /// The pillar in column `ix` of row `iy`, zero where there is none.
+    fn number(&self, ix: usize, iy: usize) -> u16;
 
-    /// Widths of some columns of row `iy` (nm). What is not held anyway is made in `room`.
+    /// The pillars of some columns of row `iy`. What is not held anyway is made in `room`.
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16];
 
-    /// As [`WidthRows::row`], for who asks only where pillars are: any number but zero stands for a width.
+    /// As [`PillarRows::row`], for who asks only where pillars are: any number but zero stands for one.
     fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         self.row(iy, columns, room)
     }
 
-    /// Call `with` with row, column and width (nm) of every pillar, rows from below.
+    /// Call `with` with row, column and number of every pillar, rows from below.
     fn each_pillar(&self, mut with: impl FnMut(usize, usize, u16))
     where
         Self: Sized,
@@ -42,8 +42,8 @@ pub trait WidthRows: Sync {
         (0..n).map(in_row).sum()
     }
 
-    /// Width of the widest pillar (nm); zero without pillars.
-    fn widest_nm(&self) -> u16 {
+    /// The largest number of a pillar: the width of the widest square or circle (nm); zero without pillars.
+    fn largest_number(&self) -> u16 {
         let n = self.lattice().sites();
         let mut room = Vec::new();
         let in_row = |iy| self.row(iy, 0..n, &mut room).iter().copied().max().unwrap_or(0);
@@ -66,11 +66,11 @@ pub trait WidthRows: Sync {
     }
 
     /// All of them as a map, if that is how they are held.
-    fn held(&self) -> Option<&WidthMap> {
+    fn held(&self) -> Option<&PillarMap> {
         None
     }
 
-    /// Number of pillars of each width; index is the width (nm), the first entry counts empty sites.
+    /// How many pillars there are of each number, which is the index; the first entry counts empty sites.
     fn histogram(&self) -> Vec<u64> {
         let n = self.lattice().sites();
         let (mut counts, mut room) = (Vec::new(), Vec::new());
@@ -87,11 +87,11 @@ pub trait WidthRows: Sync {
     }
 
     /// All of them, held.
-    fn whole(&self) -> WidthMap {
-        let mut map = WidthMap::empty(self.lattice());
+    fn whole(&self) -> PillarMap {
+        let mut map = PillarMap::empty(self.lattice());
         let mut room = Vec::new();
         let n = map.lattice.sites();
-        for (iy, mut to) in map.width_nm.outer_iter_mut().enumerate() {
+        for (iy, mut to) in map.number.outer_iter_mut().enumerate() {
             let row = self.row(iy, 0..n, &mut room);
             to.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
         }
@@ -99,22 +99,22 @@ pub trait WidthRows: Sync {
     }
 }
 
-impl WidthRows for WidthMap {
+impl PillarRows for PillarMap {
     fn lattice(&self) -> Lattice {
         self.lattice
     }
 
-    fn width(&self, ix: usize, iy: usize) -> u16 {
-        self.width_nm[[iy, ix]]
+    fn number(&self, ix: usize, iy: usize) -> u16 {
+        self.number[[iy, ix]]
     }
 
-    fn held(&self) -> Option<&WidthMap> {
+    fn held(&self) -> Option<&PillarMap> {
         Some(self)
     }
 
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, _room: &'r mut Vec<u16>) -> &'r [u16] {
         let n = self.lattice.sites();
-        let all = self.width_nm.as_slice().expect("rows are contiguous");
+        let all = self.number.as_slice().expect("rows are contiguous");
         &all[iy * n..(iy + 1) * n][columns]
     }
 }

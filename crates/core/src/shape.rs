@@ -40,7 +40,7 @@ impl PillarShape {
     }
 
     /// Area of the square of its width, or of the rectangle (nm^2): times [`PillarShape::area_share`] that of the pillar.
-    pub fn square_nm2(self, number: u16) -> u64 {
+    pub fn box_nm2(self, number: u16) -> u64 {
         match self {
             Self::Square | Self::Circle => u64::from(number) * u64::from(number),
             Self::Rectangle(pillars) => {
@@ -61,7 +61,7 @@ impl PillarShape {
 
     /// Area of a pillar (nm^2).
     pub fn area_nm2(self, number: u16) -> f64 {
-        self.square_nm2(number) as f64 * self.area_share()
+        self.box_nm2(number) as f64 * self.area_share()
     }
 
     /// The rectangles, if it is one.

@@ -11,7 +11,7 @@ use metalith_grating::{Mapping, NeighbourCell};
 use metalith_rcwa::{CellLattice, Material};
 
 use crate::spec::UnderSpec;
-use crate::{Design, WidthRule};
+use crate::{Design, PillarRule};
 
 /// The band of designs whose wavelengths are all visible (um): that of colour sensors.
 pub const VISIBLE_UM: (f64, f64) = (0.4, 0.7);
@@ -187,6 +187,6 @@ pub fn neighbour_cell(design: &Design, cache: Option<PathBuf>) -> Result<Neighbo
 
 /// How often the elements of a design draw each width beside which others: one mapping for each rule.
 pub fn mappings(design: &Design) -> Vec<Mapping> {
-    let rules = WidthRule::all(design);
+    let rules = PillarRule::all(design);
     rules.iter().map(|rule| Mapping::new(|u| rule.width_nm(u))).collect()
 }

@@ -7,7 +7,7 @@ mod lattice_orders;
 pub mod phase;
 mod spec;
 
-pub use array::{PillarArray, WidthRule};
+pub use array::{PillarArray, PillarRule};
 pub use cells::{VISIBLE_UM, band_about, cell_models, mappings, neighbour_cell};
 pub use design::Design;
 pub use lattice_orders::{AskedLight, LatticeOrders, Medium};

@@ -54,7 +54,7 @@ fn another_cell_needs_a_mapping_of_its_own() {
         let nm = name.split_once('_').unwrap().1;
         let design = parse(name, &mapped(name, &format!("wavelength_nm = {nm}\n{start}"))).unwrap();
         let (narrow, wide) = design.cell.width_range_nm;
-        let rule = metalith_design::WidthRule::of_element(&design, design.elements()[0].index);
+        let rule = metalith_design::PillarRule::of_element(&design, design.elements()[0].index);
         // A straight line from the narrowest pillar to the widest, to a step.
         assert_eq!(rule.width_nm(0.0), narrow);
         assert!(wide - rule.width_nm(0.9999) <= design.cell.width_step_nm);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use metalith_cell::{FocusedLight, Polarisation, PolarisationAxis};
-use metalith_core::{Result, Silent, WidthRows};
+use metalith_core::{PillarRows, Result, Silent};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarArray};
 
@@ -44,7 +44,7 @@ fn pillars_are_chosen_by_both_phases() {
             [Some(x), Some(y)] => library.number([x, y]),
             _ => 0,
         };
-        assert_eq!(map.width_nm[[iy, ix]], number, "{ix} {iy}");
+        assert_eq!(map.number[[iy, ix]], number, "{ix} {iy}");
         unlike += u32::from(number > 0 && wanted[0] != wanted[1]);
     }
     assert!(unlike > 30_000, "{unlike}");
@@ -53,7 +53,7 @@ fn pillars_are_chosen_by_both_phases() {
     let rows = computed.rows(computed.central());
     let mut room = Vec::new();
     for iy in 0..n {
-        assert_eq!(rows.row(iy, 0..n, &mut room), map.width_nm.row(iy).as_slice().unwrap());
+        assert_eq!(rows.row(iy, 0..n, &mut room), map.number.row(iy).as_slice().unwrap());
     }
 }
 

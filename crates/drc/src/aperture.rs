@@ -8,7 +8,7 @@ use super::polygon::{point_segment, ring_of};
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::EQUAL_NM;
 use super::work::Stop;
-use metalith_core::WidthRows;
+use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point, Rect};
 

@@ -9,7 +9,7 @@ use super::work::{Stop, Work};
 use std::borrow::Cow;
 
 use metalith_core::document::{Limits, Section};
-use metalith_core::{Lattice, WidthRows};
+use metalith_core::{Lattice, PillarRows};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{AskedLight, Design, Medium};
 

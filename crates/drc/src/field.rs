@@ -5,10 +5,10 @@ use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::ROUNDING_NM;
-use metalith_core::WidthRows;
+use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::Rect;
-use metalith_gds::extract::{ExtractedElement, HeldWidths};
+use metalith_gds::extract::{ExtractedElement, HeldPillars};
 
 /// Fields of one size, in a grid about the centre of each element or of the layout.
 struct FieldRule {
@@ -96,7 +96,7 @@ impl FieldRule {
             let cut = |w: u16, axis: usize, distance: f64| w != 0 && distance < flat.half_nm(w)[axis] - ROUNDING_NM;
             let words = || "cut by a field boundary".to_owned();
             for &(column, distance) in &columns {
-                for row in (0..n).filter(|&row| cut(e.widths.width(column, row), 0, distance)) {
+                for row in (0..n).filter(|&row| cut(e.widths.number(column, row), 0, distance)) {
                     found.rect(&flat.pillar(k, row, column), words);
                 }
             }
@@ -122,7 +122,7 @@ impl FieldRule {
             let nm = |v: i64| v as f64 * flat.unit_nm;
             let middle = [nm(r.x0 + r.x1) / 2.0, nm(r.y0 + r.y1) / 2.0];
             let nearest = flat.elements.iter().min_by(|a, b| {
-                let far = |e: &ExtractedElement<HeldWidths>| {
+                let far = |e: &ExtractedElement<HeldPillars>| {
                     let c = e.site.centre_nm;
                     (c[0] as f64 - middle[0]).hypot(c[1] as f64 - middle[1])
                 };
@@ -160,9 +160,9 @@ impl Rule for FieldRule {
             // Small lenses stand in the middle of the lattice of the largest.
             let n = e.site.lattice.sites();
             let columns = self.lines(flat, k, 0, 0).into_iter();
-            let columns = columns.filter(|&(column, _)| (0..n).any(|row| e.widths.width(column, row) != 0));
+            let columns = columns.filter(|&(column, _)| (0..n).any(|row| e.widths.number(column, row) != 0));
             let rows = self.lines(flat, k, 1, 0).into_iter();
-            let rows = rows.filter(|&(row, _)| (0..n).any(|column| e.widths.width(column, row) != 0));
+            let rows = rows.filter(|&(row, _)| (0..n).any(|column| e.widths.number(column, row) != 0));
             let lines = columns.count() + rows.count();
             if lines > 0 {
                 let half = (e.site.lattice.place_nm(0, 0).abs() + i64::from(e.site.lattice.pitch_nm()) / 2) as f64;

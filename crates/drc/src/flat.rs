@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::body::Body;
 use super::work::Work;
-use metalith_core::{PillarShape, WidthRows};
+use metalith_core::{PillarRows, PillarShape};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
-use metalith_gds::extract::{ExtractedElement, HeldWidths};
+use metalith_gds::extract::{ExtractedElement, HeldPillars};
 use metalith_gds::{LayerNumber, Layout, Point, Rect};
 
 /// Everything on one layer that is not a pillar on the lattice of an element.
@@ -74,7 +74,7 @@ pub(super) struct FlatLayout<'a> {
     /// What pillars are.
     pub shape: PillarShape,
     /// Elements with the pillars on their lattices.
-    pub elements: Vec<ExtractedElement<HeldWidths>>,
+    pub elements: Vec<ExtractedElement<HeldPillars>>,
     /// Why there are none, if there are none.
     pub no_elements: String,
     pub loose: BTreeMap<LayerNumber, Loose>,
@@ -109,7 +109,7 @@ impl FlatLayout<'_> {
                 let x = e.site.centre_nm[0] + e.site.lattice.place_nm(0, column);
                 let y = e.site.centre_nm[1] + e.site.lattice.place_nm(1, row);
                 let corner = |(dx, dy): (i64, i64)| Point::new(unit(x + dx), unit(y + dy));
-                let [a, b, c, d] = pillars.corners(e.widths.width(column, row)).map(corner);
+                let [a, b, c, d] = pillars.corners(e.widths.number(column, row)).map(corner);
                 Body::Tilted([a, b, c, d, a])
             }
         }
@@ -129,7 +129,7 @@ impl FlatLayout<'_> {
     /// The box around the pillar at a site, in database units.
     pub fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
         let e = &self.elements[element];
-        let [half_x, half_y] = self.half_nm(e.widths.width(column, row));
+        let [half_x, half_y] = self.half_nm(e.widths.number(column, row));
         let x = (e.site.centre_nm[0] + e.site.lattice.place_nm(0, column)) as f64;
         let y = (e.site.centre_nm[1] + e.site.lattice.place_nm(1, row)) as f64;
         let unit = |nm: f64| self.units(nm).round() as i64;

@@ -6,7 +6,7 @@ use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NO_DESIGN, NotRun, Rule, RuleOutcome, from_design};
 use super::tolerance::{EQUAL_NM, ROUNDING_NM};
-use metalith_core::WidthRows;
+use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point};
 

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::body::Body;
 use super::flat::{FlatLayout, Loose};
 use super::work::{Stop, Work};
-use metalith_core::WidthRows;
+use metalith_core::PillarRows;
 use metalith_gds::{LayerNumber, Rect};
 
 /// The rectangle between two shapes, or where they overlap: where to look.
@@ -158,7 +158,7 @@ fn pillars_in<'s>(
     r: Rect,
 ) -> impl Iterator<Item = Body<'static>> + 's {
     rows.flat_map(move |row| columns.clone().map(move |column| (row as usize, column as usize)))
-        .filter(move |&(row, column)| flat.elements[element].widths.width(column, row) != 0)
+        .filter(move |&(row, column)| flat.elements[element].widths.number(column, row) != 0)
         .map(move |(row, column)| flat.body(element, row, column))
         .filter(move |body| {
             let p = body.bounds();

@@ -8,7 +8,7 @@
 //! found is the best there is if several starts end there. Beside it the mapping of the design, mean over where its phase
 //! starts. From the folder `crates/grating`: `cargo run --release --example best_rows`; 5 CPU minutes.
 
-use metalith_design::{Design, WidthRule};
+use metalith_design::{Design, PillarRule};
 use metalith_grating::{Blaze, CoarseCell};
 use metalith_rcwa::SiteLattice;
 use rand::{Rng, SeedableRng};
@@ -27,7 +27,7 @@ const OFFSETS: usize = 12;
 
 fn main() {
     let design = Design::read(&metalith_testing::design("wide_5x5")).expect("a design of the repository");
-    let rule = WidthRule::new(&design.cell, &design.mapping);
+    let rule = PillarRule::new(&design.cell, &design.mapping);
     let stack = design.cell_stack().expect("a cell");
     let range = design.cell.width_range_nm;
     let (low, high) = (f64::from(range.0), f64::from(range.1));

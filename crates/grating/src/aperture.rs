@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use num_complex::{Complex32, Complex64};
 
-use metalith_core::{Error, Lattice, Result, WidthMap};
+use metalith_core::{Error, Lattice, PillarMap, Result};
 use metalith_wave::Aperture;
 
 use crate::node::{FIRST_KEPT, KEPT};
@@ -34,7 +34,7 @@ pub struct LocalCell<'a> {
 /// them. Widths that the mapping does not draw transmit as such a cell.
 #[derive(Clone, Debug)]
 pub struct GratingPillars<'a> {
-    widths: &'a WidthMap,
+    widths: &'a PillarMap,
     slopes: &'a SlopeMap,
     radius_um: f64,
     /// Column of each drawn width (nm).
@@ -54,7 +54,7 @@ impl<'a> GratingPillars<'a> {
     /// # Errors
     /// If a width is beyond the table of the cell.
     pub fn new(
-        widths: &'a WidthMap,
+        widths: &'a PillarMap,
         slopes: &'a SlopeMap,
         mapping: &Mapping,
         table: &GratingTable,
@@ -125,7 +125,7 @@ impl Aperture for GratingPillars<'_> {
     }
 
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
-        let widths = self.widths.width_nm.row(iy);
+        let widths = self.widths.number.row(iy);
         let bins = &self.bins[iy / BLOCK * self.blocks..];
         for (ix, (t, &width)) in row.iter_mut().zip(widths).enumerate() {
             let table = bins[ix / BLOCK] as usize * self.width;
@@ -149,7 +149,7 @@ fn transmission(width: u16, mapping: &Mapping, orders: &[Complex64; KEPT], by_wi
 }
 
 /// Widths of an element (nm), rising from 0, each once.
-fn drawn_widths(widths: &WidthMap) -> Vec<u16> {
+fn drawn_widths(widths: &PillarMap) -> Vec<u16> {
     let counts = widths.histogram().into_iter().enumerate();
     counts
         .filter(|(w, n)| *w == 0 || *n > 0)

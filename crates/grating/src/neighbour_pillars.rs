@@ -3,7 +3,7 @@
 use num_complex::{Complex32, Complex64};
 
 use metalith_cell::{NEIGHBOURS, NeighbourResponse, SiteResponse};
-use metalith_core::{Error, Lattice, Result, WidthMap};
+use metalith_core::{Error, Lattice, PillarMap, Result};
 use metalith_wave::Aperture;
 
 use crate::Orientation;
@@ -18,7 +18,7 @@ const MOST_WIDTHS: usize = 1000;
 /// pillar nothing passes, and a missing neighbour counts with the mean over all widths.
 #[derive(Clone, Debug)]
 pub struct NeighbourPillars<'a> {
-    widths: &'a WidthMap,
+    widths: &'a PillarMap,
     radius_um: f64,
     /// Column of each drawn width (nm); that after the last stands for no pillar.
     columns: Vec<u16>,
@@ -35,7 +35,7 @@ impl<'a> NeighbourPillars<'a> {
     /// # Errors
     /// As [`NeighbourPillars::new`].
     pub fn polarised(
-        widths: &'a WidthMap,
+        widths: &'a PillarMap,
         responses: &[NeighbourResponse; 2],
         sines: [f64; 2],
         polarisation: usize,
@@ -49,7 +49,7 @@ impl<'a> NeighbourPillars<'a> {
     ///
     /// # Errors
     /// If there are too many widths to make a table of their pairs.
-    pub fn new(widths: &'a WidthMap, response: &impl SiteResponse, sines: [f64; 2]) -> Result<Self> {
+    pub fn new(widths: &'a PillarMap, response: &impl SiteResponse, sines: [f64; 2]) -> Result<Self> {
         let orientation = Orientation::of(sines, [0.0; 2]);
         let counts = widths.histogram().into_iter().enumerate().skip(1);
         let drawn: Vec<u16> = counts.filter(|(_, n)| *n > 0).map(|(w, _)| w as u16).collect();
@@ -93,7 +93,7 @@ impl<'a> NeighbourPillars<'a> {
         let n = self.widths.lattice.sites();
         let mut all = vec![self.count as u16; n + 2 * REACH];
         if let Some(iy) = iy.filter(|iy| *iy < n) {
-            for (to, width) in all[REACH..].iter_mut().zip(self.widths.width_nm.row(iy)) {
+            for (to, width) in all[REACH..].iter_mut().zip(self.widths.number.row(iy)) {
                 *to = self.columns[usize::from(*width)];
             }
         }
@@ -155,9 +155,9 @@ mod tests {
         }
     }
 
-    fn widths() -> WidthMap {
-        let mut widths = WidthMap::empty(Lattice::new(350, 9).unwrap());
-        for ((iy, ix), w) in widths.width_nm.indexed_iter_mut() {
+    fn widths() -> PillarMap {
+        let mut widths = PillarMap::empty(Lattice::new(350, 9).unwrap());
+        for ((iy, ix), w) in widths.number.indexed_iter_mut() {
             *w = if (ix * iy) % 7 == 3 {
                 0
             } else {
@@ -176,7 +176,7 @@ mod tests {
         for iy in 0..9_usize {
             pillars.fill_row(iy, &mut row);
             for (ix, t) in row.iter().enumerate() {
-                let own = widths.width_nm[(iy, ix)];
+                let own = widths.number[(iy, ix)];
                 let mut wanted = Complex64::ZERO;
                 if own > 0 {
                     wanted = responses[1].own(f64::from(own));
@@ -184,7 +184,7 @@ mod tests {
                         // In the table's frame x is -y of the element.
                         let (x, y) = (ix as i32 + dy, iy as i32 - dx);
                         if (0..9).contains(&x) && (0..9).contains(&y) {
-                            let other = widths.width_nm[(y as usize, x as usize)];
+                            let other = widths.number[(y as usize, x as usize)];
                             if other > 0 {
                                 wanted += responses[1].pair(number, f64::from(own), f64::from(other));
                             }
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn nothing_passes_without_pillars() {
-        let widths = WidthMap::empty(Lattice::new(350, 4).unwrap());
+        let widths = PillarMap::empty(Lattice::new(350, 4).unwrap());
         let pillars = NeighbourPillars::new(&widths, &response(3), [0.0; 2]).unwrap();
         let mut row = vec![Complex32::ONE; 4];
         pillars.fill_row(2, &mut row);

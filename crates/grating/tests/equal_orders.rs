@@ -6,7 +6,7 @@ mod truth_rows;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use metalith_design::{Design, WidthRule};
+use metalith_design::{Design, PillarRule};
 use metalith_grating::Blaze;
 use metalith_rcwa::{Incidence, Side, SiteLattice, Supercell, SupercellResponse, solve_supercell};
 use num_complex::Complex64;
@@ -57,7 +57,7 @@ fn blaze(row: &Row) -> Blaze {
 }
 
 fn solve(row: &Row, blaze: &Blaze, design: &Design) -> SupercellResponse {
-    let rule = WidthRule::new(&design.cell, &design.mapping);
+    let rule = PillarRule::new(&design.cell, &design.mapping);
     let stack = design.cell_stack().unwrap();
     let wavelength_um = f64::from(row.wavelength_nm) * 1e-3;
     let lattice = SiteLattice::of_grating(blaze.turns, blaze.sites).unwrap();

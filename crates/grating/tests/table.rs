@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use metalith_cell::{CellModel, PointwiseCell};
-use metalith_core::{Lattice, Silent, WidthMap};
-use metalith_design::{Design, WidthRule};
+use metalith_core::{Lattice, PillarMap, Silent};
+use metalith_design::{Design, PillarRule};
 use metalith_grating::{
     CoarseCell, FIRST_KEPT, GratingPillars, GratingTable, GratingTableSpec, GratingVector, LocalCell, Mapping,
     Orientation, SlopeMap,
@@ -43,7 +43,7 @@ struct Prototype {
 impl Prototype {
     fn new() -> Self {
         let design = Design::read(&metalith_testing::design("prototype_3x3")).unwrap();
-        let rule = WidthRule::new(&design.cell, &design.mapping);
+        let rule = PillarRule::new(&design.cell, &design.mapping);
         let mapping = Mapping::new(|u| rule.width_nm(u));
         Self { design, mapping }
     }
@@ -136,16 +136,16 @@ fn truth_rows_follow_from_their_neighbours_in_the_table() {
 #[test]
 fn a_prism_sends_its_light_where_its_grating_does() {
     let prototype = Prototype::new();
-    let rule = WidthRule::new(&prototype.design.cell, &prototype.design.mapping);
+    let rule = PillarRule::new(&prototype.design.cell, &prototype.design.mapping);
     // A prism of 60 um that turns by 15 degrees at 550 nm: six cells a turn, but for one part in a hundred, so that all
     // phases occur.
     let (k, um, sites) = (0.1647, 0.53, 172);
     let lattice = Lattice::new(350, sites).unwrap();
     let turns = |x: usize| k * x as f64;
-    let mut widths = WidthMap::empty(lattice);
+    let mut widths = PillarMap::empty(lattice);
     for x in 0..sites {
         widths
-            .width_nm
+            .number
             .column_mut(x)
             .fill(rule.width_nm(turns(x).rem_euclid(1.0)));
     }

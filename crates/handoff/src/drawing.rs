@@ -8,7 +8,7 @@ use gds21::{
     GdsTextElem, GdsUnits,
 };
 
-use metalith_core::{Error, Result, Silent, WholeFile, WidthRows};
+use metalith_core::{Error, PillarRows, Result, Silent, WholeFile};
 use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, Symmetry};
 use metalith_gds::Layout;

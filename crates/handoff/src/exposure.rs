@@ -4,7 +4,7 @@ use super::census::Census;
 use super::dose::{Beam, Exposure, WriteTime};
 use super::fields;
 use super::process::Process;
-use metalith_core::{PillarShape, Rectangles, Result, WidthRows};
+use metalith_core::{PillarRows, PillarShape, Rectangles, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 

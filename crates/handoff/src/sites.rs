@@ -1,6 +1,6 @@
 //! Places on the chip at which widths are to be measured, and crosses to align by.
 
-use metalith_core::{LatticeKind, PillarShape, Rectangles, WidthMap};
+use metalith_core::{LatticeKind, PillarMap, PillarShape, Rectangles};
 use serde::Serialize;
 
 use super::pad::{DrawnSize, legal_width, upright_sizes, whole_mdeg};
@@ -168,12 +168,12 @@ fn from_own(shape: PillarShape, own: u16, other: u16) -> i32 {
 
 /// For each width or rotation and each ring of the lens the site whose neighbours differ least from it; among equals
 /// the one nearest the x axis, where a stage finds it by moving along one axis.
-fn best_sites(map: &WidthMap, shape: PillarShape, radius_um: f64, targets: &[u16], zones: usize) -> Vec<BestSite> {
+fn best_sites(map: &PillarMap, shape: PillarShape, radius_um: f64, targets: &[u16], zones: usize) -> Vec<BestSite> {
     let n = map.lattice.sites();
     let mut best: Vec<Option<(u64, BestSite)>> = (0..targets.len() * zones).map(|_| None).collect();
     for iy in 0..n {
         for ix in 0..n {
-            let number = map.width_nm[[iy, ix]];
+            let number = map.number[[iy, ix]];
             let Some(target) = targets.iter().position(|&w| w == number) else {
                 continue;
             };
@@ -196,16 +196,16 @@ fn best_sites(map: &WidthMap, shape: PillarShape, radius_um: f64, targets: &[u16
 }
 
 /// Least and greatest pillar about a site, from its own; none where one is missing.
-fn around(map: &WidthMap, shape: PillarShape, ix: usize, iy: usize) -> Option<(i32, i32)> {
+fn around(map: &PillarMap, shape: PillarShape, ix: usize, iy: usize) -> Option<(i32, i32)> {
     let half = match map.lattice.kind() {
         LatticeKind::Square => &AROUND_SQUARE[..],
         LatticeKind::Hexagonal => map.lattice.neighbours(),
     };
-    let own = map.width_nm[[iy, ix]];
+    let own = map.number[[iy, ix]];
     let all = half.iter().flat_map(|[x, y]| [[*x, *y], [-x, -y]]);
     all.into_iter().try_fold((0, 0), |(low, high), [x, y]| {
         let place = [iy.checked_add_signed(y as isize)?, ix.checked_add_signed(x as isize)?];
-        let other = *map.width_nm.get(place)?;
+        let other = *map.number.get(place)?;
         let apart = from_own(shape, own, other);
         (other > 0).then_some((low.min(apart), high.max(apart)))
     })

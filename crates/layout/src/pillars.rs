@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::form::PillarForm;
 use super::frame::LibraryFrame;
 use super::{coordinate, point, polygon};
-use metalith_core::{Error, Progress, Result, WholeFile, WidthRows};
+use metalith_core::{Error, PillarRows, Progress, Result, WholeFile};
 use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, PillarArray, PlacedElement, Symmetry};
 use metalith_gds::write::{PolygonRecord, ReferenceRecord, SquareRecord};
@@ -237,7 +237,7 @@ impl<'a> PillarWriter<'a> {
     /// side on all threads, written in order.
     fn rows(
         &mut self,
-        widths: &impl WidthRows,
+        widths: &impl PillarRows,
         runs: impl Fn(usize) -> [Range<usize>; 2] + Sync,
         encode: impl Fn(&mut Vec<u8>, PlacedPillar) + Sync,
     ) -> Result<()> {

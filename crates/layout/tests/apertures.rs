@@ -81,7 +81,7 @@ fn pillars_stand_in_the_aperture_and_nowhere_else() {
     let lattice = array.lattice;
     for (k, placed) in array.placed.iter().enumerate() {
         let widths = array.widths(placed);
-        for ((iy, ix), &w) in widths.width_nm.indexed_iter() {
+        for ((iy, ix), &w) in widths.number.indexed_iter() {
             let (x, y) = (lattice.coordinate_nm(ix), lattice.coordinate_nm(iy));
             assert!(inside(k, x, y).is_none_or(|held| held == (w != 0)), "{k} at ({x}, {y})");
         }
@@ -108,7 +108,7 @@ fn they_are_read_back_from_every_hierarchy_and_format() {
             let read = extract(&layout, &extraction_plan(&design), &Silent).unwrap();
             assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0));
             for (element, placed) in read.elements.iter().zip(&array.placed) {
-                assert!(element.widths.width_nm == array.widths(placed).width_nm);
+                assert!(element.widths.number == array.widths(placed).number);
             }
         }
     }

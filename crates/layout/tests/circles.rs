@@ -33,7 +33,7 @@ fn holds(path: &Path, design: &Design, array: &PillarArray) {
         assert_eq!(read.shape, PillarShape::Circle, "{name}");
         assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0), "{name}");
         for (element, placed) in read.elements.iter().zip(&array.placed) {
-            assert_eq!(element.widths.width_nm, array.widths(placed).width_nm, "{name}");
+            assert_eq!(element.widths.number, array.widths(placed).number, "{name}");
         }
     }
     let squares = extract(&layout, &plan(design, PillarShape::Square), &Silent).unwrap();

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use metalith_core::{PillarShape, Silent, WidthRows};
+use metalith_core::{PillarRows, PillarShape, Silent};
 use metalith_design::array::Symmetry;
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_design::{Design, Hierarchy, PillarArray, WidthRule};
+use metalith_design::{Design, Hierarchy, PillarArray, PillarRule};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, Why, extract, fits};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, extraction_plan, write_pillars_as};
@@ -41,7 +41,7 @@ fn expected(design: &Design, element: usize) -> BTreeMap<(i64, i64), u16> {
         corners.iter().zip(next).all(left)
     };
     let phase = ElementPhase::of(&lens, &element);
-    let rule = WidthRule::of_element(design, element.index);
+    let rule = PillarRule::of_element(design, element.index);
     let lattice = design.lattice();
     let middle = lattice.sites() as i64 / 2;
     let radius2 = (own.radius_um() * 1e3).powi(2);
@@ -79,7 +79,7 @@ fn holds(path: &Path, design: &Design, array: &PillarArray) {
         assert_eq!(element.widths.histogram()[1..], found.widths.histogram()[1..], "{name}");
     }
     for (k, (element, placed)) in read.elements.iter().zip(&array.placed).enumerate() {
-        assert_eq!(element.widths.width_nm, array.widths(placed).width_nm, "{name}");
+        assert_eq!(element.widths.number, array.widths(placed).number, "{name}");
         let lattice = element.site.lattice;
         let mut there = BTreeMap::new();
         element.widths.each_pillar(|iy, ix, width| {

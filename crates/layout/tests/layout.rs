@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use metalith_core::{Silent, WholeFile, WidthRows};
-use metalith_design::array::ClassWidths;
+use metalith_core::{PillarRows, Silent, WholeFile};
+use metalith_design::array::ClassPillars;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Point, ReadLimits, Selection, Shape, Transform, Visitor};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_as};
@@ -129,8 +129,8 @@ fn elements_that_are_not_held_give_the_same_bytes() {
     }
     for (design, hierarchy, format) in cases {
         let (held, computed) = (held(design), computed(design));
-        assert!(matches!(held.classes[0].widths, ClassWidths::Held(_)));
-        assert!(matches!(computed.classes[0].widths, ClassWidths::Computed(_)));
+        assert!(matches!(held.classes[0].widths, ClassPillars::Held(_)));
+        assert!(matches!(computed.classes[0].widths, ClassPillars::Computed(_)));
         assert_eq!(held.pillars(), computed.pillars());
         let same = bytes(design, &held, hierarchy, format) == bytes(design, &computed, hierarchy, format);
         assert!(same, "{} {hierarchy:?} {format:?}", design.name);

@@ -89,7 +89,7 @@ fn each_pillar_is_read_back_as_one_of_its_element() {
                     let meant = array.widths(placed);
                     let label = placed.element.label();
                     assert!(
-                        element.widths.width_nm == meant.width_nm,
+                        element.widths.number == meant.number,
                         "{format:?} {hierarchy:?} {label}"
                     );
                 }

@@ -105,7 +105,7 @@ fn every_pillar_is_read_back_from_every_hierarchy_and_format() {
             for (element, placed) in read.elements.iter().zip(&array.placed) {
                 let meant = array.widths(placed);
                 assert!(
-                    element.widths.width_nm == meant.width_nm,
+                    element.widths.number == meant.number,
                     "{format:?} {hierarchy:?} {}",
                     placed.element.label()
                 );
@@ -181,7 +181,7 @@ fn a_smaller_lens_of_another_focal_length_has_the_pillars_of_a_design_of_it() {
     assert_eq!(own.pillars(), small.pillars());
     let (n, beside) = (small.lattice.sites(), (own.lattice.sites() - small.lattice.sites()) / 2);
     for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
-        assert_eq!(own.width_nm[[iy + beside, ix + beside]], small.width_nm[[iy, ix]]);
+        assert_eq!(own.number[[iy + beside, ix + beside]], small.number[[iy, ix]]);
     }
 }
 

@@ -30,7 +30,7 @@ fn holds(path: &Path, design: &Design, array: &PillarArray) {
         assert_eq!(read.shape, PillarShape::Rectangle(PILLARS.into()), "{name}");
         assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0), "{name}");
         for (element, placed) in read.elements.iter().zip(&array.placed) {
-            assert_eq!(element.widths.width_nm, array.widths(placed).width_nm, "{name}");
+            assert_eq!(element.widths.number, array.widths(placed).number, "{name}");
         }
     }
     // Upright ones, of a rotation of none or a quarter turn, are upright rectangles and no squares.
@@ -82,7 +82,7 @@ fn rotations_are_half_of_the_phase_and_what_the_lattice_asks_for() {
         let lens = metalith_design::phase::LensPhase::of(&design);
         let phase = metalith_design::phase::ElementPhase::of(&lens, &array.central().element);
         let mut pillars = 0;
-        for ((iy, ix), &number) in widths.width_nm.indexed_iter().filter(|(_, n)| **n != 0) {
+        for ((iy, ix), &number) in widths.number.indexed_iter().filter(|(_, n)| **n != 0) {
             let turns = sign * PILLARS.drawn_rotation(number) / std::f64::consts::PI;
             let wanted = phase.wrapped(ix, iy).unwrap();
             let added = design.mapping.rotation.added(std::f64::consts::TAU * wanted) / std::f64::consts::PI;

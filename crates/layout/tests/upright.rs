@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use metalith_core::{PillarShape, Silent, WidthMap};
+use metalith_core::{PillarMap, PillarShape, Silent};
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, extract};
@@ -27,8 +27,8 @@ fn holds(path: &Path, design: &Design, array: &PillarArray) {
         assert!(read.shape.upright().is_some(), "{name}: {found:?}");
         for (element, placed) in read.elements.iter().zip(&array.placed) {
             // Where a lens has no pillar in the outermost sites, fewer are found.
-            let edges = |map: &WidthMap, of: &dyn Fn(u16) -> [u16; 2]| -> BTreeMap<[i64; 2], [u16; 2]> {
-                let there = map.width_nm.indexed_iter().filter(|(_, number)| **number > 0);
+            let edges = |map: &PillarMap, of: &dyn Fn(u16) -> [u16; 2]| -> BTreeMap<[i64; 2], [u16; 2]> {
+                let there = map.number.indexed_iter().filter(|(_, number)| **number > 0);
                 let place = |iy, ix| [map.lattice.place_nm(0, ix), map.lattice.place_nm(1, iy)];
                 there.map(|((iy, ix), number)| (place(iy, ix), of(*number))).collect()
             };

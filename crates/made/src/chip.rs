@@ -15,7 +15,7 @@ use super::{
     NotApplied, Perturbation, RectangleClass, cell_direction, mixed, realised_nm,
 };
 use metalith_cell::{CellStack, LitStack, PassedTable, PolarisedLight, PolarisedTables};
-use metalith_core::{Error, Progress, Result, WidthMap};
+use metalith_core::{Error, PillarMap, Progress, Result};
 use metalith_wave::Psf;
 use metalith_wave::{Accuracy, Fold, PlaneWave, Propagator, Scratch, Window};
 
@@ -151,7 +151,7 @@ impl MadeChip {
     }
 
     /// Pillars of this chip's shape as drawn, with the radius of the opening in the metal around them (um).
-    pub fn drawn<'a>(&self, pillars: &'a WidthMap, aperture_radius_um: f64) -> DrawnElement<'a> {
+    pub fn drawn<'a>(&self, pillars: &'a PillarMap, aperture_radius_um: f64) -> DrawnElement<'a> {
         DrawnElement::new(pillars, aperture_radius_um).of_shape(self.cells.stack().shape)
     }
 

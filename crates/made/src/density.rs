@@ -1,6 +1,6 @@
 //! How much is exposed around a pillar.
 
-use metalith_core::{PillarShape, WidthMap};
+use metalith_core::{PillarMap, PillarShape};
 use rayon::prelude::*;
 
 /// Range of the backscattered electrons over which fill is averaged (um): exp(-r^2 / range^2).
@@ -14,7 +14,7 @@ const STRIP: usize = 16;
 
 /// Area fraction of pillars of a shape around each site, averaged with a Gaussian of [`RANGE_UM`]. Row by row, `sites * sites`
 /// values, each between 0 and 1; what is around the lattice counts as empty.
-pub fn fill(pillars: &WidthMap, shape: PillarShape) -> Vec<f32> {
+pub fn fill(pillars: &PillarMap, shape: PillarShape) -> Vec<f32> {
     let lattice = pillars.lattice;
     let n = lattice.sites();
     let steps_nm = lattice.steps_nm().map(f64::from);
@@ -24,7 +24,7 @@ pub fn fill(pillars: &WidthMap, shape: PillarShape) -> Vec<f32> {
         Some(_) if w == 0 => 0.0,
         Some(_) => (shape.area_nm2(w) / (steps_nm[0] * steps_nm[1])) as f32,
     };
-    let mut plane: Vec<f32> = pillars.width_nm.iter().map(|&w| area(w)).collect();
+    let mut plane: Vec<f32> = pillars.number.iter().map(|&w| area(w)).collect();
     // Rows, then columns as the rows of the transposed plane.
     for step_um in lattice.steps_um() {
         blur_rows(&mut plane, n, &kernel(step_um));
@@ -82,10 +82,10 @@ mod tests {
 
     #[test]
     fn fill_is_the_share_of_area_inside_and_half_of_it_at_an_edge() {
-        let mut map = WidthMap::empty(Lattice::new(350, 1000).unwrap());
+        let mut map = PillarMap::empty(Lattice::new(350, 1000).unwrap());
         for iy in 0..1000 {
             for ix in 0..500 {
-                map.width_nm[[iy, ix]] = 175;
+                map.number[[iy, ix]] = 175;
             }
         }
         let fill = fill(&map, PillarShape::Square);
@@ -99,12 +99,12 @@ mod tests {
     #[test]
     fn fill_of_a_hexagonal_lattice_is_the_share_of_its_cells() {
         let lattice = Lattice::of_kind_covering(LatticeKind::Hexagonal, 300_000, 600).unwrap();
-        let mut map = WidthMap::empty(lattice);
+        let mut map = PillarMap::empty(lattice);
         let n = lattice.sites();
         // Half of the lattice: what is to the left of its middle.
         for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)).filter(|(_, ix)| *ix < n / 2) {
             if lattice.has(ix, iy) {
-                map.width_nm[[iy, ix]] = 300;
+                map.number[[iy, ix]] = 300;
             }
         }
         let fill = fill(&map, PillarShape::Circle);
@@ -124,8 +124,8 @@ mod tests {
 
     #[test]
     fn fill_is_the_direct_sum_at_single_sites() {
-        let mut map = WidthMap::empty(Lattice::new(350, 70).unwrap());
-        for (i, w) in map.width_nm.iter_mut().enumerate() {
+        let mut map = PillarMap::empty(Lattice::new(350, 70).unwrap());
+        for (i, w) in map.number.iter_mut().enumerate() {
             *w = (i * 7919 % 200) as u16;
         }
         let fill = fill(&map, PillarShape::Square);
@@ -136,7 +136,7 @@ mod tests {
         let total: f64 = (-reach..=reach).map(along).sum();
         for (x, y) in [(0, 0), (31, 5), (69, 40)] {
             let sum: f64 = map
-                .width_nm
+                .number
                 .indexed_iter()
                 .map(|((iy, ix), w)| {
                     let area = (f64::from(*w) / 350.0).powi(2);

@@ -14,7 +14,7 @@ use super::pupil::PupilTerms;
 use super::shifted_aperture::ShiftedAperture;
 use super::stitching::displace;
 use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, RectangleClass, density, zernike};
-use metalith_core::{Error, Lattice, PillarShape, Result, WidthMap};
+use metalith_core::{Error, Lattice, PillarMap, PillarShape, Result};
 use metalith_wave::Aperture;
 use metalith_wave::kernels::cis;
 
@@ -27,7 +27,7 @@ const STEPS_PER_NM: f64 = 10.0;
 
 /// An element as it is drawn in a layout: what every made version of it starts from.
 pub struct DrawnElement<'a> {
-    pillars: &'a WidthMap,
+    pillars: &'a PillarMap,
     aperture_radius_um: f64,
     shape: PillarShape,
     /// Centre of the element on the chip (um).
@@ -38,7 +38,7 @@ pub struct DrawnElement<'a> {
 
 impl<'a> DrawnElement<'a> {
     /// The pillars as read from a layout, squares, and the radius of the opening in the metal around them (um).
-    pub fn new(pillars: &'a WidthMap, aperture_radius_um: f64) -> Self {
+    pub fn new(pillars: &'a PillarMap, aperture_radius_um: f64) -> Self {
         Self {
             pillars,
             aperture_radius_um,
@@ -61,7 +61,7 @@ impl<'a> DrawnElement<'a> {
     }
 
     /// The pillars.
-    pub fn pillars(&self) -> &'a WidthMap {
+    pub fn pillars(&self) -> &'a PillarMap {
         self.pillars
     }
 
@@ -90,7 +90,7 @@ impl<'a> DrawnElement<'a> {
             return added;
         }
         let places = RowPlaces::new(lattice, iy, self.aperture_radius_um, self.centre_um);
-        let drawn: Vec<f64> = self.pillars.width_nm.row(iy).iter().map(|w| f64::from(*w)).collect();
+        let drawn: Vec<f64> = self.pillars.number.row(iy).iter().map(|w| f64::from(*w)).collect();
         let inputs: Vec<Input<'_>> = [Input::Row(&drawn), Input::Row(&fill)]
             .into_iter()
             .chain(places.inputs())
@@ -124,7 +124,7 @@ impl DrawnElement<'_> {
             return 0;
         };
         let (mut sum, mut pillars) = (0.0, 0.0);
-        for (step, w) in steps.iter().zip(&self.pillars.width_nm) {
+        for (step, w) in steps.iter().zip(&self.pillars.number) {
             if *w > 0 {
                 sum += f64::from(*step);
                 pillars += 1.0;
@@ -193,7 +193,7 @@ impl MadeElement {
         let (mut class, mut width_nm, mut count) = (vec![0; n * n], vec![0.0], vec![0u32]);
         let mut rectangle = Vec::from_iter(rectangles.then_some(without));
         let mut radius2 = 0;
-        for (site, &w) in drawn.pillars.width_nm.iter().enumerate() {
+        for (site, &w) in drawn.pillars.number.iter().enumerate() {
             if w == 0 || covered(site) {
                 continue;
             }

@@ -1,7 +1,7 @@
 //! Pillars that are higher at the rim of a lens than in its middle.
 
 use metalith_cell::{CellStack, ORDERS};
-use metalith_core::{Lattice, Silent, WidthMap};
+use metalith_core::{Lattice, PillarMap, Silent};
 use metalith_made::{CalibratedModel, DrawnElement, MadeChip, Perturbation, perturbed, to_middle_tops};
 use metalith_rcwa::Orders;
 use metalith_wave::{Aperture, PlaneWave};
@@ -35,9 +35,9 @@ fn heights_between_middle_and_rim_are_those_of_solved_pillars() {
     let (mut errors, mut changes) = (Vec::new(), Vec::new());
     for um in [0.455, 0.53, 0.66] {
         for width in (110..280).step_by(17) {
-            let map = WidthMap {
+            let map = PillarMap {
                 lattice,
-                width_nm: Array2::from_elem((SITES, SITES), width),
+                number: Array2::from_elem((SITES, SITES), width),
             };
             let drawn = DrawnElement::new(&map, radius_um);
             let element = chip.element(&drawn).unwrap();

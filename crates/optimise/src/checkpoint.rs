@@ -11,7 +11,7 @@ use metalith_cell::{Fidelity, kept};
 use metalith_core::text::hex;
 use metalith_core::{Error, Result};
 use metalith_design::Design;
-use metalith_design::array::WidthRule;
+use metalith_design::array::PillarRule;
 
 /// Of the kept file.
 const MAGIC: [u8; 8] = *b"MLOPTI\0\x01";
@@ -180,7 +180,7 @@ fn digest(design: &Design) -> String {
     let mut bytes = serde_json::to_vec(&decisive).expect("plain data serialises");
     if design.optimise.fidelity == Fidelity::Neighbours {
         // Their tables are at these wavelengths, for the widths of all mappings that elements have.
-        let tables = (&design.verify.wavelengths_um, WidthRule::all(design).len());
+        let tables = (&design.verify.wavelengths_um, PillarRule::all(design).len());
         bytes.extend(serde_json::to_vec(&tables).expect("plain data serialises"));
     }
     hex(&Sha256::digest(&bytes))

@@ -12,7 +12,7 @@ use super::links::{distance_of, neighbour};
 use super::rings::Rings;
 use super::unlike::{PRODUCTS, Unlike};
 use metalith_cell::{CellModel, NEIGHBOUR_DEGREE, NEIGHBOURS};
-use metalith_core::{Error, Result, WidthMap};
+use metalith_core::{Error, PillarMap, Result};
 
 /// A lens to optimise: its rings, and the sensor behind it.
 #[derive(Clone, Debug)]
@@ -126,7 +126,7 @@ impl Lens {
     ///
     /// # Errors
     /// If the array is on another lattice, or the cell does not cover a wavelength or width.
-    pub fn strehl_of_layout(&self, widths: &WidthMap, cell: &dyn CellModel, wavelengths_um: &[f64]) -> Result<Strehl> {
+    pub fn strehl_of_layout(&self, widths: &PillarMap, cell: &dyn CellModel, wavelengths_um: &[f64]) -> Result<Strehl> {
         if widths.lattice != self.rings.lattice() {
             return Err(Error::invalid(
                 "the layout is on another lattice than the lens",
@@ -145,7 +145,7 @@ impl Lens {
         };
         // Sites at one distance with one width are one term.
         let mut terms = BTreeMap::<(i64, u16), AlikeSites>::new();
-        for ((iy, ix), &width) in widths.width_nm.indexed_iter().filter(|(_, w)| **w != 0) {
+        for ((iy, ix), &width) in widths.number.indexed_iter().filter(|(_, w)| **w != 0) {
             let alike = terms.entry((widths.lattice.units2(ix, iy), width)).or_default();
             alike.count += 1;
             if let Some(neighbour) = &neighbour {
@@ -197,10 +197,10 @@ struct AlikeSites {
 }
 
 impl AlikeSites {
-    fn add_neighbours(&mut self, widths: &WidthMap, site: [usize; 2], factors: &[[f64; NEIGHBOUR_DEGREE]]) {
+    fn add_neighbours(&mut self, widths: &PillarMap, site: [usize; 2], factors: &[[f64; NEIGHBOUR_DEGREE]]) {
         for offset in NEIGHBOURS {
             let at = neighbour(site, offset, widths.lattice.sites());
-            let width = at.map_or(0, |[x, y]| widths.width_nm[(y, x)]);
+            let width = at.map_or(0, |[x, y]| widths.number[(y, x)]);
             if width != 0 {
                 let to = &mut self.neighbours[distance_of(offset) * NEIGHBOUR_DEGREE..];
                 to.iter_mut()

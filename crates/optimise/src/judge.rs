@@ -9,7 +9,7 @@ use super::limit::{largest_step, largest_step_in_layout};
 use super::robust;
 use super::run::OptimiseTask;
 use metalith_cell::{CellModel, Fidelity};
-use metalith_core::{Error, Result, WidthMap};
+use metalith_core::{Error, PillarMap, Result};
 use metalith_design::Design;
 use metalith_design::phase::{Interpolation, RadialPhase};
 
@@ -77,7 +77,7 @@ impl OptimiseTask {
     ///
     /// # Errors
     /// If a width is none that a phase is mapped to, or the cell does not cover the band.
-    pub fn judge_layout(&self, pillars: &WidthMap, cell: &dyn CellModel) -> Result<Judged> {
+    pub fn judge_layout(&self, pillars: &PillarMap, cell: &dyn CellModel) -> Result<Judged> {
         let strehl = self.lens.strehl_of_layout(pillars, cell, &self.judging_wavelengths())?;
         let step = largest_step_in_layout(pillars, &self.mapping)?;
         Ok(Judged::new("layout", cell.fidelity(), strehl, step))

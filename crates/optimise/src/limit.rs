@@ -1,7 +1,7 @@
 //! The limit on the phase step from ring to ring: a hard constraint on every design.
 
 use super::mapping::{Mapping, step};
-use metalith_core::WidthMap;
+use metalith_core::PillarMap;
 use metalith_core::{Error, Result};
 
 /// Steps are held to the limit but for rounding (turns).
@@ -139,12 +139,12 @@ pub fn largest_step(turns: &[f64]) -> f64 {
 ///
 /// # Errors
 /// If the layout holds a width that no phase is mapped to.
-pub fn largest_step_in_layout(widths: &WidthMap, mapping: &Mapping) -> Result<f64> {
+pub fn largest_step_in_layout(widths: &PillarMap, mapping: &Mapping) -> Result<f64> {
     let mut turns_of = vec![f64::NAN; usize::from(mapping.max_width_nm()) + 1];
     for choice in mapping.choices() {
         turns_of[usize::from(choice.width_nm)] = choice.turns;
     }
-    let map = &widths.width_nm;
+    let map = &widths.number;
     let turns = |w: u16| turns_of.get(usize::from(w)).copied().unwrap_or(f64::NAN);
     if let Some(stray) = map.iter().find(|&&w| w != 0 && turns(w).is_nan()) {
         return Err(Error::invalid(

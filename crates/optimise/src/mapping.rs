@@ -1,6 +1,6 @@
 //! From the phase of a ring to the width of its pillars, and the widths there are to choose from.
 
-use metalith_design::array::WidthRule;
+use metalith_design::array::PillarRule;
 
 /// Points at which a mapping is sampled over one turn; between them it is a straight line.
 const SAMPLES: usize = 4096;
@@ -25,7 +25,7 @@ pub struct WidthChoice {
 
 impl Mapping {
     /// The mapping of a design.
-    pub fn new(rule: &WidthRule) -> Self {
+    pub fn new(rule: &PillarRule) -> Self {
         let turns = |i: usize| (i as f64 / SAMPLES as f64).min(1.0 - f64::EPSILON);
         let width_nm = (0..=SAMPLES).map(|i| rule.unrounded_nm(turns(i))).collect();
         let made = (0..SAMPLES).map(|i| rule.width_nm(turns(i))).collect::<Vec<_>>();
@@ -117,7 +117,7 @@ pub mod tests {
     use metalith_design::{CellSpec, MappingComparison, MappingSpec};
 
     /// The rule of the shipped designs but for the coefficients.
-    pub fn rule(coefficients: &[f64]) -> WidthRule {
+    pub fn rule(coefficients: &[f64]) -> PillarRule {
         let cell = CellSpec {
             lattice: Default::default(),
             pitch_nm: 350,
@@ -149,7 +149,7 @@ pub mod tests {
             steered: Vec::new(),
             comparison: MappingComparison::default(),
         };
-        WidthRule::new(&cell, &mapping)
+        PillarRule::new(&cell, &mapping)
     }
 
     /// The published mapping, all powers.

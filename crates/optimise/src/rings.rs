@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use metalith_core::{Error, Lattice, LatticeKind, Result, WidthMap};
+use metalith_core::{Error, Lattice, LatticeKind, PillarMap, Result};
 
 use super::links::Links;
 
@@ -118,9 +118,9 @@ impl Rings {
     }
 
     /// Pillars of one width a ring. The array that a layout of this lens alone would hold.
-    pub fn width_map(&self, width_of_ring_nm: &[u16]) -> WidthMap {
-        let mut map = WidthMap::empty(self.lattice);
-        for ((iy, ix), width) in map.width_nm.indexed_iter_mut() {
+    pub fn width_map(&self, width_of_ring_nm: &[u16]) -> PillarMap {
+        let mut map = PillarMap::empty(self.lattice);
+        for ((iy, ix), width) in map.number.indexed_iter_mut() {
             if let Some(ring) = self.ring_at(ix, iy) {
                 *width = width_of_ring_nm[ring];
             }

@@ -11,7 +11,7 @@ use super::rings::Rings;
 use super::start::Start;
 use metalith_cell::CellModel;
 use metalith_core::{Error, Result};
-use metalith_design::array::WidthRule;
+use metalith_design::array::PillarRule;
 use metalith_design::phase::RadialPhase;
 use metalith_design::{Design, MeritSpec, OptimiseSpec, StartSpec};
 
@@ -75,7 +75,7 @@ impl OptimiseTask {
         Ok(Self {
             lens,
             reference_turns,
-            mapping: Mapping::new(&WidthRule::new(&design.cell, &design.mapping)),
+            mapping: Mapping::new(&PillarRule::new(&design.cell, &design.mapping)),
             spec: design.optimise.clone(),
             own_turns,
             limit: StepLimit::new(design.optimise.step_limit_turns)?,

@@ -212,8 +212,8 @@ fn add_scaled((re, im): (&mut [f32], &mut [f32]), by: f32, (a_re, a_im): (&[f32]
 #[cfg(test)]
 mod tests {
     use metalith_cell::{CellModel, Fidelity, SiteResponse};
-    use metalith_core::{Lattice, Silent, WidthMap};
-    use metalith_design::array::WidthRule;
+    use metalith_core::{Lattice, PillarMap, Silent};
+    use metalith_design::array::PillarRule;
     use metalith_design::{Design, cell_models};
 
     use super::super::field::{FLOOR, MeritKind};
@@ -243,7 +243,7 @@ mod tests {
                     rings,
                     gap_um: 2.4e-3 * f64::from(diameter_nm),
                 },
-                mapping: Mapping::new(&WidthRule::new(&design.cell, &design.mapping)),
+                mapping: Mapping::new(&PillarRule::new(&design.cell, &design.mapping)),
                 wavelengths_um: wavelengths(460.0, 660.0, 20.0),
             }
         }
@@ -266,7 +266,7 @@ mod tests {
         }
 
         /// The field at the focus, site by site, each among the twelve pillars about it.
-        fn of_sites(&self, widths: &WidthMap, wavelength_um: f64) -> Complex64 {
+        fn of_sites(&self, widths: &PillarMap, wavelength_um: f64) -> Complex64 {
             let response = self
                 .cell
                 .among_neighbours_in_band(wavelength_um, &|_| [0.0; 2], &Silent);
@@ -276,7 +276,7 @@ mod tests {
             let width = |x: i32, y: i32| {
                 let inside = (0..n).contains(&x) && (0..n).contains(&y);
                 if inside {
-                    widths.width_nm[(y as usize, x as usize)]
+                    widths.number[(y as usize, x as usize)]
                 } else {
                     0
                 }

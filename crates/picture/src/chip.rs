@@ -2,7 +2,7 @@
 
 use metalith_camera::{Camera, Sampling, WavelengthSteps};
 use metalith_cell::{BandResponse, CellModel, PassedTable};
-use metalith_core::{Error, Progress, Result, WidthMap};
+use metalith_core::{Error, PillarMap, Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::Symmetry;
 use metalith_gds::extract::Extraction;
@@ -20,7 +20,7 @@ use crate::ElementView;
 /// An element that differs from all others by more than a symmetry.
 pub struct DistinctChipElement<'a> {
     pub view: ElementView,
-    widths: &'a WidthMap,
+    widths: &'a PillarMap,
     made: MadeElement,
     /// Symmetries that leave its pillars and its wedge as they are.
     pub symmetries: Vec<Symmetry>,
@@ -111,7 +111,7 @@ impl<'a> ChipInLight<'a> {
             SimulationCase::Made(chip) => chip.perturbation().clone(),
         };
         let symmetric = perturbation.keeps_symmetry() && elements.iter().all(|e| e.slope == [0.0; 2]);
-        let widths: Vec<&WidthMap> = extraction.elements.iter().map(|e| &e.widths).collect();
+        let widths: Vec<&PillarMap> = extraction.elements.iter().map(|e| &e.widths).collect();
         if let SimulationCase::Made(chip) = case {
             chip.check_drawn(widths.iter().map(|map| map.histogram()))?;
         }
@@ -299,7 +299,7 @@ impl ElementInLight<'_> {
 #[allow(clippy::type_complexity, reason = "both halves are taken apart at once")]
 fn distinct_of(
     elements: &[ElementView],
-    widths: &[&WidthMap],
+    widths: &[&PillarMap],
     symmetries: &[Symmetry],
 ) -> (Vec<(usize, Vec<Symmetry>)>, Vec<(usize, Symmetry)>) {
     let turns = |t: Symmetry, from: usize, to: usize| {
@@ -345,7 +345,7 @@ struct Polarised {
 impl Polarised {
     /// Where light of these pillars goes: over one element light of unlike orders may interfere a little, and all of it is what
     /// passes.
-    fn departing_from(&self, pillars: &WidthMap) -> Vec<PassedTable> {
+    fn departing_from(&self, pillars: &PillarMap) -> Vec<PassedTable> {
         let counts = pillars.histogram();
         let power = |all: &[PassedTable]| -> f64 {
             let of = |p: &PassedTable| -> f64 {
@@ -406,7 +406,7 @@ fn among_neighbours(
     case: SimulationCase<'_>,
     sampling: &Sampling,
     view: &ElementView,
-    widths: &WidthMap,
+    widths: &PillarMap,
     progress: &dyn Progress,
 ) -> Result<Vec<Option<BandResponse>>> {
     let lattice = widths.lattice.kind();

@@ -1,6 +1,6 @@
 //! Whether a layout is that of its design: asked before anything is simulated.
 
-use metalith_core::{Error, Progress, Result, WidthCheck};
+use metalith_core::{Error, PillarCheck, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Element};
 use metalith_gds::extract::{Extraction, Oddities, Why};
@@ -32,7 +32,7 @@ pub fn check_elements(design: &Design, extraction: &Extraction) -> Result<()> {
     let all = design.elements();
     let found = all.iter().zip(&extraction.elements);
     let empty: Vec<&Element> = found
-        .filter(|(_, found)| found.widths.width_nm.iter().all(|w| *w == 0))
+        .filter(|(_, found)| found.widths.number.iter().all(|w| *w == 0))
         .map(|(element, _)| element)
         .collect();
     let Some(first) = empty.first() else {
@@ -82,7 +82,7 @@ impl PillarCount {
             ..Self::default()
         };
         for (placed, element) in array.placed.iter().zip(&extraction.elements) {
-            let check = WidthCheck::compare(array.all_rows(placed).as_ref(), &element.widths);
+            let check = PillarCheck::compare(array.all_rows(placed).as_ref(), &element.widths);
             found.missing += check.missing;
             found.extra += check.extra;
             found.others += check.wrong;

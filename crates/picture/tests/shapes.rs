@@ -87,7 +87,7 @@ fn passed(
 ) -> f64 {
     let of = |nm: &f64| {
         let (table, full) = (table(nm * 1e-3), cell.full_transmission(nm * 1e-3).unwrap());
-        let widths = extraction.elements[0].widths.width_nm.iter().filter(|w| **w > 0);
+        let widths = extraction.elements[0].widths.number.iter().filter(|w| **w > 0);
         let (count, power) = widths.fold((0.0, 0.0), |(n, sum), w| {
             (n + 1.0, sum + table[usize::from(*w)].norm_sqr())
         });

@@ -4,7 +4,7 @@ use svg::node::element::{Group, Path, SVG};
 
 use super::axis::Axis;
 use super::figure::{Figure, Frame, scale_bar};
-use metalith_core::{PillarShape, WidthMap};
+use metalith_core::{PillarMap, PillarShape};
 
 /// More pillars an axis than this would be dust.
 const MOST: f64 = 80.0;
@@ -24,7 +24,7 @@ pub struct PillarZoom {
 impl PillarZoom {
     /// Pillars of `map` in a square of `span_um` about a place counted from the element's centre (um).
     /// The span is held to 80 pitches, so that pillars can be seen.
-    pub fn new(title: impl Into<String>, map: &WidthMap, centre_um: (f64, f64), span_um: f64) -> Self {
+    pub fn new(title: impl Into<String>, map: &PillarMap, centre_um: (f64, f64), span_um: f64) -> Self {
         let lattice = map.lattice;
         let span_um = span_um.clamp(lattice.pitch_um(), MOST * lattice.pitch_um());
         let half = (span_um + lattice.pitch_um()) / 2.0;
@@ -35,7 +35,7 @@ impl PillarZoom {
         let origin = (nm(centre_um.0), nm(centre_um.1));
         for iy in near(1, centre_um.1) {
             for ix in near(0, centre_um.0) {
-                let width = map.width_nm[[iy, ix]];
+                let width = map.number[[iy, ix]];
                 if width == 0 {
                     continue;
                 }

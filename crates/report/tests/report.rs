@@ -1,6 +1,6 @@
 //! One page with every part that a report can have, as a reader's browser would get it.
 
-use metalith_core::{Lattice, WidthMap};
+use metalith_core::{Lattice, PillarMap};
 use metalith_report::{
     Axis, Cell, Chart, Column, Figure, HeatMap, ImageGrid, Page, PillarZoom, Plan, Ranking, Table, Verdict, count,
 };
@@ -17,15 +17,15 @@ fn airy_like(n: usize, widen: f64) -> Array2<f64> {
     })
 }
 
-fn lens() -> WidthMap {
-    let mut map = WidthMap::empty(Lattice::covering(60_000, 350).unwrap());
+fn lens() -> PillarMap {
+    let mut map = PillarMap::empty(Lattice::covering(60_000, 350).unwrap());
     let lattice = map.lattice;
     for iy in 0..lattice.sites() {
         for ix in 0..lattice.sites() {
             let r_um = lattice.coordinate_um(ix).hypot(lattice.coordinate_um(iy));
             if r_um <= 30.0 {
                 let turns = (r_um.hypot(144.0) - 144.0) / 0.55;
-                map.width_nm[[iy, ix]] = 100 + 2 * ((1.0 - turns.fract()) * 94.0) as u16;
+                map.number[[iy, ix]] = 100 + 2 * ((1.0 - turns.fract()) * 94.0) as u16;
             }
         }
     }

@@ -9,7 +9,7 @@ use metalith_cell::{
     BandResponse, CellModel, FittedNeighbours, ObliqueTables, POLARISATION_SHARE, PassedTable, PolarisedLight,
     PolarisedTables,
 };
-use metalith_core::{Error, LatticeKind, Progress, Result, WidthRows};
+use metalith_core::{Error, LatticeKind, PillarRows, Progress, Result};
 use metalith_grating::NeighbourPillars;
 use metalith_made::{SimulationCase, cell_direction};
 use metalith_wave::{Aperture, Fold, Pillars, PlaneWave, Psf, Scratch};
@@ -105,11 +105,11 @@ impl TransmissionTables {
         cell: &dyn CellModel,
         lattice: LatticeKind,
         wavelength_um: f64,
-        widest_nm: u16,
+        largest_number: u16,
         light: PolarisedLight,
     ) -> Result<Self> {
-        let polarised = cell.polarised(wavelength_um, widest_nm)?;
-        let normal = cell.transmissions(wavelength_um, widest_nm)?;
+        let polarised = cell.polarised(wavelength_um, largest_number)?;
+        let normal = cell.transmissions(wavelength_um, largest_number)?;
         Ok(Self::along_normal(normal, polarised, lattice, light))
     }
 
@@ -121,11 +121,11 @@ impl TransmissionTables {
         cell: &dyn CellModel,
         lattice: LatticeKind,
         wavelength_um: f64,
-        widest_nm: u16,
+        largest_number: u16,
         light: PolarisedLight,
     ) -> Result<Self> {
-        let polarised = cell.polarised_in_band(wavelength_um, widest_nm)?;
-        let normal = cell.transmissions_in_band(wavelength_um, widest_nm)?;
+        let polarised = cell.polarised_in_band(wavelength_um, largest_number)?;
+        let normal = cell.transmissions_in_band(wavelength_um, largest_number)?;
         Ok(Self {
             in_band: true,
             ..Self::along_normal(normal, polarised, lattice, light)
@@ -162,7 +162,7 @@ impl TransmissionTables {
         &mut self,
         cell: &dyn CellModel,
         waves: &[PlaneWave],
-        widest_nm: u16,
+        largest_number: u16,
         progress: &dyn Progress,
     ) -> Result<()> {
         for wave in waves {
@@ -174,9 +174,9 @@ impl TransmissionTables {
             let known = self.neighbours.contains_key(&key(sines)) || self.oblique.contains_key(&key(sines));
             if sines != [0.0; 2] && !known {
                 let tables = if self.in_band {
-                    cell.oblique_in_band(wave.wavelength_um, sines, widest_nm)?
+                    cell.oblique_in_band(wave.wavelength_um, sines, largest_number)?
                 } else {
-                    cell.oblique(wave.wavelength_um, sines, widest_nm)?
+                    cell.oblique(wave.wavelength_um, sines, largest_number)?
                 };
                 if let Some(tables) = tables {
                     self.oblique.insert(key(sines), tables);
@@ -239,7 +239,7 @@ impl TransmissionTables {
     /// If it has too many widths, or they are not held as a map.
     pub fn among_neighbours<'w>(
         &self,
-        widths: &'w dyn WidthRows,
+        widths: &'w dyn PillarRows,
         lit: &PlaneWave,
     ) -> Result<Option<Vec<NeighbourPillars<'w>>>> {
         let Some(known) = self.neighbours.get(&key(cell_direction(lit, self.lattice))) else {
@@ -263,7 +263,7 @@ impl TransmissionTables {
     /// As [`Psf::formed`].
     pub fn psf(
         &self,
-        widths: &dyn WidthRows,
+        widths: &dyn PillarRows,
         wave: &PlaneWave,
         lit: &PlaneWave,
         fold: &Fold,

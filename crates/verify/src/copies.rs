@@ -141,15 +141,15 @@ pub(super) fn place_words(symmetry: Symmetry) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::WidthCheck;
+    use crate::PillarCheck;
     use metalith_core::Silent;
 
     fn checks(array: &PillarArray, faults: u64) -> Vec<ElementCheck> {
         let check = |placed: &metalith_design::array::PlacedElement| ElementCheck {
             element: placed.element,
-            widths: WidthCheck {
+            widths: PillarCheck {
                 wrong: faults,
-                ..WidthCheck::default()
+                ..PillarCheck::default()
             },
             copy_of: None,
             turned: None,

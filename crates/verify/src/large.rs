@@ -3,24 +3,24 @@
 use std::path::Path;
 
 use metalith_cell::Fidelity;
-use metalith_core::{Progress, Result, WidthRows};
+use metalith_core::{PillarRows, Progress, Result};
 use metalith_design::array::{PillarArray, PlacedElement};
 use metalith_design::{AskedLight, Design};
-use metalith_gds::extract::{Extraction, HeldWidths, extract_folded};
+use metalith_gds::extract::{Extraction, HeldPillars, extract_folded};
 use metalith_gds::{Layout, ReadLimits};
 use metalith_layout::extraction_plan;
 use metalith_wave::Accuracy;
 
-use super::{ElementCheck, LayoutFacts, SimulationCases, Verification, WidthCheck, check, compare, facts, judge};
+use super::{ElementCheck, LayoutFacts, PillarCheck, SimulationCases, Verification, check, compare, facts, judge};
 
 /// Compare the pillars of an element as they are held: of one that is held as an eighth, and meant to have all eight
 /// symmetries, each set of copies once.
-fn compare_held(array: &PillarArray, placed: &PlacedElement, found: &HeldWidths) -> WidthCheck {
+fn compare_held(array: &PillarArray, placed: &PlacedElement, found: &HeldPillars) -> PillarCheck {
     match found {
-        HeldWidths::Eighth(map) if array.classes[placed.class].group.members().len() == 8 => {
-            WidthCheck::compare_eighth(array.rows(placed).as_ref(), map)
+        HeldPillars::Eighth(map) if array.classes[placed.class].group.members().len() == 8 => {
+            PillarCheck::compare_eighth(array.rows(placed).as_ref(), map)
         }
-        _ => WidthCheck::compare(array.all_rows(placed).as_ref(), found),
+        _ => PillarCheck::compare(array.all_rows(placed).as_ref(), found),
     }
 }
 
@@ -41,7 +41,7 @@ pub fn verify_in_parts(
     progress: &dyn Progress,
 ) -> Result<Verification> {
     let (facts, elements, extraction) = read_folded(design, array, path, progress)?;
-    let widths: Vec<&dyn WidthRows> = extraction.elements.iter().map(|e| &e.widths as _).collect();
+    let widths: Vec<&dyn PillarRows> = extraction.elements.iter().map(|e| &e.widths as _).collect();
     let found = super::Found {
         layout: facts,
         foreign: extraction.oddities.clone(),
@@ -57,7 +57,7 @@ fn read_folded(
     array: &PillarArray,
     path: &Path,
     progress: &dyn Progress,
-) -> Result<(LayoutFacts, Vec<ElementCheck>, Extraction<HeldWidths>)> {
+) -> Result<(LayoutFacts, Vec<ElementCheck>, Extraction<HeldPillars>)> {
     let layout = Layout::open_with(path, ReadLimits::default(), progress)?;
     let extraction = extract_folded(&layout, &extraction_plan(design), progress)?;
     let elements = compare(array, &extraction, |placed, found| compare_held(array, placed, found));

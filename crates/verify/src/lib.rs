@@ -29,8 +29,8 @@ use num_complex::{Complex32, Complex64};
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
-use metalith_core::{Progress, Result, WidthRows};
-use metalith_design::array::{PillarArray, PlacedElement, Symmetry, WidthRule};
+use metalith_core::{PillarRows, Progress, Result};
+use metalith_design::array::{PillarArray, PillarRule, PlacedElement, Symmetry};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{AskedLight, Design, Element, FieldAngle, LatticeOrders};
 use metalith_gds::extract::{ExtractedElement, Extraction, Oddities, Survey, extract};
@@ -45,7 +45,7 @@ pub use check::{Check, Sense};
 pub use copies::CopyAngle;
 pub use large::{verify_in_parts, verify_pillars};
 pub use memory::Simulation;
-pub use metalith_core::WidthCheck;
+pub use metalith_core::PillarCheck;
 pub use metalith_made::SimulationCase;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
@@ -74,7 +74,7 @@ pub struct LayoutFacts {
 #[derive(Clone, Debug, Serialize)]
 pub struct ElementCheck {
     pub element: Element,
-    pub widths: WidthCheck,
+    pub widths: PillarCheck,
     /// Index into [`Verification::distinct`] of the element that it is simulated as, itself or one that it is a copy of, if it is
     /// as intended.
     pub copy_of: Option<usize>,
@@ -219,7 +219,7 @@ impl ReadLayout {
         Ok(Self {
             facts: facts(layout, &extraction, layout.path()),
             elements: compare(array, &extraction, |placed, found| {
-                WidthCheck::compare(array.rows(placed).as_ref(), found)
+                PillarCheck::compare(array.rows(placed).as_ref(), found)
             }),
             extraction,
         })
@@ -278,7 +278,7 @@ struct Found<'a> {
     layout: LayoutFacts,
     elements: Vec<ElementCheck>,
     /// Pillars of each element.
-    widths: Vec<&'a dyn WidthRows>,
+    widths: Vec<&'a dyn PillarRows>,
     foreign: Oddities,
 }
 
@@ -312,7 +312,7 @@ fn judge(
         let element = one.element;
         let widths = found.widths[one.index];
         let phase = ElementPhase::of(&lens, &element);
-        let rule = WidthRule::of_element(design, element.index);
+        let rule = PillarRule::of_element(design, element.index);
         let read = simulator.read(&element, widths)?;
         simulated.push(DistinctElement {
             element,
@@ -375,7 +375,7 @@ impl<'a> MappingResponse<'a> {
         &self,
         read: &optics::ReadElement<'_>,
         phase: &ElementPhase<'_>,
-        rule: &WidthRule,
+        rule: &PillarRule,
         progress: &dyn Progress,
     ) -> Result<PhaseErrors> {
         let widths = read.widths;
@@ -400,7 +400,7 @@ impl<'a> MappingResponse<'a> {
 fn compare<W>(
     array: &PillarArray,
     extraction: &Extraction<W>,
-    widths: impl Fn(&PlacedElement, &W) -> WidthCheck,
+    widths: impl Fn(&PlacedElement, &W) -> PillarCheck,
 ) -> Vec<ElementCheck> {
     let check = |(placed, found): (&PlacedElement, &ExtractedElement<W>)| ElementCheck {
         element: placed.element,

@@ -6,8 +6,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_core::WidthRows;
-use metalith_design::array::WidthRule;
+use metalith_core::PillarRows;
+use metalith_design::array::PillarRule;
 use metalith_design::phase::ElementPhase;
 
 /// Root mean square and largest magnitude of a phase error over the pillars (rad); not a number if there are none.
@@ -20,7 +20,7 @@ pub struct PhaseError {
 /// What a written element does to the phase that was asked of it, at the wavelength of the mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhaseErrors {
-    /// Width as written, or rotation as drawn, against the unrounded one, by [`WidthRule::turns_of_width`].
+    /// Width as written, or rotation as drawn, against the unrounded one, by [`PillarRule::turns_of_width`].
     pub rounding: PhaseError,
     /// Phase of the pillar as the cell has it against the design phase, less the mean.
     pub mapping: PhaseError,
@@ -37,13 +37,13 @@ pub struct PillarResponse<'a> {
 impl PhaseErrors {
     /// Compare the pillars of an element with its phase.
     pub fn of(
-        widths: &dyn WidthRows,
+        widths: &dyn PillarRows,
         phase: &ElementPhase<'_>,
-        rule: &WidthRule,
+        rule: &PillarRule,
         response: &PillarResponse<'_>,
     ) -> Self {
         let by_width = |nm: f64| TAU * rule.turns_of_width(nm);
-        let written = (0..=widths.widest_nm())
+        let written = (0..=widths.largest_number())
             .map(|w| TAU * rule.turns_of_written(w))
             .collect::<Vec<_>>();
         let turns_of = |t: &Complex64| (t.norm() > 0.0).then(|| t.arg() / TAU);
@@ -118,7 +118,7 @@ impl Sums {
 /// Fold each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
 /// the number of threads.
 fn per_row<T: Send>(
-    widths: &dyn WidthRows,
+    widths: &dyn PillarRows,
     phase: &ElementPhase<'_>,
     fold: impl Fn(&mut dyn Iterator<Item = Pillar>) -> T + Sync,
 ) -> Vec<T> {

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::copies::CopyAngle;
 use metalith_cell::{Fidelity, PolarisedLight, PolarisedTables};
-use metalith_design::array::WidthRule;
+use metalith_design::array::PillarRule;
 use metalith_design::{Element, FieldAngle};
 use metalith_wave::psf::{Matched, Psf, PsfMetrics, order_shares, pixel_mtf};
 
@@ -160,13 +160,19 @@ pub struct OrderEfficiencies {
 
 impl OrderEfficiencies {
     /// The widths that a mapping draws (nm), rising.
-    pub(super) fn drawn_nm(rule: &WidthRule) -> Vec<u16> {
+    pub(super) fn drawn_nm(rule: &PillarRule) -> Vec<u16> {
         let all: std::collections::BTreeSet<u16> = (0..ORDER_SAMPLES).map(|i| rule.sample(i, ORDER_SAMPLES)).collect();
         all.into_iter().collect()
     }
 
     /// Of a mapping, by the table of a cell at one wavelength; `full` is |t| of a cell that passes everything.
-    pub(super) fn of(rule: &WidthRule, wavelength_um: f64, fidelity: Fidelity, full: f64, table: &[Complex64]) -> Self {
+    pub(super) fn of(
+        rule: &PillarRule,
+        wavelength_um: f64,
+        fidelity: Fidelity,
+        full: f64,
+        table: &[Complex64],
+    ) -> Self {
         let t = (0..ORDER_SAMPLES)
             .map(|i| table[usize::from(rule.sample(i, ORDER_SAMPLES))])
             .collect::<Vec<_>>();
@@ -186,7 +192,13 @@ impl OrderEfficiencies {
 
     /// The same of pillars that tell polarisations apart, in light of which one or both arrive, as shares of all of it. Over a
     /// whole turn of the phase, light that is converted of one hand does not interfere with what is not of the other.
-    pub(super) fn of_light(self, tables: &PolarisedTables, light: PolarisedLight, rule: &WidthRule, full: f64) -> Self {
+    pub(super) fn of_light(
+        self,
+        tables: &PolarisedTables,
+        light: PolarisedLight,
+        rule: &PillarRule,
+        full: f64,
+    ) -> Self {
         let power = |table: Vec<Complex64>| {
             let power = (0..ORDER_SAMPLES).map(|i| table[usize::from(rule.sample(i, ORDER_SAMPLES))].norm_sqr());
             power.sum::<f64>() / (full * full * ORDER_SAMPLES as f64)

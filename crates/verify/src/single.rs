@@ -14,7 +14,7 @@ use super::single_white::SingleWhite;
 use super::white::CameraStatement;
 use super::{model_page, white_page};
 use metalith_cell::{CellModel, Fidelity, PolarisedLight};
-use metalith_core::{Error, Lattice, LatticeKind, Progress, Result, WholeFile, WidthMap};
+use metalith_core::{Error, Lattice, LatticeKind, PillarMap, Progress, Result, WholeFile};
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_made::{MadeChip, ModelStatement, SimulationCase};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
@@ -84,7 +84,7 @@ pub fn single_psfs(
         let focus = [light.at_um[0], light.at_um[1], light.distance_um];
         for ((site, widths), psf) in elements.iter().zip(psfs) {
             // Strehl is against the sites as drawn, whatever they transmit.
-            let table = vec![Complex64::ONE; usize::from(widest_nm(&elements)) + 1];
+            let table = vec![Complex64::ONE; usize::from(largest_number(&elements)) + 1];
             let matched = Matched::of(&Pillars::new(*widths, &table)?, focus, wavelength_um, full);
             all.push(SinglePsf {
                 element: site.name.clone(),
@@ -100,13 +100,13 @@ pub fn single_psfs(
 
 /// The PSF of each element by a cell.
 fn by_cell(
-    elements: &[(&ElementSite, &WidthMap)],
+    elements: &[(&ElementSite, &PillarMap)],
     cell: &dyn CellModel,
     light: &Lighting,
     wavelength_um: f64,
     progress: &dyn Progress,
 ) -> Result<Vec<Psf>> {
-    let widest = widest_nm(elements);
+    let widest = largest_number(elements);
     let lattice = kind_of(elements);
     let mut tables = TransmissionTables::new(cell, lattice, wavelength_um, widest, light.polarised)?;
     let wave = light.wave(wavelength_um);
@@ -131,14 +131,14 @@ fn by_cell(
 
 /// The PSF of each element as made.
 fn as_made(
-    elements: &[(&ElementSite, &WidthMap)],
+    elements: &[(&ElementSite, &PillarMap)],
     chip: &MadeChip,
     light: &Lighting,
     wavelength_um: f64,
     progress: &dyn Progress,
 ) -> Result<Vec<Psf>> {
     let wave = light.wave(wavelength_um);
-    let radius_um = |widths: &WidthMap| match light.aperture_radius_um {
+    let radius_um = |widths: &PillarMap| match light.aperture_radius_um {
         Some(radius) => radius,
         None => widths.circle_um(),
     };
@@ -172,12 +172,12 @@ fn as_made(
 }
 
 /// The kind of lattice that the elements of a layout stand on.
-pub(super) fn kind_of(elements: &[(&ElementSite, &WidthMap)]) -> LatticeKind {
+pub(super) fn kind_of(elements: &[(&ElementSite, &PillarMap)]) -> LatticeKind {
     elements.first().map_or(LatticeKind::Square, |(_, w)| w.lattice.kind())
 }
 
-pub(super) fn widest_nm(elements: &[(&ElementSite, &WidthMap)]) -> u16 {
-    let all = elements.iter().flat_map(|(_, w)| w.width_nm.iter().copied());
+pub(super) fn largest_number(elements: &[(&ElementSite, &PillarMap)]) -> u16 {
+    let all = elements.iter().flat_map(|(_, w)| w.number.iter().copied());
     all.max().unwrap_or(0)
 }
 
@@ -201,8 +201,8 @@ impl Lighting {
 }
 
 /// Elements whose pillars differ from those of all before them.
-pub(super) fn distinct(found: &Extraction) -> Vec<(&ElementSite, &WidthMap)> {
-    let mut kept: Vec<(&ElementSite, &WidthMap)> = Vec::new();
+pub(super) fn distinct(found: &Extraction) -> Vec<(&ElementSite, &PillarMap)> {
+    let mut kept: Vec<(&ElementSite, &PillarMap)> = Vec::new();
     for element in &found.elements {
         if kept.iter().all(|(_, widths)| **widths != element.widths) {
             kept.push((&element.site, &element.widths));

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::case::TransmissionTables;
-use super::single::{Lighting, distinct, kind_of, widest_nm};
+use super::single::{Lighting, distinct, kind_of, largest_number};
 use super::white::{CameraStatement, STEP_NM, step_nm};
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
 use metalith_camera::{Camera, Sampling, WavelengthSteps};
@@ -55,7 +55,7 @@ pub fn single_white(
     let statement = CameraStatement::of(camera, sampling);
     let lp_mm = statement.frequencies().drawn();
     let elements = distinct(found);
-    let widest = widest_nm(&elements);
+    let widest = largest_number(&elements);
     progress.begin(
         "simulating white light",
         (elements.len() * sampling.wavelengths_nm.len()) as u64,

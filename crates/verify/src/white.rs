@@ -131,7 +131,7 @@ impl<'a> WhiteSimulator<'a> {
         let Some((camera, sampling)) = camera_of(design)? else {
             return Ok(None);
         };
-        let widest_nm = design.cell.most();
+        let largest_number = design.cell.most();
         let colour = |nm: &f64| {
             let wavelength_um = nm * 1e-3;
             let tables = match judge {
@@ -142,7 +142,7 @@ impl<'a> WhiteSimulator<'a> {
                         cell,
                         lattice.kind(),
                         wavelength_um,
-                        widest_nm,
+                        largest_number,
                         light,
                     )?)
                 }

@@ -1,6 +1,6 @@
 //! The propagators against one another, against the sum over all pillars, and against reference fields.
 
-use metalith_core::{Lattice, WidthMap};
+use metalith_core::{Lattice, PillarMap};
 use metalith_wave::camera::{Optic, PixelGrid};
 use metalith_wave::{
     Accuracy, Aperture, Direct, Fold, Hankel, Matched, PhaseFunction, Pillars, PlaneWave, Propagator, Psf, Scratch,
@@ -53,10 +53,10 @@ fn published_turns(wavelength_um: f64, duty: f64) -> f64 {
 }
 
 /// The steered element of the reference: 1 mm, f = 2.4 mm, 15 degrees at 550 nm, mapped and rounded.
-fn steered() -> WidthMap {
+fn steered() -> PillarMap {
     let lattice = Lattice::new(350, 2858).unwrap();
-    let mut map = WidthMap::empty(lattice);
-    for ((iy, ix), w) in map.width_nm.indexed_iter_mut() {
+    let mut map = PillarMap::empty(lattice);
+    for ((iy, ix), w) in map.number.indexed_iter_mut() {
         let [x, y] = [ix, iy].map(|i| lattice.coordinate_um(i));
         let r2 = x * x + y * y;
         if r2 <= 250_000.0 {

@@ -247,7 +247,7 @@ impl PsfArgs {
         let mut widths = found
             .elements
             .iter()
-            .flat_map(|e| e.widths.width_nm.iter().copied())
+            .flat_map(|e| e.widths.number.iter().copied())
             .collect::<Vec<_>>();
         widths.sort_unstable();
         widths.dedup();

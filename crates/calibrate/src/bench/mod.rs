@@ -189,7 +189,7 @@ impl<'a> Bench<'a> {
             .set
             .elements
             .iter()
-            .flat_map(|e| e.pillars.width_nm.iter().filter(|w| **w > 0));
+            .flat_map(|e| e.pillars.number.iter().filter(|w| **w > 0));
         all.fold((f64::MAX, 0.0), |(a, b), &w| (a.min(f64::from(w)), b.max(f64::from(w))))
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_core::{Error, PillarReader, Progress, Result, Wedge, WidthMap};
+use metalith_core::{Error, PillarMap, PillarReader, Progress, Result, Wedge};
 use metalith_design::{Design, Element};
 use ndarray::Array2;
 
@@ -137,7 +137,7 @@ fn session(
     bench: &BenchFile,
     layout: &Path,
     chosen: &[Element],
-    maps: Vec<WidthMap>,
+    maps: Vec<PillarMap>,
 ) -> Result<MeasuredSet> {
     let elements: PerElement<MeasuredElement> = chosen
         .iter()
@@ -234,7 +234,7 @@ pub fn sem_sites(set: &MeasuredSet, offer: SemOffer) -> Vec<SemSite> {
             let Some(at) = lattice.site_at([r * turn.cos(), r * turn.sin()]) else {
                 continue;
             };
-            let designed = element.pillars.width_nm[[at[1], at[0]]];
+            let designed = element.pillars.number[[at[1], at[0]]];
             if designed > 0 && out.len() < offer.sites {
                 out.push(SemSite {
                     element: element.index,

@@ -15,7 +15,7 @@ pub use index::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, Pe
 pub use sem::{COLUMNS as SEM_COLUMNS, SemSite};
 
 use metalith_cell::CellStack;
-use metalith_core::WidthMap;
+use metalith_core::PillarMap;
 
 /// A mean of frames this near to saturation contains clipped frames.
 pub const SATURATED: f64 = 0.97;
@@ -167,7 +167,7 @@ pub struct MeasuredElement {
     pub centre_um: [f64; 2],
     pub aperture_diameter_um: f64,
     /// Pillars as the layout has them.
-    pub pillars: WidthMap,
+    pub pillars: PillarMap,
 }
 
 impl MeasuredElement {

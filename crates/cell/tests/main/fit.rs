@@ -9,7 +9,7 @@ use metalith_cell::{
 };
 use metalith_core::Result;
 use metalith_design::Design;
-use metalith_design::array::WidthRule;
+use metalith_design::array::PillarRule;
 use metalith_rcwa::Orders;
 use num_complex::Complex64;
 
@@ -228,7 +228,7 @@ fn mappings_go_through_files_and_bad_ones_name_the_line() {
     std::fs::write(&path, text).unwrap();
     let design = Design::read(&path).unwrap();
     assert_eq!(design.mapping.table.as_ref(), Some(&exact));
-    let rule = WidthRule::new(&design.cell, &design.mapping);
+    let rule = PillarRule::new(&design.cell, &design.mapping);
     assert!(
         (0..1000)
             .map(|i| f64::from(i) / 1000.0)

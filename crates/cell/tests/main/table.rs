@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use metalith_cell::{CellModel, CellStack, CellTable, Origin, RigorousCell, TableSpec};
 use metalith_core::{Progress, Silent};
-use metalith_design::{Design, WidthRule};
+use metalith_design::{Design, PillarRule};
 use metalith_rcwa::{CellLattice, Orders};
 
 fn design() -> Design {
@@ -188,7 +188,7 @@ fn the_mapping_of_the_hexagonal_design_is_that_of_its_cell() {
     let stack = design.cell_stack().unwrap();
     let orders = Orders::new(17).unwrap();
     let phase = |width: f64| stack.transmission(width, 1.55, orders).unwrap().arg() / std::f64::consts::TAU;
-    let rule = WidthRule::new(&design.cell, &design.mapping);
+    let rule = PillarRule::new(&design.cell, &design.mapping);
     let errors: Vec<f64> = (0..24)
         .map(|k| f64::from(k) / 24.0)
         .map(|u| phase(f64::from(rule.width_nm(u))) - phase(150.0) - u)

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use metalith_core::{EighthMap, Lattice, PillarShape, WidthMap, WidthRows};
+use metalith_core::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape};
 
-use super::{Symmetry, SymmetryGroup, WidthRule};
+use super::{PillarRule, Symmetry, SymmetryGroup};
 use crate::Element;
 use crate::phase::{ElementPhase, LensPhase};
 
@@ -17,7 +17,7 @@ pub struct ComputedWidths {
     lens: Arc<LensPhase>,
     /// That of light polarised along y, if it is another.
     along_y: Option<Arc<LensPhase>>,
-    rule: Arc<WidthRule>,
+    rule: Arc<PillarRule>,
     element: Element,
 }
 
@@ -25,7 +25,7 @@ impl ComputedWidths {
     pub(super) fn new(
         lens: Arc<LensPhase>,
         along_y: Option<Arc<LensPhase>>,
-        rule: Arc<WidthRule>,
+        rule: Arc<PillarRule>,
         element: Element,
     ) -> Self {
         Self {
@@ -104,12 +104,12 @@ impl ComputedWidths {
     }
 }
 
-impl WidthRows for ComputedWidths {
+impl PillarRows for ComputedWidths {
     fn lattice(&self) -> Lattice {
         self.lens.lattice()
     }
 
-    fn width(&self, ix: usize, iy: usize) -> u16 {
+    fn number(&self, ix: usize, iy: usize) -> u16 {
         let along_y = self.phase_along_y();
         self.rule.pillar(&self.phase(), along_y.as_ref(), ix, iy)
     }
@@ -128,14 +128,14 @@ impl WidthRows for ComputedWidths {
 
 /// Pillars of a class of elements.
 #[derive(Clone, Debug)]
-pub enum ClassWidths {
-    Held(WidthMap),
+pub enum ClassPillars {
+    Held(PillarMap),
     /// Of an element that all eight symmetries leave as it is.
     Eighth(EighthMap),
     Computed(ComputedWidths),
 }
 
-impl ClassWidths {
+impl ClassPillars {
     /// Whether a symmetry turns `known` into these pillars: every site is compared if both are held.
     pub(super) fn is_copy(&self, symmetry: Symmetry, known: &Self) -> bool {
         match (known, self) {
@@ -155,7 +155,7 @@ impl ClassWidths {
     }
 
     /// The pillars as a map, to be changed.
-    pub fn map_mut(&mut self) -> &mut WidthMap {
+    pub fn map_mut(&mut self) -> &mut PillarMap {
         if !matches!(self, Self::Held(_)) {
             *self = Self::Held(self.whole());
         }
@@ -166,14 +166,14 @@ impl ClassWidths {
     }
 
     /// The pillars as a map, made if they are not held.
-    pub fn map(&self) -> Cow<'_, WidthMap> {
+    pub fn map(&self) -> Cow<'_, PillarMap> {
         match self {
             Self::Held(map) => Cow::Borrowed(map),
             other => Cow::Owned(other.whole()),
         }
     }
 
-    fn rows(&self) -> &dyn WidthRows {
+    fn rows(&self) -> &dyn PillarRows {
         match self {
             Self::Held(map) => map,
             Self::Eighth(map) => map,
@@ -182,13 +182,13 @@ impl ClassWidths {
     }
 }
 
-impl WidthRows for ClassWidths {
+impl PillarRows for ClassPillars {
     fn lattice(&self) -> Lattice {
         self.rows().lattice()
     }
 
-    fn width(&self, ix: usize, iy: usize) -> u16 {
-        self.rows().width(ix, iy)
+    fn number(&self, ix: usize, iy: usize) -> u16 {
+        self.rows().number(ix, iy)
     }
 
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {

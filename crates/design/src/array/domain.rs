@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use metalith_core::WidthRows;
+use metalith_core::PillarRows;
 
 use super::{Symmetry, SymmetryGroup};
 
@@ -25,7 +25,7 @@ impl SymmetryGroup {
     /// The pillars that the group leaves unique, in parts of equally many copies: inside a lens with
     /// all eight symmetries an octant with eight copies and its diagonal with four. A site stands for its copies if it is
     /// the first of them in reading order.
-    pub fn domain(&self, widths: &(impl WidthRows + ?Sized)) -> Vec<DomainPart> {
+    pub fn domain(&self, widths: &(impl PillarRows + ?Sized)) -> Vec<DomainPart> {
         let n = widths.lattice().sites();
         let mut parts: Vec<DomainPart> = Vec::new();
         let mut room = Vec::new();
@@ -150,21 +150,21 @@ impl SymmetryGroup {
 mod tests {
     use super::*;
     use crate::array::symmetry::tests::lens;
-    use metalith_core::{Lattice, WidthMap};
+    use metalith_core::{Lattice, PillarMap};
 
     /// The domain's copies give every pillar of the lens once.
-    fn unfold(map: &WidthMap, group: &SymmetryGroup) {
+    fn unfold(map: &PillarMap, group: &SymmetryGroup) {
         let n = map.lattice.sites();
-        let mut seen = WidthMap::empty(map.lattice);
+        let mut seen = PillarMap::empty(map.lattice);
         for part in group.domain(map) {
             for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
-                if map.width_nm[[iy, ix]] == 0 || !group.holds(&part, n, ix, iy) {
+                if map.number[[iy, ix]] == 0 || !group.holds(&part, n, ix, iy) {
                     continue;
                 }
                 for s in &part.copies {
                     let (jx, jy) = s.site(n, ix, iy);
-                    assert_eq!(seen.width_nm[[jy, jx]], 0, "a site covered twice");
-                    seen.width_nm[[jy, jx]] = map.width_nm[[iy, ix]];
+                    assert_eq!(seen.number[[jy, jx]], 0, "a site covered twice");
+                    seen.number[[jy, jx]] = map.number[[iy, ix]];
                 }
             }
         }
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn one_pillar_that_differs_breaks_the_symmetry() {
         let mut map = lens(|x, y| (100 + x * x + y * y) as u16);
-        map.width_nm[[3, 4]] += 2;
+        map.number[[3, 4]] += 2;
         let group = SymmetryGroup::of(&map);
         assert_eq!(group, SymmetryGroup::trivial());
         unfold(&map, &group);
@@ -221,9 +221,9 @@ mod tests {
             };
             let group = SymmetryGroup::of_those(chosen);
             for n in [1, 2, 3, 6, 7] {
-                let full = WidthMap {
+                let full = PillarMap {
                     lattice: Lattice::new(350, n).unwrap(),
-                    width_nm: ndarray::Array2::ones((n, n)),
+                    number: ndarray::Array2::ones((n, n)),
                 };
                 let parts = group.domain(&full);
                 let sites: u64 = parts.iter().map(|p| p.pillars * p.copies.len() as u64).sum();

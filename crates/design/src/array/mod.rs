@@ -2,20 +2,20 @@
 
 mod computed;
 mod domain;
+mod pillar_rule;
 mod symmetry;
-mod widths;
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
-pub use computed::{ClassWidths, ComputedWidths};
+pub use computed::{ClassPillars, ComputedWidths};
 pub use domain::DomainPart;
+pub use pillar_rule::PillarRule;
 pub use symmetry::{Symmetry, SymmetryGroup};
-pub use widths::WidthRule;
 
 use crate::phase::{ElementPhase, LensPhase};
 use crate::{Design, Element};
-use metalith_core::{EighthMap, Lattice, PillarShape, WidthMap, WidthRows};
+use metalith_core::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape};
 use metalith_core::{Error, Result};
 use metalith_core::{Progress, Wedge};
 
@@ -39,7 +39,7 @@ const UNSTEERED: Wedge = Wedge {
 #[derive(Clone, Debug)]
 pub struct Class {
     /// Pillars of the first element of the class.
-    pub widths: ClassWidths,
+    pub widths: ClassPillars,
     /// The symmetries of those pillars: each proven by comparing every site, or, of an element that is not held, by its
     /// phase.
     pub group: SymmetryGroup,
@@ -81,7 +81,7 @@ impl PillarArray {
     ///
     /// # Errors
     /// If there is none, they are not of one lattice, a place is farther than 1 m from the middle, or the user stopped it.
-    pub fn of_maps(shape: PillarShape, maps: Vec<(WidthMap, (i64, i64))>, progress: &dyn Progress) -> Result<Self> {
+    pub fn of_maps(shape: PillarShape, maps: Vec<(PillarMap, (i64, i64))>, progress: &dyn Progress) -> Result<Self> {
         let Some(lattice) = maps.first().map(|(map, _)| map.lattice) else {
             return Err(Error::invalid(
                 "an array without elements",
@@ -121,7 +121,7 @@ impl PillarArray {
                 centre_nm,
                 wedge: UNSTEERED,
             };
-            array.place(element, ClassWidths::Held(map));
+            array.place(element, ClassPillars::Held(map));
             progress.advance(1);
         }
         Ok(array)
@@ -149,14 +149,14 @@ impl PillarArray {
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let rule = Arc::new(WidthRule::of_element(design, element.index));
+            let rule = Arc::new(PillarRule::of_element(design, element.index));
             array.place(
                 element,
                 if held {
                     let along_y = along_y.as_ref().map(|y| ElementPhase::of(y, &element));
-                    ClassWidths::Held(rule.widths(&ElementPhase::of(&lens, &element), along_y.as_ref()))
+                    ClassPillars::Held(rule.widths(&ElementPhase::of(&lens, &element), along_y.as_ref()))
                 } else {
-                    ClassWidths::Computed(ComputedWidths::new(lens.clone(), along_y.clone(), rule, element))
+                    ClassPillars::Computed(ComputedWidths::new(lens.clone(), along_y.clone(), rule, element))
                 },
             );
             progress.advance(1);
@@ -180,40 +180,40 @@ impl PillarArray {
     }
 
     /// The pillars of one element as a map; those of its class where nothing is turned.
-    pub fn widths(&self, placed: &PlacedElement) -> Cow<'_, WidthMap> {
+    pub fn widths(&self, placed: &PlacedElement) -> Cow<'_, PillarMap> {
         match self.rows(placed) {
             Cow::Borrowed(rows) => rows.map(),
-            Cow::Owned(ClassWidths::Held(map)) => Cow::Owned(map),
+            Cow::Owned(ClassPillars::Held(map)) => Cow::Owned(map),
             Cow::Owned(other) => Cow::Owned(other.whole()),
         }
     }
 
     /// The pillars of one element, to be read row by row.
-    pub fn rows(&self, placed: &PlacedElement) -> Cow<'_, ClassWidths> {
+    pub fn rows(&self, placed: &PlacedElement) -> Cow<'_, ClassPillars> {
         let widths = &self.classes[placed.class].widths;
         match widths {
             _ if placed.symmetry == Symmetry::IDENTITY => Cow::Borrowed(widths),
-            ClassWidths::Held(map) => Cow::Owned(ClassWidths::Held(placed.symmetry.apply(map))),
+            ClassPillars::Held(map) => Cow::Owned(ClassPillars::Held(placed.symmetry.apply(map))),
             // No symmetry turns it.
-            ClassWidths::Eighth(_) => Cow::Borrowed(widths),
-            ClassWidths::Computed(class) => Cow::Owned(ClassWidths::Computed(class.steered(placed.element))),
+            ClassPillars::Eighth(_) => Cow::Borrowed(widths),
+            ClassPillars::Computed(class) => Cow::Owned(ClassPillars::Computed(class.steered(placed.element))),
         }
     }
 
     /// As [`PillarArray::rows`], for who reads all rows: an element that is not held but has all eight symmetries is made
     /// once, as an eighth.
-    pub fn all_rows(&self, placed: &PlacedElement) -> Cow<'_, ClassWidths> {
+    pub fn all_rows(&self, placed: &PlacedElement) -> Cow<'_, ClassPillars> {
         let rows = self.rows(placed);
         let eighth = EighthMap::sites(self.lattice);
         match rows.as_ref() {
-            ClassWidths::Computed(computed) if computed.group().members().len() == 8 && eighth <= MOST_EIGHTH => {
-                Cow::Owned(ClassWidths::Eighth(EighthMap::of(computed)))
+            ClassPillars::Computed(computed) if computed.group().members().len() == 8 && eighth <= MOST_EIGHTH => {
+                Cow::Owned(ClassPillars::Eighth(EighthMap::of(computed)))
             }
             _ => rows,
         }
     }
 
-    fn place(&mut self, element: Element, widths: ClassWidths) {
+    fn place(&mut self, element: Element, widths: ClassPillars) {
         let copy = self.classes.iter().enumerate().find_map(|(class, known)| {
             let mut kept = Symmetry::ALL.into_iter().filter(|s| s.keeps(self.shape));
             let symmetry = kept.find(|s| widths.is_copy(*s, &known.widths))?;

@@ -1,6 +1,6 @@
 //! The eight symmetries of the square, and those of them that leave a lens as it is.
 
-use metalith_core::{Lattice, PillarShape, WidthMap};
+use metalith_core::{Lattice, PillarMap, PillarShape};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
 
@@ -51,10 +51,10 @@ impl Symmetry {
     }
 
     /// The pillars after this symmetry.
-    pub fn apply(self, widths: &WidthMap) -> WidthMap {
-        WidthMap {
+    pub fn apply(self, widths: &PillarMap) -> PillarMap {
+        PillarMap {
             lattice: widths.lattice,
-            width_nm: self.seen(&widths.width_nm).as_standard_layout().into_owned(),
+            number: self.seen(&widths.number).as_standard_layout().into_owned(),
         }
     }
 
@@ -124,14 +124,14 @@ impl Symmetry {
     }
 
     /// Whether this symmetry turns the pillars `from` into `to`, every site compared.
-    pub fn maps(self, from: &WidthMap, to: &WidthMap) -> bool {
+    pub fn maps(self, from: &PillarMap, to: &PillarMap) -> bool {
         let n = from.lattice.sites();
-        let seen = self.seen(&from.width_nm);
+        let seen = self.seen(&from.number);
         // From the middle outwards: sites that differ are found at once there, the rim is mostly empty.
         let mut rows = (0..n).map(|k| if k % 2 == 0 { n / 2 + k / 2 } else { n / 2 - 1 - k / 2 });
         from.lattice == to.lattice
             && self.keeps_lattice(from.lattice)
-            && rows.all(|iy| iy >= n || seen.row(iy) == to.width_nm.row(iy))
+            && rows.all(|iy| iy >= n || seen.row(iy) == to.number.row(iy))
     }
 }
 
@@ -149,12 +149,12 @@ fn composed(members: &[Symmetry]) -> Option<Symmetry> {
 
 impl SymmetryGroup {
     /// The group of a lens: each symmetry is tried on every site, or follows from two that hold.
-    pub fn of(widths: &WidthMap) -> Self {
+    pub fn of(widths: &PillarMap) -> Self {
         Self::of_those(|s| s.maps(widths, widths))
     }
 
     /// As [`SymmetryGroup::of`], of those that leave each pillar of this shape as it is.
-    pub fn of_shape(widths: &WidthMap, shape: PillarShape) -> Self {
+    pub fn of_shape(widths: &PillarMap, shape: PillarShape) -> Self {
         Self::of_those(|s| s.keeps(shape) && s.maps(widths, widths))
     }
 
@@ -193,14 +193,14 @@ pub(super) mod tests {
     use super::*;
 
     /// A lens of 12 sites across, whose widths follow from twice the place from the middle.
-    pub fn lens(f: impl Fn(i64, i64) -> u16) -> WidthMap {
+    pub fn lens(f: impl Fn(i64, i64) -> u16) -> PillarMap {
         let lattice = Lattice::new(350, 12).unwrap();
-        let mut map = WidthMap::empty(lattice);
+        let mut map = PillarMap::empty(lattice);
         for iy in 0..12 {
             for ix in 0..12 {
                 let (x, y) = (lattice.half_index(ix), lattice.half_index(iy));
                 if x * x + y * y <= 121 {
-                    map.width_nm[[iy, ix]] = f(x, y);
+                    map.number[[iy, ix]] = f(x, y);
                 }
             }
         }
@@ -218,9 +218,9 @@ pub(super) mod tests {
         for s in Symmetry::ALL {
             let moved = s.apply(&map);
             assert!(s.maps(&map, &moved));
-            for ((iy, ix), w) in map.width_nm.indexed_iter() {
+            for ((iy, ix), w) in map.number.indexed_iter() {
                 let (jx, jy) = s.site(12, ix, iy);
-                assert_eq!(moved.width_nm[[jy, jx]], *w, "{s:?}");
+                assert_eq!(moved.number[[jy, jx]], *w, "{s:?}");
             }
             assert_eq!(s.after(s.inverse()), Symmetry::IDENTITY);
             assert_eq!(s.inverse().after(s), Symmetry::IDENTITY);

@@ -5,8 +5,8 @@ use super::area::{MOST_SIDES, Sides};
 use super::content::{Content, Outlines, Ring, TextCopy};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
 use metalith_core::text::printable_bytes;
-use metalith_core::{PillarShape, WidthRows};
-use metalith_gds::extract::{ExtractedElement, HeldWidths};
+use metalith_core::{PillarRows, PillarShape};
+use metalith_gds::extract::{ExtractedElement, HeldPillars};
 use metalith_gds::{LayerNumber, Point, Rect};
 
 /// Tiles along the longer side of the map of changes.
@@ -153,8 +153,8 @@ fn size([x, y]: [u16; 2]) -> (u32, u16) {
 }
 
 fn element(
-    a: &ExtractedElement<HeldWidths>,
-    b: &ExtractedElement<HeldWidths>,
+    a: &ExtractedElement<HeldPillars>,
+    b: &ExtractedElement<HeldPillars>,
     shape: PillarShape,
     changes: &mut Changes,
 ) -> ElementDiff {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::super::polygon::twice_area;
 use super::super::work::Allowance;
 use metalith_core::{Error, PillarShape, Progress, Result};
-use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, HeldWidths, Scale, Why};
+use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, HeldPillars, Scale, Why};
 use metalith_gds::{
     DrawnPillar, LayerNumber, Layout, LayoutCell, PillarFinder, Point, Rect, Selection, Shape, Text, Transform,
     Visitor, drawn_corners, rectangle_of, simplified,
@@ -37,7 +37,7 @@ pub(super) struct WantedPillars<'a> {
 pub(super) struct Content {
     /// What is a pillar.
     pub shape: PillarShape,
-    pub elements: Vec<ExtractedElement<HeldWidths>>,
+    pub elements: Vec<ExtractedElement<HeldPillars>>,
     pub outlines: BTreeMap<LayerNumber, Outlines>,
     pub counts: BTreeMap<LayerNumber, u64>,
     /// Sorted.

@@ -145,7 +145,7 @@ fn layouts_are_compared_with_their_design_and_with_one_another() {
 
     let map = array.classes[0].widths.map_mut();
     let middle = map.lattice.sites() / 2;
-    map.width_nm[[middle, middle]] -= 2;
+    map.number[[middle, middle]] -= 2;
     array.classes[0].group = metalith_design::array::SymmetryGroup::trivial();
     let changed = write(&array, Hierarchy::Flat);
     let copies = array.placed.iter().filter(|p| p.class == 0).count() as u64;

@@ -7,12 +7,12 @@ use std::collections::HashMap;
 use copies::Images;
 
 use super::MOST_SITES;
-use super::held::HeldWidths;
+use super::held::HeldPillars;
 use super::oddity::Why;
 use super::plan::ExtractedElement;
 use super::sites::{Scale, Sites, Standing};
 use crate::{DrawnPillar, ExtractionError, Rect, Transform};
-use metalith_core::{EighthMap, ElementSite, WidthRows};
+use metalith_core::{EighthMap, ElementSite, PillarRows};
 
 /// Puts pillars on the sites of elements.
 ///
@@ -21,7 +21,7 @@ use metalith_core::{EighthMap, ElementSite, WidthRows};
 pub struct Filler {
     scale: Scale,
     sites: Sites,
-    elements: Vec<ExtractedElement<HeldWidths>>,
+    elements: Vec<ExtractedElement<HeldPillars>>,
     /// Element that each placement of the current cell met last.
     guesses: Vec<u32>,
     /// Placements of the current cell about the middles of elements, if all of them are.
@@ -48,7 +48,7 @@ impl Filler {
     pub fn new(sites: Vec<ElementSite>, scale: Scale) -> Self {
         let index = Sites::new(&sites, scale);
         let empty = |site: ElementSite| ExtractedElement {
-            widths: HeldWidths::Empty(site.lattice),
+            widths: HeldPillars::Empty(site.lattice),
             site,
         };
         Self {
@@ -82,7 +82,7 @@ impl Filler {
     ///
     /// # Errors
     /// [`ExtractionError::Sites`] if they have more sites than are held: what was put after that is lost.
-    pub fn finish(self) -> Result<Vec<ExtractedElement<HeldWidths>>, ExtractionError> {
+    pub fn finish(self) -> Result<Vec<ExtractedElement<HeldPillars>>, ExtractionError> {
         if !self.refused {
             return Ok(self.elements);
         }
@@ -119,11 +119,11 @@ impl Filler {
     /// Hold an eighth of an element of which nothing is held, unless that is too much.
     fn hold_eighth(&mut self, element: u32) {
         let widths = &mut self.elements[element as usize].widths;
-        let HeldWidths::Empty(lattice) = *widths else { return };
+        let HeldPillars::Empty(lattice) = *widths else { return };
         let held = self.held + EighthMap::sites(lattice);
         if held <= self.most {
             self.held = held;
-            *widths = HeldWidths::Eighth(EighthMap::empty(lattice));
+            *widths = HeldPillars::Eighth(EighthMap::empty(lattice));
         }
     }
 
@@ -180,7 +180,7 @@ impl Filler {
             let orbit = &self.orbits[k];
             if let Some((row, column, width_nm)) = site(self, orbit) {
                 let (element, copies) = (orbit.element as usize, orbit.placements.len() as u64);
-                if let HeldWidths::Eighth(map) = &mut self.elements[element].widths {
+                if let HeldPillars::Eighth(map) = &mut self.elements[element].widths {
                     *map.at(column, row) = width_nm;
                     self.pillars += copies;
                 }
@@ -194,14 +194,14 @@ impl Filler {
     #[inline]
     fn site_of(&self, orbit: &Orbit, r: &Rect, placements: &[Transform]) -> Option<(usize, usize, u16)> {
         let element = orbit.element;
-        let HeldWidths::Eighth(map) = &self.elements[element as usize].widths else {
+        let HeldPillars::Eighth(map) = &self.elements[element as usize].widths else {
             return None;
         };
         let placed = placements.get(orbit.placements[0])?.apply_rect(r)?;
         let mut guess = element;
         let (found, row, column, width_nm) = self.standing(&placed, &mut guess).ok()?;
         let copies = map.copies(column, row);
-        if found != element || copies != orbit.placements.len() || map.width(column, row) != 0 {
+        if found != element || copies != orbit.placements.len() || map.number(column, row) != 0 {
             return None;
         }
         // Four sites about the middle are met by four placements only if no two of these put them on one site.
@@ -278,8 +278,8 @@ impl Filler {
     fn fill(&mut self, element: u32, row: usize, column: usize, number: u16) -> Result<bool, Why> {
         // Nearly all pillars are of elements that are held whole already.
         let place = match &mut self.elements[element as usize].widths {
-            HeldWidths::Whole(map) => Some(&mut map.width_nm[[row, column]]),
-            other if other.width(column, row) != 0 => return Err(Why::DuplicateSite),
+            HeldPillars::Whole(map) => Some(&mut map.number[[row, column]]),
+            other if other.number(column, row) != 0 => return Err(Why::DuplicateSite),
             _ => self.place(element, row, column),
         };
         let Some(place) = place else { return Ok(true) };
@@ -308,11 +308,11 @@ impl Filler {
     /// The width at one site alone; none if its element cannot be held.
     #[inline]
     fn place(&mut self, element: u32, row: usize, column: usize) -> Option<&mut u16> {
-        if !matches!(self.elements[element as usize].widths, HeldWidths::Whole(_)) {
+        if !matches!(self.elements[element as usize].widths, HeldPillars::Whole(_)) {
             self.hold_whole(element);
         }
         match &mut self.elements[element as usize].widths {
-            HeldWidths::Whole(map) => Some(&mut map.width_nm[[row, column]]),
+            HeldPillars::Whole(map) => Some(&mut map.number[[row, column]]),
             _ => None,
         }
     }
@@ -326,7 +326,7 @@ impl Filler {
         self.refused |= held > self.most;
         if !self.refused {
             self.held = held;
-            *widths = HeldWidths::Whole(widths.whole());
+            *widths = HeldPillars::Whole(widths.whole());
         }
     }
 
@@ -338,7 +338,7 @@ impl Filler {
         else {
             return number;
         };
-        let there = self.elements[element as usize].widths.width(column, row);
+        let there = self.elements[element as usize].widths.number(column, row);
         if number <= there {
             return number;
         }
@@ -357,7 +357,7 @@ impl Filler {
         let Some(width_nm) = self.scale.whole_nm(r.width()) else {
             return *r;
         };
-        let there = i64::from(self.elements[element as usize].widths.width(column, row));
+        let there = i64::from(self.elements[element as usize].widths.number(column, row));
         if width_nm <= there {
             return *r;
         }

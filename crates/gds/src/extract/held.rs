@@ -2,25 +2,25 @@
 
 use std::ops::Range;
 
-use metalith_core::{EighthMap, Lattice, WidthMap, WidthRows};
+use metalith_core::{EighthMap, Lattice, PillarMap, PillarRows};
 
 /// Pillars that were read of one element.
 #[derive(Clone, Debug)]
-pub enum HeldWidths {
+pub enum HeldPillars {
     /// No pillar yet: no memory.
     Empty(Lattice),
     /// All pillars came with all copies of them by the symmetries of the square.
     Eighth(EighthMap),
-    Whole(WidthMap),
+    Whole(PillarMap),
 }
 
-impl HeldWidths {
+impl HeldPillars {
     /// Sites that are held.
     pub fn sites(&self) -> u64 {
         match self {
             Self::Empty(_) => 0,
             Self::Eighth(map) => EighthMap::sites(map.lattice()),
-            Self::Whole(map) => map.width_nm.len() as u64,
+            Self::Whole(map) => map.number.len() as u64,
         }
     }
 
@@ -30,14 +30,14 @@ impl HeldWidths {
     }
 
     /// The pillars as a map.
-    pub fn into_map(self) -> WidthMap {
+    pub fn into_map(self) -> PillarMap {
         match self {
             Self::Whole(map) => map,
             other => other.whole(),
         }
     }
 
-    fn rows(&self) -> Option<&dyn WidthRows> {
+    fn rows(&self) -> Option<&dyn PillarRows> {
         match self {
             Self::Empty(_) => None,
             Self::Eighth(map) => Some(map),
@@ -46,7 +46,7 @@ impl HeldWidths {
     }
 }
 
-impl WidthRows for HeldWidths {
+impl PillarRows for HeldPillars {
     fn lattice(&self) -> Lattice {
         match self {
             Self::Empty(lattice) => *lattice,
@@ -56,15 +56,15 @@ impl WidthRows for HeldWidths {
     }
 
     #[inline]
-    fn width(&self, ix: usize, iy: usize) -> u16 {
+    fn number(&self, ix: usize, iy: usize) -> u16 {
         match self {
             Self::Empty(_) => 0,
-            Self::Eighth(map) => map.width(ix, iy),
-            Self::Whole(map) => map.width_nm[[iy, ix]],
+            Self::Eighth(map) => map.number(ix, iy),
+            Self::Whole(map) => map.number[[iy, ix]],
         }
     }
 
-    fn held(&self) -> Option<&WidthMap> {
+    fn held(&self) -> Option<&PillarMap> {
         match self {
             Self::Whole(map) => Some(map),
             Self::Empty(_) | Self::Eighth(_) => None,
@@ -84,11 +84,11 @@ impl WidthRows for HeldWidths {
     }
 
     fn pillars(&self) -> u64 {
-        self.rows().map_or(0, WidthRows::pillars)
+        self.rows().map_or(0, PillarRows::pillars)
     }
 
     fn histogram(&self) -> Vec<u64> {
         let nothing = || vec![(self.lattice().sites() as u64).pow(2)];
-        self.rows().map_or_else(nothing, WidthRows::histogram)
+        self.rows().map_or_else(nothing, PillarRows::histogram)
     }
 }

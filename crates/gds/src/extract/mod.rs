@@ -25,12 +25,12 @@ use std::path::Path;
 
 use crate::{Error, ExtractionError, Layout, Result};
 pub use metalith_core::ElementSite;
-use metalith_core::{EighthMap, LayerNumber, PillarReader, PillarShape, Progress, WidthMap};
+use metalith_core::{EighthMap, LayerNumber, PillarMap, PillarReader, PillarShape, Progress};
 use pillars::PillarCollector;
 
 pub use discover::{Discovered, discover};
 pub use filler::Filler;
-pub use held::HeldWidths;
+pub use held::HeldPillars;
 pub use sites::Scale;
 
 /// Sites of all elements together where they are held in full, or where the layout says how large they are: 5 x 5 lenses
@@ -106,7 +106,7 @@ impl PillarReader for GdsPillars {
         shape: PillarShape,
         elements: &[ElementSite],
         progress: &dyn Progress,
-    ) -> metalith_core::Result<Vec<WidthMap>> {
+    ) -> metalith_core::Result<Vec<PillarMap>> {
         let file = Layout::open(layout)?;
         let plan = ExtractionPlan::given(layer, elements.to_vec()).of_shape(shape);
         let found = extract(&file, &plan, progress)?;
@@ -123,7 +123,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
     let found = sites_of(layout, plan, progress)?;
     fits(layout.path(), &found.sites)?;
     let folded = extract_from(layout, plan, found, MOST_SITES, progress)?;
-    let whole = |e: ExtractedElement<HeldWidths>| ExtractedElement {
+    let whole = |e: ExtractedElement<HeldPillars>| ExtractedElement {
         site: e.site,
         widths: e.widths.into_map(),
     };
@@ -145,7 +145,7 @@ pub fn extract_folded(
     layout: &Layout,
     plan: &ExtractionPlan,
     progress: &dyn Progress,
-) -> Result<Extraction<HeldWidths>> {
+) -> Result<Extraction<HeldPillars>> {
     let found = sites_of(layout, plan, progress)?;
     let most = match plan.elements {
         Elements::Given(_) => MOST_GIVEN_SITES,
@@ -179,7 +179,7 @@ fn extract_from(
     found: Discovered,
     most: u64,
     progress: &dyn Progress,
-) -> Result<Extraction<HeldWidths>> {
+) -> Result<Extraction<HeldPillars>> {
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
     let mut pillars = PillarCollector::new(plan, found.shape, found.sites, Scale::of(layout)?, most);

@@ -1,7 +1,7 @@
 //! The visitor that fills the width maps.
 
 use super::filler::Filler;
-use super::held::HeldWidths;
+use super::held::HeldPillars;
 use super::oddity::{Oddities, Oddity, Why};
 use super::plan::{Extraction, ExtractionPlan};
 use super::sites::Scale;
@@ -36,7 +36,7 @@ impl PillarCollector {
         }
     }
 
-    pub fn finish(self, top: String) -> Result<Extraction<HeldWidths>, ExtractionError> {
+    pub fn finish(self, top: String) -> Result<Extraction<HeldPillars>, ExtractionError> {
         Ok(Extraction {
             top,
             shape: self.shape,

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::oddity::Oddities;
 use super::survey::Survey;
 use crate::{LayerNumber, Selection};
-use metalith_core::{ElementSite, Error, PillarShape, Result, WidthMap};
+use metalith_core::{ElementSite, Error, PillarMap, PillarShape, Result};
 
 /// Where the elements are.
 #[derive(Clone, Debug)]
@@ -73,14 +73,14 @@ impl ExtractionPlan {
 
 /// The pillars of one element as the layout has them.
 #[derive(Clone, Debug)]
-pub struct ExtractedElement<W = WidthMap> {
+pub struct ExtractedElement<W = PillarMap> {
     pub site: ElementSite,
     pub widths: W,
 }
 
 /// What a layout holds.
 #[derive(Clone, Debug)]
-pub struct Extraction<W = WidthMap> {
+pub struct Extraction<W = PillarMap> {
     /// Name of the cell that was read.
     pub top: String,
     pub elements: Vec<ExtractedElement<W>>,

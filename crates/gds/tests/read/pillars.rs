@@ -1,6 +1,6 @@
 //! What is taken for a pillar, and where the elements are.
 
-use metalith_core::{Lattice, LatticeKind, PillarShape, RotatedRectangles, Silent, WidthMap};
+use metalith_core::{Lattice, LatticeKind, PillarMap, PillarShape, RotatedRectangles, Silent};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
 use metalith_testing::gds::Gds;
@@ -8,10 +8,10 @@ use metalith_testing::gds::Gds;
 use crate::{PILLARS, foreign_files, layout};
 
 /// The lens of `scripts/make_foreign_layouts.py`.
-fn foreign_lens() -> (ElementSite, WidthMap) {
+fn foreign_lens() -> (ElementSite, PillarMap) {
     let lattice = Lattice::new(350, 24).unwrap();
-    let mut widths = WidthMap::empty(lattice);
-    for ((iy, ix), w) in widths.width_nm.indexed_iter_mut() {
+    let mut widths = PillarMap::empty(lattice);
+    for ((iy, ix), w) in widths.number.indexed_iter_mut() {
         let h2 = lattice.half_radius2(ix, iy);
         if h2 <= 24 * 24 {
             *w = (100 + 2 * (7 * h2 % 101)) as u16;
@@ -89,7 +89,7 @@ fn circles_are_pillars_where_most_are() {
     let read = extract(&file, &ExtractionPlan::discover(PILLARS), &Silent).unwrap();
     assert_eq!(read.shape, PillarShape::Circle);
     assert_eq!((read.elements.len(), read.pillars), (1, 35));
-    let widths = &read.elements[0].widths.width_nm;
+    let widths = &read.elements[0].widths.number;
     assert_eq!((widths[[0, 0]], widths[[0, 1]], widths[[1, 1]]), (200, 120, 0));
     assert_eq!(read.oddities.listed[0].why, Why::OtherShape);
     // Taken for squares, they are none.
@@ -124,7 +124,7 @@ fn circles_of_few_corners_are_on_their_sites() {
             panic!("{corners}: {} elements", read.elements.len())
         };
         assert_eq!((element.site.centre_nm, element.site.lattice.pitch_nm()), ([0, 0], 350));
-        assert!(element.widths.width_nm.iter().all(|w| *w == 200), "{corners}");
+        assert!(element.widths.number.iter().all(|w| *w == 200), "{corners}");
     }
 }
 
@@ -177,7 +177,7 @@ fn upright_rectangles_are_found_among_squares_and_marks() {
     assert_eq!((read.pillars, read.oddities.total()), (400, 0));
     let map = &read.elements[0].widths;
     for k in 0..400_usize {
-        let edges = pillars.edges_nm(map.width_nm[[k / 20, k % 20]]).map(i32::from);
+        let edges = pillars.edges_nm(map.number[[k / 20, k % 20]]).map(i32::from);
         assert_eq!(edges, several(k as i32), "{k}");
     }
     let read = found(&several, true).unwrap();
@@ -254,8 +254,8 @@ fn everything_that_is_not_a_pillar_is_listed() {
     assert_eq!(read.oddities.listed[1].centre_nm, [526.0, 175.0]);
     assert_eq!(read.oddities.listed[2].size_nm, [100.0, 102.0]);
     assert_eq!(read.pillars, 2);
-    assert_eq!(read.elements[0].widths.width_nm[[2, 2]], 100);
-    assert_eq!(read.elements[0].widths.width_nm[[3, 1]], 100);
+    assert_eq!(read.elements[0].widths.number[[2, 2]], 100);
+    assert_eq!(read.elements[0].widths.number[[3, 1]], 100);
 }
 
 /// A hexagonal lattice as people draw one: an array of every other row, then an array of the rows between. The same rows without
@@ -313,7 +313,7 @@ fn wide_pillars_are_found_and_pads_are_not() {
         let lattice = element.site.lattice;
         assert_eq!((lattice.pitch_nm(), element.site.centre_nm), (pitch as u32, [0, 0]));
         assert_eq!((read.pillars, read.oddities.total()), (36, 0), "{pitch}");
-        assert_eq!(element.widths.width_nm[[1, 2]], (least + 8 * step) as u16);
+        assert_eq!(element.widths.number[[1, 2]], (least + 8 * step) as u16);
     }
     // Rows of a hexagonal lattice of 12 um are 10.392 um apart.
     let mut gds = Gds::library();

@@ -1,6 +1,6 @@
 //! Random trees of cells: read as gds21 reads them, every reference followed.
 
-use metalith_core::{Lattice, Silent, WidthMap};
+use metalith_core::{Lattice, PillarMap, Silent};
 use metalith_gds::extract::{ElementSite, Extraction, ExtractionPlan, extract};
 use proptest::prelude::*;
 use rand::SeedableRng;
@@ -174,14 +174,14 @@ proptest! {
     ) {
         let lattice = Lattice::new(2 * pitch, 2 * half).unwrap();
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        let mut widths = WidthMap::empty(lattice);
+        let mut widths = PillarMap::empty(lattice);
         let mut gds = Gds::library();
         gds.cell("TOP");
         for iy in 0..2 * half {
             for ix in 0..2 * half {
                 let w = 2 * rand::Rng::random_range(&mut rng, 20..pitch as u16);
                 if lattice.half_radius2(ix, iy) <= (2 * half as i64).pow(2) {
-                    widths.width_nm[[iy, ix]] = w;
+                    widths.number[[iy, ix]] = w;
                     let (px, py) = (x + lattice.coordinate_nm(ix), y + lattice.coordinate_nm(iy));
                     gds.square(1, px as i32, py as i32, i32::from(w));
                 }

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use metalith_cell::{CellModel, PointwiseCell};
 use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_design::{Design, WidthRule};
+use metalith_design::{Design, PillarRule};
 use metalith_grating::{Blaze, CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, RealRow, SiteGrid};
 use num_complex::Complex64;
 
@@ -56,7 +56,7 @@ pub struct Prototype {
 impl Prototype {
     pub fn new() -> Self {
         let design = Design::read(&metalith_testing::design("prototype_3x3")).unwrap();
-        let rule = WidthRule::new(&design.cell, &design.mapping);
+        let rule = PillarRule::new(&design.cell, &design.mapping);
         let mapping = Mapping::new(|u| rule.width_nm(u));
         Self { design, mapping }
     }
@@ -93,7 +93,7 @@ impl Prototype {
         let normal = [normal.clone(), normal];
         let table = self.neighbours(um, sines);
 
-        let rule = WidthRule::new(&self.design.cell, &self.design.mapping);
+        let rule = PillarRule::new(&self.design.cell, &self.design.mapping);
         let mut rows = Vec::new();
         let mut first: [Vec<[Complex64; 2]>; 3] = Default::default();
         let directions = RealRow::directions([sin_x, sin_y]);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use metalith_design::{Design, WidthRule};
+use metalith_design::{Design, PillarRule};
 use metalith_grating::{Blaze, BlazeOrders, CoarseCell};
 use num_complex::Complex64;
 
@@ -73,7 +73,7 @@ pub fn read() -> Vec<Row> {
 
 /// Solve rows of one grating and one wavelength as the design maps their phases, and compare.
 fn summary(rows: &[&Row], design: &Design, cell: &CoarseCell<'_>) -> Summary {
-    let rule = WidthRule::new(&design.cell, &design.mapping);
+    let rule = PillarRule::new(&design.cell, &design.mapping);
     // Both polarisations come from one solution.
     let mut solved: BTreeMap<(bool, String), BlazeOrders> = BTreeMap::new();
     let n = rows.len() as f64;

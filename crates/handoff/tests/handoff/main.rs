@@ -306,7 +306,7 @@ fn areas_are_those_of_the_pillars_and_times_follow_from_them() {
     let drawn: f64 = array
         .placed
         .iter()
-        .flat_map(|p| array.widths(p).into_owned().width_nm.into_iter())
+        .flat_map(|p| array.widths(p).into_owned().number.into_iter())
         .map(|w| (f64::from(w) * 1e-3).powi(2))
         .sum();
     let census = Census::take(&shared().join("layout/mini_3x3_pillars.gds"), &Silent).unwrap();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 use std::path::{Path, PathBuf};
 
-use metalith_core::{LatticeKind, PillarShape, Progress, Rectangles, Result, Silent, WidthRows};
+use metalith_core::{LatticeKind, PillarRows, PillarShape, Progress, Rectangles, Result, Silent};
 use metalith_design::{Design, PillarArray};
 use metalith_gds::{
     LayerNumber, Layout, Point, Rect, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use metalith_core::{Error, LayerNumber, Progress, Result, WidthRows};
+use metalith_core::{Error, LayerNumber, PillarRows, Progress, Result};
 use metalith_design::array::{DomainPart, SymmetryGroup};
 use metalith_oasis::{CellBounds, CompressedBlock, Placing, RecordBuffer, Repetition};
 use rayon::prelude::*;
@@ -73,7 +73,7 @@ impl PillarEncoding {
 
 /// Pillars of an element, those that its symmetries leave unique, in a cell for each part of them.
 pub(super) struct ElementPillars<'a> {
-    pub widths: &'a dyn WidthRows,
+    pub widths: &'a dyn PillarRows,
     group: &'a SymmetryGroup,
     parts: &'a [DomainPart],
     /// Columns of each part in each row.
@@ -126,7 +126,7 @@ pub(super) fn bounds_of(corners: [i64; 4]) -> CellBounds {
 
 impl<'a> ElementPillars<'a> {
     pub fn new(
-        widths: &'a dyn WidthRows,
+        widths: &'a dyn PillarRows,
         group: &'a SymmetryGroup,
         parts: &'a [DomainPart],
         layer: LayerNumber,
@@ -365,7 +365,7 @@ impl<'a> ElementPillars<'a> {
         let mut corners: Vec<Vec<[i64; 2]>> = Vec::new();
         rings::walk(lattice.sites(), sector, rings, |ix, iy| {
             if let Some(part) = self.group.part_of(self.parts, lattice.sites(), ix, iy)
-                && let width = self.widths.width(ix, iy)
+                && let width = self.widths.number(ix, iy)
                 && width != 0
             {
                 let out = &mut out[part];

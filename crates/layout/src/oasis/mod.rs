@@ -6,7 +6,7 @@ mod rings;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use metalith_core::{Error, Progress, Result, WholeFile, WidthRows};
+use metalith_core::{Error, PillarRows, Progress, Result, WholeFile};
 use metalith_design::array::{DomainPart, PillarArray, Symmetry, SymmetryGroup};
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use metalith_oasis::{CompressedBlock, OasisWriter, Placing, RecordBuffer};
@@ -292,7 +292,7 @@ impl Elements<'_, '_> {
 
     fn element<'e>(
         &self,
-        widths: &'e dyn WidthRows,
+        widths: &'e dyn PillarRows,
         group: &'e SymmetryGroup,
         parts: &'e [DomainPart],
     ) -> ElementPillars<'e> {
@@ -300,7 +300,7 @@ impl Elements<'_, '_> {
     }
 
     /// A lens of parts.
-    fn lens(&mut self, name: &str, widths: &dyn WidthRows, group: &SymmetryGroup) -> Result<(u64, [i64; 4])> {
+    fn lens(&mut self, name: &str, widths: &dyn PillarRows, group: &SymmetryGroup) -> Result<(u64, [i64; 4])> {
         let parts = group.domain(widths);
         let mut pillars = self.element(widths, group, &parts);
         let names: Vec<String> = (b'A'..)
@@ -359,7 +359,7 @@ impl Elements<'_, '_> {
     }
 
     /// Numbers of the cells of all widths, by width, if the encoding refers to them.
-    fn numbers_of_widths(&mut self, widths: &dyn WidthRows, encoding: PillarEncoding) -> Vec<u64> {
+    fn numbers_of_widths(&mut self, widths: &dyn PillarRows, encoding: PillarEncoding) -> Vec<u64> {
         let refers = match encoding {
             PillarEncoding::References => true,
             PillarEncoding::Lists(_) => !self.form.is_square(),

@@ -11,7 +11,7 @@ use super::psf_metrics::{PsfImages, PsfPair, PsfResult};
 use metalith_cell::Fidelity;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
-use metalith_core::{Lattice, WidthRows};
+use metalith_core::{Lattice, PillarRows};
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_made::{DrawnElement, MadeElement, MadeView, SimulationCase};
@@ -53,7 +53,7 @@ pub(super) struct ElementSimulator<'a> {
 
 /// An element as read from a layout, and as made in each case that is a made chip.
 pub(super) struct ReadElement<'a> {
-    pub widths: &'a dyn WidthRows,
+    pub widths: &'a dyn PillarRows,
     /// What chips are made of, if the pillars are held as a map.
     drawn: Option<DrawnElement<'a>>,
     pub made: Vec<Option<MadeElement>>,
@@ -77,9 +77,15 @@ impl<'a> ElementSimulator<'a> {
                     tables: match case {
                         SimulationCase::Made(_) => None,
                         SimulationCase::Cell(cell) => {
-                            let (widest_nm, light) = (widest_nm(design), design.verify.light());
+                            let (largest_number, light) = (largest_number(design), design.verify.light());
                             let kind = lattice.kind();
-                            Some(TransmissionTables::new(*cell, kind, wavelength_um, widest_nm, light)?)
+                            Some(TransmissionTables::new(
+                                *cell,
+                                kind,
+                                wavelength_um,
+                                largest_number,
+                                light,
+                            )?)
                         }
                     },
                 })
@@ -122,7 +128,7 @@ impl<'a> ElementSimulator<'a> {
             let waves = all_arriving(&lit, colour.wavelength_um)?;
             for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
                 if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
-                    tables.add_directions(*cell, &waves, widest_nm(self.design), progress)?;
+                    tables.add_directions(*cell, &waves, largest_number(self.design), progress)?;
                 }
             }
         }
@@ -176,7 +182,7 @@ impl<'a> ElementSimulator<'a> {
     ///
     /// # Errors
     /// As [`MadeElement::new`]; also if a chip is to be made of pillars that are not held as a map.
-    pub fn read<'w>(&self, element: &Element, widths: &'w dyn WidthRows) -> Result<ReadElement<'w>> {
+    pub fn read<'w>(&self, element: &Element, widths: &'w dyn PillarRows) -> Result<ReadElement<'w>> {
         let drawn = widths.held().map(|map| {
             let drawn = DrawnElement::new(map, self.design.aperture_radius_of_um(element));
             drawn.of_shape(self.design.cell.shape).placed(element.centre_um())
@@ -271,7 +277,7 @@ impl<'a> ElementSimulator<'a> {
         task: &Task<'_>,
         (element, phase): (&Element, &ElementPhase<'_>),
         designed: &dyn Aperture,
-        widths: &dyn WidthRows,
+        widths: &dyn PillarRows,
         scratch: &mut Scratch,
     ) -> Result<PsfPair> {
         let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
@@ -400,7 +406,7 @@ pub(super) fn open_matched(
 }
 
 /// Widths that tables go to.
-fn widest_nm(design: &Design) -> u16 {
+fn largest_number(design: &Design) -> u16 {
     design.cell.most()
 }
 

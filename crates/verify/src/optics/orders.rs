@@ -8,7 +8,7 @@ use crate::psf_metrics::OrderEfficiencies;
 use crate::site_orders::site_shares;
 use metalith_core::{Progress, Result};
 use metalith_design::Element;
-use metalith_design::array::WidthRule;
+use metalith_design::array::PillarRule;
 use metalith_design::phase::ElementPhase;
 use metalith_made::{MadeChip, SimulationCase};
 use metalith_wave::Aperture;
@@ -24,7 +24,7 @@ impl ElementSimulator<'_> {
         &self,
         element: &Element,
         phase: &ElementPhase<'_>,
-        rule: &WidthRule,
+        rule: &PillarRule,
         read: &ReadElement<'_>,
         progress: &dyn Progress,
     ) -> Result<Vec<OrderEfficiencies>> {
@@ -84,7 +84,7 @@ impl ElementSimulator<'_> {
 /// Transmissions with the drawn width (nm) as index, for the widths that a rule draws.
 fn by_drawn_width(
     chip: &MadeChip,
-    rule: &WidthRule,
+    rule: &PillarRule,
     density_steps: i32,
     wavelength_um: f64,
     progress: &dyn Progress,

@@ -1,6 +1,6 @@
 //! What was designed: the chip, the pillars in the middle, phase and width along a radius.
 
-use metalith_core::{Lattice, PillarShape, Rectangles, WidthMap, WidthRows};
+use metalith_core::{Lattice, PillarMap, PillarRows, PillarShape, Rectangles};
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase, RadialPhase};
 use metalith_design::{Design, LensSpec};
@@ -82,7 +82,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
         Chart::new(format!("{title} over the radius"), Axis::linear("radius", "um"), axis).size(420.0, 260.0);
     let last = along(&|ix| phase.turns(ix, n / 2)).len();
     let shown = along(&|ix| {
-        Some(rows.width(ix, n / 2))
+        Some(rows.number(ix, n / 2))
             .filter(|w| *w > 0)
             .map(|w| shown_number(design, w))
     });
@@ -161,15 +161,15 @@ pub(super) fn step(design: &Design) -> f64 {
 }
 
 /// The sites about the middle of an element that figures show.
-fn middle(rows: &impl WidthRows) -> WidthMap {
+fn middle(rows: &impl PillarRows) -> PillarMap {
     let lattice = rows.lattice();
     let n = lattice.sites();
     let beside = n.saturating_sub(2 * RADIUS_POINTS) / 2;
     let shown =
         Lattice::of_kind(lattice.kind(), lattice.pitch_nm(), n - 2 * beside).expect("a part of a lattice is one");
-    let mut map = WidthMap::empty(shown);
-    for ((iy, ix), width) in map.width_nm.indexed_iter_mut() {
-        *width = rows.width(ix + beside, iy + beside);
+    let mut map = PillarMap::empty(shown);
+    for ((iy, ix), width) in map.number.indexed_iter_mut() {
+        *width = rows.number(ix + beside, iy + beside);
     }
     map
 }

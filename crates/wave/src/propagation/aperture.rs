@@ -1,6 +1,6 @@
 //! The transmission of an element, row by row.
 
-use metalith_core::{Lattice, WidthRows};
+use metalith_core::{Lattice, PillarRows};
 use num_complex::{Complex32, Complex64};
 
 use crate::error::{Result, WaveError};
@@ -34,7 +34,7 @@ pub trait Aperture: Sync {
 /// Pillars as they stand in a layout, through a table of what each width transmits.
 #[derive(Clone)]
 pub struct Pillars<'a> {
-    widths: &'a dyn WidthRows,
+    widths: &'a dyn PillarRows,
     table: Vec<Complex32>,
     radius_um: f64,
 }
@@ -45,8 +45,8 @@ impl<'a> Pillars<'a> {
     ///
     /// # Errors
     /// If a width is beyond the table.
-    pub fn new(widths: &'a dyn WidthRows, table: &[Complex64]) -> Result<Self> {
-        let largest = usize::from(widths.widest_nm());
+    pub fn new(widths: &'a dyn PillarRows, table: &[Complex64]) -> Result<Self> {
+        let largest = usize::from(widths.largest_number());
         if largest >= table.len() {
             return Err(WaveError::Width {
                 width_nm: largest,
@@ -159,7 +159,7 @@ fn single(t: Complex64) -> Complex32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::WidthMap;
+    use metalith_core::PillarMap;
 
     #[test]
     fn circle_counts_its_sites_exactly() {
@@ -171,8 +171,8 @@ mod tests {
 
     #[test]
     fn pillars_know_how_far_out_they_reach() {
-        let mut widths = WidthMap::empty(Lattice::new(350, 8).unwrap());
-        widths.width_nm[[6, 1]] = 120;
+        let mut widths = PillarMap::empty(Lattice::new(350, 8).unwrap());
+        widths.number[[6, 1]] = 120;
         let mut table = vec![Complex64::new(9.0, 9.0); 121];
         table[120] = Complex64::new(0.5, -0.25);
         let pillars = Pillars::new(&widths, &table).unwrap();

@@ -250,7 +250,7 @@ fn misplaced(site: &SemSite, elements: &PerElement<MeasuredElement>) -> Option<(
     let place = format!("at {:?} um in element {:?}", site.at_um, site.element);
     let written = element
         .site_at(site.at_um)
-        .map_or(0, |at| element.pillars.width_nm.as_slice().map_or(0, |w| w[at]));
+        .map_or(0, |at| element.pillars.number.as_slice().map_or(0, |w| w[at]));
     if written == 0 {
         let what = format!("it names a pillar {place}, where the layout has none");
         return Some((

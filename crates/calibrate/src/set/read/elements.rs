@@ -5,13 +5,13 @@ use std::path::Path;
 use super::{APERTURE_DIAMETER_UM, whole};
 use crate::set::{MeasuredElement, Stack};
 use metalith_core::document::{Limits, Section};
-use metalith_core::{ElementSite, Lattice, Result, WidthMap};
+use metalith_core::{ElementSite, Lattice, PillarMap, Result};
 
 pub(super) fn elements(
     root: &Section<'_, '_>,
     stack: &Stack,
     layout: &Path,
-    read: &dyn Fn(&[ElementSite]) -> Result<Vec<WidthMap>>,
+    read: &dyn Fn(&[ElementSite]) -> Result<Vec<PillarMap>>,
 ) -> Vec<MeasuredElement> {
     let sections = root.sections("element");
     if sections.is_empty() {
@@ -37,7 +37,7 @@ pub(super) fn elements(
             index,
             centre_um,
             aperture_diameter_um,
-            pillars: WidthMap::empty(lattice),
+            pillars: PillarMap::empty(lattice),
         });
     }
     if !layout.is_file() {

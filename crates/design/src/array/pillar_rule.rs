@@ -10,11 +10,11 @@ use crate::{CellSpec, Design, MappingSpec, SteeredMapping, SteeringSteps};
 use metalith_cell::{
     ForwardPolynomial, Handedness, InversePolynomial, MappingTable, PillarLibrary, PolarisationAxis, RotationMapping,
 };
-use metalith_core::{PillarShape, RotatedRectangles, UprightRectangles, WidthMap};
+use metalith_core::{PillarMap, PillarShape, RotatedRectangles, UprightRectangles};
 
 /// Rounds the duty cycle that a mapping asks for to a width that may be written.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WidthRule {
+pub struct PillarRule {
     polynomial: InversePolynomial,
     table: Option<MappingTable>,
     pitch_nm: f64,
@@ -143,7 +143,7 @@ impl RotationRule {
 /// The largest phase below a turn that tables of mappings tell from one.
 const LAST_TURN: f64 = 0.9999;
 
-impl WidthRule {
+impl PillarRule {
     /// The rule of the element of a design with this index, asked about the light that the design is verified in.
     pub fn of_element(design: &Design, index: (i32, i32)) -> Self {
         let common = Self::new(&design.cell, &design.mapping).along(design.axis());
@@ -271,7 +271,7 @@ impl WidthRule {
     }
 
     /// Width or number of a sample of the mapping, of so many whose phases are evenly spaced over a turn: see
-    /// [`WidthRule::phase_of_sample`]. Where light along the other axis has a phase of its own, it is any.
+    /// [`PillarRule::phase_of_sample`]. Where light along the other axis has a phase of its own, it is any.
     pub fn sample(&self, k: usize, samples: usize) -> u16 {
         let own = Self::phase_of_sample(k, samples);
         let Some(pair) = &self.pair else {
@@ -304,12 +304,12 @@ impl WidthRule {
     }
 
     /// The pillars of an element with this phase, and with this one of light along y if it is another.
-    pub fn widths(&self, phase: &ElementPhase<'_>, along_y: Option<&ElementPhase<'_>>) -> WidthMap {
-        let mut map = WidthMap::empty(phase.lattice());
+    pub fn widths(&self, phase: &ElementPhase<'_>, along_y: Option<&ElementPhase<'_>>) -> PillarMap {
+        let mut map = PillarMap::empty(phase.lattice());
         let n = map.lattice.sites();
         let is_mirrored = phase.is_mirrored() && along_y.is_none_or(ElementPhase::is_mirrored);
         let computed = if is_mirrored { n.div_ceil(2) } else { n };
-        let sites = map.width_nm.as_slice_mut().expect("a new array is contiguous");
+        let sites = map.number.as_slice_mut().expect("a new array is contiguous");
         let (rows, mirrored) = sites.split_at_mut(computed * n);
         rows.par_chunks_mut(n).enumerate().for_each(|(iy, row)| {
             for (ix, width) in row.iter_mut().enumerate() {
@@ -385,12 +385,12 @@ mod tests {
             changed += usize::from(along_an_axis);
             if along_an_axis {
                 // A phase of u turns is a duty cycle of 0.3 + 0.5 u on a pitch of 350 nm.
-                let drawn = after.widths(b).width_nm.iter().copied().max().unwrap();
+                let drawn = after.widths(b).number.iter().copied().max().unwrap();
                 assert_eq!(drawn, 280);
             }
         }
         assert_eq!(changed, 4);
-        assert_eq!(WidthRule::all(&own).len(), 2);
+        assert_eq!(PillarRule::all(&own).len(), 2);
         // A design without them is what it was.
         assert!(!serde_json::to_string(&common.mapping).unwrap().contains("steered"));
     }

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use crate::{EighthMap, PillarShape, WidthRows};
+use crate::{EighthMap, PillarRows, PillarShape};
 
 /// How the pillars of one element differ from the intended ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct WidthCheck {
+pub struct PillarCheck {
     /// Pillars that were read back.
     pub pillars: u64,
     /// Sites with a pillar of another width.
@@ -19,12 +19,12 @@ pub struct WidthCheck {
     pub largest_nm: Option<u16>,
 }
 
-impl WidthCheck {
+impl PillarCheck {
     /// Compare every site.
     ///
     /// # Panics
     /// If the two are on different lattices.
-    pub fn compare(intended: &impl WidthRows, found: &impl WidthRows) -> Self {
+    pub fn compare(intended: &impl PillarRows, found: &impl PillarRows) -> Self {
         let lattice = intended.lattice();
         assert_eq!(lattice, found.lattice(), "an element is read back on its own lattice");
         let mut check = Self::alike();
@@ -41,7 +41,7 @@ impl WidthCheck {
     ///
     /// # Panics
     /// If the two are on different lattices.
-    pub fn compare_eighth(intended: &impl WidthRows, found: &EighthMap) -> Self {
+    pub fn compare_eighth(intended: &impl PillarRows, found: &EighthMap) -> Self {
         let lattice = intended.lattice();
         assert_eq!(lattice, found.lattice(), "an element is read back on its own lattice");
         let mut check = Self::alike();
@@ -103,20 +103,20 @@ impl WidthCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Lattice, UprightRectangles, WidthMap};
+    use crate::{Lattice, PillarMap, UprightRectangles};
 
     #[test]
     fn every_kind_of_difference_is_counted_once() {
-        let mut intended = WidthMap::empty(Lattice::new(350, 4).unwrap());
-        intended.width_nm.fill(200);
-        intended.width_nm[[0, 0]] = 0;
+        let mut intended = PillarMap::empty(Lattice::new(350, 4).unwrap());
+        intended.number.fill(200);
+        intended.number[[0, 0]] = 0;
         let mut found = intended.clone();
-        found.width_nm[[0, 0]] = 120;
-        found.width_nm[[1, 2]] = 0;
-        found.width_nm[[3, 3]] = 194;
-        found.width_nm[[3, 2]] = 202;
-        let check = WidthCheck::compare(&intended, &found);
-        let expected = WidthCheck {
+        found.number[[0, 0]] = 120;
+        found.number[[1, 2]] = 0;
+        found.number[[3, 3]] = 194;
+        found.number[[3, 2]] = 202;
+        let check = PillarCheck::compare(&intended, &found);
+        let expected = PillarCheck {
             pillars: 15,
             wrong: 2,
             missing: 1,
@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(check.of_shape(PillarShape::Circle), expected);
         let upright = PillarShape::Rectangle(UprightRectangles::of_lengths([100, 120].into_iter()).unwrap().into());
         assert_eq!(check.of_shape(upright).largest_nm, None);
-        assert_eq!(WidthCheck::compare(&intended, &intended).faults(), 0);
+        assert_eq!(PillarCheck::compare(&intended, &intended).faults(), 0);
     }
 
     /// An eighth against the whole, on even and odd lattices, with every kind of difference.
@@ -142,8 +142,8 @@ mod tests {
                 *intended.at(ix, iy) = if radius2 % 7 == 1 { 0 } else { 100 + radius2 % 50 };
                 *found.at(ix, iy) = if radius2 % 5 == 1 { 0 } else { 100 + radius2 % 48 };
             }
-            let whole = WidthCheck::compare(&intended.whole(), &found.whole());
-            assert_eq!(WidthCheck::compare_eighth(&intended, &found), whole);
+            let whole = PillarCheck::compare(&intended.whole(), &found.whole());
+            assert_eq!(PillarCheck::compare_eighth(&intended, &found), whole);
             assert!(n < 20 || (whole.wrong > 0 && whole.missing > 0 && whole.extra > 0));
         }
     }
