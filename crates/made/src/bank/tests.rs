@@ -193,3 +193,38 @@ fn tables_that_take_too_long_are_refused() {
         "{said}"
     );
 }
+
+/// Index, taper and mask of upright rectangles count as their height does.
+#[test]
+fn what_varies_of_a_pillar_beside_its_edges_is_met_between_the_nodes() {
+    const BETWEEN: f64 = 5e-3;
+    let stack = CellStack {
+        film: Material::named("tio2_siefke_2016").unwrap(),
+        shape: PillarShape::Rectangle(UPRIGHT.into()),
+        ..CellStack::paper(354.0, 600.0).unwrap()
+    };
+    let number = UPRIGHT.number([100, 130]).unwrap();
+    let colour = (0.526, BAND_ORDERS);
+    for most in [
+        [0.0, 0.02, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0, 0.0],
+        [6.0, 0.0, 0.0, 0.0, 8.0],
+    ] {
+        let range = BankRange {
+            widths_nm: [-1.0, 1.0],
+            numbers: vec![number],
+            changes: [CellChange::default(), change_of(most)],
+            colours: vec![colour],
+        };
+        let bank = CellBank::solve(&stack, range, &Silent).unwrap();
+        let change = change_of(most.map(|most| 0.4 * most));
+        let (rows, bare) = bank.rectangles(&change, colour, &[0.6], &[number]).unwrap();
+        let etched = perturbed(&stack, &change);
+        let orders = Orders::new(BAND_ORDERS).unwrap();
+        let exact = etched.birefringent([100.6, 130.6], colour.0, orders).unwrap();
+        for (t, exact) in rows[0].iter().zip(exact) {
+            assert!((t - exact).norm() < BETWEEN, "{most:?}: {t} {exact}");
+        }
+        assert_eq!(bare.len(), 2);
+    }
+}
