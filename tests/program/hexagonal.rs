@@ -225,21 +225,6 @@ fn a_chip_as_made_loses_as_much_as_on_a_square_lattice() {
     assert!(all < COSTS, "{all}");
 }
 
-/// What knows squares alone names the line of the design that says otherwise, and does nothing.
-#[test]
-fn what_knows_squares_alone_refuses_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("cells");
-    let output = metalith(&["cells", "--steered", "--out"], &[&out, &design("hexagonal_1550")]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(
-        said.contains("--steered knows square lattices alone") && said.contains("hexagonal_1550.toml"),
-        "{said}"
-    );
-    assert!(!out.exists(), "it left something behind");
-}
-
 /// A cell that is made of square lattices is refused where it is asked for, before anything is written; left out, the best of
 /// the others judges.
 #[test]

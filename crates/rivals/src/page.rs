@@ -121,3 +121,37 @@ fn one(page: &mut Page, camera: &ComparedCamera) {
     }
     page.figure(row.caption("The first photograph; a mosaic of colours is shown as colours."));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_limits_a_camera_is_on_its_page() {
+        let camera = |limits: Option<&str>| ComparedCamera {
+            name: "array".into(),
+            words: "Nine lenses.".into(),
+            field_deg: 60.0,
+            ways: Vec::new(),
+            frame_cpu_s: None,
+            limits: limits.map(str::to_owned),
+            shown: None,
+        };
+        let comparison = |camera: ComparedCamera| Comparison {
+            photographs: vec!["a".into()],
+            size: [64, 64],
+            averaged_from: None,
+            camera: "sensor".into(),
+            seed: 1,
+            cameras: vec![camera],
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let written = |camera: ComparedCamera| {
+            write_comparison(&comparison(camera), folder.path()).unwrap();
+            ["compare.html", "compare.json"].map(|name| std::fs::read_to_string(folder.path().join(name)).unwrap())
+        };
+        const NOTE: &str = "the restoration is limited by its operator";
+        assert!(written(camera(Some(NOTE))).iter().all(|text| text.contains(NOTE)));
+        assert!(!written(camera(None)).iter().any(|text| text.contains(NOTE)));
+    }
+}
