@@ -43,10 +43,15 @@ pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
             "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances of a millimetre and more, in millimetres; `inf` in an NPY is far away",
         )
     };
+    // What is read as scenes are is told as a depth map.
+    let told = |error: Error| match error {
+        Error::Table { what, .. } => fault(&what),
+        other => other,
+    };
     let mm = if bytes.starts_with(b"\x93NUMPY") {
-        array(path, &bytes)?.0
+        array(path, &bytes).map_err(told)?.0
     } else if bytes.starts_with(b"\x89PNG") {
-        let (values, deep) = png_values(path, &bytes)?;
+        let (values, deep) = png_values(path, &bytes).map_err(told)?;
         if !deep {
             return Err(fault("its values have fewer than 16 bits"));
         }
@@ -82,6 +87,12 @@ mod tests {
         assert_eq!((depth[[0, 0]], depth[[15, 15]]), (1e3, 256e3));
         let scene = SceneImage::of_rgb("", &ndarray::Array3::zeros((16, 17, 3)), 60.0, f64::INFINITY);
         assert!(scene.with_depth(depth).is_err());
+        std::fs::write(&path, npy_bytes("(8, 8)", &[500.0; 64])).unwrap();
+        let error = read_depth(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("8 x 8 pixels") && error.contains("distances of a millimetre"),
+            "{error}"
+        );
         let mut values = [500.0; 256];
         values[17] = f64::INFINITY;
         write(&values);
