@@ -220,10 +220,25 @@ impl Gather<'_, '_> {
             }
             return Ok(());
         }
+        self.remembered(shape, placements, |own| own.passes(shape, placements))
+    }
+
+    /// What `ask` says of an outline, whether no rule finds anything in it, for all outlines that are known to be the same; one in which
+    /// something is found is shown each time.
+    ///
+    /// # Errors
+    /// If that is too much work.
+    #[inline]
+    fn remembered(
+        &mut self,
+        shape: &Shape<'_>,
+        placements: &[Transform],
+        ask: impl FnOnce(&mut Self) -> Result<bool>,
+    ) -> Result<()> {
         let mut memo = std::mem::take(&mut self.sound);
         let mut shown = None;
         let is_sound = memo.placed(shape.outline, &Transform::IDENTITY, || {
-            let passes = self.passes(shape, placements);
+            let passes = ask(self);
             let is_sound = matches!(passes, Ok(true));
             shown = Some(passes);
             is_sound
@@ -236,22 +251,35 @@ impl Gather<'_, '_> {
         }
     }
 
-    /// The same of an outline of any number of corners.
+    /// The same of an outline of any number of corners. Those of a cell that stands in a million places are told by their number.
     ///
     /// # Errors
     /// If that is too much work.
+    #[inline]
     fn show_ring(&mut self, shape: &Shape<'_>, around: &Rect, placements: &[Transform]) -> Result<()> {
+        match shape.outline.has_number() {
+            true => self.remembered(shape, placements, |own| own.ring_passes(shape, around, placements)),
+            false => self.ring_passes(shape, around, placements).map(|_| ()),
+        }
+    }
+
+    /// Show such an outline to the rules, unless one of the same corners was sound; whether it is.
+    ///
+    /// # Errors
+    /// If that is too much work.
+    fn ring_passes(&mut self, shape: &Shape<'_>, around: &Rect, placements: &[Transform]) -> Result<bool> {
         let (x, y) = (around.x0 + around.width() / 2, around.y0 + around.height() / 2);
         self.relative.clear();
         self.relative
             .extend(shape.outline.points().map(|p| Point::new(p.x - x, p.y - y)));
-        if !self.sound_rings.contains(self.relative.as_slice())
-            && self.passes(shape, placements)?
-            && self.sound_rings.len() < TABLE
-        {
+        if self.sound_rings.contains(self.relative.as_slice()) {
+            return Ok(true);
+        }
+        let is_sound = self.passes(shape, placements)?;
+        if is_sound && self.sound_rings.len() < TABLE {
             self.sound_rings.insert(self.relative.as_slice().into());
         }
-        Ok(())
+        Ok(is_sound)
     }
 
     /// A pillar that is known by its corners: where it has no site it is kept as it is drawn.

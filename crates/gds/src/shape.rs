@@ -152,6 +152,12 @@ impl<'a> Outline<'a> {
         }
     }
 
+    /// Whether its points are told by a number from others of the layout.
+    #[inline]
+    pub fn has_number(&self) -> bool {
+        self.number.is_some()
+    }
+
     /// The number of points.
     pub fn len(&self) -> usize {
         self.points.len()
