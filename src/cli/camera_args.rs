@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metalith::camera::Camera;
-use metalith::{CalibratedModel, Design, Result};
+use metalith::{CalibratedModel, Design, Error, Result};
 
 use super::{Terminal, standard_input};
 
@@ -33,6 +33,21 @@ pub struct CameraFiles {
     pub design: Design,
     pub camera: Camera,
     pub model: Option<CalibratedModel>,
+}
+
+/// The distance (um) that an option says in millimetres; none is far.
+///
+/// # Errors
+/// If it is none that a scene can have.
+pub fn distance_um(distance_mm: Option<f64>) -> Result<f64> {
+    match distance_mm {
+        None => Ok(f64::INFINITY),
+        Some(mm) if mm > 0.0 => Ok(mm * 1e3),
+        Some(_) => Err(Error::invalid(
+            "a scene at no distance",
+            "give a positive --distance-mm",
+        )),
+    }
 }
 
 impl CameraArgs {

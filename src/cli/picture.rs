@@ -13,7 +13,7 @@ use metalith::picture::{
 };
 use metalith::{Error, Result};
 
-use super::camera_args::{CameraArgs, CameraFiles};
+use super::camera_args::{CameraArgs, CameraFiles, distance_um};
 use super::paths::{apart, name_of};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
@@ -115,13 +115,7 @@ impl PictureArgs {
     }
 
     fn scene(&self) -> Result<SceneImage> {
-        let distance_um = self.distance_mm.map_or(f64::INFINITY, |mm| mm * 1e3);
-        if distance_um.is_nan() || distance_um <= 0.0 {
-            return Err(Error::invalid(
-                "a scene at no distance",
-                "give a positive --distance-mm",
-            ));
-        }
+        let distance_um = distance_um(self.distance_mm)?;
         let built_in = self.scene.parse::<BuiltIn>().ok();
         let idle = |option: &str, what: &str| {
             Err(Error::invalid(

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::Result;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::SceneImage;
 use metalith::picture::{
     FrameNumbers, FrameStatement, Rehearsal, RestoredPicture, RestoredReport, Studio, check_scored, read_signals,
 };
-use metalith::{Error, Result};
 use ndarray::Array3;
 
-use super::camera_args::{CameraArgs, CameraFiles};
+use super::camera_args::{CameraArgs, CameraFiles, distance_um};
 use super::paths::{apart, name_of};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
@@ -76,16 +76,7 @@ pub fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let wanted = pictures(&args.method, args.separate)?;
     let CameraFiles { design, camera, model } = args.with.read(terminal)?;
-    let distance_um = match args.distance_mm {
-        None => f64::INFINITY,
-        Some(mm) if mm > 0.0 => mm * 1e3,
-        Some(_) => {
-            return Err(Error::invalid(
-                "a scene at no distance",
-                "give a positive --distance-mm",
-            ));
-        }
-    };
+    let distance_um = distance_um(args.distance_mm)?;
     let side = usize::from(args.pixels);
     // Nothing is known of it but its size and its field.
     let scene = SceneImage::of_rgb(

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::camera::Camera;
-use metalith::cell::{PublishedCell, cache_folder, oblique_refused};
+use metalith::cell::{cache_folder, oblique_refused};
 use metalith::design::{CellIncidence, LatticeOrders};
 use metalith::picture::thumbnail;
 use metalith::report::{Figure, sig};
@@ -112,10 +112,7 @@ impl Judging {
     /// If it could be neither simulated nor compared with its design, or its pillars cannot be judged by the cell.
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
         let fidelity = self.fidelity(design);
-        fidelity.check(design.cell.shape, design.cell.lattice)?;
-        if fidelity == Fidelity::Published {
-            PublishedCell::of_stack(&design.cell_stack()?)?;
-        }
+        design.check_fidelity(fidelity)?;
         if self.as_lit && design.cell.shape.rectangles().is_some() {
             return Err(oblique_refused());
         }

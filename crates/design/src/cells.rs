@@ -53,6 +53,18 @@ impl Design {
         })
     }
 
+    /// Check that its pillars can be judged by a cell.
+    ///
+    /// # Errors
+    /// If they cannot, or a material is not known.
+    pub fn check_fidelity(&self, fidelity: Fidelity) -> Result<()> {
+        fidelity.check(self.cell.shape, self.cell.lattice)?;
+        match fidelity {
+            Fidelity::Published => PublishedCell::of_stack(&self.cell_stack()?).map(|_| ()),
+            _ => Ok(()),
+        }
+    }
+
     /// The cell that the design asks for: upright walls, sharp corners, no mask.
     ///
     /// # Errors
@@ -138,7 +150,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
     wanted
         .iter()
         .map(|fidelity| -> Result<Box<dyn CellModel>> {
-            fidelity.check(design.cell.shape, design.cell.lattice)?;
+            design.check_fidelity(*fidelity)?;
             match design.cell.shape.rectangles() {
                 Some(Rectangles::Rotated(pillars)) => {
                     let arriving = design.cell.arriving.unwrap_or_default();

@@ -112,12 +112,8 @@ impl Rule for SpacingRule {
 fn least_gap_nm(design: &Design) -> f64 {
     let cell = &design.cell;
     let nearest_nm = CellLattice::drawn(cell.lattice, cell.pitch_nm).nearest_nm(f64::from(cell.pitch_nm));
-    // Sides of upright rectangles face one another; rotated ones may reach out by their diagonal.
-    let widest_nm = match cell.shape.upright() {
-        Some(pillars) => f64::from(pillars.longest_nm()),
-        None => cell.shape.widest_nm(cell.width_range_nm.1),
-    };
-    (nearest_nm - widest_nm).max(0.0)
+    let (_, widest) = cell.width_range_nm;
+    cell.shape.least_gap(widest, [nearest_nm, 0.0]).max(0.0)
 }
 
 fn report_overlap(a: &Body<'_>, b: &Body<'_>, found: &mut Findings) {

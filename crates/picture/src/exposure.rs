@@ -107,6 +107,14 @@ pub(crate) fn recorded(camera: &Camera, signal: f64) -> f32 {
     ((signal.min(camera.sensor.largest_signal()) / step).round() * step) as f32
 }
 
+/// How many planes the frames of a camera have: one behind a colour filter array, else one for each channel.
+pub(crate) fn planes_of(camera: &Camera) -> usize {
+    match camera.sensor.filter {
+        ColourFilter::None => camera.channels.len(),
+        _ => 1,
+    }
+}
+
 impl Frame {
     /// Of signals that were recorded, of full scale, in the planes that the sensor of a camera has; `gain` as [`gains`] has it.
     pub fn of_signals(camera: &Camera, gain: &[f64], planes: Vec<Array2<f32>>) -> Self {

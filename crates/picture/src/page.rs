@@ -137,14 +137,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
                 .collect::<Vec<_>>()
                 .join(", "),
         ),
-        (
-            "Pixels at full scale",
-            format!(
-                "{} ({} %)",
-                report.of_frame.saturated,
-                fixed(100.0 * report.of_frame.saturated_share, 1)
-            ),
-        ),
+        ("Pixels at full scale", report.of_frame.saturated_words()),
     ]);
     zooms(&mut page, pages);
     errors(&mut page, pages);
@@ -250,12 +243,6 @@ fn scores(page: &mut Page, report: &PictureReport) {
             table.row(row);
         }
     }
-    let errors: Vec<String> = report
-        .of_frame
-        .operator_error
-        .iter()
-        .map(|e| format!("{} %", fixed(100.0 * e, 2)))
-        .collect();
     let forecasts = match report.restorations.iter().any(|r| !r.forecast_db.is_empty()) {
         true => {
             "The forecasts are made on a random scene, which says what share of the detail of each size is lost where: one is for the mean over photographs (GB82), the other for the detail that this scene has in each zone. Whole photographs differ from that mean by some 3 dB. "
@@ -264,7 +251,7 @@ fn scores(page: &mut Page, report: &PictureReport) {
     };
     page.table(table.caption(format!(
         "{forecasts}The restoration knows less than the simulation: on a random scene its operator errs by {} of the light of a pixel (root mean square), channel by channel, which is taken for noise.",
-        errors.join(", ")
+        report.of_frame.error_words()
     )));
 }
 

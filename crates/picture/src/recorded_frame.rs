@@ -3,13 +3,13 @@
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use metalith_camera::{Camera, ColourFilter};
+use metalith_camera::Camera;
 use metalith_core::file::read_at_most;
 use metalith_core::{Error, Result};
 use ndarray::Array2;
 
 use crate::dataset::black_level;
-use crate::exposure::{Frame, recorded};
+use crate::exposure::{Frame, planes_of, recorded};
 use crate::png16;
 use crate::studio::Studio;
 
@@ -37,11 +37,7 @@ struct Grey {
 /// If it cannot be read, is of another camera, or neither it nor `numbers` says what its numbers are.
 pub fn read_signals(path: &Path, camera: &Camera, numbers: FrameNumbers) -> Result<Vec<Array2<f32>>> {
     let (rows, columns) = (camera.sensor.rows as usize, camera.sensor.columns as usize);
-    let planes = match camera.sensor.filter {
-        ColourFilter::None => camera.channels.len(),
-        _ => 1,
-    };
-    let grey = read_grey(path, [rows * planes, columns])?;
+    let grey = read_grey(path, [rows * planes_of(camera), columns])?;
     let signal = signals(camera, path, &grey, numbers)?;
     let plane = |numbers: &[u16]| {
         let signals = numbers.iter().map(|number| signal(*number)).collect();
@@ -57,10 +53,7 @@ impl Studio {
     /// If it is of another camera, or has signals that are no numbers.
     pub fn frame_of(&self, signals: Vec<Array2<f32>>) -> Result<Frame> {
         let sensor = &self.camera.sensor;
-        let planes = match sensor.filter {
-            ColourFilter::None => self.gain.len(),
-            _ => 1,
-        };
+        let planes = planes_of(&self.camera);
         if signals.len() != planes {
             return Err(Error::invalid(
                 format!("{} planes of a frame, and the camera gives {planes}", signals.len()),
@@ -176,6 +169,7 @@ mod tests {
     use super::*;
     use crate::exposure::expose;
     use crate::files::FrameFile;
+    use metalith_camera::ColourFilter;
 
     /// A small sensor with a filter, and its frame of light that fills it here and there.
     fn recorded_by(filter: ColourFilter) -> (Camera, Frame) {

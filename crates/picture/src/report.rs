@@ -47,6 +47,24 @@ pub struct FrameStatement {
 }
 
 impl FrameStatement {
+    /// Pixels at full scale, and their share.
+    pub(crate) fn saturated_words(&self) -> String {
+        format!(
+            "{} ({} %)",
+            self.saturated,
+            metalith_report::fixed(100.0 * self.saturated_share, 1)
+        )
+    }
+
+    /// What the operator of the restoration errs by, channel by channel.
+    pub(crate) fn error_words(&self) -> String {
+        let each = self.operator_error.iter();
+        let words: Vec<String> = each
+            .map(|e| format!("{} %", metalith_report::fixed(100.0 * e, 2)))
+            .collect();
+        words.join(", ")
+    }
+
     /// Of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. Notes and what the
     /// operator errs by are added.
     pub fn new(

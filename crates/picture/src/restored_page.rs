@@ -80,18 +80,10 @@ impl RestoredReport {
         page.figure(row.caption(
             "The mosaic of the frame is shown as colours. Pictures are restored from this frame alone; how bright they are follows from `white` in [exposure] of the camera.",
         ));
-        let errors: Vec<String> = of
-            .operator_error
-            .iter()
-            .map(|e| format!("{} %", fixed(100.0 * e, 2)))
-            .collect();
         page.facts(&[
-            (
-                "Pixels at full scale",
-                format!("{} ({} %)", of.saturated, fixed(100.0 * of.saturated_share, 1)),
-            ),
+            ("Pixels at full scale", of.saturated_words()),
             ("Mean signal, of full scale", fixed(frame.mean_signal(), 3)),
-            ("The operator of the restoration errs by", errors.join(", ")),
+            ("The operator of the restoration errs by", of.error_words()),
         ]);
         list_assumptions(&mut page, &of.assumptions);
         page
