@@ -318,4 +318,7 @@ fn summary(findings: &OptimiseReport) {
         );
     }
     print_line!("{}", findings.neighbours());
+    if let Some(words) = findings.limit_costs() {
+        print_line!("{words}");
+    }
 }

@@ -72,6 +72,7 @@ impl Camera {
                 columns: 1936,
                 rows: 1216,
                 offset_um: [0.0; 2],
+                distance_um: None,
                 tilt_rad: [0.0; 2],
                 filter: ColourFilter::None,
                 bits: 12,
@@ -230,6 +231,7 @@ fn read_sensor(s: &Section<'_, '_>) -> Sensor {
         offset_um: s
             .optional_array("offset_um", Limits::new(-1e5..=1e5, "um"))
             .unwrap_or([0.0; 2]),
+        distance_um: s.optional_float("distance_um", Limits::new(1.0..=1e5, "um")),
         tilt_rad: s
             .optional_array("tilt_deg", Limits::new(-20.0..=20.0, "degrees"))
             .unwrap_or([0.0_f64; 2])

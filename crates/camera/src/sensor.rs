@@ -12,6 +12,10 @@ pub struct Sensor {
     pub rows: u32,
     /// Middle of the sensor from the middle of the chip, x and y (um).
     pub offset_um: [f64; 2],
+    /// From the pillar tops to the sensor below the middle of the chip (um), if the camera says it: else the focal length that
+    /// the lenses of a design share.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_um: Option<f64>,
     /// Tilt of the sensor against the chip about the y and the x axis: the distance grows with x and with y (rad).
     pub tilt_rad: [f64; 2],
     pub filter: ColourFilter,

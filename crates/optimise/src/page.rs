@@ -79,6 +79,17 @@ impl OptimiseReport {
             .all(|j| j.largest_step_turns <= self.step_limit_turns + 1e-6)
     }
 
+    /// What the limit on the step costs, in words, where what was found is worse than what it is counted from and that has larger
+    /// steps.
+    pub fn limit_costs(&self) -> Option<String> {
+        let (before, after) = (self.before.first()?, self.after.first()?);
+        limit_costs(
+            (before.largest_step_turns, before.geometric_mean),
+            (self.step_limit_turns, after.geometric_mean),
+            &self.merit_over_limit,
+        )
+    }
+
     /// All phases that were judged, with what they are called.
     pub fn phases(&self) -> [(&'static str, &[Judged]); 3] {
         [
@@ -132,6 +143,9 @@ impl OptimiseReport {
         }
         page.code(&self.command);
         page.note(self.neighbours());
+        if let Some(words) = self.limit_costs() {
+            page.note(words);
+        }
         page.section("Strehl ratio");
         page.paragraph(
             "On a grid of 0.5 nm between the wavelengths that were optimised on, against the same aperture \
@@ -358,4 +372,43 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / count;
     let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
     (mean, variance.sqrt())
+}
+
+/// Of the largest step (turns) and the Strehl ratio before, the limit and the ratio after, and what wider limits reach.
+fn limit_costs(before: (f64, f64), after: (f64, f64), over_limit: &[(f64, f64)]) -> Option<String> {
+    let ((step, was), (limit, is)) = (before, after);
+    if step <= limit || is >= was {
+        return None;
+    }
+    let wider = over_limit.iter().find(|(wider, merit)| *wider > limit && *merit > was);
+    let hint = wider.map_or_else(String::new, |(wider, merit)| {
+        format!(
+            "; with `step_limit_turns = {wider}` in [optimise] {} is reached",
+            sig(*merit, 3)
+        )
+    });
+    Some(format!(
+        "The phase before has steps of {step:.3} turns from ring to ring, those of a phase that is found are limited to {limit}, and this costs more than was gained{hint}."
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_that_costs_more_than_was_gained_is_named() {
+        let over = [(0.1, 0.2), (0.2, 0.36), (0.3, 0.54), (0.4, 0.55)];
+        let words = limit_costs((0.295, 0.525), (0.2, 0.36), &over).unwrap();
+        assert!(
+            words.contains("0.295 turns") && words.contains("`step_limit_turns = 0.3`") && words.contains("0.540"),
+            "{words}"
+        );
+        // No limit of those that were tried does better.
+        let words = limit_costs((0.295, 0.6), (0.2, 0.36), &over).unwrap();
+        assert!(!words.contains("step_limit_turns"), "{words}");
+        // Better than before, or before within the limit.
+        assert!(limit_costs((0.295, 0.3), (0.2, 0.36), &over).is_none());
+        assert!(limit_costs((0.2, 0.525), (0.2, 0.36), &over).is_none());
+    }
 }

@@ -3,15 +3,16 @@
 use metalith_camera::{Camera, Sampling, WavelengthSteps};
 use metalith_cell::{BandResponse, CellModel, PassedTable};
 use metalith_core::{Error, PillarMap, Progress, Result};
-use metalith_design::Design;
 use metalith_design::array::Symmetry;
+use metalith_design::phase::OpenAreas;
+use metalith_design::{Design, Element};
 use metalith_gds::extract::Extraction;
 use metalith_grating::NeighbourPillars;
 use metalith_made::{
     ArrivingLight, CameraChange, ClassTable, DrawnElement, MadeElement, MadeView, PathChange, Perturbation,
     SimulationCase, cell_direction,
 };
-use metalith_wave::{Matched, PhaseFunction, PlaneWave};
+use metalith_wave::PlaneWave;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -24,6 +25,8 @@ pub struct DistinctChipElement<'a> {
     made: MadeElement,
     /// Symmetries that leave its pillars and its wedge as they are.
     pub symmetries: Vec<Symmetry>,
+    /// Area of its sites (um^2).
+    open_um2: f64,
     /// What its pillars transmit among unlike neighbours, of a cell that knows; one for each wavelength.
     among_neighbours: Vec<Option<BandResponse>>,
 }
@@ -41,10 +44,8 @@ pub struct ChipInLight<'a> {
     /// Of a cell that changes polarisation, what reaches the sensor, by wavelength.
     polarised: Vec<Option<Polarised>>,
     perturbation: Perturbation,
-    /// Power of the light that arrives at an element, at each wavelength, in the unit of a PSF's energy (um^2).
-    pub arriving_um2: Vec<f64>,
-    /// Area of the sites of an element (um^2).
-    open_um2: f64,
+    /// Share of the light that passes where no pillars are, at each wavelength.
+    full: Vec<f64>,
     /// One over the distance of the scene (1/m).
     source_per_m: f64,
 }
@@ -70,15 +71,28 @@ struct Tables {
 /// Largest distance of the wavelengths that are simulated (nm), as in the figures of white light of a run.
 pub const STEP_NM: f64 = 12.5;
 
-/// Where the elements of a design are before a sensor.
+/// From the pillar tops of a design to the sensor of a camera, below the middle of the chip (um): as the camera says, else in the
+/// focus of the lens that elements share.
+pub fn sensor_um(design: &Design, camera: &Camera) -> f64 {
+    camera.sensor.distance_um.unwrap_or(design.lens.focal_length_um)
+}
+
+/// Where the elements of a design are before a sensor: one plane for all, whatever their focal lengths.
 pub fn element_views(design: &Design, camera: &Camera) -> Vec<ElementView> {
-    let view = |element: metalith_design::Element| ElementView {
-        centre_um: [element.centre_nm.0 as f64 * 1e-3, element.centre_nm.1 as f64 * 1e-3],
+    let areas = OpenAreas::of(design);
+    let view = |(element, open_um2): (Element, &f64)| ElementView {
+        centre_um: element.centre_um(),
         wedge: element.wedge,
-        focal_um: design.lens.focal_length_um,
+        area: open_um2 / areas.lens_um2,
+        sensor_um: sensor_um(design, camera),
         slope: camera.sensor.tilt_rad.map(f64::tan),
     };
-    design.elements().into_iter().map(view).collect()
+    design
+        .elements()
+        .into_iter()
+        .zip(&areas.elements_um2)
+        .map(view)
+        .collect()
 }
 
 /// Wavelengths at which a camera is simulated behind a design.
@@ -119,15 +133,8 @@ impl<'a> ChipInLight<'a> {
             .into_iter()
             .filter(|s| symmetric && s.keeps(design.cell.shape));
         let (chosen, copies) = distinct_of(&elements, &widths, &symmetries.collect::<Vec<_>>());
-        let ones = PhaseFunction {
-            lattice: design.lattice(),
-            radius_um: design.lens.radius_um(),
-            amplitude: 1.0,
-            phase_rad: |_, _| 0.0,
-        };
-        let focus = [0.0, 0.0, design.lens.focal_length_um];
-        let open_um2 = Matched::of(&ones, focus, design.mapping.wavelength_um, 1.0).power_um2;
-        let arriving = |nm: &f64| Ok(case.full_transmission(nm * 1e-3)?.powi(2) * open_um2);
+        let areas = OpenAreas::of(design);
+        let full = |nm: &f64| Ok(case.full_transmission(nm * 1e-3)?.powi(2));
         progress.begin("solving the cells", sampling.wavelengths_nm.len() as u64);
         let by_width = match case {
             SimulationCase::Made(_) => Vec::new(),
@@ -139,29 +146,29 @@ impl<'a> ChipInLight<'a> {
         };
         let mut distinct = Vec::new();
         for (k, symmetries) in chosen {
-            let placed = design.elements()[k].centre_um();
-            let drawn = DrawnElement::new(widths[k], design.aperture_radius_um())
+            let element = &design.elements()[k];
+            let drawn = DrawnElement::new(widths[k], design.aperture_radius_of_um(element))
                 .of_shape(design.cell.shape)
-                .placed(placed);
+                .placed(element.centre_um());
             distinct.push(DistinctChipElement {
                 view: elements[k],
                 widths: widths[k],
                 made: MadeElement::new(&drawn, &perturbation.geometry)?,
                 symmetries,
+                open_um2: areas.elements_um2[k],
                 among_neighbours: among_neighbours(case, &sampling, &elements[k], widths[k], progress)?,
             });
         }
         Ok(Self {
             copies,
             distinct,
-            arriving_um2: sampling.wavelengths_nm.iter().map(arriving).collect::<Result<_>>()?,
+            full: sampling.wavelengths_nm.iter().map(full).collect::<Result<_>>()?,
             sampling,
             elements,
             case,
             by_width,
             polarised,
             perturbation,
-            open_um2,
             source_per_m: 1e6 / scene_distance_um,
         })
     }
@@ -189,6 +196,11 @@ impl<'a> ChipInLight<'a> {
             distinct,
             tables,
         })
+    }
+
+    /// Power of the light that arrives at a distinct element at a wavelength, by its index, in the unit of a PSF's energy (um^2).
+    pub fn arriving_um2(&self, distinct: usize, wavelength: usize) -> f64 {
+        self.full[wavelength] * self.distinct[distinct].open_um2
     }
 
     fn tables(&self, element: &DistinctChipElement<'_>, index: usize, progress: &dyn Progress) -> Result<Tables> {
@@ -232,6 +244,11 @@ impl<'a> ChipInLight<'a> {
 }
 
 impl ElementInLight<'_> {
+    /// As [`ChipInLight::arriving_um2`].
+    pub fn arriving_um2(&self, wavelength: usize) -> f64 {
+        self.chip.arriving_um2(self.distinct, wavelength)
+    }
+
     /// In the light of one wavelength, by its index, from a direction.
     ///
     /// # Panics
@@ -282,7 +299,7 @@ impl ElementInLight<'_> {
         let Tables { classes, share, .. } = self.at(wavelength);
         // The power of a wave is the square of its sum over the area, over the area.
         let site_um2 = made.lattice().cell_um2();
-        let all = self.chip.arriving_um2[wavelength] * self.chip.open_um2;
+        let all = self.arriving_um2(wavelength) * self.chip.distinct[self.distinct].open_um2;
         let of = |table: &ClassTable| (table.sum(made.classes()) * site_um2).norm_sqr() / all;
         classes.iter().map(of).sum::<f64>() * share
     }
@@ -303,7 +320,9 @@ fn distinct_of(
     symmetries: &[Symmetry],
 ) -> (Vec<(usize, Vec<Symmetry>)>, Vec<(usize, Symmetry)>) {
     let turns = |t: Symmetry, from: usize, to: usize| {
-        same_wedge(t, &elements[from], &elements[to]) && t.maps(widths[from], widths[to])
+        elements[from].area == elements[to].area
+            && same_wedge(t, &elements[from], &elements[to])
+            && t.maps(widths[from], widths[to])
     };
     let (mut distinct, mut copies): (Vec<(usize, Vec<Symmetry>)>, Vec<_>) = (Vec::new(), Vec::new());
     for k in 0..elements.len() {

@@ -109,8 +109,10 @@ pub struct ElementView {
     /// Middle of the element on the chip (um).
     pub centre_um: [f64; 2],
     pub wedge: Wedge,
+    /// Area of the element that is open, over that of the lens that the elements of a design share.
+    pub area: f64,
     /// From the pillar tops to the sensor below the middle of the chip (um).
-    pub focal_um: f64,
+    pub sensor_um: f64,
     /// Slope of the sensor's plane against the chip, along x and y.
     pub slope: [f64; 2],
 }
@@ -162,15 +164,21 @@ impl ElementView {
     }
 
     fn axis_distance_um(&self) -> f64 {
-        self.focal_um + self.slope[0] * self.centre_um[0] + self.slope[1] * self.centre_um[1]
+        self.sensor_um + self.slope[0] * self.centre_um[0] + self.slope[1] * self.centre_um[1]
     }
 
     /// Projected solid angle of the light whose chief rays land on a small area about a place, over that area (1/um^2):
-    /// d^2 sines / d^2 x. A flat surface of unit radiance sends so much power to each unit of the element's own area.
-    pub fn projected_per_um2(&self, place_um: [f64; 2]) -> f64 {
+    /// d^2 sines / d^2 x.
+    fn projected_per_um2(&self, place_um: [f64; 2]) -> f64 {
         let z = self.distance_um(place_um);
         let r2 = place_um[0].powi(2) + place_um[1].powi(2) + z * z;
         self.axis_distance_um() * z / (r2 * r2)
+    }
+
+    /// Power that a flat surface of unit radiance sends through the element to a small area about a place, over that area and
+    /// that of the lens that the elements share (1/um^2).
+    pub fn flux_per_um2(&self, place_um: [f64; 2]) -> f64 {
+        self.area * self.projected_per_um2(place_um)
     }
 }
 
@@ -186,7 +194,8 @@ mod tests {
                 sin_x: 15.0_f64.to_radians().sin(),
                 sin_y: -15.0_f64.to_radians().sin(),
             },
-            focal_um: 2400.0,
+            area: 1.0,
+            sensor_um: 2400.0,
             slope: [0.01, -0.02],
         }
     }
@@ -285,7 +294,8 @@ mod tests {
                 sin_x: 0.0,
                 sin_y: 0.0,
             },
-            focal_um: 2400.0,
+            area: 1.0,
+            sensor_um: 2400.0,
             slope: [0.0; 2],
         };
         let at = |x: f64| flat(x).landing_um(flat(x).sines([0.0; 2], 100e3), 0.5).unwrap()[0];

@@ -42,7 +42,7 @@ mod veil;
 mod wanted;
 
 pub use assumed::{Assumed, AssumedScore, without_dispersion, worth_of_assumptions};
-pub use chip::{ChipInLight, ElementInLight, element_views, sampling_of};
+pub use chip::{ChipInLight, ElementInLight, element_views, sampling_of, sensor_um};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetOrigin, DatasetPair, PairWriter, write_dataset, write_dataset_manifest};
 pub use doubt::{Doubt, DoubtReport};

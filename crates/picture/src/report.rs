@@ -4,10 +4,13 @@ use nalgebra::DMatrix;
 use ndarray::Array3;
 use serde::Serialize;
 
+use metalith_camera::Camera;
 use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
+use metalith_design::Design;
 use metalith_made::{CalibratedModel, ModelStatement};
 
 use crate::assumed::AssumedScore;
+use crate::chip::sensor_um;
 use crate::doubt::DoubtReport;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
@@ -286,7 +289,11 @@ impl Studio {
                 "field of the kernels",
                 format!(
                     "{} degrees from the axis of each element, at {} x {} places; between them kernels are blended{}; steeper light is traced as rays",
-                    fixed((spec.reach_um / self.design.lens.focal_length_um).atan().to_degrees()),
+                    fixed(
+                        (spec.reach_um / sensor_um(&self.design, &self.camera))
+                            .atan()
+                            .to_degrees()
+                    ),
                     spec.nodes,
                     spec.nodes,
                     match self.between {
@@ -311,6 +318,7 @@ impl Studio {
                     crate::chip::STEP_NM
                 ),
             ),
+            assumption("sensor", place_of_sensor(&self.design, &self.camera)),
             assumption("illuminant", self.camera.illuminant.name().to_owned()),
             assumption("spectra of the scene", spectra_of(scene)),
             assumption(
@@ -345,6 +353,33 @@ impl Studio {
         }));
         all
     }
+}
+
+/// Where the sensor is, against the focal lengths of lenses.
+fn place_of_sensor(design: &Design, camera: &Camera) -> String {
+    let distance_um = sensor_um(design, camera);
+    let source = match camera.sensor.distance_um {
+        Some(_) => "as the camera says",
+        None => "the focal length of [lens]",
+    };
+    let off = design.lens_sizes_um().map(|[_, focal_um]| focal_um);
+    let off: Vec<f64> = off.filter(|focal_um| *focal_um != distance_um).collect();
+    let others = match (
+        off.iter().copied().reduce(f64::min),
+        off.iter().copied().reduce(f64::max),
+    ) {
+        (Some(least), Some(most)) => format!(
+            "; elements of other focal lengths are out of focus there: {} of {} ({})",
+            off.len(),
+            design.elements().len(),
+            match least == most {
+                true => format!("{least} um"),
+                false => format!("{least} to {most} um"),
+            }
+        ),
+        _ => String::new(),
+    };
+    format!("{distance_um} um behind the pillar tops in the middle of the chip, {source}{others}")
 }
 
 /// What is assumed of the polarisation of the scene, at pillars that give this light the phase of the design.

@@ -121,7 +121,7 @@ fn of_frame(studio: &Studio, channel: usize, frame: &Frame, truth: &Array2<f64>)
             samples.push(Sample {
                 x: x - 0.5 * (view.columns as f64 - 1.0),
                 y: y - 0.5 * (view.rows as f64 - 1.0),
-                seen: f64::from(*value) / frame.gain[channel] / element.projected_per_um2(place),
+                seen: f64::from(*value) / frame.gain[channel] / element.flux_per_um2(place),
                 truth: between(truth, y, x),
             });
         }

@@ -19,7 +19,7 @@ use crate::sight::{check_coverage, check_view, check_windows};
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::studio::Studio;
 use crate::veil::Veil;
-use crate::{ChannelColours, ChipInLight, ElementView, SceneView, element_views, sampling_of};
+use crate::{ChannelColours, ChipInLight, ElementView, SceneView, element_views, sampling_of, sensor_um};
 
 /// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
 /// steeply is the veil's. A lens of the paper sees 60 degrees.
@@ -35,7 +35,7 @@ const NODES_OF_SIXFOLD: usize = 5 * (NODES - 1) / 2 + 1;
 const RESTORED_STEPS: usize = (NODES - 1) / 2;
 /// Radius of lenses whose fast fields err by more than accurate ones, which cost as much there: what is seen of them is mostly the
 /// window of a kernel (um).
-const SMALL_UM: f64 = 150.0;
+pub(crate) const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
 
@@ -46,8 +46,8 @@ impl BankSpec {
             pixel_um: camera.sensor.pixel_um,
             window: WINDOW,
             nodes: NODES,
-            reach_um: design.lens.focal_length_um * FIELD_DEG.to_radians().tan(),
-            accurate: design.lens.radius_um() < SMALL_UM,
+            reach_um: sensor_um(design, camera) * FIELD_DEG.to_radians().tan(),
+            accurate: design.lens_sizes_um().all(|[radius_um, _]| radius_um < SMALL_UM),
         }
     }
 
@@ -101,7 +101,7 @@ pub(crate) struct Wanted<'a> {
 /// The view in which a camera's pictures behind a design are simulated of scenes with this one: sensor pixels look at two points along
 /// each axis, in the middle of the field, and what is finer than these would be taken for something coarse.
 pub fn simulated_view(design: &Design, camera: &Camera, view: &SceneView) -> SceneView {
-    view.no_finer(0.5 * camera.sensor.pixel_um / design.lens.focal_length_um)
+    view.no_finer(0.5 * camera.sensor.pixel_um / sensor_um(design, camera))
 }
 
 /// What decides a bank, as text.
@@ -130,7 +130,6 @@ struct Inputs<'a> {
 
 impl<'a> Wanted<'a> {
     pub(crate) fn new(design: &'a Design, camera: &'a Camera, scene: &'a SceneImage) -> Result<Self> {
-        design.one_lens("the simulation of pictures")?;
         let elements = element_views(design, camera);
         let given = scene.view;
         let view = simulated_view(design, camera, &given);

@@ -158,7 +158,7 @@ fn a_hexagonal_lens_takes_pictures() {
             &mut Scratch::default(),
         )
         .unwrap();
-        let wanted = psf.values.sum() * window.step_um.powi(2) / taken.chip.arriving_um2[index];
+        let wanted = psf.values.sum() * window.step_um.powi(2) / taken.chip.arriving_um2(0, index);
         let (unique, _) = taken.bank.distinct[0].nodes[node[0] * spec.nodes + node[1]];
         let found = f64::from(taken.bank.distinct[0].in_window[unique * nm_of_chip.len() + index]);
         println!("{place:?} um: {found:.5} {wanted:.5}");

@@ -5,7 +5,7 @@
 
 use metalith_core::{Error, Progress, Result};
 use metalith_picture::restore::{Recorded, SceneStatistics, without_veil};
-use metalith_picture::{FftScratch, FrameOperator, SquareFft, Studio};
+use metalith_picture::{FftScratch, FrameOperator, SquareFft, Studio, sensor_um};
 use metalith_wave::kernels::fft_size;
 use ndarray::{Array2, Zip};
 use num_complex::Complex32;
@@ -214,7 +214,7 @@ impl<'a> Tiles<'a> {
 fn prior(studio: &Studio, fft: &SquareFft) -> Vec<f32> {
     let n = fft.size();
     // Pixels of the sensor for a pixel of the scene: what scenes have beyond their own finest detail is taken to be like it.
-    let scale = studio.design.lens.focal_length_um * studio.view.pixel() / studio.camera.sensor.pixel_um;
+    let scale = sensor_um(&studio.design, &studio.camera) * studio.view.pixel() / studio.camera.sensor.pixel_um;
     let strength = SceneStatistics::grey(1).terms(1.0).slopes / (scale * scale);
     let squared: Vec<f64> = (0..n)
         .map(|k| {

@@ -2,11 +2,13 @@
 //! that steers each of them. Phases are kept in turns, so that the modulo is exact.
 
 mod element;
+mod open;
 mod radial;
 mod table;
 mod term;
 
 pub(crate) use element::Rotation;
 pub use element::{ElementPhase, LensPhase};
+pub use open::OpenAreas;
 pub use radial::{Interpolation, RadialPhase};
 pub use term::{MapTable, PhaseTerm, TermForm, ZernikeOrder};

@@ -19,7 +19,7 @@ pub struct BankSpec {
     pub nodes: usize,
     /// From the element's axis to the last of these places (um): light whose chief ray lands farther off is the veil's.
     pub reach_um: f64,
-    /// Fields to 1e-5 of the matched peak instead of 1e-3; see [`metalith_wave::Accuracy`].
+    /// Fields of all elements to 1e-5 of the matched peak, those of small lenses always, instead of to 1e-3; see [`metalith_wave::Accuracy`].
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub accurate: bool,
 }

@@ -10,6 +10,7 @@ use crate::ElementView;
 use crate::chip::{ChipInLight, ElementInLight};
 use crate::operator::FftScratch;
 use crate::spectra::SceneSpectrum;
+use crate::wanted::SMALL_UM;
 
 impl KernelBank {
     /// Whether the kernels of a chip can be held, for so many spectra of a scene.
@@ -190,7 +191,7 @@ impl Builder<'_> {
         };
         let lit = self.light.lit(wavelength, sines);
         // The PSF has no structure finer than wavelength / (2 NA).
-        let aperture = (lit.element.radius_um() / view.focal_um).atan().sin();
+        let aperture = (lit.element.radius_um() / view.sensor_um).atan().sin();
         let quarter = self.spec.pixel_um / QUARTERS as f64;
         let within = (quarter * 4.0 * aperture / um).ceil().max(1.0) as usize;
         let window = Window {
@@ -199,12 +200,12 @@ impl Builder<'_> {
             samples: side * within,
             distance_um: view.distance_um(landing),
         };
-        let accuracy = match self.spec.accurate {
+        let accuracy = match self.spec.accurate || lit.element.radius_um() < SMALL_UM {
             true => Accuracy::Accurate,
             false => Accuracy::Fast,
         };
         let psf = lit.psf(window, accuracy, &[], scratch)?;
-        let share = window.step_um.powi(2) / self.chip.arriving_um2[wavelength];
+        let share = window.step_um.powi(2) / self.light.arriving_um2(wavelength);
         for (iy, row) in psf.values.rows().into_iter().enumerate() {
             let out = &mut quarters[iy / within * side..][..side];
             for (ix, v) in row.iter().enumerate() {

@@ -155,7 +155,7 @@ impl<'a> FrameOperator<'a> {
         // Pixels of the scene from one point to the next, in the middle of the field.
         let step = match elements.first() {
             Some(element) if detail.points == ScenePoints::OneASquare => {
-                sensor.pixel_um * detail.points.cell() as f64 / (element.focal_um * view.pixel())
+                sensor.pixel_um * detail.points.cell() as f64 / (element.sensor_um * view.pixel())
             }
             _ => 0.0,
         };

@@ -75,10 +75,10 @@ impl Warp {
             .map_or(f64::INFINITY, |n| 0.5 * f64::from(n) * spec.pixel_um);
         let brightness = |place: [f64; 2]| match assumed.butterworth {
             true => {
-                let tangent = place[0].hypot(place[1]) / element.focal_um;
-                element.projected_per_um2([0.0; 2]) * butterworth(tangent)
+                let tangent = place[0].hypot(place[1]) / element.sensor_um;
+                element.flux_per_um2([0.0; 2]) * butterworth(tangent)
             }
-            false => element.projected_per_um2(place),
+            false => element.flux_per_um2(place),
         };
         let pixel = spec.pixel_um;
         // Row and column of the element's axis.
@@ -87,7 +87,7 @@ impl Warp {
         let step = cell as f64;
         // Of what a point stands for: in pixels of the scene in the middle of the field, and on the sensor (um).
         let side = area.sqrt() * pixel;
-        let sides = [side / (element.focal_um * space.view.pixel()), side];
+        let sides = [side / (element.sensor_um * space.view.pixel()), side];
         // Cells of the field, as far as their light reaches the sensor.
         let sizes = [sensor.rows, sensor.columns].map(|n| i64::from(n.div_ceil(cell as u32)));
         let ends = [0, 1].map(|k| {
@@ -246,7 +246,7 @@ fn extent(element: &ElementView, spec: &BankSpec, channel_um: f64) -> ([f64; 2],
             if let Some(landing) = element.landing_um(sines, channel_um) {
                 for a in 0..2 {
                     // Nothing is seen farther off than under 80 degrees.
-                    let within = landing[a].clamp(-6.0 * element.focal_um, 6.0 * element.focal_um);
+                    let within = landing[a].clamp(-6.0 * element.sensor_um, 6.0 * element.sensor_um);
                     low[a] = low[a].min(within);
                     high[a] = high[a].max(within);
                 }
@@ -295,7 +295,8 @@ mod tests {
                     sin_x: 0.0,
                     sin_y: 0.0,
                 },
-                focal_um: 100.0,
+                area: 1.0,
+                sensor_um: 100.0,
                 slope: [0.0; 2],
             };
             let point = CellPoint {

@@ -57,7 +57,7 @@ impl Veil {
             }
             let light = chip.in_light(distinct, &chosen, progress)?;
             let distance_um = chip.distinct[distinct].view.distance_um([0.0; 2]);
-            let departures: Vec<Vec<(i32, Departure)>> = chosen
+            let departed: Vec<Departed> = chosen
                 .par_iter()
                 .map(|i| {
                     let lit = light.lit(*i, [0.0; 2]);
@@ -73,25 +73,31 @@ impl Veil {
                         let aperture = lit.element.lit_aperture(table, &lit.light);
                         (*order, Departure::of(&aperture, all[*i] * 1e-3, distance_um, BLOCKS))
                     };
-                    parts.iter().map(of).collect()
+                    Departed {
+                        parts: parts.iter().map(of).collect(),
+                        arriving_um2: light.arriving_um2(*i),
+                        zero_order: light.zero_order(*i),
+                    }
                 })
                 .collect();
-            let zero_orders: Vec<f64> = chosen.iter().map(|i| light.zero_order(*i)).collect();
             for element in (0..chip.elements.len()).filter(|e| chip.copies[*e].0 == distinct) {
+                let area = chip.elements[element].area;
                 // Row by row: the light of all squares is larger than the veil itself.
                 for row in 0..SCENE_CELLS {
                     let squares = row * SCENE_CELLS..(row + 1) * SCENE_CELLS;
                     let traced: Vec<Traced> = squares
                         .clone()
                         .into_par_iter()
-                        .map(|square| tracer.trace(element, square, &departures, &zero_orders))
+                        .map(|square| tracer.trace(element, square, &departed))
                         .collect::<Result<_>>()?;
                     for (square, one) in squares.zip(&traced) {
                         for (pair, total) in budget.iter_mut().enumerate() {
                             let from = (pair * SCENE_CELLS * SCENE_CELLS + square) * cells[0] * cells[1];
                             let to = &mut values[from..from + cells[0] * cells[1]];
-                            to.iter_mut().zip(&one.light[pair]).for_each(|(a, b)| *a += *b as f32);
-                            total.add(&one.shares[pair], tracer.solid(square));
+                            to.iter_mut()
+                                .zip(&one.light[pair])
+                                .for_each(|(a, b)| *a += (area * *b) as f32);
+                            total.add(&one.shares[pair], area * tracer.solid(square));
                         }
                     }
                 }
@@ -138,7 +144,17 @@ struct Tracer<'a> {
     weights: &'a [Vec<f64>],
 }
 
-/// The veil of one square of the scene through one element.
+/// Light of one wavelength behind a distinct element.
+struct Departed {
+    /// Each with how often it has the phase of the element.
+    parts: Vec<(i32, Departure)>,
+    /// As [`ElementInLight::arriving_um2`](crate::chip::ElementInLight::arriving_um2).
+    arriving_um2: f64,
+    /// As [`ElementInLight::zero_order`](crate::chip::ElementInLight::zero_order).
+    zero_order: f64,
+}
+
+/// The veil of one square of the scene through one element, of what arrives there.
 struct Traced {
     /// By channel and spectrum: light on each square of the sensor.
     light: Vec<Vec<f64>>,
@@ -162,13 +178,7 @@ impl Tracer<'_> {
         solid_angle(self.view, row, column) * pixels
     }
 
-    fn trace(
-        &self,
-        element: usize,
-        cell: usize,
-        departures: &[Vec<(i32, Departure)>],
-        zero_orders: &[f64],
-    ) -> Result<Traced> {
+    fn trace(&self, element: usize, cell: usize, departed: &[Departed]) -> Result<Traced> {
         let pairs = self.weights.len();
         let view: &ElementView = &self.chip.elements[element];
         let [row, column] = self.middle(cell);
@@ -187,12 +197,8 @@ impl Tracer<'_> {
         let maps: Vec<LandedLight> = self
             .chosen
             .iter()
-            .zip(departures.iter().zip(zero_orders))
-            .map(|(i, (departures, zero_order))| {
-                let mut landed = self.landed(element, *i, sines, departures, place)?;
-                landed.zero_order = *zero_order;
-                Ok(landed)
-            })
+            .zip(departed)
+            .map(|(i, departed)| self.landed(element, *i, sines, departed, place))
             .collect::<Result<_>>()?;
         let bases = self.bank.bases;
         for pair in 0..pairs {
@@ -231,7 +237,7 @@ impl Tracer<'_> {
         element: usize,
         wavelength: usize,
         sines: [f64; 2],
-        departures: &[(i32, Departure)],
+        departed: &Departed,
         place: Option<[f64; 2]>,
     ) -> Result<LandedLight> {
         let view = &self.chip.elements[element];
@@ -261,20 +267,21 @@ impl Tracer<'_> {
             cells: 2 * (far / cell_um).ceil() as usize + 2,
             distance_um: view.distance_um([0.0; 2]),
         };
-        let (order, departure) = &departures[0];
+        let (order, departure) = &departed.parts[0];
         let mut landing = departure.landing(own, towards(*order), grid)?;
-        for (order, departure) in &departures[1..] {
+        for (order, departure) in &departed.parts[1..] {
             let other = departure.landing(own, towards(*order), grid)?;
             landing.power_um2 += &other.power_um2;
             landing.beyond_um2 += other.beyond_um2;
             landing.evanescent_um2 += other.evanescent_um2;
         }
-        let share = 1.0 / self.chip.arriving_um2[wavelength];
+        let share = 1.0 / departed.arriving_um2;
         let chief = place.and_then(|_| view.landing_um(sines, um));
         let window = 0.5 * self.bank.spec.window as f64 * pixel;
         let mut found = LandedLight {
             travelling: landing.travelling_um2() * share,
             evanescent: landing.evanescent_um2 * share,
+            zero_order: departed.zero_order,
             ..LandedLight::default()
         };
         let mut inside = 0.0;

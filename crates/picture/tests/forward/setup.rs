@@ -1,4 +1,4 @@
-//! A small chip before a small sensor.
+//! Small chips before a small sensor.
 
 use metalith_camera::{Camera, Channel, Illuminant, Response, Sensor};
 use metalith_cell::CellModel;
@@ -17,16 +17,20 @@ pub const MIDDLE: usize = 4;
 pub const BELOW: usize = 1;
 pub const LEFT: usize = 3;
 
-/// Pixels of 2 um an axis: the middle element and two of its neighbours.
+/// Of lenses of their own: a hexagon of 80 um with a shorter focal length, which looks aside, and a cubic phase.
+pub const HEXAGON: usize = 2;
+pub const CUBIC: usize = 3;
+
+/// Pixels of 2 um an axis: the middle element and two of its neighbours, or two lenses of their own.
 pub const ROWS: u32 = 120;
 
-fn camera(bands: &[[f64; 2]]) -> Camera {
+fn camera(bands: &[[f64; 2]], offset_um: [f64; 2]) -> Camera {
     let plain = Camera::three_bands(2.0);
     Camera {
         sensor: Sensor {
             columns: ROWS,
             rows: ROWS,
-            offset_um: [-75.0, -75.0],
+            offset_um,
             ..plain.sensor
         },
         channels: bands
@@ -84,14 +88,23 @@ impl Setup {
     }
 }
 
+/// Nine elements of one lens.
 pub fn setup(bands: &[[f64; 2]], size: usize) -> Setup {
-    let design = Design::read("../../designs/mini_3x3.toml".as_ref()).unwrap();
+    setup_of("mini_3x3", camera(bands, [-75.0, -75.0]), size)
+}
+
+/// Four lenses of their own kinds, of which the sensor sees the two below.
+pub fn mixed(bands: &[[f64; 2]], size: usize) -> Setup {
+    setup_of("mixed_lenses", camera(bands, [0.0, -75.0]), size)
+}
+
+fn setup_of(name: &str, camera: Camera, size: usize) -> Setup {
+    let design = Design::read(format!("../../designs/{name}.toml").as_ref()).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let layout = folder.path().join("mini.gds");
+    let layout = folder.path().join("pillars.gds");
     write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
     let extraction = read_pillars(&design, &layout, &Silent).unwrap();
-    let camera = camera(bands);
     let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
     let scene = waves(size, [0.0; 2]);
     Setup {
