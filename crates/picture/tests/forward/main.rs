@@ -107,6 +107,9 @@ fn direct_sum(setup: &Setup, scene: &SceneImage, elements: &[usize], points: usi
 /// 1.5 um is sampled too coarsely by points 1 um apart (1.1e-3 and 1.4e-3).
 const SIZE: usize = 160;
 
+/// Places an axis, 4.3 um apart as in the program's own kernels for such light and lenses (41 over 166 um).
+const NODES: usize = 13;
+
 /// What the image behind an element is off the direct sum, of its range: root mean square and at any one pixel; `about`: where the
 /// scene is (degrees).
 fn off_direct_sum(setup: &Setup, bank: &KernelBank, element: usize, about: [f64; 2]) -> [f64; 2] {
@@ -130,19 +133,20 @@ fn off_direct_sum(setup: &Setup, bank: &KernelBank, element: usize, about: [f64;
     [rms, worst]
 }
 
-/// Overlapping patches, kernels between nodes, spectra of the scene and of the channel, against some
+/// Overlapping patches, kernels between nodes as in light of narrow bands, spectra of the scene and of the channel, against some
 /// thousand fields over the whole sensor.
 #[test]
 #[ignore = "second tier: some minutes of CPU time, in scripts/slow_tests.sh"]
 fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
-    /// Root mean square over the image of the scene, of the range: 3.4e-4 is reached behind the middle element and 5.7e-4
+    /// Root mean square over the image of the scene, of the range: 2.5e-4 is reached behind the middle element and 5.6e-4
     /// behind one that steers.
     const RMS: f64 = 1e-3;
-    /// Any one pixel, of the range; 1.6e-3 and 1.7e-3 are reached.
-    const WORST: f64 = 3e-3;
+    /// Any one pixel, of the range: 6.1e-4 behind the middle element. Behind the one that steers it is 1.8e-3, in one pixel where the
+    /// rim of the scene falls on its middle: four points are few for what bends there.
+    const WORST: f64 = 2e-3;
     // Two wavelengths, both simulated.
     let setup = setup(&[[550.0, 551.0]], SIZE);
-    let bank = KernelBank::build(&setup.chip(), &setup.scene.basis, spec(96, 13), &Silent).unwrap();
+    let bank = KernelBank::build(&setup.chip(), &setup.scene.basis, spec(96, NODES), &Silent).unwrap();
     // The neighbour below looks up.
     for (element, about) in [(MIDDLE, [0.0, 0.0]), (BELOW, [0.0, 15.0])] {
         let [rms, worst] = off_direct_sum(&setup, &bank, element, about);
@@ -154,14 +158,15 @@ fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
 #[test]
 #[ignore = "second tier: some minutes of CPU time, in scripts/slow_tests.sh"]
 fn a_frame_of_lenses_of_their_own_is_the_direct_sum() {
-    const RMS: f64 = 1e-3;
-    const WORST: f64 = 3e-3;
+    /// Root mean square as above, 7.6e-4 and 2.7e-4, and any one pixel, 3.0e-4 and 3.8e-4, of the range: an image out of focus has more
+    /// pixels than the scene that the root mean square is over.
+    const OFF: f64 = 1e-3;
     let setup = mixed(&[[550.0, 551.0]], SIZE);
-    let bank = KernelBank::build(&setup.chip(), &setup.scene.basis, spec(96, 13), &Silent).unwrap();
+    let bank = KernelBank::build(&setup.chip(), &setup.scene.basis, spec(96, NODES), &Silent).unwrap();
     // A wedge of eight degrees along x looks the other way.
     for (element, about) in [(HEXAGON, [-8.0, 0.0]), (CUBIC, [0.0, 0.0])] {
         let [rms, worst] = off_direct_sum(&setup, &bank, element, about);
-        assert!(rms < RMS && worst < WORST, "{element}: {rms} {worst}");
+        assert!(rms < OFF && worst < OFF, "{element}: {rms} {worst}");
     }
 }
 

@@ -9,7 +9,7 @@ use metalith_gds::extract::Extraction;
 use metalith_layout::{read_pillars, write_pillars};
 use metalith_made::SimulationCase;
 use metalith_picture::scene::SceneImage;
-use metalith_picture::{BankSpec, ChipInLight, Detail, ElementView, FrameOperator, KernelBank, SceneSpace, Veil};
+use metalith_picture::{BankSpec, ChipInLight, KernelBank, Veil};
 use ndarray::Array3;
 
 /// The middle element, and its neighbour below and to the left.
@@ -68,18 +68,6 @@ impl Setup {
             &Silent,
         )
         .unwrap()
-    }
-
-    /// The operator of the simulation on a flat scene.
-    pub fn simulation<'a>(
-        &self,
-        bank: &'a KernelBank,
-        veil: &'a Veil,
-        views: &[ElementView],
-        scene: &SceneImage,
-    ) -> FrameOperator<'a> {
-        let space = SceneSpace::flat(&scene.view);
-        FrameOperator::new(bank, veil, views, &self.camera, &space, Detail::simulation(3))
     }
 
     pub fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> Veil {
