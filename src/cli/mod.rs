@@ -24,6 +24,7 @@ mod plan;
 mod psf;
 mod restore;
 mod run;
+mod shipped_designs;
 mod standard_input;
 mod study;
 mod terminal;

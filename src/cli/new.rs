@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use metalith::{Design, Error, Result, WholeFile};
 
+use super::shipped_designs::ShippedDesign;
 use super::{Outcome, Terminal, print_line};
 
 /// The design, with braces around what is filled in.
@@ -87,7 +88,7 @@ impl StartCell {
 /// Write a commented design file to start from.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  metalith new mine.toml --diameter-um 200 --focal-length-um 480\n  metalith run mine.toml"
+    after_help = "Examples:\n  metalith new mine.toml --diameter-um 200 --focal-length-um 480\n  metalith run mine.toml\n  metalith new pair.toml --like birefringent_532"
 )]
 pub struct NewArgs {
     /// The file to write; the design has its name. An existing file is never replaced.
@@ -113,6 +114,12 @@ pub struct NewArgs {
     /// Angle that each step from the centre element adds (degrees).
     #[arg(long, value_name = "DEG", default_value_t = 15.0)]
     steering_deg: f64,
+
+    /// Begin with a design that comes with the program, and the files that it names, instead: other shapes of pillars, lattices,
+    /// materials, waves, phases and arrays.
+    #[arg(long, value_name = "DESIGN", value_parser = ShippedDesign::names(), conflicts_with_all = ["elements", "diameter_um",
+        "focal_length_um", "wavelength_nm", "steering_deg"])]
+    like: Option<String>,
 }
 
 impl NewArgs {
@@ -169,6 +176,13 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
         ));
     }
     let name = args.design.file_stem().unwrap_or_default().to_string_lossy();
+    if let Some(like) = &args.like {
+        for file in ShippedDesign::of(like).write(&args.design, &name)? {
+            print_line!("{}", file.display());
+        }
+        print_line!("next: metalith run {}", args.design.display());
+        return Ok(Outcome::Fine);
+    }
     let text = args.text(&name);
     // What cannot be is said before a file stands there.
     Design::parse(&args.design, &text)?;
@@ -185,7 +199,7 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
             .iter()
             .find(|(most_nm, _)| nm > *VISIBLE_NM.end() && nm <= *most_nm);
         let like = longer.map_or(String::new(), |(_, like)| {
-            format!("take those of designs/{like}.toml, or ")
+            format!("begin with `--like {like}`, or ")
         });
         terminal.say(&format!(
             "note: [cell], [mapping] and [verify] of {} are for {} to {} nm, not for {nm} nm: {like}change them, and let `metalith \

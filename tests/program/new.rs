@@ -77,11 +77,75 @@ fn a_new_design_for_long_waves_says_what_its_cell_is_for() {
     for nm in ["850", "940", "1550"] {
         new(nm).stderr(contains("those of designs/asi_940.toml, as much larger as the wave"));
     }
-    new("800").stderr(contains("take those of designs/asi_940.toml"));
-    new("1700").stderr(contains("designs/hexagonal_1550.toml"));
+    new("800").stderr(contains("begin with `--like asi_940`"));
+    new("1700").stderr(contains("`--like hexagonal_1550`"));
     new("380").stderr(contains("not for 380 nm: change them"));
     let quiet = new("633");
     assert!(quiet.get_output().stderr.is_empty());
+}
+
+/// Every design of the repository can be begun with from the program alone, and is the same but for its name.
+#[test]
+fn a_new_design_may_be_like_one_that_comes_with_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let shipped = metalith_testing::root().join("designs");
+    let new = |arguments: &[&str]| {
+        let mut program = metalith();
+        program.current_dir(folder.path()).arg("new").args(arguments);
+        program.assert()
+    };
+    let mut tried = 0;
+    for entry in fs::read_dir(&shipped).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        let like = path.file_stem().unwrap().to_str().unwrap();
+        let mine = format!("my_{like}");
+        new(&[&format!("{mine}.toml"), "--like", like]).success();
+        let written = fs::read_to_string(folder.path().join(format!("{mine}.toml"))).unwrap();
+        let renamed = written.replacen(&format!("name = \"{mine}\""), &format!("name = \"{like}\""), 1);
+        assert!(
+            renamed != written && renamed == fs::read_to_string(&path).unwrap(),
+            "{like}"
+        );
+        tried += 1;
+    }
+    assert!(tried > 15);
+    for file in [
+        "phases/birefringent_532.csv",
+        "phases/four_spots.npy",
+        "mappings/tio2_532.csv",
+    ] {
+        assert!(fs::read(folder.path().join(file)).unwrap() == fs::read(shipped.join(file)).unwrap());
+    }
+    let mut layout = metalith();
+    layout.current_dir(folder.path());
+    layout
+        .args(["layout", "my_birefringent_532.toml", "--quiet"])
+        .assert()
+        .success();
+}
+
+/// A file of another content is kept, and nothing is left of a design that cannot be.
+#[test]
+fn a_new_design_like_another_replaces_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let new = |arguments: &[&str]| {
+        let mut program = metalith();
+        program.current_dir(folder.path()).arg("new").args(arguments);
+        program.assert().code(2)
+    };
+    new(&["two words.toml", "--like", "tio2_532"]).stderr(contains("cannot name files"));
+    assert!(!folder.path().join("two words.toml").exists() && !folder.path().join("mappings/tio2_532.csv").exists());
+    let mapping = folder.path().join("mappings/tio2_532.csv");
+    fs::create_dir_all(mapping.parent().unwrap()).unwrap();
+    fs::write(&mapping, "mine").unwrap();
+    new(&["mine.toml", "--like", "tio2_532"]).stderr(contains("exists and is another file"));
+    assert_eq!(fs::read_to_string(&mapping).unwrap(), "mine");
+    assert!(!folder.path().join("mine.toml").exists());
+    new(&["mine.toml", "--like", "tio2"]).stderr(contains("tio2_532"));
+    new(&["mine.toml", "--like", "tio2_532", "--diameter-um", "50"]).stderr(contains("cannot be used with"));
 }
 
 /// A design that is piped in makes the layout of the same design in a file.

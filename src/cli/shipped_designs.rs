@@ -1,0 +1,99 @@
+//! The designs that come with the program, to start from.
+
+use std::path::{Path, PathBuf};
+
+use include_dir::{Dir, include_dir};
+use metalith::{Design, Error, Result, WholeFile};
+
+static DESIGNS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/designs");
+
+/// A design of the repository, with the files that it names.
+pub struct ShippedDesign {
+    text: &'static str,
+    /// Files by their paths from the design.
+    files: Vec<(&'static Path, &'static [u8])>,
+}
+
+impl ShippedDesign {
+    /// The names of all, in the order of the alphabet.
+    pub fn names() -> Vec<&'static str> {
+        let toml = DESIGNS
+            .files()
+            .filter(|f| f.path().extension().is_some_and(|e| e == "toml"));
+        let mut names: Vec<_> = toml.filter_map(|f| f.path().file_stem()?.to_str()).collect();
+        names.sort_unstable();
+        names
+    }
+
+    /// One of [`ShippedDesign::names`].
+    ///
+    /// # Panics
+    /// If it is none of them.
+    pub fn of(name: &str) -> Self {
+        let file = DESIGNS.get_file(format!("{name}.toml")).expect("one of the names");
+        let text = file.contents_utf8().expect("designs are text");
+        let named = DESIGNS.dirs().flat_map(Dir::files).filter(|f| {
+            let path = f.path().to_str().expect("a path of the repository");
+            text.contains(&format!("\"{path}\""))
+        });
+        Self {
+            text,
+            files: named.map(|f| (f.path(), f.contents())).collect(),
+        }
+    }
+
+    /// Write it under another name, with its files beside it, and give the paths of all.
+    ///
+    /// # Errors
+    /// If a file is there that says something else, the name is none of a design, or a file cannot be written: then none of them is
+    /// left.
+    pub fn write(&self, design: &Path, name: &str) -> Result<Vec<PathBuf>> {
+        let folder = design.parent().unwrap_or(Path::new(""));
+        let beside: Vec<(PathBuf, &[u8])> = self
+            .files
+            .iter()
+            .map(|(path, bytes)| (folder.join(path), *bytes))
+            .collect();
+        for (path, bytes) in &beside {
+            if path.exists() && std::fs::read(path).ok().as_deref() != Some(*bytes) {
+                return Err(Error::invalid(
+                    format!("{} exists and is another file", path.display()),
+                    "write the design to another folder, or move the file away",
+                ));
+            }
+        }
+        let missing: Vec<_> = beside.into_iter().filter(|(path, _)| !path.exists()).collect();
+        let written = (|| {
+            for (path, bytes) in &missing {
+                let parent = path.parent().expect("it is in a folder");
+                std::fs::create_dir_all(parent).map_err(Error::io("create the folder", parent))?;
+                WholeFile::write(path, bytes)?;
+            }
+            let text = self.renamed(name);
+            Design::parse(design, &text)?;
+            WholeFile::write(design, text.as_bytes())
+        })();
+        if let Err(error) = written {
+            for (path, _) in &missing {
+                let _ = std::fs::remove_file(path);
+            }
+            return Err(error);
+        }
+        let files = missing.into_iter().map(|(path, _)| path);
+        Ok(std::iter::once(design.to_owned()).chain(files).collect())
+    }
+
+    /// With another name in the first line that says one: that of the design.
+    fn renamed(&self, name: &str) -> String {
+        let lines = self.text.split_inclusive('\n');
+        let mut named = false;
+        let renamed = lines.map(|line| {
+            if named || !line.starts_with("name = ") {
+                return line.to_owned();
+            }
+            named = true;
+            format!("name = \"{name}\"\n")
+        });
+        renamed.collect()
+    }
+}
