@@ -198,9 +198,7 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
         let longer = LONGER
             .iter()
             .find(|(most_nm, _)| nm > *VISIBLE_NM.end() && nm <= *most_nm);
-        let like = longer.map_or(String::new(), |(_, like)| {
-            format!("begin with `--like {like}`, or ")
-        });
+        let like = longer.map_or(String::new(), |(_, like)| format!("begin with `--like {like}`, or "));
         terminal.say(&format!(
             "note: [cell], [mapping] and [verify] of {} are for {} to {} nm, not for {nm} nm: {like}change them, and let `metalith \
              cells` find the mapping",

@@ -9,13 +9,14 @@ use super::line::Line;
 use metalith_cell::{PolarisationAxis, PolarisedLight};
 use metalith_core::{Error, PillarMap, Progress, Result};
 use metalith_design::array::PillarArray;
+use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{CellIncidence, Design, Element};
 use metalith_layout::read_pillars;
 use metalith_made::{MadeChip, MadeElement};
-use metalith_verify::PsfResult;
+use metalith_verify::{PsfResult, open_matched};
 use metalith_wave::propagation::{incident, landing_um};
-use metalith_wave::psf::{Matched, PixelFrequencies, Psf};
-use metalith_wave::{Accuracy, PhaseFunction, Scratch, Window};
+use metalith_wave::psf::{PixelFrequencies, Psf};
+use metalith_wave::{Accuracy, Scratch, Window};
 
 /// Chips that are compared.
 pub(super) const CHIPS: usize = 3;
@@ -51,6 +52,7 @@ pub fn compensation_cases(
 ) -> Result<Vec<CompensationCase>> {
     let line = &compensated.line;
     let found = read_pillars(design, layout, progress)?;
+    let lens = LensPhase::of(design);
     let work = intended.classes.len() * line.colours.len();
     progress.begin("simulating elements", work as u64);
     let mut cases = Vec::new();
@@ -59,7 +61,9 @@ pub fn compensation_cases(
         let plain = intended.widths(&intended.placed[place]);
         let corrected = &found.elements[place].widths;
         let element = intended.placed[place].element;
-        cases.extend(of_element(design, line, &element, [&plain, corrected], progress)?);
+        let phase = ElementPhase::of(&lens, &element);
+        let drawn = [plain.as_ref(), corrected];
+        cases.extend(of_element(design, line, (&element, &phase), drawn, progress)?);
     }
     Ok(cases)
 }
@@ -68,17 +72,14 @@ pub fn compensation_cases(
 fn of_element(
     design: &Design,
     line: &Line,
-    element: &Element,
+    (element, phase): (&Element, &ElementPhase<'_>),
     [plain, corrected]: [&PillarMap; 2],
     progress: &dyn Progress,
 ) -> Result<Vec<CompensationCase>> {
-    let lens = &design.lens;
-    let open = PhaseFunction {
-        lattice: plain.lattice,
-        radius_um: lens.radius_um(),
-        amplitude: 1.0,
-        phase_rad: |_, _| 0.0,
-    };
+    let (focal_um, opening_um) = (
+        design.lens_of(element).focal_length_um,
+        design.aperture_radius_of_um(element),
+    );
     let chips: [(&'static str, &MadeChip, &PillarMap); CHIPS] = [
         ("intended", &line.stated, plain),
         ("made, uncorrected", &line.chip, plain),
@@ -86,7 +87,7 @@ fn of_element(
     ];
     let made: Vec<MadeElement> = chips
         .iter()
-        .map(|(_, chip, widths)| chip.element(&chip.drawn(widths, line.aperture_radius_um).placed(element.centre_um())))
+        .map(|(_, chip, widths)| chip.element(&chip.drawn(widths, opening_um).placed(element.centre_um())))
         .collect::<Result<_>>()?;
     let as_lit = design.verify.incidence == CellIncidence::AsLit;
     let drawn = PixelFrequencies::of(design.verify.pixel_um).drawn();
@@ -98,14 +99,9 @@ fn of_element(
         }
         let um = colour.wavelength_um;
         let wave = incident(&element.wedge, um, [0.0, 0.0])?;
-        let chief = landing_um(&element.wedge, &wave, lens.focal_length_um)?;
-        let window = Window::about(
-            chief,
-            plain.lattice.pitch_um(),
-            design.verify.window_samples,
-            lens.focal_length_um,
-        );
-        let matched = Matched::of(&open, [chief[0], chief[1], lens.focal_length_um], um, colour.full);
+        let chief = landing_um(&element.wedge, &wave, focal_um)?;
+        let window = Window::about(chief, plain.lattice.pitch_um(), design.verify.window_samples, focal_um);
+        let matched = open_matched(design, element, phase, [chief[0], chief[1], focal_um], um).scaled(colour.full);
         for ((pillars, chip, _), made) in chips.iter().zip(&made) {
             let view = match colour.axis {
                 None => chip.view(made, &wave, as_lit, progress)?,

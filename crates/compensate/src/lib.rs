@@ -64,16 +64,20 @@ pub struct CompensationSummary {
 /// Compensate the pillars of a design for what a model says of the line.
 ///
 /// # Errors
-/// If elements have lenses of their own, pillars are rotated rectangles, a cell cannot be solved, or the user stopped it.
+/// If pillars are rotated rectangles, a cell cannot be solved, or the user stopped it.
 pub fn compensate(
     design: &Design,
     array: &PillarArray,
     model: &CalibratedModel,
     progress: &dyn Progress,
 ) -> Result<Compensated> {
-    design.one_lens("the compensation")?;
     let mut line = Line::new(design, model, progress)?;
     let copies = |class: usize| array.placed.iter().filter(|p| p.class == class).count() as u64;
+    let opening_um = |class: usize| {
+        let first = array.placed.iter().find(|p| p.class == class);
+        first.map_or(0.0, |placed| design.aperture_radius_of_um(&placed.element))
+    };
+    let openings_um: Vec<f64> = (0..array.classes.len()).map(opening_um).collect();
     let mut drawn = array.clone();
     drawn.compensated = true;
     let mut error = [0.0; 2];
@@ -81,7 +85,8 @@ pub fn compensate(
         if progress.stopped() {
             return Err(Error::Interrupted);
         }
-        let steps: Vec<Vec<i32>> = drawn.classes.iter().map(|c| line.steps(&c.widths.map())).collect();
+        let classes = drawn.classes.iter().zip(&openings_um);
+        let steps: Vec<Vec<i32>> = classes.map(|(c, um)| line.steps(&c.widths.map(), *um)).collect();
         let mut kinds = Kinds::default();
         for (k, (class, steps)) in array.classes.iter().zip(&steps).enumerate() {
             kinds.count(&class.widths.map(), steps, copies(k));

@@ -30,8 +30,6 @@ pub struct Line {
     pub colours: Vec<ColourTransmissions>,
     /// Widths (nm) that may be drawn, or numbers of upright rectangles.
     pub drawn: Vec<u16>,
-    /// Radius of the openings in the metal (um).
-    pub aperture_radius_um: f64,
     /// The least step of density that transmissions are known for.
     first_step: i32,
 }
@@ -68,7 +66,6 @@ impl Line {
             chip: MadeChip::in_light(&lit, model)?.kept_in(kept.as_deref()),
             colours: Vec::new(),
             drawn,
-            aperture_radius_um: design.aperture_radius_um(),
             first_step: 0,
         };
         for &um in &design.verify.wavelengths_um {
@@ -108,9 +105,10 @@ impl Line {
         self.chip.perturbation().geometry.varies_by_site()
     }
 
-    /// Steps that density adds to the width at every site of a layout as drawn, row by row.
-    pub fn steps(&self, drawn: &PillarMap) -> Vec<i32> {
-        let element = self.chip.drawn(drawn, self.aperture_radius_um);
+    /// Steps that density adds to the width at every site of an element as drawn, whose opening in the metal has this radius (um), row
+    /// by row.
+    pub fn steps(&self, drawn: &PillarMap, aperture_radius_um: f64) -> Vec<i32> {
+        let element = self.chip.drawn(drawn, aperture_radius_um);
         let steps = element.site_steps(&self.chip.perturbation().geometry);
         steps.unwrap_or_else(|| vec![0; drawn.number.len()])
     }

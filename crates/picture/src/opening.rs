@@ -24,7 +24,7 @@ impl Studio {
     /// and veil are kept on the disk.
     ///
     /// # Errors
-    /// If elements have lenses of their own, the layout cannot be read or has no pillars in one of the elements, the camera does not
+    /// If the layout cannot be read or has no pillars in one of the elements, the camera does not
     /// see the chip, a scene is wider than the array sees, a spectral cube has not the wavelengths that the camera counts, kernels or
     /// veil are too large, or the user stopped it. That they cannot be kept is a warning to `progress`, and so are pillars that are
     /// not those of the design, and scenes with finer pixels than are simulated ([`simulated_view`](crate::simulated_view)).

@@ -47,6 +47,7 @@ pub use large::{verify_in_parts, verify_pillars};
 pub use memory::Simulation;
 pub use metalith_core::PillarCheck;
 pub use metalith_made::SimulationCase;
+pub use optics::open_matched;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};

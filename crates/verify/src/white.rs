@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::case::TransmissionTables;
-use super::optics::{ReadElement, open_matched};
+use super::optics::ReadElement;
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
 use metalith_camera::{Camera, Sampling, WavelengthSteps};
 use metalith_core::{Error, Lattice, Progress, Result};
@@ -237,7 +237,7 @@ impl<'a> WhiteSimulator<'a> {
             _ => Ok(None),
         };
         let views = self.colours.iter().map(view).collect::<Result<Vec<_>>>()?;
-        let area_um2 = self.area_um2(element, phase);
+        let area_um2 = phase.open_um2();
         let samples = self
             .colours
             .par_iter()
@@ -291,12 +291,6 @@ impl<'a> WhiteSimulator<'a> {
             (None, None) => unreachable!("a case is a cell or a made chip"),
         };
         Ok(per_light(landing, psf, colour.full * colour.full * area_um2))
-    }
-
-    /// What the sites of an element pass if all pass everything (um^2).
-    fn area_um2(&self, element: &Element, phase: &ElementPhase<'_>) -> f64 {
-        let focus = [0.0, 0.0, self.design.lens_of(element).focal_length_um];
-        open_matched(self.design, element, phase, focus, self.design.mapping.wavelength_um).power_um2
     }
 
     fn point(&self, element: &Element) -> Point {

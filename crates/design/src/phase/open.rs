@@ -16,26 +16,31 @@ impl OpenAreas {
     /// Of a design.
     pub fn of(design: &Design) -> Self {
         let lens = LensPhase::of(design);
-        let lens_um2 = area_um2(&lens, |ix, iy| lens.holds(ix, iy));
-        let of_element = |element: Element| {
-            let phase = ElementPhase::of(&lens, &element);
-            match phase.is_of_lens(&ElementPhase::new(&lens, &element.wedge)) {
+        let elements = design.elements();
+        // Whatever its wedge.
+        let shared = ElementPhase::new(&lens, &elements[0].wedge);
+        let lens_um2 = shared.open_um2();
+        let of_element = |element: &Element| {
+            let phase = ElementPhase::of(&lens, element);
+            match phase.is_of_lens(&shared) {
                 true => lens_um2,
-                false => area_um2(&lens, |ix, iy| phase.holds(ix, iy)),
+                false => phase.open_um2(),
             }
         };
         Self {
             lens_um2,
-            elements_um2: design.elements().into_iter().map(of_element).collect(),
+            elements_um2: elements.iter().map(of_element).collect(),
         }
     }
 }
 
-fn area_um2(lens: &LensPhase, holds: impl Fn(usize, usize) -> bool) -> f64 {
-    let lattice = lens.lattice();
-    let n = lattice.sites();
-    let held = (0..n)
-        .flat_map(|iy| (0..n).map(move |ix| (ix, iy)))
-        .filter(|(ix, iy)| holds(*ix, *iy));
-    lattice.cell_um2() * held.count() as f64
+impl ElementPhase<'_> {
+    /// Area of the sites that are inside the lens (um^2).
+    pub fn open_um2(&self) -> f64 {
+        let lattice = self.lattice();
+        let n = lattice.sites();
+        let sites = (0..n).flat_map(|iy| (0..n).map(move |ix| (ix, iy)));
+        let held = sites.filter(|(ix, iy)| self.holds(*ix, *iy));
+        lattice.cell_um2() * held.count() as f64
+    }
 }

@@ -312,7 +312,7 @@ impl<'a> ElementSimulator<'a> {
                 (Some(tables), None) => tables.psf(widths, wave, &lit, &fold, lp_mm, scratch)?,
                 (None, None) => unreachable!("a case is a cell or a made chip"),
             };
-            let matched = scaled(&perfect, at.full);
+            let matched = perfect.scaled(at.full);
             extracted.push((at.fidelity, PsfResult::of(&found, &matched, spec.pixel_um)));
             judged.get_or_insert(found);
         }
@@ -377,8 +377,9 @@ fn arriving(element: &Element, wavelength_um: f64, field: FieldAngle) -> Result<
     Ok(incident(&element.wedge, wavelength_um, field_rad)?)
 }
 
-/// The sites of an element, all of modulus one, with the perfect phase for a focus (um).
-pub(super) fn open_matched(
+/// The sites of an element, all of modulus one, with the perfect phase for a focus (um from its middle), whatever the outline of
+/// its lens: what Strehl ratios are against.
+pub fn open_matched(
     design: &Design,
     element: &Element,
     phase: &ElementPhase<'_>,
@@ -408,15 +409,6 @@ pub(super) fn open_matched(
 /// Widths that tables go to.
 fn largest_number(design: &Design) -> u16 {
     design.cell.most()
-}
-
-/// The same with sites of another modulus.
-fn scaled(matched: &Matched, full_transmission: f64) -> Matched {
-    let power = full_transmission * full_transmission;
-    Matched {
-        peak: matched.peak * power,
-        power_um2: matched.power_um2 * power,
-    }
 }
 
 /// A PSF per unit of arriving power, so that cells with and without amplitude share one scale.

@@ -46,4 +46,14 @@ impl Matched {
             power_um2: full_transmission * full_transmission * site_um2 * sites as f64,
         }
     }
+
+    /// The same with sites of another modulus, in place of one.
+    #[must_use]
+    pub fn scaled(&self, full_transmission: f64) -> Self {
+        let power = full_transmission * full_transmission;
+        Self {
+            peak: self.peak * power,
+            power_um2: self.power_um2 * power,
+        }
+    }
 }
