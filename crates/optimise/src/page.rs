@@ -380,7 +380,8 @@ fn limit_costs(before: (f64, f64), after: (f64, f64), over_limit: &[(f64, f64)])
     if step <= limit || is >= was {
         return None;
     }
-    let wider = over_limit.iter().find(|(wider, merit)| *wider > limit && *merit > was);
+    // The first that lets the phase before through.
+    let wider = over_limit.iter().find(|(wider, merit)| *wider >= step && *merit > is);
     let hint = wider.map_or_else(String::new, |(wider, merit)| {
         format!(
             "; with `step_limit_turns = {wider}` in [optimise] {} is reached",
@@ -404,8 +405,8 @@ mod tests {
             words.contains("0.295 turns") && words.contains("`step_limit_turns = 0.3`") && words.contains("0.540"),
             "{words}"
         );
-        // No limit of those that were tried does better.
-        let words = limit_costs((0.295, 0.6), (0.2, 0.36), &over).unwrap();
+        // No limit that was tried is as wide.
+        let words = limit_costs((0.45, 0.525), (0.2, 0.36), &over).unwrap();
         assert!(!words.contains("step_limit_turns"), "{words}");
         // Better than before, or before within the limit.
         assert!(limit_costs((0.295, 0.3), (0.2, 0.36), &over).is_none());

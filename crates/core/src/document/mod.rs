@@ -43,8 +43,18 @@ const MOST_HELD: usize = 1000;
 /// The text of a file that a person wrote.
 ///
 /// # Errors
-/// If it cannot be read, is longer than 4 MiB, or is not UTF-8.
+/// If it cannot be read, is longer than 4 MiB, or is not UTF-8. Of a file of another kind it is said what it is.
 pub fn load(path: &Path) -> Result<String> {
+    load_text(path).map_err(|error| match crate::file::binary_kind(path) {
+        Some(kind) => Error::invalid(
+            format!("{} is {kind}, and a text is asked for here", path.display()),
+            "check which file is given where: `--help` says the order",
+        ),
+        None => error,
+    })
+}
+
+fn load_text(path: &Path) -> Result<String> {
     let bytes = crate::file::read_at_most(path, LONGEST, "a text that a person wrote")?;
     String::from_utf8(bytes).map_err(|e| Error::Table {
         path: path.to_owned(),

@@ -121,3 +121,22 @@ fn sections_of_one_name_are_judged_each() {
     assert_eq!(words(&faults), ["`a` cannot be 50", "a and b differ"]);
     assert_eq!(faults.line_column(faults.faults()[1].span.start), (6, 5));
 }
+
+#[test]
+fn a_file_of_another_kind_is_said_to_be_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lens.gds");
+    // A header of GDSII before what no text is long enough for.
+    let mut layout = vec![0x00, 0x06, 0x00, 0x02, 0x02, 0x58];
+    layout.resize(super::LONGEST as usize + 1, 0xff);
+    for (bytes, kind) in [
+        (&layout[..], "a layout in GDSII"),
+        (b"%SEMI-OASIS\r\n\x01\xff", "a layout in OASIS"),
+        (b"\x89PNG\r\n\x1a\n", "a picture (PNG)"),
+        (b"\xff\xfe", "not UTF-8"),
+    ] {
+        std::fs::write(&path, bytes).unwrap();
+        let error = super::load(&path).unwrap_err().to_string();
+        assert!(error.contains("lens.gds") && error.contains(kind), "{error}");
+    }
+}

@@ -2,6 +2,7 @@
 
 mod digest;
 mod folder;
+mod kind;
 mod part;
 mod past_cache;
 mod turn;
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 pub use digest::file_digest;
 pub use folder::WholeFolder;
+pub(crate) use kind::binary_kind;
 pub use past_cache::{Ahead, Block};
 pub use turn::FolderTurn;
 
