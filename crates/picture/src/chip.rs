@@ -44,7 +44,7 @@ pub struct ChipInLight<'a> {
     /// Of a cell that changes polarisation, what reaches the sensor, by wavelength.
     polarised: Vec<Option<Polarised>>,
     perturbation: Perturbation,
-    /// Share of the light that passes where no pillars are, at each wavelength.
+    /// Share of the light that cells send on that pass everything, at each wavelength.
     full: Vec<f64>,
     /// One over the distance of the scene (1/m).
     source_per_m: f64,
