@@ -9,6 +9,7 @@ static DESIGNS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/designs");
 
 /// A design of the repository, with the files that it names.
 pub struct ShippedDesign {
+    name: String,
     text: &'static str,
     /// Files by their paths from the design.
     files: Vec<(&'static Path, &'static [u8])>,
@@ -37,6 +38,7 @@ impl ShippedDesign {
             text.contains(&format!("\"{path}\""))
         });
         Self {
+            name: name.to_owned(),
             text,
             files: named.map(|f| (f.path(), f.contents())).collect(),
         }
@@ -55,7 +57,11 @@ impl ShippedDesign {
             .map(|(path, bytes)| (folder.join(path), *bytes))
             .collect();
         for (path, bytes) in &beside {
-            if path.exists() && std::fs::read(path).ok().as_deref() != Some(*bytes) {
+            // A file of another size, however large, is not read.
+            let is_as_long =
+                || std::fs::metadata(path).is_ok_and(|found| found.is_file() && found.len() == bytes.len() as u64);
+            let is_it = || is_as_long() && std::fs::read(path).is_ok_and(|found| found == *bytes);
+            if path.exists() && !is_it() {
                 return Err(Error::invalid(
                     format!("{} exists and is another file", path.display()),
                     "write the design to another folder, or move the file away",
@@ -69,7 +75,8 @@ impl ShippedDesign {
                 std::fs::create_dir_all(parent).map_err(Error::io("create the folder", parent))?;
                 WholeFile::write(path, bytes)?;
             }
-            let text = self.renamed(name);
+            let [own, new] = [&self.name, name].map(|name| format!("name = \"{name}\""));
+            let text = self.text.replacen(&own, &new, 1);
             Design::parse(design, &text)?;
             WholeFile::write(design, text.as_bytes())
         })();
@@ -81,19 +88,5 @@ impl ShippedDesign {
         }
         let files = missing.into_iter().map(|(path, _)| path);
         Ok(std::iter::once(design.to_owned()).chain(files).collect())
-    }
-
-    /// With another name in the first line that says one: that of the design.
-    fn renamed(&self, name: &str) -> String {
-        let lines = self.text.split_inclusive('\n');
-        let mut named = false;
-        let renamed = lines.map(|line| {
-            if named || !line.starts_with("name = ") {
-                return line.to_owned();
-            }
-            named = true;
-            format!("name = \"{name}\"\n")
-        });
-        renamed.collect()
     }
 }

@@ -74,7 +74,7 @@ pub fn compensate(
     let mut line = Line::new(design, model, progress)?;
     let copies = |class: usize| array.placed.iter().filter(|p| p.class == class).count() as u64;
     let opening_um = |class: usize| {
-        let first = array.placed.iter().find(|p| p.class == class);
+        let first = array.first_of(class);
         first.map_or(0.0, |placed| design.aperture_radius_of_um(&placed.element))
     };
     let openings_um: Vec<f64> = (0..array.classes.len()).map(opening_um).collect();

@@ -171,7 +171,7 @@ fn no_copies(array: &PillarArray) -> Option<String> {
 
 /// What a person should know of a class that has no symmetry.
 fn no_symmetry(array: &PillarArray, class: usize) -> Option<String> {
-    let first = array.placed.iter().find(|p| p.class == class)?;
+    let first = array.first_of(class)?;
     (array.classes[class].group.members().len() == 1).then(|| {
         format!(
             "element {} has no symmetry: all its pillars are written",

@@ -79,7 +79,10 @@ pub fn sensor_um(design: &Design, camera: &Camera) -> f64 {
 
 /// Where the elements of a design are before a sensor: one plane for all, whatever their focal lengths.
 pub fn element_views(design: &Design, camera: &Camera) -> Vec<ElementView> {
-    let areas = OpenAreas::of(design);
+    views_of(design, camera, &OpenAreas::of(design))
+}
+
+fn views_of(design: &Design, camera: &Camera, areas: &OpenAreas) -> Vec<ElementView> {
     let view = |(element, open_um2): (Element, &f64)| ElementView {
         centre_um: element.centre_um(),
         wedge: element.wedge,
@@ -119,7 +122,8 @@ impl<'a> ChipInLight<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let sampling = sampling_of(design, camera)?;
-        let elements = element_views(design, camera);
+        let areas = OpenAreas::of(design);
+        let elements = views_of(design, camera, &areas);
         let perturbation = match case {
             SimulationCase::Cell(_) => Perturbation::default(),
             SimulationCase::Made(chip) => chip.perturbation().clone(),
@@ -133,7 +137,6 @@ impl<'a> ChipInLight<'a> {
             .into_iter()
             .filter(|s| symmetric && s.keeps(design.cell.shape));
         let (chosen, copies) = distinct_of(&elements, &widths, &symmetries.collect::<Vec<_>>());
-        let areas = OpenAreas::of(design);
         let full = |nm: &f64| Ok(case.full_transmission(nm * 1e-3)?.powi(2));
         progress.begin("solving the cells", sampling.wavelengths_nm.len() as u64);
         let by_width = match case {

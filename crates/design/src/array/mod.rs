@@ -188,6 +188,11 @@ impl PillarArray {
         }
     }
 
+    /// The first element of a class, in the order of the elements; none if the class has none.
+    pub fn first_of(&self, class: usize) -> Option<&PlacedElement> {
+        self.placed.iter().find(|placed| placed.class == class)
+    }
+
     /// The pillars of one element, to be read row by row.
     pub fn rows(&self, placed: &PlacedElement) -> Cow<'_, ClassPillars> {
         let widths = &self.classes[placed.class].widths;
