@@ -4,7 +4,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use metalith::wave::{Fold, Matched, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
+use metalith::wave::{FoldedPropagator, IdealPsf, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
 use metalith::{Accuracy, Lattice, PillarMap};
 use num_complex::Complex64;
 
@@ -39,19 +39,19 @@ fn fields(c: &mut Criterion) {
         let window = Window::about([0.0, 0.0], 0.35, samples, focal_um);
         let wave = PlaneWave::normal(0.55);
         for accuracy in [Accuracy::Accurate, Accuracy::Fast] {
-            let fold = Fold::plan(map.lattice, radius_um, 0.55, window, accuracy).expect("a plan");
+            let fold = FoldedPropagator::plan(map.lattice, radius_um, 0.55, window, accuracy).expect("a plan");
             let mut scratch = Scratch::default();
             group.bench_function(BenchmarkId::new(name, format!("{accuracy:?}")), |b| {
                 b.iter(|| black_box(fold.field(&pillars, &wave, &mut scratch)).expect("a field"));
             });
         }
-        let fold = Fold::plan(map.lattice, radius_um, 0.55, window, Accuracy::Accurate).expect("a plan");
+        let fold = FoldedPropagator::plan(map.lattice, radius_um, 0.55, window, Accuracy::Accurate).expect("a plan");
         let mut scratch = Scratch::default();
         let field = fold.field(&pillars, &wave, &mut scratch).expect("a field");
         group.bench_function(BenchmarkId::new(name, "adjoint"), |b| {
             b.iter(|| black_box(fold.adjoint(&field.values, &wave, &mut scratch)).expect("an adjoint"));
         });
-        let matched = Matched::of(&pillars, [0.0, 0.0, focal_um], 0.55, 1.0);
+        let matched = IdealPsf::of(&pillars, [0.0, 0.0, focal_um], 0.55, 1.0);
         group.bench_function(BenchmarkId::new(name, "metrics"), |b| {
             b.iter(|| black_box(Psf::of(&field).metrics(&matched, 5.86)));
         });

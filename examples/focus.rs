@@ -8,7 +8,9 @@
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-use metalith::wave::{Aperture, Fold, PhaseFunction, PillarFunction, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith::wave::{
+    Aperture, FoldedPropagator, PhaseFunction, PillarFunction, Pillars, PlaneWave, Propagator, Scratch, Window,
+};
 use metalith::{Accuracy, Lattice, PillarMap};
 use num_complex::Complex64;
 
@@ -69,7 +71,8 @@ fn report(
     for _ in 0..repeats {
         // Planning and memory are part of the cost of one PSF.
         let radius = aperture.radius_um();
-        let fold = Fold::plan(aperture.lattice(), radius, wave.wavelength_um, window, accuracy).expect("a plan");
+        let fold =
+            FoldedPropagator::plan(aperture.lattice(), radius, wave.wavelength_um, window, accuracy).expect("a plan");
         let field = fold.field(aperture, wave, &mut Scratch::default()).expect("a field");
         let v = field.values[[128, 128]];
         value = Complex64::new(v.re.into(), v.im.into());

@@ -10,10 +10,10 @@
 
 use std::path::PathBuf;
 
-use metalith::camera::Camera;
 use metalith::picture::restore::RestorationMethod;
 use metalith::picture::scene::{images_in, read_far_scene};
-use metalith::picture::{Rehearsal, ScenePower, Studio, Zone, ZoneScore, scores};
+use metalith::picture::{ImagingSystem, Rehearsal, ScenePower, Zone, ZoneScore, scores};
+use metalith::sensor::Camera;
 use metalith::{Design, Error, Result, Silent};
 
 /// Scores of all photographs by one way.
@@ -37,7 +37,7 @@ fn main() -> Result<()> {
     let camera = Camera::read(camera.as_ref())?;
     let photographs = images_in(folder.as_ref())?;
     let read = |path: &PathBuf| read_far_scene(path, field_deg);
-    let studio = Studio::open(
+    let studio = ImagingSystem::open(
         &design,
         layout.as_ref(),
         &camera,

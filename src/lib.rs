@@ -84,11 +84,10 @@ extern crate self as metalith;
 pub mod cli;
 mod session;
 
+pub use metalith_baselines as baselines;
 pub use metalith_calibrate as calibrate;
-pub use metalith_camera as camera;
 pub use metalith_cell as cell;
 pub use metalith_cell_study as cell_study;
-pub use metalith_compensate as compensate;
 pub use metalith_design as design;
 pub use metalith_design::{array, phase};
 pub use metalith_drc as drc;
@@ -98,27 +97,29 @@ pub use metalith_gds::extract;
 pub use metalith_grating as grating;
 pub use metalith_handoff as handoff;
 pub use metalith_layout as layout;
-pub use metalith_made as made;
+pub use metalith_optics as optics;
 pub use metalith_optimise as optimise;
 pub use metalith_picture as picture;
 pub use metalith_prior as prior;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
-pub use metalith_rivals as rivals;
+pub use metalith_sensor as sensor;
 pub use metalith_study as study;
 pub use metalith_verify as verify;
+pub use metalith_verify::compensate;
 pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
-pub use metalith_core::{
-    ElementSite, Error, Fault, Faults, FolderTurn, Lattice, LatticeKind, PillarMap, PillarRows, PillarShape, Progress,
-    Rectangles, Result, RotatedRectangles, Silent, UprightRectangles, Wedge, WholeFile, text,
-};
+pub use metalith_core::{AtomicFile, Error, Fault, Faults, FolderLock, Progress, Result, Silent, Wedge, text};
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;
 pub use metalith_gds::extract::{Extraction, ExtractionPlan, extract};
 pub use metalith_layout::{write_apertures, write_layer_properties, write_pillars};
-pub use metalith_made::{CalibratedModel, MadeChip};
+pub use metalith_optics::{AsBuiltChip, CalibratedModel};
+pub use metalith_pillars::{
+    ElementSite, Lattice, LatticeKind, PillarMap, PillarRows, PillarShape, Rectangles, RotatedRectangles,
+    UprightRectangles,
+};
 pub use metalith_verify::{SimulationCase, SimulationCases, Verification, verify, write_report};
 pub use metalith_wave::Accuracy;
 pub use session::plan_session;

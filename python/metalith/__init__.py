@@ -23,7 +23,7 @@ from ._layouts import (
 )
 from ._light import Psf, PsfSet, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
-from ._pictures import Frame, Studio, denoise
+from ._pictures import Frame, ImagingSystem, denoise
 from ._checks import CapturePlan, CheckReport, Marker, Verification, check, plan, verify
 from ._diagnosis import Diagnosis, FoundEffect, RankedEffect, calibrate
 from ._studies import Study, StudyResult
@@ -46,7 +46,7 @@ __all__ = [
     "RankedEffect",
     "Rectangles",
     "Shape",
-    "Studio",
+    "ImagingSystem",
     "Study",
     "StudyResult",
     "Transmission",

@@ -35,7 +35,7 @@ class Frame:
         return self._native.saturated
 
 
-class Studio:
+class ImagingSystem:
     """A layout behind a camera, for scenes of one size and field.
 
     The pillars are read from the bytes of the layout. Kernels over the field are made once, which takes minutes for
@@ -64,7 +64,7 @@ class Studio:
         rows, columns = (_arguments.whole("shape", n, 1, MOST_SIDE) for n in shape)
         self.shape = shape
         self.field_deg = field_deg
-        self._native = _native.Studio.open(
+        self._native = _native.ImagingSystem.open(
             design._native, layout, camera, rows, columns, field_deg, distance_mm, model, prior, progress
         )
 

@@ -8,7 +8,7 @@ use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
 use metalith::extract::GdsPillars;
 use metalith::gds::ReadLimits;
 use metalith::{
-    Accuracy, CalibratedModel, Layout, MadeChip, PillarArray, PillarRows as _, Result, SimulationCases, cell_models,
+    Accuracy, AsBuiltChip, CalibratedModel, Layout, PillarArray, PillarRows as _, Result, SimulationCases, cell_models,
 };
 use pyo3::prelude::*;
 
@@ -73,8 +73,8 @@ pub fn verify(
     work(py, progress, |p| {
         let array = PillarArray::build(design, p)?;
         let model = model.as_deref().map(CalibratedModel::read).transpose()?;
-        let chip = |model| -> Result<MadeChip> {
-            Ok(MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+        let chip = |model| -> Result<AsBuiltChip> {
+            Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
         };
         let made = model.as_ref().map(chip).transpose()?;
         if let Some(chip) = &made {

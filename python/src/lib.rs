@@ -51,7 +51,7 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(light::propagate, m)?)?;
     m.add_function(wrap_pyfunction!(light::cell, m)?)?;
     m.add_function(wrap_pyfunction!(light::index, m)?)?;
-    m.add_class::<pictures::Studio>()?;
+    m.add_class::<pictures::ImagingSystem>()?;
     m.add_class::<pictures::Frame>()?;
     m.add_function(wrap_pyfunction!(pictures::denoise, m)?)?;
     m.add_function(wrap_pyfunction!(checks::check, m)?)?;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use metalith::cell::CellStack;
 use metalith::rcwa::{Material, Orders};
-use metalith::wave::{Aperture, Direct, Fold, PlaneWave, Propagator, Scratch, Window};
+use metalith::wave::{Aperture, Direct, FoldedPropagator, PlaneWave, Propagator, Scratch, Window};
 use metalith::{Accuracy, Error, Lattice, LatticeKind, Result};
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
@@ -114,7 +114,7 @@ pub fn propagate<'py>(
             let sum = Direct::plan(given.lattice, um, window)?;
             return Ok(sum.field(&given, &wave, &mut scratch)?);
         }
-        let fold = Fold::plan(given.lattice, given.radius_um, um, window, accuracy)?;
+        let fold = FoldedPropagator::plan(given.lattice, given.radius_um, um, window, accuracy)?;
         Ok(fold.field(&given, &wave, &mut scratch)?)
     })?;
     let along = |axis: usize| (0..window.samples).map(move |i| window.coordinate_um(axis, i));

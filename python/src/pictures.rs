@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use metalith::camera::Camera;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::SceneImage;
 use metalith::picture::{self, OperatorError, Rehearsal};
 use metalith::prior::NetworkDenoiser;
+use metalith::sensor::Camera;
 use metalith::{CalibratedModel, Error, Result};
 use ndarray::Array3;
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
@@ -21,8 +21,8 @@ const FAR: f64 = f64::INFINITY;
 
 /// A layout behind a camera, and the field of its scenes.
 #[pyclass(frozen)]
-pub struct Studio {
-    studio: picture::Studio,
+pub struct ImagingSystem {
+    studio: picture::ImagingSystem,
     /// What the operator of the restoration errs by; found when it is first needed.
     operator_error: OnceLock<OperatorError>,
 }
@@ -49,7 +49,7 @@ impl Frame {
 }
 
 #[pymethods]
-impl Studio {
+impl ImagingSystem {
     /// Kernels and veil of a layout, made or taken from the disk. Scenes whose pixels are finer than half of one of the sensor are
     /// averaged to these; truth and pictures have the size of the averaged scene then.
     #[staticmethod]
@@ -75,7 +75,7 @@ impl Studio {
             let prior = prior.as_deref().map(LearnedDenoiser::read).transpose()?;
             let black = Array3::zeros((rows, columns, 3));
             let scene = SceneImage::of_rgb("scene", &black, field_deg, distance_mm.map_or(FAR, |mm| mm * 1e3));
-            let mut studio = picture::Studio::open(design, &layout, &camera, model.as_ref(), &scene, p)?;
+            let mut studio = picture::ImagingSystem::open(design, &layout, &camera, model.as_ref(), &scene, p)?;
             if let Some(prior) = prior {
                 studio.prior = prior;
             }
@@ -154,7 +154,7 @@ impl Studio {
     }
 }
 
-impl Studio {
+impl ImagingSystem {
     fn scene(&self, rgb: &Array3<f64>) -> Result<SceneImage> {
         let view = self.studio.given;
         if rgb.dim() != (view.rows, view.columns, 3) {

@@ -7,7 +7,7 @@ use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
 use metalith::{
-    Accuracy, Error, MadeChip, PillarMap, PillarRows as _, PillarShape, Progress, Result, Wedge, cell_models,
+    Accuracy, AsBuiltChip, Error, PillarMap, PillarRows as _, PillarShape, Progress, Result, Wedge, cell_models,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -188,7 +188,7 @@ fn simulate_together(
 type ToldPsfs<'py> = (Vec<Bound<'py, PyDict>>, Option<String>);
 
 /// What is simulated as made, if anything, with the PSFs.
-fn told<'py>(py: Python<'py>, (found, made): (Vec<Found>, Option<MadeChip>)) -> PyResult<ToldPsfs<'py>> {
+fn told<'py>(py: Python<'py>, (found, made): (Vec<Found>, Option<AsBuiltChip>)) -> PyResult<ToldPsfs<'py>> {
     let one = |f: Found| {
         let dict = PyDict::new(py);
         let (m, window) = (f.psf.metrics, f.psf.psf.window);
@@ -262,7 +262,7 @@ pub fn psf_of_array<'py>(
         let (cells, made) = match &wanted {
             Wanted::Cell(fidelity) => (cell_models(&design, &[*fidelity])?, None),
             Wanted::Model(model) => {
-                let chip = MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
+                let chip = AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
                 let classes = chosen.iter().map(|k| &array.array.classes[placed[*k].class]);
                 chip.check_drawn(classes.map(|class| class.widths.histogram()))?;
                 (Vec::new(), Some(chip))
@@ -349,7 +349,7 @@ pub fn psf_of_widths<'py>(
                     polarised: light,
                     stack,
                 };
-                let chip = MadeChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());
+                let chip = AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());
                 chip.check_drawn(maps.iter().map(PillarMap::histogram))?;
                 (None, Some(chip))
             }

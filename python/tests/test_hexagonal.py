@@ -305,7 +305,7 @@ def test_a_picture_is_of_its_scene(array: ml.Array, tmp_path: Path) -> None:
     camera = tmp_path / "camera.toml"
     camera.write_text(text)
     design = array.design or pytest.fail()
-    studio = ml.Studio(design, tmp_path / "chip.oas", camera, shape=shape, field_deg=30.0)
+    studio = ml.ImagingSystem(design, tmp_path / "chip.oas", camera, shape=shape, field_deg=30.0)
     scene = np.full((*shape, 3), 0.02)
     scene[4:12, 18:28] = 0.9
     restored, truth = studio.restore(studio.record(scene)), studio.truth(scene)

@@ -47,15 +47,15 @@ def scene() -> npt.NDArray[np.float64]:
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> ml.Studio:
+def studio(tmp_path_factory: pytest.TempPathFactory) -> ml.ImagingSystem:
     folder = tmp_path_factory.mktemp("studio")
     (folder / "small.toml").write_text(CAMERA)
     design = ml.Design.read(MINI)
     design.array().write(folder / "chip.oas")
-    return ml.Studio(design, folder / "chip.oas", folder / "small.toml", shape=SHAPE, field_deg=60.0)
+    return ml.ImagingSystem(design, folder / "chip.oas", folder / "small.toml", shape=SHAPE, field_deg=60.0)
 
 
-def test_a_frame_is_what_the_sensor_records(studio: ml.Studio) -> None:
+def test_a_frame_is_what_the_sensor_records(studio: ml.ImagingSystem) -> None:
     frame = studio.record(scene())
     (plane,) = frame.planes
     assert plane.shape == (240, 240) and plane.dtype == np.float32
@@ -71,7 +71,7 @@ def test_a_frame_is_what_the_sensor_records(studio: ml.Studio) -> None:
     assert np.std((other - plane)[lit]) == pytest.approx(expected, rel=0.2)
 
 
-def test_a_grey_scene_is_one_of_three_equal_colours(studio: ml.Studio) -> None:
+def test_a_grey_scene_is_one_of_three_equal_colours(studio: ml.ImagingSystem) -> None:
     grey = scene()[:, :, 0]
     colours = np.repeat(grey[:, :, None], 3, axis=2)
     for given in (grey, grey[:, :, None]):
@@ -79,7 +79,7 @@ def test_a_grey_scene_is_one_of_three_equal_colours(studio: ml.Studio) -> None:
         assert np.array_equal(studio.truth(given), studio.truth(colours))
 
 
-def test_a_picture_is_restored(studio: ml.Studio) -> None:
+def test_a_picture_is_restored(studio: ml.ImagingSystem) -> None:
     truth = studio.truth(scene())
     assert truth.shape == (*SHAPE, 3)
     frame = studio.record(scene())
@@ -97,7 +97,7 @@ def test_a_picture_is_restored(studio: ml.Studio) -> None:
     assert np.array_equal(studio.restore(frame), found["tikhonov"])
 
 
-def test_a_frame_from_elsewhere_is_restored_as_one_that_was_simulated(studio: ml.Studio) -> None:
+def test_a_frame_from_elsewhere_is_restored_as_one_that_was_simulated(studio: ml.ImagingSystem) -> None:
     frame = studio.record(scene())
     again = studio.frame(frame.planes)
     assert again.saturated == frame.saturated
@@ -113,7 +113,7 @@ def test_a_frame_from_elsewhere_is_restored_as_one_that_was_simulated(studio: ml
         studio.frame([plane * np.nan])
 
 
-def test_what_cannot_be_recorded_or_restored_is_told(studio: ml.Studio) -> None:
+def test_what_cannot_be_recorded_or_restored_is_told(studio: ml.ImagingSystem) -> None:
     with pytest.raises(ml.MetalithError, match=r"give one of shape \(48, 48, 3\)"):
         studio.record(np.zeros((20, 48, 3)))
     with pytest.raises(ml.MetalithError, match=r"of shape \(48, 48, 2\)\n  help: give three colours.*or a grey picture"):

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::camera::Camera;
+use metalith::sensor::Camera;
 use metalith::{CalibratedModel, Design, Error, Result};
 
 use super::{Terminal, standard_input};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::ReadLimits;
-use metalith::{Error, Layout, PillarShape, Result, WholeFile};
+use metalith::{AtomicFile, Error, Layout, PillarShape, Result};
 
 use super::compensated::CompensatedFor;
 use super::output::is_standard_output;
@@ -134,7 +134,7 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         if is_standard_output(path) {
             text = form;
         } else {
-            WholeFile::write(path, form(&report).as_bytes())?;
+            AtomicFile::write(path, form(&report).as_bytes())?;
         }
     }
     print_line!("{}", text(&report).trim_end());

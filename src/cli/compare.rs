@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use metalith::picture::KeptKernels;
-use metalith::rivals::{Comparison, DiffuserSpec, Lensless, Lineup, ListedDesign, MaskSpec, write_comparison};
+use metalith::baselines::{
+    Comparison, ComparisonResult, DiffuserSpec, Lensless, ListedDesign, MaskSpec, write_comparison,
+};
+use metalith::picture::KernelCache;
 use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 
@@ -227,8 +229,8 @@ impl ComparedDesign {
 
 impl CompareArgs {
     /// What is asked for, as the library has it.
-    fn lineup(&self) -> Result<Lineup> {
-        Ok(Lineup {
+    fn lineup(&self) -> Result<Comparison> {
+        Ok(Comparison {
             camera: self.camera.clone(),
             designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
             lensless: self
@@ -269,7 +271,7 @@ pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let open = lineup.open()?;
     open.notes().iter().for_each(|note| terminal.say(note));
-    let kept = KeptKernels::of_user();
+    let kept = KernelCache::of_user();
     let take = |k| open.take(k, &kept, terminal);
     let comparison = open.comparison((0..lineup.count()).map(take).collect::<Result<_>>()?);
     terminal.clear();
@@ -284,7 +286,7 @@ pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
 }
 
 /// Write the page and the numbers of a comparison, and print its table.
-pub fn tell(comparison: &Comparison, folder: &Path) -> Result<Outcome> {
+pub fn tell(comparison: &ComparisonResult, folder: &Path) -> Result<Outcome> {
     write_comparison(comparison, folder)?;
     output::line(format_args!("{}", comparison.markdown()));
     output::line(format_args!("page: {}", folder.join("compare.html").display()));

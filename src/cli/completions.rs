@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
-use metalith::{Result, WholeFile};
+use metalith::{AtomicFile, Result};
 
 use super::{Arguments, Outcome, Terminal, output, print_line};
 
@@ -40,7 +40,7 @@ pub fn manual(args: &ManualArgs, _terminal: &Terminal) -> Result<Outcome> {
         clap_mangen::Man::new(command)
             .render(&mut page)
             .map_err(metalith::Error::io("format", &path))?;
-        WholeFile::write(&path, &page)?;
+        AtomicFile::write(&path, &page)?;
         print_line!("{}", path.display());
     }
     Ok(Outcome::Fine)

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::picture::scene::{images_in, read_far_scene};
-use metalith::picture::{DatasetManifest, DatasetOrigin, Studio, check_images, write_dataset};
+use metalith::picture::{DatasetManifest, DatasetOrigin, ImagingSystem, check_images, write_dataset};
 use metalith::study::{PairsRequest, is_planned, plan_pairs};
 use metalith::{Error, Result};
 
@@ -92,7 +92,7 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let read = |path: &Path| read_far_scene(path, args.with.field_deg);
     let layout = InputFile::of(&args.layout)?;
     let origin = DatasetOrigin::of(&design, &layout, &camera, args.with.model.as_deref())?;
-    let studio = Studio::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
+    let studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
     let operator = studio.simulation();
     let head = DatasetManifest::of(&studio, origin, args.seed);
     let manifest = write_dataset(&studio, &operator, &images, &read, head, &args.out, terminal)?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::{Design, Error, Result, WholeFile};
+use metalith::{AtomicFile, Design, Error, Result};
 
 use super::shipped_designs::ShippedDesign;
 use super::{Outcome, Terminal, print_line};
@@ -186,7 +186,7 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     let text = args.text(&name);
     // What cannot be is said before a file stands there.
     Design::parse(&args.design, &text)?;
-    WholeFile::write(&args.design, text.as_bytes())?;
+    AtomicFile::write(&args.design, text.as_bytes())?;
     let nm = args.wavelength_nm;
     if INFRARED_NM.contains(&nm) {
         terminal.say(&format!(

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::made::CalibratedModel;
+use metalith::optics::CalibratedModel;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::picture::{
-    Doubt, Frame, FrameFile, FrameStatement, KeptKernels, PicturePages, PictureReport, Rehearsal, RestorationReport,
-    ScenePower, Studio, ZoneScore, check_scored, contrast_curves, picture_file, psnr_words, scores,
-    worth_of_assumptions, write_pages,
+    Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport, Rehearsal,
+    RestorationReport, ScenePower, Uncertainty, ZoneScore, check_scored, contrast_curves, picture_file, psnr_words,
+    scores, worth_of_assumptions, write_pages,
 };
 use metalith::{Error, Result};
 
@@ -160,7 +160,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     apart(inputs.into_iter().chain(others), &written)?;
     let layout = InputFile::of(&args.layout)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
-    let mut studio = Studio::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    let mut studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {
         studio.prior = prior;
     }
@@ -204,7 +204,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
     }
     let doubt = match args.samples {
-        Some(n) => Some(Doubt::of(&studio.samples(
+        Some(n) => Some(Uncertainty::of(&studio.samples(
             &operator,
             error,
             &frame,
@@ -221,7 +221,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             &layout,
             model.as_ref(),
             &scene,
-            &KeptKernels::of_user(),
+            &KernelCache::of_user(),
             terminal,
         )?;
         report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.seed, terminal)?;
@@ -272,7 +272,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
 
 fn report(
     args: &PictureArgs,
-    studio: &Studio,
+    studio: &ImagingSystem,
     scene: &SceneImage,
     frame: &Frame,
     restorations: Vec<RestorationReport>,

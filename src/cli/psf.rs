@@ -14,7 +14,7 @@ use metalith::report::{count, exact, sig};
 use metalith::verify::{
     STREHL_AGAINST, SimulationCase, SinglePsfReport, single_psfs, single_white, write_single_psf_report,
 };
-use metalith::{CalibratedModel, Error, Extraction, ExtractionPlan, LatticeKind, Layout, MadeChip, Result, extract};
+use metalith::{AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, LatticeKind, Layout, Result, extract};
 
 use self::light::PsfLight;
 use super::standard_input::InputFile;
@@ -346,7 +346,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         (Some(light), Some(chip)) => simulate(SimulationCase::Made(chip), light)?,
         (Some(light), None) => simulate(SimulationCase::Cell(args.cell(&found, light)?.as_ref()), light)?,
     };
-    let model = made.as_ref().map(MadeChip::statement);
+    let model = made.as_ref().map(AsBuiltChip::statement);
     if let Some(folder) = &args.out {
         let name = args
             .layout

@@ -7,7 +7,7 @@ use metalith::Result;
 use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::picture::scene::SceneImage;
 use metalith::picture::{
-    FrameNumbers, FrameStatement, Rehearsal, RestoredPicture, RestoredReport, Studio, check_scored, read_signals,
+    FrameNumbers, FrameStatement, ImagingSystem, Rehearsal, RestoredPicture, RestoredReport, check_scored, read_signals,
 };
 use ndarray::Array3;
 
@@ -101,7 +101,7 @@ pub fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     let signals = read_signals(&args.frame, &camera, numbers)?;
     let layout = InputFile::of(&args.layout)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
-    let mut studio = Studio::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    let mut studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {
         studio.prior = prior;
     }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::{Error, PillarArray, Result, WholeFile};
+use metalith::{AtomicFile, Error, PillarArray, Result};
 
 use super::layout::Target;
 use super::verify::Judging;
@@ -36,8 +36,8 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let folder = args.target.folder(&design);
     let _turn = terminal.turn_at(&folder)?;
     // A report speaks of the layout beside it: the old one must not stand beside a new layout, whatever happens.
-    WholeFile::discard(&folder.join("report.html"))?;
-    WholeFile::discard(&folder.join("report.json"))?;
+    AtomicFile::discard(&folder.join("report.html"))?;
+    AtomicFile::discard(&folder.join("report.json"))?;
     let written = args.target.write(&design, &array, terminal)?;
     let judged = args
         .judging

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use include_dir::{Dir, include_dir};
-use metalith::{Design, Error, Result, WholeFile};
+use metalith::{AtomicFile, Design, Error, Result};
 
 static DESIGNS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/designs");
 
@@ -73,12 +73,12 @@ impl ShippedDesign {
             for (path, bytes) in &missing {
                 let parent = path.parent().expect("it is in a folder");
                 std::fs::create_dir_all(parent).map_err(Error::io("create the folder", parent))?;
-                WholeFile::write(path, bytes)?;
+                AtomicFile::write(path, bytes)?;
             }
             let [own, new] = [&self.name, name].map(|name| format!("name = \"{name}\""));
             let text = self.text.replacen(&own, &new, 1);
             Design::parse(design, &text)?;
-            WholeFile::write(design, text.as_bytes())
+            AtomicFile::write(design, text.as_bytes())
         })();
         if let Err(error) = written {
             for (path, _) in &missing {

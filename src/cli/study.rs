@@ -27,7 +27,7 @@ pub struct StudyArgs {
 
 #[derive(Subcommand)]
 enum Step {
-    /// Cut a study into shards: the layout, the tables of cells, the first draw to know its time, and a manifest.
+    /// Sharding a study into shards: the layout, the tables of cells, the first draw to know its time, and a manifest.
     Plan(PlanArgs),
     /// Make one shard, or all that are missing. One that is there is left as it is.
     Run(RunArgs),

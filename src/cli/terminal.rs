@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use metalith::{FolderTurn, Progress};
+use metalith::{FolderLock, Progress};
 
 use super::output;
 
@@ -151,8 +151,8 @@ impl Terminal {
     }
 
     /// Wait until no other process writes the files of a folder, which are made together.
-    pub fn turn_at(&self, folder: &Path) -> metalith::Result<FolderTurn> {
-        FolderTurn::wait(folder, self, || {
+    pub fn turn_at(&self, folder: &Path) -> metalith::Result<FolderLock> {
+        FolderLock::wait(folder, self, || {
             self.say(&format!(
                 "another process writes into {}: waiting for it",
                 folder.display()

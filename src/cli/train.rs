@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::picture::KeptKernels;
+use metalith::baselines::{Comparison, StageKind};
+use metalith::picture::KernelCache;
 use metalith::picture::scene::images_in;
 use metalith::picture::scene::read_picture;
 use metalith::prior::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_finisher};
-use metalith::rivals::{Lineup, StageKind};
 use metalith::{Error, Result};
 
 use super::compare::{ComparedDesign, LenslessArgs, Rival};
@@ -90,7 +90,7 @@ impl TrainArgs {
     }
 
     /// The camera that a last stage is for.
-    fn lineup(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Lineup> {
+    fn lineup(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Comparison> {
         let wrong = |what: &str, hint: &str| Err(Error::invalid(what, hint));
         let lensless = match (kind, &self.design) {
             (StageKind::FlatNet, None) => vec![self.bare.camera(Rival::Flatcam)?],
@@ -99,7 +99,7 @@ impl TrainArgs {
             (_, Some(_)) => return wrong("a camera without a lens has no design", "leave --design out"),
             (_, None) => return wrong("this last stage is of the array of a design", "name it by --design"),
         };
-        Ok(Lineup {
+        Ok(Comparison {
             camera: self.camera.clone().unwrap_or_default(),
             designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
             lensless,
@@ -127,7 +127,7 @@ impl TrainArgs {
         let lineup = self.lineup(kind, photographs)?;
         let open = lineup.open()?;
         Stacks::check(lineup.photographs.len(), open.size(), spec.piece)?;
-        let kept = KeptKernels::of_user();
+        let kept = KernelCache::of_user();
         let (stacks, taught) = open.lessons(0, kind, &beside(out, ".pictures"), &kept, terminal)?;
         let stacks = Stacks::new(stacks, taught, spec.piece)?;
         train_finisher(&stacks, spec, out, state, terminal)

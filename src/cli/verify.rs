@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::camera::Camera;
 use metalith::cell::{cache_folder, oblique_refused};
 use metalith::design::{CellIncidence, LatticeOrders};
 use metalith::picture::thumbnail;
 use metalith::report::{Figure, sig};
+use metalith::sensor::Camera;
 use metalith::{
-    Accuracy, CalibratedModel, Design, Error, Fidelity, MadeChip, PillarArray, PillarRows, Result, SimulationCases,
+    Accuracy, AsBuiltChip, CalibratedModel, Design, Error, Fidelity, PillarArray, PillarRows, Result, SimulationCases,
     Verification, cell_models, verify,
     verify::{Simulation, verify_in_parts, verify_pillars},
     write_report,
@@ -199,8 +199,8 @@ impl Judging {
             }
         }
         let model = self.model()?;
-        let chip = |model| -> Result<MadeChip> {
-            Ok(MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+        let chip = |model| -> Result<AsBuiltChip> {
+            Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
         };
         let made = model.as_ref().map(chip).transpose()?;
         // A made chip judges, and cells of the pillars as drawn stand beside it.

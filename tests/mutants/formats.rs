@@ -4,16 +4,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use metalith::calibrate::{BenchFile, DeclaredEffect, MeasuredSet};
-use metalith::camera::{Camera, Spectrum};
 use metalith::cell::{MappingTable, Material, PillarLibrary};
 use metalith::drc::{Deck, Waivers};
 use metalith::gds::extract::GdsPillars;
 use metalith::handoff::{Manifest, ManifestEntry, Process, verify_handoff};
-use metalith::made::Perturbation;
+use metalith::optics::Perturbation;
 use metalith::optimise::Checkpoint;
 use metalith::phase::{Interpolation, RadialPhase};
 use metalith::picture::scene::{SceneFile, read_depth, read_picture, read_scene};
 use metalith::prior::NetworkDenoiser;
+use metalith::sensor::{Camera, Spectrum};
 use metalith::study::{Slurm, Tolerance};
 use metalith::{CalibratedModel, Design, Silent};
 use metalith_testing::session::{PIXELS, small_set};

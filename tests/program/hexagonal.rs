@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use metalith::compensate::compensate;
-use metalith::made::{CalibratedModel, Perturbation};
+use metalith::optics::{CalibratedModel, Perturbation};
 use metalith::optimise::{OptimiseTask, lens_alone};
 use metalith::{Design, Fidelity, PillarArray, Silent, cell_models};
 use metalith_testing::{design, golden};

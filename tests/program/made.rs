@@ -8,7 +8,7 @@ use metalith::calibrate::{Bench, MeasuredSet, Sampling, Stage, all_effects};
 use metalith::compensate::{compensate, compensation_cases};
 use metalith::design::CellIncidence;
 use metalith::extract::GdsPillars;
-use metalith::made::{CalibratedModel, MadeChip, Perturbation};
+use metalith::optics::{AsBuiltChip, CalibratedModel, Perturbation};
 use metalith::verify::{Lighting, SimulationCase, single_psfs};
 use metalith::wave::{Scratch, Window};
 use metalith::{
@@ -88,9 +88,9 @@ impl Files {
         )
     }
 
-    fn chip(&self, perturbation: &Perturbation) -> MadeChip {
+    fn chip(&self, perturbation: &Perturbation) -> AsBuiltChip {
         let model = CalibratedModel::new("set".into(), "finding".into(), perturbation.clone());
-        MadeChip::new(&self.design.cell_stack().unwrap(), &model).unwrap()
+        AsBuiltChip::new(&self.design.cell_stack().unwrap(), &model).unwrap()
     }
 
     /// PSFs of the centre element by each command, the first by `run` and `verify`; in units of |E|^2 / |E_inc|^2.
@@ -156,7 +156,7 @@ impl Files {
         let element = bench.element_of(0.into(), perturbation).unwrap();
         let light = bench.direction_of(0.into(), perturbation, UM);
         let sines = if self.design.verify.incidence == CellIncidence::AsLit {
-            metalith::made::cell_direction(&light.plane, metalith::LatticeKind::Square)
+            metalith::optics::cell_direction(&light.plane, metalith::LatticeKind::Square)
         } else {
             [0.0; 2]
         };

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use metalith::cell::CellStack;
 use metalith::compensate::compensate;
-use metalith::made::{CalibratedModel, Perturbation};
+use metalith::optics::{CalibratedModel, Perturbation};
 use metalith::{
     Accuracy, Design, Extraction, ExtractionPlan, Fidelity, Layout, PillarArray, Silent, SimulationCases, cell_models,
     extract, verify, write_pillars,

@@ -11,7 +11,7 @@ use crate::fit::{FitProblem, held_out, mean_error};
 use crate::set::{MeasuredSet, PerCapture};
 use crate::simulator::Simulator;
 use crate::surrogate::Surrogate;
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// The error of one fidelity of the cell.
 #[derive(Clone, Debug, Serialize)]

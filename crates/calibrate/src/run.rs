@@ -10,8 +10,9 @@ use crate::proposal::{Proposed, propose};
 use crate::search::{Evidence, LEAST_GAIN};
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
-use metalith_core::{FolderTurn, PillarReader, Progress, Result, WholeFile};
-use metalith_made::CalibratedModel;
+use metalith_core::{AtomicFile, FolderLock, Progress, Result};
+use metalith_optics::CalibratedModel;
+use metalith_pillars::PillarReader;
 
 /// The file of the calibrated model, in the folder of the answers.
 const MODEL: &str = "model.toml";
@@ -83,13 +84,13 @@ fn conclude(
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Calibration> {
-    let _turn = FolderTurn::wait(out, progress, || {
+    let _turn = FolderLock::wait(out, progress, || {
         progress.warn("another run writes into this folder: waiting for it")
     })?;
     // This run may find none, and those of another must not stand beside its answer.
-    WholeFile::discard(&out.join(MODEL))?;
+    AtomicFile::discard(&out.join(MODEL))?;
     let file = out.join(PROPOSAL);
-    WholeFile::discard(&file)?;
+    AtomicFile::discard(&file)?;
     let mut proposed: Vec<Proposed> = Vec::new();
     let mut adopted: Option<(Session<'_>, Simulations)> = None;
     let without = diagnosis.error.after.held_out;
@@ -119,7 +120,7 @@ fn conclude(
     }
     if !proposed.is_empty() {
         let effects: Vec<DeclaredEffect> = proposed.iter().map(|p| p.effect.clone()).collect();
-        WholeFile::write(&file, DeclaredEffect::text(&effects).as_bytes())?;
+        AtomicFile::write(&file, DeclaredEffect::text(&effects).as_bytes())?;
         let reason = |p: &Proposed| format!("`{}`: {}", p.effect.name, p.reason);
         diagnosis.proposal = Some(Proposal {
             file: file.display().to_string(),

@@ -8,7 +8,7 @@ use super::effects::Effect;
 use super::forward_model::Slot;
 use super::optics::PixelGrid;
 use metalith_core::{Progress, Result};
-use metalith_made::{CellChange, Perturbation, to_middle_tops};
+use metalith_optics::{CellChange, Perturbation, to_middle_tops};
 
 /// Widths that a bias may add or take (nm); cells are tabulated so far beyond the layout.
 pub const WIDTH_ROOM_NM: f64 = 36.0;

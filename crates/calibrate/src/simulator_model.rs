@@ -7,7 +7,7 @@ use crate::forward_model::{ForwardModel, ParameterPoint, Slot, SmoothTerm, TRANS
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 use crate::simulator::Simulator;
-use metalith_made::{Perturbation, zernike};
+use metalith_optics::{Perturbation, zernike};
 
 /// Cells are solved at multiples of this share of a typical size; the surrogate covers the difference.
 const CELL_STEP: f64 = 1.0 / 16.0;

@@ -5,8 +5,8 @@ use ndarray::Array2;
 use crate::fit::{Fit, FitProblem, covariance, minimise};
 use crate::forward_model::{PATH_TERMS, TRANSMISSION_TERMS};
 use crate::simulator::Simulator;
-use metalith_made::legendre;
-use metalith_made::zernike;
+use metalith_optics::legendre;
+use metalith_optics::zernike;
 
 /// Pairs of axes of the smooth blur.
 const BLURS: [[usize; 2]; 3] = [[0, 0], [0, 1], [1, 1]];

@@ -7,8 +7,9 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use metalith_cell::{LibraryErrors, PillarLibrary, PolarisationAxis, UPRIGHT_ORDERS, UprightCell};
-use metalith_core::{Error, Progress, Result, UprightRectangles, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::Design;
+use metalith_pillars::UprightRectangles;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, fixed, sig, write_json};
 
 /// What the pillars of a design do at the wavelength of the mapping.
@@ -73,7 +74,7 @@ pub fn write_library_report(study: &LibraryStudy, folder: &Path) -> Result<()> {
     page(study).write(&folder.join("cells.html"))?;
     write_json(&folder.join("cells.json"), "cells", study)?;
     let csv = study.nearest.to_csv(study.pillars);
-    WholeFile::write(&folder.join("library.csv"), csv.as_bytes())
+    AtomicFile::write(&folder.join("library.csv"), csv.as_bytes())
 }
 
 fn page(study: &LibraryStudy) -> Page {

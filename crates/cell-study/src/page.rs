@@ -6,7 +6,7 @@ use ndarray::Array2;
 
 use super::study::{CellStudy, MappingStudy};
 use metalith_cell::{Basis, MappingError};
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 use metalith_design::SteeringSteps;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, count, fixed, sig, write_json};
 
@@ -28,13 +28,13 @@ pub fn write_cell_report(study: &CellStudy, folder: &Path) -> Result<()> {
             .filter(|c| *c != ',')
             .map(|c| if c == ' ' { '_' } else { c })
             .collect();
-        WholeFile::write(
+        AtomicFile::write(
             &folder.join(format!("mapping_{name}.csv")),
             mapping.table.to_csv().as_bytes(),
         )?;
     }
     if !study.steered.is_empty() {
-        WholeFile::write(&folder.join("mapping_steered.toml"), steered_toml(study).as_bytes())?;
+        AtomicFile::write(&folder.join("mapping_steered.toml"), steered_toml(study).as_bytes())?;
     }
     Ok(())
 }

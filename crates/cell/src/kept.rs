@@ -13,7 +13,8 @@ use num_complex::Complex64;
 use sha2::{Digest, Sha256};
 
 use metalith_core::text::hex;
-use metalith_core::{Error, PillarShape, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_pillars::PillarShape;
 
 /// Raised whenever the solver or the sampling changes what it answers: kept results are then of no use.
 pub const SOLVER: u32 = 1;
@@ -101,7 +102,7 @@ pub fn write(file: &Path, magic: [u8; 8], inputs: &[u8], content: &[u8]) -> Resu
 /// A kept file that is written piece by piece, with the bytes of [`seal`]: content of a gigabyte need not be held twice.
 pub struct KeptWriter {
     path: PathBuf,
-    file: WholeFile,
+    file: AtomicFile,
     /// Of all that was written.
     digest: Sha256,
 }
@@ -117,7 +118,7 @@ impl KeptWriter {
     pub fn create(file: &Path, magic: [u8; 8], inputs: &[u8]) -> Result<Self> {
         let mut kept = Self {
             path: file.to_owned(),
-            file: WholeFile::create(file)?,
+            file: AtomicFile::create(file)?,
             digest: Sha256::new(),
         };
         kept.add(&before_content(magic, inputs))?;
@@ -222,7 +223,7 @@ impl Read for Digested {
 /// A small table that is kept in a folder under the name of its inputs, if there is a folder. That it cannot be read or kept
 /// is a warning, and no reason to stop.
 #[derive(Clone, Debug)]
-pub struct KeptTable {
+pub struct CacheEntry {
     name: String,
     folder: Option<PathBuf>,
     shipped: Option<&'static [u8]>,
@@ -231,10 +232,10 @@ pub struct KeptTable {
     what: &'static str,
 }
 
-/// Longest file of a [`KeptTable`] that is read (bytes): weights and inputs are some hundred thousand at most.
+/// Longest file of a [`CacheEntry`] that is read (bytes): weights and inputs are some hundred thousand at most.
 const LONGEST_TABLE: u64 = 1 << 20;
 
-impl KeptTable {
+impl CacheEntry {
     /// A table of `what`, such as "gratings": `kind` begins the name of its file.
     pub fn new(folder: Option<&Path>, kind: &str, magic: [u8; 8], inputs: Vec<u8>, what: &'static str) -> Self {
         Self {

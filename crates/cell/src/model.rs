@@ -6,7 +6,8 @@ use std::str::FromStr;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use metalith_core::{Error, LatticeKind, PillarShape, Progress, Result};
+use metalith_core::{Error, Progress, Result};
+use metalith_pillars::{LatticeKind, PillarShape};
 
 use crate::{BandResponse, FittedNeighbours, PolarisedTables, RotatedCell};
 

@@ -9,7 +9,7 @@
 //! Chebyshev's polynomials as terms. b_d is zero on the mean over the widths that are drawn: a neighbour that is not there
 //! counts with that mean. Resonances that need many equal pillars in a row are not in it.
 
-use metalith_core::LatticeKind;
+use metalith_pillars::LatticeKind;
 use num_complex::Complex64;
 
 /// Offsets of the neighbours that count on a square lattice (pitches along x and y).
@@ -45,7 +45,7 @@ const NEIGHBOURS_OF_HEXAGONAL: [[i32; 2]; NEIGHBOURS.len()] = [
     [0, -2],
 ];
 
-/// Offsets of the neighbours that count, in places of the grid of a [`Lattice`](metalith_core::Lattice) of this kind.
+/// Offsets of the neighbours that count, in places of the grid of a [`Lattice`](metalith_pillars::Lattice) of this kind.
 pub fn neighbours(kind: LatticeKind) -> &'static [[i32; 2]; NEIGHBOURS.len()] {
     match kind {
         LatticeKind::Square => &NEIGHBOURS,

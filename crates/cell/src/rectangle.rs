@@ -127,7 +127,7 @@ pub fn oblique_refused() -> Error {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use metalith_core::RotatedRectangles;
+    use metalith_pillars::RotatedRectangles;
     use metalith_rcwa::{Material, circular};
 
     use super::*;

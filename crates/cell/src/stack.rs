@@ -5,7 +5,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_core::{Error, PillarShape, Result};
+use metalith_core::{Error, Result};
+use metalith_pillars::PillarShape;
 use metalith_rcwa::{CellLattice, Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, transmit};
 
 /// A pillar on its substrate, as etched: everything that decides its transmission but its width.

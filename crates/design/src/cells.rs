@@ -6,8 +6,9 @@ use metalith_cell::{
     CellModel, CellStack, Fidelity, FittedCell, LitStack, PointwiseCell, PublishedCell, RotatedCell, TableSpec,
     UniformLayer, UprightCell, cache_folder,
 };
-use metalith_core::{Error, Rectangles, Result};
+use metalith_core::{Error, Result};
 use metalith_grating::{Mapping, NeighbourCell};
+use metalith_pillars::Rectangles;
 use metalith_rcwa::{CellLattice, Material};
 
 use crate::spec::UnderSpec;
@@ -171,7 +172,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 Fidelity::Neighbours => Ok(Box::new(neighbour_cell(design, cache_folder())?)),
                 Fidelity::Calibrated => Err(Error::invalid(
                     "a calibrated cell without the model it is calibrated by",
-                    "read the model that `metalith calibrate` wrote and make a `MadeChip` of it",
+                    "read the model that `metalith calibrate` wrote and make a `AsBuiltChip` of it",
                 )),
                 Fidelity::Fitted => {
                     let stack = design.cell_stack()?;

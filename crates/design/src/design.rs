@@ -9,7 +9,8 @@ use sha2::{Digest, Sha256};
 use metalith_cell::{Analyser, CellStack, FocusedLight, PolarisationAxis};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::text::{hex, quoted};
-use metalith_core::{ElementSite, Error, Lattice, Result};
+use metalith_core::{Error, Result};
+use metalith_pillars::{ElementSite, Lattice};
 
 use crate::spec::{
     ArraySpec, CellSpec, Element, FieldAngle, Footprint, LayoutSpec, LensOutline, LensSpec, LibraryFile, MappingSpec,

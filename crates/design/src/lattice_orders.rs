@@ -5,7 +5,8 @@ use std::cmp::Ordering;
 use serde::Serialize;
 
 use crate::{Design, FieldAngle};
-use metalith_core::{LatticeKind, Result};
+use metalith_core::Result;
+use metalith_pillars::LatticeKind;
 
 /// What lies on one side of the pillars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

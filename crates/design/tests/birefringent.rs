@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use metalith_cell::{FocusedLight, Polarisation, PolarisationAxis};
-use metalith_core::{PillarRows, Result, Silent};
+use metalith_core::{Result, Silent};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarArray};
+use metalith_pillars::PillarRows;
 
 const NAME: &str = "birefringent_532";
 

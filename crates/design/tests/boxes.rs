@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_core::{Lattice, Result};
+use metalith_core::Result;
 use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
+use metalith_pillars::Lattice;
 
 fn path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))

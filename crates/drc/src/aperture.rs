@@ -8,9 +8,9 @@ use super::polygon::{point_segment, ring_of};
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::EQUAL_NM;
 use super::work::Stop;
-use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point, Rect};
+use metalith_pillars::PillarRows;
 
 struct ApertureRule {
     layer: LayerNumber,

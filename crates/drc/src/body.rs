@@ -1,8 +1,8 @@
 //! One shape as rules about distances see it.
 
 use super::polygon::{distance, inside, overlap, ring_of, twice_area};
-use metalith_core::{CHORD_ERROR, PillarShape, circle_corners};
 use metalith_gds::{Point, Rect, simplified};
+use metalith_pillars::{CHORD_ERROR, PillarShape, circle_corners};
 
 /// Steps of work of one pair of sides of polygons: four distances of a point from a side.
 const SIDES: u64 = 8;

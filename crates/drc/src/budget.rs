@@ -4,9 +4,9 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{Needs, Rule, RuleOutcome};
-use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
+use metalith_pillars::PillarRows;
 use metalith_report::exact;
 
 enum BudgetRule {

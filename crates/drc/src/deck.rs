@@ -7,11 +7,12 @@ use std::sync::Arc;
 use super::context::Context;
 use super::rule::{DeckRule, Rule, Severity};
 use super::{aperture, budget, density, design, field, lattice, layers, marks, outline, spacing, tree, width};
+use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::text::quoted;
-use metalith_core::{PillarShape, Result};
 use metalith_design::Design;
 use metalith_gds::LayerNumber;
+use metalith_pillars::PillarShape;
 
 /// The decks that ship with the program, by the names of their files; the first is the standard one.
 const SHIPPED: [(&str, &str); 18] = [
@@ -294,7 +295,7 @@ fn parse_layer(text: &str) -> Option<LayerNumber> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::RotatedRectangles;
+    use metalith_pillars::RotatedRectangles;
 
     #[test]
     fn the_decks_of_the_program_are_sound() {

@@ -5,10 +5,10 @@ use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
-use metalith_core::{Lattice, PillarRows};
 use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_gds::{Point, Rect};
+use metalith_pillars::{Lattice, PillarRows};
 
 struct FillRule {
     window_um: f64,

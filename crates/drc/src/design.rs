@@ -9,9 +9,9 @@ use super::work::{Stop, Work};
 use std::borrow::Cow;
 
 use metalith_core::document::{Limits, Section};
-use metalith_core::{Lattice, PillarRows};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{AskedLight, Design, Medium};
+use metalith_pillars::{Lattice, PillarRows};
 
 enum Against {
     Count,

@@ -3,9 +3,10 @@
 use super::deck::Deck;
 use super::input::CheckInput;
 use super::work::Allowance;
-use metalith_core::{ElementSite, Error, PillarShape, Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Discovered, Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
+use metalith_pillars::{ElementSite, PillarShape};
 
 /// The layer that pillars are known by, and further layers whose shapes count as if they were on it.
 pub(super) fn pillar_layers(deck: &Deck) -> (LayerNumber, &[LayerNumber]) {

@@ -5,10 +5,10 @@ use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::ROUNDING_NM;
-use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::Rect;
-use metalith_gds::extract::{ExtractedElement, HeldPillars};
+use metalith_gds::extract::{ExtractedElement, StoredPillars};
+use metalith_pillars::PillarRows;
 
 /// Fields of one size, in a grid about the centre of each element or of the layout.
 struct FieldRule {
@@ -122,7 +122,7 @@ impl FieldRule {
             let nm = |v: i64| v as f64 * flat.unit_nm;
             let middle = [nm(r.x0 + r.x1) / 2.0, nm(r.y0 + r.y1) / 2.0];
             let nearest = flat.elements.iter().min_by(|a, b| {
-                let far = |e: &ExtractedElement<HeldPillars>| {
+                let far = |e: &ExtractedElement<StoredPillars>| {
                     let c = e.site.centre_nm;
                     (c[0] as f64 - middle[0]).hypot(c[1] as f64 - middle[1])
                 };

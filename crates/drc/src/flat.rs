@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use super::body::Body;
 use super::work::Work;
-use metalith_core::{PillarRows, PillarShape};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
-use metalith_gds::extract::{ExtractedElement, HeldPillars};
+use metalith_gds::extract::{ExtractedElement, StoredPillars};
 use metalith_gds::{LayerNumber, Layout, Point, Rect};
+use metalith_pillars::{PillarRows, PillarShape};
 
 /// Everything on one layer that is not a pillar on the lattice of an element.
 #[derive(Default)]
@@ -74,7 +74,7 @@ pub(super) struct FlatLayout<'a> {
     /// What pillars are.
     pub shape: PillarShape,
     /// Elements with the pillars on their lattices.
-    pub elements: Vec<ExtractedElement<HeldPillars>>,
+    pub elements: Vec<ExtractedElement<StoredPillars>>,
     /// Why there are none, if there are none.
     pub no_elements: String,
     pub loose: BTreeMap<LayerNumber, Loose>,

@@ -15,12 +15,13 @@ use super::rule::DeckRule;
 use super::work::{Allowance, Stop, Work};
 use foldhash::fast::RandomState;
 use metalith_core::text::printable_bytes;
-use metalith_core::{Error, PillarShape, Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Discovered, Filler, Scale, Why};
 use metalith_gds::{
     BoxMemo, DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point, Rect, Selection,
     Shape, Text, Transform, Visitor, circle_of, rectangle_of, simplified,
 };
+use metalith_pillars::PillarShape;
 
 /// Widest square that is decided by table (database units).
 const TABLE: usize = 4096;

@@ -6,9 +6,9 @@ use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NO_DESIGN, NotRun, Rule, RuleOutcome, from_design};
 use super::tolerance::{EQUAL_NM, ROUNDING_NM};
-use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point};
+use metalith_pillars::PillarRows;
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let nm = || Limits::new(0.001..=1e6, "nm");

@@ -4,9 +4,9 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
-use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Rect};
+use metalith_pillars::PillarRows;
 
 enum LayerRule {
     Whitelist(Vec<LayerNumber>),

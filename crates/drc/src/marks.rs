@@ -4,10 +4,10 @@ use super::context::Context;
 use super::findings::Findings;
 use super::flat::{FlatLayout, Loose};
 use super::rule::{NotRun, Rule, RuleOutcome};
-use metalith_core::PillarRows;
 use metalith_core::document::{Limits, Section};
 use metalith_design::MarkSpec;
 use metalith_gds::{LayerNumber, Point, Rect};
+use metalith_pillars::PillarRows;
 
 enum Marks {
     /// Nothing on `others` within a distance of a mark (nm).

@@ -6,8 +6,8 @@ use std::ops::Range;
 use super::body::Body;
 use super::flat::{FlatLayout, Loose};
 use super::work::{Stop, Work};
-use metalith_core::PillarRows;
 use metalith_gds::{LayerNumber, Rect};
+use metalith_pillars::PillarRows;
 
 /// The rectangle between two shapes, or where they overlap: where to look.
 pub(super) fn place(a: &Rect, b: &Rect) -> Rect {

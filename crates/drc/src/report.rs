@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use metalith_core::PillarShape;
+use metalith_pillars::PillarShape;
 use serde::Serialize;
 
 use super::deck::Deck;

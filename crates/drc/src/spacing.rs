@@ -8,9 +8,9 @@ use super::pairs::{near, place};
 use super::rule::{NO_DESIGN, NotRun, Rule, RuleOutcome, from_design};
 use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
-use metalith_core::{LatticeKind, PillarRows};
 use metalith_design::Design;
 use metalith_gds::LayerNumber;
+use metalith_pillars::{LatticeKind, PillarRows};
 use metalith_rcwa::CellLattice;
 
 #[derive(Clone, Copy, PartialEq)]

@@ -87,7 +87,7 @@ fn strips_side_by_side_are_compared_each() {
 /// Rotated rectangles: in any hierarchy the same; one rotation, one nanometre of one corner and one pillar more are differences.
 #[test]
 fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
-    let pillars = metalith_core::RotatedRectangles {
+    let pillars = metalith_pillars::RotatedRectangles {
         width_nm: 100,
         length_nm: 250,
         steps: 180,
@@ -129,7 +129,7 @@ fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
 /// Upright rectangles: other edges are wider, narrower, or, of one area, rotated by a quarter turn; in nanometres of an edge.
 #[test]
 fn upright_rectangles_are_compared_by_their_edges() {
-    let pillars = metalith_core::UprightRectangles {
+    let pillars = metalith_pillars::UprightRectangles {
         shortest_nm: 100,
         step_nm: 10,
         lengths: 18,

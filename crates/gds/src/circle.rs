@@ -157,7 +157,7 @@ fn grid_of(corners: &[Point], unit_nm: f64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::circle_corners;
+    use metalith_pillars::circle_corners;
 
     fn closed(corners: impl IntoIterator<Item = (i64, i64)>) -> Vec<Point> {
         let mut points: Vec<Point> = corners.into_iter().map(|(x, y)| Point::new(x + 70, y - 30)).collect();

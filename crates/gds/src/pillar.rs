@@ -5,7 +5,7 @@ use super::memo::{BoxMemo, OutlineMemo};
 use super::rectangle::tilted_rectangle_of;
 use super::shape::{Outline, Point, Rect, Shape, rectangle_of, simplified};
 use super::transform::Transform;
-use metalith_core::PillarShape;
+use metalith_pillars::PillarShape;
 
 /// An outline that may be a pillar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,7 +126,8 @@ mod tests {
     use super::super::rectangle::tests::PILLARS;
     use super::super::shape::ShapeKind;
     use super::*;
-    use metalith_core::{LayerNumber, UprightRectangles};
+    use metalith_core::LayerNumber;
+    use metalith_pillars::UprightRectangles;
 
     /// A closed outline, as the reader of a layout gives it.
     fn shape(points: &[Point]) -> Shape<'_> {

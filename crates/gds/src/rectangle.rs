@@ -1,7 +1,7 @@
 //! Outlines that stand for rectangles at any angle.
 
 use super::shape::{Point, Rect, rounding, simplified};
-use metalith_core::Rectangles;
+use metalith_pillars::Rectangles;
 
 /// A rectangle at any angle, as its corners on the grid show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +79,7 @@ impl TiltedRectangle {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use metalith_core::RotatedRectangles;
+    use metalith_pillars::RotatedRectangles;
 
     pub const PILLARS: Rectangles = Rectangles::Rotated(RotatedRectangles {
         width_nm: 90,

@@ -1,7 +1,8 @@
 //! What stands on a layer.
 
 use super::transform::{Transform, turned};
-use metalith_core::{LayerNumber, PillarShape};
+use metalith_core::LayerNumber;
+use metalith_pillars::PillarShape;
 
 /// By how much a corner of a circle or a rectangle may be off its place, in database units or in nanometres, whichever is more:
 /// corners are rounded to one of these grids, twice where a cell is placed at an angle.

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 
 use num_complex::{Complex32, Complex64};
 
-use metalith_core::{Error, Lattice, PillarMap, Result};
+use metalith_core::{Error, Result};
+use metalith_pillars::{Lattice, PillarMap};
 use metalith_wave::Aperture;
 
 use crate::node::{FIRST_KEPT, KEPT};

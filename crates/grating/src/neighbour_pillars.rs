@@ -3,7 +3,8 @@
 use num_complex::{Complex32, Complex64};
 
 use metalith_cell::{NEIGHBOURS, NeighbourResponse, SiteResponse};
-use metalith_core::{Error, Lattice, PillarMap, Result};
+use metalith_core::{Error, Result};
+use metalith_pillars::{Lattice, PillarMap};
 use metalith_wave::Aperture;
 
 use crate::Orientation;

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_cell::kept::{self, KeptTable};
+use metalith_cell::kept::{self, CacheEntry};
 use metalith_cell::{CellStack, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourResponse, SiteResponse};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::SiteLattice;
@@ -124,8 +124,8 @@ fn basis(mappings: &[Mapping]) -> NeighbourBasis {
     NeighbourBasis::new(samples.map(|w| f64::from(*w)))
 }
 
-fn kept(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping], cache: Option<&Path>) -> KeptTable {
-    KeptTable::new(cache, "neighbours", MAGIC, inputs(spec, stack, mappings), "neighbours").or_shipped(shipped::file)
+fn kept(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping], cache: Option<&Path>) -> CacheEntry {
+    CacheEntry::new(cache, "neighbours", MAGIC, inputs(spec, stack, mappings), "neighbours").or_shipped(shipped::file)
 }
 
 fn solve(

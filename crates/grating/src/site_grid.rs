@@ -1,7 +1,7 @@
 //! How the sites of supercells lie in the plane, and on the grid of an element.
 
 use metalith_cell::{CellStack, NEIGHBOURS, neighbours};
-use metalith_core::LatticeKind;
+use metalith_pillars::LatticeKind;
 use metalith_rcwa::CellLattice;
 
 use crate::table::images;

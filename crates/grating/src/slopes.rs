@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 
 /// Edge of the blocks of sites that share a grating vector. The vector of a 1 mm lens of F/2.4 changes by 0.003 turns
 /// a site over them; where the phase of rings jumps, the mean over so many is needed.

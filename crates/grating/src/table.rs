@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use metalith_cell::CellStack;
-use metalith_cell::kept::{self, KeptTable};
+use metalith_cell::kept::{self, CacheEntry};
 use metalith_core::{Error, Progress, Result};
 
 use crate::node::{KEPT, PHASES};
@@ -62,7 +62,7 @@ impl GratingTable {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let vectors = chosen(spec)?;
-        let kept = KeptTable::new(cache, "grating", MAGIC, inputs(spec, stack, mapping), "gratings");
+        let kept = CacheEntry::new(cache, "grating", MAGIC, inputs(spec, stack, mapping), "gratings");
         if let Some(amplitudes) = kept.read(|content| decode(content, vectors.len()), progress) {
             progress.advance(vectors.len() as u64);
             return Self::of(spec, vectors.into_iter().zip(amplitudes).collect());

@@ -7,12 +7,13 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use metalith_cell::{CellModel, PointwiseCell};
-use metalith_core::{Lattice, PillarMap, Silent};
+use metalith_core::Silent;
 use metalith_design::{Design, PillarRule};
 use metalith_grating::{
     CoarseCell, FIRST_KEPT, GratingPillars, GratingTable, GratingTableSpec, GratingVector, LocalCell, Mapping,
     Orientation, SlopeMap,
 };
+use metalith_pillars::{Lattice, PillarMap};
 use metalith_wave::Aperture;
 use num_complex::{Complex32, Complex64};
 use truth_rows::Row;

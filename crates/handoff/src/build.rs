@@ -12,11 +12,11 @@ use super::options::HandoffOptions;
 use super::sources::Sources;
 use super::{documents, front, layouts, manifest, rules, zip};
 use metalith_cell::{Fidelity, cache_folder};
-use metalith_core::{Error, Progress, Result, WholeFolder};
+use metalith_core::{AtomicFolder, Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::cell_models;
 use metalith_gds::Layout;
-use metalith_made::MadeChip;
+use metalith_optics::AsBuiltChip;
 use metalith_report::{Verdict, write_json};
 use metalith_verify::{SimulationCases, verify_layout, write_report};
 
@@ -35,7 +35,7 @@ pub fn handoff(options: &HandoffOptions, progress: &dyn Progress) -> Result<Hand
     judging(options, &sources).check(cell.shape, cell.lattice)?;
     let archive = archive_of(options);
     replaceable(&options.out, &archive)?;
-    let new = WholeFolder::create(&options.out, &archive)?;
+    let new = AtomicFolder::create(&options.out, &archive)?;
     let mut files = Listing::new(&new.folder());
     let checks = fill(&mut files, &sources, options, progress)?;
     let manifest = seal(&files, &sources, options, progress)?;
@@ -135,8 +135,8 @@ fn verification(
         wanted.push(Fidelity::Published);
     }
     let models = cell_models(design, &wanted)?;
-    let chip = |model| -> Result<MadeChip> {
-        Ok(MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+    let chip = |model| -> Result<AsBuiltChip> {
+        Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
     };
     let made = sources.model.as_ref().map(chip).transpose()?;
     let cases = match &made {
@@ -222,7 +222,7 @@ fn seal(files: &Listing, sources: &Sources, options: &HandoffOptions, progress: 
 }
 
 /// Pack the files of the manifest, and the manifest.
-fn pack(new: &WholeFolder, manifest: &Manifest, options: &HandoffOptions, progress: &dyn Progress) -> Result<()> {
+fn pack(new: &AtomicFolder, manifest: &Manifest, options: &HandoffOptions, progress: &dyn Progress) -> Result<()> {
     let name = options.out.file_name().unwrap_or_default().to_string_lossy();
     let folder = new.folder();
     let packed: BTreeSet<&str> = manifest

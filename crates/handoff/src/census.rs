@@ -10,7 +10,7 @@ use metalith_gds::{LayerNumber, Layout, LayoutCell, ReadLimits, Rect, Selection,
 
 /// One file.
 #[derive(Clone, Debug, Serialize)]
-pub struct Census {
+pub struct LayoutStatistics {
     pub file: String,
     pub bytes: u64,
     pub top: String,
@@ -45,7 +45,7 @@ pub struct LayerCount {
     pub bounds_um: Option<[f64; 4]>,
 }
 
-impl Census {
+impl LayoutStatistics {
     /// Count the file at `path`.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::census::Census;
+use super::census::LayoutStatistics;
 use super::documents::Documents;
 use super::drawing::RectNm;
 use super::manifest::Manifest;
@@ -51,7 +51,7 @@ pub(super) struct Contents<'a> {
     pub command: &'a str,
     pub design_digest: String,
     pub pillars: u64,
-    pub census: Vec<Census>,
+    pub census: Vec<LayoutStatistics>,
     #[serde(flatten)]
     pub documents: Documents,
     pub blocks: Vec<DoseBlock>,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::census::Census;
+use super::census::LayoutStatistics;
 use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
 use super::exposure::{exposures, snapping};
 use super::layouts::Layouts;
@@ -35,7 +35,7 @@ pub(super) fn write(
     design: &Design,
     process: &Process,
     layouts: &Layouts,
-    census: &[Census],
+    census: &[LayoutStatistics],
 ) -> Result<Documents> {
     let documents = Documents {
         exposures: exposures(design, process, census)?,

@@ -8,11 +8,12 @@ use gds21::{
     GdsTextElem, GdsUnits,
 };
 
-use metalith_core::{Error, PillarRows, Result, Silent, WholeFile};
+use metalith_core::{AtomicFile, Error, Result, Silent};
 use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, Symmetry};
 use metalith_gds::Layout;
 use metalith_layout::{LayoutFormat, PillarForm, convert};
+use metalith_pillars::PillarRows;
 
 /// Layer and datatype.
 pub(super) type LayerPair = (i16, i16);
@@ -280,7 +281,7 @@ impl Drawing {
                 "please report this with the design and the process file",
             )
         })?;
-        WholeFile::write(path, &bytes)
+        AtomicFile::write(path, &bytes)
     }
 }
 

@@ -1,18 +1,19 @@
 //! Exposed area and writing time of the first step, and the effect of the shot grid on widths.
 
-use super::census::Census;
+use super::census::LayoutStatistics;
 use super::dose::{Beam, Exposure, WriteTime};
 use super::fields;
 use super::process::Process;
-use metalith_core::{PillarRows, PillarShape, Rectangles, Result};
+use metalith_core::Result;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
+use metalith_pillars::{PillarRows, PillarShape, Rectangles};
 
 /// Exposed area and writing time of each file of the first step.
 pub(super) fn exposures(
     design: &Design,
     process: &Process,
-    census: &[Census],
+    census: &[LayoutStatistics],
 ) -> Result<Vec<(String, Exposure, Vec<WriteTime>)>> {
     let layers = &design.layout.layers;
     let mut exposures = Vec::new();

@@ -7,8 +7,9 @@ use std::path::Path;
 use super::manifest::{self, files_below};
 use super::process::Process;
 use super::zip;
-use metalith_core::{Error, PillarShape, Result};
+use metalith_core::{Error, Result};
 use metalith_design::Design;
+use metalith_pillars::PillarShape;
 
 /// Whether the process can make the design at all.
 pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {

@@ -2,19 +2,19 @@
 
 use std::path::PathBuf;
 
-use super::census::Census;
+use super::census::LayoutStatistics;
 use super::drawing::RectNm;
 use super::listing::Listing;
 use super::matrix::{self, DoseBlock};
 use super::process::Process;
 use super::sources::Sources;
 use super::structures::{Structure, Structures};
-use metalith_compensate::compensate;
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_gds::{Layout, ReadLimits};
 use metalith_layout::{LayoutFormat, write_apertures_as, write_layer_properties, write_pillars_as};
+use metalith_verify::compensate::compensate;
 
 /// The files that were written.
 pub(super) struct Layouts {
@@ -64,7 +64,7 @@ impl OfEach<Layout> {
     ///
     /// # Errors
     /// If one cannot be read, or the user stopped it.
-    pub fn census(&self, progress: &dyn Progress) -> Result<Vec<Census>> {
+    pub fn census(&self, progress: &dyn Progress) -> Result<Vec<LayoutStatistics>> {
         [
             &self.pillars,
             &self.apertures,
@@ -74,7 +74,7 @@ impl OfEach<Layout> {
             &self.reference,
         ]
         .into_iter()
-        .map(|layout| Census::of(layout, progress))
+        .map(|layout| LayoutStatistics::of(layout, progress))
         .collect()
     }
 }

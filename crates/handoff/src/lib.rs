@@ -32,7 +32,7 @@ mod tables;
 mod zip;
 
 pub use build::handoff;
-pub use census::{CellCount, Census, LayerCount};
+pub use census::{CellCount, LayerCount, LayoutStatistics};
 pub use contents::{Handoff, HandoffCheck};
 pub use dose::{Beam, DoseRow, Exposure, WriteTime};
 pub use manifest::{HandoffVerification, Manifest, ManifestEntry, verify as verify_handoff};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 
 /// The folder, and every file that is in it.
 pub(super) struct Listing {
@@ -37,6 +37,6 @@ impl Listing {
     /// # Errors
     /// If it cannot be written.
     pub fn write(&mut self, name: impl Into<String>, purpose: impl Into<String>, bytes: &[u8]) -> Result<()> {
-        WholeFile::write(&self.add(name, purpose), bytes)
+        AtomicFile::write(&self.add(name, purpose), bytes)
     }
 }

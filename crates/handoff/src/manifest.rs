@@ -11,8 +11,8 @@ use sha2::{Digest, Sha256};
 
 use metalith_core::file::read_at_most;
 use metalith_core::text::{hex, printable, quoted};
+use metalith_core::{AtomicFile, Progress};
 use metalith_core::{Error, Result};
-use metalith_core::{Progress, WholeFile};
 
 /// Name of the manifest in a hand-off.
 pub(super) const NAME: &str = "manifest.json";
@@ -109,7 +109,7 @@ impl Manifest {
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
         text.push('\n');
-        WholeFile::write(&folder.join(NAME), text.as_bytes())
+        AtomicFile::write(&folder.join(NAME), text.as_bytes())
     }
 
     fn read(folder: &Path) -> Result<Self> {

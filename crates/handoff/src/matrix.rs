@@ -6,11 +6,12 @@ use super::dose::doses;
 use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
 use super::pad::dose_pads;
 use super::process::Process;
-use metalith_core::{LatticeKind, Result, Silent};
+use metalith_core::{Result, Silent};
 use metalith_design::Design;
 use metalith_design::array::{Class, PillarArray, Symmetry};
 use metalith_design::phase::RadialPhase;
 use metalith_layout::PillarForm;
+use metalith_pillars::LatticeKind;
 
 /// Space between the parts of a block (nm).
 const APART: i64 = 20_000;

@@ -1,8 +1,8 @@
 //! Pillars of uniform pads: outline, words, and what is measured of them.
 
-use metalith_core::{PillarShape, Rectangles, RotatedRectangles, UprightRectangles};
 use metalith_design::Design;
 use metalith_layout::PillarForm;
+use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles, UprightRectangles};
 use serde::Serialize;
 
 use super::process::Process;

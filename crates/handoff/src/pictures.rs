@@ -5,8 +5,8 @@ use super::matrix::DoseBlock;
 use super::pad::PadPillar;
 use super::process::{Method, Process, Tone};
 use super::structures::Structure;
-use metalith_core::Rectangles;
 use metalith_design::Design;
+use metalith_pillars::Rectangles;
 use metalith_report::{Figure, Plan, PlanLayer};
 
 fn corners(r: RectNm) -> ((f64, f64), (f64, f64)) {

@@ -9,7 +9,7 @@ use super::layouts::{Layouts, OfEach};
 use super::listing::Listing;
 use super::sources::Sources;
 use super::structures::{Structure, middle_of_reference};
-use metalith_core::{Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_drc::{CheckInput, Date, Deck, DrcReport, Waiver, Waivers};
@@ -118,7 +118,7 @@ pub(super) fn check(
             if kind == "json" {
                 write_json(&path, "check", report)?;
             } else {
-                WholeFile::write(&path, text.as_bytes())?;
+                AtomicFile::write(&path, text.as_bytes())?;
             }
         }
     }
@@ -139,7 +139,7 @@ impl Subject<'_> {
                     format!("checks/{}_waivers.toml", self.name),
                     "what test structures break on purpose, and why",
                 );
-                WholeFile::write(&path, text(&on_purpose).as_bytes())?;
+                AtomicFile::write(&path, text(&on_purpose).as_bytes())?;
                 let on_purpose = Waivers::read(&path)?;
                 waivers = Some(waivers.map_or(on_purpose.clone(), |accepted| accepted.and(&on_purpose)));
             }

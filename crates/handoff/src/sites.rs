@@ -1,6 +1,6 @@
 //! Places on the chip at which widths are to be measured, and crosses to align by.
 
-use metalith_core::{LatticeKind, PillarMap, PillarShape, Rectangles};
+use metalith_pillars::{LatticeKind, PillarMap, PillarShape, Rectangles};
 use serde::Serialize;
 
 use super::pad::{DrawnSize, legal_width, upright_sizes, whole_mdeg};

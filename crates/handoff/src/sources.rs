@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use super::listing::Listing;
 use super::options::HandoffOptions;
 use super::process::{Process, ShapeRules};
-use metalith_camera::Camera;
-use metalith_compensate::compensated_name;
 use metalith_core::file::read_at_most;
 use metalith_core::text::is_printable;
 use metalith_core::{Error, Result, document};
 use metalith_design::Design;
 use metalith_drc::{Deck, Waivers};
-use metalith_made::CalibratedModel;
+use metalith_optics::CalibratedModel;
 use metalith_rcwa::Material;
+use metalith_sensor::Camera;
+use metalith_verify::compensate::compensated_name;
 
 /// Longest input that is kept; tables of the phase of a 10 mm lens have 1 MB.
 const LONGEST: u64 = 256 << 20;

@@ -8,7 +8,8 @@ use super::pad::DrawnSize;
 use super::process::Process;
 use super::sites::{Cross, MetrologySite};
 use super::structures::Structure;
-use metalith_core::{PillarShape, Rectangles, Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
+use metalith_pillars::{PillarShape, Rectangles};
 
 /// Rows of text under a head.
 struct Csv(String);
@@ -27,7 +28,7 @@ impl Csv {
     }
 
     fn write(&self, path: &Path) -> Result<()> {
-        WholeFile::write(path, self.0.as_bytes())
+        AtomicFile::write(path, self.0.as_bytes())
     }
 }
 

@@ -10,8 +10,8 @@ use std::path::Path;
 use flate2::write::DeflateEncoder;
 use flate2::{Compression, Crc};
 
+use metalith_core::{AtomicFile, Progress};
 use metalith_core::{Error, Result};
-use metalith_core::{Progress, WholeFile};
 
 /// 1 January 1980, the earliest date of the format.
 const DATE: u16 = 0x0021;
@@ -68,7 +68,7 @@ pub(super) fn pack(path: &Path, files: &[(String, std::path::PathBuf)], progress
     }
     progress.begin("packing", total);
     let mut out = Counted {
-        inner: WholeFile::create(path)?,
+        inner: AtomicFile::create(path)?,
         written: 0,
     };
     let mut entries = Vec::with_capacity(files.len());
@@ -182,7 +182,7 @@ fn fields(out: &mut Vec<u8>, numbers: &[u16]) {
 
 /// A file that counts the bytes written.
 struct Counted {
-    inner: WholeFile,
+    inner: AtomicFile,
     written: u64,
 }
 

@@ -1,7 +1,7 @@
 //! The outline of one pillar of each width or rotation, as it is written.
 
-use metalith_core::{CHORD_ERROR, PillarShape, Rectangles};
 use metalith_design::Design;
+use metalith_pillars::{CHORD_ERROR, PillarShape, Rectangles};
 
 /// How pillars are drawn: their shape, and how near to a circle polygons are.
 #[derive(Clone, Copy, Debug, PartialEq)]

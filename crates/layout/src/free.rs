@@ -7,9 +7,10 @@ use chrono::NaiveDateTime;
 use super::fixed::FixedShapes;
 use super::form::PillarForm;
 use super::{LayoutFormat, PillarLayout, Written};
-use metalith_core::{Error, LayerNumber, PillarShape, Progress, Result};
+use metalith_core::{Error, LayerNumber, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Hierarchy, LayoutLayer};
+use metalith_pillars::PillarShape;
 
 /// What a layout needs beside its pillars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

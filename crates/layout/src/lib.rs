@@ -24,7 +24,7 @@ use gds21::GdsElement;
 
 use fixed::FixedShapes;
 use frame::LibraryFrame;
-use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use pillars::PillarWriter;
@@ -188,7 +188,7 @@ pub fn write_apertures(design: &Design, path: &Path) -> Result<Written> {
     let frame = LibraryFrame::new(top_cell(design), frame::date(design))?;
     let (begin, end) = frame.cell(&top_cell(design), FixedShapes::of_apertures(design).gds())?;
     let bytes = [frame.head(), &begin, &end, frame.tail()].concat();
-    WholeFile::write(path, &bytes)?;
+    AtomicFile::write(path, &bytes)?;
     Ok(Written {
         path: path.to_owned(),
         bytes: bytes.len() as u64,

@@ -11,10 +11,11 @@ use rayon::prelude::*;
 use super::form::PillarForm;
 use super::frame::LibraryFrame;
 use super::{coordinate, point, polygon};
-use metalith_core::{Error, PillarRows, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, PillarArray, PlacedElement, Symmetry};
 use metalith_gds::write::{PolygonRecord, ReferenceRecord, SquareRecord};
+use metalith_pillars::PillarRows;
 
 /// Sites of the rows that are encoded as one block, about: a megabyte.
 const SITES: usize = 12_000;
@@ -23,7 +24,7 @@ const SITES: usize = 12_000;
 const BLOCKS: usize = 8;
 
 pub(super) struct PillarWriter<'a> {
-    file: WholeFile,
+    file: AtomicFile,
     path: &'a Path,
     frame: &'a LibraryFrame,
     layer: &'a LayoutLayer,
@@ -123,7 +124,7 @@ impl<'a> PillarWriter<'a> {
         progress: &'a dyn Progress,
     ) -> Result<Self> {
         let mut writer = Self {
-            file: WholeFile::create(path)?,
+            file: AtomicFile::create(path)?,
             path,
             frame,
             layer,

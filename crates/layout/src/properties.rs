@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 use metalith_design::Design;
 
 /// Frame and fill colour and dither pattern of each layer, in the order of [`metalith_design::Layers::all`]:
@@ -37,7 +37,7 @@ pub fn write_layer_properties(design: &Design, path: &Path) -> Result<()> {
         .expect("a string grows");
     }
     xml.push_str("</layer-properties>\n");
-    WholeFile::write(path, xml.as_bytes())
+    AtomicFile::write(path, xml.as_bytes())
 }
 
 /// Text as it may stand between XML tags.

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use metalith_core::{PillarShape, Silent};
+use metalith_core::Silent;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, Why, extract};
 use metalith_layout::{LayoutFormat, OasisEncoding, write_pillars_as};
+use metalith_pillars::PillarShape;
 use metalith_testing::design;
 
 fn circles() -> Design {

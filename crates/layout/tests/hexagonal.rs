@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use metalith_core::{PillarRows, PillarShape, Silent};
+use metalith_core::Silent;
 use metalith_design::array::Symmetry;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Hierarchy, PillarArray, PillarRule};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, Why, extract, fits};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, extraction_plan, write_pillars_as};
+use metalith_pillars::{PillarRows, PillarShape};
 use metalith_testing::design;
 
 const PITCH_NM: i64 = 350;

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use metalith_core::{PillarRows, Silent, WholeFile};
+use metalith_core::{AtomicFile, Silent};
 use metalith_design::array::ClassPillars;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Point, ReadLimits, Selection, Shape, Transform, Visitor};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_as};
 use metalith_oasis::{CellReference, NameTable, OasisItem, OasisLimits, OasisReader, OasisShape};
+use metalith_pillars::PillarRows;
 use metalith_testing::gds::Gds;
 use metalith_testing::{design, golden};
 use serde_json::json;
@@ -189,9 +190,9 @@ fn an_unfinished_file_replaces_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("kept.gds");
     fs::write(&path, "old").unwrap();
-    let mut file = WholeFile::create(&path).unwrap();
+    let mut file = AtomicFile::create(&path).unwrap();
     file.write_all(&[0; 3_000_000]).unwrap();
-    assert!(WholeFile::create(&path).is_err(), "two writers of one file");
+    assert!(AtomicFile::create(&path).is_err(), "two writers of one file");
     drop(file);
     assert_eq!(fs::read(&path).unwrap(), b"old");
     assert_eq!(
@@ -201,7 +202,7 @@ fn an_unfinished_file_replaces_nothing() {
     );
     // What a killed run leaves is overwritten by the next.
     fs::write(folder.path().join(".kept.gds.part"), [7; 100]).unwrap();
-    WholeFile::write(&path, b"new").unwrap();
+    AtomicFile::write(&path, b"new").unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"new");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use metalith_core::{PillarShape, RotatedRectangles, Silent};
+use metalith_core::Silent;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, extract};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, extraction_plan, write_pillars_as};
+use metalith_pillars::{PillarShape, RotatedRectangles};
 use metalith_testing::design;
 
 const PILLARS: RotatedRectangles = RotatedRectangles {

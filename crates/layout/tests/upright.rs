@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use metalith_core::{PillarMap, PillarShape, Silent};
+use metalith_core::Silent;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, extract};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, extraction_plan, write_pillars_as};
+use metalith_pillars::{PillarMap, PillarShape};
 use metalith_testing::design;
 
 fn holds(path: &Path, design: &Design, array: &PillarArray) {

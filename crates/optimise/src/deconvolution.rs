@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::focus::Lens;
 use super::image_error::Spectrum;
-use super::imaging::{Imaging, OpticalTransfer, Rooms};
+use super::imaging::{BufferPool, Imaging, OpticalTransfer};
 use super::mapping::Mapping;
 use super::pupil::Pupil;
 use super::views::{Views, window_offset_um};
@@ -26,7 +26,7 @@ pub struct Deconvolution {
     pub(super) pupils: Vec<Vec<Pupil>>,
     /// Transmission over its full value by whole width, one for each wavelength.
     pub(super) tables: Vec<Vec<Complex64>>,
-    pub(super) rooms: Rooms,
+    pub(super) rooms: BufferPool,
 }
 
 /// Wavelengths of one channel at one angle, by index.
@@ -111,7 +111,7 @@ impl Deconvolution {
             mapping,
             pupils,
             tables,
-            rooms: Rooms::default(),
+            rooms: BufferPool::default(),
         })
     }
 
@@ -215,7 +215,8 @@ pub mod tests {
     use super::super::{PixelWindow, Rings, Start};
     use super::*;
     use metalith_cell::PublishedCell;
-    use metalith_core::{Lattice, Silent};
+    use metalith_core::Silent;
+    use metalith_pillars::Lattice;
 
     pub fn small() -> (Lens, Deconvolution) {
         let rings = Rings::new(Lattice::covering(60_000, 350).unwrap(), 60_000).unwrap();

@@ -95,7 +95,7 @@ impl<'p> Exchange<'p> {
         self.problem.mapping().widths_of(&self.choices)
     }
 
-    /// Visit every ring once, in random order. The generator depends on the seed and the sweep alone.
+    /// RingContext every ring once, in random order. The generator depends on the seed and the sweep alone.
     pub fn sweep_once(&mut self) {
         let temperature = self.schedule.temperature_of(self.sweep);
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
@@ -204,7 +204,7 @@ mod tests {
     use super::super::{MeritKind, Start, wavelengths};
     use super::*;
     use metalith_cell::{CellModel, PublishedCell};
-    use metalith_core::Lattice;
+    use metalith_pillars::Lattice;
 
     const SCHEDULE: Schedule = Schedule {
         hot_sweeps: 4,

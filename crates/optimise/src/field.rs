@@ -6,8 +6,8 @@ use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
 use super::mapping::Mapping;
+use super::neighbour_terms::{NeighbourTerms, RingContext};
 use super::planes::Planes;
-use super::surroundings::{Surroundings, Visit};
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Result};
 
@@ -72,7 +72,7 @@ pub struct FieldProblem {
     /// Of each row that is no padding.
     pub(super) conditions: Vec<Option<Condition>>,
     /// Where the neighbours of pillars are not taken for equals.
-    pub(super) surroundings: Option<Surroundings>,
+    pub(super) surroundings: Option<NeighbourTerms>,
 }
 
 impl FieldProblem {
@@ -171,13 +171,13 @@ impl FieldProblem {
     }
 
     /// What the width of a ring acts on beside its own transmission, while others have these widths (nm); nothing among equals.
-    pub fn visit(&self, ring: usize, widths_nm: &[u16]) -> Option<Visit> {
+    pub fn visit(&self, ring: usize, widths_nm: &[u16]) -> Option<RingContext> {
         self.surroundings.as_ref().map(|s| s.visit(ring, widths_nm))
     }
 
     /// Fields of all rows that depend on the width of a ring, if it has this one.
     #[inline(always)]
-    pub fn contribution(&self, ring: usize, width_nm: u16, visit: Option<&Visit>, out: &mut Planes) {
+    pub fn contribution(&self, ring: usize, width_nm: u16, visit: Option<&RingContext>, out: &mut Planes) {
         let (k_re, k_im) = self.kernel_of(ring);
         let (t_re, t_im) = self.transmission_of(width_nm);
         for i in 0..k_re.len() {
@@ -242,7 +242,7 @@ pub mod tests {
     use super::super::{Start, wavelengths};
     use super::*;
     use metalith_cell::PublishedCell;
-    use metalith_core::Lattice;
+    use metalith_pillars::Lattice;
 
     pub fn lens() -> Lens {
         let rings = Rings::new(Lattice::covering(60_000, 350).unwrap(), 60_000).unwrap();

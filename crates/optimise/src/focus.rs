@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use super::field::{Condition, FieldPoint};
 use super::kernel::RingField;
 use super::links::{distance_of, neighbour};
+use super::pair_response::{PRODUCTS, PairResponse};
 use super::rings::Rings;
-use super::unlike::{PRODUCTS, Unlike};
 use metalith_cell::{CellModel, NEIGHBOUR_DEGREE, NEIGHBOURS};
-use metalith_core::{Error, PillarMap, Result};
+use metalith_core::{Error, Result};
+use metalith_pillars::PillarMap;
 
 /// A lens to optimise: its rings, and the sensor behind it.
 #[derive(Clone, Debug)]
@@ -93,7 +94,7 @@ impl Lens {
         cell: &dyn CellModel,
         wavelength_um: f64,
     ) -> Result<Vec<Complex64>> {
-        match Unlike::of(cell, wavelength_um, widths_nm.iter().copied())? {
+        match PairResponse::of(cell, wavelength_um, widths_nm.iter().copied())? {
             Some(unlike) => Ok(unlike.of_rings(&self.rings, widths_nm)),
             None => among_equals(widths_nm, cell, wavelength_um),
         }
@@ -109,7 +110,7 @@ impl Lens {
             .par_iter()
             .map(|&wavelength_um| {
                 let field = RingField::new(&self.rings, wavelength_um, self.gap_um);
-                let sum = match Unlike::of(cell, wavelength_um, widths_nm.iter().copied())? {
+                let sum = match PairResponse::of(cell, wavelength_um, widths_nm.iter().copied())? {
                     Some(unlike) => unlike.on_axis(&self.rings, &field, widths_nm),
                     None => {
                         let t = among_equals(widths_nm, cell, wavelength_um)?;
@@ -138,7 +139,7 @@ impl Lens {
             .filter(|(_, n)| **n > 0)
             .map(|(w, _)| w)
             .collect();
-        let unlike = |wavelength_um: f64| Unlike::of(cell, wavelength_um, drawn.iter().copied());
+        let unlike = |wavelength_um: f64| PairResponse::of(cell, wavelength_um, drawn.iter().copied());
         let neighbour = match wavelengths_um.first() {
             Some(um) => unlike(*um)?.map(|u| u.neighbour),
             None => None,
@@ -192,7 +193,7 @@ fn among_equals(widths_nm: &[u16], cell: &dyn CellModel, wavelength_um: f64) -> 
 #[derive(Clone, Copy, Default)]
 struct AlikeSites {
     count: u32,
-    /// Factors of the widths of all their neighbours, as [`Unlike::factors`] has the own ones.
+    /// Factors of the widths of all their neighbours, as [`PairResponse::factors`] has the own ones.
     neighbours: [f64; PRODUCTS],
 }
 

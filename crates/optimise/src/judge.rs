@@ -9,9 +9,10 @@ use super::limit::{largest_step, largest_step_in_layout};
 use super::robust;
 use super::run::OptimiseTask;
 use metalith_cell::{CellModel, Fidelity};
-use metalith_core::{Error, PillarMap, Result};
+use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_design::phase::{Interpolation, RadialPhase};
+use metalith_pillars::PillarMap;
 
 /// Strehl ratio over wavelength of one phase, judged in one way.
 #[derive(Clone, Debug, Serialize)]

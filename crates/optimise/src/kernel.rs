@@ -114,7 +114,7 @@ impl<'r> RingField<'r> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::{Lattice, LatticeKind};
+    use metalith_pillars::{Lattice, LatticeKind};
 
     const KINDS: [LatticeKind; 2] = [LatticeKind::Square, LatticeKind::Hexagonal];
 

@@ -1,8 +1,8 @@
 //! The limit on the phase step from ring to ring: a hard constraint on every design.
 
 use super::mapping::{Mapping, step};
-use metalith_core::PillarMap;
 use metalith_core::{Error, Result};
+use metalith_pillars::PillarMap;
 
 /// Steps are held to the limit but for rounding (turns).
 const ROUNDING: f64 = 1e-9;

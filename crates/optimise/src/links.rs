@@ -116,7 +116,7 @@ pub fn distance_of([x, y]: [i32; 2]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::Lattice;
+    use metalith_pillars::Lattice;
 
     /// Sums of a hundred polynomials of degree seven.
     const ROUNDING: f64 = 1e-9;

@@ -113,8 +113,8 @@ pub mod tests {
     use super::*;
 
     use metalith_cell::InversePolynomial;
-    use metalith_core::PillarShape;
     use metalith_design::{CellSpec, MappingComparison, MappingSpec};
+    use metalith_pillars::PillarShape;
 
     /// The rule of the shipped designs but for the coefficients.
     pub fn rule(coefficients: &[f64]) -> PillarRule {

@@ -2,7 +2,8 @@
 
 use std::sync::OnceLock;
 
-use metalith_core::{Error, Lattice, LatticeKind, PillarMap, Result};
+use metalith_core::{Error, Result};
+use metalith_pillars::{Lattice, LatticeKind, PillarMap};
 
 use super::links::Links;
 

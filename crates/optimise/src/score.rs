@@ -1,13 +1,20 @@
 //! The inner loop of exchange: the merit of every candidate of one ring.
 
 use super::field::{FLOOR, FieldProblem, MeritKind};
+use super::neighbour_terms::RingContext;
 use super::planes::Planes;
-use super::surroundings::Visit;
 
 impl FieldProblem {
     /// The merit, but for a constant, with each candidate width in one ring. `fields` are those without what depends on that
     /// width, and the inverse intensities that logarithms count from.
-    pub fn score(&self, ring: usize, visit: Option<&Visit>, fields: Fields<'_>, widths_nm: &[u16], scores: &mut [f64]) {
+    pub fn score(
+        &self,
+        ring: usize,
+        visit: Option<&RingContext>,
+        fields: Fields<'_>,
+        widths_nm: &[u16],
+        scores: &mut [f64],
+    ) {
         pulp::Arch::new().dispatch(|| match visit {
             None => {
                 let kernel = self.kernel_of(ring);

@@ -9,7 +9,7 @@ use super::kernel::RingField;
 use metalith_cell::CellModel;
 use metalith_core::Result;
 use metalith_wave::psf::{PixelFrequencies, pixel_mtf};
-use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, FoldedPropagator, Pillars, PlaneWave, Psf, Scratch, Window};
 
 /// Samples of the window about the focus that contrast is computed with; light outside of it counts too.
 const WINDOW_SAMPLES: usize = 128;
@@ -76,7 +76,7 @@ impl OverWavelength<'_> {
         let reported = PixelFrequencies::of(pixel_um).reported();
         let contrast = |scratch: &mut Scratch, &wavelength_um: &f64| {
             let wave = PlaneWave::normal(wavelength_um);
-            let fold = Fold::plan(lattice, radius_um, wavelength_um, window, Accuracy::Fast)?;
+            let fold = FoldedPropagator::plan(lattice, radius_um, wavelength_um, window, Accuracy::Fast)?;
             let mut of = |widths: &&[u16]| {
                 let mut table = vec![Complex64::ZERO];
                 table.extend(self.lens.transmissions_of_rings(widths, self.cell, wavelength_um)?);

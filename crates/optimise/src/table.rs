@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::rings::Rings;
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 
 /// Write the phase of each ring (turns) as `r_um,phase_rad`, one row in the middle of each ring. A design
 /// reads it with `source = "table"` and `interpolation = "nearest"`. `remarks` go before it as comments.
@@ -21,5 +21,5 @@ pub fn write_phase_table(path: &Path, rings: &Rings, turns: &[f64], remarks: &[S
         let phase = turns.rem_euclid(1.0) * std::f64::consts::TAU;
         let _ = writeln!(text, "{:.3},{phase:.6}", rings.middle_um(ring));
     }
-    WholeFile::write(path, text.as_bytes())
+    AtomicFile::write(path, text.as_bytes())
 }

@@ -6,10 +6,11 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use metalith_cell::{CellModel, PublishedCell};
-use metalith_core::{Lattice, Progress, Silent};
+use metalith_core::{Progress, Silent};
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, Lens, OptimiseTask, RingField, Rings, Start, largest_step};
-use metalith_wave::{Accuracy, Direct, Fold, Pillars, PlaneWave, Propagator, Scratch, Window};
+use metalith_pillars::Lattice;
+use metalith_wave::{Accuracy, Direct, FoldedPropagator, Pillars, PlaneWave, Propagator, Scratch, Window};
 use num_complex::Complex64;
 
 /// The kernel at full size, on the axis: a broadband phase, every ring of the 1 mm lens.
@@ -42,7 +43,7 @@ fn the_kernel_agrees_with_direct_sum_and_fold() {
     let error = (quick * common - direct).norm() / field.matched();
     assert!(error < DIRECT, "{error:e}");
     let window = Window::about([0.0, 0.0], 0.35, 16, lens.gap_um);
-    let fold = Fold::plan(lattice, 500.0, wavelength, window, Accuracy::Accurate).unwrap();
+    let fold = FoldedPropagator::plan(lattice, 500.0, wavelength, window, Accuracy::Accurate).unwrap();
     let found = fold.field(&pillars, &wave, &mut Scratch::default()).unwrap().values[[8, 8]];
     let found = Complex64::new(found.re.into(), found.im.into());
     let error = (found.norm() - direct.norm()).abs() / field.matched();

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::kernels::{BankSpec, DistinctKernels, KernelBank};
 use crate::layout::PillarCount;
-use crate::veil::{LightShares, SCENE_CELLS, Veil};
+use crate::stray_light::{LightShares, SCENE_CELLS, StrayLight};
 
 const BANK_MAGIC: [u8; 8] = *b"MLKERN\0\x02";
 const VEIL_MAGIC: [u8; 8] = *b"MLVEIL\0\x05";
@@ -183,12 +183,12 @@ pub fn keep_bank(folder: &Path, inputs: &[u8], bank: &KernelBank) -> Result<()> 
 }
 
 /// The veil that was kept for these inputs in a folder; none if there is none that can be used.
-pub fn kept_veil(folder: &Path, inputs: &[u8]) -> Option<Veil> {
+pub fn kept_veil(folder: &Path, inputs: &[u8]) -> Option<StrayLight> {
     read(&file_of(folder, "veil", inputs), VEIL_MAGIC, inputs, |content| {
         let head: VeilHead = content.head()?;
         let sizes = [head.cells[0], head.cells[1], head.channels, head.bases];
         let size = sizes.iter().try_fold(SCENE_CELLS.pow(2), |n, m| n.checked_mul(*m))?;
-        Some(Veil {
+        Some(StrayLight {
             cells: head.cells,
             channels: head.channels,
             bases: head.bases,
@@ -202,7 +202,7 @@ pub fn kept_veil(folder: &Path, inputs: &[u8]) -> Option<Veil> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn keep_veil(folder: &Path, inputs: &[u8], veil: &Veil) -> Result<()> {
+pub fn keep_veil(folder: &Path, inputs: &[u8], veil: &StrayLight) -> Result<()> {
     let head = VeilHead {
         cells: veil.cells,
         channels: veil.channels,
@@ -289,8 +289,8 @@ mod tests {
         std::fs::write(&file, damaged).unwrap();
         assert!(kept_bank(folder.path(), b"inputs").is_none());
 
-        let sensor = metalith_camera::Camera::three_bands(5.86).sensor;
-        let mut veil = Veil::none(&sensor, 1, 1);
+        let sensor = metalith_sensor::Camera::three_bands(5.86).sensor;
+        let mut veil = StrayLight::none(&sensor, 1, 1);
         veil.values.iter_mut().enumerate().for_each(|(i, v)| *v = i as f32);
         keep_veil(folder.path(), b"inputs", &veil).unwrap();
         let back = kept_veil(folder.path(), b"inputs").unwrap();

@@ -1,17 +1,18 @@
 //! The chip before its sensor: elements as read from a layout, in light.
 
-use metalith_camera::{Camera, Sampling, WavelengthSteps};
 use metalith_cell::{BandResponse, CellModel, PassedTable};
-use metalith_core::{Error, PillarMap, Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::array::Symmetry;
 use metalith_design::phase::OpenAreas;
 use metalith_design::{Design, Element};
 use metalith_gds::extract::Extraction;
 use metalith_grating::NeighbourPillars;
-use metalith_made::{
-    ArrivingLight, CameraChange, ClassTable, DrawnElement, MadeElement, MadeView, PathChange, Perturbation,
+use metalith_optics::{
+    ArrivingLight, AsBuiltElement, AsBuiltOptics, CameraChange, ClassTable, DrawnElement, PathChange, Perturbation,
     SimulationCase, cell_direction,
 };
+use metalith_pillars::PillarMap;
+use metalith_sensor::{Camera, Sampling, WavelengthSteps};
 use metalith_wave::PlaneWave;
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -22,7 +23,7 @@ use crate::ElementView;
 pub struct DistinctChipElement<'a> {
     pub view: ElementView,
     widths: &'a PillarMap,
-    made: MadeElement,
+    made: AsBuiltElement,
     /// Symmetries that leave its pillars and its wedge as they are.
     pub symmetries: Vec<Symmetry>,
     /// Area of its sites (um^2).
@@ -62,7 +63,7 @@ struct Tables {
     classes: Vec<ClassTable>,
     /// As [`ElementInLight::departing`], where these are not `classes`, each once with the phase of the element.
     departing: Option<Vec<(ClassTable, i32)>>,
-    /// As [`MadeView::share`].
+    /// As [`AsBuiltOptics::share`].
     share: f64,
     gap_um: f64,
     camera: CameraChange,
@@ -156,7 +157,7 @@ impl<'a> ChipInLight<'a> {
             distinct.push(DistinctChipElement {
                 view: elements[k],
                 widths: widths[k],
-                made: MadeElement::new(&drawn, &perturbation.geometry)?,
+                made: AsBuiltElement::new(&drawn, &perturbation.geometry)?,
                 symmetries,
                 open_um2: areas.elements_um2[k],
                 among_neighbours: among_neighbours(case, &sampling, &elements[k], widths[k], progress)?,
@@ -256,7 +257,7 @@ impl ElementInLight<'_> {
     ///
     /// # Panics
     /// If it was not made for this wavelength.
-    pub fn lit(&self, wavelength: usize, sines: [f64; 2]) -> MadeView<'_> {
+    pub fn lit(&self, wavelength: usize, sines: [f64; 2]) -> AsBuiltOptics<'_> {
         let chip = self.chip;
         let stated = PlaneWave {
             wavelength_um: chip.sampling.wavelengths_nm[wavelength] * 1e-3,
@@ -268,7 +269,7 @@ impl ElementInLight<'_> {
             source_per_m: chip.perturbation.path.source_per_m + chip.source_per_m,
             ..chip.perturbation.path.clone()
         };
-        MadeView {
+        AsBuiltOptics {
             element: &chip.distinct[self.distinct].made,
             tables: tables.classes.clone(),
             share: tables.share,

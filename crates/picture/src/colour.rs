@@ -1,6 +1,6 @@
 //! Channels of a camera and colours of a picture.
 
-use metalith_camera::ChannelSampling;
+use metalith_sensor::ChannelSampling;
 use nalgebra::DMatrix;
 use ndarray::{Array2, Array3};
 
@@ -70,7 +70,7 @@ impl ChannelColours {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_camera::Camera;
+    use metalith_sensor::Camera;
 
     #[test]
     fn colours_come_back_from_channels() {

@@ -9,18 +9,18 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_camera::Camera;
 use metalith_core::file::{file_digest, read_at_most};
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result, WholeFile, srgb};
+use metalith_core::{AtomicFile, Error, Progress, Result, srgb};
 use metalith_design::Design;
+use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::imaging_system::ImagingSystem;
 use crate::operator::FrameOperator;
 use crate::png16;
 use crate::scene::SceneImage;
-use crate::studio::Studio;
 
 /// Images of one shard: a folder named by the range of their numbers.
 const SHARD: usize = 1000;
@@ -114,7 +114,7 @@ pub(crate) fn black_level(camera: &Camera) -> u16 {
 
 impl DatasetManifest {
     /// Of a set that has no pairs yet.
-    pub fn of(studio: &Studio, made_from: DatasetOrigin, seed: u64) -> Self {
+    pub fn of(studio: &ImagingSystem, made_from: DatasetOrigin, seed: u64) -> Self {
         Self {
             design: studio.design.name.clone(),
             camera: studio.camera.name.clone(),
@@ -136,7 +136,7 @@ impl DatasetManifest {
 /// If an image cannot be read or is not of the size that the studio was opened for, a file cannot be written, or the user
 /// stopped it; what is complete is kept.
 pub fn write_dataset(
-    studio: &Studio,
+    studio: &ImagingSystem,
     operator: &FrameOperator<'_>,
     images: &[PathBuf],
     read: &dyn Fn(&Path) -> Result<SceneImage>,
@@ -167,7 +167,7 @@ pub fn write_dataset_manifest(folder: &Path, manifest: &DatasetManifest) -> Resu
 
 /// What writes the pairs of a set.
 pub struct PairWriter<'a> {
-    studio: &'a Studio,
+    studio: &'a ImagingSystem,
     operator: &'a FrameOperator<'a>,
     seed: u64,
     folder: &'a Path,
@@ -178,7 +178,7 @@ pub struct PairWriter<'a> {
 
 impl<'a> PairWriter<'a> {
     /// For the simulation of a studio, noise of a seed, and a folder.
-    pub fn new(studio: &'a Studio, operator: &'a FrameOperator<'a>, seed: u64, folder: &'a Path) -> Self {
+    pub fn new(studio: &'a ImagingSystem, operator: &'a FrameOperator<'a>, seed: u64, folder: &'a Path) -> Self {
         Self {
             studio,
             operator,
@@ -221,8 +221,8 @@ impl<'a> PairWriter<'a> {
                 let ideal = self.studio.truth(&scene).mapv(srgb::encoded);
                 let frame = png16::grey(&recorded.planes, self.black, &of_frame);
                 let truth = png16::colour(&ideal, Some(&of_truth));
-                WholeFile::write(&frame_file, &frame)?;
-                WholeFile::write(&truth_file, &truth)?;
+                AtomicFile::write(&frame_file, &frame)?;
+                AtomicFile::write(&truth_file, &truth)?;
                 [frame, truth]
             }
         };
@@ -244,7 +244,7 @@ impl<'a> PairWriter<'a> {
 mod tests {
     use super::*;
     use crate::exposure::expose;
-    use metalith_camera::SensorNoise;
+    use metalith_sensor::SensorNoise;
     use ndarray::Array2;
 
     #[test]

@@ -1,8 +1,8 @@
 //! From light in the pixels to the numbers that a camera gives out.
 
-use metalith_camera::{Camera, ColourFilter};
 use metalith_core::{Error, Result};
 use metalith_report::sig;
+use metalith_sensor::{Camera, ColourFilter};
 use metalith_wave::camera::Noise;
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;
@@ -26,7 +26,7 @@ pub struct Frame {
 }
 
 /// What each channel counts of the light of the scene, against the one that counts most.
-pub fn sensitivity(camera: &Camera, channels: &[metalith_camera::ChannelSampling]) -> Vec<f64> {
+pub fn sensitivity(camera: &Camera, channels: &[metalith_sensor::ChannelSampling]) -> Vec<f64> {
     let counted: Vec<f64> = channels
         .iter()
         .map(|c| c.parts.iter().map(|p| p.weight).sum())
@@ -269,7 +269,7 @@ pub(crate) fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_camera::SensorNoise;
+    use metalith_sensor::SensorNoise;
 
     /// Whole steps in single precision lie on either side of those in double precision.
     #[test]

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_camera::Camera;
-use metalith_core::{Result, WholeFile, srgb};
+use metalith_core::{AtomicFile, Result, srgb};
+use metalith_sensor::Camera;
 use ndarray::Array3;
 use serde::Serialize;
 
@@ -46,7 +46,7 @@ impl FrameFile {
     pub fn write(&self, frame: &Frame, folder: &Path) -> Result<PathBuf> {
         let path = folder.join(&self.file);
         let bytes = png16::grey(&frame.planes, self.black_level, "frame of metalith picture");
-        WholeFile::write(&path, &bytes)?;
+        AtomicFile::write(&path, &bytes)?;
         Ok(path)
     }
 }

@@ -10,7 +10,7 @@ const KERNELS: &str = "kernels";
 
 /// Where kernels and veil are kept between runs.
 #[derive(Clone, Debug)]
-pub struct KeptKernels {
+pub struct KernelCache {
     /// Nowhere, if left out.
     pub(crate) folder: Option<PathBuf>,
     pub(crate) make: bool,
@@ -18,7 +18,7 @@ pub struct KeptKernels {
     asked: bool,
 }
 
-impl KeptKernels {
+impl KernelCache {
     /// Where this user keeps tables of cells too.
     pub fn of_user() -> Self {
         Self {
@@ -67,8 +67,8 @@ impl KeptKernels {
 mod tests {
     use super::*;
     use crate::cache;
-    use crate::veil::Veil;
-    use metalith_camera::Camera;
+    use crate::stray_light::StrayLight;
+    use metalith_sensor::Camera;
     use std::sync::Mutex;
 
     /// Holds the notes.
@@ -91,14 +91,14 @@ mod tests {
         let file = place.path().join("file");
         std::fs::write(&file, "").unwrap();
         let sensor = Camera::three_bands(5.86).sensor;
-        let veil = Veil::none(&sensor, 1, 1);
+        let veil = StrayLight::none(&sensor, 1, 1);
         let write = |folder: &Path| cache::keep_veil(folder, b"inputs", &veil);
         let listener = Listener(Mutex::default());
-        let asked = KeptKernels::made(&file);
+        let asked = KernelCache::made(&file);
         assert!(asked.keep("the veil is", write, &listener).is_err());
-        let of_user = KeptKernels {
+        let of_user = KernelCache {
             folder: asked.folder.clone(),
-            ..KeptKernels::of_user()
+            ..KernelCache::of_user()
         };
         of_user.keep("the veil is", write, &listener).unwrap();
         let notes = listener.0.into_inner().unwrap();

@@ -1,9 +1,10 @@
 //! Whether a layout is that of its design: asked before anything is simulated.
 
-use metalith_core::{Error, PillarCheck, Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Element};
-use metalith_gds::extract::{Extraction, Oddities, Why};
+use metalith_gds::extract::{Extraction, UnrecognisedShapes, Why};
+use metalith_pillars::PillarCheck;
 use metalith_report::count;
 use serde::{Deserialize, Serialize};
 
@@ -62,7 +63,7 @@ pub fn check_elements(design: &Design, extraction: &Extraction) -> Result<()> {
 }
 
 /// Why shapes are no pillars of a design, in words; none where there are none.
-fn why(foreign: &Oddities) -> String {
+fn why(foreign: &UnrecognisedShapes) -> String {
     let each = Why::ALL.into_iter().zip(foreign.by_why).filter(|(_, n)| *n > 0);
     let words: Vec<String> = each.map(|(why, n)| format!("{} {}", count(n), why.words())).collect();
     words.join(", ")

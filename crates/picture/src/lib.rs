@@ -2,22 +2,25 @@
 //!
 //! ```text
 //! layout as read, camera       ->  ChipInLight
-//! spectra of a scene           ->  KernelBank: images of a point over the field; Veil: all other light
+//! spectra of a scene           ->  KernelBank: images of a point over the field; StrayLight: all other light
 //! both, and a view             ->  FrameOperator: planes of the scene to the frame, and its adjoint
 //! ```
 
-mod assumed;
+mod approximation_set;
 mod cache;
 mod chip;
 mod colour;
 mod dataset;
-mod doubt;
 mod exposure;
+mod field_of_view;
 mod files;
 mod forecast;
+mod forecast_scene;
 mod geometry;
 mod image_check;
+mod imaging_system;
 mod kept;
+mod kernel_plan;
 mod kernels;
 mod layout;
 mod opening;
@@ -27,31 +30,30 @@ mod page;
 mod png16;
 mod point_image;
 mod recorded_frame;
-mod rehearsal;
 mod report;
 mod resolution;
 pub mod restore;
 mod restored_page;
 pub mod scene;
 mod score;
-mod sight;
 pub mod spectra;
-mod studio;
+mod stray_light;
 mod thumbnail;
-mod veil;
-mod wanted;
+mod uncertainty;
 
-pub use assumed::{Assumed, AssumedScore, without_dispersion, worth_of_assumptions};
+pub use approximation_set::{ApproximationSet, AssumedScore, without_dispersion, worth_of_assumptions};
 pub use chip::{ChipInLight, ElementInLight, element_views, sampling_of, sensor_um};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetOrigin, DatasetPair, PairWriter, write_dataset, write_dataset_manifest};
-pub use doubt::{Doubt, DoubtReport};
 pub use exposure::{Frame, channel_at, counts_channel, expose, gains, sensitivity};
 pub use files::{FrameFile, picture_file};
 pub use forecast::{Forecast, ScenePower};
+pub use forecast_scene::Rehearsal;
 pub use geometry::{ElementView, SceneSpace, SceneView};
 pub use image_check::check_images;
-pub use kept::KeptKernels;
+pub use imaging_system::ImagingSystem;
+pub use kept::KernelCache;
+pub use kernel_plan::simulated_view;
 pub use kernels::{BankSpec, KernelBank};
 pub use layout::PillarCount;
 pub use operator::{BetweenNodes, Detail, FftScratch, FrameOperator, SceneInputs, ScenePoints, SquareFft};
@@ -60,12 +62,10 @@ pub use page::{PicturePages, pictures_side_by_side, shown, write_pages};
 pub use png16::write_picture;
 pub use point_image::PointImage;
 pub use recorded_frame::{FrameNumbers, read_signals};
-pub use rehearsal::Rehearsal;
 pub use report::{Assumption, ChannelBudget, FrameStatement, HomographyResidual, PictureReport, RestorationReport};
 pub use resolution::{ContrastCurve, contrast_curves};
 pub use restored_page::{RestoredPicture, RestoredReport};
 pub use score::{MOST_DB, SCORED_SIDES, Zone, ZoneScore, check_scored, psnr_words, scores};
-pub use studio::Studio;
+pub use stray_light::{LightShares, StrayLight};
 pub use thumbnail::thumbnail;
-pub use veil::{LightShares, Veil};
-pub use wanted::simulated_view;
+pub use uncertainty::{DoubtReport, Uncertainty};

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use metalith_camera::Camera;
 use metalith_cell::cache_folder;
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
@@ -10,16 +9,17 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, cell_models};
 use metalith_gds::extract::Extraction;
 use metalith_layout::read_pillars;
-use metalith_made::{CalibratedModel, MadeChip, SimulationCase};
+use metalith_optics::{AsBuiltChip, CalibratedModel, SimulationCase};
+use metalith_sensor::Camera;
 
-use crate::kept::KeptKernels;
+use crate::imaging_system::ImagingSystem;
+use crate::kept::KernelCache;
+use crate::kernel_plan::Wanted;
 use crate::layout::{PillarCount, check_elements};
 use crate::scene::SceneImage;
-use crate::studio::Studio;
-use crate::wanted::Wanted;
 use crate::{SceneView, cache};
 
-impl Studio {
+impl ImagingSystem {
     /// For a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes of a field. Kernels
     /// and veil are kept on the disk.
     ///
@@ -36,13 +36,13 @@ impl Studio {
         scene: &SceneImage,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::open_kept(design, layout, camera, model, scene, &KeptKernels::of_user(), progress)
+        Self::open_kept(design, layout, camera, model, scene, &KernelCache::of_user(), progress)
     }
 
     /// The same with kernels and veil that are kept elsewhere.
     ///
     /// # Errors
-    /// As [`Studio::open`]; if nothing may be made and something is not there, or what was made cannot be kept in a folder that
+    /// As [`ImagingSystem::open`]; if nothing may be made and something is not there, or what was made cannot be kept in a folder that
     /// was asked for.
     pub fn open_kept(
         design: &Design,
@@ -50,7 +50,7 @@ impl Studio {
         camera: &Camera,
         model: Option<&CalibratedModel>,
         scene: &SceneImage,
-        kept: &KeptKernels,
+        kept: &KernelCache,
         progress: &dyn Progress,
     ) -> Result<Self> {
         Self::open_wanted(
@@ -69,7 +69,7 @@ impl Studio {
         design: &Design,
         layout: &Path,
         model: Option<&CalibratedModel>,
-        kept: &KeptKernels,
+        kept: &KernelCache,
         progress: &dyn Progress,
     ) -> Result<Self> {
         progress.begin("reading the layout", 1);
@@ -88,7 +88,7 @@ impl Studio {
         let veil = folder.and_then(|f| cache::kept_veil(f, &veil_inputs));
         let from_cache = [bank.is_some(), veil.is_some()];
         if let (
-            KeptKernels {
+            KernelCache {
                 folder: Some(folder),
                 make: false,
                 ..
@@ -130,7 +130,7 @@ impl Studio {
                 let made;
                 let case = match model {
                     Some(model) => {
-                        made = MadeChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
+                        made = AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
                         SimulationCase::Made(&made)
                     }
                     None => {
@@ -162,11 +162,11 @@ impl Studio {
     }
 
     /// For pillars that were read and a case that is at hand, such as one of many draws of a chip: nothing is kept on the
-    /// disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as for [`Studio::open`]
+    /// disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as for [`ImagingSystem::open`]
     /// if left out.
     ///
     /// # Errors
-    /// As [`Studio::open`].
+    /// As [`ImagingSystem::open`].
     pub fn of_pillars(
         design: &Design,
         extraction: &Extraction,

@@ -2,19 +2,19 @@
 
 use std::path::Path;
 
-use metalith_camera::{Camera, ColourFilter};
 use metalith_core::{Result, part, srgb};
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table, fixed, write_json};
+use metalith_sensor::{Camera, ColourFilter};
 use ndarray::{Array2, Array3};
 
-use crate::assumed::AssumedScore;
-use crate::doubt::{Doubt, DoubtReport, root_mean_square};
+use crate::approximation_set::AssumedScore;
 use crate::exposure::Frame;
 use crate::files::write_restored;
 use crate::point_image;
 use crate::report::{Assumption, PictureReport};
 use crate::resolution::ContrastCurve;
 use crate::score::Zone;
+use crate::uncertainty::{DoubtReport, Uncertainty, root_mean_square};
 
 /// Pictures beside the numbers.
 pub struct PicturePages<'a> {
@@ -26,7 +26,7 @@ pub struct PicturePages<'a> {
     pub restored: &'a [Array3<f64>],
     pub camera: &'a Camera,
     /// What samples say, if any were drawn.
-    pub doubt: Option<&'a Doubt>,
+    pub doubt: Option<&'a Uncertainty>,
 }
 
 /// Edge of a zoom (pixels of the scene).
@@ -191,7 +191,7 @@ fn map(title: &str, values: &Array2<f64>, what: &str) -> HeatMap {
 }
 
 /// What samples say: where they differ, detail is invented.
-fn doubt(page: &mut Page, doubt: &Doubt, report: &DoubtReport) {
+fn doubt(page: &mut Page, doubt: &Uncertainty, report: &DoubtReport) {
     page.section("How sure the picture is");
     let mut row = PhotoRow::new("Mean of samples", 250.0);
     row.photo("mean", &doubt.mean.mapv(srgb::encoded));
@@ -200,7 +200,7 @@ fn doubt(page: &mut Page, doubt: &Doubt, report: &DoubtReport) {
         doubt.samples,
         fixed(report.scores[0].psnr_db, 2)
     )));
-    let map = map("Doubt", &doubt.spread, "deviation");
+    let map = map("Uncertainty", &doubt.spread, "deviation");
     page.figure(map.caption(format!(
         "Deviation of the samples from their mean, of sRGB values: where it is large, detail is invented. The order of the pixels by doubt and that by true error have a rank correlation of {}. It says where, not how much: samples deviate by {} on average, their mean errs by {}.",
         fixed(report.rank_correlation, 2),
@@ -260,7 +260,7 @@ fn budget(page: &mut Page, report: &PictureReport) {
     let mut table = Table::new([
         Column::text("Channel"),
         Column::number("Images", "%"),
-        Column::number("Veil on the sensor", "%"),
+        Column::number("StrayLight on the sensor", "%"),
         Column::number("Beside the sensor", "%"),
         Column::number("Not passed", "%"),
         Column::number("Not travelling", "%"),
@@ -320,7 +320,7 @@ pub(crate) fn list_assumptions(page: &mut Page, all: &[Assumption]) {
 fn worth(page: &mut Page, cases: &[AssumedScore]) {
     let Some(physics) = cases.first() else { return };
     page.section("What the assumptions of others are worth");
-    let mut columns = vec![Column::text("Assumed")];
+    let mut columns = vec![Column::text("ApproximationSet")];
     for zone in Zone::ALL {
         columns.push(Column::number(format!("PSNR, {}", zone.name()), "dB"));
     }

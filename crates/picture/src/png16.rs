@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use metalith_core::text::hex;
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 use ndarray::{Array2, Array3};
 use sha2::{Digest, Sha256};
 
@@ -44,7 +44,7 @@ pub(crate) fn colour(values: &Array3<f64>, source: Option<&str>) -> Vec<u8> {
 /// # Errors
 /// If it cannot be written; then what stood there before still does.
 pub fn write_picture(path: &Path, values: &Array3<f64>) -> Result<()> {
-    WholeFile::write(path, &colour(values, None))
+    AtomicFile::write(path, &colour(values, None))
 }
 
 /// What the picture of a file was made from; none if the file is damaged or does not say so, or its numbers are not those that were

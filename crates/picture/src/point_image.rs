@@ -4,7 +4,7 @@ use metalith_report::{Cell, Column, ImageGrid, Page, Table};
 use ndarray::Array2;
 use serde::Serialize;
 
-use crate::studio::Studio;
+use crate::imaging_system::ImagingSystem;
 
 /// Elements whose images are drawn, at most: figures of the others stand in the table.
 const DRAWN: usize = 6;
@@ -25,7 +25,7 @@ pub struct PointImage {
     pub values: Array2<f64>,
 }
 
-impl Studio {
+impl ImagingSystem {
     /// Images of a point by each distinct element and channel.
     pub fn point_images(&self) -> Vec<PointImage> {
         let (bank, elements) = (&self.bank, self.design.elements());

@@ -3,15 +3,15 @@
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use metalith_camera::Camera;
 use metalith_core::file::read_at_most;
 use metalith_core::{Error, Result};
+use metalith_sensor::Camera;
 use ndarray::Array2;
 
 use crate::dataset::black_level;
 use crate::exposure::{Frame, planes_of, recorded};
+use crate::imaging_system::ImagingSystem;
 use crate::png16;
-use crate::studio::Studio;
 
 /// What the numbers of a frame's file stand for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -46,7 +46,7 @@ pub fn read_signals(path: &Path, camera: &Camera, numbers: FrameNumbers) -> Resu
     Ok(grey.numbers.chunks_exact(rows * columns).map(plane).collect())
 }
 
-impl Studio {
+impl ImagingSystem {
     /// The frame of signals that the camera recorded, of full scale, in planes as those of [`Frame::planes`].
     ///
     /// # Errors
@@ -169,7 +169,7 @@ mod tests {
     use super::*;
     use crate::exposure::expose;
     use crate::files::FrameFile;
-    use metalith_camera::ColourFilter;
+    use metalith_sensor::ColourFilter;
 
     /// A small sensor with a filter, and its frame of light that fills it here and there.
     fn recorded_by(filter: ColourFilter) -> (Camera, Frame) {

@@ -4,16 +4,17 @@ use nalgebra::DMatrix;
 use ndarray::Array3;
 use serde::Serialize;
 
-use metalith_camera::Camera;
 use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
 use metalith_design::Design;
-use metalith_made::{CalibratedModel, ModelStatement};
+use metalith_optics::{CalibratedModel, ModelStatement};
+use metalith_sensor::Camera;
 
-use crate::assumed::AssumedScore;
+use crate::approximation_set::AssumedScore;
 use crate::chip::sensor_um;
-use crate::doubt::DoubtReport;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
+use crate::imaging_system::ImagingSystem;
+use crate::kernel_plan::averaging;
 use crate::layout::PillarCount;
 use crate::operator::BetweenNodes;
 use crate::point_image::PointImage;
@@ -22,9 +23,8 @@ use crate::restore::RestorationMethod;
 use crate::scene::SceneImage;
 use crate::score::ZoneScore;
 use crate::spectra::rgb_basis;
-use crate::studio::Studio;
-use crate::veil::LightShares;
-use crate::wanted::averaging;
+use crate::stray_light::LightShares;
+use crate::uncertainty::DoubtReport;
 
 /// What is said of a frame, simulated or recorded, whatever is made of it.
 #[derive(Clone, Debug, Serialize)]
@@ -71,7 +71,7 @@ impl FrameStatement {
     /// Of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. Notes and what the
     /// operator errs by are added.
     pub fn new(
-        studio: &Studio,
+        studio: &ImagingSystem,
         layout: String,
         scene: &SceneImage,
         frame: &Frame,
@@ -197,7 +197,7 @@ impl RestorationReport {
     }
 }
 
-impl Studio {
+impl ImagingSystem {
     /// What is to be known of a frame before its picture is looked at; `truth` is the scene in linear sRGB.
     pub fn notes(&self, frame: &Frame, truth: &Array3<f64>) -> Vec<String> {
         let layout = self.pillars.as_ref().and_then(PillarCount::note);
@@ -308,7 +308,7 @@ impl Studio {
                 format!(
                     "{} pixels; what lands outside is the veil, in squares of {} pixels",
                     spec.window,
-                    crate::veil::CELL_PIXELS
+                    crate::stray_light::CELL_PIXELS
                 ),
             ),
             assumption(

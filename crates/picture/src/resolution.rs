@@ -11,8 +11,8 @@ use ndarray::{Array2, Array3};
 use serde::Serialize;
 
 use crate::exposure::{Frame, counts_channel};
+use crate::imaging_system::ImagingSystem;
 use crate::scene::{BuiltIn, LEAN_DEG, SPOKES, STAR};
-use crate::studio::Studio;
 
 /// Contrast by frequency.
 #[derive(Clone, Debug, Serialize)]
@@ -46,7 +46,7 @@ const STAR_MOST: f64 = 0.2;
 /// Curves of the frame behind the element that looks ahead, channel by channel, and of the picture; none for a scene from
 /// which they cannot be read.
 pub fn contrast_curves(
-    studio: &Studio,
+    studio: &ImagingSystem,
     kind: BuiltIn,
     truth: &Array3<f64>,
     frame: &Frame,
@@ -91,7 +91,7 @@ fn of_picture(picture: &Array2<f64>, truth: &Array2<f64>) -> Vec<Sample> {
 }
 
 /// The pixels that count a channel behind the element whose wedge is the least.
-fn of_frame(studio: &Studio, channel: usize, frame: &Frame, truth: &Array2<f64>) -> Vec<Sample> {
+fn of_frame(studio: &ImagingSystem, channel: usize, frame: &Frame, truth: &Array2<f64>) -> Vec<Sample> {
     let wedge = |k: &usize| {
         let w = studio.elements[*k].wedge;
         w.sin_x.hypot(w.sin_y)

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use metalith_camera::Camera;
 use metalith_core::{Result, srgb};
 use metalith_report::{Page, PhotoRow, fixed, write_json};
+use metalith_sensor::Camera;
 use ndarray::Array3;
 use serde::Serialize;
 

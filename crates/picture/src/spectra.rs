@@ -3,11 +3,11 @@
 //! Red, green and blue become reflectances by a basis of the kind of Mallett and Yuksel, Spectral Primary Decomposition
 //! for Rendering with sRGB Reflectance, Eurographics Symposium on Rendering (2019): three curves, each not negative, that
 //! add up to one at every wavelength and are as smooth as they can be while each has, in D65, the colour of its primary.
-//! They are solved for here, for the observer of [`metalith_camera::observer`].
+//! They are solved for here, for the observer of [`metalith_sensor::observer`].
 
 use std::sync::OnceLock;
 
-use metalith_camera::{Illuminant, observer};
+use metalith_sensor::{Illuminant, observer};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::Serialize;
 

@@ -2,19 +2,19 @@
 
 use std::path::Path;
 
-use metalith_camera::Camera;
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
-use metalith_made::CalibratedModel;
+use metalith_optics::CalibratedModel;
 use metalith_report::{Figure, fixed};
+use metalith_sensor::Camera;
 
+use crate::field_of_view::widest_field_deg;
+use crate::forecast_scene::Rehearsal;
+use crate::imaging_system::ImagingSystem;
 use crate::page::pictures_side_by_side;
-use crate::rehearsal::Rehearsal;
 use crate::restore::RestorationMethod;
 use crate::scene::{BuiltIn, chart};
 use crate::score::scores;
-use crate::sight::widest_field_deg;
-use crate::studio::Studio;
 
 /// Pixels an axis of the scene.
 const PIXELS: usize = 512;
@@ -27,7 +27,7 @@ const SEED: u64 = 1;
 /// or the widest field that the array sees.
 ///
 /// # Errors
-/// As [`Studio::open`] and [`Studio::restore`]; if the camera does not see the chip.
+/// As [`ImagingSystem::open`] and [`ImagingSystem::restore`]; if the camera does not see the chip.
 pub fn thumbnail(
     design: &Design,
     layout: &Path,
@@ -37,7 +37,7 @@ pub fn thumbnail(
 ) -> Result<Figure> {
     let field_deg = widest_field_deg(design, camera, PIXELS, MOST_DEG)?;
     let scene = chart(BuiltIn::Star, PIXELS, field_deg, f64::INFINITY);
-    let studio = Studio::open(design, layout, camera, model, &scene, progress)?;
+    let studio = ImagingSystem::open(design, layout, camera, model, &scene, progress)?;
     let frame = studio.record(&studio.simulation(), &scene, SEED)?;
     let operator = studio.restoration();
     let error = Rehearsal::new(&studio, &operator).operator_error;

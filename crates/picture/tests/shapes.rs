@@ -1,15 +1,15 @@
 //! Pictures of lenses that are no squares on a square lattice: where their light goes, against what their cells pass.
 
-use metalith_camera::{Camera, Channel, Illuminant, Response, Sensor};
 use metalith_cell::{Analyser, CellModel, PolarisedTables};
 use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
 use metalith_gds::extract::Extraction;
 use metalith_layout::{read_pillars, write_pillars};
-use metalith_made::SimulationCase;
+use metalith_optics::SimulationCase;
 use metalith_picture::scene::SceneImage;
-use metalith_picture::{BankSpec, ChipInLight, KernelBank, Veil};
+use metalith_picture::{BankSpec, ChipInLight, KernelBank, StrayLight};
+use metalith_sensor::{Camera, Channel, Illuminant, Response, Sensor};
 use metalith_wave::{Direct, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
 use ndarray::Array3;
 
@@ -57,7 +57,7 @@ fn camera(nm: f64) -> Camera {
 struct Taken<'a> {
     chip: ChipInLight<'a>,
     bank: KernelBank,
-    veil: Veil,
+    veil: StrayLight,
 }
 
 fn taken<'a>(design: &Design, extraction: &'a Extraction, cell: &'a dyn CellModel, nm: f64) -> Taken<'a> {
@@ -73,7 +73,7 @@ fn taken<'a>(design: &Design, extraction: &'a Extraction, cell: &'a dyn CellMode
         accurate: true,
     };
     let bank = KernelBank::build(&chip, &scene.basis, spec, &Silent).unwrap();
-    let veil = Veil::build(&chip, &bank, &scene.basis, &camera.sensor, &scene.view, &Silent).unwrap();
+    let veil = StrayLight::build(&chip, &bank, &scene.basis, &camera.sensor, &scene.view, &Silent).unwrap();
     Taken { chip, bank, veil }
 }
 

@@ -4,8 +4,8 @@ use metalith_cell::Fidelity;
 use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
-use metalith_wave::propagation::{Departure, LandingGrid, leaving};
-use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::propagation::{LandingGrid, LocalAngularSpectrum, leaving};
+use metalith_wave::{Accuracy, FoldedPropagator, Pillars, PlaneWave, Psf, Scratch, Window};
 
 /// Squares of the veil: 16 pixels of 5.86 um.
 const CELL_UM: f64 = 93.76;
@@ -34,7 +34,7 @@ fn the_veil_of_an_element_is_that_of_its_field() {
         for um in [0.455, 0.53, 0.66] {
             let table = cells[0].transmissions(um, design.cell.pitch_nm as u16).unwrap();
             let pillars = Pillars::new(widths.as_ref(), &table).unwrap();
-            let departure = Departure::of(&pillars, um, focal_um, BLOCKS);
+            let departure = LocalAngularSpectrum::of(&pillars, um, focal_um, BLOCKS);
             for (beyond, most_of_total, most_of_map) in DIRECTIONS {
                 let mut wave = PlaneWave::looked_at(&elements[k].wedge, um);
                 wave.sin_x += beyond;
@@ -86,7 +86,7 @@ fn power_of_field(design: &Design, pillars: &Pillars<'_>, wave: &PlaneWave, cent
         distance_um: design.lens.focal_length_um,
     };
     let (radius, um) = (design.lens.radius_um(), wave.wavelength_um);
-    let fold = Fold::plan(design.lattice(), radius, um, window, Accuracy::Accurate).unwrap();
+    let fold = FoldedPropagator::plan(design.lattice(), radius, um, window, Accuracy::Accurate).unwrap();
     let psf = Psf::formed(&fold, pillars, wave, &[], &mut Scratch::default()).unwrap();
     psf.values.sum() * window.step_um.powi(2)
 }

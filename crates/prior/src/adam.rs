@@ -1,7 +1,7 @@
 //! Steps down a gradient (Kingma and Ba, Adam, arXiv:1412.6980).
 
 /// Share of what was that stays in the mean of gradients, and in that of their squares.
-const STAYS: [f32; 2] = [0.9, 0.999];
+const BETAS: [f32; 2] = [0.9, 0.999];
 /// Keeps a weight without gradient where it is.
 const LEAST: f32 = 1e-8;
 
@@ -23,11 +23,11 @@ impl Adam {
 
     /// Step number `step`, counted from one, of length `rate` a weight.
     pub fn step(&mut self, weights: &mut [f32], gradient: &[f32], step: u64, rate: f32) {
-        let missing = STAYS.map(|s| 1.0 - f64::from(s).powf(step as f64) as f32);
+        let missing = BETAS.map(|s| 1.0 - f64::from(s).powf(step as f64) as f32);
         let means = self.first.iter_mut().zip(&mut self.second);
         for ((weight, g), (first, second)) in weights.iter_mut().zip(gradient).zip(means) {
-            *first = STAYS[0] * *first + (1.0 - STAYS[0]) * g;
-            *second = STAYS[1] * *second + (1.0 - STAYS[1]) * g * g;
+            *first = BETAS[0] * *first + (1.0 - BETAS[0]) * g;
+            *second = BETAS[1] * *second + (1.0 - BETAS[1]) * g * g;
             *weight -= rate * (*first / missing[0]) / ((*second / missing[1]).sqrt() + LEAST);
         }
     }

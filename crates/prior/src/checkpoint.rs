@@ -5,7 +5,7 @@ use std::path::Path;
 
 use metalith_core::file::read_at_most;
 use metalith_core::text::hex;
-use metalith_core::{Error, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Result};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 
@@ -58,7 +58,7 @@ impl Checkpoint {
         });
         let file =
             safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
-        WholeFile::write(path, &file)
+        AtomicFile::write(path, &file)
     }
 
     /// The state of a file, if there is one.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
 use ndarray::{Array3, Axis};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -61,7 +61,7 @@ const KEEP_TIME: Duration = Duration::from_secs(60);
 const ADDED: f32 = 0.1;
 
 /// One example: what the network sees, the picture that its answer is added to, what should come out, and how much errors count.
-pub(crate) struct Lesson {
+pub(crate) struct Sample {
     pub input: Features,
     pub picture: Array3<f32>,
     pub clean: Array3<f32>,
@@ -77,7 +77,7 @@ pub(crate) trait Lessons: Sync {
     fn origin(&self, spec: &TrainingSpec) -> serde_json::Value;
 
     /// Example number `k`, with pieces and seed of a specification: the same whatever was drawn before.
-    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Lesson;
+    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Sample;
 
     /// Mean peak signal to noise ratio of what is held out (dB).
     fn held_out(&self, network: Network) -> f64;
@@ -162,7 +162,7 @@ pub(crate) fn learn(
     }
     write_weights(out, &plan, &at.weights, &origin)?;
     // What is learnt is in the weights: the next training begins anew, with whatever numbers.
-    WholeFile::discard(state)?;
+    AtomicFile::discard(state)?;
     // The weights as they are written: in half precision.
     let written: Vec<f32> = at.weights.iter().map(|w| half::f16::from_f32(*w).to_f32()).collect();
     Ok(TrainingReport {
@@ -211,7 +211,7 @@ fn step(lessons: &dyn Lessons, spec: &TrainingSpec, plan: &Plan, at: &Checkpoint
 }
 
 /// Mean squared error of an example by its weight, and its gradient.
-fn loss(network: &Network, lesson: Lesson) -> (f64, Vec<f32>) {
+fn loss(network: &Network, lesson: Sample) -> (f64, Vec<f32>) {
     let (answer, trace) = network.traced(lesson.input);
     let found = answer.shuffled();
     let share = lesson.weight / lesson.clean.len() as f32;
@@ -247,7 +247,7 @@ pub(crate) mod tests {
     use super::*;
 
     /// That the gradient of every layer is what difference quotients say, on one example.
-    pub fn gradients_hold(size: Size, lesson: impl Fn() -> Lesson) {
+    pub fn gradients_hold(size: Size, lesson: impl Fn() -> Sample) {
         /// A difference quotient in single precision of a loss of some thousand terms.
         const QUOTIENT: f64 = 0.02;
         let plan = Plan::new(size);

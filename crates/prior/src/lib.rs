@@ -5,7 +5,7 @@
 //! noisy picture, map of its noise    -> expected picture             (`NetworkDenoiser::denoise`)
 //! the same, and a seed               -> one of the pictures it may be of  (`NetworkDenoiser::sample`)
 //! pictures of frames, their scenes   -> weights                      (`train_finisher`)
-//! pictures restored from one frame   -> one picture                  (`Finisher::finish`)
+//! pictures restored from one frame   -> one picture                  (`PostProcessor::finish`)
 //! two pictures, weights of others    -> how different they look      (`PerceptualDistance`)
 //! ```
 //!
@@ -19,12 +19,12 @@ mod convolution;
 mod denoiser;
 mod examples;
 mod features;
-mod finisher;
 mod learning;
 mod network;
 #[cfg(feature = "onnx")]
 mod onnx;
 mod perceptual;
+mod post_processor;
 mod sample;
 mod squares;
 mod stacks;
@@ -33,10 +33,10 @@ mod weights;
 
 pub use denoiser::NetworkDenoiser;
 pub use examples::{Photographs, with_noise};
-pub use finisher::{Finisher, Taught, train_finisher};
 pub use learning::{TrainingReport, TrainingSpec};
 pub use network::COLOURS;
 pub use perceptual::PerceptualDistance;
+pub use post_processor::{PostProcessor, Provenance, train_finisher};
 pub use sample::SAMPLING_STEPS;
 pub use stacks::{Stack, Stacks};
 pub use training::{JUDGED, train};

@@ -6,7 +6,7 @@ use std::path::Path;
 use half::f16;
 use metalith_core::file::read_at_most;
 use metalith_core::text::hex;
-use metalith_core::{Error, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Result};
 use ndarray::{Array2, Array3, Axis, concatenate};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -15,9 +15,9 @@ use sha2::{Digest, Sha256};
 
 use crate::examples::is_held_out;
 use crate::features::Features;
-use crate::finisher::{Finisher, STAGE, Taught};
-use crate::learning::{Lesson, Lessons, TrainingSpec, psnr_db};
+use crate::learning::{Lessons, Sample, TrainingSpec, psnr_db};
 use crate::network::{COLOURS, Network, Size};
+use crate::post_processor::{PostProcessor, Provenance, STAGE};
 use crate::squares::{cut, squares};
 
 /// Longest file of the pictures of a frame (bytes).
@@ -62,7 +62,7 @@ impl Stack {
         });
         let file =
             safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
-        WholeFile::write(path, &file)
+        AtomicFile::write(path, &file)
     }
 
     /// The one that a file keeps, if it is whole and of the same; else it has to be made again.
@@ -152,7 +152,7 @@ pub(crate) fn seen(piece: &Array3<f32>, place: [usize; 2], whole: [usize; 2]) ->
 pub struct Stacks {
     learnt: Vec<Stack>,
     held_out: Vec<Stack>,
-    taught: Taught,
+    taught: Provenance,
 }
 
 impl Stacks {
@@ -174,7 +174,7 @@ impl Stacks {
     ///
     /// # Errors
     /// If there are fewer than two, one has another number of pictures, or is smaller than a piece.
-    pub fn new(stacks: Vec<Stack>, taught: Taught, piece: usize) -> Result<Self> {
+    pub fn new(stacks: Vec<Stack>, taught: Provenance, piece: usize) -> Result<Self> {
         let least = |axis: usize| stacks.iter().map(|s| s.size()[axis]).min().unwrap_or(0);
         Self::check(stacks.len(), [least(0), least(1)], piece)?;
         if let Some(other) = stacks.iter().find(|s| s.pictures() != taught.pictures) {
@@ -202,7 +202,7 @@ impl Stacks {
     }
 
     /// What the network is taught for.
-    pub fn taught(&self) -> &Taught {
+    pub fn taught(&self) -> &Provenance {
         &self.taught
     }
 
@@ -226,7 +226,7 @@ impl Lessons for Stacks {
         serde_json::json!({ "spec": spec, STAGE: self.taught, "pictures": self.digest() })
     }
 
-    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Lesson {
+    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Sample {
         let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
         random.set_stream(k);
         let stack = &self.learnt[random.random_range(0..self.learnt.len())];
@@ -238,7 +238,7 @@ impl Lessons for Stacks {
         ];
         let of = |planes: &Array3<f16>| cut(planes, place, [piece, piece, planes.dim().2]).mapv(f16::to_f32);
         let pictures = of(&stack.pictures);
-        Lesson {
+        Sample {
             input: seen(&pictures, place, stack.size()),
             picture: cut(&pictures, [0; 2], [piece, piece, COLOURS]),
             clean: of(&stack.clean),
@@ -247,7 +247,7 @@ impl Lessons for Stacks {
     }
 
     fn held_out(&self, network: Network) -> f64 {
-        let finisher = Finisher::of_network(network, self.taught.clone());
+        let finisher = PostProcessor::of_network(network, self.taught.clone());
         let all = self.held_out.iter().map(|stack| {
             let found = finisher.corrected(&stack.pictures.mapv(f16::to_f32));
             psnr_db(&found, &stack.clean.mapv(f16::to_f32))

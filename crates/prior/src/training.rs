@@ -6,7 +6,7 @@ use metalith_core::{Progress, Result};
 
 use crate::denoiser::{NetworkDenoiser, input};
 use crate::examples::Photographs;
-use crate::learning::{Lesson, Lessons, TrainingReport, TrainingSpec, learn, psnr_db};
+use crate::learning::{Lessons, Sample, TrainingReport, TrainingSpec, learn, psnr_db};
 use crate::network::{Network, Size};
 
 /// Errors where noise of this deviation is are weighted by one, others by one over theirs.
@@ -40,10 +40,10 @@ impl Lessons for Photographs {
         serde_json::json!({ "spec": spec, "photographs": self.digest() })
     }
 
-    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Lesson {
+    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Sample {
         let example = self.example(spec.piece, spec.seed, k);
         let mean = example.deviation.mean().unwrap_or(EQUAL);
-        Lesson {
+        Sample {
             input: input(&example.noisy, &example.deviation),
             picture: example.noisy,
             clean: example.clean,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use half::f16;
 use metalith_core::file::read_at_most;
-use metalith_core::{Error, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Result};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use crate::network::{Layer, Plan, Size};
@@ -77,7 +77,7 @@ pub(crate) fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training:
         (layer.name.clone(), view)
     });
     let bytes = safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
-    WholeFile::write(path, &bytes)
+    AtomicFile::write(path, &bytes)
 }
 
 fn parse(bytes: &[u8], path: &Path, plan: &Plan) -> Result<Vec<f32>> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::basis::{Family, Kept};
+use super::basis::{Family, RetainedOrders};
 use super::layer::Modes;
 use super::outline::Outline;
 use super::{CellLattice, Result};
@@ -14,7 +14,7 @@ use super::{CellLattice, Result};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Section {
     pub family: Family,
-    pub kept: Kept,
+    pub kept: RetainedOrders,
     /// Of the incident wave over k0.
     pub k: [f64; 2],
     pub steps: [f64; 2],

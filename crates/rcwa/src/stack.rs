@@ -1,10 +1,10 @@
 //! What the solver is given: layers on a lattice, in optical constants.
 
-use metalith_core::LatticeKind;
+use metalith_pillars::LatticeKind;
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::basis::Kept;
+use super::basis::RetainedOrders;
 use super::outline::Outline;
 use super::{Error, Result};
 
@@ -192,11 +192,13 @@ impl LayerStack {
     }
 
     /// Which plane waves are kept of so many orders.
-    pub(super) fn kept(&self, orders: Orders) -> Kept {
+    pub(super) fn kept(&self, orders: Orders) -> RetainedOrders {
         match self.lattice {
-            CellLattice::Square if self.has_slanted() && !self.has_upright() => Kept::disc(orders.along_axis()),
-            CellLattice::Square => Kept::Square(orders.highest()),
-            CellLattice::Staggered { .. } => Kept::circle(orders.along_axis()),
+            CellLattice::Square if self.has_slanted() && !self.has_upright() => {
+                RetainedOrders::disc(orders.along_axis())
+            }
+            CellLattice::Square => RetainedOrders::Square(orders.highest()),
+            CellLattice::Staggered { .. } => RetainedOrders::circle(orders.along_axis()),
         }
     }
 

@@ -7,7 +7,7 @@ use svg::node::element::{Description, Group, Image, Line, Path, Rectangle, SVG, 
 
 use super::axis::Fitted;
 use super::number::short;
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 
 /// Styles of all drawings, for light, dark and print.
 pub(super) const STYLE: &str = include_str!("figure.css");
@@ -49,7 +49,7 @@ impl Figure {
     /// # Errors
     /// If the file cannot be written.
     pub fn write_svg(&self, path: &FilePath) -> Result<()> {
-        WholeFile::write(path, self.to_svg().as_bytes())
+        AtomicFile::write(path, self.to_svg().as_bytes())
     }
 
     /// The drawing as an SVG file of its own, styles included.

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use metalith_core::WholeFile;
+use metalith_core::AtomicFile;
 use metalith_core::{Error, Result};
 
 /// Write `report.json`: the fields of `numbers`, led by `report` (which command's numbers these are) and
@@ -28,5 +28,5 @@ pub fn write_json(path: &Path, report: &str, numbers: &impl Serialize) -> Result
     whole.extend(fields);
     let mut text = format!("{:#}", Value::Object(whole));
     text.push('\n');
-    WholeFile::write(path, text.as_bytes())
+    AtomicFile::write(path, text.as_bytes())
 }

@@ -12,7 +12,7 @@
 //! | [`PhotoRow`] | pictures in colour, side by side |
 //! | [`Matrix`] | shares of named rows by named columns, such as what was taken for what |
 //! | [`Plan`] | shapes of a layout to scale: circles, rectangles, polygons, crosses |
-//! | [`PillarZoom`] | real pillars of a [`PillarMap`](metalith_core::PillarMap), to scale |
+//! | [`PillarZoom`] | real pillars of a [`PillarMap`](metalith_pillars::PillarMap), to scale |
 //!
 //! Everything is deterministic: no dates, fixed number formats, palettes of our own that are safe for
 //! colour-blind readers. Pass and fail are words, never colour alone. Numbers in a page are rounded for

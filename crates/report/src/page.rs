@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::figure::{Figure, STYLE};
 use super::table::{Table, Verdict};
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 
 /// Styles of text and tables; those of drawings, and the colours of both, stand beside the drawings.
 const PAGE_STYLE: &str = include_str!("page.css");
@@ -202,7 +202,7 @@ impl Page {
     /// # Errors
     /// If it cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        WholeFile::write(path, self.html().as_bytes())
+        AtomicFile::write(path, self.html().as_bytes())
     }
 }
 

@@ -4,7 +4,7 @@ use svg::node::element::{Group, Path, SVG};
 
 use super::axis::Axis;
 use super::figure::{Figure, Frame, scale_bar};
-use metalith_core::{PillarMap, PillarShape};
+use metalith_pillars::{PillarMap, PillarShape};
 
 /// More pillars an axis than this would be dust.
 const MOST: f64 = 80.0;

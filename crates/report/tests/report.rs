@@ -1,6 +1,6 @@
 //! One page with every part that a report can have, as a reader's browser would get it.
 
-use metalith_core::{Lattice, PillarMap};
+use metalith_pillars::{Lattice, PillarMap};
 use metalith_report::{
     Axis, Cell, Chart, Column, Figure, HeatMap, ImageGrid, Page, PillarZoom, Plan, Ranking, Table, Verdict, count,
 };

@@ -10,11 +10,11 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design};
 use metalith_gds::{Layout, ReadLimits};
-use metalith_made::{BankRange, CalibratedModel, CellBank, CellChange, MadeChip, Perturbation, bank_orders};
+use metalith_optics::{AsBuiltChip, BankRange, CalibratedModel, CellBank, CellChange, Perturbation, bank_orders};
 use metalith_verify::{ReadLayout, SimulationCases, Verification, wavelengths_um};
 
 use crate::bias::check_biases;
-use crate::draw::Drawer;
+use crate::draw::Sampler;
 use crate::manifest::another_plan;
 use crate::picture::{KnownChip, PictureBench, TakenPicture};
 use crate::plan::{Plan, key};
@@ -37,7 +37,7 @@ impl Progress for Quiet<'_> {
 /// Everything that judges a draw.
 pub(crate) struct Bench {
     pub tolerance: Tolerance,
-    pub drawer: Drawer,
+    pub drawer: Sampler,
     picture: Option<PictureBench>,
     made: MadeRange,
     key: [u8; 32],
@@ -89,7 +89,7 @@ impl Bench {
                 "give a model without declared effects",
             ));
         }
-        let drawer = Drawer::new(&tolerance, base);
+        let drawer = Sampler::new(&tolerance, base);
         let picture = tolerance.picture.as_ref().map(PictureBench::open).transpose()?;
         let mut made = MadeRange::of(&drawer, key)?;
         if picture.as_ref().is_some_and(PictureBench::knows_design) {
@@ -272,13 +272,13 @@ impl Bench {
 }
 
 /// A chip of a design, all its cells from a bank.
-fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Result<MadeChip> {
+fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Result<AsBuiltChip> {
     let stated = LitStack {
         stack: bank.stated().clone(),
         focused: design.focused(),
         polarised: design.verify.light(),
     };
-    Ok(MadeChip::in_light(&stated, model)?.from_bank(bank))
+    Ok(AsBuiltChip::in_light(&stated, model)?.from_bank(bank))
 }
 
 /// Check that rectangles, if the pillars of a design are such, can be made like that.
@@ -303,7 +303,7 @@ fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Res
 
 impl MadeRange {
     /// Every draw is drawn, none is simulated.
-    fn of(drawer: &Drawer, key: [u8; 32]) -> Result<Self> {
+    fn of(drawer: &Sampler, key: [u8; 32]) -> Result<Self> {
         let first = drawer.perturbation(&drawer.draw(key, 0)?);
         let mut range = Self {
             bias_nm: [f64::MAX, f64::MIN],

@@ -3,16 +3,16 @@
 use metalith_cell::CellStack;
 use metalith_core::{Error, Result};
 use metalith_gds::extract::Extraction;
-use metalith_made::{CalibratedModel, Perturbation};
+use metalith_optics::{CalibratedModel, Perturbation};
 
-use crate::draw::Drawer;
+use crate::draw::Sampler;
 
 /// Nothing, if pillars can be as wide as every draw of a design makes them.
 ///
 /// # Errors
 /// With the draw that leaves nothing of the narrowest pillar, or joins the widest ones.
 pub(crate) fn check_biases(
-    drawer: &Drawer,
+    drawer: &Sampler,
     key: [u8; 32],
     design: u64,
     stack: &CellStack,

@@ -2,18 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_camera::Camera;
+use metalith_baselines::{ComparedCamera, Comparison, ComparisonResult, ListedDesign};
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
-use metalith_picture::KeptKernels;
-use metalith_rivals::{ComparedCamera, Comparison, Lineup, ListedDesign};
+use metalith_picture::KernelCache;
+use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::cut::Cut;
 use crate::manifest::{Manifest, absolute, another_plan};
+use crate::sharding::Sharding;
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -26,7 +26,7 @@ pub struct ComparisonPlan {
     work: String,
     /// SHA-256 of all that decides the answers, in hexadecimal.
     pub key: String,
-    pub lineup: Lineup,
+    pub lineup: Comparison,
     /// Folder of the plan.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -59,8 +59,8 @@ impl ComparisonPlan {
     }
 
     /// How it is cut: each camera for itself.
-    pub fn cut(&self) -> Cut {
-        Cut {
+    pub fn cut(&self) -> Sharding {
+        Sharding {
             key: self.key.clone(),
             part: "camera",
             parts: self.lineup.count() as u64,
@@ -78,7 +78,7 @@ impl ComparisonPlan {
             return Err(another_plan(&self.folder));
         }
         let open = self.lineup.open()?;
-        let kept = KeptKernels::only(&self.folder);
+        let kept = KernelCache::only(&self.folder);
         let camera = |k: u64| open.take(k as usize, &kept, progress);
         shards.iter().try_for_each(|n| self.cut().make(*n, &camera, progress))
     }
@@ -87,13 +87,13 @@ impl ComparisonPlan {
     ///
     /// # Errors
     /// If cameras are missing or there twice; as [`ComparisonPlan::run`].
-    pub fn merge(&self, progress: &dyn Progress) -> Result<Comparison> {
+    pub fn merge(&self, progress: &dyn Progress) -> Result<ComparisonResult> {
         let mut cameras: Vec<ComparedCamera> = self.cut().whole(&|_| None)?;
         if key(&self.lineup)? != self.key {
             return Err(another_plan(&self.folder));
         }
         let open = self.lineup.open()?;
-        let kept = KeptKernels::only(&self.folder);
+        let kept = KernelCache::only(&self.folder);
         for (k, camera) in cameras.iter_mut().enumerate() {
             camera.shown = open.take_first(k, 1, &kept, progress)?.shown;
         }
@@ -102,7 +102,7 @@ impl ComparisonPlan {
 }
 
 /// SHA-256 of everything that decides the answers.
-fn key(lineup: &Lineup) -> Result<String> {
+fn key(lineup: &Comparison) -> Result<String> {
     let mut hash = Sha256::new();
     hash.update(env!("CARGO_PKG_VERSION"));
     // What is asked for, with the names of the files; what they say follows.
@@ -137,7 +137,7 @@ fn key(lineup: &Lineup) -> Result<String> {
 ///
 /// # Errors
 /// If a file cannot be used, the folder holds another plan, or the user stopped it.
-pub fn plan_comparison(lineup: &Lineup, folder: &Path, progress: &dyn Progress) -> Result<ComparisonPlan> {
+pub fn plan_comparison(lineup: &Comparison, folder: &Path, progress: &dyn Progress) -> Result<ComparisonPlan> {
     let lineup = placed(lineup)?;
     let open = lineup.open()?;
     open.notes().iter().for_each(|note| progress.warn(note));
@@ -146,7 +146,7 @@ pub fn plan_comparison(lineup: &Lineup, folder: &Path, progress: &dyn Progress) 
         return Ok(known);
     }
     for k in 0..lineup.count() {
-        open.prepare(k, &KeptKernels::made(folder), progress)?;
+        open.prepare(k, &KernelCache::made(folder), progress)?;
     }
     let plan = ComparisonPlan {
         schema: SCHEMA,
@@ -160,7 +160,7 @@ pub fn plan_comparison(lineup: &Lineup, folder: &Path, progress: &dyn Progress) 
 }
 
 /// The same with paths that hold wherever a shard is made.
-fn placed(lineup: &Lineup) -> Result<Lineup> {
+fn placed(lineup: &Comparison) -> Result<Comparison> {
     let design = |listed: &ListedDesign| {
         Ok(ListedDesign {
             design: absolute(&listed.design)?,
@@ -169,7 +169,7 @@ fn placed(lineup: &Lineup) -> Result<Lineup> {
             ..listed.clone()
         })
     };
-    Ok(Lineup {
+    Ok(Comparison {
         camera: absolute(&lineup.camera)?,
         designs: lineup.designs.iter().map(design).collect::<Result<_>>()?,
         photographs: lineup.photographs.iter().map(|p| absolute(p)).collect::<Result<_>>()?,

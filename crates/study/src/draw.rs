@@ -3,7 +3,7 @@
 use metalith_calibrate::Effect;
 use metalith_core::document::Scalar;
 use metalith_core::{Error, Result};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal, Uniform};
@@ -14,7 +14,7 @@ use crate::tolerance::{Distribution, TAIL_SD, Tolerance, effects};
 /// Amounts that are drawn at the most until one is physical.
 const MOST_TRIES: usize = 10_000;
 
-/// The amounts of one draw, in the order of `Drawer::names`.
+/// The amounts of one draw, in the order of `Sampler::names`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
     /// In the unit of each quantity.
@@ -38,14 +38,14 @@ enum Source {
 }
 
 /// Makes the draws of a tolerance.
-pub(crate) struct Drawer {
+pub(crate) struct Sampler {
     effects: Vec<Box<dyn Effect>>,
     quantities: Vec<Quantity>,
     base: Perturbation,
     draws: u64,
 }
 
-impl Drawer {
+impl Sampler {
     /// For a tolerance that was read; `base` is what its model says.
     pub fn new(tolerance: &Tolerance, base: Perturbation) -> Self {
         let effects = effects();
@@ -235,7 +235,7 @@ mod tests {
     use crate::tolerance::{Grid, Varied};
     use metalith_wave::Accuracy;
 
-    fn drawer(sd: f64) -> Drawer {
+    fn drawer(sd: f64) -> Sampler {
         let normal = |effect: &str, sd| Varied {
             effect: effect.into(),
             distribution: Distribution::Normal { mean: 0.0, sd },
@@ -263,7 +263,7 @@ mod tests {
             picture: None,
             limits: Vec::new(),
         };
-        Drawer::new(&tolerance, Perturbation::default())
+        Sampler::new(&tolerance, Perturbation::default())
     }
 
     #[test]

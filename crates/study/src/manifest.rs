@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use metalith_core::file::read_at_most;
-use metalith_core::{Error, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -60,7 +60,7 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
     fn write_in(&self, folder: &Path) -> Result<()> {
         let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
         text.push('\n');
-        WholeFile::write(&folder.join(MANIFEST), text.as_bytes())
+        AtomicFile::write(&folder.join(MANIFEST), text.as_bytes())
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
 use serde::Serialize;
 
 use crate::bench::JudgedDraw;
@@ -148,7 +148,7 @@ impl StudyResult {
                 bytes
             }
         };
-        WholeFile::write(path, &bytes)
+        AtomicFile::write(path, &bytes)
     }
 
     fn lines(&self) -> String {

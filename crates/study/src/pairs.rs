@@ -3,21 +3,22 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use metalith_camera::Camera;
 use metalith_core::file::{file_digest, read_at_most};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
-use metalith_made::CalibratedModel;
+use metalith_optics::CalibratedModel;
 use metalith_picture::scene::{SceneImage, read_far_scene};
 use metalith_picture::{
-    DatasetManifest, DatasetOrigin, DatasetPair, KeptKernels, PairWriter, Studio, check_images, write_dataset_manifest,
+    DatasetManifest, DatasetOrigin, DatasetPair, ImagingSystem, KernelCache, PairWriter, check_images,
+    write_dataset_manifest,
 };
+use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::cut::{Cut, parts_per_shard, ranges};
 use crate::manifest::{Manifest, absolute, another_plan};
+use crate::sharding::{Sharding, parts_per_shard, ranges};
 
 /// Version of the format of the manifest. Frames of version 1 have no black level.
 const SCHEMA: u32 = 2;
@@ -93,8 +94,8 @@ impl PairsPlan {
     }
 
     /// How it is cut.
-    pub fn cut(&self) -> Cut {
-        Cut {
+    pub fn cut(&self) -> Sharding {
+        Sharding {
             key: self.key.clone(),
             part: "pair",
             parts: self.digests.len() as u64,
@@ -111,7 +112,7 @@ impl PairsPlan {
         if hex(&self.request.key(&self.digests)?) != self.key {
             return Err(another_plan(&self.folder));
         }
-        let studio = self.request.studio(&KeptKernels::only(&self.folder), progress)?;
+        let studio = self.request.studio(&KernelCache::only(&self.folder), progress)?;
         let operator = studio.simulation();
         let writer = PairWriter::new(&studio, &operator, self.request.seed, &self.folder);
         let pair = |k: u64| {
@@ -216,13 +217,13 @@ impl PairsRequest {
         read_far_scene(image, self.field_deg)
     }
 
-    fn studio(&self, kept: &KeptKernels, progress: &dyn Progress) -> Result<Studio> {
+    fn studio(&self, kept: &KernelCache, progress: &dyn Progress) -> Result<ImagingSystem> {
         let design = Design::read(&self.design)?;
         let camera = Camera::read(&self.camera)?;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let first = self.images.first();
         let first = first.ok_or_else(|| Error::invalid("no images", "give a folder with at least one"))?;
-        Studio::open_kept(
+        ImagingSystem::open_kept(
             &design,
             &self.layout,
             &camera,
@@ -260,7 +261,7 @@ pub fn plan_pairs(
         return Ok(known);
     }
     check_images(&request.images, progress)?;
-    let studio = request.studio(&KeptKernels::made(folder), progress)?;
+    let studio = request.studio(&KernelCache::made(folder), progress)?;
     let origin = DatasetOrigin::of(
         &studio.design,
         &request.layout,

@@ -2,19 +2,19 @@
 
 use std::path::PathBuf;
 
-use metalith_camera::Camera;
 use metalith_cell::BAND_ORDERS;
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_gds::extract::Extraction;
-use metalith_made::{MadeChip, SimulationCase};
+use metalith_optics::{AsBuiltChip, SimulationCase};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, SceneImage, chart, read_far_scene};
 use metalith_picture::{
-    Frame, FrameOperator, OperatorError, Rehearsal, SCORED_SIDES, ScenePower, Studio, Zone, ZoneScore, check_scored,
-    sampling_of, scores,
+    Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal, SCORED_SIDES, ScenePower, Zone, ZoneScore,
+    check_scored, sampling_of, scores,
 };
+use metalith_sensor::Camera;
 use ndarray::Array3;
 
 /// Pixels an axis of a built-in scene, if nothing else is said.
@@ -112,7 +112,7 @@ pub(crate) struct PictureBench {
 
 /// The chip that a restoration knows when cameras are not calibrated.
 pub(crate) struct KnownChip {
-    studio: Studio,
+    studio: ImagingSystem,
     operator_error: OperatorError,
 }
 
@@ -167,11 +167,11 @@ impl PictureBench {
         &self,
         design: &Design,
         extraction: &Extraction,
-        chip: &MadeChip,
+        chip: &AsBuiltChip,
         progress: &dyn Progress,
-    ) -> Result<Studio> {
+    ) -> Result<ImagingSystem> {
         let case = SimulationCase::Made(chip);
-        Studio::of_pillars(
+        ImagingSystem::of_pillars(
             design,
             extraction,
             case,
@@ -185,12 +185,12 @@ impl PictureBench {
     /// The chip that restorations of all draws know.
     ///
     /// # Errors
-    /// As [`Studio::of_pillars`].
+    /// As [`ImagingSystem::of_pillars`].
     pub fn known(
         &self,
         design: &Design,
         extraction: &Extraction,
-        chip: &MadeChip,
+        chip: &AsBuiltChip,
         progress: &dyn Progress,
     ) -> Result<KnownChip> {
         let studio = self.studio(design, extraction, chip, progress)?;
@@ -201,12 +201,12 @@ impl PictureBench {
     /// The picture that a chip takes; `known` is what its restoration knows, itself if left out.
     ///
     /// # Errors
-    /// As [`Studio::of_pillars`] and [`Studio::restore`].
+    /// As [`ImagingSystem::of_pillars`] and [`ImagingSystem::restore`].
     pub fn take(
         &self,
         design: &Design,
         extraction: &Extraction,
-        chip: &MadeChip,
+        chip: &AsBuiltChip,
         known: Option<&KnownChip>,
         progress: &dyn Progress,
     ) -> Result<TakenPicture> {

@@ -5,7 +5,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use metalith_camera::Camera;
 use metalith_cell::CellStack;
 use metalith_cell::kept::solver_of;
 use metalith_core::file::file_digest;
@@ -13,15 +12,16 @@ use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_layout::write_pillars;
-use metalith_made::{BankRange, CellBank};
+use metalith_optics::{BankRange, CellBank};
+use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::bench::{Bench, Files, Quiet};
-use crate::cut::{Cut, parts_per_shard};
 use crate::manifest::{Manifest, absolute, another_plan, is_planned};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
+use crate::sharding::{Sharding, parts_per_shard};
 use crate::tolerance::Tolerance;
 
 /// Version of the format of the manifest.
@@ -82,8 +82,8 @@ impl Plan {
     }
 
     /// How it is cut.
-    pub fn cut(&self) -> Cut {
-        Cut {
+    pub fn cut(&self) -> Sharding {
+        Sharding {
             key: self.key.clone(),
             part: "draw",
             parts: self.draws,

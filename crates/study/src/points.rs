@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use metalith_core::document::Scalar;
 use serde::Serialize;
 
-use crate::draw::Drawer;
+use crate::draw::Sampler;
 use crate::record::DrawRecord;
 use crate::yields::wilson;
 
@@ -39,14 +39,14 @@ pub struct Spread {
 type Held<'n> = (usize, &'n str, f64, Scalar);
 
 /// The values of each quantity of a grid, one quantity after the other.
-pub(crate) fn each_value(drawer: &Drawer, names: &[(String, String)], draws: &[DrawRecord]) -> Vec<GridPoint> {
+pub(crate) fn each_value(drawer: &Sampler, names: &[(String, String)], draws: &[DrawRecord]) -> Vec<GridPoint> {
     let grids = grids(drawer, names);
     let values = grids.into_iter().flatten();
     values.map(|held| point(&[held], draws)).collect()
 }
 
 /// Every combination of values, where there are several grids and not too many combinations.
-pub(crate) fn combinations(drawer: &Drawer, names: &[(String, String)], draws: &[DrawRecord]) -> Vec<GridPoint> {
+pub(crate) fn combinations(drawer: &Sampler, names: &[(String, String)], draws: &[DrawRecord]) -> Vec<GridPoint> {
     let grids = grids(drawer, names);
     let sizes = grids.iter().map(Vec::len);
     if grids.len() < 2 || sizes.fold(1, usize::saturating_mul) > MOST_COMBINATIONS {
@@ -64,7 +64,7 @@ pub(crate) fn combinations(drawer: &Drawer, names: &[(String, String)], draws: &
     all.iter().map(|held| point(held, draws)).collect()
 }
 
-fn grids<'n>(drawer: &Drawer, names: &'n [(String, String)]) -> Vec<Vec<Held<'n>>> {
+fn grids<'n>(drawer: &Sampler, names: &'n [(String, String)]) -> Vec<Vec<Held<'n>>> {
     let each = names.iter().enumerate().filter_map(|(q, (name, _))| {
         let mut values = drawer.grid(q)?;
         // A value that stands twice is one value with twice the draws.

@@ -38,7 +38,7 @@ impl<'p> Run<'p> {
     }
 
     /// What draws are made by.
-    pub(crate) fn drawer(&self) -> &crate::draw::Drawer {
+    pub(crate) fn drawer(&self) -> &crate::draw::Sampler {
         &self.bench.drawer
     }
 }

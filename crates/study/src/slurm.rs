@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use metalith_core::document::{Document, Section, load};
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 
-use crate::cut::Cut;
 use crate::manifest::absolute;
+use crate::sharding::Sharding;
 
 /// What the jobs of a cluster need.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,7 +65,7 @@ impl Slurm {
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn submissions(plan: &Cut, slurm: &Slurm, shards: &[u64]) -> Result<Vec<Submission>> {
+pub fn submissions(plan: &Sharding, slurm: &Slurm, shards: &[u64]) -> Result<Vec<Submission>> {
     let folder = absolute(&plan.folder.join("slurm"))?;
     let study = absolute(&plan.folder)?;
     // Indices run from zero to below the size.
@@ -74,9 +74,9 @@ pub fn submissions(plan: &Cut, slurm: &Slurm, shards: &[u64]) -> Result<Vec<Subm
     for (k, chunk) in shards.chunks(most).enumerate() {
         let list = folder.join(format!("array_{k:03}.txt"));
         let numbers: String = chunk.iter().map(|n| format!("{n}\n")).collect();
-        WholeFile::write(&list, numbers.as_bytes())?;
+        AtomicFile::write(&list, numbers.as_bytes())?;
         let script = folder.join(format!("array_{k:03}.sh"));
-        WholeFile::write(&script, job(slurm, &study, &folder, &list, chunk.len()).as_bytes())?;
+        AtomicFile::write(&script, job(slurm, &study, &folder, &list, chunk.len()).as_bytes())?;
         all.push(Submission {
             script,
             shards: chunk.to_vec(),

@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells, write_phase_table};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::bench::Quiet;
-use crate::cut::Cut;
 use crate::manifest::{Manifest, absolute, another_plan};
+use crate::sharding::Sharding;
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 1;
@@ -90,8 +90,8 @@ impl StartsPlan {
     }
 
     /// How it is cut.
-    pub fn cut(&self) -> Cut {
-        Cut {
+    pub fn cut(&self) -> Sharding {
+        Sharding {
             key: self.key.clone(),
             part: "start",
             parts: self.starts,
@@ -167,7 +167,7 @@ impl StartsPlan {
         for s in &starts {
             table.push_str(&format!("{},{},{},{}\n", s.start, s.seed, s.from, s.merit));
         }
-        WholeFile::write(&self.folder.join("starts.csv"), table.as_bytes())?;
+        AtomicFile::write(&self.folder.join("starts.csv"), table.as_bytes())?;
         Ok(StartsResult { starts, best, phase })
     }
 }

@@ -447,12 +447,12 @@ at_least = 0.6
         }
         // No other effect may set what such PSFs do not show.
         for effect in effects() {
-            let mut perturbation = metalith_made::Perturbation::default();
+            let mut perturbation = metalith_optics::Perturbation::default();
             let numbers: Vec<f64> = effect.parameters().iter().map(|p| p.typical).collect();
             effect.apply(&numbers, &mut perturbation);
             assert_ne!(
                 perturbation,
-                metalith_made::Perturbation::default(),
+                metalith_optics::Perturbation::default(),
                 "{}",
                 effect.name()
             );

@@ -5,11 +5,11 @@ use std::path::Path;
 use metalith_core::{Progress, Result};
 
 use crate::comparison::ComparisonPlan;
-use crate::cut::Cut;
 use crate::manifest;
 use crate::pairs::PairsPlan;
 use crate::plan::Plan;
 use crate::shard::Run;
+use crate::sharding::Sharding;
 use crate::starts::StartsPlan;
 
 /// Work that was planned into a folder.
@@ -40,7 +40,7 @@ impl Work {
     }
 
     /// How it is cut.
-    pub fn cut(&self) -> Cut {
+    pub fn cut(&self) -> Sharding {
         match self {
             Self::Study(plan) => plan.cut(),
             Self::Pairs(plan) => plan.cut(),

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use metalith_core::{PillarShape, Silent, UprightRectangles};
+use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
 use metalith_gds::Layout;
 use metalith_layout::write_pillars;
-use metalith_made::{CalibratedModel, MadeChip, Perturbation};
+use metalith_optics::{AsBuiltChip, CalibratedModel, Perturbation};
+use metalith_pillars::{PillarShape, UprightRectangles};
 use metalith_study::{DrawRecord, PlanSettings, Work, merge, plan};
 use metalith_testing::rectangles::{Small, rotated, upright};
 use metalith_verify::{ReadLayout, SimulationCases, Verification};
@@ -53,7 +54,7 @@ fn judged_with(small: &Small, model: Option<Perturbation>, kept: Option<&Path>) 
     let models = cell_models(&design, &[design.verify.fidelity]).unwrap();
     let chip = model.map(|perturbation| {
         let model = CalibratedModel::new("set".into(), "found".into(), perturbation);
-        let chip = MadeChip::in_light(&design.lit_stack().unwrap(), &model).unwrap();
+        let chip = AsBuiltChip::in_light(&design.lit_stack().unwrap(), &model).unwrap();
         chip.kept_in(kept)
     });
     let cases = match &chip {

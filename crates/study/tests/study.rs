@@ -8,10 +8,10 @@ use std::path::Path;
 use common::{SMALL_CAMERA, tolerance};
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
-use metalith_made::{CalibratedModel, Perturbation};
+use metalith_optics::{CalibratedModel, Perturbation};
 use metalith_picture::restore::RestorationMethod;
 use metalith_picture::scene::{BuiltIn, chart};
-use metalith_picture::{Rehearsal, Studio, scores};
+use metalith_picture::{ImagingSystem, Rehearsal, scores};
 use metalith_study::{Plan, PlanSettings, Run, Work, merge, plan, write_page};
 
 fn run_shard(plan: &Plan, number: u64) -> metalith_core::Result<()> {
@@ -295,13 +295,13 @@ fn pictures_are_figures_of_a_draw() {
     let of = |figures: &std::collections::BTreeMap<String, Option<f64>>, key: &str| figures[key].unwrap();
 
     let design = metalith_design::Design::read(&folder.path().join("design.toml")).unwrap();
-    let camera = metalith_camera::Camera::read(&folder.path().join("camera.toml")).unwrap();
+    let camera = metalith_sensor::Camera::read(&folder.path().join("camera.toml")).unwrap();
     let scene = chart(BuiltIn::Star, 64, 50.0, f64::INFINITY);
     let layout = folder.path().join("draw/layout.gds");
     let pillars = metalith_layout::read_pillars(&design, &layout, &Silent).unwrap();
     let cells = metalith_design::cell_models(&design, &[metalith_cell::Fidelity::Rigorous]).unwrap();
-    let case = metalith_made::SimulationCase::Cell(cells[0].as_ref());
-    let studio = Studio::of_pillars(&design, &pillars, case, &camera, &scene, Some(5), &Silent).unwrap();
+    let case = metalith_optics::SimulationCase::Cell(cells[0].as_ref());
+    let studio = ImagingSystem::of_pillars(&design, &pillars, case, &camera, &scene, Some(5), &Silent).unwrap();
     let frame = studio.record(&studio.simulation(), &scene, 1).unwrap();
     let operator = studio.restoration();
     let error = Rehearsal::new(&studio, &operator).operator_error;

@@ -6,12 +6,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use common::{SMALL_CAMERA, tolerance};
+use metalith_baselines::{Comparison, ComparisonResult, Lensless, ListedDesign, MaskSpec};
 use metalith_core::Silent;
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells};
 use metalith_picture::scene::read_far_scene;
-use metalith_picture::{DatasetManifest, DatasetOrigin, Studio, write_dataset};
-use metalith_rivals::{Comparison, Lensless, Lineup, ListedDesign, MaskSpec};
+use metalith_picture::{DatasetManifest, DatasetOrigin, ImagingSystem, write_dataset};
 use metalith_study::{PairsRequest, Work, plan_comparison, plan_pairs, plan_starts};
 
 /// The layout of a design, written into a folder.
@@ -103,10 +103,10 @@ fn pairs_of_shards_are_those_of_one_run() {
     assert!(!at("bad/kernels").exists());
 
     let scene = |path: &Path| read_far_scene(path, 50.0);
-    let camera = metalith_camera::Camera::read(&at("camera.toml")).unwrap();
-    let kept = metalith_picture::KeptKernels::made(&at("alone"));
+    let camera = metalith_sensor::Camera::read(&at("camera.toml")).unwrap();
+    let kept = metalith_picture::KernelCache::made(&at("alone"));
     let first = scene(&images[0]).unwrap();
-    let studio = Studio::open_kept(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
+    let studio = ImagingSystem::open_kept(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
     let origin = DatasetOrigin::of(&design, &layout, &camera, None).unwrap();
     let write = |seed| {
         let head = DatasetManifest::of(&studio, origin.clone(), seed);
@@ -202,7 +202,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     let camera = SMALL_CAMERA.replace(mono, &three.collect::<String>());
     fs::write(at("camera.toml"), camera).unwrap();
     let design = Design::read(&at("design.toml")).unwrap();
-    let lineup = Lineup {
+    let lineup = Comparison {
         camera: at("camera.toml"),
         designs: vec![ListedDesign {
             name: Some("small".into()),
@@ -231,11 +231,11 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     work.run(&[0], &Silent).unwrap();
     let merged = planned.merge(&Silent).unwrap();
     let open = lineup.open().unwrap();
-    let kept = metalith_picture::KeptKernels::only(&at("parts"));
+    let kept = metalith_picture::KernelCache::only(&at("parts"));
     let cameras = (0..4).map(|k| open.take(k, &kept, &Silent).unwrap()).collect();
     let direct = open.comparison(cameras);
     // Numbers of a line of JSON come back to rounding.
-    let scores = |c: &Comparison| {
+    let scores = |c: &ComparisonResult| {
         let ways = c.cameras.iter().flat_map(|camera| &camera.ways);
         let all = ways.flat_map(|w| w.mean.iter().chain(w.photographs.iter().flatten()));
         all.map(|s| (s.zone, (s.psnr_db * 1e9).round(), (s.ssim * 1e9).round()))
@@ -251,7 +251,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     ];
     assert_eq!(names, expected);
     assert!(merged.cameras.iter().all(|c| c.shown.is_some()));
-    metalith_rivals::write_comparison(&merged, &at("page")).unwrap();
+    metalith_baselines::write_comparison(&merged, &at("page")).unwrap();
     let page = fs::read_to_string(at("page/compare.html")).unwrap();
     for part in ["Pictures of small", "Pictures of FlatCam, ours"] {
         assert!(page.contains(part), "{part}");

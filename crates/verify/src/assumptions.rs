@@ -1,8 +1,8 @@
 //! What a simulation assumes, and how much each assumption weighs for the design at hand.
 
 use metalith_cell::{Fidelity, FocusedLight, ORDERS, Truncation};
-use metalith_core::{PillarShape, Rectangles, RotatedRectangles};
 use metalith_design::{CellIncidence, Design, Element};
+use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles};
 use metalith_report::{Cell, Column, Page, Table, exact, fixed, sig};
 
 use super::page::span;

@@ -9,10 +9,11 @@ use metalith_cell::{
     BandResponse, CellModel, FittedNeighbours, ObliqueTables, POLARISATION_SHARE, PassedTable, PolarisedLight,
     PolarisedTables,
 };
-use metalith_core::{Error, LatticeKind, PillarRows, Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_grating::NeighbourPillars;
-use metalith_made::{SimulationCase, cell_direction};
-use metalith_wave::{Aperture, Fold, Pillars, PlaneWave, Psf, Scratch};
+use metalith_optics::{SimulationCase, cell_direction};
+use metalith_pillars::{LatticeKind, PillarRows};
+use metalith_wave::{Aperture, FoldedPropagator, Pillars, PlaneWave, Psf, Scratch};
 
 /// The case that judges, and those that are simulated beside it.
 #[derive(Clone)]
@@ -266,7 +267,7 @@ impl TransmissionTables {
         widths: &dyn PillarRows,
         wave: &PlaneWave,
         lit: &PlaneWave,
-        fold: &Fold,
+        fold: &FoldedPropagator,
         lp_mm: &[f64],
         scratch: &mut Scratch,
     ) -> Result<Psf> {

@@ -3,21 +3,22 @@
 use std::path::Path;
 
 use metalith_cell::Fidelity;
-use metalith_core::{PillarRows, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_design::array::{PillarArray, PlacedElement};
 use metalith_design::{AskedLight, Design};
-use metalith_gds::extract::{Extraction, HeldPillars, extract_folded};
+use metalith_gds::extract::{Extraction, StoredPillars, extract_folded};
 use metalith_gds::{Layout, ReadLimits};
 use metalith_layout::extraction_plan;
+use metalith_pillars::PillarRows;
 use metalith_wave::Accuracy;
 
 use super::{ElementCheck, LayoutFacts, PillarCheck, SimulationCases, Verification, check, compare, facts, judge};
 
 /// Compare the pillars of an element as they are held: of one that is held as an eighth, and meant to have all eight
 /// symmetries, each set of copies once.
-fn compare_held(array: &PillarArray, placed: &PlacedElement, found: &HeldPillars) -> PillarCheck {
+fn compare_held(array: &PillarArray, placed: &PlacedElement, found: &StoredPillars) -> PillarCheck {
     match found {
-        HeldPillars::Eighth(map) if array.classes[placed.class].group.members().len() == 8 => {
+        StoredPillars::Eighth(map) if array.classes[placed.class].group.members().len() == 8 => {
             PillarCheck::compare_eighth(array.rows(placed).as_ref(), map)
         }
         _ => PillarCheck::compare(array.all_rows(placed).as_ref(), found),
@@ -57,7 +58,7 @@ fn read_folded(
     array: &PillarArray,
     path: &Path,
     progress: &dyn Progress,
-) -> Result<(LayoutFacts, Vec<ElementCheck>, Extraction<HeldPillars>)> {
+) -> Result<(LayoutFacts, Vec<ElementCheck>, Extraction<StoredPillars>)> {
     let layout = Layout::open_with(path, ReadLimits::default(), progress)?;
     let extraction = extract_folded(&layout, &extraction_plan(design), progress)?;
     let elements = compare(array, &extraction, |placed, found| compare_held(array, placed, found));

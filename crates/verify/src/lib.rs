@@ -5,6 +5,7 @@ mod assumptions;
 mod birefringence;
 mod case;
 mod check;
+pub mod compensate;
 mod copies;
 mod large;
 mod media;
@@ -29,14 +30,15 @@ use num_complex::{Complex32, Complex64};
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
-use metalith_core::{PillarRows, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_design::array::{PillarArray, PillarRule, PlacedElement, Symmetry};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{AskedLight, Design, Element, FieldAngle, LatticeOrders};
-use metalith_gds::extract::{ExtractedElement, Extraction, Oddities, Survey, extract};
+use metalith_gds::extract::{ExtractedElement, Extraction, Survey, UnrecognisedShapes, extract};
 use metalith_gds::{self, Layout};
 use metalith_layout::extraction_plan;
-use metalith_made::{MadeChip, ModelStatement};
+use metalith_optics::{AsBuiltChip, ModelStatement};
+use metalith_pillars::PillarRows;
 use metalith_wave::Accuracy;
 use metalith_wave::propagation::Steepness;
 
@@ -45,8 +47,8 @@ pub use check::{Check, Sense};
 pub use copies::CopyAngle;
 pub use large::{verify_in_parts, verify_pillars};
 pub use memory::Simulation;
-pub use metalith_core::PillarCheck;
-pub use metalith_made::SimulationCase;
+pub use metalith_optics::SimulationCase;
+pub use metalith_pillars::PillarCheck;
 pub use optics::open_matched;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
@@ -124,7 +126,7 @@ pub struct Verification {
     pub camera: Option<CameraStatement>,
     pub layout: LayoutFacts,
     pub elements: Vec<ElementCheck>,
-    pub foreign: Oddities,
+    pub foreign: UnrecognisedShapes,
     pub distinct: Vec<DistinctElement>,
     /// Of a design of rotated rectangles: how near their lattice is to the phase that is asked.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -258,7 +260,7 @@ impl ReadLayout {
 /// # Errors
 /// If it cannot be used.
 pub fn camera_files(camera: &Path) -> Result<Vec<std::path::PathBuf>> {
-    Ok(metalith_camera::Camera::read(camera)?.files)
+    Ok(metalith_sensor::Camera::read(camera)?.files)
 }
 
 /// Wavelengths at which a design is judged (um): those that single PSFs and the mapping are for, and those of the band
@@ -280,7 +282,7 @@ struct Found<'a> {
     elements: Vec<ElementCheck>,
     /// Pillars of each element.
     widths: Vec<&'a dyn PillarRows>,
-    foreign: Oddities,
+    foreign: UnrecognisedShapes,
 }
 
 /// Simulate what was read of a layout and hold it to the limits of its design; a thread holds spectra of at most
@@ -359,7 +361,7 @@ fn judge(
 /// What pillars transmit at the wavelength of the mapping, in the case that judges.
 enum MappingResponse<'a> {
     ByWidth(Vec<Complex64>),
-    Made(f64, &'a MadeChip),
+    Made(f64, &'a AsBuiltChip),
 }
 
 impl<'a> MappingResponse<'a> {

@@ -5,7 +5,7 @@ use std::path::Path;
 use metalith_core::Result;
 use metalith_design::{Design, Element, LensSpec};
 use metalith_gds::extract::{Holding, fits_folded, held_sites};
-use metalith_wave::{Accuracy, Fold, Window};
+use metalith_wave::{Accuracy, FoldedPropagator, Window};
 
 use super::{optics, white};
 
@@ -114,7 +114,7 @@ fn largest_spectra_bytes(design: &Design, accuracy: Accuracy) -> Result<usize> {
             design.verify.window_samples,
             lens.focal_length_um,
         );
-        let fold = Fold::plan(lattice, lens.radius_um(), wavelength_um, window, accuracy)?;
+        let fold = FoldedPropagator::plan(lattice, lens.radius_um(), wavelength_um, window, accuracy)?;
         Ok(fold.spectra_bytes())
     };
     let white = white::wavelengths_um(design)?;

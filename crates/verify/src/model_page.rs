@@ -1,6 +1,6 @@
 //! The part of a report that says by which calibrated model chips were made.
 
-use metalith_made::ModelStatement;
+use metalith_optics::ModelStatement;
 use metalith_report::Page;
 
 /// What the model changes, and what of it is not applied.

@@ -6,9 +6,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_core::PillarRows;
 use metalith_design::array::PillarRule;
 use metalith_design::phase::ElementPhase;
+use metalith_pillars::PillarRows;
 
 /// Root mean square and largest magnitude of a phase error over the pillars (rad); not a number if there are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -115,7 +115,7 @@ impl Sums {
     }
 }
 
-/// Fold each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
+/// FoldedPropagator each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
 /// the number of threads.
 fn per_row<T: Send>(
     widths: &dyn PillarRows,

@@ -8,7 +8,7 @@ use super::copies::CopyAngle;
 use metalith_cell::{Fidelity, PolarisedLight, PolarisedTables};
 use metalith_design::array::PillarRule;
 use metalith_design::{Element, FieldAngle};
-use metalith_wave::psf::{Matched, Psf, PsfMetrics, order_shares, pixel_mtf};
+use metalith_wave::psf::{IdealPsf, Psf, PsfMetrics, order_shares, pixel_mtf};
 
 /// Samples of the phase that the orders of a mapping are computed from: many times the number of widths.
 const ORDER_SAMPLES: usize = 4096;
@@ -24,7 +24,7 @@ pub struct PsfResult {
 }
 
 impl PsfResult {
-    pub fn of(psf: &Psf, matched: &Matched, pixel_um: f64) -> Self {
+    pub fn of(psf: &Psf, matched: &IdealPsf, pixel_um: f64) -> Self {
         let mean = |f: f64| 0.5 * (psf.contrast(0, f) + psf.contrast(1, f)) * pixel_mtf(pixel_um, f);
         let known = psf.otf.iter().flat_map(|otf| otf.lp_mm.iter().copied());
         Self {

@@ -5,7 +5,7 @@ use serde::Serialize;
 use metalith_cell::{MappingError, RotatedCell, RotationCurve, RotationMapping, Truncation};
 use metalith_core::Result;
 use metalith_design::Design;
-use metalith_made::SimulationCase;
+use metalith_optics::SimulationCase;
 
 /// Lattices of equal rotations, at the wavelength of the mapping.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -14,12 +14,13 @@ use super::single_white::SingleWhite;
 use super::white::CameraStatement;
 use super::{model_page, white_page};
 use metalith_cell::{CellModel, Fidelity, PolarisedLight};
-use metalith_core::{Error, Lattice, LatticeKind, PillarMap, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_gds::extract::{ElementSite, Extraction};
-use metalith_made::{MadeChip, ModelStatement, SimulationCase};
+use metalith_optics::{AsBuiltChip, ModelStatement, SimulationCase};
+use metalith_pillars::{Lattice, LatticeKind, PillarMap};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
-use metalith_wave::psf::{Matched, PixelFrequencies, Psf, PsfMetrics};
-use metalith_wave::{Accuracy, Fold, Pillars, PlaneWave, Scratch, Window};
+use metalith_wave::psf::{IdealPsf, PixelFrequencies, Psf, PsfMetrics};
+use metalith_wave::{Accuracy, FoldedPropagator, Pillars, PlaneWave, Scratch, Window};
 
 /// In what light, and where on the sensor.
 #[derive(Clone, Debug)]
@@ -85,7 +86,7 @@ pub fn single_psfs(
         for ((site, widths), psf) in elements.iter().zip(psfs) {
             // Strehl is against the sites as drawn, whatever they transmit.
             let table = vec![Complex64::ONE; usize::from(largest_number(&elements)) + 1];
-            let matched = Matched::of(&Pillars::new(*widths, &table)?, focus, wavelength_um, full);
+            let matched = IdealPsf::of(&Pillars::new(*widths, &table)?, focus, wavelength_um, full);
             all.push(SinglePsf {
                 element: site.name.clone(),
                 wavelength_um,
@@ -121,7 +122,7 @@ fn by_cell(
                 return Err(Error::Interrupted);
             }
             let (window, radius_um) = (light.window(widths.lattice), widths.circle_um());
-            let fold = Fold::plan(widths.lattice, radius_um, wavelength_um, window, light.accuracy)?;
+            let fold = FoldedPropagator::plan(widths.lattice, radius_um, wavelength_um, window, light.accuracy)?;
             let psf = tables.psf(*widths, &wave, &wave, &fold, &light.reported_lp_mm(), scratch)?;
             progress.advance(1);
             Ok(psf)
@@ -132,7 +133,7 @@ fn by_cell(
 /// The PSF of each element as made.
 fn as_made(
     elements: &[(&ElementSite, &PillarMap)],
-    chip: &MadeChip,
+    chip: &AsBuiltChip,
     light: &Lighting,
     wavelength_um: f64,
     progress: &dyn Progress,
@@ -328,7 +329,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
 struct Numbers<'a> {
     psfs: &'a [SinglePsf],
     assumptions: BTreeMap<&'a str, &'a str>,
-    oddities: &'a metalith_gds::extract::Oddities,
+    oddities: &'a metalith_gds::extract::UnrecognisedShapes,
     #[serde(skip_serializing_if = "Option::is_none")]
     model: Option<&'a ModelStatement>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -350,5 +351,5 @@ fn write_npy(path: &Path, values: &Array2<f64>) -> Result<()> {
         npy.finish()
     };
     fill(&mut bytes).map_err(Error::io("encode", path))?;
-    WholeFile::write(path, &bytes)
+    AtomicFile::write(path, &bytes)
 }

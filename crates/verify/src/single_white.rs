@@ -8,12 +8,12 @@ use super::case::TransmissionTables;
 use super::single::{Lighting, distinct, kind_of, largest_number};
 use super::white::{CameraStatement, STEP_NM, step_nm};
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
-use metalith_camera::{Camera, Sampling, WavelengthSteps};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
-use metalith_made::SimulationCase;
-use metalith_wave::psf::{BandSample, Matched};
-use metalith_wave::{Accuracy, Fold, Pillars, Scratch, Window};
+use metalith_optics::SimulationCase;
+use metalith_sensor::{Camera, Sampling, WavelengthSteps};
+use metalith_wave::psf::{BandSample, IdealPsf};
+use metalith_wave::{Accuracy, FoldedPropagator, Pillars, Scratch, Window};
 
 /// One distinct element of a layout in white light.
 #[derive(Clone, Debug, Serialize)]
@@ -108,9 +108,9 @@ pub fn single_white(
             let pitch = widths.lattice.pitch_um();
             let window = Window::about(landing, pitch, light.samples, light.distance_um);
             let psf = match (view, tables) {
-                (Some(view), _) => metalith_made::MadeView::psf(view, window, Accuracy::Fast, &lp_mm, scratch)?,
+                (Some(view), _) => metalith_optics::AsBuiltOptics::psf(view, window, Accuracy::Fast, &lp_mm, scratch)?,
                 (None, Some(tables)) => {
-                    let fold = Fold::plan(widths.lattice, widths.circle_um(), um, window, Accuracy::Fast)?;
+                    let fold = FoldedPropagator::plan(widths.lattice, widths.circle_um(), um, window, Accuracy::Fast)?;
                     tables.psf(widths, &wave, &wave, &fold, &lp_mm, scratch)?
                 }
                 (None, None) => unreachable!("a case is a cell or a made chip"),
@@ -119,7 +119,7 @@ pub fn single_white(
             let ones = vec![Complex64::ONE; usize::from(widest) + 1];
             let focus = [landing[0], landing[1], light.distance_um];
             let full = case.full_transmission(um)?;
-            let matched = Matched::of(&Pillars::new(widths, &ones)?, focus, um, full);
+            let matched = IdealPsf::of(&Pillars::new(widths, &ones)?, focus, um, full);
             progress.advance(1);
             Ok(per_light(landing, psf, matched.power_um2))
         };

@@ -92,8 +92,9 @@ fn row_of_blocks(apertures: &[&dyn Aperture], phase: &ElementPhase<'_>, by: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::{Lattice, Wedge};
+    use metalith_core::Wedge;
     use metalith_design::phase::{LensPhase, RadialPhase};
+    use metalith_pillars::Lattice;
     use metalith_wave::PhaseMap;
 
     /// Of a block's thousand sites, what other orders add.

@@ -10,13 +10,14 @@ use serde::Serialize;
 use super::case::TransmissionTables;
 use super::optics::ReadElement;
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
-use metalith_camera::{Camera, Sampling, WavelengthSteps};
-use metalith_core::{Error, Lattice, Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element};
-use metalith_made::{MadeView, SimulationCase};
+use metalith_optics::{AsBuiltOptics, SimulationCase};
+use metalith_pillars::Lattice;
+use metalith_sensor::{Camera, Sampling, WavelengthSteps};
 use metalith_wave::psf::{BandSample, PixelFrequencies};
-use metalith_wave::{Accuracy, Fold, PlaneWave, Scratch, Window};
+use metalith_wave::{Accuracy, FoldedPropagator, PlaneWave, Scratch, Window};
 
 /// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
 /// this weighs is reported for each channel.
@@ -109,7 +110,7 @@ pub(super) struct WhiteSimulator<'a> {
     design: &'a Design,
     lattice: Lattice,
     judge: SimulationCase<'a>,
-    /// Spectra that a thread may hold at a time, if not all (bytes): see [`Fold::within`].
+    /// Spectra that a thread may hold at a time, if not all (bytes): see [`FoldedPropagator::within`].
     part_bytes: Option<usize>,
     camera: Camera,
     sampling: Sampling,
@@ -266,7 +267,7 @@ impl<'a> WhiteSimulator<'a> {
         &self,
         element: &Element,
         (colour, area_um2): (&Colour, f64),
-        view: Option<&MadeView<'_>>,
+        view: Option<&AsBuiltOptics<'_>>,
         read: &ReadElement<'_>,
         scratch: &mut Scratch,
     ) -> Result<BandSample> {
@@ -280,7 +281,8 @@ impl<'a> WhiteSimulator<'a> {
             (Some(view), _) => view.psf(window, Accuracy::Fast, &self.lp_mm, scratch)?,
             (None, Some(tables)) => {
                 let radius_um = lens.radius_um();
-                let fold = Fold::plan(self.lattice, radius_um, colour.wavelength_um, window, Accuracy::Fast)?;
+                let fold =
+                    FoldedPropagator::plan(self.lattice, radius_um, colour.wavelength_um, window, Accuracy::Fast)?;
                 let fold = match self.part_bytes {
                     Some(bytes) => fold.within(bytes),
                     None => fold,

@@ -3,9 +3,9 @@
 use ndarray::Array2;
 use serde::Serialize;
 
-use metalith_camera::ChannelSampling;
 use metalith_core::{Result, Wedge};
 use metalith_design::Element;
+use metalith_sensor::ChannelSampling;
 use metalith_wave::psf::{BandPart, BandSample, band_otf, pixel_mtf, polychromatic};
 use metalith_wave::{PlaneWave, Psf, propagation};
 

@@ -3,9 +3,10 @@
 use metalith_cell::{
     Analyser, CellModel, Fidelity, HandTables, Handedness, Polarisation, PolarisedLight, PolarisedTables,
 };
-use metalith_core::{Result, RotatedRectangles, Silent};
+use metalith_core::{Result, Silent};
 use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 use metalith_layout::{read_pillars, write_pillars};
+use metalith_pillars::RotatedRectangles;
 use metalith_testing::design;
 use metalith_verify::{Lighting, SimulationCase, SimulationCases, SinglePsf, Verification, single_psfs, verify};
 use metalith_wave::{Accuracy, Psf};

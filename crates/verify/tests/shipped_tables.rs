@@ -2,7 +2,7 @@
 
 use metalith_design::{Design, mappings};
 use metalith_grating::{NeighbourTable, NeighbourTableSpec};
-use metalith_made::cell_direction;
+use metalith_optics::cell_direction;
 use metalith_wave::propagation::incident;
 
 /// Also those whose mapping and directions are the prototype's, and one that is verified at more wavelengths.

@@ -11,7 +11,7 @@ pub mod restore;
 pub use error::{Result, WaveError};
 pub use photograph::Photograph;
 pub use propagation::{
-    Accuracy, Aperture, Direct, Fade, Field, Fold, Hankel, PhaseFunction, PhaseMap, PhaseSites, PillarFunction,
-    Pillars, PlaneWave, Propagator, Scratch, Window,
+    Accuracy, Aperture, Direct, Fade, Field, FoldedPropagator, Hankel, PhaseFunction, PhaseMap, PhaseSites,
+    PillarFunction, Pillars, PlaneWave, Propagator, Scratch, Window,
 };
-pub use psf::{Matched, Psf, PsfMetrics};
+pub use psf::{IdealPsf, Psf, PsfMetrics};

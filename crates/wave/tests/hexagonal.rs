@@ -1,11 +1,11 @@
 //! Light from a hexagonal lattice: the field of a smooth aperture is that of any lattice that samples it, and what is fast
 //! gives the direct sum.
 
-use metalith_core::{Lattice, LatticeKind};
-use metalith_wave::propagation::{Departure, Landing, LandingGrid, Steepness};
+use metalith_pillars::{Lattice, LatticeKind};
+use metalith_wave::propagation::{LandingGrid, LocalAngularSpectrum, SensorIrradiance, Steepness};
 use metalith_wave::{
-    Accuracy, Aperture, Direct, Fold, Hankel, Matched, PhaseFunction, PillarFunction, PlaneWave, Propagator, Psf,
-    Scratch, Window,
+    Accuracy, Aperture, Direct, FoldedPropagator, Hankel, IdealPsf, PhaseFunction, PillarFunction, PlaneWave,
+    Propagator, Psf, Scratch, Window,
 };
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
@@ -140,7 +140,7 @@ fn largest_difference(a: &Array2<Complex32>, b: &Array2<Complex32>) -> f64 {
 /// The largest difference between both ways to a field about a place.
 fn fold_from_direct(aperture: &dyn Aperture, wave: &PlaneWave, window: Window, accuracy: Accuracy) -> f64 {
     let (lattice, um) = (aperture.lattice(), wave.wavelength_um);
-    let fold = Fold::plan(lattice, aperture.radius_um(), um, window, accuracy).unwrap();
+    let fold = FoldedPropagator::plan(lattice, aperture.radius_um(), um, window, accuracy).unwrap();
     let direct = Direct::plan(lattice, um, window).unwrap();
     let scratch = &mut Scratch::default();
     let [a, b]: [&dyn Propagator; 2] = [&fold, &direct];
@@ -208,9 +208,9 @@ fn the_adjoint_of_a_folded_field_is_one() {
     for (iy, mut row) in sites.rows_mut().into_iter().enumerate() {
         lens.fill_row(iy, row.as_slice_mut().unwrap());
     }
-    let planned = Fold::plan(lattice, 20.0, 0.5, window, Accuracy::Accurate).unwrap();
+    let planned = FoldedPropagator::plan(lattice, 20.0, 0.5, window, Accuracy::Accurate).unwrap();
     // A period shorter than the lattice along both axes, so that sites are folded onto one another.
-    let folded = Fold::with_fade(lattice, 0.5, window, [180, 96], [12.0, 15.0]).unwrap();
+    let folded = FoldedPropagator::with_fade(lattice, 0.5, window, [180, 96], [12.0, 15.0]).unwrap();
     for fold in [planned, folded] {
         let scratch = &mut Scratch::default();
         let field = fold.field(&lens, &wave, scratch).unwrap().values;
@@ -259,7 +259,7 @@ fn orders_of_a_coarse_lattice_land_where_the_reciprocal_lattice_has_them() {
         let window = Window::about(centre, 1.5, 31, z);
         let error = fold_from_direct(&disc, &wave, window, Accuracy::Accurate) / matched;
         assert!(error < ACCURATE, "{order:?}: {error}");
-        let fold = Fold::plan(lattice, 15.0, um, window, Accuracy::Accurate).unwrap();
+        let fold = FoldedPropagator::plan(lattice, 15.0, um, window, Accuracy::Accurate).unwrap();
         let field = fold.field(&disc, &wave, &mut Scratch::default()).unwrap();
         let share = Psf::of(&field).energy_um2() / (PI * 225.0);
         // Of point samples each order has all power once, but for the rim of the disc and what lands beside the window.
@@ -285,10 +285,10 @@ fn an_ideal_lens_is_sharp_where_it_is_designed_to_be() {
     let lens = small([0.0; 2]);
     let (radius2, um) = (400.0, 0.55);
     let wave = PlaneWave::normal(um);
-    let matched = Matched::of(&lens, [0.0, 0.0, 50.0], um, 1.2);
+    let matched = IdealPsf::of(&lens, [0.0, 0.0, 50.0], um, 1.2);
     let psf = |z: f64| {
         let window = Window::about([0.0; 2], 0.18, 128, z);
-        let fold = Fold::plan(lens.lattice, 20.0, um, window, Accuracy::Accurate).unwrap();
+        let fold = FoldedPropagator::plan(lens.lattice, 20.0, um, window, Accuracy::Accurate).unwrap();
         Psf::formed(&fold, &lens, &wave, &LP_MM, &mut Scratch::default()).unwrap()
     };
     let peak = |psf: &Psf| psf.values.iter().copied().fold(0.0, f64::max);
@@ -318,7 +318,7 @@ fn an_ideal_lens_is_sharp_where_it_is_designed_to_be() {
         ..lens
     };
     let window = Window::about([0.0; 2], 0.18, 128, 50.0);
-    let fold = Fold::plan(square.lattice, 20.0, um, window, Accuracy::Accurate).unwrap();
+    let fold = FoldedPropagator::plan(square.lattice, 20.0, um, window, Accuracy::Accurate).unwrap();
     let square = Psf::formed(&fold, &square, &wave, &LP_MM, &mut Scratch::default()).unwrap();
     let square = square.otf.unwrap();
     for (i, lp_mm) in LP_MM.into_iter().enumerate() {
@@ -373,11 +373,13 @@ fn rays_land_where_wave_optics_has_them() {
         cells: 11,
         distance_um: z,
     };
-    let map = Landing::of(&lens, &wave, steered, grid).unwrap();
-    let power = Matched::of(&lens, [0.0, 0.0, z], um, 1.0).power_um2;
+    let map = SensorIrradiance::of(&lens, &wave, steered, grid).unwrap();
+    let power = IdealPsf::of(&lens, [0.0, 0.0, z], um, 1.0).power_um2;
     let all = map.travelling_um2() + map.evanescent_um2;
     assert!((all / power - 1.0).abs() < ROUNDING, "{}", all / power);
-    let departing = Departure::of(&lens, um, z, 8).landing([0.0; 2], steered, grid).unwrap();
+    let departing = LocalAngularSpectrum::of(&lens, um, z, 8)
+        .landing([0.0; 2], steered, grid)
+        .unwrap();
     let moved: f64 = departing
         .power_um2
         .iter()
@@ -396,7 +398,7 @@ fn rays_land_where_wave_optics_has_them() {
         samples: 3 * per_cell,
         distance_um: z,
     };
-    let fold = Fold::plan(lens.lattice, 70.0, um, window, Accuracy::Accurate).unwrap();
+    let fold = FoldedPropagator::plan(lens.lattice, 70.0, um, window, Accuracy::Accurate).unwrap();
     let field = fold.field(&lens, &wave, &mut Scratch::default()).unwrap();
     let exact = |iy: usize, ix: usize| {
         let part = metalith_core::part(
@@ -440,17 +442,17 @@ fn rows_out_of_reach_are_not_asked_for() {
         cells: 8,
         distance_um: z,
     };
-    let matched = |aperture: &dyn Aperture| Matched::of(aperture, [0.0, 0.0, z], 0.55, 1.0);
+    let matched = |aperture: &dyn Aperture| IdealPsf::of(aperture, [0.0, 0.0, z], 0.55, 1.0);
     assert_eq!(matched(&within), matched(&lens));
-    let landing = |aperture: &dyn Aperture| Landing::of(aperture, &wave, [0.0; 2], grid).unwrap().power_um2;
+    let landing = |aperture: &dyn Aperture| SensorIrradiance::of(aperture, &wave, [0.0; 2], grid).unwrap().power_um2;
     assert_eq!(landing(&within), landing(&lens));
     let departing = |aperture: &dyn Aperture| {
-        let departure = Departure::of(aperture, 0.55, z, 4);
+        let departure = LocalAngularSpectrum::of(aperture, 0.55, z, 4);
         departure.landing([0.0; 2], [0.0; 2], grid).unwrap().power_um2
     };
     assert_eq!(departing(&within), departing(&lens));
     let window = Window::about([0.0; 2], 0.5, 8, z);
-    let fold = Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).unwrap();
+    let fold = FoldedPropagator::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).unwrap();
     let direct = Direct::plan(lens.lattice, 0.55, window).unwrap();
     for way in [&fold as &dyn Propagator, &direct] {
         assert!(way.field(&within, &wave, &mut Scratch::default()).is_ok());

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 use metalith_wave::{
-    Accuracy, Aperture, Direct, Fold, PhaseFunction, PhaseMap, PlaneWave, Propagator, Psf, Scratch, Window,
+    Accuracy, Aperture, Direct, FoldedPropagator, PhaseFunction, PhaseMap, PlaneWave, Propagator, Psf, Scratch, Window,
 };
 use num_complex::Complex64;
 
@@ -78,7 +78,7 @@ fn a_hologram_sends_its_light_into_orders_by_its_fourier_coefficients() {
         let cosine = (1.0 - sines[0] * sines[0] - sines[1] * sines[1]).sqrt();
         // As far as half-way to the neighbours, in steps below lambda / (2 NA).
         let window = Window::about(sines.map(|s| focus_um * s / cosine), 1.25, 32, focus_um);
-        let fold = Fold::plan(lattice, radius_um, um, window, Accuracy::Accurate).unwrap();
+        let fold = FoldedPropagator::plan(lattice, radius_um, um, window, Accuracy::Accurate).unwrap();
         let direct = Direct::plan(lattice, um, window).unwrap();
         let [by_fold, by_sums] = [&fold as &dyn Propagator, &direct].map(|way| {
             let field = way.field(&element, &wave, &mut Scratch::default()).unwrap();

@@ -1,10 +1,10 @@
 //! The propagators against one another, against the sum over all pillars, and against reference fields.
 
-use metalith_core::{Lattice, PillarMap};
+use metalith_pillars::{Lattice, PillarMap};
 use metalith_wave::camera::{Optic, PixelGrid};
 use metalith_wave::{
-    Accuracy, Aperture, Direct, Fold, Hankel, Matched, PhaseFunction, Pillars, PlaneWave, Propagator, Psf, Scratch,
-    WaveError, Window,
+    Accuracy, Aperture, Direct, FoldedPropagator, Hankel, IdealPsf, PhaseFunction, Pillars, PlaneWave, Propagator, Psf,
+    Scratch, WaveError, Window,
 };
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
@@ -96,7 +96,7 @@ fn worst(case: &[Reference], aperture: &dyn Aperture, accuracy: Accuracy, peak: 
     for step in [0.5, 0.35, 0.1] {
         let window = Window::about([x, y], step, 257, z);
         let radius = aperture.radius_um();
-        let fold = Fold::plan(aperture.lattice(), radius, wave.wavelength_um, window, accuracy).unwrap();
+        let fold = FoldedPropagator::plan(aperture.lattice(), radius, wave.wavelength_um, window, accuracy).unwrap();
         let values = field_of(&fold, aperture, &wave);
         for (r, error) in case.iter().zip(&mut errors) {
             let place = [0, 1].map(|a| (r.point_um[a] - window.centre_um[a]) / step + 128.0);
@@ -192,7 +192,7 @@ fn fold_agrees_with_the_direct_sum_for_small_lenses_wherever_they_look() {
             samples: 21,
             distance_um: z,
         };
-        let fold = Fold::plan(lens.lattice, 20.0, wavelength, window, Accuracy::Accurate).unwrap();
+        let fold = FoldedPropagator::plan(lens.lattice, 20.0, wavelength, window, Accuracy::Accurate).unwrap();
         let direct = Direct::plan(lens.lattice, wavelength, window).unwrap();
         let matched = 1.2 * TAU / 2.0 * 400.0 / (wavelength * z);
         let error = largest_difference(&field_of(&fold, &lens, &wave), &field_of(&direct, &lens, &wave)) / matched;
@@ -232,9 +232,9 @@ fn adjoints_are_adjoint() {
         a.iter().zip(b).map(|(a, b)| double(*a).conj() * double(*b)).sum()
     };
     let norm = |a: &Array2<Complex32>| dot(a, a).re.sqrt();
-    let fold = |accuracy| Fold::plan(lens.lattice, 20.0, 0.5, window, accuracy).unwrap();
+    let fold = |accuracy| FoldedPropagator::plan(lens.lattice, 20.0, 0.5, window, accuracy).unwrap();
     // A period shorter than the lattice, so that sites are folded onto one another.
-    let folded = Fold::with_fade(lens.lattice, 0.5, window, [96, 96], [12.0, 15.0]).unwrap();
+    let folded = FoldedPropagator::with_fade(lens.lattice, 0.5, window, [96, 96], [12.0, 15.0]).unwrap();
     let direct = Direct::plan(lens.lattice, 0.5, window).unwrap();
     let (accurate, fast) = (fold(Accuracy::Accurate), fold(Accuracy::Fast));
     let all: [&dyn Propagator; 4] = [&accurate, &fast, &folded, &direct];
@@ -293,7 +293,7 @@ fn rings_agree_with_the_lattice_on_the_axis_and_near_it() {
 fn what_does_not_fit_together_is_refused() {
     let lens = small(0.0);
     let window = Window::about([0.0, 0.0], 0.5, 8, 50.0);
-    let fold = Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).unwrap();
+    let fold = FoldedPropagator::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).unwrap();
     let scratch = &mut Scratch::default();
     let wave = PlaneWave::normal(0.55);
     let blue = fold.field(&lens, &PlaneWave::normal(0.56), scratch);
@@ -319,7 +319,7 @@ fn what_does_not_fit_together_is_refused() {
         distance_um: f64::NAN,
         ..window
     };
-    let plan = |window| Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).err();
+    let plan = |window| FoldedPropagator::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Fast).err();
     assert!(matches!(plan(far), Some(WaveError::Window { .. })));
     let wide = Window { step_um: 1e6, ..window };
     assert!(matches!(plan(wide), Some(WaveError::Fade { .. })));
@@ -334,12 +334,12 @@ fn a_perfect_lens_has_the_image_of_theory() {
         phase_rad: |x: f64, y: f64| -TAU / 0.53 * ((x * x + y * y + 336.0 * 336.0).sqrt() - 336.0),
     };
     let window = Window::about([0.0, 0.0], 0.35, 256, 336.0);
-    let fold = Fold::plan(lens.lattice, 70.0, 0.53, window, Accuracy::Accurate).unwrap();
+    let fold = FoldedPropagator::plan(lens.lattice, 70.0, 0.53, window, Accuracy::Accurate).unwrap();
     let field = fold
         .field(&lens, &PlaneWave::normal(0.53), &mut Scratch::default())
         .unwrap();
     let psf = Psf::of(&field);
-    let matched = Matched::of(&lens, [0.0, 0.0, 336.0], 0.53, 1.2);
+    let matched = IdealPsf::of(&lens, [0.0, 0.0, 336.0], 0.53, 1.2);
     let metrics = psf.metrics(&matched, 5.86);
     // All sites in phase: the accuracy of the fold, twice for the square.
     assert!((metrics.strehl - 1.0).abs() < 2.0 * ACCURATE);
@@ -373,7 +373,7 @@ fn a_pixel_sees_the_same_by_both_ways() {
         samples: 96,
         distance_um: 50.0,
     };
-    let fold = Fold::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Accurate).unwrap();
+    let fold = FoldedPropagator::plan(lens.lattice, 20.0, 0.55, window, Accuracy::Accurate).unwrap();
     let field = fold
         .field(&lens, &PlaneWave::normal(0.55), &mut Scratch::default())
         .unwrap();

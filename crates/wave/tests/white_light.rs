@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use metalith_core::{Lattice, Wedge};
+use metalith_core::Wedge;
+use metalith_pillars::Lattice;
 use metalith_wave::propagation::{Otf, landing_um};
 use metalith_wave::psf::{BandPart, BandSample, band_otf, polychromatic};
-use metalith_wave::{Accuracy, Aperture, Fold, PhaseFunction, PlaneWave, Psf, Scratch, Window};
+use metalith_wave::{Accuracy, Aperture, FoldedPropagator, PhaseFunction, PlaneWave, Psf, Scratch, Window};
 
 const RADIUS_UM: f64 = 60.0;
 const FOCAL_UM: f64 = 300.0;
@@ -48,7 +49,7 @@ fn lens() -> impl Aperture {
 fn psf(nm: f64, centre_um: [f64; 2], samples: usize, accuracy: Accuracy) -> Psf {
     let lens = lens();
     let window = Window::about(centre_um, 0.35, samples, FOCAL_UM);
-    let fold = Fold::plan(lens.lattice(), RADIUS_UM, nm * 1e-3, window, accuracy).unwrap();
+    let fold = FoldedPropagator::plan(lens.lattice(), RADIUS_UM, nm * 1e-3, window, accuracy).unwrap();
     Psf::formed(&fold, &lens, &wave(nm), &LP_MM, &mut Scratch::default()).unwrap()
 }
 

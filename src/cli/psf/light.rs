@@ -1,7 +1,7 @@
 //! The light that `metalith psf` simulates: wavelengths that were asked for, and what a camera counts.
 
-use metalith::camera::{Camera, Sampling};
 use metalith::design::{USUAL_PIXEL_UM, VISIBLE_UM, band_about};
+use metalith::sensor::{Camera, Sampling};
 use metalith::verify::white_sampling;
 use metalith::{Extraction, Result};
 

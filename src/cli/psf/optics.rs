@@ -11,7 +11,7 @@ use metalith::rcwa::{CellLattice, Material};
 use metalith::report::{exact, sig};
 use metalith::verify::Lighting;
 use metalith::{
-    Accuracy, CalibratedModel, CellModel, Error, Extraction, LatticeKind, MadeChip, PillarShape, Rectangles, Result,
+    Accuracy, AsBuiltChip, CalibratedModel, CellModel, Error, Extraction, LatticeKind, PillarShape, Rectangles, Result,
     Wedge,
 };
 
@@ -212,7 +212,7 @@ impl PsfArgs {
     }
 
     /// The chip as a measured process makes it.
-    pub(super) fn made(&self, found: &Extraction, model: &CalibratedModel) -> Result<MadeChip> {
+    pub(super) fn made(&self, found: &Extraction, model: &CalibratedModel) -> Result<AsBuiltChip> {
         let shape = found.shape;
         let stated = LitStack {
             stack: self.stack(found)?,
@@ -220,7 +220,7 @@ impl PsfArgs {
             polarised: self.polarised_light(shape),
         };
         model.check_drawn(&stated.stack, found.elements.iter().map(|e| e.widths.histogram()))?;
-        Ok(MadeChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref()))
+        Ok(AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref()))
     }
 
     /// What solves it for the pillars as drawn.

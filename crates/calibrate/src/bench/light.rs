@@ -8,10 +8,11 @@ use rayon::prelude::*;
 use super::{Bench, FocusSeries};
 use crate::cells::PillarTable;
 use crate::set::{ElementIndex, PerCapture};
-use metalith_core::{Error, Lattice, Progress, Result};
-use metalith_made::{
-    ArrivingLight, ClassTable, GeometryChange, LightChange, MadeAperture, MadeElement, PathChange, spread,
+use metalith_core::{Error, Progress, Result};
+use metalith_optics::{
+    ArrivingLight, AsBuiltElement, ClassTable, GeometryChange, LightChange, MadeAperture, PathChange, spread,
 };
+use metalith_pillars::Lattice;
 use metalith_wave::propagation::DistancesScratch;
 use metalith_wave::{Aperture, PlaneWave};
 
@@ -21,7 +22,7 @@ const MADE_BYTES: usize = 1_200_000_000;
 
 /// What an element on a lattice takes as it is made (bytes).
 fn made_bytes(lattice: Lattice) -> usize {
-    MadeElement::MOST_BYTES_PER_SITE * lattice.sites() * lattice.sites()
+    AsBuiltElement::MOST_BYTES_PER_SITE * lattice.sites() * lattice.sites()
 }
 
 /// A candidate chip, and the light that it is illuminated with.
@@ -52,7 +53,7 @@ impl Bench<'_> {
             .map(|chip| vec![PerCapture::from(vec![Vec::new(); self.set.captures.len()]); chip.lights.len()])
             .collect();
         for batch in self.batches(chips.len()) {
-            let elements: Vec<Vec<MadeElement>> = batch
+            let elements: Vec<Vec<AsBuiltElement>> = batch
                 .clone()
                 .into_par_iter()
                 .map(|e| {
@@ -117,8 +118,8 @@ impl Bench<'_> {
     }
 
     /// An element of a candidate chip.
-    pub(super) fn element(&self, element: ElementIndex, chip: &Lit<'_>) -> Result<MadeElement> {
-        let made = MadeElement::new(&self.drawn[element], chip.geometry)?;
+    pub(super) fn element(&self, element: ElementIndex, chip: &Lit<'_>) -> Result<AsBuiltElement> {
+        let made = AsBuiltElement::new(&self.drawn[element], chip.geometry)?;
         Ok(match chip.scatter {
             Some(seed) => made.with_pillars_removed(seed + usize::from(element) as u64),
             None => made,
@@ -130,7 +131,7 @@ impl Bench<'_> {
         &self,
         group: &FocusSeries,
         chips: &[Lit<'_>],
-        elements: &[MadeElement],
+        elements: &[AsBuiltElement],
         path: &PathChange,
     ) -> Vec<Vec<Vec<Vec<f32>>>> {
         let lattice = self.set.elements[group.element].pillars.lattice;
@@ -204,7 +205,7 @@ pub(super) fn light(group: &FocusSeries, path: &PathChange, wavelength_um: f64) 
 }
 
 /// Transmission of the sites of an element at one of the wavelengths.
-fn table(chip: &Lit<'_>, element: &MadeElement, wavelength: usize) -> ClassTable {
+fn table(chip: &Lit<'_>, element: &AsBuiltElement, wavelength: usize) -> ClassTable {
     let of = |cells: &PillarTable| element.table(|width| cells.at(wavelength, width), cells.bare[wavelength]);
     let mut table = of(&chip.cells);
     if let Some(rim) = &chip.rim {
@@ -224,7 +225,7 @@ mod tests {
     use metalith_design::{Design, PillarArray};
     use metalith_gds::extract::GdsPillars;
     use metalith_layout::write_pillars;
-    use metalith_made::Stitching;
+    use metalith_optics::Stitching;
     use metalith_wave::Direct;
     use num_complex::Complex64;
 

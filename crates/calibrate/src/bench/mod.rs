@@ -16,7 +16,7 @@ use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{
     Capture, CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera,
 };
-use metalith_made::{DrawnElement, GeometryChange, KernelFilter, Perturbation, veiled};
+use metalith_optics::{DrawnElement, GeometryChange, KernelFilter, Perturbation, veiled};
 use metalith_wave::propagation::{Distances, DistancesPlan};
 
 /// Sampling of the simulated bench.
@@ -257,7 +257,7 @@ impl<'a> Bench<'a> {
         let [cx, cy] = group.centre_um;
         let r = (cx * cx + cy * cy + z * z).sqrt();
         let (sx, sy, sz) = (cx / r, cy / r, z / r);
-        // Landing is z s / sz; sines of incidence change by the cosine of the angle on each axis.
+        // SensorIrradiance is z s / sz; sines of incidence change by the cosine of the angle on each axis.
         let [ax, ay] = group.aoi_rad.map(f64::cos);
         let cross = sx * sy / sz.powi(3);
         [

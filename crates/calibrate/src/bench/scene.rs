@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use metalith_camera::{Blend, Camera, Channel, Illuminant, Led, Response, Spectrum};
 use metalith_cell::PublishedCell;
 use metalith_core::Silent;
 use metalith_design::Design;
 use metalith_gds::extract::GdsPillars;
 use metalith_layout::read_pillars;
-use metalith_made::{Perturbation, SimulationCase};
+use metalith_optics::{Perturbation, SimulationCase};
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{
-    BankSpec, BetweenNodes, ChipInLight, Detail, FrameOperator, KernelBank, SceneSpace, Veil, element_views,
+    BankSpec, BetweenNodes, ChipInLight, Detail, FrameOperator, KernelBank, SceneSpace, StrayLight, element_views,
 };
+use metalith_sensor::{Blend, Camera, Channel, Illuminant, Led, Response, Spectrum};
 use metalith_testing::session::{PIXELS, middle_set, small_design, small_set};
 use ndarray::{Array2, Array3};
 
@@ -110,7 +110,7 @@ impl Lenses {
             let chip = ChipInLight::new(&self.design, &extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
             let scene = spot(capture.aoi_rad[0].sin(), focal_um);
             let views = element_views(&self.design, &camera);
-            let veil = Veil::none(&camera.sensor, 1, 3);
+            let veil = StrayLight::none(&camera.sensor, 1, 3);
             let space = SceneSpace::flat(&scene.view);
             let index = views
                 .iter()
@@ -167,7 +167,7 @@ fn lamp(centre_nm: f64, width_nm: f64, window_um: [f64; 2]) -> Camera {
     // A bench weighs light by power, a channel counts photons.
     let power = Spectrum::new((350..=750).map(|nm| (f64::from(nm), 500.0 / f64::from(nm))).collect()).unwrap();
     Camera {
-        sensor: metalith_camera::Sensor {
+        sensor: metalith_sensor::Sensor {
             columns: (FINER * PIXELS) as u32,
             rows: (FINER * PIXELS) as u32,
             offset_um: window_um,

@@ -4,29 +4,29 @@ use super::light::light;
 use super::{Bench, FocusSeries};
 use crate::set::CaptureIndex;
 use metalith_core::Result;
-use metalith_made::{ArrivingLight, DrawnElement, MadeElement, MadeView, Perturbation, SolvedWidths};
+use metalith_optics::{ArrivingLight, AsBuiltElement, AsBuiltOptics, DrawnElement, Perturbation, SolvedWidths};
 
 impl Bench<'_> {
     /// The element of a capture with a perturbation applied.
     ///
     /// # Errors
-    /// As [`MadeElement::new`].
-    pub fn element_of(&self, capture: CaptureIndex, perturbation: &Perturbation) -> Result<MadeElement> {
+    /// As [`AsBuiltElement::new`].
+    pub fn element_of(&self, capture: CaptureIndex, perturbation: &Perturbation) -> Result<AsBuiltElement> {
         let drawn: &DrawnElement<'_> = &self.drawn[self.set.captures[capture].element];
-        MadeElement::new(drawn, &perturbation.geometry)
+        AsBuiltElement::new(drawn, &perturbation.geometry)
     }
 
     /// That element under the light of the capture, at one wavelength (um). `solved`: transmission of its widths.
     pub fn view<'a>(
         &self,
         capture: CaptureIndex,
-        element: &'a MadeElement,
+        element: &'a AsBuiltElement,
         perturbation: &Perturbation,
         wavelength_um: f64,
         solved: &SolvedWidths,
-    ) -> MadeView<'a> {
+    ) -> AsBuiltOptics<'a> {
         let light = self.direction_of(capture, perturbation, wavelength_um);
-        MadeView::new(element, light, perturbation, solved)
+        AsBuiltOptics::new(element, light, perturbation, solved)
     }
 
     /// The incident wave at the element of a capture, at one wavelength (um).
@@ -138,7 +138,7 @@ mod tests {
                     .unwrap()
                     .mapv(|energy| energy / (pixel * pixel));
                 let mean = want.mean().unwrap();
-                want.mapv_inplace(|v| metalith_made::veiled(v, mean, stray));
+                want.mapv_inplace(|v| metalith_optics::veiled(v, mean, stray));
                 let peak = want.iter().copied().fold(0.0, f64::max);
                 let got = grid.pixels([0.0; 2]);
                 assert!(got.iter().all(|v| v.is_finite()), "{}", effect.name());
@@ -153,7 +153,7 @@ mod tests {
     /// The transmission at any width, interpolated in a table of whole nanometres as the tables of this crate are.
     fn between(table: &[Complex64], width_nm: f64) -> Complex64 {
         let i = width_nm.floor();
-        let weights = metalith_made::lagrange(width_nm - i);
+        let weights = metalith_optics::lagrange(width_nm - i);
         let at = i as usize;
         table[at - 1..at + 3].iter().zip(weights).map(|(t, w)| t * w).sum()
     }

@@ -23,8 +23,8 @@ use self::carry::{Carried, carried_over};
 use metalith_cell::kept;
 use metalith_cell::{CellModel, CellStack};
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result, WholeFile};
-use metalith_made::{CellChange, off_cutoff, perturbed, possible_width_nm};
+use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_optics::{CellChange, off_cutoff, perturbed, possible_width_nm};
 use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
 
 /// Orders along an axis for the stated cell: errs by about 0.005 rad.
@@ -219,7 +219,7 @@ impl RigorousCells {
                 let table = make()?;
                 if let Some(path) = &path {
                     // A cache that cannot be written costs time, not correctness.
-                    let _ = WholeFile::write(path, &table.bytes(solver));
+                    let _ = AtomicFile::write(path, &table.bytes(solver));
                 }
                 table
             }

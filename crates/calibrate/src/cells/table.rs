@@ -1,7 +1,7 @@
 //! Transmissions of pillars over width and wavelength.
 
 use metalith_cell::kept;
-use metalith_made::lagrange;
+use metalith_optics::lagrange;
 use num_complex::Complex64;
 
 /// Version of the cached file.

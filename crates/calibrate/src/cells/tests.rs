@@ -14,7 +14,7 @@ fn made_up() -> CellStack {
         lattice: metalith_rcwa::CellLattice::Square,
         pitch_nm: 350.0,
         height_nm: 700.0,
-        shape: metalith_core::PillarShape::Square,
+        shape: metalith_pillars::PillarShape::Square,
         under: Vec::new(),
         film: constant(2.02),
         substrate: constant(1.46),
@@ -88,7 +88,7 @@ fn a_change_solved_with_few_orders_is_that_with_many() {
 /// the polynomials that intervals count with, root mean square over LEDs and polynomials, of amplitude and of phase.
 fn smooth_error(cells: &RigorousCells, few: usize, many: usize, leds: &[Vec<f64>]) -> [f64; 2] {
     use crate::forward_model::TRANSMISSION_TERMS;
-    use metalith_made::legendre;
+    use metalith_optics::legendre;
     use nalgebra::{DMatrix, DVector};
     let tables = [few, many].map(|orders| cells.solved(&CellChange::default(), orders, &Silent).unwrap());
     let count = tables[0].t[0].len();

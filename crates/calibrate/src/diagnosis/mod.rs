@@ -5,7 +5,7 @@ mod pattern;
 
 use std::path::Path;
 
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -198,7 +198,7 @@ impl Diagnosis {
     pub fn write(&self, path: &Path) -> Result<()> {
         let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
         text.push('\n');
-        WholeFile::write(path, text.as_bytes())
+        AtomicFile::write(path, text.as_bytes())
     }
 
     /// One line for a person.

@@ -1,7 +1,7 @@
 //! The wavefront behind the lens is bent: by the substrate, by stress, or by the writer.
 
 use super::{Effect, Parameter, Stage, ValueError};
-use metalith_made::{DeclaredQuantity, Perturbation};
+use metalith_optics::{DeclaredQuantity, Perturbation};
 
 /// Optical path over every lens by some Zernike polynomials of one kind, the same at all colours.
 pub struct Aberration {

@@ -1,7 +1,7 @@
 //! Overlay error: the aperture is shifted against the pillars by the second exposure.
 
 use super::{Effect, Parameter, Stage, ValueError};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// From the pillars to their aperture along x and y. Light through the crescent that opens on the far side is
 /// not deflected and left out.

@@ -1,7 +1,7 @@
 //! Every pillar is wider or narrower than drawn by the same amount.
 
 use super::{Effect, Parameter, Stage, ValueError};
-use metalith_made::{DeclaredQuantity, Perturbation};
+use metalith_optics::{DeclaredQuantity, Perturbation};
 
 /// Width added to every pillar.
 pub struct CdBias;

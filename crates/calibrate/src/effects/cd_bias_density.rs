@@ -1,7 +1,7 @@
 //! Pillars are wider where more is exposed around them: backscattered electrons, or loading of the etch.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::{DeclaredQuantity, Perturbation};
+use metalith_optics::{DeclaredQuantity, Perturbation};
 
 /// Width added for each unit of area fraction, averaged over the range of the backscatter.
 pub struct CdBiasDensity;

@@ -2,7 +2,7 @@
 
 use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Radius of the vertical edges. Area and phase fall with its square, which is what is fitted.
 pub struct CornerRounding;

@@ -7,7 +7,7 @@ use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
-use metalith_made::{CompiledTerm, DeclaredQuantity, DeclaredTerm, Perturbation};
+use metalith_optics::{CompiledTerm, DeclaredQuantity, DeclaredTerm, Perturbation};
 use metalith_report::sig;
 
 /// Most parameters of one effect: a step of the search fits all of them at once.

@@ -2,7 +2,7 @@
 
 use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Added to the height; the height itself is reported.
 pub struct FilmHeight;

@@ -1,7 +1,7 @@
 //! The refractive index of the film differs from the ellipsometry: another position on the wafer, or densified since.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Added to n at every wavelength.
 pub struct FilmIndex;

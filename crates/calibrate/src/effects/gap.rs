@@ -1,7 +1,7 @@
 //! The camera's plane is farther from the chip than stated.
 
 use super::{Effect, Parameter, Stage, ValueError};
-use metalith_made::{DeclaredQuantity, Perturbation};
+use metalith_optics::{DeclaredQuantity, Perturbation};
 
 /// Added to every distance.
 pub struct Gap;

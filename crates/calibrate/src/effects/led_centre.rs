@@ -1,7 +1,7 @@
 //! The centre wavelength of one LED differs from the stated one: temperature, current, or batch.
 
 use super::{Effect, Parameter, Stage, ValueError};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Added to the centre of one LED.
 pub struct LedCentre {

@@ -1,7 +1,7 @@
 //! Pillars are missing at random positions.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Share of the pillars that are missing.
 pub struct MissingPillars;

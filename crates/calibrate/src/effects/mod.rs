@@ -34,7 +34,7 @@ pub use value_error::ValueError;
 
 use super::set::MeasuredSet;
 use metalith_core::{Error, Result};
-use metalith_made::{DeclaredQuantity, Perturbation};
+use metalith_optics::{DeclaredQuantity, Perturbation};
 
 /// Where in the model an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Standard deviation of a Gaussian; its square is what is fitted.
 pub struct PixelBlur;

@@ -1,7 +1,7 @@
 //! Alumina of the etch mask was left on the pillars.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Thickness of the residual alumina.
 pub struct ResidualMask;

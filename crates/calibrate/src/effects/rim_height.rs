@@ -3,7 +3,7 @@
 //! An etch that goes deeper at the rim is another change: tops are level there, and film or a trench is left between the pillars.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Height added at the rim over that in the middle, with the square of the radius between: the first term of any smooth
 /// change that is the same all around. It is the same in every lens.

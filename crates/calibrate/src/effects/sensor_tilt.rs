@@ -3,7 +3,7 @@
 use super::{Effect, Parameter, Stage, ValueError};
 use crate::extent::Extent;
 use crate::set::MeasuredSet;
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Difference of distance at the outermost element for a tilt of typical size, and for the largest (um).
 const TYPICAL_UM: f64 = 2.0;

@@ -1,7 +1,7 @@
 //! Sidewall taper: the top keeps its width, the foot is wider or narrower.
 
 use super::{Effect, Parameter, Stage};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Angle of the wall from the vertical; positive if the foot is wider.
 pub struct SidewallTaper;

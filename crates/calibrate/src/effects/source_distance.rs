@@ -2,7 +2,7 @@
 
 use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// The reciprocal distance is fitted (1/m); the distance itself is reported.
 pub struct SourceDistance;

@@ -2,7 +2,7 @@
 
 use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Ratio of the diameter to the stated one; the ratio less one is fitted.
 pub struct SourceSize;

@@ -2,7 +2,7 @@
 
 use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
-use metalith_made::{Perturbation, Stitching};
+use metalith_optics::{Perturbation, Stitching};
 
 /// Displacements that a writer may make (nm).
 const MOST_NM: f64 = 300.0;

@@ -1,7 +1,7 @@
 //! A share of the light is spread uniformly: scatter in the relay.
 
 use super::{Effect, Parameter, Stage, ValueError};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Share of the light of a window that is spread over it.
 pub struct StrayLight;

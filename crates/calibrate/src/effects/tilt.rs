@@ -1,7 +1,7 @@
 //! The angle of incidence differs from the stated one, by the same angle for every capture.
 
 use super::{Effect, Parameter, Stage, ValueError};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Added to the angle of incidence along x and y.
 pub struct Tilt;

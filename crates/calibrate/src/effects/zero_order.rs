@@ -2,7 +2,7 @@
 
 use super::{Effect, Parameter, Stage, ValueError};
 use crate::set::MeasuredSet;
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Amplitude of that light relative to the incident wave.
 pub struct ZeroOrder;

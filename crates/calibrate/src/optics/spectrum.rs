@@ -1,7 +1,7 @@
 //! Quadrature over the spectrum of an LED.
 
 use crate::set::Led;
-use metalith_made::LightChange;
+use metalith_optics::LightChange;
 
 /// Equidistant wavelengths over a Gaussian: for smooth integrands this sum converges faster than any power
 /// of its step.

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use metalith_core::{Error, PillarMap, PillarReader, Progress, Result, Wedge};
+use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_design::{Design, Element};
+use metalith_pillars::{PillarMap, PillarReader};
 use ndarray::Array2;
 
 use super::bench_file::{BenchFile, SemOffer};

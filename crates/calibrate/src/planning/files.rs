@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use metalith_cell::Material;
-use metalith_core::{Error, PillarShape, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Result};
 use metalith_design::Design;
+use metalith_pillars::PillarShape;
 
 use super::bench_file::BenchFile;
 use crate::set::MeasuredSet;
@@ -43,12 +44,12 @@ pub fn write_set(folder: &Path, design: &Design, bench: &BenchFile, set: &Measur
         spacer = Some((name, layer.height_nm));
     }
     if !set.sem.is_empty() {
-        WholeFile::write(&folder.join("cd_sem.csv"), sem_table(set).as_bytes())?;
+        AtomicFile::write(&folder.join("cd_sem.csv"), sem_table(set).as_bytes())?;
     }
     let captures = folder.join("captures");
     std::fs::create_dir_all(&captures).map_err(Error::io("make", &captures))?;
     let text = text(design, bench, set, layout, &substrate, spacer);
-    WholeFile::write(&folder.join("measurement.toml"), text.as_bytes())
+    AtomicFile::write(&folder.join("measurement.toml"), text.as_bytes())
 }
 
 /// The file of a capture, from the folder of the set.
@@ -194,7 +195,7 @@ fn write_table(path: &Path, material: &Material, set: &MeasuredSet) -> Result<()
         let _ = writeln!(text, "{nm},{:.6},{:.6}", index.re, index.im);
         nm += TABLE_STEP_NM;
     }
-    WholeFile::write(path, text.as_bytes())
+    AtomicFile::write(path, text.as_bytes())
 }
 
 /// The sites that a SEM is to measure, `measured_nm` left empty.

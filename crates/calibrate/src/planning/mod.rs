@@ -30,8 +30,9 @@ mod wanted;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use metalith_core::{PillarReader, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_design::Design;
+use metalith_pillars::PillarReader;
 use serde::Serialize;
 
 pub use begun::check_not_begun;

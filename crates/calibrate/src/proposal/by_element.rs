@@ -5,7 +5,7 @@ use crate::effects::{DeclaredEffect, DeclaredParameter, Effect, MOST_PARAMETERS}
 use crate::fit::SIGMAS_95;
 use crate::search::{Grouping, Pattern};
 use crate::simulator::Simulator;
-use metalith_made::DeclaredQuantity;
+use metalith_optics::DeclaredQuantity;
 
 /// Fewest elements: two values are always on a line.
 const ELEMENTS: usize = 3;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::effects::{DeclaredEffect, DeclaredParameter};
 use crate::fit::{Fit, FitProblem};
 use metalith_core::{Error, Progress, Result};
-use metalith_made::{DeclaredQuantity, blur};
+use metalith_optics::{DeclaredQuantity, blur};
 use metalith_wave::kernels::sum_of_products;
 
 /// Part of a frame's edge that displacements go to: light from farther is not in the frame.

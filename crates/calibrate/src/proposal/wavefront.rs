@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use crate::effects::{DeclaredEffect, DeclaredParameter};
 use crate::set::MeasuredSet;
 use crate::smooth_residual::SmoothResidual;
-use metalith_made::DeclaredQuantity;
+use metalith_optics::DeclaredQuantity;
 
 /// A polynomial counts if its coefficient is this many standard deviations.
 const SURE: f64 = 4.0;

@@ -4,7 +4,7 @@ use crate::fit::{Fit, FitProblem, minimise};
 use crate::optics::PixelGrid;
 use crate::session::Session;
 use metalith_core::{Progress, Result};
-use metalith_made::{Perturbation, Stitching};
+use metalith_optics::{Perturbation, Stitching};
 
 /// Places that are tried first, over the diameter of a lens, and then about the best of them: [`crate::effects::StitchedFields`] finds
 /// its own from the nearest.

@@ -15,7 +15,7 @@ pub use index::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, Pe
 pub use sem::{COLUMNS as SEM_COLUMNS, SemSite};
 
 use metalith_cell::CellStack;
-use metalith_core::PillarMap;
+use metalith_pillars::PillarMap;
 
 /// A mean of frames this near to saturation contains clipped frames.
 pub const SATURATED: f64 = 0.97;

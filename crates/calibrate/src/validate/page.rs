@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::chips::NOTHING;
 use super::{ClaimedNumber, Validation, ValidationTrial};
-use metalith_core::{Result, WholeFile};
+use metalith_core::{AtomicFile, Result};
 use metalith_report::{Axis, Cell, Column, HeatMap, ImageGrid, Matrix, Page, Table, Verdict, sig, write_json};
 
 /// Largest share of sets without effect in which one may be claimed.
@@ -18,7 +18,7 @@ const SIGMAS: f64 = 6.0;
 /// # Errors
 /// If a file cannot be written.
 pub fn write_validation(folder: &Path, validation: &Validation) -> Result<()> {
-    WholeFile::write(&folder.join("validation.txt"), validation.text().as_bytes())?;
+    AtomicFile::write(&folder.join("validation.txt"), validation.text().as_bytes())?;
     write_json(&folder.join("validation.json"), "calibrate --validate", validation)?;
     let mut page = Page::new(
         "Validation of the calibration",

@@ -16,7 +16,7 @@ use crate::session::{Settings, check_effects};
 use crate::set::{MeasuredSet, PerCapture, PerLed};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use metalith_core::{Error, Progress, Result};
-use metalith_made::Perturbation;
+use metalith_optics::Perturbation;
 
 /// Diffraction orders along an axis; fits use others.
 pub(crate) const ORDERS: usize = 11;

@@ -7,7 +7,7 @@ use metalith_calibrate::{
 };
 use metalith_core::Silent;
 use metalith_gds::extract::GdsPillars;
-use metalith_made::CalibratedModel;
+use metalith_optics::CalibratedModel;
 use metalith_testing::session::set_of_three;
 
 use crate::set::{FOLDERS, LIKE, SYNTHESIZER, names, settings, with_effects};

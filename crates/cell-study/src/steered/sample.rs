@@ -98,8 +98,8 @@ mod tests {
     use super::*;
     use metalith_cell::NeighbourBasis;
     use metalith_cell::SiteResponse;
-    use metalith_core::Lattice;
     use metalith_design::phase::RadialPhase;
+    use metalith_pillars::Lattice;
 
     /// What is said of a sample of so many sites.
     const SAMPLED: f64 = 0.005;

@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::MappingError;
 use crate::{Handedness, RotatedCell, RotationMapping};
-use metalith_core::{Result, RotatedRectangles};
+use metalith_core::Result;
+use metalith_pillars::RotatedRectangles;
 
 /// Phases over half a turn, after which what a lattice adds repeats, that a series is fitted to: four times as many as the
 /// fastest term of [`RotatedCell`] has.

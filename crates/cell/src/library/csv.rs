@@ -6,7 +6,8 @@ use std::path::Path;
 
 use super::{LibraryPillar, PillarLibrary};
 use metalith_core::text::{quoted, table_rows};
-use metalith_core::{Error, Result, UprightRectangles};
+use metalith_core::{Error, Result};
+use metalith_pillars::UprightRectangles;
 
 /// Longest library that is read (bytes): twice that of the most pillars.
 const LONGEST_CSV: u64 = 1 << 20;

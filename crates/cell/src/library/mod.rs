@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Along, MappingError, PolarisationAxis};
-use metalith_core::{Error, Result, UprightRectangles};
+use metalith_core::{Error, Result};
+use metalith_pillars::UprightRectangles;
 
 /// Parts of a turn that phases are told apart by, along either axis: 0.012 rad at most from the middle of one, where neighbouring
 /// pillars of a library are some tenths apart.

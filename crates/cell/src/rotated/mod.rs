@@ -9,7 +9,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use num_complex::Complex64;
 use serde::Serialize;
 
-use metalith_core::{Result, RotatedRectangles};
+use metalith_core::Result;
+use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
 
 pub use self::samples::RotationSamples;

@@ -5,7 +5,8 @@ use std::f64::consts::FRAC_PI_2;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use metalith_core::{Result, RotatedRectangles};
+use metalith_core::Result;
+use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::{Orders, circular};
 
 use super::series::{Channels, Series, samples, solved_rotations};

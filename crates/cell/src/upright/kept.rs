@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::Along;
 use crate::CellStack;
-use crate::kept::{KeptTable, bytes_of, complex_of, solver_of};
-use metalith_core::{PillarShape, UprightRectangles};
+use crate::kept::{CacheEntry, bytes_of, complex_of, solver_of};
+use metalith_pillars::{PillarShape, UprightRectangles};
 
 const MAGIC: [u8; 8] = *b"MLUPRT\0\x01";
 
@@ -19,7 +19,7 @@ pub(super) fn table(
     pillars: UprightRectangles,
     wavelength_um: f64,
     orders: usize,
-) -> KeptTable {
+) -> CacheEntry {
     #[derive(Serialize)]
     struct Inputs<'a> {
         solver: u32,
@@ -36,7 +36,7 @@ pub(super) fn table(
         orders,
     };
     let inputs = serde_json::to_vec(&inputs).expect("plain data serialises");
-    KeptTable::new(folder, "upright", MAGIC, inputs, "upright rectangles")
+    CacheEntry::new(folder, "upright", MAGIC, inputs, "upright rectangles")
 }
 
 /// Along x and along y by pillar, from the first on.

@@ -9,7 +9,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use metalith_core::{Error, Progress, Result, Silent, UprightRectangles};
+use metalith_core::{Error, Progress, Result, Silent};
+use metalith_pillars::UprightRectangles;
 use metalith_rcwa::{Incidence, LayerStack, Orders, Outline, Side, solve_each};
 
 use crate::pointwise::BAND_ORDERS;

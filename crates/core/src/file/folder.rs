@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 ///
 /// Renaming `.part` to `.ready` decides: before, the old ones are untouched; after, whatever is left to do is done by
 /// the next run, which finds the new ones. At no moment does an archive lie beside a folder that is newer.
-pub struct WholeFolder {
+pub struct AtomicFolder {
     places: Places,
     part: PathBuf,
     /// Held until the end; the file is removed with it.
@@ -67,7 +67,7 @@ impl Step {
     ];
 }
 
-impl WholeFolder {
+impl AtomicFolder {
     /// Begin to write the folder that is to stand at `target`, with an archive that is to stand at `archive` in the
     /// same parent. What a killed run left is finished or removed first.
     ///
@@ -119,7 +119,7 @@ impl WholeFolder {
     }
 }
 
-impl Drop for WholeFolder {
+impl Drop for AtomicFolder {
     fn drop(&mut self) {
         if !self.part.as_os_str().is_empty() {
             // Not finished: what is left of it is of no use.

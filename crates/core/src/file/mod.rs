@@ -1,21 +1,21 @@
 //! Files that appear whole or not at all.
 
 mod digest;
+mod direct_io;
 mod folder;
+mod folder_lock;
 mod kind;
 mod part;
-mod past_cache;
-mod turn;
 
 use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 pub use digest::file_digest;
-pub use folder::WholeFolder;
+pub use direct_io::{Ahead, Block};
+pub use folder::AtomicFolder;
+pub use folder_lock::FolderLock;
 pub(crate) use kind::binary_kind;
-pub use past_cache::{Ahead, Block};
-pub use turn::FolderTurn;
 
 use crate::error::{Error, Result};
 
@@ -49,17 +49,17 @@ pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
 
 /// A file written beside its place and renamed into it when complete.
 ///
-/// Until [`WholeFile::commit`] the old file, if any, is untouched; dropped or killed before, nothing
+/// Until [`AtomicFile::commit`] the old file, if any, is untouched; dropped or killed before, nothing
 /// replaces it. The unfinished file has a fixed name (`.name.part`), so that the next run overwrites
 /// what a killed one left. It is locked, so that two runs do not write into one another, and it is written only
 /// if it is an ordinary file with no other name: links and pipes that lie there are refused.
-pub struct WholeFile {
+pub struct AtomicFile {
     target: PathBuf,
     part: PathBuf,
-    out: Option<past_cache::Output>,
+    out: Option<direct_io::Output>,
 }
 
-impl WholeFile {
+impl AtomicFile {
     /// Remove the file that an earlier run left at `target`, if there is one.
     ///
     /// # Errors
@@ -97,7 +97,7 @@ impl WholeFile {
         let file = part::open(&part, target)?;
         Ok(Self {
             target: target.to_owned(),
-            out: Some(past_cache::Output::new(file, &part)),
+            out: Some(direct_io::Output::new(file, &part)),
             part,
         })
     }
@@ -105,7 +105,7 @@ impl WholeFile {
     /// Write the whole of `bytes` to the file at `target`.
     ///
     /// # Errors
-    /// As [`WholeFile::create`] and [`WholeFile::commit`].
+    /// As [`AtomicFile::create`] and [`AtomicFile::commit`].
     pub fn write(target: &Path, bytes: &[u8]) -> Result<()> {
         let mut file = Self::create(target)?;
         file.write_all(bytes).map_err(Error::io("write", target))?;
@@ -133,7 +133,7 @@ impl WholeFile {
     }
 }
 
-impl Write for WholeFile {
+impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.out.as_mut().expect("written before commit").write(bytes)
     }
@@ -143,7 +143,7 @@ impl Write for WholeFile {
     }
 }
 
-impl Drop for WholeFile {
+impl Drop for AtomicFile {
     fn drop(&mut self) {
         // Not finished: what is left of an abandoned file is of no use.
         if let Some(out) = &self.out {

@@ -5,7 +5,7 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use super::{WholeFile, part};
+use super::{AtomicFile, part};
 
 /// Tells the process that a test starts what to do, and where.
 const ROLE: &str = "METALITH_TEST_ROLE";
@@ -67,11 +67,11 @@ fn other_process() {
             let claimed = part::claim(&opened, &part, &target).unwrap();
             println!("claimed {claimed}");
             drop(opened);
-            WholeFile::write(&target, b"late").unwrap();
+            AtomicFile::write(&target, b"late").unwrap();
         }
         // Holds the file until it is killed or told to end.
         "holder" => {
-            let mut file = WholeFile::create(&target).unwrap();
+            let mut file = AtomicFile::create(&target).unwrap();
             file.write_all(&vec![b'h'; LENGTH]).unwrap();
             println!("holds");
             std::io::stdin().lock().read_line(&mut String::new()).unwrap();
@@ -81,7 +81,7 @@ fn other_process() {
             let bytes = vec![role.as_bytes()[0]; LENGTH];
             let mut done = 0;
             while done < WRITES {
-                match WholeFile::write(&target, &bytes) {
+                match AtomicFile::write(&target, &bytes) {
                     Ok(()) => done += 1,
                     Err(error) => assert!(error.to_string().contains("another process is writing"), "{error}"),
                 }
@@ -95,7 +95,7 @@ fn other_process() {
 fn a_late_process_does_not_touch_the_published_file() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("out");
-    let mut first = WholeFile::create(&target).unwrap();
+    let mut first = AtomicFile::create(&target).unwrap();
     let mut late = start("late", &target);
     let mut said = BufReader::new(late.stdout.take().unwrap());
     wait_for(&mut said, "opened");
@@ -146,13 +146,13 @@ fn a_killed_process_leaves_nothing_in_the_way() {
     let mut holder = start("holder", &target);
     let mut said = BufReader::new(holder.stdout.take().unwrap());
     wait_for(&mut said, "holds");
-    let error = WholeFile::create(&target).map(|_| ()).unwrap_err().to_string();
+    let error = AtomicFile::create(&target).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("another process is writing"), "{error}");
     holder.kill().unwrap();
     holder.wait().unwrap();
     assert_eq!(std::fs::read(&target).unwrap(), b"old");
     assert!(part_of(&target).exists());
-    WholeFile::write(&target, b"new").unwrap();
+    AtomicFile::write(&target, b"new").unwrap();
     assert_eq!(std::fs::read(&target).unwrap(), b"new");
     assert!(!part_of(&target).exists());
 }
@@ -164,10 +164,10 @@ fn a_run_that_lost_its_file_leaves_that_of_another_alone() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("out");
     for commits in [true, false] {
-        let mut first = WholeFile::create(&target).unwrap();
+        let mut first = AtomicFile::create(&target).unwrap();
         first.write_all(b"first").unwrap();
         std::fs::remove_file(part_of(&target)).unwrap();
-        let mut second = WholeFile::create(&target).unwrap();
+        let mut second = AtomicFile::create(&target).unwrap();
         second.write_all(b"second").unwrap();
         if commits {
             let error = first.commit().unwrap_err().to_string();
@@ -191,7 +191,7 @@ fn links_are_not_followed() {
     let part = part_of(&target);
     std::fs::write(&other, b"precious").unwrap();
     symlink(&other, &part).unwrap();
-    let refused = || WholeFile::write(&target, b"new").unwrap_err().to_string();
+    let refused = || AtomicFile::write(&target, b"new").unwrap_err().to_string();
     assert!(refused().contains("not an ordinary file"));
     std::fs::remove_file(&part).unwrap();
     symlink(folder.path().join("nowhere"), &part).unwrap();
@@ -211,7 +211,7 @@ fn pipes_and_folders_are_refused() {
     let target = folder.path().join("out");
     let part = part_of(&target);
     assert!(Command::new("mkfifo").arg(&part).status().unwrap().success());
-    let refused = || WholeFile::create(&target).map(|_| ()).unwrap_err().to_string();
+    let refused = || AtomicFile::create(&target).map(|_| ()).unwrap_err().to_string();
     assert!(refused().contains("not an ordinary file"));
     // With a reader the pipe can be opened, and is refused all the same.
     let reader = std::fs::File::options().read(true).write(true).open(&part).unwrap();

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use metalith_core::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape};
+use metalith_pillars::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape};
 
 use super::{PillarRule, Symmetry, SymmetryGroup};
 use crate::Element;

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use metalith_core::PillarRows;
+use metalith_pillars::PillarRows;
 
 use super::{Symmetry, SymmetryGroup};
 
@@ -150,7 +150,7 @@ impl SymmetryGroup {
 mod tests {
     use super::*;
     use crate::array::symmetry::tests::lens;
-    use metalith_core::{Lattice, PillarMap};
+    use metalith_pillars::{Lattice, PillarMap};
 
     /// The domain's copies give every pillar of the lens once.
     fn unfold(map: &PillarMap, group: &SymmetryGroup) {

@@ -15,9 +15,9 @@ pub use symmetry::{Symmetry, SymmetryGroup};
 
 use crate::phase::{ElementPhase, LensPhase};
 use crate::{Design, Element};
-use metalith_core::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape};
 use metalith_core::{Error, Result};
 use metalith_core::{Progress, Wedge};
+use metalith_pillars::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape};
 
 /// Sites of an element that is held (128 MB): one of 2.8 mm. The pillars of a larger one are made as they are asked for.
 const MOST_HELD: u64 = 1 << 26;

@@ -10,7 +10,7 @@ use crate::{CellSpec, Design, MappingSpec, SteeredMapping, SteeringSteps};
 use metalith_cell::{
     ForwardPolynomial, Handedness, InversePolynomial, MappingTable, PillarLibrary, PolarisationAxis, RotationMapping,
 };
-use metalith_core::{PillarMap, PillarShape, RotatedRectangles, UprightRectangles};
+use metalith_pillars::{PillarMap, PillarShape, RotatedRectangles, UprightRectangles};
 
 /// Rounds the duty cycle that a mapping asks for to a width that may be written.
 #[derive(Clone, Debug, PartialEq)]

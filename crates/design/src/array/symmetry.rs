@@ -1,6 +1,6 @@
 //! The eight symmetries of the square, and those of them that leave a lens as it is.
 
-use metalith_core::{Lattice, PillarMap, PillarShape};
+use metalith_pillars::{Lattice, PillarMap, PillarShape};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
 

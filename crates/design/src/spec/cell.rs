@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::lens::WAVELENGTH;
 use metalith_cell::{FocusedLight, Handedness, InversePolynomial, Polarisation, PolarisationAxis};
 use metalith_core::document::{Limits, Section};
-use metalith_core::{LatticeKind, PillarShape, RotatedRectangles, UprightRectangles};
+use metalith_pillars::{LatticeKind, PillarShape, RotatedRectangles, UprightRectangles};
 use metalith_rcwa::Material;
 
 /// The unit cell: a pillar on a lattice.

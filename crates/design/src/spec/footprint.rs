@@ -1,8 +1,8 @@
 //! The box that the pillars of an element stand in: what tells which elements are too near to one another.
 
 use super::{ArraySpec, CellSpec, LensSpec, PlacedSpec};
-use metalith_core::Lattice;
 use metalith_core::document::Section;
+use metalith_pillars::Lattice;
 
 /// Outermost places of the pillars of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

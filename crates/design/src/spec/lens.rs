@@ -8,8 +8,9 @@ use super::array::whole_nm;
 use super::outline::{self, DIAMETER, LensOutline};
 use super::{CellSpec, term};
 use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TermForm};
+use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
-use metalith_core::{Lattice, Result};
+use metalith_pillars::Lattice;
 
 /// The lens that all elements of the array share, or that an element has of its own.
 #[derive(Clone, Debug, PartialEq, Serialize)]

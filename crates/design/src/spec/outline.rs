@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::CellSpec;
 use super::lens::read_diameter;
-use metalith_core::Lattice;
 use metalith_core::document::{Limits, Section};
+use metalith_pillars::Lattice;
 
 /// Smallest and largest diameter of a lens (um).
 pub(super) const DIAMETER: Limits = Limits {

@@ -5,9 +5,9 @@ use super::area::{MOST_SIDES, Sides};
 use super::content::{Content, Outlines, Ring, TextCopy};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
 use metalith_core::text::printable_bytes;
-use metalith_core::{PillarRows, PillarShape};
-use metalith_gds::extract::{ExtractedElement, HeldPillars};
+use metalith_gds::extract::{ExtractedElement, StoredPillars};
 use metalith_gds::{LayerNumber, Point, Rect};
+use metalith_pillars::{PillarRows, PillarShape};
 
 /// Tiles along the longer side of the map of changes.
 const TILES: usize = 128;
@@ -153,8 +153,8 @@ fn size([x, y]: [u16; 2]) -> (u32, u16) {
 }
 
 fn element(
-    a: &ExtractedElement<HeldPillars>,
-    b: &ExtractedElement<HeldPillars>,
+    a: &ExtractedElement<StoredPillars>,
+    b: &ExtractedElement<StoredPillars>,
     shape: PillarShape,
     changes: &mut Changes,
 ) -> ElementDiff {

@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::super::polygon::twice_area;
 use super::super::work::Allowance;
-use metalith_core::{Error, PillarShape, Progress, Result};
-use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, HeldPillars, Scale, Why};
+use metalith_core::{Error, Progress, Result};
+use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, Scale, StoredPillars, Why};
 use metalith_gds::{
     DrawnPillar, LayerNumber, Layout, LayoutCell, PillarFinder, Point, Rect, Selection, Shape, Text, Transform,
     Visitor, drawn_corners, rectangle_of, simplified,
 };
+use metalith_pillars::PillarShape;
 
 /// Vertices that may be placed for each that may be held: most corners of rectangles are not.
 const PLACED: u64 = 8;
@@ -37,7 +38,7 @@ pub(super) struct WantedPillars<'a> {
 pub(super) struct Content {
     /// What is a pillar.
     pub shape: PillarShape,
-    pub elements: Vec<ExtractedElement<HeldPillars>>,
+    pub elements: Vec<ExtractedElement<StoredPillars>>,
     pub outlines: BTreeMap<LayerNumber, Outlines>,
     pub counts: BTreeMap<LayerNumber, u64>,
     /// Sorted.

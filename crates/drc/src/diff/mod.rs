@@ -19,9 +19,10 @@ use std::io::Read;
 
 use super::work::Allowance;
 use content::{Content, Strings, WantedPillars};
-use metalith_core::{ElementSite, Error, PillarShape, Progress, Result, UprightRectangles};
+use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
+use metalith_pillars::{ElementSite, PillarShape, UprightRectangles};
 
 /// Options of a comparison.
 #[derive(Clone, Copy, Debug)]

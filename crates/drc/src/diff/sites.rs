@@ -1,7 +1,7 @@
 //! The elements of both layouts on common lattices.
 
-use metalith_core::Lattice;
 use metalith_gds::extract::ElementSite;
+use metalith_pillars::Lattice;
 
 /// Add the elements of a second layout to those of a first: an element on the lattice of one that is known
 /// extends it; one that overlaps a known one on another lattice is left out, and its pillars are compared

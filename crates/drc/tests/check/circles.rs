@@ -1,6 +1,6 @@
 //! The deck for round pillars: a clean chip, and for each rule of theirs one that breaks it.
 
-use metalith_core::circle_corners;
+use metalith_pillars::circle_corners;
 use metalith_testing::gds::Gds;
 
 use crate::deck_from;

@@ -2,12 +2,13 @@
 
 use std::f64::consts::PI;
 
-use metalith_core::{Silent, circle_corners};
+use metalith_core::Silent;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_drc::diff::{DiffPlan, diff};
 use metalith_drc::{CheckInput, DrcReport};
 use metalith_gds::Layout;
 use metalith_layout::write_pillars;
+use metalith_pillars::circle_corners;
 use metalith_testing::gds::Gds;
 
 use crate::{broken, deck_from, input, layout};

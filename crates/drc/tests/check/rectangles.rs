@@ -1,7 +1,8 @@
 //! The deck for rotated rectangles: a clean chip, and for each rule of theirs one that breaks it.
 
-use metalith_core::{RotatedRectangles, Silent, UprightRectangles};
+use metalith_core::Silent;
 use metalith_drc::CheckInput;
+use metalith_pillars::{RotatedRectangles, UprightRectangles};
 use metalith_testing::gds::Gds;
 
 use crate::on_lattice::{broken_on_lattice, site};

@@ -10,7 +10,8 @@ use crate::{
     Error, ExtractionError, LayerNumber, Layout, LayoutCell, PillarFinder, Rect, Result, Selection, Shape, Transform,
     Visitor,
 };
-use metalith_core::{ElementSite, PillarShape, Progress, Rectangles};
+use metalith_core::Progress;
+use metalith_pillars::{ElementSite, PillarShape, Rectangles};
 
 /// How a layout is looked at.
 #[derive(Clone, Copy)]

@@ -7,12 +7,12 @@ use std::collections::HashMap;
 use copies::Images;
 
 use super::MOST_SITES;
-use super::held::HeldPillars;
+use super::held::StoredPillars;
 use super::oddity::Why;
 use super::plan::ExtractedElement;
 use super::sites::{Scale, Sites, Standing};
 use crate::{DrawnPillar, ExtractionError, Rect, Transform};
-use metalith_core::{EighthMap, ElementSite, PillarRows};
+use metalith_pillars::{EighthMap, ElementSite, PillarRows};
 
 /// Puts pillars on the sites of elements.
 ///
@@ -21,7 +21,7 @@ use metalith_core::{EighthMap, ElementSite, PillarRows};
 pub struct Filler {
     scale: Scale,
     sites: Sites,
-    elements: Vec<ExtractedElement<HeldPillars>>,
+    elements: Vec<ExtractedElement<StoredPillars>>,
     /// Element that each placement of the current cell met last.
     guesses: Vec<u32>,
     /// Placements of the current cell about the middles of elements, if all of them are.
@@ -48,7 +48,7 @@ impl Filler {
     pub fn new(sites: Vec<ElementSite>, scale: Scale) -> Self {
         let index = Sites::new(&sites, scale);
         let empty = |site: ElementSite| ExtractedElement {
-            widths: HeldPillars::Empty(site.lattice),
+            widths: StoredPillars::Empty(site.lattice),
             site,
         };
         Self {
@@ -82,7 +82,7 @@ impl Filler {
     ///
     /// # Errors
     /// [`ExtractionError::Sites`] if they have more sites than are held: what was put after that is lost.
-    pub fn finish(self) -> Result<Vec<ExtractedElement<HeldPillars>>, ExtractionError> {
+    pub fn finish(self) -> Result<Vec<ExtractedElement<StoredPillars>>, ExtractionError> {
         if !self.refused {
             return Ok(self.elements);
         }
@@ -119,11 +119,11 @@ impl Filler {
     /// Hold an eighth of an element of which nothing is held, unless that is too much.
     fn hold_eighth(&mut self, element: u32) {
         let widths = &mut self.elements[element as usize].widths;
-        let HeldPillars::Empty(lattice) = *widths else { return };
+        let StoredPillars::Empty(lattice) = *widths else { return };
         let held = self.held + EighthMap::sites(lattice);
         if held <= self.most {
             self.held = held;
-            *widths = HeldPillars::Eighth(EighthMap::empty(lattice));
+            *widths = StoredPillars::Eighth(EighthMap::empty(lattice));
         }
     }
 
@@ -180,7 +180,7 @@ impl Filler {
             let orbit = &self.orbits[k];
             if let Some((row, column, width_nm)) = site(self, orbit) {
                 let (element, copies) = (orbit.element as usize, orbit.placements.len() as u64);
-                if let HeldPillars::Eighth(map) = &mut self.elements[element].widths {
+                if let StoredPillars::Eighth(map) = &mut self.elements[element].widths {
                     *map.at(column, row) = width_nm;
                     self.pillars += copies;
                 }
@@ -194,7 +194,7 @@ impl Filler {
     #[inline]
     fn site_of(&self, orbit: &Orbit, r: &Rect, placements: &[Transform]) -> Option<(usize, usize, u16)> {
         let element = orbit.element;
-        let HeldPillars::Eighth(map) = &self.elements[element as usize].widths else {
+        let StoredPillars::Eighth(map) = &self.elements[element as usize].widths else {
             return None;
         };
         let placed = placements.get(orbit.placements[0])?.apply_rect(r)?;
@@ -278,7 +278,7 @@ impl Filler {
     fn fill(&mut self, element: u32, row: usize, column: usize, number: u16) -> Result<bool, Why> {
         // Nearly all pillars are of elements that are held whole already.
         let place = match &mut self.elements[element as usize].widths {
-            HeldPillars::Whole(map) => Some(&mut map.number[[row, column]]),
+            StoredPillars::Whole(map) => Some(&mut map.number[[row, column]]),
             other if other.number(column, row) != 0 => return Err(Why::DuplicateSite),
             _ => self.place(element, row, column),
         };
@@ -308,11 +308,11 @@ impl Filler {
     /// The width at one site alone; none if its element cannot be held.
     #[inline]
     fn place(&mut self, element: u32, row: usize, column: usize) -> Option<&mut u16> {
-        if !matches!(self.elements[element as usize].widths, HeldPillars::Whole(_)) {
+        if !matches!(self.elements[element as usize].widths, StoredPillars::Whole(_)) {
             self.hold_whole(element);
         }
         match &mut self.elements[element as usize].widths {
-            HeldPillars::Whole(map) => Some(&mut map.number[[row, column]]),
+            StoredPillars::Whole(map) => Some(&mut map.number[[row, column]]),
             _ => None,
         }
     }
@@ -326,7 +326,7 @@ impl Filler {
         self.refused |= held > self.most;
         if !self.refused {
             self.held = held;
-            *widths = HeldPillars::Whole(widths.whole());
+            *widths = StoredPillars::Whole(widths.whole());
         }
     }
 

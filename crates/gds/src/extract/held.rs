@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use metalith_core::{EighthMap, Lattice, PillarMap, PillarRows};
+use metalith_pillars::{EighthMap, Lattice, PillarMap, PillarRows};
 
 /// Pillars that were read of one element.
 #[derive(Clone, Debug)]
-pub enum HeldPillars {
+pub enum StoredPillars {
     /// No pillar yet: no memory.
     Empty(Lattice),
     /// All pillars came with all copies of them by the symmetries of the square.
@@ -14,7 +14,7 @@ pub enum HeldPillars {
     Whole(PillarMap),
 }
 
-impl HeldPillars {
+impl StoredPillars {
     /// Sites that are held.
     pub fn sites(&self) -> u64 {
         match self {
@@ -46,7 +46,7 @@ impl HeldPillars {
     }
 }
 
-impl PillarRows for HeldPillars {
+impl PillarRows for StoredPillars {
     fn lattice(&self) -> Lattice {
         match self {
             Self::Empty(lattice) => *lattice,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::tiles::TileMap;
 use crate::{ExtractionError, Point, Rect};
-use metalith_core::{ElementSite, Lattice, LatticeKind};
+use metalith_pillars::{ElementSite, Lattice, LatticeKind};
 
 /// Fewer pillars together are no element.
 pub(super) const FEWEST: u64 = 16;

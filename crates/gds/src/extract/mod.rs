@@ -17,20 +17,21 @@ mod sizes;
 mod survey;
 mod tiles;
 
-pub use oddity::{Oddities, Oddity, Why};
+pub use oddity::{UnrecognisedShape, UnrecognisedShapes, Why};
 pub use plan::{Elements, ExtractedElement, Extraction, ExtractionPlan};
 pub use survey::{LayerSummary, Survey, TextSummary};
 
 use std::path::Path;
 
 use crate::{Error, ExtractionError, Layout, Result};
-pub use metalith_core::ElementSite;
-use metalith_core::{EighthMap, LayerNumber, PillarMap, PillarReader, PillarShape, Progress};
+use metalith_core::{LayerNumber, Progress};
+pub use metalith_pillars::ElementSite;
+use metalith_pillars::{EighthMap, PillarMap, PillarReader, PillarShape};
 use pillars::PillarCollector;
 
 pub use discover::{Discovered, discover};
 pub use filler::Filler;
-pub use held::HeldPillars;
+pub use held::StoredPillars;
 pub use sites::Scale;
 
 /// Sites of all elements together where they are held in full, or where the layout says how large they are: 5 x 5 lenses
@@ -123,7 +124,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
     let found = sites_of(layout, plan, progress)?;
     fits(layout.path(), &found.sites)?;
     let folded = extract_from(layout, plan, found, MOST_SITES, progress)?;
-    let whole = |e: ExtractedElement<HeldPillars>| ExtractedElement {
+    let whole = |e: ExtractedElement<StoredPillars>| ExtractedElement {
         site: e.site,
         widths: e.widths.into_map(),
     };
@@ -145,7 +146,7 @@ pub fn extract_folded(
     layout: &Layout,
     plan: &ExtractionPlan,
     progress: &dyn Progress,
-) -> Result<Extraction<HeldPillars>> {
+) -> Result<Extraction<StoredPillars>> {
     let found = sites_of(layout, plan, progress)?;
     let most = match plan.elements {
         Elements::Given(_) => MOST_GIVEN_SITES,
@@ -179,7 +180,7 @@ fn extract_from(
     found: Discovered,
     most: u64,
     progress: &dyn Progress,
-) -> Result<Extraction<HeldPillars>> {
+) -> Result<Extraction<StoredPillars>> {
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
     let mut pillars = PillarCollector::new(plan, found.shape, found.sites, Scale::of(layout)?, most);

@@ -24,7 +24,7 @@ pub enum Why {
 }
 
 impl Why {
-    /// All reasons, in the order of [`Oddities::by_why`].
+    /// All reasons, in the order of [`UnrecognisedShapes::by_why`].
     pub const ALL: [Self; 7] = [
         Self::OffLattice,
         Self::UnequalSides,
@@ -51,7 +51,7 @@ impl Why {
 
 /// One shape that is not a pillar.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Oddity {
+pub struct UnrecognisedShape {
     pub why: Why,
     /// Middle of its bounding box in the layout (nm).
     pub centre_nm: [f64; 2],
@@ -63,19 +63,19 @@ pub struct Oddity {
 
 /// Shapes that are not pillars: the first of them, and the number of all.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Oddities {
-    pub listed: Vec<Oddity>,
+pub struct UnrecognisedShapes {
+    pub listed: Vec<UnrecognisedShape>,
     /// Number for each of [`Why::ALL`].
     pub by_why: [u64; 7],
 }
 
-impl Oddities {
+impl UnrecognisedShapes {
     /// Number of all.
     pub fn total(&self) -> u64 {
         self.by_why.iter().sum()
     }
 
-    pub(super) fn add(&mut self, oddity: Oddity, most: usize) {
+    pub(super) fn add(&mut self, oddity: UnrecognisedShape, most: usize) {
         self.by_why[oddity.why as usize] += 1;
         if self.listed.len() < most {
             self.listed.push(oddity);

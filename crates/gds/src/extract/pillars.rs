@@ -1,13 +1,13 @@
 //! The visitor that fills the width maps.
 
 use super::filler::Filler;
-use super::held::HeldPillars;
-use super::oddity::{Oddities, Oddity, Why};
+use super::held::StoredPillars;
+use super::oddity::{UnrecognisedShape, UnrecognisedShapes, Why};
 use super::plan::{Extraction, ExtractionPlan};
 use super::sites::Scale;
 use super::survey::Surveyor;
 use crate::{ExtractionError, LayerNumber, LayoutCell, PillarFinder, Rect, Shape, Text, Transform, Visitor, pillar_of};
-use metalith_core::{ElementSite, PillarShape};
+use metalith_pillars::{ElementSite, PillarShape};
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
 pub(super) struct PillarCollector {
@@ -17,7 +17,7 @@ pub(super) struct PillarCollector {
     scale: Scale,
     finder: PillarFinder,
     filler: Filler,
-    oddities: Oddities,
+    oddities: UnrecognisedShapes,
     surveyor: Surveyor,
 }
 
@@ -31,12 +31,12 @@ impl PillarCollector {
             scale,
             finder: PillarFinder::new(shape, scale.nm(1.0)),
             filler: Filler::new(sites, scale).holding(most),
-            oddities: Oddities::default(),
+            oddities: UnrecognisedShapes::default(),
             surveyor: Surveyor::default(),
         }
     }
 
-    pub fn finish(self, top: String) -> Result<Extraction<HeldPillars>, ExtractionError> {
+    pub fn finish(self, top: String) -> Result<Extraction<StoredPillars>, ExtractionError> {
         Ok(Extraction {
             top,
             shape: self.shape,
@@ -58,7 +58,7 @@ impl PillarCollector {
     #[cold]
     fn odd(&mut self, why: Why, r: &Rect, offset: u64) {
         let nm = |v: i64| self.scale.nm(v as f64);
-        let oddity = Oddity {
+        let oddity = UnrecognisedShape {
             why,
             centre_nm: [nm(r.x0 + r.x1) / 2.0, nm(r.y0 + r.y1) / 2.0],
             size_nm: [nm(r.width()), nm(r.height())],

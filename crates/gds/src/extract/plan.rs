@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use super::oddity::Oddities;
+use super::oddity::UnrecognisedShapes;
 use super::survey::Survey;
 use crate::{LayerNumber, Selection};
-use metalith_core::{ElementSite, Error, PillarMap, PillarShape, Result};
+use metalith_core::{Error, Result};
+use metalith_pillars::{ElementSite, PillarMap, PillarShape};
 
 /// Where the elements are.
 #[derive(Clone, Debug)]
@@ -89,7 +90,7 @@ pub struct Extraction<W = PillarMap> {
     /// Pillars on a lattice, over all elements.
     pub pillars: u64,
     /// Everything on the pillar layer that is not a pillar on the lattice of an element.
-    pub oddities: Oddities,
+    pub oddities: UnrecognisedShapes,
     /// All layers and texts.
     pub survey: Survey,
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::{Layout, Rect, Result};
-use metalith_core::ElementSite;
+use metalith_pillars::ElementSite;
 
 /// Database unit as `num / den` nanometres: lengths are compared as `database units * num` and `nm * den`.
 #[derive(Clone, Copy, Debug)]
@@ -194,7 +194,7 @@ impl Sites {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::{Lattice, LatticeKind};
+    use metalith_pillars::{Lattice, LatticeKind};
 
     fn square(x: i64, y: i64, w: i64) -> Rect {
         Rect {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::sites::Scale;
 use crate::memo::{BoxMemo, OutlineMemo};
 use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
-use metalith_core::{Rectangles, RotatedRectangles, UprightRectangles};
+use metalith_pillars::{Rectangles, RotatedRectangles, UprightRectangles};
 
 /// Sizes that are told apart: a layout has one, and what its corners make of it.
 const MOST_SIZES: usize = 1 << 12;

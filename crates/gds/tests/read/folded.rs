@@ -1,8 +1,9 @@
 //! Elements that a file folds by symmetry are held as an eighth, and are the same pillars as if they were not.
 
-use metalith_core::{Lattice, PillarRows, Silent};
-use metalith_gds::extract::{ElementSite, ExtractionPlan, HeldPillars, Oddities, extract, extract_folded};
+use metalith_core::Silent;
+use metalith_gds::extract::{ElementSite, ExtractionPlan, StoredPillars, UnrecognisedShapes, extract, extract_folded};
 use metalith_gds::{Layout, Transform};
+use metalith_pillars::{Lattice, PillarRows};
 use metalith_testing::gds::Gds;
 
 use super::{PILLARS, layout};
@@ -66,7 +67,7 @@ fn file(cells: &Cells<'_>, folded: bool) -> Layout {
 }
 
 /// Both ways of reading both files agree; returns how the folded one was held and what is odd in it.
-fn held(sites: usize, cells: &Cells<'_>) -> (HeldPillars, Oddities) {
+fn held(sites: usize, cells: &Cells<'_>) -> (StoredPillars, UnrecognisedShapes) {
     let plan = ExtractionPlan::given(PILLARS, vec![site(sites)]);
     let flat = extract(&file(cells, false), &plan, &Silent).unwrap();
     let folded = file(cells, true);
@@ -87,14 +88,14 @@ fn what_is_folded_by_all_symmetries_is_held_as_an_eighth() {
     let rotations = &ALL[..4];
     let octant: &[_] = &[(1, 3, 120), (3, 5, 130), (-1, 7, 140)];
     let (even, oddities) = held(8, &[(octant, &ALL), (&[(3, 3, 110), (-5, 5, 112)], rotations)]);
-    assert!(matches!(even, HeldPillars::Eighth(_)));
+    assert!(matches!(even, StoredPillars::Eighth(_)));
     assert_eq!(oddities.total(), 0);
     // Odd lattices have sites on the axes, each on one mirror, and one in the middle, which four copies meet.
     let odd: &Cells<'_> = &[(&[(2, 4, 120)], &ALL), (&[(0, 4, 110), (6, 6, 114)], rotations)];
-    assert!(matches!(held(7, odd).0, HeldPillars::Eighth(_)));
+    assert!(matches!(held(7, odd).0, StoredPillars::Eighth(_)));
     assert!(matches!(
         held(7, &[(&[(0, 0, 90)], &ALL[..1])]).0,
-        HeldPillars::Whole(_)
+        StoredPillars::Whole(_)
     ));
 }
 
@@ -116,7 +117,7 @@ fn what_breaks_the_symmetry_is_read_as_it_stands() {
         let (_, oddities) = held(8, cells);
         assert_eq!(oddities.total(), odd, "{cells:?}");
     }
-    assert!(matches!(held(8, cases[0].0).0, HeldPillars::Whole(_)));
+    assert!(matches!(held(8, cases[0].0).0, StoredPillars::Whole(_)));
     // Off the lattice, and turned by less than a quarter.
     assert_eq!(held(8, &[(octant, &ALL), (&[(2, 3, 100)], &ALL)]).1.total(), 8);
     assert!(Transform::IDENTITY.is_square());

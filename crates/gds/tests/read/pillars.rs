@@ -1,8 +1,9 @@
 //! What is taken for a pillar, and where the elements are.
 
-use metalith_core::{Lattice, LatticeKind, PillarMap, PillarShape, RotatedRectangles, Silent};
+use metalith_core::Silent;
 use metalith_gds::Layout;
 use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
+use metalith_pillars::{Lattice, LatticeKind, PillarMap, PillarShape, RotatedRectangles};
 use metalith_testing::gds::Gds;
 
 use crate::{PILLARS, foreign_files, layout};
@@ -68,7 +69,7 @@ fn polygon_about(x: i32, y: i32, corners: &[(i64, i64)]) -> Vec<(i32, i32)> {
 
 /// The polygon of a circle about a place, closed.
 fn circle_of_points(x: i32, y: i32, diameter: u32) -> Vec<(i32, i32)> {
-    polygon_about(x, y, &metalith_core::circle_corners(diameter, 0.5))
+    polygon_about(x, y, &metalith_pillars::circle_corners(diameter, 0.5))
 }
 
 /// Circles of two diameters on a lattice, and one square among them.

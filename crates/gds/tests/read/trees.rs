@@ -1,7 +1,8 @@
 //! Random trees of cells: read as gds21 reads them, every reference followed.
 
-use metalith_core::{Lattice, PillarMap, Silent};
+use metalith_core::Silent;
 use metalith_gds::extract::{ElementSite, Extraction, ExtractionPlan, extract};
+use metalith_pillars::{Lattice, PillarMap};
 use proptest::prelude::*;
 use rand::SeedableRng;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::SHOWN;
-use crate::census::Census;
+use crate::census::LayoutStatistics;
 use crate::contents::Contents;
 use crate::pictures;
 use metalith_core::Result;
@@ -126,7 +126,7 @@ pub(super) fn cells(page: &mut Page, c: &Contents<'_>) {
 }
 
 /// Cells, those that hold others first, each with what it holds.
-fn tree(file: &Census) -> String {
+fn tree(file: &LayoutStatistics) -> String {
     let mut cells: Vec<_> = file.cells.iter().collect();
     cells.sort_by(|a, b| a.depth.cmp(&b.depth).then(a.name.cmp(&b.name)));
     let mut text = String::new();

@@ -4,7 +4,7 @@ use super::SHOWN;
 use crate::contents::Contents;
 use crate::pad::measured;
 use crate::pictures;
-use metalith_core::{PillarShape, Rectangles};
+use metalith_pillars::{PillarShape, Rectangles};
 use metalith_report::{Cell, Column, Page, Table};
 
 pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {

@@ -4,7 +4,7 @@ use crate::contents::Contents;
 use crate::dose::{DOSE_FORMULA, FORMULA, duration};
 use crate::pad::{dose_pads, measured};
 use crate::{job, pictures};
-use metalith_core::{PillarShape, Rectangles};
+use metalith_pillars::{PillarShape, Rectangles};
 use metalith_report::{Cell, Column, Page, Table, fixed};
 
 pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use metalith_core::Result;
 use metalith_core::document::load;
-use metalith_core::{PillarShape, Result};
 use metalith_design::Design;
 use metalith_drc::Deck;
+use metalith_pillars::PillarShape;
 
 /// The processes that ship with the program, by the names of their files; the first is the standard one.
 const SHIPPED: [(&str, &str); 5] = [
@@ -342,7 +343,7 @@ mod tests {
 
     #[test]
     fn the_shipped_processes_are_read_and_expose_pillars() {
-        let rectangles = metalith_core::RotatedRectangles {
+        let rectangles = metalith_pillars::RotatedRectangles {
             width_nm: 100,
             length_nm: 250,
             steps: 180,

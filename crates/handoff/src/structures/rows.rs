@@ -5,8 +5,8 @@ use crate::drawing::{RectNm, Sheet, nm};
 use crate::matrix::top_pad;
 use crate::pad::{DrawnSize, line_width, test_pads};
 use crate::process::Process;
-use metalith_core::{LatticeKind, PillarShape, Rectangles};
 use metalith_design::Design;
+use metalith_pillars::{LatticeKind, PillarShape, Rectangles};
 
 /// Lines of a dense CD group; odd, so that the middle one is as dense as lines get.
 const LINES: i64 = 5;

@@ -13,11 +13,12 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use metalith_cell::Fidelity;
-use metalith_core::{Error, Lattice, Progress, Result, Silent};
+use metalith_core::{Error, Progress, Result, Silent};
 use metalith_design::{Design, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Selection, Shape, Transform, Visitor};
-use metalith_handoff::{Census, HandoffOptions, Manifest, handoff, verify_handoff};
+use metalith_handoff::{HandoffOptions, LayoutStatistics, Manifest, handoff, verify_handoff};
 use metalith_layout::LayoutFormat;
+use metalith_pillars::Lattice;
 use metalith_wave::Accuracy;
 
 const DESIGN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml");
@@ -274,7 +275,7 @@ fn at_every_place_to_look_stands_the_pillar_of_the_table() {
 
 #[test]
 fn nine_blocks_are_alike_but_for_their_dose() {
-    let census = Census::take(&shared().join("dose/mini_3x3_dose_matrix.gds"), &Silent).unwrap();
+    let census = LayoutStatistics::take(&shared().join("dose/mini_3x3_dose_matrix.gds"), &Silent).unwrap();
     let first = census.layer(20, 1).unwrap();
     // 60 um: pads of 171 x 171 pillars for three widths, and one lens.
     let pads = 171 * 171 * 3;
@@ -309,7 +310,7 @@ fn areas_are_those_of_the_pillars_and_times_follow_from_them() {
         .flat_map(|p| array.widths(p).into_owned().number.into_iter())
         .map(|w| (f64::from(w) * 1e-3).powi(2))
         .sum();
-    let census = Census::take(&shared().join("layout/mini_3x3_pillars.gds"), &Silent).unwrap();
+    let census = LayoutStatistics::take(&shared().join("layout/mini_3x3_pillars.gds"), &Silent).unwrap();
     let pillars = census.layer(1, 0).unwrap();
     assert_eq!(pillars.shapes, array.pillars());
     // Areas are summed in whole square nanometres: only this test's own sum is rounded.
@@ -330,7 +331,7 @@ fn no_text_is_exposed_and_step_two_is_flat() {
     let files = ["layout/mini_3x3", "tests/mini_3x3_tests", "tests/mini_3x3_reference"];
     for file in files {
         for (step, exposed) in [("pillars", [1, 3]), ("apertures", [2, 4])] {
-            let census = Census::take(&shared().join(format!("{file}_{step}.gds")), &Silent).unwrap();
+            let census = LayoutStatistics::take(&shared().join(format!("{file}_{step}.gds")), &Silent).unwrap();
             let shown = census.layers.iter().filter(|l| exposed.contains(&l.layer));
             assert!(shown.clone().any(|l| l.shapes > 0), "{file}_{step} exposes something");
             assert!(shown.map(|l| l.texts).sum::<u64>() == 0, "{file}_{step}");
@@ -452,7 +453,7 @@ fn stopped_it_leaves_nothing() {
 #[test]
 fn the_reference_lens_is_as_large_as_the_elements() {
     let design = Design::read(Path::new(DESIGN)).unwrap();
-    let census = Census::take(&shared().join("tests/mini_3x3_reference_pillars.gds"), &Silent).unwrap();
+    let census = LayoutStatistics::take(&shared().join("tests/mini_3x3_reference_pillars.gds"), &Silent).unwrap();
     let bounds = census.layer(1, 0).unwrap().bounds_um.unwrap();
     let lattice = Lattice::covering(design.lens.diameter_nm, design.cell.pitch_nm).unwrap();
     let reach = lattice.coordinate_um(lattice.sites() - 1);

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 use std::path::{Path, PathBuf};
 
-use metalith_core::{LatticeKind, PillarRows, PillarShape, Progress, Rectangles, Result, Silent};
+use metalith_core::{Progress, Result, Silent};
 use metalith_design::{Design, PillarArray};
 use metalith_gds::{
     LayerNumber, Layout, Point, Rect, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of,
 };
-use metalith_handoff::{Census, HandoffOptions, handoff, verify_handoff};
+use metalith_handoff::{HandoffOptions, LayoutStatistics, handoff, verify_handoff};
 use metalith_layout::LayoutFormat;
+use metalith_pillars::{LatticeKind, PillarRows, PillarShape, Rectangles};
 use metalith_wave::Accuracy;
 
 use super::{PILLARS, SUMMED, TABLE_S, rows_in};
@@ -100,7 +101,7 @@ fn is_drawn(outline: &[Point], row: &BTreeMap<String, String>, shape: PillarShap
         }
         PillarShape::Rectangle(Rectangles::Rotated(_)) => {
             let number = |key: &str| row[key].parse::<f64>().unwrap();
-            let drawn = metalith_core::RotatedRectangles {
+            let drawn = metalith_pillars::RotatedRectangles {
                 width_nm: number("drawn_width_nm") as u16,
                 length_nm: number("drawn_length_nm") as u16,
                 steps: 180,
@@ -132,7 +133,7 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
     }
 
     // The area drawn is the sum over all outlines, to the last square nanometre; and that of the shapes but for chords and the grid.
-    let census = Census::take(&file, &Silent).unwrap();
+    let census = LayoutStatistics::take(&file, &Silent).unwrap();
     let counted = census.layer(1, 0).unwrap();
     let drawn: f64 = pillars.values().map(|p| area(p)).sum::<f64>() * 1e-6;
     assert!((counted.area_um2 - drawn).abs() < SUMMED * drawn);
@@ -206,7 +207,7 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
     assert_eq!(seen, 2 * pads);
 
     // Nine blocks, alike but for their dose.
-    let matrix = Census::take(&folder.join(format!("dose/{name}_dose_matrix.gds")), &Silent).unwrap();
+    let matrix = LayoutStatistics::take(&folder.join(format!("dose/{name}_dose_matrix.gds")), &Silent).unwrap();
     let first = matrix.layer(20, 1).unwrap();
     let a_pad = (0.95 * 60_f64.powi(2) / design.lattice().cell_um2()) as u64;
     assert!(first.shapes > 3 * a_pad);

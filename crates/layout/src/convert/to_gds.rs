@@ -5,7 +5,7 @@ use std::path::Path;
 
 use gds21::{GdsArrayRef, GdsBoundary, GdsDateTimes, GdsElement, GdsLibrary, GdsPath, GdsPoint, GdsStrans};
 use gds21::{GdsStruct, GdsStructRef, GdsTextElem, GdsUnits};
-use metalith_core::{Error, LayerNumber, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, LayerNumber, Progress, Result};
 use metalith_gds::{CellConsumer, CellItem, Layout, LayoutCell, Point};
 use metalith_oasis::Repetition;
 
@@ -29,7 +29,7 @@ const END_OF_LIBRARY: [u8; 4] = [0, 4, 4, 0];
 pub(super) fn write(layout: &Layout, path: &Path, progress: &dyn Progress) -> Result<u64> {
     let mut target = Target {
         layout,
-        out: BufWriter::new(WholeFile::create(path)?),
+        out: BufWriter::new(AtomicFile::create(path)?),
         path,
         bytes: 0,
         elements: Vec::new(),
@@ -70,7 +70,7 @@ fn encode(library: &GdsLibrary) -> Result<Vec<u8>> {
 
 struct Target<'a> {
     layout: &'a Layout,
-    out: BufWriter<WholeFile>,
+    out: BufWriter<AtomicFile>,
     path: &'a Path,
     bytes: u64,
     elements: Vec<GdsElement>,

@@ -3,7 +3,7 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use metalith_core::{Error, LayerNumber, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, LayerNumber, Progress, Result};
 use metalith_gds::{CellConsumer, CellItem, Layout, LayoutCell, Point, rectangle_of};
 use metalith_oasis::{CellBounds, CompressedBlock, OasisWriter, Placing, RecordBuffer, Repetition};
 
@@ -17,7 +17,7 @@ const LEVEL: u32 = 6;
 /// Write all cells. Returns the length of the file.
 pub(super) fn write(layout: &Layout, tops: &[&str], path: &Path, progress: &dyn Progress) -> Result<u64> {
     let io = |error| Error::io("write", path)(error);
-    let out = BufWriter::new(WholeFile::create(path)?);
+    let out = BufWriter::new(AtomicFile::create(path)?);
     let mut writer = OasisWriter::new(out, 1000.0 / layout.unit_nm(), tops, false).map_err(io)?;
     // Numbers of cells are their indices.
     for (index, cell) in layout.cells().iter().enumerate() {
@@ -45,7 +45,7 @@ pub(super) fn write(layout: &Layout, tops: &[&str], path: &Path, progress: &dyn 
 }
 
 struct Target<'a> {
-    writer: OasisWriter<BufWriter<WholeFile>>,
+    writer: OasisWriter<BufWriter<AtomicFile>>,
     path: &'a Path,
     records: RecordBuffer,
     open: bool,

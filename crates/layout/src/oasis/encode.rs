@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use metalith_core::{Error, LayerNumber, PillarRows, Progress, Result};
+use metalith_core::{Error, LayerNumber, Progress, Result};
 use metalith_design::array::{DomainPart, SymmetryGroup};
 use metalith_oasis::{CellBounds, CompressedBlock, Placing, RecordBuffer, Repetition};
+use metalith_pillars::PillarRows;
 use rayon::prelude::*;
 
 use super::super::form::PillarForm;

@@ -6,10 +6,11 @@ mod rings;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use metalith_core::{Error, PillarRows, Progress, Result, WholeFile};
+use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::array::{DomainPart, PillarArray, Symmetry, SymmetryGroup};
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use metalith_oasis::{CompressedBlock, OasisWriter, Placing, RecordBuffer};
+use metalith_pillars::PillarRows;
 
 use super::fixed::FixedShapes;
 use super::form::PillarForm;
@@ -149,14 +150,14 @@ impl PlacedCell {
 
 /// The file that is written.
 struct OasisFile<'a> {
-    writer: OasisWriter<BufWriter<WholeFile>>,
+    writer: OasisWriter<BufWriter<AtomicFile>>,
     path: &'a Path,
     top: String,
 }
 
 impl<'a> OasisFile<'a> {
     fn create(top: &str, path: &'a Path) -> Result<Self> {
-        let out = BufWriter::new(WholeFile::create(path)?);
+        let out = BufWriter::new(AtomicFile::create(path)?);
         let writer = OasisWriter::new(out, GRID_PER_UM, &[top], true).map_err(Error::io("write", path))?;
         Ok(Self {
             writer,

@@ -17,24 +17,24 @@ pub struct Imaging<'p> {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
     scratch: Vec<Complex32>,
-    room: Room,
+    room: Scratch,
 }
 
 /// The large buffers, which one view hands on to the next: memory fresh from the system costs a sixth of the time.
 #[derive(Default)]
-pub struct Room {
+pub struct Scratch {
     /// Rows of cells after the transform along x: `[cell y][x]`.
     rows: Vec<Complex32>,
     /// Field on the sensor for y >= 0: `[x][y]`, y from 0 to size / 2.
     field: Vec<Complex32>,
 }
 
-/// Rooms that nobody is in.
+/// BufferPool that nobody is in.
 #[derive(Default)]
-pub struct Rooms(Mutex<Vec<Room>>);
+pub struct BufferPool(Mutex<Vec<Scratch>>);
 
-impl Rooms {
-    pub fn enter(&self) -> Room {
+impl BufferPool {
+    pub fn enter(&self) -> Scratch {
         let mut rooms = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         rooms.pop().unwrap_or_default()
     }
@@ -50,7 +50,7 @@ impl Rooms {
 pub type OpticalTransfer = Vec<Complex32>;
 
 impl<'p> Imaging<'p> {
-    pub fn new(pupil: &'p Pupil, window: PixelWindow, mut room: Room) -> Self {
+    pub fn new(pupil: &'p Pupil, window: PixelWindow, mut room: Scratch) -> Self {
         // Both are written in full before they are read.
         room.rows.resize(pupil.cells.1 * pupil.size, Complex32::default());
         room.field

@@ -6,7 +6,7 @@ use super::super::Rings;
 use super::super::focus::Lens;
 use super::super::views::window_offset_um;
 use super::*;
-use metalith_core::{Lattice, LatticeKind};
+use metalith_pillars::{Lattice, LatticeKind};
 
 const WINDOW: PixelWindow = PixelWindow {
     pixels: 24,
@@ -66,7 +66,7 @@ fn intensities_are_those_of_all_sites() {
         let pupil = Pupil::new(&lens, wavelength, angle, WINDOW, offset).unwrap();
         let n = pupil.size;
         let spacing = WINDOW.side_um() / n as f64;
-        let found = Imaging::new(&pupil, WINDOW, Room::default()).intensity(&t.0, &t.1);
+        let found = Imaging::new(&pupil, WINDOW, Scratch::default()).intensity(&t.0, &t.1);
         let samples = [(0, 0), (1, 2), (5, 0), (n - 7, 1), (9, 8), (n - 16, 0)];
         let landing = 240.0 * angle.tan() + offset;
         let places = samples.map(|(x, y)| {
@@ -99,7 +99,7 @@ fn power_is_kept() {
     let lens = lens();
     let t = planes(&phases(&lens));
     let pupil = Pupil::new(&lens, 0.55, 0.0, WINDOW, 0.0).unwrap();
-    let h0 = Imaging::new(&pupil, WINDOW, Room::default()).transfer(&t.0, &t.1)[0];
+    let h0 = Imaging::new(&pupil, WINDOW, Scratch::default()).transfer(&t.0, &t.1)[0];
     assert!(h0.im.abs() < SINGLE && ARRIVES.contains(&h0.re), "{h0}");
 }
 
@@ -110,7 +110,7 @@ fn the_adjoint_is_that_of_differences() {
     const TOLERANCE: f64 = 5e-3;
     let lens = lens();
     let pupil = Pupil::new(&lens, 0.6, 0.3, WINDOW, 1.0).unwrap();
-    let mut imaging = Imaging::new(&pupil, WINDOW, Room::default());
+    let mut imaging = Imaging::new(&pupil, WINDOW, Scratch::default());
     let t = planes(&phases(&lens));
     let count = imaging.transfer(&t.0, &t.1).len();
     let slope = (0..count)

@@ -8,9 +8,9 @@ use super::bank::{BankSpec, DistinctKernels, KernelBank};
 use super::spectrum::{KernelPlan, MovedPart, QUARTERS};
 use crate::ElementView;
 use crate::chip::{ChipInLight, ElementInLight};
+use crate::kernel_plan::SMALL_UM;
 use crate::operator::FftScratch;
 use crate::spectra::SceneSpectrum;
-use crate::wanted::SMALL_UM;
 
 impl KernelBank {
     /// Whether the kernels of a chip can be held, for so many spectra of a scene.
@@ -162,7 +162,7 @@ impl Builder<'_> {
         Ok(NodeKernels { values, in_window })
     }
 
-    fn parts(&self, sines: [f64; 2], channel: &metalith_camera::ChannelSampling, reference_um: f64) -> Vec<MovedPart> {
+    fn parts(&self, sines: [f64; 2], channel: &metalith_sensor::ChannelSampling, reference_um: f64) -> Vec<MovedPart> {
         let view = self.view;
         let Some(from) = view.landing_um(sines, reference_um) else {
             return Vec::new();

@@ -3,11 +3,11 @@
 //! The PSF of a wavelength about its chief ray, summed over squares of a quarter of a pixel, is transformed. Between two
 //! wavelengths it is the mean of both with weights that change linearly, and moves with its chief ray, as in
 //! [`metalith_wave::psf::polychromatic`]; in light of narrow bands it follows a cubic through four
-//! ([`metalith_camera::Blend`]). Here the band is a sum over points 1 nm apart, which a pixel cannot tell from a line.
+//! ([`metalith_sensor::Blend`]). Here the band is a sum over points 1 nm apart, which a pixel cannot tell from a line.
 
 use std::ops::Range;
 
-use metalith_camera::ChannelPart;
+use metalith_sensor::ChannelPart;
 use num_complex::Complex32;
 
 use crate::operator::{FftScratch, SquareFft};
@@ -33,7 +33,7 @@ pub struct MovedPart {
     pub weight: f64,
     /// Wavelength (nm).
     pub nm: f64,
-    /// Wavelengths whose PSFs it is a sum of, with their weights: [`metalith_camera::Sampling::blended`].
+    /// Wavelengths whose PSFs it is a sum of, with their weights: [`metalith_sensor::Sampling::blended`].
     pub blended: Vec<(usize, f64)>,
     /// From the chief ray of the channel to that of the part (pixels).
     pub offset: [f64; 2],

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use metalith_camera::lagrange;
+use metalith_sensor::lagrange;
 
 /// How the kernel at a place of an element's field follows from those of the nodes about it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

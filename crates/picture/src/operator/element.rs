@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use metalith_camera::Sensor;
+use metalith_sensor::Sensor;
 use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
 use num_complex::Complex32;

@@ -30,15 +30,15 @@ mod warp;
 
 use std::borrow::Cow;
 
-use metalith_camera::Camera;
+use metalith_sensor::Camera;
 use nalgebra::DMatrix;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::assumed::Assumed;
+use crate::approximation_set::ApproximationSet;
 use crate::exposure::box_sums;
 use crate::kernels::KernelBank;
-use crate::veil::{self, Veil};
+use crate::stray_light::{self, StrayLight};
 use crate::{ElementView, SceneSpace, SceneView};
 
 pub use between::BetweenNodes;
@@ -94,7 +94,7 @@ pub struct Detail {
     /// Which kernels are in force between these nodes.
     pub between: BetweenNodes,
     pub inputs: SceneInputs,
-    pub assumed: Assumed,
+    pub assumed: ApproximationSet,
     /// How the inputs vary with one another: planes (rows) from independent ones (columns). With it kept kernels are as few
     /// mixtures as see the same to 0.2 % of the light.
     pub statistics: Option<DMatrix<f64>>,
@@ -108,7 +108,7 @@ impl Detail {
             node_step: 1,
             between: BetweenNodes::Linear,
             inputs: SceneInputs::Spectra(0..spectra),
-            assumed: Assumed::default(),
+            assumed: ApproximationSet::default(),
             statistics: None,
         }
     }
@@ -120,7 +120,7 @@ impl Detail {
             node_step: 2,
             between: BetweenNodes::Linear,
             inputs,
-            assumed: Assumed::default(),
+            assumed: ApproximationSet::default(),
             statistics: None,
         }
     }
@@ -133,7 +133,7 @@ pub struct FrameOperator<'a> {
     channels: usize,
     inputs: SceneInputs,
     elements: Vec<ElementOperator<'a>>,
-    veil: Cow<'a, Veil>,
+    veil: Cow<'a, StrayLight>,
     smoothing: Smoothing,
 }
 
@@ -142,7 +142,7 @@ impl<'a> FrameOperator<'a> {
     /// memory.
     pub fn new(
         bank: &'a KernelBank,
-        veil: &'a Veil,
+        veil: &'a StrayLight,
         elements: &[ElementView],
         camera: &Camera,
         space: &SceneSpace,
@@ -239,7 +239,10 @@ impl<'a> FrameOperator<'a> {
     }
 
     fn add_veil(&self, scene: &[Array2<f32>], frames: &mut [Array2<f32>]) {
-        let gathered: Vec<Vec<f64>> = scene.par_iter().map(|p| veil::gather(&self.view, p.view())).collect();
+        let gathered: Vec<Vec<f64>> = scene
+            .par_iter()
+            .map(|p| stray_light::gather(&self.view, p.view()))
+            .collect();
         frames.par_iter_mut().enumerate().for_each(|(channel, frame)| {
             let mut cells = vec![0.0; self.veil.cells[0] * self.veil.cells[1]];
             for (input, light) in gathered.iter().enumerate() {
@@ -248,7 +251,7 @@ impl<'a> FrameOperator<'a> {
                     cells.iter_mut().zip(own).for_each(|(c, v)| *c += v);
                 }
             }
-            veil::lay(&cells, self.veil.cells, frame);
+            stray_light::lay(&cells, self.veil.cells, frame);
         });
     }
 
@@ -286,16 +289,19 @@ impl<'a> FrameOperator<'a> {
         }
         planes.par_iter_mut().for_each(|p| *p = self.smoothing.adjoint(p));
         if veil {
-            let lifted: Vec<Vec<f64>> = frames.par_iter().map(|f| veil::lift(f, self.veil.cells)).collect();
+            let lifted: Vec<Vec<f64>> = frames
+                .par_iter()
+                .map(|f| stray_light::lift(f, self.veil.cells))
+                .collect();
             planes.par_iter_mut().enumerate().for_each(|(input, plane)| {
-                let mut cells = vec![0.0; veil::SCENE_CELLS * veil::SCENE_CELLS];
+                let mut cells = vec![0.0; stray_light::SCENE_CELLS * stray_light::SCENE_CELLS];
                 for (channel, light) in lifted.iter().enumerate() {
                     if let Some(basis) = self.veil_basis(channel, input) {
                         let own = self.veil.adjoint(channel, basis, light);
                         cells.iter_mut().zip(own).for_each(|(c, v)| *c += v);
                     }
                 }
-                veil::spread(&self.view, &cells, plane);
+                stray_light::spread(&self.view, &cells, plane);
             });
         }
         planes

@@ -6,11 +6,11 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use metalith_camera::{ColourFilter, Sensor};
+use metalith_sensor::{ColourFilter, Sensor};
 use nalgebra::DMatrix;
 
 use super::{BetweenNodes, Detail, SceneInputs, ScenePoints};
-use crate::assumed::Assumed;
+use crate::approximation_set::ApproximationSet;
 use crate::exposure::channel_at;
 use crate::kernels::{BankSpec, KernelBank, TurnedKernel};
 
@@ -20,7 +20,7 @@ pub struct KernelSource<'a> {
     pub bank: &'a KernelBank,
     pub points: ScenePoints,
     pub inputs: SceneInputs,
-    pub assumed: Assumed,
+    pub assumed: ApproximationSet,
     /// How inputs vary with one another, if kernels are to be mixed.
     pub statistics: Option<DMatrix<f64>>,
     /// That of the bank, with the nodes that are used.

@@ -1,12 +1,12 @@
 //! Which place of the scene each pixel of a sub-image looks at.
 
-use metalith_camera::Sensor;
+use metalith_sensor::Sensor;
 use ndarray::Array2;
 
 use super::between::BetweenNodes;
 use super::sub_image::PixelGrid;
 use crate::ElementView;
-use crate::assumed::{Assumed, butterworth};
+use crate::approximation_set::{ApproximationSet, butterworth};
 use crate::geometry::SceneSpace;
 use crate::kernels::BankSpec;
 
@@ -50,7 +50,7 @@ pub struct CellPoint {
     /// Pixels whose light the point stands for.
     pub area: f64,
     /// What is assumed of the brightness over the field.
-    pub assumed: Assumed,
+    pub assumed: ApproximationSet,
 }
 
 impl Warp {
@@ -264,8 +264,8 @@ fn extent(element: &ElementView, spec: &BankSpec, channel_um: f64) -> ([f64; 2],
 mod tests {
     use super::*;
     use crate::SceneView;
-    use metalith_camera::Camera;
     use metalith_core::Wedge;
+    use metalith_sensor::Camera;
 
     /// The field of an element is cut where its light does not reach the sensor, and what is left looks where it did.
     #[test]
@@ -304,7 +304,7 @@ mod tests {
                 shift: [0.0; 2],
                 reach,
                 area: 1.0,
-                assumed: Assumed::default(),
+                assumed: ApproximationSet::default(),
             };
             Warp::new(&element, &sensor, &spec, &space, 0.55, point)
         };

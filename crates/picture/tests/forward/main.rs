@@ -3,14 +3,14 @@
 mod parts;
 mod setup;
 
-use metalith_camera::{Camera, Sensor};
 use metalith_core::Silent;
 use metalith_picture::restore::SceneStatistics;
 use metalith_picture::scene::SceneImage;
 use metalith_picture::{
-    Assumed, BetweenNodes, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace,
-    Veil, element_views,
+    ApproximationSet, BetweenNodes, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints,
+    SceneSpace, StrayLight, element_views,
 };
+use metalith_sensor::{Camera, Sensor};
 use metalith_wave::{Accuracy, Scratch, Window};
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -117,7 +117,7 @@ fn off_direct_sum(setup: &Setup, bank: &KernelBank, element: usize, about: [f64;
     const IMAGE: f64 = 100.0;
     let nm = setup.chip().sampling.wavelengths_nm.clone();
     assert_eq!(nm.len(), 2, "all wavelengths are simulated");
-    let veil = Veil::none(&setup.camera.sensor, 1, 3);
+    let veil = StrayLight::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     let scene = waves(SIZE, about);
     let space = SceneSpace::flat(&scene.view);
@@ -178,7 +178,7 @@ fn copies_are_what_symmetry_makes_of_them() {
     let setup = setup(&[[520.0, 560.0]], 40);
     let chip = setup.chip();
     let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-    let veil = Veil::none(&setup.camera.sensor, 1, 3);
+    let veil = StrayLight::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     // The neighbour below looks up.
     let scene = waves(40, [0.0, 15.0]);
@@ -209,7 +209,7 @@ fn a_coarse_grid_of_points_sees_the_same() {
     let setup = setup(&[[550.0, 551.0]], 40);
     let chip = setup.chip();
     let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-    let veil = Veil::none(&setup.camera.sensor, 1, 3);
+    let veil = StrayLight::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
     let frame = |points: ScenePoints| {
@@ -256,7 +256,7 @@ fn one_kernel_for_a_field_is_the_same_kernel_at_every_node() {
         let middle = element.nodes[element.nodes.len() / 2];
         element.nodes.fill(middle);
     }
-    let veil = Veil::none(&setup.camera.sensor, 2, 3);
+    let veil = StrayLight::none(&setup.camera.sensor, 2, 3);
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
     for plain in [
@@ -268,9 +268,9 @@ fn one_kernel_for_a_field_is_the_same_kernel_at_every_node() {
         },
     ] {
         let fixed = Detail {
-            assumed: Assumed {
+            assumed: ApproximationSet {
                 fixed_kernels: true,
-                ..Assumed::default()
+                ..ApproximationSet::default()
             },
             ..plain.clone()
         };
@@ -309,7 +309,7 @@ fn the_adjoint_is_that_of_the_operator() {
         },
         Detail::restoration(ScenePoints::OneAPixel, SceneInputs::Channels(0..3)),
         Detail {
-            assumed: Assumed::paper(),
+            assumed: ApproximationSet::paper(),
             ..Detail::restoration(ScenePoints::OneASquare, SceneInputs::Spectra(0..3))
         },
     ] {

@@ -1,9 +1,11 @@
 //! The operator of a part of a sensor, and on any number of threads.
 
-use metalith_camera::Camera;
 use metalith_core::{Silent, part};
 use metalith_picture::restore::SceneStatistics;
-use metalith_picture::{Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, Veil, element_views};
+use metalith_picture::{
+    Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, StrayLight, element_views,
+};
+use metalith_sensor::Camera;
 use ndarray::Array2;
 
 use crate::setup::{ROWS, Setup, setup, spec};
@@ -54,7 +56,7 @@ fn a_part_of_a_sensor_sees_what_the_whole_sees_there() {
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
     let cameras = [setup.camera.clone(), part_of(&setup.camera)];
-    let veils = [0, 1].map(|k| Veil::none(&cameras[k].sensor, 1, 3));
+    let veils = [0, 1].map(|k| StrayLight::none(&cameras[k].sensor, 1, 3));
     let near = |a: &Array2<f32>, b: &Array2<f32>, what: &str| {
         let range = b.iter().fold(0.0f32, |range, v| range.max(v.abs()));
         let off = (a - b).iter().fold(0.0f32, |off, v| off.max(v.abs()));
@@ -103,7 +105,7 @@ fn the_operator_depends_on_no_number_of_threads() {
     let bank = bank(&setup);
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
-    let veil = Veil::none(&setup.camera.sensor, 1, 3);
+    let veil = StrayLight::none(&setup.camera.sensor, 1, 3);
     let planes = vec![Array2::ones((20, 20)); 3];
     for detail in details() {
         let operator = FrameOperator::new(&bank, &veil, &views, &setup.camera, &space, detail);

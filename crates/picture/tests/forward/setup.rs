@@ -1,15 +1,15 @@
 //! Small chips before a small sensor.
 
-use metalith_camera::{Camera, Channel, Illuminant, Response, Sensor};
 use metalith_cell::CellModel;
 use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
 use metalith_gds::extract::Extraction;
 use metalith_layout::{read_pillars, write_pillars};
-use metalith_made::SimulationCase;
+use metalith_optics::SimulationCase;
 use metalith_picture::scene::SceneImage;
-use metalith_picture::{BankSpec, ChipInLight, KernelBank, Veil};
+use metalith_picture::{BankSpec, ChipInLight, KernelBank, StrayLight};
+use metalith_sensor::{Camera, Channel, Illuminant, Response, Sensor};
 use ndarray::Array3;
 
 /// The middle element, and its neighbour below and to the left.
@@ -70,9 +70,9 @@ impl Setup {
         .unwrap()
     }
 
-    pub fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> Veil {
+    pub fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> StrayLight {
         let (sensor, scene) = (&self.camera.sensor, &self.scene);
-        Veil::build(chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
+        StrayLight::build(chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
     }
 }
 

@@ -4,7 +4,7 @@ use super::Family;
 
 /// A choice of orders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kept {
+pub(crate) enum RetainedOrders {
     /// Of a square lattice, all up to this order along either axis.
     Square(usize),
     /// Of a square lattice, those in a circle, where m^2 + n^2 is at most this: of pillars whose sides face all ways, which are met
@@ -38,7 +38,7 @@ fn largest(along_axis: usize, squares: impl Fn(i32) -> Vec<usize>) -> usize {
         .unwrap_or(0)
 }
 
-impl Kept {
+impl RetainedOrders {
     /// The largest circle of a square lattice with no more orders than are kept with so many along an axis.
     pub fn disc(along_axis: usize) -> Self {
         let all = |last: i32| {
@@ -104,14 +104,14 @@ mod tests {
 
     #[test]
     fn a_sixth_of_a_turn_leaves_the_circle_alike() {
-        let all = Kept::Circle(100).orders(Family::Product(Space::Full, Space::Full));
+        let all = RetainedOrders::Circle(100).orders(Family::Product(Space::Full, Space::Full));
         assert!(all.contains(&[0, 10]) && all.contains(&[5, 5]));
         for [m, n] in &all {
             // By a sixth of a turn (m, n / sqrt 3) goes to ((m - n) / 2, (3 m + n) / 2 / sqrt 3).
             let turned = [(m - n) / 2, (3 * m + n) / 2];
             assert!(all.contains(&turned), "{m} {n}: {turned:?}");
         }
-        let [x, y] = Kept::Circle(100).reach();
+        let [x, y] = RetainedOrders::Circle(100).reach();
         let most = |axis: usize| all.iter().map(|o| o[axis]).max().unwrap() as usize;
         assert_eq!([most(0), most(1)], [x, y]);
     }
@@ -119,28 +119,32 @@ mod tests {
     #[test]
     fn a_circle_has_as_many_orders_as_a_square_or_a_shell_less() {
         for along_axis in [1, 3, 5, 9, 13, 17, 33, 127] {
-            let count = |kept: Kept| kept.orders(Family::Product(Space::Full, Space::Full)).len();
-            type Counted = fn(usize) -> Kept;
-            let bounds: [(Kept, Counted); 2] = [
-                (Kept::disc(along_axis), Kept::Disc),
-                (Kept::circle(along_axis), Kept::Circle),
+            let count = |kept: RetainedOrders| kept.orders(Family::Product(Space::Full, Space::Full)).len();
+            type Counted = fn(usize) -> RetainedOrders;
+            let bounds: [(RetainedOrders, Counted); 2] = [
+                (RetainedOrders::disc(along_axis), RetainedOrders::Disc),
+                (RetainedOrders::circle(along_axis), RetainedOrders::Circle),
             ];
             for (kept, of) in bounds {
                 assert!(count(kept) <= along_axis * along_axis, "{along_axis} {kept:?}");
-                let (Kept::Disc(most) | Kept::Circle(most)) = kept else {
+                let (RetainedOrders::Disc(most) | RetainedOrders::Circle(most)) = kept else {
                     unreachable!()
                 };
                 let next = (most + 1..).find(|s| count(of(*s)) > count(kept)).unwrap();
                 assert!(count(of(next)) > along_axis * along_axis, "{along_axis} {kept:?}");
             }
         }
-        assert_eq!(Kept::circle(3), Kept::Circle(4));
-        assert_eq!(Kept::disc(3), Kept::Disc(2));
+        assert_eq!(RetainedOrders::circle(3), RetainedOrders::Circle(4));
+        assert_eq!(RetainedOrders::disc(3), RetainedOrders::Disc(2));
     }
 
     #[test]
     fn every_order_has_its_place() {
-        for kept in [Kept::Square(3), Kept::Disc(11), Kept::Circle(36)] {
+        for kept in [
+            RetainedOrders::Square(3),
+            RetainedOrders::Disc(11),
+            RetainedOrders::Circle(36),
+        ] {
             for x in [Space::Full, Space::Even, Space::Odd] {
                 for y in [Space::Full, Space::Even, Space::Odd] {
                     let family = Family::Product(x, y);

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use super::scalar::Scalar;
 pub(super) use family::Family;
-pub(super) use kept::Kept;
+pub(super) use kept::RetainedOrders;
 
 /// Functions of one axis.
 ///
@@ -130,7 +130,7 @@ impl Rows {
 /// The transverse field of a lattice in one symmetry.
 #[derive(Clone)]
 pub(super) struct FieldBasis {
-    pub kept: Kept,
+    pub kept: RetainedOrders,
     /// What Ex, Ey and Ez are made of.
     pub families: [Family; 3],
     /// The orders of their functions.
@@ -141,7 +141,7 @@ pub(super) struct FieldBasis {
 impl FieldBasis {
     /// `family` is that of Ex, `k` the wave vector of the zero order over k0, `steps` the wavelength over the periods along
     /// the axes. The k of an axis in an even or odd space is zero, and both are in a family that half a turn tells.
-    pub fn new(kept: Kept, family: Family, k: [f64; 2], steps: [f64; 2]) -> Self {
+    pub fn new(kept: RetainedOrders, family: Family, k: [f64; 2], steps: [f64; 2]) -> Self {
         let families = family.of_components();
         let orders = families.map(|f| kept.orders(f));
         let place = |c: usize, order: [i32; 2]| kept.position(families[c], &orders[c], order);

@@ -1,6 +1,6 @@
 //! The sites of a supercell: a lattice of translations, oblique if need be, on the lattice of sites.
 
-use crate::basis::Kept;
+use crate::basis::RetainedOrders;
 use crate::error::{Error, Result};
 
 /// Translations that leave a supercell as it is, in steps: (`row`, 0) and (`shift`, `rows`). The first step is one pitch along x; the
@@ -99,7 +99,7 @@ impl SiteLattice {
     /// Waves of staggered rows: those of the circle that holds the orders that a single cell keeps with `-highest..=highest` along an
     /// axis. Where all pillars are equal the orders of the single cell are coupled to no others, and are the same.
     pub(super) fn staggered_waves(&self, highest: usize) -> Vec<[i32; 2]> {
-        let Kept::Circle(most) = Kept::circle(2 * highest + 1) else {
+        let RetainedOrders::Circle(most) = RetainedOrders::circle(2 * highest + 1) else {
             unreachable!("orders of staggered rows are kept in a circle");
         };
         // Orders of a rectangle of one pitch by two rows are (x, 2 y - x) over the number of sites.

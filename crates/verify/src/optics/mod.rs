@@ -11,14 +11,15 @@ use super::psf_metrics::{PsfImages, PsfPair, PsfResult};
 use metalith_cell::Fidelity;
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
-use metalith_core::{Lattice, PillarRows};
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
-use metalith_made::{DrawnElement, MadeElement, MadeView, SimulationCase};
+use metalith_optics::{AsBuiltElement, AsBuiltOptics, DrawnElement, SimulationCase};
+use metalith_pillars::{Lattice, PillarRows};
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::PixelFrequencies;
 use metalith_wave::{
-    Accuracy, Aperture, Fold, Matched, PhaseFunction, PhaseMap, PhaseSites, PlaneWave, Psf, Scratch, Window,
+    Accuracy, Aperture, FoldedPropagator, IdealPsf, PhaseFunction, PhaseMap, PhaseSites, PlaneWave, Psf, Scratch,
+    Window,
 };
 
 /// Where an element looks.
@@ -46,7 +47,7 @@ pub(super) struct ElementSimulator<'a> {
     lattice: Lattice,
     cases: Vec<SimulationCase<'a>>,
     accuracy: Accuracy,
-    /// Spectra that a thread may hold at a time, if not all (bytes): see [`Fold::within`].
+    /// Spectra that a thread may hold at a time, if not all (bytes): see [`FoldedPropagator::within`].
     part_bytes: Option<usize>,
     colours: Vec<Colour>,
 }
@@ -56,7 +57,7 @@ pub(super) struct ReadElement<'a> {
     pub widths: &'a dyn PillarRows,
     /// What chips are made of, if the pillars are held as a map.
     drawn: Option<DrawnElement<'a>>,
-    pub made: Vec<Option<MadeElement>>,
+    pub made: Vec<Option<AsBuiltElement>>,
 }
 
 impl<'a> ElementSimulator<'a> {
@@ -163,7 +164,7 @@ impl<'a> ElementSimulator<'a> {
 
     /// The lens with the perfect phase for the place where a chief ray lands, all sites of modulus one: what Strehl ratios
     /// are against.
-    fn perfect(&self, element: &Element, phase: &ElementPhase<'_>, chief_um: [f64; 2], wavelength_um: f64) -> Matched {
+    fn perfect(&self, element: &Element, phase: &ElementPhase<'_>, chief_um: [f64; 2], wavelength_um: f64) -> IdealPsf {
         let [x, y] = chief_um;
         let focus = [x, y, self.design.lens_of(element).focal_length_um];
         open_matched(self.design, element, phase, focus, wavelength_um)
@@ -181,7 +182,7 @@ impl<'a> ElementSimulator<'a> {
     /// An element as read, with what each made chip makes of it.
     ///
     /// # Errors
-    /// As [`MadeElement::new`]; also if a chip is to be made of pillars that are not held as a map.
+    /// As [`AsBuiltElement::new`]; also if a chip is to be made of pillars that are not held as a map.
     pub fn read<'w>(&self, element: &Element, widths: &'w dyn PillarRows) -> Result<ReadElement<'w>> {
         let drawn = widths.held().map(|map| {
             let drawn = DrawnElement::new(map, self.design.aperture_radius_of_um(element));
@@ -262,7 +263,7 @@ impl<'a> ElementSimulator<'a> {
         read: &'r ReadElement<'_>,
         wave: &PlaneWave,
         progress: &dyn Progress,
-    ) -> Result<Vec<Option<MadeView<'r>>>> {
+    ) -> Result<Vec<Option<AsBuiltOptics<'r>>>> {
         let pairs = self.cases.iter().zip(&read.made);
         pairs
             .map(|(case, made)| match (case, made) {
@@ -293,7 +294,7 @@ impl<'a> ElementSimulator<'a> {
             spec.window_samples,
             lens.focal_length_um,
         );
-        let fold = Fold::plan(self.lattice, lens.radius_um(), wavelength_um, window, self.accuracy)?;
+        let fold = FoldedPropagator::plan(self.lattice, lens.radius_um(), wavelength_um, window, self.accuracy)?;
         let fold = match self.part_bytes {
             Some(bytes) => fold.within(bytes),
             None => fold,
@@ -346,7 +347,7 @@ struct Task<'a> {
     copy: Option<CopyAngle>,
     wave: PlaneWave,
     /// Of each case that is a made chip.
-    views: Vec<Option<MadeView<'a>>>,
+    views: Vec<Option<AsBuiltOptics<'a>>>,
 }
 
 /// The light of some elements from some field angles.
@@ -385,7 +386,7 @@ pub fn open_matched(
     phase: &ElementPhase<'_>,
     focus_um: [f64; 3],
     wavelength_um: f64,
-) -> Matched {
+) -> IdealPsf {
     let (lattice, lens) = (phase.lattice(), design.lens_of(element));
     let radius_um = lens.radius_um();
     if lens.outline.is_some() {
@@ -395,7 +396,7 @@ pub fn open_matched(
             radius_um,
             turns,
         };
-        return Matched::of(&open, focus_um, wavelength_um, 1.0);
+        return IdealPsf::of(&open, focus_um, wavelength_um, 1.0);
     }
     let open = PhaseFunction {
         lattice,
@@ -403,7 +404,7 @@ pub fn open_matched(
         amplitude: 1.0,
         phase_rad: |_, _| 0.0,
     };
-    Matched::of(&open, focus_um, wavelength_um, 1.0)
+    IdealPsf::of(&open, focus_um, wavelength_um, 1.0)
 }
 
 /// Widths that tables go to.

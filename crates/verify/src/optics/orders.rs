@@ -10,7 +10,7 @@ use metalith_core::{Progress, Result};
 use metalith_design::Element;
 use metalith_design::array::PillarRule;
 use metalith_design::phase::ElementPhase;
-use metalith_made::{MadeChip, SimulationCase};
+use metalith_optics::{AsBuiltChip, SimulationCase};
 use metalith_wave::Aperture;
 
 impl ElementSimulator<'_> {
@@ -83,7 +83,7 @@ impl ElementSimulator<'_> {
 
 /// Transmissions with the drawn width (nm) as index, for the widths that a rule draws.
 fn by_drawn_width(
-    chip: &MadeChip,
+    chip: &AsBuiltChip,
     rule: &PillarRule,
     density_steps: i32,
     wavelength_um: f64,

@@ -1,9 +1,9 @@
 //! What was designed: the chip, the pillars in the middle, phase and width along a radius.
 
-use metalith_core::{Lattice, PillarMap, PillarRows, PillarShape, Rectangles};
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase, RadialPhase};
 use metalith_design::{Design, LensSpec};
+use metalith_pillars::{Lattice, PillarMap, PillarRows, PillarShape, Rectangles};
 use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, exact};
 
 /// Pillars that the picture of the middle shows along an axis.

@@ -3,9 +3,9 @@
 use super::designed::{numbers, shown_number, step};
 use crate::Verification;
 use crate::copies::place_words;
-use metalith_core::{PillarShape, Rectangles};
 use metalith_design::Design;
 use metalith_design::array::Symmetry;
+use metalith_pillars::{PillarShape, Rectangles};
 use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, counted, sig};
 
 /// Odd shapes that are listed in the page; all are in `report.json` up to its own limit.

@@ -1,6 +1,6 @@
 //! The transmission of an element, row by row.
 
-use metalith_core::{Lattice, PillarRows};
+use metalith_pillars::{Lattice, PillarRows};
 use num_complex::{Complex32, Complex64};
 
 use crate::error::{Result, WaveError};
@@ -159,7 +159,7 @@ fn single(t: Complex64) -> Complex32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::PillarMap;
+    use metalith_pillars::PillarMap;
 
     #[test]
     fn circle_counts_its_sites_exactly() {

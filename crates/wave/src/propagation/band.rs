@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 
 use super::Window;
 use crate::error::{Result, WaveError};

@@ -1,6 +1,6 @@
 //! The field by the sum itself.
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;

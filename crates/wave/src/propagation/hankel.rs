@@ -1,6 +1,6 @@
 //! The field of a round element, ring by ring.
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 use num_complex::Complex64;
 
 use super::aperture::sites_inside;

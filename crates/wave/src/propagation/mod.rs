@@ -14,14 +14,14 @@
 
 mod aperture;
 mod band;
-mod departure;
 mod direct;
 mod distances;
 mod fold;
 mod hankel;
-mod landing;
+mod local_angular_spectrum;
 mod phase;
 mod propagator;
+mod sensor_irradiance;
 mod steepness;
 mod tiles;
 mod transfer;
@@ -31,14 +31,14 @@ mod zoom;
 
 pub use aperture::{Aperture, PillarFunction, Pillars};
 pub use band::{Accuracy, Fade};
-pub use departure::Departure;
 pub use direct::Direct;
 pub use distances::{Distances, DistancesPlan, DistancesScratch};
-pub use fold::{Fold, Otf};
+pub use fold::{FoldedPropagator, Otf};
 pub use hankel::Hankel;
-pub use landing::{Landing, LandingGrid};
+pub use local_angular_spectrum::LocalAngularSpectrum;
 pub use phase::{PhaseFunction, PhaseMap, PhaseSites};
 pub use propagator::{Field, Propagator, Scratch};
+pub use sensor_irradiance::{LandingGrid, SensorIrradiance};
 pub use steepness::Steepness;
 pub use wave::{PlaneWave, incident, landing_um, leaving};
 pub use window::Window;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 use ndarray::Array2;
 use num_complex::Complex32;
 

@@ -1,6 +1,6 @@
 //! Where a phase is too steep for its lattice.
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 use serde::Serialize;
 
 /// Where a phase is too steep for its lattice.

@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 use num_complex::Complex32;
 use rustfft::FftPlanner;
 

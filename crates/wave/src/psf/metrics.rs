@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Matched, PixelFrequencies, Psf, pixel_mtf};
+use super::{IdealPsf, PixelFrequencies, Psf, pixel_mtf};
 
 /// The numbers that two PSFs are compared by.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -35,7 +35,7 @@ pub struct PsfMetrics {
 impl Psf {
     /// All numbers that are reported of a PSF, for pixels with this edge (um). Contrast is over all light that passes if the PSF was
     /// formed with the frequencies of these pixels.
-    pub fn metrics(&self, matched: &Matched, pixel_um: f64) -> PsfMetrics {
+    pub fn metrics(&self, matched: &IdealPsf, pixel_um: f64) -> PsfMetrics {
         let (peak, peak_um) = self.peak();
         let mtf = |lp_mm: f64| [0, 1].map(|axis| self.contrast(axis, lp_mm));
         let passed = self.otf.as_ref().map_or_else(|| self.energy_um2(), |otf| otf.power_um2);

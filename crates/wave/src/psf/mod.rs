@@ -29,7 +29,7 @@ pub use metrics::PsfMetrics;
 pub use mtf::{PixelFrequencies, pixel_mtf};
 pub use orders::order_shares;
 pub use polychromatic::{BandPart, BandSample, Polychromatic, band_otf, polychromatic};
-pub use reference::Matched;
+pub use reference::IdealPsf;
 
 /// |E|^2 / |E_inc|^2 on a window of the sensor's plane, E_inc in the medium of incidence.
 ///

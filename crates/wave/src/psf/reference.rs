@@ -7,14 +7,14 @@ use crate::Aperture;
 /// The same aperture passing all its power in the zero order with the perfect phase: what a Strehl ratio and a
 /// share of energy are against.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Matched {
+pub struct IdealPsf {
     /// |E|^2 / |E_inc|^2 where all sites arrive in phase.
     pub peak: f64,
     /// |E|^2 / |E_inc|^2 behind the aperture, summed over its area (um^2).
     pub power_um2: f64,
 }
 
-impl Matched {
+impl IdealPsf {
     /// For the sites of `aperture` that pass anything, each with |t| = `full_transmission`, in focus at `focus_um`,
     /// x, y and z from the element's centre.
     ///

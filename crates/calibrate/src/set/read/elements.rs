@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::{APERTURE_DIAMETER_UM, whole};
 use crate::set::{MeasuredElement, Stack};
+use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
-use metalith_core::{ElementSite, Lattice, PillarMap, Result};
+use metalith_pillars::{ElementSite, Lattice, PillarMap};
 
 pub(super) fn elements(
     root: &Section<'_, '_>,

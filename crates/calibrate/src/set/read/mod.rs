@@ -11,7 +11,8 @@ use captures::{captures, widths};
 use elements::elements;
 use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
-use metalith_core::{ElementSite, LatticeKind, LayerNumber, PillarReader, PillarShape, Progress, Result};
+use metalith_core::{LayerNumber, Progress, Result};
+use metalith_pillars::{ElementSite, LatticeKind, PillarReader, PillarShape};
 use metalith_rcwa::CellLattice;
 use ndarray::Array2;
 

@@ -27,8 +27,8 @@ fn names(parent: &Path) -> Vec<String> {
     names
 }
 
-fn begin(parent: &Path) -> Result<WholeFolder> {
-    WholeFolder::create(&parent.join("kit"), &parent.join("kit.zip"))
+fn begin(parent: &Path) -> Result<AtomicFolder> {
+    AtomicFolder::create(&parent.join("kit"), &parent.join("kit.zip"))
 }
 
 fn replace(parent: &Path, version: &str) {
@@ -38,7 +38,7 @@ fn replace(parent: &Path, version: &str) {
 }
 
 /// As a killed process leaves it: nothing is removed, and the lock is no longer held.
-fn kill(mut new: WholeFolder) {
+fn kill(mut new: AtomicFolder) {
     new.part = PathBuf::new();
     // Closing alone would not do: a process that another test is starting shares the open file until it executes.
     new.lock.take().unwrap().unlock().unwrap();

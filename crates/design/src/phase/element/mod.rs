@@ -7,7 +7,8 @@ use std::sync::Arc;
 use super::{PhaseTerm, RadialPhase};
 use crate::spec::OutlineRows;
 use crate::{Design, Element, LensOutline, LensSpec};
-use metalith_core::{Lattice, LatticeKind, Wedge};
+use metalith_core::Wedge;
+use metalith_pillars::{Lattice, LatticeKind};
 
 /// Radii that are tabulated at most: 64 MB. A lens of 1 mm has a million.
 const MOST_ENTRIES: i64 = 1 << 23;

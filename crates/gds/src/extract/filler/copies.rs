@@ -96,7 +96,7 @@ impl Filler {
         }
         let twice_middle = sums.map(|sum| sum.map(|sum| sum.checked_mul(self.scale.num)));
         let first = [dx, dy];
-        let is_about = |e: &super::ExtractedElement<super::HeldPillars>| {
+        let is_about = |e: &super::ExtractedElement<super::StoredPillars>| {
             (0..2).all(|axis| {
                 let twice = 2 * e.site.centre_nm[axis] * self.scale.den;
                 let symmetric = |reach: &std::ops::Range<usize>| reach.start + reach.end == e.site.lattice.sites();

@@ -13,7 +13,7 @@ mod propagate;
 
 use std::sync::Arc;
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
@@ -216,7 +216,7 @@ mod tests {
     use super::*;
     use crate::kernels::cis;
     use crate::propagation::{Direct, PhaseFunction, PlaneWave};
-    use metalith_core::LatticeKind;
+    use metalith_pillars::LatticeKind;
 
     /// Share of the peak intensity by which samples may differ from the direct sum: what the fade lets
     /// through, in single precision.

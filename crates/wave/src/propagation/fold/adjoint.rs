@@ -3,11 +3,11 @@
 use ndarray::Array2;
 use num_complex::Complex32;
 
-use super::{Fold, LANES};
+use super::{FoldedPropagator, LANES};
 use crate::kernels::{multiply_conj, process, scatter};
 use crate::propagation::{PlaneWave, Scratch};
 
-impl Fold {
+impl FoldedPropagator {
     /// The adjoint of `window_rows`.
     pub(super) fn window_rows_adjoint(&self, values: &Array2<Complex32>, scratch: &mut Scratch) {
         let (kx, samples) = (self.band.count[0], self.window.samples);

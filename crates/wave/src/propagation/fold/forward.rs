@@ -5,11 +5,11 @@ use std::ops::Range;
 use ndarray::ArrayViewMut2;
 use num_complex::Complex32;
 
-use super::{Fold, LANES};
+use super::{FoldedPropagator, LANES};
 use crate::kernels::{accumulate, gather, multiply, process, product_sum};
 use crate::propagation::{Aperture, PlaneWave, Scratch};
 
-impl Fold {
+impl FoldedPropagator {
     /// Folds and transforms along x; leaves the kept columns of these blocks in tiles of `LANES` columns by all rows. Gives
     /// the power that the aperture passes of a wave of unit amplitude (um^2).
     pub(super) fn rows_forward(

@@ -16,7 +16,7 @@ mod otf;
 use std::ops::Range;
 use std::sync::Arc;
 
-use metalith_core::Lattice;
+use metalith_pillars::Lattice;
 use ndarray::{Array2, ArrayViewMut2};
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
@@ -35,7 +35,7 @@ pub use otf::Otf;
 pub(super) const LANES: usize = 8;
 
 /// A plan for one lattice, wavelength and window; made once, used for any number of apertures and angles.
-pub struct Fold {
+pub struct FoldedPropagator {
     lattice: Lattice,
     wavelength_um: f64,
     window: Window,
@@ -49,7 +49,7 @@ pub struct Fold {
     blocks_at_once: usize,
 }
 
-impl Fold {
+impl FoldedPropagator {
     /// For apertures on `lattice` that pass nothing outside `radius_um` of their centre. Period and fade
     /// follow from lens, window, distance and the accuracy asked for.
     ///
@@ -71,7 +71,7 @@ impl Fold {
     /// who study the method.
     ///
     /// # Errors
-    /// As [`Fold::plan`], and if the fade does not end after it begins.
+    /// As [`FoldedPropagator::plan`], and if the fade does not end after it begins.
     pub fn with_fade(
         lattice: Lattice,
         wavelength_um: f64,
@@ -257,7 +257,7 @@ impl Fold {
     }
 }
 
-impl Propagator for Fold {
+impl Propagator for FoldedPropagator {
     fn window(&self) -> &Window {
         &self.window
     }

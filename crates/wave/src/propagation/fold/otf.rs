@@ -8,7 +8,7 @@
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 
-use super::Fold;
+use super::FoldedPropagator;
 use crate::error::Result;
 use crate::kernels::product_sum;
 use crate::propagation::{Aperture, Field, PlaneWave, Scratch};
@@ -56,7 +56,7 @@ impl Otf {
     }
 }
 
-impl Fold {
+impl FoldedPropagator {
     /// The field in the window, and the transfer function of all light at `lp_mm` (line pairs a millimetre).
     ///
     /// Between two bins of the transform the transfer function is interpolated: right for light that lands within a
@@ -152,7 +152,7 @@ impl Correlation {
 
 #[cfg(test)]
 mod tests {
-    use metalith_core::Lattice;
+    use metalith_pillars::Lattice;
 
     use super::*;
     use crate::propagation::{Accuracy, PhaseFunction, Propagator, Window};
@@ -163,7 +163,7 @@ mod tests {
     const RADIUS_UM: f64 = 40.0;
     const LP_MM: [f64; 4] = [20.0, 60.0, 150.0, 300.0];
 
-    fn fold(samples: usize) -> Fold {
+    fn fold(samples: usize) -> FoldedPropagator {
         let window = Window {
             centre_um: [0.0; 2],
             step_um: 0.35,
@@ -171,7 +171,7 @@ mod tests {
             distance_um: FOCAL_UM,
         };
         let lattice = Lattice::covering(80_000, 350).unwrap();
-        Fold::plan(lattice, RADIUS_UM, WAVELENGTH_UM, window, Accuracy::Accurate).unwrap()
+        FoldedPropagator::plan(lattice, RADIUS_UM, WAVELENGTH_UM, window, Accuracy::Accurate).unwrap()
     }
 
     /// A lens with the phase times a factor: one for a perfect lens, less for one that leaves a veil round its image.
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn a_field_in_parts_is_the_whole_to_the_last_bit() {
         let wave = PlaneWave::normal(WAVELENGTH_UM);
-        let formed = |fold: Fold| {
+        let formed = |fold: FoldedPropagator| {
             fold.with_otf(&lens(0.8), &wave, &LP_MM, &mut Scratch::default())
                 .unwrap()
         };

@@ -1,0 +1,217 @@
+//! The chip of a design before its sensor, as a contender.
+
+use metalith_core::{Progress, Result};
+use metalith_picture::restore::{Blend, Recorded, RestorationMethod, restore_each};
+use metalith_picture::scene::SceneImage;
+use metalith_picture::{Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal};
+use ndarray::{Array2, Array3, Zip};
+
+use crate::baseline_camera::{BaselineCamera, Method, no_stage};
+use crate::stage::{Stage, StageKind};
+use crate::wiener;
+
+/// A chip that is open for scenes of one field, and the ways of restoring its frames.
+pub struct ArrayCamera<'a> {
+    studio: &'a ImagingSystem,
+    simulation: FrameOperator<'a>,
+    restoration: FrameOperator<'a>,
+    error: OperatorError,
+    ways: Vec<(RestorationMethod, bool)>,
+    stages: Vec<Stage>,
+}
+
+/// An element is shown alone where it has at least this share of its most trusted place; elsewhere the blend stands in its picture.
+const LEAST_TRUST: f32 = 0.02;
+
+impl<'a> ArrayCamera<'a> {
+    /// For a studio and these methods, by all elements at once and, if asked for, by each alone.
+    pub fn new(studio: &'a ImagingSystem, methods: &[RestorationMethod], separate: bool) -> Self {
+        let restoration = studio.restoration();
+        let error = Rehearsal::new(studio, &restoration).operator_error;
+        let alone = separate && restoration.elements() > 1;
+        let ways = methods.iter().flat_map(|m| {
+            let kinds: &[bool] = if alone { &[true, false] } else { &[true] };
+            kinds.iter().map(move |joint| (*m, *joint))
+        });
+        Self {
+            simulation: studio.simulation(),
+            restoration,
+            error,
+            ways: ways.collect(),
+            stages: Vec::new(),
+            studio,
+        }
+    }
+
+    /// With learnt last stages, each a further way.
+    #[must_use]
+    pub fn with_stages(mut self, stages: Vec<Stage>) -> Self {
+        self.stages = stages;
+        self
+    }
+
+    /// The blend of all elements, then the picture of each alone.
+    fn blend_and_elements(&self, recorded: &Recorded<'_>, progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
+        let shape = (self.studio.view.rows, self.studio.view.columns);
+        let mut blend = Blend::new(shape, self.restoration.inputs());
+        let mut alone = vec![None; self.restoration.elements()];
+        restore_each(
+            recorded,
+            RestorationMethod::Tikhonov,
+            progress,
+            &mut |element, picture, trust| {
+                blend.add(picture, trust);
+                alone[element] = Some((picture.clone(), trust.clone()));
+            },
+        )?;
+        let blend = blend.finished();
+        for (picture, trust) in alone.iter_mut().flatten() {
+            for ((plane, trust), blend) in picture.iter_mut().zip(trust).zip(&blend) {
+                let least = LEAST_TRUST * trust.iter().copied().fold(0.0, f32::max);
+                Zip::from(plane)
+                    .and(&*trust)
+                    .and(blend)
+                    .for_each(|p, t, b| *p = if *t > least { *p } else { *b });
+            }
+        }
+        // Elements that see nothing of the scene have no picture of their own.
+        let mut pictures = vec![blend];
+        for seen in alone {
+            let own = seen.map_or_else(|| pictures[0].clone(), |(picture, _)| picture);
+            pictures.push(own);
+        }
+        Ok(pictures)
+    }
+}
+
+impl BaselineCamera for ArrayCamera<'_> {
+    fn ways(&self) -> Vec<Method> {
+        let several = self.restoration.elements() > 1;
+        let way = |(method, joint): &(RestorationMethod, bool)| Method {
+            method: method.name().to_owned(),
+            joint: several.then_some(*joint),
+        };
+        let learnt = |stage: &Stage| Method {
+            method: stage.kind.words().to_owned(),
+            joint: None,
+        };
+        let learnt = self.stages.iter().map(learnt);
+        self.ways.iter().map(way).chain(learnt).collect()
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        self.studio.camera.channel_names()
+    }
+
+    fn limits(&self) -> Option<String> {
+        self.error.note(&self.channel_names())
+    }
+
+    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
+        self.studio.record(&self.simulation, scene, seed)
+    }
+
+    fn truth(&self, scene: &SceneImage) -> Array3<f64> {
+        self.studio.truth(scene)
+    }
+
+    fn unrestored(&self, frame: &Frame) -> Option<Array3<f64>> {
+        Some(self.studio.unrestored(&self.restoration, frame))
+    }
+
+    fn restore(&self, frame: &Frame, way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
+        match way.checked_sub(self.ways.len()) {
+            Some(k) => {
+                let stage = &self.stages[k];
+                stage.finish(&self.pictures(frame, stage.kind, progress)?)
+            }
+            None => {
+                let (method, joint) = self.ways[way];
+                self.studio
+                    .restore(&self.restoration, &self.error, frame, method, joint, progress)
+            }
+        }
+    }
+
+    fn pictures(&self, frame: &Frame, kind: StageKind, progress: &dyn Progress) -> Result<Vec<Array3<f64>>> {
+        frame.is_of(self.restoration.frame(), self.studio.gain.len())?;
+        let (light, trust) = frame.light(&self.studio.camera, &self.error);
+        let recorded = Recorded {
+            operator: &self.restoration,
+            light: &light,
+            trust: &trust,
+            prior: &self.studio.prior,
+        };
+        match kind {
+            StageKind::MultiWiener => {
+                let all = wiener::pictures(self.studio, &recorded, progress)?;
+                Ok(all.iter().map(|planes| self.studio.colours.rgb(planes)).collect())
+            }
+            StageKind::Blending => {
+                let all = self.blend_and_elements(&recorded, progress)?;
+                Ok(all
+                    .iter()
+                    .map(|planes| self.studio.picture(&self.restoration, planes))
+                    .collect())
+            }
+            _ => no_stage(kind, "an array"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::PICTURES;
+    use metalith_core::Silent;
+    use metalith_design::array::PillarArray;
+    use metalith_design::{Design, cell_models};
+    use metalith_layout::{read_pillars, write_pillars};
+    use metalith_optics::SimulationCase;
+    use metalith_sensor::{Camera, Sensor};
+
+    #[test]
+    #[ignore = "second tier: CPU time, run by scripts/slow_tests.sh"]
+    fn last_stages_see_what_they_say() {
+        let design = Design::read("../../designs/mini_3x3.toml".as_ref()).unwrap();
+        let array = PillarArray::build(&design, &Silent).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let layout = folder.path().join("mini.gds");
+        write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
+        let extraction = read_pillars(&design, &layout, &Silent).unwrap();
+        let plain = Camera::three_bands(2.0);
+        let camera = Camera {
+            sensor: Sensor {
+                columns: 280,
+                rows: 280,
+                ..plain.sensor
+            },
+            ..plain
+        };
+        let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
+        let case = SimulationCase::Cell(cells[0].as_ref());
+        let rgb = Array3::from_shape_fn((64, 64, 3), |(y, x, c)| {
+            0.1 + 0.7 * f64::from(u8::from((x / 8 + y / 11 + c) % 3 == 0))
+        });
+        let scene = SceneImage::of_rgb("", &rgb, 60.0, f64::INFINITY);
+        let studio = ImagingSystem::of_pillars(&design, &extraction, case, &camera, &scene, Some(5), &Silent).unwrap();
+        let ready = ArrayCamera::new(&studio, &[RestorationMethod::Tikhonov], true);
+        let frame = ready.record(&scene, 1).unwrap();
+        let truth = ready.truth(&scene);
+        let wiener = ready.pictures(&frame, StageKind::MultiWiener, &Silent).unwrap();
+        assert_eq!(wiener.len(), PICTURES);
+        assert!(
+            wiener
+                .iter()
+                .all(|p| p.dim() == truth.dim() && p.iter().all(|v| v.is_finite()))
+        );
+        assert!(wiener[0] != wiener[1], "kernels of two places are not the same");
+        let alone = ready.pictures(&frame, StageKind::Blending, &Silent).unwrap();
+        assert_eq!(alone.len(), 1 + 9);
+        assert!(
+            alone[0] == ready.restore(&frame, 1, &Silent).unwrap(),
+            "the blend is that of --separate"
+        );
+        assert!(ready.pictures(&frame, StageKind::FlatNet, &Silent).is_err());
+    }
+}

@@ -1,0 +1,75 @@
+//! What a camera must be able to do to be compared.
+
+use metalith_core::{Progress, Result};
+use metalith_picture::Frame;
+use metalith_picture::scene::SceneImage;
+use ndarray::Array3;
+use serde::{Deserialize, Serialize};
+
+use crate::stage::StageKind;
+
+/// One way of making a picture of a frame.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Method {
+    /// Name of the method.
+    pub method: String,
+    /// By all elements at once, or by each alone; none where there is one element.
+    pub joint: Option<bool>,
+}
+
+impl Method {
+    /// In words, for tables.
+    pub fn words(&self) -> String {
+        match self.joint {
+            None => self.method.clone(),
+            Some(true) => format!("{}, joint", self.method),
+            Some(false) => format!("{}, each alone", self.method),
+        }
+    }
+}
+
+/// A camera that is ready to take scenes of one size and field.
+pub trait BaselineCamera {
+    /// Ways of making a picture of its frames.
+    fn ways(&self) -> Vec<Method>;
+
+    /// Names of its channels, in the order of the planes of a frame without a colour filter array.
+    fn channel_names(&self) -> Vec<String>;
+
+    /// What limits its restorations, for a person; nothing where that is the light and the noise of its frames alone.
+    fn limits(&self) -> Option<String> {
+        None
+    }
+
+    /// The frame that its sensor records of a scene, noise drawn from a seed.
+    ///
+    /// # Errors
+    /// If the scene has another size or field than the camera was made ready for.
+    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame>;
+
+    /// What a perfect camera of the same channels would give, linear sRGB `[row, column, colour]`.
+    fn truth(&self, scene: &SceneImage) -> Array3<f64>;
+
+    /// The frame as a picture, where it is one: linear sRGB of the size of the scene.
+    fn unrestored(&self, frame: &Frame) -> Option<Array3<f64>>;
+
+    /// The picture restored from a frame in one of its ways, by its index.
+    ///
+    /// # Errors
+    /// If the frame is of another camera, or the user stopped it.
+    fn restore(&self, frame: &Frame, way: usize, progress: &dyn Progress) -> Result<Array3<f64>>;
+
+    /// Pictures of a frame that a learnt last stage sees, linear sRGB, in their order.
+    ///
+    /// # Errors
+    /// If there is no such stage for this camera, the frame is of another one, or the user stopped it.
+    fn pictures(&self, frame: &Frame, kind: StageKind, progress: &dyn Progress) -> Result<Vec<Array3<f64>>>;
+}
+
+/// That a camera has no such last stage.
+pub(crate) fn no_stage<T>(kind: StageKind, camera: &str) -> Result<T> {
+    Err(metalith_core::Error::invalid(
+        format!("the last stage `{}` is not for {camera}", kind.name()),
+        "flatnet is for FlatCam, unrolled-diffuser for DiffuserCam, multi-wiener and blending for arrays",
+    ))
+}

@@ -1,0 +1,394 @@
+//! The cameras of a comparison, from their files.
+
+use std::path::{Path, PathBuf};
+
+use metalith_core::{Error, Progress, Result, part};
+use metalith_design::Design;
+use metalith_picture::restore::RestorationMethod;
+use metalith_picture::scene::{SceneImage, read_far_scene};
+use metalith_picture::{ApproximationSet, ImagingSystem, KernelCache, SceneView, check_scored, simulated_view};
+use metalith_prior::PerceptualDistance;
+use metalith_sensor::Camera;
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+use crate::compare::{ComparedCamera, ComparisonResult, compare};
+use crate::lensless::of_one_wavelength;
+use crate::stage::Stage;
+use crate::{ArrayCamera, BaselineCamera, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
+
+/// What is compared: designs, cameras without a lens, photographs, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Comparison {
+    /// Sensor, light, exposure and noise of all cameras that name no other.
+    pub camera: PathBuf,
+    pub designs: Vec<ListedDesign>,
+    pub lensless: Vec<Lensless>,
+    /// Names of the ways to restore the frames of designs.
+    pub methods: Vec<String>,
+    /// By each element of an array alone too.
+    pub separate: bool,
+    /// Each design also as the paper assumes such cameras to be, and those without a lens with one wavelength a colour.
+    pub paper: bool,
+    /// Angle from the left to the right edge of a photograph (degrees).
+    pub field_deg: f64,
+    /// Of the noise.
+    pub seed: u64,
+    pub photographs: Vec<PathBuf>,
+    /// Photographs are cut to the square of so many pixels in their middle.
+    #[serde(default)]
+    pub pixels: Option<usize>,
+    /// Weights of learnt last stages, each behind the cameras that it was taught for.
+    #[serde(default)]
+    pub learnt: Vec<PathBuf>,
+    /// Weights of the learned perceptual distance, if pictures are judged by it.
+    #[serde(default)]
+    pub lpips: Option<PathBuf>,
+}
+
+/// A design that is compared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListedDesign {
+    /// That of the design if left out.
+    pub name: Option<String>,
+    pub design: PathBuf,
+    pub layout: PathBuf,
+    /// A camera of its own.
+    pub camera: Option<PathBuf>,
+    /// The field that a photograph fills, if it is another.
+    pub field_deg: Option<f64>,
+}
+
+/// A camera without a lens.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Lensless {
+    /// A mask that is a product of two sequences.
+    FlatCam(MaskSpec),
+    /// A rough surface.
+    DiffuserCam(DiffuserSpec),
+}
+
+/// A lineup whose files were read.
+pub struct OpenLineup<'a> {
+    pub(crate) of: &'a Comparison,
+    pub(crate) camera: Camera,
+    methods: Vec<RestorationMethod>,
+    /// With the camera of each.
+    pub(crate) designs: Vec<(Design, Camera)>,
+    /// In the pixels that all cameras are simulated in.
+    pub(crate) photographs: Vec<SceneImage>,
+    /// As they were given.
+    given: SceneView,
+    pub(crate) stages: Vec<Stage>,
+    /// What pictures are judged by too.
+    perceptual: Option<PerceptualDistance>,
+}
+
+/// What is done with a camera that is ready: it, its name and words in the table, its photographs.
+pub(crate) type Ready<'f> = dyn FnMut(&dyn BaselineCamera, (&str, &str), &[SceneImage]) -> Result<()> + 'f;
+
+impl Comparison {
+    /// Read all files: mistakes before any work.
+    ///
+    /// # Errors
+    /// If nothing is compared, a file cannot be read, or photographs are not of one size.
+    pub fn open(&self) -> Result<OpenLineup<'_>> {
+        if self.designs.is_empty() && self.lensless.is_empty() {
+            return Err(Error::invalid(
+                "no camera to compare",
+                "give --design, --rivals or both",
+            ));
+        }
+        let methods = self.methods.iter().map(|m| m.parse()).collect::<Result<_>>()?;
+        let camera = Camera::read(&self.camera)?;
+        let photographs: Vec<SceneImage> = self
+            .photographs
+            .iter()
+            .map(|p| self.photograph(p))
+            .collect::<Result<_>>()?;
+        let Some(first) = photographs.first().map(|p| p.view) else {
+            return Err(Error::invalid("no photographs", "give at least one"));
+        };
+        if let Some(other) = photographs.iter().find(|p| p.view != first) {
+            return Err(Error::invalid(
+                format!(
+                    "`{}` has {} x {} pixels, the first photograph {} x {}",
+                    other.name, other.view.columns, other.view.rows, first.columns, first.rows
+                ),
+                "give photographs of one size",
+            ));
+        }
+        let own = |listed: &ListedDesign| {
+            let own = listed.camera.as_deref().map(Camera::read).transpose()?;
+            Ok((Design::read(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
+        };
+        let designs: Vec<(Design, Camera)> = self.designs.iter().map(own).collect::<Result<_>>()?;
+        let view = self.simulated_view(&designs, first);
+        let averaged = |photograph: SceneImage| match view == first {
+            true => photograph,
+            false => photograph.averaged(&view),
+        };
+        let open = OpenLineup {
+            of: self,
+            camera,
+            methods,
+            designs,
+            photographs: photographs.into_iter().map(averaged).collect(),
+            given: first,
+            stages: self.learnt.iter().map(|p| Stage::read(p)).collect::<Result<_>>()?,
+            perceptual: self.lpips.as_deref().map(PerceptualDistance::read).transpose()?,
+        };
+        open.stages_have_cameras()?;
+        Ok(open)
+    }
+
+    /// The coarsest of the views that designs are simulated in: all cameras take the same photographs.
+    fn simulated_view(&self, designs: &[(Design, Camera)], given: SceneView) -> SceneView {
+        let own = self.designs.iter().zip(designs).map(|(listed, (design, camera))| {
+            let field_deg = listed.field_deg.unwrap_or(given.field_deg);
+            simulated_view(design, camera, &SceneView { field_deg, ..given })
+        });
+        own.min_by_key(|view| view.columns).map_or(given, |view| SceneView {
+            field_deg: given.field_deg,
+            ..view
+        })
+    }
+
+    fn photograph(&self, path: &Path) -> Result<SceneImage> {
+        let scene = read_far_scene(path, self.field_deg)?;
+        match self.pixels {
+            Some(pixels) => middle(scene, pixels),
+            None => Ok(scene),
+        }
+    }
+
+    /// Cameras of the table: designs, then those without a lens, each once, or twice with the assumptions of the paper.
+    pub fn count(&self) -> usize {
+        (self.designs.len() + self.lensless.len()) * self.kinds()
+    }
+
+    /// Cameras of the table for each that is listed: with the assumptions of the paper, one more.
+    pub(crate) fn kinds(&self) -> usize {
+        1 + usize::from(self.paper)
+    }
+}
+
+/// The square of so many pixels in the middle of a scene.
+fn middle(mut scene: SceneImage, pixels: usize) -> Result<SceneImage> {
+    let SceneView { rows, columns, .. } = scene.view;
+    if rows.min(columns) < pixels {
+        return Err(Error::invalid(
+            format!("`{}` has {columns} x {rows} pixels, fewer than {pixels}", scene.name),
+            "give a smaller --pixels, or larger photographs",
+        ));
+    }
+    let (top, left) = ((rows - pixels) / 2, (columns - pixels) / 2);
+    let cut = |plane: &Array2<f32>| part(plane.view(), top..top + pixels, left..left + pixels).to_owned();
+    scene.planes = scene.planes.iter().map(cut).collect();
+    scene.depth_um = scene.depth_um.as_ref().map(cut);
+    (scene.view.rows, scene.view.columns) = (pixels, pixels);
+    Ok(scene)
+}
+
+impl OpenLineup<'_> {
+    /// Let camera `k` take all photographs.
+    ///
+    /// # Errors
+    /// If photographs are too small to be scored, it cannot be made ready, or the user stopped it.
+    pub fn take(&self, k: usize, kept: &KernelCache, progress: &dyn Progress) -> Result<ComparedCamera> {
+        self.take_first(k, self.photographs.len(), kept, progress)
+    }
+
+    /// The same of the first so many photographs, of all if there are no more.
+    ///
+    /// # Errors
+    /// As [`OpenLineup::take`].
+    pub fn take_first(
+        &self,
+        k: usize,
+        photographs: usize,
+        kept: &KernelCache,
+        progress: &dyn Progress,
+    ) -> Result<ComparedCamera> {
+        check_scored(&self.photographs[0].view)?;
+        let mut found = None;
+        self.ready(k, kept, progress, &mut |contender, names, all| {
+            let (all, perceptual) = (&all[..photographs.min(all.len())], self.perceptual.as_ref());
+            found = Some(compare(contender, names, all, self.of.seed, perceptual, progress)?);
+            Ok(())
+        })?;
+        Ok(found.expect("a camera that is ready takes photographs"))
+    }
+
+    /// Make the kernels of camera `k` where they are kept.
+    ///
+    /// # Errors
+    /// As [`OpenLineup::take`].
+    pub fn prepare(&self, k: usize, kept: &KernelCache, progress: &dyn Progress) -> Result<()> {
+        match k < self.designs.len() * self.of.kinds() {
+            true => self.ready(k, kept, progress, &mut |_, _, _| Ok(())),
+            false => Ok(()),
+        }
+    }
+
+    /// Rows and columns of all photographs, as cameras take them.
+    pub fn size(&self) -> [usize; 2] {
+        let view = self.photographs[0].view;
+        [view.rows, view.columns]
+    }
+
+    /// The table of these cameras.
+    pub fn comparison(&self, cameras: Vec<ComparedCamera>) -> ComparisonResult {
+        let view = self.photographs[0].view;
+        ComparisonResult {
+            photographs: self.photographs.iter().map(|p| p.name.clone()).collect(),
+            size: self.size(),
+            averaged_from: (view != self.given).then_some([self.given.rows, self.given.columns]),
+            camera: self.camera.name.clone(),
+            seed: self.of.seed,
+            cameras,
+        }
+    }
+
+    /// Make camera `k` ready and use it.
+    pub(crate) fn ready(
+        &self,
+        k: usize,
+        kept: &KernelCache,
+        progress: &dyn Progress,
+        then: &mut Ready<'_>,
+    ) -> Result<()> {
+        let kinds = self.of.kinds();
+        match k.checked_sub(self.designs.len() * kinds) {
+            None => self.ready_design(k / kinds, k % kinds == 1, kept, progress, then),
+            Some(k) => self.ready_lensless(k / kinds, k % kinds == 1, progress, then),
+        }
+    }
+
+    fn ready_design(
+        &self,
+        k: usize,
+        as_the_paper: bool,
+        kept: &KernelCache,
+        progress: &dyn Progress,
+        then: &mut Ready<'_>,
+    ) -> Result<()> {
+        let (listed, (design, camera)) = (&self.of.designs[k], &self.designs[k]);
+        let name = listed.name.as_deref().unwrap_or(&design.name);
+        let mut photographs = self.photographs.clone();
+        if let Some(field_deg) = listed.field_deg {
+            photographs.iter_mut().for_each(|p| p.view.field_deg = field_deg);
+        }
+        let first = &photographs[0];
+        let studio = ImagingSystem::open_kept(design, &listed.layout, camera, None, first, kept, progress)?;
+        if !as_the_paper {
+            let elements = match design.elements().len() {
+                1 => "one element".into(),
+                n => format!("{n} elements"),
+            };
+            let words = format!(
+                "the layout of `{}` behind `{}`, {elements}, pillars by the cell `{}`, veil and dispersion included.",
+                design.name, camera.name, design.verify.fidelity
+            );
+            let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
+            return then(&ready, (name, &words), &photographs);
+        }
+        let narrow = studio.open_without_dispersion(design, &listed.layout, None, first, kept, progress)?;
+        drop(studio);
+        let studio = narrow.assuming(ApproximationSet::paper())?;
+        let words = format!(
+            "`{}` as the paper assumes such cameras to be: one kernel for each element and colour, brightness by a Butterworth filter, one wavelength a colour, no veil, patches of 420 x 420 pixels.",
+            design.name
+        );
+        let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate);
+        then(&ready, (&format!("{name}, paper's assumptions"), &words), &photographs)
+    }
+
+    fn ready_lensless(
+        &self,
+        k: usize,
+        as_the_paper: bool,
+        progress: &dyn Progress,
+        then: &mut Ready<'_>,
+    ) -> Result<()> {
+        let view = self.photographs[0].view;
+        let (camera, stage, [kind, light]) = match as_the_paper {
+            // Last stages were taught with all light of a channel.
+            true => (
+                of_one_wavelength(&self.camera)?,
+                None,
+                [", no dispersion", ", one wavelength a colour"],
+            ),
+            false => (
+                self.camera.clone(),
+                self.stages_of(self.designs.len() + k)?.pop(),
+                [""; 2],
+            ),
+        };
+        match &self.of.lensless[k] {
+            Lensless::FlatCam(mask) => {
+                let words = format!(
+                    "a mask in place of a lens, the product of two sequences of maximum length (511 members of {} um), {} um before the sensor{light}; Tikhonov in closed form by singular values.",
+                    mask.feature_um, mask.distance_um
+                );
+                let ready = FlatCam::new(mask, &camera, view, progress)?.with_stage(stage);
+                then(&ready, (&format!("FlatCam, ours{kind}"), &words), &self.photographs)
+            }
+            Lensless::DiffuserCam(spec) => {
+                let words = format!(
+                    "a random smooth surface in place of a lens, numbers {} um apart, {} um before the sensor, its opening {} of the sensor along each axis{light}; caustic by rays; total variation with the crop (ADMM).",
+                    spec.grain_um, spec.distance_um, spec.opening
+                );
+                let ready = DiffuserCam::new(spec, &camera, view, progress)?.with_stage(stage);
+                then(&ready, (&format!("DiffuserCam, ours{kind}"), &words), &self.photographs)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array3;
+
+    /// Photographs that are finer than a design is simulated with are averaged, for all cameras alike, and the table says so.
+    #[test]
+    fn fine_photographs_are_averaged_for_all_cameras() {
+        let folder = tempfile::tempdir().unwrap();
+        let photograph = folder.path().join("fine.png");
+        metalith_picture::write_picture(&photograph, &Array3::from_elem((100, 1500, 3), 0.5)).unwrap();
+        let lineup = Comparison {
+            camera: "../../cameras/gt1930.toml".into(),
+            designs: vec![ListedDesign {
+                name: None,
+                design: "../../designs/prototype_3x3.toml".into(),
+                layout: folder.path().join("none.gds"),
+                camera: None,
+                field_deg: None,
+            }],
+            lensless: vec![Lensless::FlatCam(MaskSpec::standard())],
+            methods: vec!["tikhonov".into()],
+            separate: false,
+            paper: false,
+            field_deg: 80.0,
+            seed: 1,
+            photographs: vec![photograph],
+            pixels: None,
+            learnt: Vec::new(),
+            lpips: None,
+        };
+        let open = lineup.open().unwrap();
+        let found = open.comparison(Vec::new());
+        assert_eq!((found.size, found.averaged_from), ([91, 1374], Some([100, 1500])));
+        assert_eq!(open.photographs[0].planes[0].dim(), (91, 1374));
+        assert!(found.markdown().contains("1374 x 91 pixels (averaged from 1500 x 100)"));
+        let coarse = Comparison {
+            designs: Vec::new(),
+            ..lineup.clone()
+        };
+        assert_eq!(coarse.open().unwrap().comparison(Vec::new()).averaged_from, None);
+    }
+}

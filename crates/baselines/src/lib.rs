@@ -1,0 +1,41 @@
+//! Cameras side by side: the same scenes, sensor, exposure and noise, behind different optics.
+//!
+//! ```text
+//! a camera that is ready, photographs  ->  ComparedCamera: scores by method and zone, CPU seconds
+//! all of them                          ->  ComparisonResult: a table in Markdown, a page, JSON
+//! ```
+//!
+//! | question | file |
+//! | --- | --- |
+//! | what a camera must be able to do | `contender` |
+//! | the chip of a design before its sensor | `array` |
+//! | what cameras without a lens have in common | `lensless` |
+//! | a mask that is a product of two sequences | `flatcam/` |
+//! | the caustic of a random surface | `diffusercam/` |
+//! | learnt last stages, what they are taught by, and pictures by Wiener filters for one of them | `stage`, `teaching`, `wiener` |
+//! | which cameras, from their files | `lineup` |
+//! | scores of all photographs | `compare` |
+//! | the table, the page | `table`, `page` |
+
+mod array;
+mod baseline_camera;
+mod compare;
+mod comparison;
+mod cpu;
+mod diffusercam;
+mod flatcam;
+mod lensless;
+mod page;
+mod stage;
+mod table;
+mod teaching;
+mod wiener;
+
+pub use array::ArrayCamera;
+pub use baseline_camera::{BaselineCamera, Method};
+pub use compare::{ComparedCamera, ComparisonResult, MethodScores, compare};
+pub use comparison::{Comparison, Lensless, ListedDesign, OpenLineup};
+pub use diffusercam::{DiffuserCam, DiffuserSpec};
+pub use flatcam::{FlatCam, MaskSpec};
+pub use page::write_comparison;
+pub use stage::{Stage, StageKind};

@@ -1,0 +1,157 @@
+//! The page of a comparison.
+
+use std::path::Path;
+
+use metalith_core::{Result, srgb};
+use metalith_picture::{Zone, shown};
+use metalith_report::{Cell, Column, Page, PhotoRow, Table, write_json};
+
+use crate::compare::{ComparedCamera, ComparisonResult};
+
+/// Write `compare.html` and `compare.json` into a folder.
+///
+/// # Errors
+/// If they cannot be written.
+pub fn write_comparison(comparison: &ComparisonResult, folder: &Path) -> Result<()> {
+    write_json(&folder.join("compare.json"), "comparison", comparison)?;
+    page(comparison).write(&folder.join("compare.html"))
+}
+
+fn page(comparison: &ComparisonResult) -> Page {
+    let mut page = Page::new(
+        "Cameras side by side",
+        format!(
+            "{} of {} x {} pixels{}, sensor and light of {}",
+            comparison.counted(),
+            comparison.size[1],
+            comparison.size[0],
+            comparison.averaged(),
+            comparison.camera
+        ),
+    );
+    let mut best = PhotoRow::new("Scene, and the picture of each camera", 220.0);
+    if let Some(first) = comparison.cameras.iter().find_map(|c| c.shown.as_ref()) {
+        best.photo("scene", &first.scene.mapv(srgb::encoded));
+    }
+    for camera in &comparison.cameras {
+        if let Some((_, picture)) = camera.best() {
+            best.photo(camera.name.as_str(), &picture.mapv(srgb::encoded));
+        }
+    }
+    page.figure(best.caption(format!(
+        "The first photograph, {}, restored from the frame of each camera in the way that scores best over all photographs. Every camera fills its own field with it.",
+        comparison.photographs.first().map_or("", String::as_str)
+    )));
+    page.section("Scores");
+    table(&mut page, comparison, "PSNR", "dB", 2, |s| s.psnr_db);
+    table(&mut page, comparison, "SSIM", "", 3, |s| s.ssim);
+    table(&mut page, comparison, "PSNR of linear light", "dB", 2, |s| {
+        s.psnr_linear_db
+    });
+    page.paragraph(
+        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values if nothing else is said. CPU seconds are of one picture. Frames of cameras without a lens are no pictures and have no scores. LPIPS needs the weights of that measure (`--lpips`): without them its column is empty.",
+    );
+    for camera in &comparison.cameras {
+        one(&mut page, camera);
+    }
+    page.section("Photographs");
+    page.list(&comparison.photographs);
+    page
+}
+
+impl ComparedCamera {
+    /// Name of the way with the highest PSNR, and its picture of the first photograph.
+    pub fn best(&self) -> Option<(String, &ndarray::Array3<f64>)> {
+        let restored = self.ways.iter().filter(|w| w.way.is_some());
+        let both = restored.zip(&self.shown.as_ref()?.pictures);
+        let best = both.max_by(|a, b| a.0.mean[0].psnr_db.total_cmp(&b.0.mean[0].psnr_db))?;
+        Some((best.0.words(), best.1))
+    }
+}
+
+fn table(
+    page: &mut Page,
+    comparison: &ComparisonResult,
+    what: &str,
+    unit: &str,
+    digits: usize,
+    of: fn(&metalith_picture::ZoneScore) -> f64,
+) {
+    let mut columns = vec![Column::text("Camera"), Column::text("Picture")];
+    columns.extend(Zone::ALL.map(|z| Column::number(format!("{what}, {}", z.name()), unit)));
+    let scored = what == "SSIM";
+    if scored {
+        columns.push(Column::number("1 - LPIPS", ""));
+        columns.push(Column::number("CPU time", "s"));
+    }
+    let mut table = Table::new(columns);
+    for camera in &comparison.cameras {
+        for way in &camera.ways {
+            let mut row = vec![Cell::from(camera.name.as_str()), Cell::from(way.words())];
+            row.extend(way.mean.iter().map(|s| Cell::fixed(of(s), digits)));
+            if scored {
+                let optional = |v: Option<f64>, digits| v.map_or_else(Cell::none, |v| Cell::fixed(v, digits));
+                row.push(optional(way.one_less_lpips, 3));
+                row.push(optional(way.cpu_s, 0));
+            }
+            table.row(row);
+        }
+    }
+    page.table(table);
+}
+
+fn one(page: &mut Page, camera: &ComparedCamera) {
+    page.section(camera.name.as_str());
+    page.paragraph(format!(
+        "{} Its scenes fill {} degrees.",
+        camera.words, camera.field_deg
+    ));
+    if let Some(limits) = &camera.limits {
+        page.note(limits);
+    }
+    let Some(pictures) = &camera.shown else {
+        return;
+    };
+    let mut row = PhotoRow::new(format!("Pictures of {}", camera.name), 220.0);
+    row.photo("scene", &pictures.scene.mapv(srgb::encoded));
+    row.photo("frame as recorded", &shown(&pictures.frame, &pictures.channel_names));
+    let restored = camera.ways.iter().filter(|w| w.way.is_some());
+    for (way, picture) in restored.zip(&pictures.pictures) {
+        row.photo(way.words(), &picture.mapv(srgb::encoded));
+    }
+    page.figure(row.caption("The first photograph; a mosaic of colours is shown as colours."));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_limits_a_camera_is_on_its_page() {
+        let camera = |limits: Option<&str>| ComparedCamera {
+            name: "array".into(),
+            words: "Nine lenses.".into(),
+            field_deg: 60.0,
+            ways: Vec::new(),
+            frame_cpu_s: None,
+            limits: limits.map(str::to_owned),
+            shown: None,
+        };
+        let comparison = |camera: ComparedCamera| ComparisonResult {
+            photographs: vec!["a".into()],
+            size: [64, 64],
+            averaged_from: None,
+            camera: "sensor".into(),
+            seed: 1,
+            cameras: vec![camera],
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let written = |camera: ComparedCamera| {
+            write_comparison(&comparison(camera), folder.path()).unwrap();
+            ["compare.html", "compare.json"].map(|name| std::fs::read_to_string(folder.path().join(name)).unwrap())
+        };
+        const NOTE: &str = "the restoration is limited by its operator";
+        assert!(written(camera(Some(NOTE))).iter().all(|text| text.contains(NOTE)));
+        assert!(!written(camera(None)).iter().any(|text| text.contains(NOTE)));
+    }
+}

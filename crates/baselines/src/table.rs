@@ -1,0 +1,79 @@
+//! The comparison as a table.
+
+use std::fmt::Write;
+
+use metalith_picture::Zone;
+
+use crate::compare::{ComparisonResult, MethodScores};
+
+impl MethodScores {
+    /// What was scored, in words.
+    pub fn words(&self) -> String {
+        self.way
+            .as_ref()
+            .map_or_else(|| "frame as recorded".to_owned(), crate::Method::words)
+    }
+}
+
+impl ComparisonResult {
+    /// How many photographs were taken, in words.
+    pub(crate) fn counted(&self) -> String {
+        match self.photographs.len() {
+            1 => "1 photograph".into(),
+            n => format!("{n} photographs"),
+        }
+    }
+
+    /// What photographs were made of, in words behind their size; nothing if they are as they were given.
+    pub(crate) fn averaged(&self) -> String {
+        let from = self.averaged_from;
+        from.map_or_else(String::new, |[rows, columns]| {
+            format!(" (averaged from {columns} x {rows})")
+        })
+    }
+
+    /// The table in Markdown: a row for each camera and way; zones are separated by slashes.
+    pub fn markdown(&self) -> String {
+        let zones = Zone::ALL.map(Zone::name).join(" / ");
+        let mut text = String::new();
+        let mut line = |words: String| writeln!(text, "{words}").expect("strings take everything");
+        line(format!(
+            "{} of {} x {} pixels{}, sensor and light `{}`, noise of seed {}. Zones: {zones}.\n",
+            self.counted(),
+            self.size[1],
+            self.size[0],
+            self.averaged(),
+            self.camera,
+            self.seed
+        ));
+        line(
+            "| camera | picture | PSNR (dB) | SSIM | 1 - LPIPS | PSNR of linear light (dB) | CPU s |\n| --- | --- | --- | --- | --- | --- | --- |"
+                .into(),
+        );
+        for camera in &self.cameras {
+            for way in &camera.ways {
+                let list = |digits: usize, of: fn(&metalith_picture::ZoneScore) -> f64| {
+                    let all = way.mean.iter().map(|s| format!("{:.digits$}", of(s)));
+                    all.collect::<Vec<_>>().join(" / ")
+                };
+                let optional =
+                    |value: Option<f64>, digits: usize| value.map_or_else(String::new, |v| format!("{v:.digits$}"));
+                line(format!(
+                    "| {} | {} | {} | {} | {} | {} | {} |",
+                    camera.name,
+                    way.words(),
+                    list(2, |s| s.psnr_db),
+                    list(3, |s| s.ssim),
+                    optional(way.one_less_lpips, 3),
+                    list(2, |s| s.psnr_linear_db),
+                    optional(way.cpu_s, 0),
+                ));
+            }
+        }
+        line(String::new());
+        for camera in &self.cameras {
+            line(format!("- {}: {}", camera.name, camera.words));
+        }
+        text
+    }
+}

@@ -1,0 +1,95 @@
+//! One run at a time writes the files of a folder.
+
+use std::fs::{self, File, TryLockError};
+use std::path::Path;
+use std::time::Duration;
+
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+
+/// How long a run waits before it asks again.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// The turn of a run to write the files of a folder, which belong together: two runs at once would leave some of the one and
+/// some of the other. It ends when it is dropped, or with the process.
+#[derive(Debug)]
+pub struct FolderLock {
+    /// The folder itself, locked; none where folders or their file system have no locks.
+    _locked: Option<File>,
+}
+
+impl FolderLock {
+    /// Wait for the turn at `folder`, which is made if need be. `wait` is called once if another process has it.
+    ///
+    /// # Errors
+    /// If the folder cannot be made, or the user stops the run while it waits.
+    pub fn wait(folder: &Path, progress: &dyn Progress, wait: impl FnOnce()) -> Result<Self> {
+        let folder = if folder.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            folder
+        };
+        fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
+        // A folder may be written and not read; and elsewhere it cannot be opened.
+        let Ok(opened) = File::open(folder) else {
+            return Ok(Self { _locked: None });
+        };
+        let mut wait = Some(wait);
+        while let Err(TryLockError::WouldBlock) = opened.try_lock() {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            if let Some(wait) = wait.take() {
+                wait();
+            }
+            std::thread::sleep(PAUSE);
+        }
+        Ok(Self { _locked: Some(opened) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+
+    /// A person who stops the run as soon as it has to wait.
+    struct Impatient;
+
+    impl Progress for Impatient {
+        fn begin(&self, _what: &str, _steps: u64) {}
+
+        fn advance(&self, _steps: u64) {}
+
+        fn stopped(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn one_has_the_turn_until_it_is_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("new");
+        let first = FolderLock::wait(&place, &Impatient, || panic!("nobody else is there")).unwrap();
+        assert!(matches!(
+            FolderLock::wait(&place, &Impatient, || ()),
+            Err(Error::Interrupted)
+        ));
+        let other = FolderLock::wait(folder.path(), &Impatient, || panic!("another folder")).unwrap();
+        drop((first, other));
+        FolderLock::wait(&place, &Silent, || panic!("it is free again")).unwrap();
+    }
+
+    #[test]
+    fn who_waits_gets_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = FolderLock::wait(folder.path(), &Silent, || ()).unwrap();
+        let (mut first, mut waited) = (Some(first), false);
+        FolderLock::wait(folder.path(), &Silent, || {
+            waited = true;
+            drop(first.take());
+        })
+        .unwrap();
+        assert!(waited);
+    }
+}

@@ -1,0 +1,200 @@
+//! The calibrated model as a file.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Perturbation, PerturbationFault};
+use metalith_cell::CellStack;
+use metalith_core::document::{self, Fault, Faults};
+use metalith_core::text::quoted;
+use metalith_core::{AtomicFile, Error, Result};
+
+/// Version of the format that is written. The first called its perturbation `departure`; it is still read.
+const SCHEMA: u32 = 2;
+
+/// What a session has taught, in a file that later designs are simulated and compensated with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CalibratedModel {
+    schema: u32,
+    /// The session that it comes from.
+    pub set: String,
+    /// In words: what was found.
+    pub finding: String,
+    /// How chips and bench differ from what is stated.
+    #[serde(alias = "departure")]
+    pub perturbation: Perturbation,
+}
+
+impl CalibratedModel {
+    /// A model of what was found.
+    pub fn new(set: String, finding: String, perturbation: Perturbation) -> Self {
+        Self {
+            schema: SCHEMA,
+            set,
+            finding,
+            perturbation,
+        }
+    }
+
+    /// Nothing, if pillars of a stack can be as the model says that are drawn so often, by width or number, on each of some elements.
+    ///
+    /// # Errors
+    /// If the bias of all widths leaves nothing of the narrowest that is drawn, or joins the widest.
+    pub fn check_drawn(&self, stack: &CellStack, counts: impl IntoIterator<Item = Vec<u64>>) -> Result<()> {
+        let drawn = |counts: Vec<u64>| (1..counts.len()).filter(move |number| counts[*number] > 0);
+        let numbers = counts.into_iter().flat_map(drawn);
+        let edges = numbers.flat_map(|number| stack.shape.edges_nm(number as u16));
+        let [least, most] = edges.fold([f64::INFINITY, 0.0], |[least, most], nm| [nm.min(least), nm.max(most)]);
+        match most > 0.0 {
+            true => self.check_bias([least, most], stack.lattice.nearest_nm(stack.pitch_nm)),
+            false => Ok(()),
+        }
+    }
+
+    /// The same of pillars whose edges are drawn from the one to the other of these (nm), `nearest_nm` from middle to middle.
+    fn check_bias(&self, edges_nm: [f64; 2], nearest_nm: f64) -> Result<()> {
+        let bias_nm = self.perturbation.geometry.cd_bias_nm;
+        let [narrowest, widest] = edges_nm.map(|nm| nm + bias_nm);
+        if narrowest > 0.0 && widest < nearest_nm {
+            return Ok(());
+        }
+        let what = match narrowest > 0.0 {
+            true => format!("makes pillars of {widest} nm, {nearest_nm} nm from one to the next"),
+            false => format!("leaves nothing of pillars drawn {} nm wide", edges_nm[0]),
+        };
+        Err(Error::invalid(
+            format!("`cd_bias_nm` = {bias_nm} of the model {what}"),
+            format!(
+                "set it in [perturbation.geometry] between {} and {}",
+                -edges_nm[0],
+                nearest_nm - edges_nm[1]
+            ),
+        ))
+    }
+
+    /// Read a model file.
+    ///
+    /// # Errors
+    /// If it cannot be read; as [`CalibratedModel::parse`].
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::parse(path, &document::load(path)?)
+    }
+
+    /// A model from the text of the file at `path`.
+    ///
+    /// # Errors
+    /// If it is not such a file; all numbers that cannot be at once.
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        let written = "give the `model.toml` that `metalith calibrate` has written";
+        let model: Self = toml::from_str(text).map_err(|e| {
+            let fault = Fault {
+                span: e.span().unwrap_or(0..0),
+                what: quoted(e.message()),
+                hint: written.into(),
+            };
+            Error::Text(Box::new(Faults::new(path, text, vec![fault], 1)))
+        })?;
+        if !(1..=SCHEMA).contains(&model.schema) {
+            let what = format!("this is a model of schema {}, 1 to {SCHEMA} are known", model.schema);
+            return Err(Error::Text(Box::new(Faults::at_keys(
+                path,
+                text,
+                vec![("schema".into(), what, written.into())],
+            ))));
+        }
+        let faults = model.perturbation.faults();
+        if !faults.is_empty() {
+            let section = match text.contains("[perturbation") {
+                true => "perturbation",
+                false => "departure",
+            };
+            let placed = |fault: PerturbationFault| (format!("{section}.{}", fault.key), fault.what, fault.hint);
+            let faults = faults.into_iter().map(placed).collect();
+            return Err(Error::Text(Box::new(Faults::at_keys(path, text, faults))));
+        }
+        Ok(Self {
+            schema: SCHEMA,
+            ..model
+        })
+    }
+
+    /// Write it.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = toml::to_string(self).expect("plain data serialises");
+        AtomicFile::write(path, text.as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model() -> CalibratedModel {
+        let mut perturbation = Perturbation::default();
+        perturbation.geometry.cd_bias_nm = -9.75;
+        *perturbation.light.shift_mut(1) = 0.5;
+        CalibratedModel::new("chip".into(), "explained by cd_bias".into(), perturbation)
+    }
+
+    #[test]
+    fn a_model_file_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.toml");
+        model().write(&path).unwrap();
+        assert_eq!(CalibratedModel::read(&path).unwrap(), model());
+        std::fs::write(&path, "schema = 7").unwrap();
+        let error = CalibratedModel::read(&path).unwrap_err().to_string();
+        assert!(error.contains("model.toml:1:1: missing field"), "{error}");
+    }
+
+    #[test]
+    fn a_bias_that_pillars_cannot_have_is_refused_with_what_they_can() {
+        let biased = |nm| {
+            let mut model = model();
+            model.perturbation.geometry.cd_bias_nm = nm;
+            model.check_bias([100.0, 280.0], 350.0).map_err(|e| e.to_string())
+        };
+        for nm in [-99.9, 0.0, 69.9] {
+            assert_eq!(biased(nm), Ok(()));
+        }
+        for (nm, what) in [
+            (-100.0, "leaves nothing of pillars drawn 100 nm wide"),
+            (70.0, "makes pillars of 350 nm, 350 nm from one to the next"),
+        ] {
+            let error = biased(nm).unwrap_err();
+            assert!(error.contains(what) && error.contains("between -100 and 70"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_the_first_schema_is_read_and_a_number_that_cannot_be_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.toml");
+        model().write(&path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let first = text
+            .replace("schema = 2", "schema = 1")
+            .replace("[perturbation", "[departure");
+        assert!(first.contains("[departure.geometry]"), "{first}");
+        std::fs::write(&path, first).unwrap();
+        assert_eq!(CalibratedModel::read(&path).unwrap(), model());
+        let wrong = text
+            .replace("stray_light = 0.0", "stray_light = 7.0")
+            .replace("missing_pillars = 0.0", "missing_pillars = nan");
+        std::fs::write(&path, &wrong).unwrap();
+        let error = CalibratedModel::read(&path).unwrap_err();
+        let place = |key: &str| {
+            let line = wrong.lines().position(|line| line.starts_with(key)).unwrap();
+            format!("model.toml:{}:{}: `{key}` cannot be ", line + 1, key.len() + 4)
+        };
+        for key in ["stray_light", "missing_pillars"] {
+            assert!(error.to_string().contains(&place(key)), "{error}");
+        }
+        assert_eq!(error.exit_code(), 2);
+    }
+}

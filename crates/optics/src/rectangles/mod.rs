@@ -1,0 +1,298 @@
+//! Rectangles as made: light of both polarisations that they tell apart, and what of it reaches the sensor.
+
+mod kept;
+mod rows;
+mod solved;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use rows::RowOrders;
+pub(crate) use rows::{bare_row, row_length, solve_rotated, solve_upright};
+
+use self::solved::SolvedRectangles;
+use super::cells::SolvedWidths;
+use super::{CalibratedModel, CellBank, CellChange, DeclaredQuantity};
+use metalith_cell::{
+    AxisTables, BAND_ORDERS, CellStack, FocusedLight, HandTables, Handedness, ORDERS, PassedTable, PolarisationAxis,
+    PolarisedLight, PolarisedTables, RotationSamples, UPRIGHT_ORDERS,
+};
+use metalith_core::{Error, Progress, Result};
+use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles};
+
+/// A class of rectangles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RectangleClass {
+    /// Its number; zero is a site without pillar.
+    pub number: u16,
+    /// What both edges are off by (nm).
+    pub bias_nm: f64,
+}
+
+impl RectangleClass {
+    /// Of sites whose pillar is missing.
+    pub const WITHOUT_PILLAR: Self = Self {
+        number: 0,
+        bias_nm: 0.0,
+    };
+}
+
+/// A wavelength (um): one of few, or one of many that a band is averaged over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum RectangleColour {
+    Single(f64),
+    OfBand(f64),
+}
+
+impl RectangleColour {
+    pub fn um(self) -> f64 {
+        match self {
+            Self::Single(um) | Self::OfBand(um) => um,
+        }
+    }
+
+    /// Wavelength and orders that banks of pillars of a shape are solved with.
+    fn of_bank(self, shape: PillarShape) -> (f64, usize) {
+        match self {
+            Self::Single(um) => (um, bank_orders(shape)),
+            Self::OfBand(um) => (um, BAND_ORDERS),
+        }
+    }
+}
+
+/// Diffraction orders an axis that a bank of pillars of a shape is solved with at single wavelengths. Those of upright rectangles are as many
+/// as of pillars as drawn: with fewer, those of a lens beside a resonance have a Strehl ratio that is off by two in a hundred.
+pub fn bank_orders(shape: PillarShape) -> usize {
+    match shape.upright() {
+        Some(_) => UPRIGHT_ORDERS,
+        None => ORDERS,
+    }
+}
+
+/// A row for each bias, and one for a site without pillar: see [`rows`].
+pub(crate) type RowsOfBiases = (Vec<Vec<Complex64>>, Vec<Complex64>);
+
+/// Where rows are from.
+enum RowSource {
+    Bank(Arc<CellBank>),
+    Solved(Box<SolvedRectangles>),
+}
+
+/// The rectangles of a chip, and the light that they are in.
+pub(super) struct MadeRectangles {
+    pillars: Rectangles,
+    focused: FocusedLight,
+    pub polarised: PolarisedLight,
+    source: RowSource,
+}
+
+impl MadeRectangles {
+    /// Of a stack of rectangles, which focus `focused`; solved where they are needed.
+    ///
+    /// # Errors
+    /// If they are no such rectangles, or the model has what they have no meaning for.
+    pub fn new(
+        stated: &CellStack,
+        model: &CalibratedModel,
+        focused: FocusedLight,
+        polarised: PolarisedLight,
+    ) -> Result<Self> {
+        let pillars = stated.shape.rectangles();
+        let fits = matches!(
+            (pillars, focused),
+            (Some(Rectangles::Rotated(_)), FocusedLight::Circular(_))
+                | (Some(Rectangles::Upright(_)), FocusedLight::Linear(_))
+        );
+        let Some(pillars) = pillars.filter(|_| fits) else {
+            return Err(Error::invalid(
+                "light of a polarisation that these pillars do not focus",
+                "say circular light of rotated rectangles, linear light of upright ones, and none of others",
+            ));
+        };
+        model.check_shape(stated.shape)?;
+        Ok(Self {
+            pillars,
+            focused,
+            polarised,
+            source: RowSource::Solved(Box::new(SolvedRectangles::new(stated.clone(), pillars))),
+        })
+    }
+
+    /// The same, whose solved rows are kept in a folder from one run to the next.
+    pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
+        if let RowSource::Solved(solved) = &mut self.source {
+            solved.folder = folder.map(Path::to_owned);
+        }
+        self
+    }
+
+    /// The same with all rows from a bank of the same pillars.
+    pub fn of_bank(self, bank: &Arc<CellBank>) -> Self {
+        Self {
+            source: RowSource::Bank(Arc::clone(bank)),
+            ..self
+        }
+    }
+
+    /// What each class does to light of both polarisations; after them a site without pillar, and one that light passes as it is.
+    ///
+    /// # Errors
+    /// If a cell cannot be solved, or is not in the bank; also if the user stopped it.
+    pub fn tables(
+        &self,
+        change: &CellChange,
+        classes: &[RectangleClass],
+        colour: RectangleColour,
+        progress: &dyn Progress,
+    ) -> Result<PolarisedTables> {
+        let mut places: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+        for (class, RectangleClass { bias_nm, .. }) in classes.iter().enumerate().filter(|(_, c)| c.number > 0) {
+            places.entry(bias_nm.to_bits()).or_default().push(class);
+        }
+        let (keys, members): (Vec<_>, Vec<Vec<usize>>) = places.into_iter().unzip();
+        let biases: Vec<f64> = keys.into_iter().map(f64::from_bits).collect();
+        let mut numbers: Vec<u16> = classes.iter().map(|c| c.number).filter(|n| *n > 0).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let (rows, bare) = match &self.source {
+            RowSource::Bank(bank) => {
+                let colour = colour.of_bank(bank.stated().shape);
+                bank.rectangles(change, colour, &biases, &numbers)?
+            }
+            RowSource::Solved(solved) => solved.rows(change, colour, &biases, &numbers, progress)?,
+        };
+        let found = Found {
+            classes,
+            members: &members,
+            numbers: &numbers,
+            rows: &rows,
+            bare: &bare,
+        };
+        Ok(match (self.pillars, self.focused) {
+            (Rectangles::Rotated(pillars), FocusedLight::Circular(hand)) => {
+                PolarisedTables::Hands(found.hands(pillars, hand))
+            }
+            (_, FocusedLight::Linear(axis)) => PolarisedTables::Axes(found.axes(axis)),
+            (Rectangles::Upright(_), FocusedLight::Circular(_)) => unreachable!("checked when they were made"),
+        })
+    }
+
+    /// Of tables of light that leaves such classes, what [`SolvedWidths`] has: one table for all light that interferes with no other.
+    pub fn solved(leaving: Vec<PassedTable>) -> SolvedWidths {
+        let mut solved = SolvedWidths {
+            pillars: Vec::new(),
+            bare: Vec::new(),
+            unseen: Vec::new(),
+            share: 1.0,
+            rim: None,
+        };
+        for mut table in leaving.into_iter().map(|p| p.table) {
+            solved.unseen.extend(table.pop());
+            solved.bare.extend(table.pop());
+            solved.pillars.push(table);
+        }
+        solved
+    }
+}
+
+impl CalibratedModel {
+    /// Nothing, if all that the model says has a meaning for pillars of this shape.
+    ///
+    /// # Errors
+    /// If they are rectangles and it says what counts for one width alone.
+    pub fn check_shape(&self, shape: PillarShape) -> Result<()> {
+        match shape.rectangles() {
+            Some(_) => check_rectangles(self),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What rectangles have no meaning for.
+fn check_rectangles(model: &CalibratedModel) -> Result<()> {
+    let (geometry, cell) = (&model.perturbation.geometry, &model.perturbation.cell);
+    if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
+        return Err(Error::invalid(
+            "the pillars are rectangles, and the transmission of the model goes by one width",
+            "give a model without `transmission` and `transmission_phase_rad`: rectangles are told by no one width",
+        ));
+    }
+    if cell.corner_rounding_nm != 0.0 {
+        return Err(Error::invalid(
+            "the pillars are rectangles, and the model rounds corners",
+            "set `corner_rounding_nm = 0` in [perturbation.cell] of the model: rectangles are solved with sharp corners",
+        ));
+    }
+    let by_width = geometry.declared.iter().find(|term| {
+        let of_width = term.quantity == DeclaredQuantity::WidthNm;
+        of_width && term.compiled().is_ok_and(|compiled| compiled.uses("w"))
+    });
+    match by_width {
+        Some(term) => Err(Error::invalid(
+            format!(
+                "the declared width `{}` goes by the drawn width `w`, of rectangles",
+                term.name
+            ),
+            "declare it by `fill` and places alone: rectangles are told by no one width",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Rows that were found for classes.
+struct Found<'a> {
+    classes: &'a [RectangleClass],
+    /// Classes of each row.
+    members: &'a [Vec<usize>],
+    /// Numbers of the pillars that rows of upright rectangles have, rising.
+    numbers: &'a [u16],
+    rows: &'a [Vec<Complex64>],
+    bare: &'a [Complex64],
+}
+
+impl Found<'_> {
+    /// A table of all sites without pillar, and the one that light passes as it is.
+    fn room(&self, bare: Complex64, passes: Complex64) -> Vec<Complex64> {
+        let mut room = vec![bare; self.classes.len() + 2];
+        room[self.classes.len() + 1] = passes;
+        room
+    }
+
+    fn hands(&self, pillars: RotatedRectangles, focused: Handedness) -> HandTables {
+        let bare = RotationSamples::of_numbers(self.bare).hands(pillars, &[0], focused);
+        let mut all = HandTables {
+            focused,
+            converted: bare.converted.each_ref().map(|t| self.room(t[0], Complex64::ZERO)),
+            unconverted: bare.unconverted.each_ref().map(|t| self.room(t[0], Complex64::ONE)),
+        };
+        for (row, members) in self.rows.iter().zip(self.members) {
+            let numbers: Vec<u16> = members.iter().map(|class| self.classes[*class].number).collect();
+            let own = RotationSamples::of_numbers(row).hands(pillars, &numbers, focused);
+            let tables = all.converted.iter_mut().zip(own.converted);
+            for (to, from) in tables.chain(all.unconverted.iter_mut().zip(own.unconverted)) {
+                members.iter().zip(from).for_each(|(class, t)| to[*class] = t);
+            }
+        }
+        all
+    }
+
+    fn axes(&self, focused: PolarisationAxis) -> AxisTables {
+        let along = PolarisationAxis::ALL.map(|axis| {
+            let mut table = self.room(self.bare.first().copied().unwrap_or_default(), Complex64::ONE);
+            for (row, members) in self.rows.iter().zip(self.members) {
+                for class in members {
+                    let place = self.numbers.partition_point(|n| *n < self.classes[*class].number);
+                    table[*class] = row[2 * place + axis.index()];
+                }
+            }
+            table
+        });
+        AxisTables { focused, along }
+    }
+}
+
+#[cfg(test)]
+mod tests;

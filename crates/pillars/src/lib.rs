@@ -1,0 +1,19 @@
+//! Lattices, the kinds of pillars that stand on them, and maps of pillars by site.
+
+mod circle;
+mod eighth;
+mod element_site;
+mod lattice;
+mod pillar_check;
+mod rectangle;
+mod rows;
+mod shape;
+
+pub use circle::{CHORD_ERROR, circle_corners};
+pub use eighth::EighthMap;
+pub use element_site::{ElementSite, PillarReader};
+pub use lattice::{Lattice, LatticeKind, PillarMap};
+pub use pillar_check::PillarCheck;
+pub use rectangle::{Rectangles, RotatedRectangles, UprightRectangles};
+pub use rows::PillarRows;
+pub use shape::PillarShape;
