@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use metalith_calibrate::{BenchFile, CapturePlan, PlanRequest, check_not_begun, check_plannable, plan};
+use metalith_bench_plan::{BenchFile, CapturePlan, PlanRequest, check_not_begun, check_plannable, plan};
 use metalith_cell::cache_folder;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, PillarArray};

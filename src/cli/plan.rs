@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::calibrate::{BenchFile, CapturePlan};
+use metalith::bench_plan::{BenchFile, CapturePlan};
 use metalith::{Result, plan_session};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};

@@ -2,9 +2,9 @@
 
 pub use metalith_attribution::{
     EXPLAINED, ForwardModel, HeldOutErrors, IntervalParts, LEAST_GAIN, LinearTrend, Measurements, ModelError,
-    ParameterPoint, Pattern, REFERENCES_DECIDE, Rejection, SIGMAS_95, Slot, SmoothGroups, SmoothTerm, TriedEffect,
-    attribute_set, cluster_groups, cosines, covariance, error_of_measurement, fit_of, half_widths, held_out, may_leave,
-    mean_error, minimise, projected,
+    ParameterPoint, Pattern, Rejection, SIGMAS_95, Slot, SmoothGroups, SmoothTerm, TriedEffect, attribute_set,
+    cluster_groups, cosines, covariance, error_of_measurement, fit_of, half_widths, held_out, may_leave, mean_error,
+    minimise,
 };
 
 use crate::data::Data;

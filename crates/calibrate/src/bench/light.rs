@@ -226,13 +226,13 @@ mod tests {
     use metalith_gds::extract::GdsPillars;
     use metalith_layout::write_pillars;
     use metalith_optics::Stitching;
+    use metalith_pillars::PillarReader;
     use metalith_wave::Direct;
     use num_complex::Complex64;
 
     use super::*;
     use crate::bench::Sampling;
-    use crate::planning::{BenchFile, candidates};
-    use crate::set::{Led, MeasuredSet};
+    use crate::set::{Capture, ElementIndex, Led, LedIndex, MeasuredElement, MeasuredSet, Stack};
 
     /// A small lens of the shipped hexagonal design, as a session of one line of 1550 nm that looks at it from the side, on the
     /// axis and beside it.
@@ -247,21 +247,55 @@ mod tests {
         let layout = folder.path().join("layout.gds");
         let array = PillarArray::build(&design, &Silent).unwrap();
         write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
-        let file = folder.path().join("bench.toml");
-        let text = metalith_testing::session::bench();
-        let captures = "distance_um = [43.0, 46.0]\nfield_deg = [0.0, 0.0, 6.0, -3.0]\n";
-        std::fs::write(&file, format!("schema = 1\n{text}\n[captures]\n{captures}")).unwrap();
-        let mut bench = BenchFile::read(&file).unwrap();
-        bench.leds = vec![Led {
+        let sites = design.sites_of(&design.elements());
+        let layer = design.layout.layers.pillars.number();
+        let maps = GdsPillars
+            .pillars(&layout, layer, design.cell.shape, &sites, &Silent)
+            .unwrap();
+        let mut set = MeasuredSet::read(
+            &metalith_testing::session::small_set(folder.path()),
+            &GdsPillars,
+            &Silent,
+        )
+        .unwrap();
+        set.stack = Stack {
+            cell: design.cell_stack().unwrap(),
+            lens_diameter_um: 30.0,
+            focal_length_um: 45.0,
+        };
+        set.leds = vec![Led {
             centre_nm: 1550.0,
             fwhm_nm: 0.5,
             channel: None,
         }]
         .into();
-        let found = candidates(&design, &bench, &layout, &GdsPillars, &Silent).unwrap();
-        let mut set = found.set;
+        let elements = design.elements().into_iter().zip(maps);
+        set.elements = elements
+            .map(|(element, pillars)| MeasuredElement {
+                index: [element.index.0.into(), element.index.1.into()],
+                centre_um: element.centre_um(),
+                aperture_diameter_um: 2.0 * design.aperture_radius_of_um(&element),
+                pillars,
+            })
+            .collect();
         assert!(!set.elements.raw[0].pillars.lattice.is_square());
-        set.captures = found.captures.into();
+        let like = set.captures.raw[0].clone();
+        let seen = |aoi_deg: [f64; 2], distance_um: f64| {
+            let aoi_rad = aoi_deg.map(f64::to_radians);
+            let sines = aoi_rad.map(f64::sin);
+            let along = (1.0 - sines[0].powi(2) - sines[1].powi(2)).sqrt();
+            Capture {
+                name: format!("{aoi_deg:?} {distance_um}"),
+                element: ElementIndex::from(0),
+                led: LedIndex::from(0),
+                aoi_rad,
+                distance_um,
+                window_centre_um: sines.map(|s| set.stack.focal_length_um * s / along),
+                ..like.clone()
+            }
+        };
+        let captures = [[0.0, 0.0], [6.0, -3.0]].map(|aoi| [43.0, 46.0].map(|distance| seen(aoi, distance)));
+        set.captures = captures.concat().into();
         set
     }
 

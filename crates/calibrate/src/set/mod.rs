@@ -2,7 +2,7 @@
 
 mod frame;
 mod index;
-pub(crate) mod read;
+pub mod read;
 mod sem;
 
 use std::path::PathBuf;

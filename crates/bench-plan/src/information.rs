@@ -4,15 +4,16 @@ use metalith_core::{Progress, Result};
 use nalgebra::DMatrix;
 use ndarray::Array2;
 
-use super::bench_file::BenchFile;
-use super::candidates::{Candidates, sem_sites};
-use crate::bench::{Bench, Sampling};
-use crate::cells::{CellSource, RigorousCells};
-use crate::data::{Data, Nuisances};
-use crate::effects::Effect;
-use crate::set::{Capture, MeasuredSet, PerCapture};
-use crate::simulator::{Simulator, WIDTH_ROOM_NM};
-use crate::statistics::{FitProblem, Measurements, Surrogate};
+use crate::bench_file::BenchFile;
+use crate::candidates::{Candidates, sem_sites};
+use metalith_attribution::Measurements;
+use metalith_calibrate::Effect;
+use metalith_calibrate::{Bench, Sampling};
+use metalith_calibrate::{Capture, MeasuredSet, PerCapture};
+use metalith_calibrate::{CellSource, RigorousCells};
+use metalith_calibrate::{Data, Nuisances};
+use metalith_calibrate::{FitProblem, Surrogate};
+use metalith_calibrate::{Simulator, WIDTH_ROOM_NM};
 
 /// Captures that are simulated at once: each holds an image for two sizes of every parameter.
 const TOGETHER: usize = 12;

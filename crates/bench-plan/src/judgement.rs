@@ -4,13 +4,14 @@
 use metalith_core::{Progress, Result};
 use serde::Serialize;
 
-use super::choice::{Choice, NEEDED, Picked, Requirement, energy, lookalike};
-use crate::data::{Data, Nuisances};
-use crate::effects::Effect;
-use crate::set::MeasuredSet;
-use crate::simulator::Simulator;
-use crate::simulator_model::separating_measurement;
-use crate::statistics::{FitProblem, ForwardModel, Measurements, REFERENCES_DECIDE, Surrogate, half_widths};
+use crate::choice::{Choice, NEEDED, Picked, Requirement, energy, lookalike};
+use metalith_attribution::{ForwardModel, Measurements, REFERENCES_DECIDE, half_widths};
+use metalith_calibrate::Effect;
+use metalith_calibrate::MeasuredSet;
+use metalith_calibrate::Simulator;
+use metalith_calibrate::separating_measurement;
+use metalith_calibrate::{Data, Nuisances};
+use metalith_calibrate::{FitProblem, Surrogate};
 
 /// Margin that is enough: the choice stops at one, and its sums round.
 const ENOUGH: f64 = 1.0 - 1e-6;

@@ -7,9 +7,9 @@ use metalith_design::{Design, Element};
 use metalith_pillars::{PillarMap, PillarReader};
 use ndarray::Array2;
 
-use super::bench_file::{BenchFile, SemOffer};
-use crate::set::read::WINDOW_CENTRE_UM;
-use crate::set::{
+use crate::bench_file::{BenchFile, SemOffer};
+use metalith_calibrate::set_format::WINDOW_CENTRE_UM;
+use metalith_calibrate::{
     Capture, ElementIndex, LedIndex, MeasuredElement, MeasuredSet, PerCapture, PerElement, SemSite, Stack,
 };
 
@@ -250,8 +250,8 @@ pub fn sem_sites(set: &MeasuredSet, offer: SemOffer) -> Vec<SemSite> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::bench_file::tests::small_bench;
     use super::*;
+    use crate::bench_file::tests::small_bench;
     use metalith_core::Silent;
     use metalith_design::PillarArray;
     use metalith_gds::extract::GdsPillars;

@@ -4,9 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use metalith_calibrate::{
-    BenchFile, CapturePlan, MeasuredSet, PlanRequest, Sampling, Session, Settings, Synthesizer, plan,
-};
+use metalith_bench_plan::{BenchFile, CapturePlan, PlanRequest, plan};
+use metalith_calibrate::{MeasuredSet, Sampling, Session, Settings, Synthesizer};
 use metalith_core::Silent;
 use metalith_design::{Design, PillarArray};
 use metalith_gds::extract::GdsPillars;

@@ -4,9 +4,9 @@ use metalith_core::document::Limits;
 use metalith_core::{Error, Result};
 use metalith_design::Design;
 
-use super::bench_file::BenchFile;
-use super::candidates::{chosen_elements, distances_um, lens_diameter_um};
-use crate::set::read;
+use crate::bench_file::BenchFile;
+use crate::candidates::{chosen_elements, distances_um, lens_diameter_um};
+use metalith_calibrate::set_format as read;
 
 /// Nothing, if a set of the design can be planned and read: pillars that are squares or circles, elements that are round, and all
 /// within what a set may say.
@@ -69,8 +69,8 @@ fn check(design: &Design, numbers: Vec<(&str, f64, Limits)>, hint: &str) -> Resu
 
 #[cfg(test)]
 mod tests {
-    use super::super::bench_file::tests::small_bench;
     use super::*;
+    use crate::bench_file::tests::small_bench;
 
     fn checked(name: &str) -> Result<()> {
         let path = metalith_testing::root().join(format!("designs/{name}.toml"));

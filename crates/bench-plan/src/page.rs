@@ -3,8 +3,8 @@
 use metalith_core::Result;
 use metalith_report::{Cell, Column, ImageGrid, Page, Table, Verdict, count, exact, sig};
 
-use super::CapturePlan;
-use crate::set::MeasuredSet;
+use crate::CapturePlan;
+use metalith_calibrate::MeasuredSet;
 
 /// Pictures of a row.
 const COLUMNS: usize = 6;

@@ -6,8 +6,8 @@ use std::path::Path;
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 
-use crate::set::read;
-use crate::set::{Led, PerLed, RelayCamera};
+use metalith_calibrate::set_format as read;
+use metalith_calibrate::{Led, PerLed, RelayCamera};
 
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;

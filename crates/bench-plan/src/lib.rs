@@ -37,20 +37,18 @@ use serde::Serialize;
 
 pub use begun::check_not_begun;
 pub use bench_file::{BenchFile, SemOffer};
-#[cfg(test)]
-pub(crate) use candidates::candidates;
 pub use judgement::{Confusion, PlannedEffect};
 pub use limits::check_plannable;
 
-use crate::bench::{Bench, Sampling};
-use crate::effects::{self, Effect};
-use crate::session::check_effects;
-use crate::set::MeasuredSet;
-use crate::simulator::Simulator;
-use crate::statistics::{Surrogate, check_calibration_fits};
 use candidates::{Candidates, sem_sites};
 use choice::{Choice, Picked, Place, Requirement};
 use information::{Information, cells_of, exposed};
+use metalith_calibrate::MeasuredSet;
+use metalith_calibrate::Simulator;
+use metalith_calibrate::check_effects;
+use metalith_calibrate::{Bench, Sampling};
+use metalith_calibrate::{Effect, all_effects};
+use metalith_calibrate::{Surrogate, check_calibration_fits};
 use wanted::{check_wanted, only_of_what_is_found, requirements};
 
 /// Spectra of a plan: steps in wavelength are coarser than those of a calibration, since nothing is fitted.
@@ -194,7 +192,7 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
 }
 
 fn wanted_effects(set: &MeasuredSet, request: &PlanRequest<'_>) -> Result<Vec<Box<dyn Effect>>> {
-    let mut effects = effects::all(set);
+    let mut effects = all_effects(set);
     check_effects(&effects, &request.only)?;
     if !request.only.is_empty() {
         effects.retain(|e| request.only.contains(&e.name()));
@@ -202,7 +200,7 @@ fn wanted_effects(set: &MeasuredSet, request: &PlanRequest<'_>) -> Result<Vec<Bo
     Ok(effects)
 }
 
-fn place(capture: &crate::set::Capture) -> Place {
+fn place(capture: &metalith_calibrate::Capture) -> Place {
     Place {
         element: capture.element.into(),
         led: capture.led.into(),
@@ -228,7 +226,7 @@ fn chosen_set(candidates: &Candidates, bench: &BenchFile, information: &Informat
     set
 }
 
-fn planned(capture: &crate::set::Capture, set: &MeasuredSet, bench: &BenchFile) -> PlannedCapture {
+fn planned(capture: &metalith_calibrate::Capture, set: &MeasuredSet, bench: &BenchFile) -> PlannedCapture {
     PlannedCapture {
         file: files::frame_file(&capture.name, bench),
         element: set.elements[capture.element].index,

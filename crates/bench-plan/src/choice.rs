@@ -10,8 +10,8 @@
 
 use nalgebra::DMatrix;
 
-use super::information::Information;
-use crate::statistics::{LEAST_GAIN, covariance, projected};
+use crate::information::Information;
+use metalith_attribution::{LEAST_GAIN, covariance, projected};
 
 /// Gain in reduced chi-square per pixel that is asked for: twice what a calibration takes for more than the error of its
 /// own model, because what comes back is noisy.
@@ -249,9 +249,9 @@ pub fn lookalike(products: &DMatrix<f64>, r: &Requirement) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::information::Told;
     use super::*;
-    use crate::set::{Capture, ElementIndex, LedIndex};
+    use crate::information::Told;
+    use metalith_calibrate::{Capture, ElementIndex, LedIndex};
 
     /// Pixels of every test capture.
     const PIXELS: f64 = 1000.0;
