@@ -7,7 +7,7 @@
 //! | folder | holds | may use |
 //! | --- | --- | --- |
 //! | `set` | the measured set and its files | |
-//! | `effects` | what chips and benches are known to do to light, one file each | `set` |
+//! | `effects` | what chips and benches are known to do to light | `set` |
 //! | `bench`, `cells`, `optics`, `simulator` | the simulated bench | `set`, `effects` |
 //! | `data`, `screening`, `speckle`, `grouping` | captures, nuisances and noise as `metalith-attribution` needs them | `bench` |
 //! | `simulator_model`, `smooth_shape`, `cell_error` | the simulated bench as its forward model | `data` |
