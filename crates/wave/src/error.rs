@@ -75,7 +75,7 @@ pub enum WaveError {
 
     /// A direction behind the element that never meets the sensor.
     #[error("light that leaves an element with sines {}, {} does not reach the sensor", sines[0] + 0.0, sines[1] + 0.0)]
-    SensorIrradiance { sines: [f64; 2] },
+    MissesSensor { sines: [f64; 2] },
 
     /// Pixels that reach beyond the window that the PSF is known on.
     #[error("{pixels} pixels of {pixel_um} um about {centre_um:?} um do not fit into the window")]
@@ -138,7 +138,7 @@ impl WaveError {
             Self::Incidence { .. } => {
                 "keep field angles smaller: light arrives at less than 90 degrees from the chip's normal".into()
             }
-            Self::SensorIrradiance { .. } => "keep wedge and field angle smaller at the longest wavelength".into(),
+            Self::MissesSensor { .. } => "keep wedge and field angle smaller at the longest wavelength".into(),
             Self::Pixels { .. } => "use fewer pixels, or form the PSF on a larger window".into(),
             Self::Samples => "form both on the same number of samples and with the same step".into(),
             Self::Kernels { .. } => {

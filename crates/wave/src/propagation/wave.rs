@@ -77,7 +77,7 @@ pub fn landing_um(wedge: &Wedge, wave: &PlaneWave, distance_um: f64) -> Result<[
     if cosine2 > 0.0 {
         return Ok([x, y].map(|s| distance_um * s / cosine2.sqrt()));
     }
-    Err(WaveError::SensorIrradiance { sines: [x, y] })
+    Err(WaveError::MissesSensor { sines: [x, y] })
 }
 
 #[cfg(test)]
