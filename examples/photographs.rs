@@ -26,11 +26,11 @@ fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [design, layout, camera, folder, field, methods, more @ ..] = &arguments[..] else {
         let usage = "DESIGN LAYOUT CAMERA FOLDER FIELD_DEG METHOD,METHOD [separate]";
-        return Err(Error::invalid("too few arguments", usage));
+        return Err(Error::refused("example/photographs", "too few arguments", usage));
     };
     let field_deg = field
         .parse()
-        .map_err(|_| Error::invalid("the field is no number", "give degrees"))?;
+        .map_err(|_| Error::refused("example/photographs", "the field is no number", "give degrees"))?;
     let methods: Vec<RestorationMethod> = methods.split(',').map(str::parse).collect::<Result<_>>()?;
     let separate = more.iter().any(|a| a == "separate");
     let design = Design::read(design.as_ref())?;

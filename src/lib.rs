@@ -110,7 +110,9 @@ pub use metalith_verify::compensate;
 pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
-pub use metalith_core::{AtomicFile, Error, Fault, Faults, FolderLock, Progress, Result, Silent, Wedge, text};
+pub use metalith_core::{
+    AtomicFile, Error, Fault, FaultKind, Faults, FolderLock, Progress, Result, Silent, Wedge, text,
+};
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;
 pub use metalith_gds::extract::{Extraction, ExtractionPlan, extract};

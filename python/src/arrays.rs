@@ -166,7 +166,8 @@ impl Array {
     /// Widths of one element (nm): uint16, rows along +y, columns along +x, zero where there is no pillar.
     fn widths<'py>(&self, py: Python<'py>, element: usize) -> PyResult<Bound<'py, PyArray2<u16>>> {
         let placed = self.array.placed.get(element).ok_or_else(|| {
-            error(Error::invalid(
+            error(Error::refused(
+                "array/unknown-element",
                 format!("there is no element {element}"),
                 format!("this array has elements 0 to {}", self.array.placed.len() - 1),
             ))
@@ -191,7 +192,8 @@ impl Array {
             Some("sref") => Hierarchy::Sref,
             Some("flat") => Hierarchy::Flat,
             Some(other) => {
-                return Err(error(Error::invalid(
+                return Err(error(Error::refused(
+                    "layout/unknown-hierarchy",
                     format!("there is no hierarchy `{other}`"),
                     "use folded, sref or flat",
                 )));
@@ -202,7 +204,8 @@ impl Array {
             Some("gds") => LayoutFormat::Gds,
             Some("oas") => LayoutFormat::Oasis(OasisEncoding::default()),
             _ => {
-                return Err(error(Error::invalid(
+                return Err(error(Error::refused(
+                    "layout/unknown-ending",
                     format!("{}: this ending is not known", path.display()),
                     "name a file that ends in .gds or .oas",
                 )));
@@ -237,7 +240,8 @@ pub fn array_of_widths(
 ) -> PyResult<Array> {
     let shape = shape_of(shape).map_err(error)?;
     if widths.len() != centres_nm.len() || widths.is_empty() {
-        return Err(error(Error::invalid(
+        return Err(error(Error::refused(
+            "array/counts-differ",
             format!("{} maps of widths, {} centres", widths.len(), centres_nm.len()),
             "give one centre for each map, and at least one",
         )));
@@ -269,13 +273,15 @@ pub fn width_map(
     if let Some(pillars) = shape.rectangles() {
         let longer = pillars.edges_nm(pillars.last()).into_iter().max().unwrap_or(0);
         if u32::from(longer) > pitch_nm {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "array/pillar-too-wide",
                 format!("rectangles {longer} nm long at a pitch of {pitch_nm} nm"),
                 "give edges of at most the pitch",
             ));
         }
         if let Some(wrong) = width_nm.iter().find(|n| **n > pillars.last()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "array/unknown-pillar",
                 format!("a rectangle of number {wrong}"),
                 format!(
                     "numbers go from 1 to {}: the steps of half a turn, or the pairs of widths",
@@ -284,7 +290,8 @@ pub fn width_map(
             ));
         }
     } else if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > widest_nm) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "array/pillar-too-wide",
             format!("a pillar {wrong} nm wide"),
             format!(
                 "widths are even, so that edges are whole nanometres, and at most the distance of neighbours, {widest_nm} nm"

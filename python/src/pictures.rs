@@ -158,13 +158,15 @@ impl ImagingSystem {
     fn scene(&self, rgb: &Array3<f64>) -> Result<SceneImage> {
         let view = self.studio.given;
         if rgb.dim() != (view.rows, view.columns, 3) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "imaging/scene-shape",
                 format!("a scene of shape {:?}", rgb.dim()),
                 format!("give one of shape ({}, {}, 3)", view.rows, view.columns),
             ));
         }
         if !rgb.iter().all(|v| v.is_finite() && *v >= 0.0) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "imaging/scene-values",
                 "a scene with light that is negative or no number",
                 "give finite values from zero, white being one",
             ));

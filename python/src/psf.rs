@@ -33,7 +33,8 @@ const APERTURES_UM: std::ops::RangeInclusive<f64> = 0.1..=1e5;
 /// Nothing, if a length that is given lies within a range (um).
 fn within(what: &str, um: Option<f64>, range: &std::ops::RangeInclusive<f64>) -> Result<()> {
     match um.filter(|um| !range.contains(um)) {
-        Some(um) => Err(Error::invalid(
+        Some(um) => Err(Error::refused(
+            "option/out-of-range",
             format!("{what} = {um}"),
             format!(
                 "give a number from {} to {}, in micrometres",
@@ -234,7 +235,8 @@ pub fn psf_of_array<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<ToldPsfs<'py>> {
     let design = array.design.as_ref().ok_or_else(|| {
-        error(Error::invalid(
+        error(Error::refused(
+            "psf/no-sensor",
             "an array of widths says nothing of the sensor",
             "give `distance_um` and what pillars are made of",
         ))
@@ -247,7 +249,8 @@ pub fn psf_of_array<'py>(
     let is_first = |k: &usize| (0..*k).all(|earlier| looks(earlier) != looks(*k));
     let chosen = elements.unwrap_or_else(|| (0..placed.len()).filter(is_first).collect());
     if let Some(wrong) = chosen.iter().find(|k| **k >= placed.len()) {
-        return Err(error(Error::invalid(
+        return Err(error(Error::refused(
+            "array/unknown-element",
             format!("there is no element {wrong}"),
             format!("this array has elements 0 to {}", placed.len() - 1),
         )));

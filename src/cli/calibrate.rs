@@ -98,7 +98,8 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
         }
     };
     if let Some(k) = (1..outs.len()).find(|&k| outs[..k].contains(&outs[k])) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "calibrate/same-answer",
             format!(
                 "{} and a set before it would be answered in {}",
                 args.sets[k].display(),
@@ -108,7 +109,8 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
         ));
     }
     if args.validate && args.sets.len() > 1 {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "calibrate/several-sets",
             "a validation of several sets",
             "validate one at a time: synthetic sets are made like one",
         ));

@@ -43,7 +43,8 @@ pub fn distance_um(distance_mm: Option<f64>) -> Result<f64> {
     match distance_mm {
         None => Ok(f64::INFINITY),
         Some(mm) if mm > 0.0 => Ok(mm * 1e3),
-        Some(_) => Err(Error::invalid(
+        Some(_) => Err(Error::refused(
+            "option/scene-distance",
             "a scene at no distance",
             "give a positive --distance-mm",
         )),

@@ -61,7 +61,8 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name));
     match design.cell.shape.rectangles() {
         Some(_) if args.steered => {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cells/steered-rectangles",
                 "mappings of steered elements for rectangles",
                 "leave out --steered: unlike neighbours are known of squares alone",
             ));

@@ -75,7 +75,8 @@ impl CheckArgs {
             .map(|(path, _)| path)
             .partition(|path| is_standard_output(path));
         if printed.len() + usize::from(self.json) > 1 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "option/two-on-standard-output",
                 "two results for standard output",
                 "give `-` to one of --lyrdb, --junit and --sarif, without --json",
             ));

@@ -216,7 +216,8 @@ impl ComparedDesign {
         let folder = Path::new("out").join(&design.name);
         let there = ["gds", "oas"].map(|e| folder.join(format!("{}_pillars.{e}", design.name)));
         there.iter().find(|p| p.is_file()).cloned().ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "compare/no-layout",
                 format!("no layout of `{}` at {}", design.name, there[0].display()),
                 format!(
                     "write it by `metalith layout {}`, or name it behind a colon",

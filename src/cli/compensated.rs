@@ -45,7 +45,8 @@ pub fn judged_as_made(option: &str, model: Option<&Path>, fidelity: Option<Fidel
     if model.is_none() || fidelity.is_none() {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "option/fidelity-of-compensated",
         "`--fidelity` describes pillars as drawn, and a compensated layout is judged as it is made",
         format!("leave out `--fidelity`, or `{option}` for the layout as designed"),
     ))

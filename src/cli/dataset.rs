@@ -83,7 +83,8 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
         return plan(args, images, terminal);
     }
     if is_planned(&args.out) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "dataset/folder-of-plan",
             format!("{} holds a plan, which is carried out in shards", args.out.display()),
             "make them by `metalith study run FOLDER --missing`, or name another folder with --out",
         ));

@@ -66,14 +66,16 @@ fn noise(text: &str) -> std::result::Result<f32, String> {
 
 pub fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.out.is_none() && !args.add {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "denoise/nothing-to-do",
             "nothing would come of this",
             "name a file with --out, or hold the result against the picture with --add",
         ));
     }
     if let Some(out) = &args.out {
         if out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "denoise/unknown-ending",
                 format!("{}: pictures are written as PNG", out.display()),
                 "name a file that ends in .png",
             ));

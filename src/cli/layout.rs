@@ -99,7 +99,8 @@ impl FormatArgs {
             Some(EncodingArg::Smallest) => OasisEncoding::Smallest,
         };
         match (self.format, self.oasis) {
-            (Some(FormatArg::Gds), Some(_)) => Err(metalith::Error::invalid(
+            (Some(FormatArg::Gds), Some(_)) => Err(metalith::Error::refused(
+                "option/two-formats",
                 "--oasis and --format gds",
                 "leave one of them out",
             )),

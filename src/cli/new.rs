@@ -170,7 +170,8 @@ impl NewArgs {
 
 pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.design.exists() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "new/exists",
             format!("{} exists", args.design.display()),
             "give another name, or move the file away",
         ));

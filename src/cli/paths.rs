@@ -19,7 +19,8 @@ pub fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&Path]) 
         } else {
             continue;
         };
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "option/same-file",
             format!("{} {what}", output.display()),
             "name another file to write to",
         ));

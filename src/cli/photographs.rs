@@ -137,9 +137,13 @@ fn phases(args: &PhotographsArgs, task: &OptimiseTask) -> Result<Vec<(String, Ve
         ),
     ];
     for phase in &args.phase {
-        let (name, file) = phase
-            .split_once('=')
-            .ok_or_else(|| Error::invalid(format!("`{phase}` names no phase"), "write --phase NAME=FILE"))?;
+        let (name, file) = phase.split_once('=').ok_or_else(|| {
+            Error::refused(
+                "photographs/unknown-phase",
+                format!("`{phase}` names no phase"),
+                "write --phase NAME=FILE",
+            )
+        })?;
         let edge_um = task.lens.rings.middle_um(task.lens.rings.len() - 1);
         let table = RadialPhase::read_table(Path::new(file), Interpolation::Nearest, edge_um)?;
         phases.push((name.to_owned(), turns_of(&task.lens.rings, &table)));

@@ -118,7 +118,8 @@ impl PictureArgs {
         let distance_um = distance_um(self.distance_mm)?;
         let built_in = self.scene.parse::<BuiltIn>().ok();
         let idle = |option: &str, what: &str| {
-            Err(Error::invalid(
+            Err(Error::refused(
+                "option/not-of-scene",
                 format!("{option} says nothing of `{}`: it is of {what}", self.scene),
                 format!("leave {option} out, or give another scene"),
             ))

@@ -239,7 +239,8 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if args.extract_only || others <= found.pillars {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "psf/not-pillars",
         format!(
             "{}: only {} of {} shapes on layer {} are {} on a lattice",
             args.layout.display(),
@@ -262,7 +263,11 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
         && !args.extract_only
         && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))
     {
-        return Err(Error::invalid(format!("{}: {what}", args.layout.display()), hint));
+        return Err(Error::refused(
+            "psf/kinds-of-pillars",
+            format!("{}: {what}", args.layout.display()),
+            hint,
+        ));
     }
     Ok(())
 }
@@ -271,7 +276,8 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
 /// told which it passes.
 fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if found.shape.rectangles().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/polarisation-of-pillars",
             format!(
                 "{}: light of a polarisation for {}",
                 args.layout.display(),
@@ -282,7 +288,8 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
         ));
     }
     if found.shape.upright().is_some() && (args.analyser == Some(Analyser::Circular) || args.focused.is_some()) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/not-focused",
             format!(
                 "{}: its pillars are upright rectangles, which focus linear light, and {} was asked for",
                 args.layout.display(),
@@ -298,7 +305,8 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
         ));
     }
     if args.analyser == Some(Analyser::Circular) && args.hand().is_none() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/analyser",
             format!(
                 "a circular analyser in light that arrives {}",
                 args.arriving(found.shape)

@@ -147,7 +147,8 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let found = work.cut().status()?;
     if let Some((path, why)) = found.unusable.first() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "study/tables-unreadable",
             format!("{} cannot be used: {why}", path.display()),
             "remove it first",
         ));
@@ -196,7 +197,8 @@ fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Termina
     if failed.is_empty() {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "study/shards-not-made",
         format!("{} shards were not made, the first is {}", failed.len(), failed[0]),
         "their messages stand above; run again with --missing",
     ))
@@ -241,7 +243,8 @@ fn submit(args: &SubmitArgs) -> Result<Outcome> {
             .output()
             .map_err(Error::io("start sbatch for", &submission.script))?;
         if !answer.status.success() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/sbatch",
                 format!(
                     "sbatch refused {}: {}",
                     submission.script.display(),
@@ -268,7 +271,8 @@ fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
 fn without_table(args: &MergeArgs) -> Result<()> {
     match &args.out {
         None => Ok(()),
-        Some(_) => Err(Error::invalid(
+        Some(_) => Err(Error::refused(
+            "study/no-table",
             "this work has no table of draws",
             "leave --out out: files are written into the folder of the plan",
         )),

@@ -181,7 +181,8 @@ impl Judging {
         match self.simulation(design, layout)? {
             Simulation::Whole => {}
             _ if camera.is_some() => {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "verify/too-large",
                     "a picture of a layout whose elements are too large to be held in full",
                     "leave out --picture, or allow more memory with --memory-mb",
                 ));

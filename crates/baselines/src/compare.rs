@@ -90,7 +90,7 @@ pub fn compare(
 ) -> Result<ComparedCamera> {
     let first = photographs
         .first()
-        .ok_or_else(|| Error::invalid("no photographs", "give at least one"))?;
+        .ok_or_else(|| Error::refused("compare/no-photographs", "no photographs", "give at least one"))?;
     let limits = contender.limits();
     if let Some(limits) = &limits {
         progress.warn(&format!("{name}: {limits}"));

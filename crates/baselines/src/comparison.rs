@@ -97,7 +97,8 @@ impl Comparison {
     /// If nothing is compared, a file cannot be read, or photographs are not of one size.
     pub fn open(&self) -> Result<OpenLineup<'_>> {
         if self.designs.is_empty() && self.lensless.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "compare/no-camera",
                 "no camera to compare",
                 "give --design, --rivals or both",
             ));
@@ -110,10 +111,15 @@ impl Comparison {
             .map(|p| self.photograph(p))
             .collect::<Result<_>>()?;
         let Some(first) = photographs.first().map(|p| p.view) else {
-            return Err(Error::invalid("no photographs", "give at least one"));
+            return Err(Error::refused(
+                "compare/no-photographs",
+                "no photographs",
+                "give at least one",
+            ));
         };
         if let Some(other) = photographs.iter().find(|p| p.view != first) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "compare/photographs-differ-in-size",
                 format!(
                     "`{}` has {} x {} pixels, the first photograph {} x {}",
                     other.name, other.view.columns, other.view.rows, first.columns, first.rows
@@ -180,7 +186,8 @@ impl Comparison {
 fn middle(mut scene: SceneImage, pixels: usize) -> Result<SceneImage> {
     let SceneView { rows, columns, .. } = scene.view;
     if rows.min(columns) < pixels {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "compare/photograph-too-small",
             format!("`{}` has {columns} x {rows} pixels, fewer than {pixels}", scene.name),
             "give a smaller --pixels, or larger photographs",
         ));

@@ -128,14 +128,16 @@ impl LenslessBench {
     /// is near.
     pub fn new(camera: &Camera, view: SceneView, step_nm: f64) -> Result<Self> {
         if !(view.field_deg > 0.0 && view.field_deg < WIDEST_DEG) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lensless/field-of-view",
                 format!("a field of {} degrees", view.field_deg),
                 format!("give a field of more than 0 and less than {WIDEST_DEG} degrees"),
             ));
         }
         let [rows, columns] = [camera.sensor.rows, camera.sensor.columns];
         if rows.min(columns) < 2 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lensless/sensor-size",
                 format!("a sensor of {columns} x {rows} pixels behind a camera without a lens"),
                 "give a sensor of at least 2 x 2 pixels: each colour has its own in a square of these",
             ));
@@ -143,13 +145,15 @@ impl LenslessBench {
         let sampling = camera.sampling(BAND_NM, step_nm)?;
         let colours = ChannelColours::of(&sampling.channels);
         if !colours.has_colours() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lensless/colours",
                 format!("camera `{}` tells no three colours apart", camera.name),
                 "compare cameras without a lens behind a camera of colours",
             ));
         }
         if view.distance_um.is_finite() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lensless/near-scene",
                 "a scene near to a camera without a lens",
                 "compare such cameras on scenes that are far away",
             ));
@@ -270,7 +274,8 @@ impl LenslessBench {
     pub fn sees(&self, scene: &SceneImage) -> Result<()> {
         match scene.view == self.view {
             true => Ok(()),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "compare/scenes-differ",
                 format!("the scene `{}` has another size or field than the first", scene.name),
                 "give scenes of one size and field at a time",
             )),

@@ -67,7 +67,8 @@ impl FromStr for StageKind {
 
     fn from_str(text: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|k| k.name() == text).ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "compare/unknown-stage",
                 format!("`{text}` is no learnt last stage"),
                 "use flatnet, unrolled-diffuser, multi-wiener or blending",
             )
@@ -119,7 +120,7 @@ pub(crate) fn encoded(picture: &Array3<f64>) -> Array3<f32> {
 /// SHA-256 of all that decides frames but the scene and the noise: what stands before the sensor, the sensor and its light, the field.
 pub(crate) fn camera_digest(optics: &impl Serialize, camera: &Camera, view: &SceneView) -> Result<String> {
     let field = [view.rows as f64, view.columns as f64, view.field_deg];
-    let text =
-        serde_json::to_vec(&(optics, camera, field)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+    let text = serde_json::to_vec(&(optics, camera, field))
+        .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
     Ok(hex(&Sha256::digest(text)))
 }

@@ -70,7 +70,13 @@ impl OpenLineup<'_> {
         let followed: Vec<Followed> = cameras.map(|k| self.followed(k)).collect::<Result<_>>()?;
         let mut seen = HashSet::new();
         for (stage, path) in self.stages.iter().zip(&self.of.learnt) {
-            let refused = |what: String, hint: &str| Err(Error::invalid(format!("{}: {what}", path.display()), hint));
+            let refused = |what: String, hint: &str| {
+                Err(Error::refused(
+                    "compare/stage-without-camera",
+                    format!("{}: {what}", path.display()),
+                    hint,
+                ))
+            };
             let kind = stage.kind.name();
             if !seen.insert((kind, &stage.taught().camera)) {
                 return refused(

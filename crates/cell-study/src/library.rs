@@ -39,7 +39,8 @@ impl LibraryStudy {
     /// If the pillars are no upright rectangles, the cell cannot be solved, or the user stopped it.
     pub fn new(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Self> {
         let pillars = design.cell.shape.upright().ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "cells/kind-of-pillar",
                 format!("the pillars of {} are {}", design.name, design.cell.shape.plural()),
                 "this study is of upright rectangles",
             )

@@ -47,7 +47,8 @@ impl RotationStudy {
     /// If the pillars are no rectangles, or the cell cannot be solved.
     pub fn new(design: &Design) -> Result<Self> {
         let pillars = design.cell.shape.rotated().ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "cells/kind-of-pillar",
                 format!("the pillars of {} are {}", design.name, design.cell.shape.plural()),
                 "this study is of rotated rectangles",
             )

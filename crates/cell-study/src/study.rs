@@ -49,7 +49,8 @@ impl StudyOptions {
     pub fn check(&self) -> Result<()> {
         match (0.0..1.0).contains(&self.threshold) {
             true => Ok(()),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "cells/bad-zero-order",
                 format!("widths are bad below a zero order of {}", self.threshold),
                 "give a share of the incident power, such as 0.3",
             )),

@@ -41,7 +41,8 @@ impl PhaseCurve {
     /// As [`CellModel::transmissions`]; also if there are fewer than two widths.
     pub fn new(cell: &dyn CellModel, wavelength_um: f64, widths_nm: &[u16]) -> Result<Self> {
         let (Some(&widest), true) = (widths_nm.last(), widths_nm.len() > 1) else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/curve-too-short",
                 "a phase curve over fewer than two widths",
                 "widen the range of widths of the cell",
             ));

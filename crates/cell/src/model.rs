@@ -66,7 +66,7 @@ impl Fidelity {
     /// If they cannot.
     pub fn check(self, shape: PillarShape, lattice: LatticeKind) -> Result<()> {
         match self.refusal(shape, lattice) {
-            Some((what, hint)) => Err(Error::invalid(what, hint)),
+            Some((what, hint)) => Err(Error::refused("cell/model-not-for-pillar", what, hint)),
             None => Ok(()),
         }
     }
@@ -94,7 +94,8 @@ impl FromStr for Fidelity {
 
     fn from_str(text: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "cell/unknown-model",
                 format!("`{text}` is not a fidelity of the cell"),
                 "use published, fitted, rigorous or neighbours",
             )

@@ -33,7 +33,11 @@ impl PublishedCell {
     pub fn of_stack(stack: &CellStack) -> Result<Self> {
         match stack.is_of_the_paper() {
             true => Ok(Self::new(stack.pitch_nm as u32)),
-            false => Err(Error::invalid(Self::OTHERS, Self::ANOTHER_CELL)),
+            false => Err(Error::refused(
+                "cell/published-for-other-cell",
+                Self::OTHERS,
+                Self::ANOTHER_CELL,
+            )),
         }
     }
 
@@ -52,7 +56,8 @@ impl CellModel for PublishedCell {
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
         let (short, long) = PUBLISHED_UM;
         if !(short - ROUNDING_UM..=long + ROUNDING_UM).contains(&wavelength_um) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/published-wavelength",
                 format!(
                     "the `published` cell at {} nm: its polynomials are of {} to {} nm",
                     (wavelength_um * 1e4).round() / 10.0,

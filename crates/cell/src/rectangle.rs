@@ -67,7 +67,8 @@ impl CellStack {
             rotation,
         } = *pillar;
         if ![width_nm, length_nm, rotation].iter().all(|v| v.is_finite()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/rectangle-does-not-fit",
                 format!("a pillar of {width_nm} x {length_nm} nm, rotated by {rotation} rad"),
                 "give both edges in nm and the angle in rad",
             ));
@@ -86,7 +87,8 @@ impl CellStack {
     /// Refuses rounded corners, which no rectangle is solved with.
     pub(super) fn check_sharp(&self) -> Result<()> {
         if self.corner_radius_nm > 0.0 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/rounded-rectangle",
                 "rectangles with rounded corners",
                 "leave the corner radius at 0: rectangles are solved with sharp corners",
             ));
@@ -122,7 +124,7 @@ pub const OBLIQUE_RECTANGLES: [&str; 2] = [
 /// Why cells of rectangles are not solved in light that arrives at an angle.
 pub fn oblique_refused() -> Error {
     let [what, hint] = OBLIQUE_RECTANGLES;
-    Error::invalid(what, hint)
+    Error::refused("cell/oblique-not-possible", what, hint)
 }
 
 #[cfg(test)]

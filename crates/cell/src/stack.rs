@@ -102,7 +102,8 @@ impl CellStack {
     /// which no width tells apart: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
         if self.shape.rectangles().is_some() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/rectangle-by-width",
                 "rectangular pillars, where those of a width are asked for",
                 "use squares or circles here: `photographs` and calibration know no rectangles, `optimise` no upright ones; the other commands do",
             ));
@@ -195,7 +196,8 @@ impl CellStack {
         let cosine = |index: Complex64| (1.0 - (sines[0].powi(2) + sines[1].powi(2)) / index.re.powi(2)).sqrt();
         let (below, above) = (cosine(layers.below), cosine(layers.above));
         if above.is_nan() || above <= 0.0 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "light/evanescent",
                 format!("light at sines of {:.4}, {:.4} leaves no pillar", sines[0], sines[1]),
                 "use an angle of less than 90 degrees in air",
             ));
@@ -260,7 +262,8 @@ impl CellStack {
         if k <= MOST_SUBSTRATE_K {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "cell/absorbing-substrate",
             format!(
                 "the substrate {} has k = {k} at {:.1} nm, where light arrives through it",
                 self.substrate,
@@ -295,7 +298,8 @@ impl CellStack {
         if width_nm.is_finite() && width_nm >= 0.0 {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "cell/width-out-of-range",
             format!("a pillar {width_nm} nm wide"),
             "give its width in nm, zero for a site without pillar",
         ))
@@ -304,26 +308,30 @@ impl CellStack {
     fn check(&self) -> Result<()> {
         let lean = self.taper.abs();
         if lean.is_nan() || lean >= MOST_TAPER {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/side-wall",
                 format!("walls that lean by {} degrees", self.taper.to_degrees()),
                 "use an angle from upright below 45 degrees",
             ));
         }
         if !(self.height_nm.is_finite() && self.height_nm > 0.0) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/height",
                 format!("pillars {} nm high", self.height_nm),
                 "give a positive height",
             ));
         }
         let sound = |v: f64| v.is_finite() && v >= 0.0;
         if let Some(under) = self.under.iter().find(|u| !sound(u.height_nm)) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/residual-film",
                 format!("{} nm of {} under the pillars", under.height_nm, under.material),
                 "give a thickness of zero or more",
             ));
         }
         if !sound(self.corner_radius_nm) || !sound(self.mask_height_nm) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/corner-radius",
                 format!(
                     "a corner radius of {} nm with {} nm of mask",
                     self.corner_radius_nm, self.mask_height_nm

@@ -67,7 +67,8 @@ impl TableSpec {
     fn check(&self) -> Result<()> {
         let (short, long) = self.band_um;
         if !(short > 0.0 && long > short && long - short <= WIDEST_BAND_UM) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/band",
                 format!("a band from {short} to {long} um"),
                 format!("give two rising, positive wavelengths at most {WIDEST_BAND_UM} um apart"),
             ));
@@ -75,19 +76,22 @@ impl TableSpec {
         let (low, high) = self.widths_nm;
         let pitch = self.stack.pitch_nm;
         if !(1.0..=LARGEST_PITCH_NM).contains(&pitch) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/pitch",
                 format!("a table of a cell with a pitch of {pitch} nm"),
                 format!("use a pitch from 1 to {LARGEST_PITCH_NM} nm"),
             ));
         }
         if low == 0 || low > high || f64::from(high) > pitch {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/width-range",
                 format!("pillars from {low} to {high} nm wide on a pitch of {pitch} nm"),
                 "give a range of widths above zero that fits into the pitch",
             ));
         }
         if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/tolerance",
                 format!("a tolerance of {} in t", self.tolerance),
                 "give a positive number, such as 0.01",
             ));
@@ -198,7 +202,8 @@ impl CellTable {
         self.check_wavelength(wavelength_um)?;
         let pitch = self.spec.stack.pitch_nm;
         if !(0.0..=pitch).contains(&width_nm) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/width-out-of-range",
                 format!("a pillar {width_nm} nm wide on a pitch of {pitch} nm"),
                 "give a width from zero to the pitch",
             ));
@@ -220,7 +225,8 @@ impl CellTable {
         let last = usize::from(max_width_nm);
         let pitch = self.spec.stack.pitch_nm;
         if f64::from(max_width_nm) > pitch {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/width-out-of-range",
                 format!("a pillar {max_width_nm} nm wide on a pitch of {pitch} nm"),
                 "the layout has pillars that the cell cannot hold: correct it or the design's pitch",
             ));
@@ -248,7 +254,8 @@ impl CellTable {
         if wavelength_um >= short - slack && wavelength_um <= long + slack {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "cell/wavelength-out-of-band",
             format!("the cell library spans {short} to {long} um, not {wavelength_um} um"),
             "make the library for a wider band",
         ))

@@ -17,7 +17,7 @@ mod zernike;
 
 pub use cross::cross_corners;
 #[cfg(feature = "documents")]
-pub use document::{Fault, Faults};
+pub use document::{Fault, FaultKind, Faults};
 pub use error::{Error, Result};
 pub use file::{AtomicFile, AtomicFolder, FolderLock};
 pub use layer::LayerNumber;

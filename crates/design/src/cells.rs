@@ -170,7 +170,8 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
                 }
                 Fidelity::Neighbours => Ok(Box::new(neighbour_cell(design, cache_folder())?)),
-                Fidelity::Calibrated => Err(Error::invalid(
+                Fidelity::Calibrated => Err(Error::refused(
+                    "cell/no-calibrated-model",
                     "a calibrated cell without the model it is calibrated by",
                     "read the model that `metalith calibrate` wrote and make a `AsBuiltChip` of it",
                 )),

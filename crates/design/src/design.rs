@@ -163,7 +163,8 @@ impl Design {
         };
         for (section, band_um) in bands.into_iter().filter_map(|(section, band)| Some((section, band?))) {
             if !(is_known(band_um.0) && is_known(band_um.1)) {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "design/band-beyond-materials",
                     format!(
                         "{}: `band_nm` of [{section}] is {}, and the materials of [cell] are known from {}",
                         self.path.display(),
@@ -240,7 +241,8 @@ impl Design {
     /// If they are not; `who` knows one round lens alone.
     pub fn one_lens(&self, who: &str) -> Result<()> {
         if self.array.has_own_lenses() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "design/individual-lenses",
                 format!(
                     "{who} knows one lens for all elements, and elements of the design have their own, or rotated ones"
                 ),
@@ -249,7 +251,8 @@ impl Design {
             ));
         }
         if self.lens.outline.is_some() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "design/polygonal-aperture",
                 format!("{who} knows round lenses alone, and the aperture of the design is a polygon"),
                 "leave `aperture` of [lens] out: simulate the round lens about it",
             ));
@@ -263,7 +266,8 @@ impl Design {
     /// If phases over the plane are added to it, of whichever element; `who` knows none.
     pub fn radial_phase(&self, who: &str) -> Result<()> {
         if self.lens.along_y.is_some() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "design/two-phases",
                 format!(
                     "{who} knows one phase for all light, and {} has another in [phase.y]",
                     self.path.display()
@@ -274,7 +278,8 @@ impl Design {
         if self.lens.terms.is_empty() {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "design/phase-not-radial",
             format!(
                 "{who} knows phases over the radius alone, and {} adds {} over the plane by [[phase.term]]",
                 self.path.display(),

@@ -472,7 +472,11 @@ impl Gather<'_, '_> {
 /// The error that ends a visit.
 fn ended(stop: Stop) -> Error {
     match stop {
-        Stop::TooMuch(why) => Error::invalid(why, "write the layout with simpler outlines or fewer copies"),
+        Stop::TooMuch(why) => Error::refused(
+            "check/too-complex",
+            why,
+            "write the layout with simpler outlines or fewer copies",
+        ),
         Stop::Interrupted => Error::Interrupted,
     }
 }

@@ -308,6 +308,18 @@ impl LayoutError {
 }
 
 impl ExtractionError {
+    /// Identity of the error, `subject/cause`: the text may change, the identity stays.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Sites { .. } => "extract/sites",
+            Self::NoElements { .. } => "extract/no-elements",
+            Self::Groups { .. } => "extract/groups",
+            Self::Scattered { .. } => "extract/scattered",
+            Self::Sparse { .. } => "extract/sparse",
+            Self::Lattice { .. } => "extract/lattice",
+        }
+    }
+
     /// What to do about it.
     pub fn remedy(&self) -> String {
         match self {
@@ -355,7 +367,7 @@ impl From<metalith_core::Error> for Error {
 /// One text with its remedy, for a program; the cause stays its source.
 impl From<Error> for metalith_core::Error {
     fn from(error: Error) -> Self {
-        let (what, hint) = match error {
+        let (id, what, hint) = match error {
             Error::Io { action, path, source } => return Self::Io { action, path, source },
             Error::Interrupted => return Self::Interrupted,
             Error::Visitor(error) => return error,
@@ -372,11 +384,16 @@ impl From<Error> for metalith_core::Error {
                     source: Some(Box::new(error)),
                 };
             }
-            Error::NotAFile { .. } => (error.to_string(), "name a GDSII or OASIS file".into()),
-            Error::Changed { .. } => (error.to_string(), BEING_WRITTEN.into()),
-            Error::Extraction { ref cause, .. } => (error.to_string(), cause.remedy()),
+            Error::NotAFile { .. } => (
+                "file/not-ordinary",
+                error.to_string(),
+                "name a GDSII or OASIS file".into(),
+            ),
+            Error::Changed { .. } => ("file/replaced-meanwhile", error.to_string(), BEING_WRITTEN.into()),
+            Error::Extraction { ref cause, .. } => (cause.id(), error.to_string(), cause.remedy()),
         };
         Self::Invalid {
+            id,
             what,
             hint,
             source: Some(Box::new(error)),

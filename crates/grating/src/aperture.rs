@@ -67,7 +67,8 @@ impl<'a> GratingPillars<'a> {
         let last = drawn.last().copied().unwrap_or(0);
         let by_width = local.by_width;
         if usize::from(last) >= by_width.len() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "grating/width-out-of-range",
                 format!(
                     "a pillar {last} nm wide for a cell up to {} nm",
                     by_width.len().saturating_sub(1)

@@ -73,7 +73,8 @@ impl Blaze {
     /// If it has no sites or more than [`SiteLattice::MOST`], if its offset is not finite, or as [`CoarseCell::solve`].
     pub fn solve(&self, cell: &CoarseCell<'_>, width_nm: impl Fn(f64) -> f64, sines: [f64; 2]) -> Result<BlazeOrders> {
         if !self.offset_turns.is_finite() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "grating/phase",
                 format!("a grating with a phase of {} turns at the origin", self.offset_turns),
                 "give a finite phase",
             ));

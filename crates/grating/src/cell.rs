@@ -55,7 +55,8 @@ impl<'a> CoarseCell<'a> {
         let highest = coarse(SiteGrid::of(stack));
         let (low, high) = widths_nm;
         if !(low > 0.0 && low <= high) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "grating/width-range",
                 format!("pillars from {low} to {high} nm wide"),
                 "give the narrowest and the widest width in nm, both positive",
             ));
@@ -115,7 +116,8 @@ impl<'a> CoarseCell<'a> {
     /// If there is not one finite width for each site, or as the solver.
     pub fn solve(&self, lattice: SiteLattice, widths_nm: &[f64], sines: [f64; 2]) -> Result<SupercellResponse> {
         if let Some(width) = widths_nm.iter().find(|width| !width.is_finite()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/width-out-of-range",
                 format!("a pillar {width} nm wide"),
                 "give its width in nm",
             ));

@@ -123,7 +123,8 @@ impl Sums {
             matrix[(i, i)] += ridge * matrix[(i, i)].max(self.count * f64::EPSILON);
         }
         linear::solve(matrix, &mut self.right, f64::MIN_POSITIVE).ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "neighbours/singular",
                 "supercells that do not tell their pillars apart",
                 "give a mapping that draws several widths",
             )

@@ -56,7 +56,8 @@ impl Mapping {
             *sum = up_to;
         }
         if up_to == 0 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "neighbours/no-pillars",
                 "a layout without pillars",
                 "name the layer of the pillars",
             ));

@@ -56,7 +56,8 @@ impl<'a> NeighbourPillars<'a> {
         let drawn: Vec<u16> = counts.filter(|(_, n)| *n > 0).map(|(w, _)| w as u16).collect();
         let count = drawn.len();
         if count > MOST_WIDTHS {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "neighbours/too-many-widths",
                 format!("an element with pillars of {count} widths"),
                 format!("at most {MOST_WIDTHS} can have neighbours; judge it by another fidelity"),
             ));

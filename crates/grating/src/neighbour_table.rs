@@ -111,7 +111,8 @@ pub fn sites_by(response: &impl SiteResponse, lattice: &SiteLattice, widths_nm: 
 fn check(spec: &NeighbourTableSpec, mappings: &[Mapping]) -> Result<()> {
     let numbers = [spec.wavelength_um, spec.sines[0], spec.sines[1]];
     if mappings.is_empty() || !numbers.iter().all(|v| v.is_finite()) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "neighbours/table-spec",
             format!("a table of neighbours for {spec:?} and {} mappings", mappings.len()),
             "give finite numbers and a mapping",
         ));

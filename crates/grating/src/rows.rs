@@ -224,14 +224,16 @@ impl RealRow {
         let turns = grid.turns_of_places(self.direction);
         let lattice = SiteLattice::of_grating(turns, pillars)?;
         if lattice.len() != pillars {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "supercell/direction",
                 format!("a row of {pillars} pillars in the direction {:?}", self.direction),
                 "use a direction along an axis or a diagonal, such as (1, 0) or (-1, 1)",
             ));
         }
         let counted = self.counted(grid);
         if counted.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "supercell/not-periodic",
                 format!("a row of {pillars} pillars that does not repeat"),
                 {
                     let ends = self.ends(grid);

@@ -45,7 +45,8 @@ impl<const N: usize> Surface<N> {
         let mut weights = values.to_vec();
         weights.resize(size, [Complex64::ZERO; N]);
         solve(matrix, &mut weights, LEAST_PIVOT).ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "grating/vectors",
                 "grating vectors that coincide or lie on one line",
                 "give at least three that span the plane",
             )

@@ -179,7 +179,8 @@ fn chosen(spec: &GratingTableSpec) -> Result<Vec<GratingVector>> {
         *radius,
     ];
     if numbers.iter().any(|v| !v.is_finite()) || !(0.0..=1.0).contains(radius) || middle.iter().any(|k| k.abs() > 1.0) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "grating/table-spec",
             format!("a table of gratings for {spec:?}"),
             "give finite numbers, and a disc within one turn a site",
         ));

@@ -193,7 +193,8 @@ fn seal(files: &Listing, sources: &Sources, options: &HandoffOptions, progress: 
     differ.extend(there.other.iter().map(String::as_str));
     differ.extend(there.empty.iter().map(String::as_str));
     if let Some(first) = differ.first() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "handoff/folder-changed",
             format!("{first} was added or removed while the hand-off was made"),
             "let nothing else write into its folder, and try again",
         ));

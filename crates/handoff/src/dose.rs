@@ -34,7 +34,8 @@ impl Beam {
                 clock_mhz: clock(shot_step_nm),
             })
             .ok_or_else(|| {
-                Error::invalid(
+                Error::refused(
+                    "handoff/beam-current",
                     format!(
                         "{current_na} nA is too much for a dose of {dose_uc_cm2} uC/cm2 at {} MHz",
                         writer.clock_max_mhz

@@ -237,7 +237,8 @@ fn polygon(layer: &LayoutLayer, corners: &[(i64, i64)]) -> GdsElement {
 
 /// What gds21 refuses to encode would be a mistake of ours; it is reported, not hidden.
 fn encoding(error: impl std::fmt::Debug) -> Error {
-    Error::invalid(
+    Error::refused(
+        "layout/encoding",
         format!("the layout cannot be encoded: {error:?}"),
         "please report this with the design file",
     )

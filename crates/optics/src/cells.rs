@@ -141,7 +141,8 @@ impl RealisedCells {
 
     /// That a bank has no answer.
     pub(super) fn along_normal_alone() -> Error {
-        Error::invalid(
+        Error::refused(
+            "study/oblique",
             "tables of cells are for light along the normal",
             "leave out `incidence = \"as_lit\"`",
         )

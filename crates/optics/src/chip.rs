@@ -76,7 +76,11 @@ impl AsBuiltChip {
         let faults = model.perturbation.faults();
         if !faults.is_empty() {
             let all: Vec<String> = faults.iter().map(ToString::to_string).collect();
-            return Err(Error::invalid(all.join("\n"), "correct the calibrated model"));
+            return Err(Error::refused(
+                "model/refused",
+                all.join("\n"),
+                "correct the calibrated model",
+            ));
         }
         let perturbation = &model.perturbation;
         Ok(Self {

@@ -379,7 +379,8 @@ pub fn mixed(
 const MOST_CLASS: u16 = u16::MAX - 1;
 
 fn too_many() -> Error {
-    Error::invalid(
+    Error::refused(
+        "model/too-many-widths",
         format!("widths as made fall into more than {MOST_CLASS} classes of {BIAS_STEP_NM} nm"),
         "lower `cd_bias_density_nm` of the model, or draw fewer widths",
     )

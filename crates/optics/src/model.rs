@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Perturbation, PerturbationFault};
 use metalith_cell::CellStack;
-use metalith_core::document::{self, Fault, Faults};
+use metalith_core::document::{self, Fault, FaultKind, Faults};
 use metalith_core::text::quoted;
 use metalith_core::{AtomicFile, Error, Result};
 
@@ -64,7 +64,8 @@ impl CalibratedModel {
             true => format!("makes pillars of {widest} nm, {nearest_nm} nm from one to the next"),
             false => format!("leaves nothing of pillars drawn {} nm wide", edges_nm[0]),
         };
-        Err(Error::invalid(
+        Err(Error::refused(
+            "model/bias-out-of-range",
             format!("`cd_bias_nm` = {bias_nm} of the model {what}"),
             format!(
                 "set it in [perturbation.geometry] between {} and {}",
@@ -90,6 +91,8 @@ impl CalibratedModel {
         let written = "give the `model.toml` that `metalith calibrate` has written";
         let model: Self = toml::from_str(text).map_err(|e| {
             let fault = Fault {
+                kind: FaultKind::Inconsistent,
+                key: String::new(),
                 span: e.span().unwrap_or(0..0),
                 what: quoted(e.message()),
                 hint: written.into(),

@@ -111,7 +111,8 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
     let ((first, last), band) = (ends(tables), design.optimise.band_um);
     let words = |(a, b): (f64, f64)| format!("from {:.0} to {:.0} nm", a * 1e3, b * 1e3);
     if first >= last {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "optimise/neighbours-one-wavelength",
             format!(
                 "a table of unlike neighbours at one wavelength alone, for a band {}",
                 words(band)
@@ -138,7 +139,8 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
 pub(super) fn check_shape(design: &Design) -> Result<()> {
     match design.cell.shape.upright() {
         None => Ok(()),
-        Some(_) => Err(Error::invalid(
+        Some(_) => Err(Error::refused(
+            "optimise/upright-rectangles",
             "the pillars are upright rectangles, which have a phase for each polarisation",
             "use squares, circles or rotated rectangles: the optimiser finds one phase for all light",
         )),

@@ -53,7 +53,8 @@ impl Deconvolution {
         let (angles, lengths) = (views.angles_rad.len(), views.wavelengths_um.len());
         if angles == 0 || views.channels == 0 || lengths < 2 * views.channels || !views.window.pixels.is_multiple_of(2)
         {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/shapes",
                 format!(
                     "{lengths} wavelengths in {} channels at {angles} angles",
                     views.channels
@@ -90,7 +91,8 @@ impl Deconvolution {
                         let bytes = pupil.bytes();
                         let so_far = used.fetch_add(bytes, std::sync::atomic::Ordering::Relaxed) + bytes;
                         if so_far > memory_bytes {
-                            return Err(Error::invalid(
+                            return Err(Error::refused(
+                                "optimise/memory",
                                 format!(
                                     "the kernels of {} views take more than {memory_bytes} bytes",
                                     angles * lengths

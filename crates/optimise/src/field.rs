@@ -97,7 +97,8 @@ impl FieldProblem {
             .max()
             .unwrap_or(0);
         if rings == 0 || blocks.iter().flat_map(|b| &b.2).any(|r| r.kernel.len() != rings) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/shapes",
                 "the rows of a merit are empty or differ in the number of rings",
                 "give every row one number a ring",
             ));
@@ -119,7 +120,8 @@ impl FieldProblem {
         let widths = usize::from(mapping.max_width_nm()) + 2;
         let bytes = 8 * (rings as u64 + widths as u64) * rows as u64;
         if bytes > memory_bytes {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/memory",
                 format!("the kernel of {rows} rows by {rings} rings takes {bytes} bytes, more than {memory_bytes}"),
                 "take fewer wavelengths, errors or window points, or raise `memory_mb`",
             ));
@@ -199,7 +201,8 @@ fn transmissions(conditions: &[Option<Condition>], cells: &[&dyn CellModel], wid
                 return Ok(vec![Complex64::ZERO; widths]);
             };
             let cell = cells.get(condition.cell).ok_or_else(|| {
-                Error::invalid(
+                Error::refused(
+                    "optimise/unknown-cell",
                     format!("there is no cell {}", condition.cell),
                     "name one of the cells given",
                 )

@@ -129,7 +129,8 @@ impl Lens {
     /// If the array is on another lattice, or the cell does not cover a wavelength or width.
     pub fn strehl_of_layout(&self, widths: &PillarMap, cell: &dyn CellModel, wavelengths_um: &[f64]) -> Result<Strehl> {
         if widths.lattice != self.rings.lattice() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/lattices-differ",
                 "the layout is on another lattice than the lens",
                 "judge it with the design that it was made from",
             ));

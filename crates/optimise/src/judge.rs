@@ -97,7 +97,8 @@ impl OptimiseTask {
         draws: usize,
     ) -> Result<Vec<f64>> {
         if cells.iter().any(|cell| cell.fidelity() == Fidelity::Neighbours) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/errors-among-neighbours",
                 "errors of fabrication among unlike neighbours",
                 "judge them with the cell `rigorous`",
             ));

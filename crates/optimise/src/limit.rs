@@ -28,7 +28,8 @@ impl StepLimit {
         if turns > 0.0 && turns <= 0.5 {
             return Ok(Self { turns });
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "optimise/phase-step",
             format!("a limit of {turns} turns on the phase step"),
             "give more than 0 and at most 0.5 turns; 0.5 is no limit",
         ))
@@ -147,7 +148,8 @@ pub fn largest_step_in_layout(widths: &PillarMap, mapping: &Mapping) -> Result<f
     let map = &widths.number;
     let turns = |w: u16| turns_of.get(usize::from(w)).copied().unwrap_or(f64::NAN);
     if let Some(stray) = map.iter().find(|&&w| w != 0 && turns(w).is_nan()) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "optimise/unmapped-width",
             format!("the layout holds pillars of {stray} nm, which no phase is mapped to"),
             "compare with the mapping that the layout was made with",
         ));

@@ -55,7 +55,8 @@ impl FieldProblem {
         // In single precision, and in double precision before; and the kernel of the rings with its table.
         let bytes = (24 * numbers + 8 * (self.rings() + of_width + 1)) as u64 * rows as u64;
         if bytes > memory_bytes {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/memory",
                 format!(
                     "neighbours of {} rings at {rows} wavelengths take {bytes} bytes, more than {memory_bytes}",
                     self.rings()
@@ -69,13 +70,15 @@ impl FieldProblem {
             };
             let wavelength_um = condition.wavelength_um;
             if condition.cell != 0 || condition.width_bias_nm != 0.0 {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "optimise/errors-among-neighbours",
                     "errors of fabrication among unlike neighbours",
                     "leave out [optimise.robust], or optimise with the cell `rigorous`",
                 ));
             }
             let unlike = PairResponse::of(cell, wavelength_um, widths.iter().copied())?.ok_or_else(|| {
-                Error::invalid(
+                Error::refused(
+                    "optimise/no-neighbour-model",
                     format!("the cell `{}` takes neighbours for equals", cell.fidelity()),
                     "optimise with the cell `neighbours`",
                 )

@@ -49,7 +49,8 @@ impl Rings {
     pub fn new(lattice: Lattice, diameter_nm: u32) -> Result<Self> {
         let odd = lattice.is_square() && !lattice.sites().is_multiple_of(2);
         if odd || diameter_nm / lattice.pitch_nm() < 2 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/no-rings",
                 format!(
                     "a lens of {diameter_nm} nm on a lattice of {} sites has no rings",
                     lattice.sites()
@@ -58,7 +59,8 @@ impl Rings {
             ));
         }
         if (lattice.sites() as u64) * u64::from(lattice.steps_nm()[0]) < u64::from(diameter_nm) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/lattice-too-small",
                 format!("{} sites do not hold a lens of {diameter_nm} nm", lattice.sites()),
                 "use more sites or a smaller lens",
             ));

@@ -126,7 +126,8 @@ impl OptimiseTask {
             StartSpec::Random => Start::Random,
             StartSpec::Previous => Start::Previous(self.own_turns.clone()),
             StartSpec::Log => {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "optimise/log-from-itself",
                     "the merit `log` cannot begin with its own result",
                     "use start = \"all\" or \"log_asphere\"; \"log\" is for Adam, and for the merit `deconvolution`",
                 ));

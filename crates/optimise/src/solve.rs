@@ -47,7 +47,11 @@ impl OptimiseTask {
                 }
                 let problem = self.field_problem(&self.spec.merit, cells)?;
                 let problem = problem.ok_or_else(|| {
-                    Error::invalid("exchange has no merit to gain", "give sum, log or side_lobes a weight")
+                    Error::refused(
+                        "optimise/nothing-to-exchange",
+                        "exchange has no merit to gain",
+                        "give sum, log or side_lobes a weight",
+                    )
                 })?;
                 let starts = (0..chains).map(|i| self.start(i)).collect::<Result<Vec<_>>>()?;
                 let course = Course::new(annealing, blocks);
@@ -90,7 +94,13 @@ impl OptimiseTask {
             .into_iter()
             .enumerate()
             .max_by(|(i, a), (j, b)| a.merit.total_cmp(&b.merit).then(j.cmp(i)))
-            .ok_or_else(|| Error::invalid("an exchange without chains", "use chains = 1 or more"))?;
+            .ok_or_else(|| {
+                Error::refused(
+                    "optimise/no-chains",
+                    "an exchange without chains",
+                    "use chains = 1 or more",
+                )
+            })?;
         Ok(found.optimised(starts[at].name(), interrupted))
     }
 

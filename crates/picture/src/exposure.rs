@@ -66,7 +66,8 @@ pub fn gains(camera: &Camera, sensitivity: &[f64], white: &[Array2<f32>]) -> Res
         .map(|(frame, s)| f64::from(frame.iter().copied().fold(0.0, f32::max)) * s)
         .fold(0.0, f64::max);
     if brightest <= 0.0 {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "imaging/no-light",
             "no light of the scene reaches the sensor",
             "check `offset_um`, `columns` and `rows` of the sensor against the chip, and the field of the scene",
         ));
@@ -139,7 +140,8 @@ impl Frame {
         if self.gain.len() == channels && self.planes.iter().all(|p| p.dim() == (rows, columns)) {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "restore/frame-of-another-camera",
             format!(
                 "the frame is of another camera: it has {own_columns} x {own_rows} pixels and {} channels, the camera {columns} x {rows} and {channels}",
                 self.gain.len()

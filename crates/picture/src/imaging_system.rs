@@ -147,7 +147,8 @@ impl ImagingSystem {
     pub fn record(&self, operator: &FrameOperator<'_>, scene: &SceneImage, seed: u64) -> Result<Frame> {
         let scene = self.simulated(scene);
         if scene.view != self.view || scene.basis[..] != self.basis[..self.scene_spectra] {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "imaging/scenes-differ",
                 format!(
                     "the scene `{}` has another size, field or spectra than the first",
                     scene.name
@@ -268,7 +269,8 @@ impl ImagingSystem {
         let (light, trust) = frame.light(&self.camera, error);
         match trust.iter().flatten().any(|t| *t > 0.0) {
             true => Ok([light, trust]),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "restore/all-saturated",
                 "nothing is known of the scene: every pixel that counts light is at full scale",
                 "give a scene of which white is 1, or a lower `white` in [exposure] of the camera",
             )),

@@ -49,7 +49,8 @@ pub fn check_elements(design: &Design, extraction: &Extraction) -> Result<()> {
         let [x, y] = oddity.centre_nm.map(|nm| nm * 1e-3);
         format!(" ({}), the first about ({x:.1}, {y:.1}) um", why(foreign))
     });
-    Err(Error::invalid(
+    Err(Error::refused(
+        "imaging/element-not-in-layout",
         format!(
             "element {} of `{}` at ({x}, {y}) um has no pillar in this layout{others}: on layer {} stand {} pillars on sites of elements, and {} other shapes{where_first}",
             first.label(),

@@ -96,7 +96,8 @@ impl ImagingSystem {
             [false, _] | [_, false],
         ) = (kept, from_cache)
         {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "imaging/kernels-missing",
                 format!("{} does not hold the kernels of this camera", folder.display()),
                 "plan the set again; a shard makes no kernels of its own",
             ));

@@ -92,7 +92,8 @@ fn decibels<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<f64, D::E
 fn psnr_of(error: f64) -> Result<f64> {
     match error.is_nan() {
         false => Ok((-10.0 * error.log10()).min(MOST_DB)),
-        true => Err(Error::invalid(
+        true => Err(Error::refused(
+            "score/not-numbers",
             "a picture whose values are no numbers",
             "look at its frame: where next to no pixel is below full scale nothing can be restored; if that is not so, report this",
         )),
@@ -115,7 +116,8 @@ pub fn check_scored(view: &SceneView) -> Result<()> {
     if view.rows.min(view.columns) >= *SCORED_SIDES.start() {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "score/too-small",
         format!(
             "a scene of {} x {} pixels is too small for the similarity of its pictures, which is taken in nine parts of it",
             view.columns, view.rows
@@ -131,7 +133,8 @@ pub fn check_scored(view: &SceneView) -> Result<()> {
 pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScore>> {
     let (rows, columns, colours) = truth.dim();
     if picture.dim() != truth.dim() || colours != 3 {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "score/shapes",
             format!("pictures of shapes {:?} and {:?}", picture.dim(), truth.dim()),
             "give two of one shape, (rows, columns, 3)",
         ));

@@ -97,19 +97,22 @@ impl Lattice {
     /// As [`Lattice::new`]; also if the places of a hexagonal lattice are an even number.
     pub fn of_kind(kind: LatticeKind, pitch_nm: u32, sites: usize) -> Result<Self> {
         if pitch_nm == 0 || !pitch_nm.is_multiple_of(2) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lattice/off-grid",
                 format!("a pitch of {pitch_nm} nm puts pillar centres off the 1 nm grid"),
                 "use an even, positive number of nanometres",
             ));
         }
         if sites == 0 || sites > 1 << 20 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lattice/sites",
                 format!("a lattice of {sites} sites an axis"),
                 "use between 1 and 1,048,576 sites an axis",
             ));
         }
         if kind == LatticeKind::Hexagonal && sites.is_multiple_of(2) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lattice/sites",
                 format!("a hexagonal lattice of {sites} places an axis"),
                 "use an odd number: one is in the centre",
             ));

@@ -56,8 +56,8 @@ impl Checkpoint {
             let view = TensorView::new(Dtype::F32, shape.clone(), bytes).expect("four bytes a number");
             (*name, view)
         });
-        let file =
-            safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+        let file = safetensors::serialize(views, Some(about))
+            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
         AtomicFile::write(path, &file)
     }
 

@@ -85,7 +85,8 @@ impl NetworkDenoiser {
         };
         let (rows, columns, colours) = picture.dim();
         if colours != COLOURS || rows == 0 || columns == 0 || deviation.dim() != picture.dim() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "denoise/shapes",
                 format!(
                     "values of shape {:?}, deviations of shape {:?}",
                     picture.dim(),

@@ -50,7 +50,13 @@ impl Photographs {
     /// # Errors
     /// If there are fewer than two, or one is too small.
     pub fn new(pictures: Vec<(String, Array3<f32>)>, piece: usize) -> Result<Self> {
-        let invalid = |what: String| Error::invalid(what, "give a folder of at least two larger photographs in colour");
+        let invalid = |what: String| {
+            Error::refused(
+                "train/too-few-photographs",
+                what,
+                "give a folder of at least two larger photographs in colour",
+            )
+        };
         if pictures.len() < 2 {
             return Err(invalid(format!(
                 "{} photographs are too few to learn from",

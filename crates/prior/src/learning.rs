@@ -89,7 +89,7 @@ impl TrainingSpec {
     /// # Errors
     /// If there is nothing to learn, or pieces are too small, too large or no multiple of eight.
     pub fn check(&self) -> Result<()> {
-        let fault = |what: &str, hint: &str| Err(Error::invalid(what, hint));
+        let fault = |what: &str, hint: &str| Err(Error::refused("cell/model-not-for-pillar", what, hint));
         if !self.piece.is_multiple_of(8) || !(32..=512).contains(&self.piece) {
             return fault(
                 "pieces of this size cannot be learnt from",
@@ -142,7 +142,8 @@ pub(crate) fn learn(
         }
         let (loss, gradient) = step(lessons, spec, &plan, &at);
         if !loss.is_finite() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "train/diverged",
                 format!("learning went astray at step {}", at.step),
                 "use another --seed or more pieces a step, and report this",
             ));

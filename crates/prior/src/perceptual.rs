@@ -121,7 +121,8 @@ impl PerceptualDistance {
     pub fn between(&self, a: ArrayView3<'_, f64>, b: ArrayView3<'_, f64>) -> Result<f64> {
         let (rows, columns, colours) = a.dim();
         if a.dim() != b.dim() || colours != 3 || rows.min(columns) < LEAST_PIXELS {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "score/shapes",
                 format!(
                     "pictures of {:?} and {:?} have no perceptual distance",
                     a.shape(),

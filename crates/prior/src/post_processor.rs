@@ -74,7 +74,8 @@ impl PostProcessor {
     /// If there are more or fewer of them, or they differ in size.
     pub fn finish(&self, pictures: &[Array3<f32>]) -> Result<Array3<f32>> {
         if pictures.len() != self.taught.pictures {
-            return Err(metalith_core::Error::invalid(
+            return Err(metalith_core::Error::refused(
+                "stage/number-of-pictures",
                 format!(
                     "{} pictures of a frame for a network that was taught by {}",
                     pictures.len(),

@@ -60,8 +60,8 @@ impl Stack {
             let view = TensorView::new(Dtype::F16, shape, bytes).expect("two bytes a number");
             (*name, view)
         });
-        let file =
-            safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+        let file = safetensors::serialize(views, Some(about))
+            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
         AtomicFile::write(path, &file)
     }
 
@@ -124,7 +124,8 @@ fn digest(bytes: &[Vec<u8>; 2], of: &str) -> String {
 /// Pictures behind one another: `[row, column, colour]`.
 pub(crate) fn piled(pictures: &[Array3<f32>], size: (usize, usize, usize)) -> Result<Array3<f32>> {
     if pictures.is_empty() || pictures.iter().any(|p| p.dim() != size) || size.2 != COLOURS {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "stage/shapes",
             "pictures of one frame that differ in size, or none",
             "give pictures in colour of the size of the scene",
         ));
@@ -164,7 +165,8 @@ impl Stacks {
         if photographs >= 2 && rows.min(columns) >= piece {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "train/too-few-photographs",
             format!("{photographs} photographs of {columns} x {rows} pixels are too few or too small to learn from"),
             format!("give at least two of {piece} x {piece} pixels or more, or a smaller --piece"),
         ))
@@ -178,7 +180,8 @@ impl Stacks {
         let least = |axis: usize| stacks.iter().map(|s| s.size()[axis]).min().unwrap_or(0);
         Self::check(stacks.len(), [least(0), least(1)], piece)?;
         if let Some(other) = stacks.iter().find(|s| s.pictures() != taught.pictures) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "stage/number-of-pictures",
                 format!(
                     "{} pictures of a frame, and {} of others",
                     other.pictures(),

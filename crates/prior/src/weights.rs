@@ -76,7 +76,8 @@ pub(crate) fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training:
         let view = TensorView::new(Dtype::F16, shape(layer), bytes).expect("two bytes a weight");
         (layer.name.clone(), view)
     });
-    let bytes = safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+    let bytes = safetensors::serialize(views, Some(about))
+        .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
     AtomicFile::write(path, &bytes)
 }
 

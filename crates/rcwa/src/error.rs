@@ -140,6 +140,38 @@ impl Error {
         move |source| Self::Io { path, source }
     }
 
+    /// Identity of the error, `subject/cause`: the text may change, the identity stays.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Wavelength { .. } => "rcwa/wavelength",
+            Self::Angle => "rcwa/angle",
+            Self::NoIncidentWave { .. } => "rcwa/no-incident-wave",
+            Self::Orders { .. } => "rcwa/orders",
+            Self::TooLarge { .. } => "rcwa/too-large",
+            Self::Sites { .. } => "rcwa/sites",
+            Self::CellCount { .. } => "rcwa/cell-count",
+            Self::UnlikeCells { .. } => "rcwa/unlike-cells",
+            Self::OutlineCount { .. } => "rcwa/outline-count",
+            Self::RotatedSite { .. } => "rcwa/rotated-site",
+            Self::SupercellOrders { .. } => "rcwa/supercell-orders",
+            Self::SupercellTooLarge { .. } => "rcwa/supercell-too-large",
+            Self::Pitch { .. } => "rcwa/pitch",
+            Self::Row { .. } => "rcwa/row",
+            Self::StaggeredOutline { .. } => "rcwa/staggered-outline",
+            Self::Index { .. } => "rcwa/index",
+            Self::Height { .. } => "rcwa/height",
+            Self::Width { .. } => "rcwa/width",
+            Self::Polarising => "rcwa/polarising",
+            Self::NoModes { .. } => "rcwa/no-modes",
+            Self::Cutoff => "rcwa/cutoff",
+            Self::UnknownMaterial { .. } => "rcwa/unknown-material",
+            Self::MaterialIndex { .. } => "rcwa/material-index",
+            Self::OutOfRange { .. } => "rcwa/out-of-range",
+            Self::Io { .. } => "file/system",
+            Self::Table { .. } => "rcwa/material-table",
+        }
+    }
+
     /// What to do about it.
     pub fn remedy(&self) -> String {
         match self {
@@ -211,6 +243,7 @@ impl From<Error> for metalith_core::Error {
                 source,
             },
             other => Self::Invalid {
+                id: other.id(),
                 what: other.to_string(),
                 hint: other.remedy(),
                 source: Some(Box::new(other)),

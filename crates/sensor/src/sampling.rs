@@ -225,7 +225,8 @@ impl Camera {
             let kept: f64 = parts.iter().map(|p| p.weight).sum();
             if kept <= 0.0 {
                 let [short, long] = range_nm.map(|nm| (nm * 10.0).round() / 10.0);
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "camera/no-light",
                     format!(
                         "channel `{}` of the camera counts no light from {short} to {long} nm",
                         channel.name

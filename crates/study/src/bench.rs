@@ -84,7 +84,8 @@ impl Bench {
             None => Perturbation::default(),
         };
         if base.declared().next().is_some() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/declared-effects",
                 "a model with declared effects: how wide their pillars become is not known before they are drawn",
                 "give a model without declared effects",
             ));
@@ -163,7 +164,8 @@ impl Bench {
     ) -> Result<Subject> {
         let design = self.tolerance.design(number)?;
         if design.verify.incidence == CellIncidence::AsLit {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/oblique",
                 "a study takes the cells along the normal, and the design asks for them as they are lit",
                 "leave out `incidence = \"as_lit\"` in [verify] of the design of the study",
             ));
@@ -287,13 +289,15 @@ fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Res
         return Ok(());
     }
     if made.changes.iter().any(|change| change.corner_rounding_nm != 0.0) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "study/corner-rounding",
             "`corner_rounding` of rectangles",
             "leave it out of the study and of its model: rectangles are solved with sharp corners",
         ));
     }
     if has_picture {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "study/pictures-of-rectangles",
             "pictures of rectangles in a study",
             "leave out [picture]; `metalith picture` takes the picture of the chip as drawn",
         ));

@@ -36,7 +36,8 @@ pub(crate) fn check_biases(
         made.geometry.cd_bias_nm = bias_nm;
         let model = CalibratedModel::new(String::new(), String::new(), made);
         model.check_drawn(stack, counts.clone()).map_err(|error| match error {
-            Error::Invalid { what, hint, .. } => Error::invalid(
+            Error::Invalid { id, what, hint, .. } => Error::refused(
+                id,
                 format!("draw {k} of the study: {what}"),
                 format!("vary `cd_bias` over less, or {hint}"),
             ),

@@ -106,7 +106,10 @@ fn key(lineup: &Comparison) -> Result<String> {
     let mut hash = Sha256::new();
     hash.update(env!("CARGO_PKG_VERSION"));
     // What is asked for, with the names of the files; what they say follows.
-    hash.update(serde_json::to_vec(lineup).map_err(|e| Error::invalid(e.to_string(), "report this"))?);
+    hash.update(
+        serde_json::to_vec(lineup)
+            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?,
+    );
     let mut files = Camera::read(&lineup.camera)?.files;
     for listed in &lineup.designs {
         let design = Design::read(&listed.design)?;

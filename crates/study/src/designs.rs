@@ -59,7 +59,7 @@ impl Tolerance {
             return Design::read(&self.design);
         }
         let text = with_values(&load(&self.design)?, &self.setting(number))
-            .map_err(|NoPlace { what, hint, .. }| Error::invalid(what, hint))?;
+            .map_err(|NoPlace { what, hint, .. }| Error::refused("study/design-key", what, hint))?;
         Design::parse(&self.design, &text)
     }
 }

@@ -192,7 +192,8 @@ impl Sampler {
                 return Ok(amount);
             }
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "study/amount-impossible",
             format!("`{}` is hardly ever within what a chip can have", quantity.name),
             "give a distribution that overlaps with the physical range of the effect",
         ))

@@ -89,7 +89,8 @@ fn fault(folder: &Path, what: String) -> Error {
 
 /// What to say of a folder whose plan is not that of these files.
 pub(crate) fn another_plan(folder: &Path) -> Error {
-    Error::invalid(
+    Error::refused(
+        "study/another-plan",
         format!(
             "{} holds another plan, or a file of it has changed since, or another version of the program planned it",
             folder.display()

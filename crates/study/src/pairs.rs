@@ -120,7 +120,8 @@ impl PairsPlan {
             let image = &self.request.images[k];
             // Before anything of another image is written.
             if image_digest(image)? != self.digests[k] {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "study/input-changed",
                     format!("{} has changed since the set was planned", image.display()),
                     "plan it again into another folder",
                 ));
@@ -169,7 +170,8 @@ impl PairsPlan {
         let mut shards: Vec<u64> = bad.iter().map(|k| k / self.images_per_shard).collect();
         shards.dedup();
         let first = self.cut().path(shards[0]);
-        Err(Error::invalid(
+        Err(Error::refused(
+            "study/damaged-pairs",
             format!(
                 "files of {} of {} pairs are damaged or not there: {}",
                 bad.len(),
@@ -222,7 +224,8 @@ impl PairsRequest {
         let camera = Camera::read(&self.camera)?;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let first = self.images.first();
-        let first = first.ok_or_else(|| Error::invalid("no images", "give a folder with at least one"))?;
+        let first =
+            first.ok_or_else(|| Error::refused("study/no-images", "no images", "give a folder with at least one"))?;
         ImagingSystem::open_kept(
             &design,
             &self.layout,

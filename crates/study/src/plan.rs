@@ -236,7 +236,8 @@ impl Plan {
         for limit in &bench.tolerance.limits {
             if !first.record.figures.contains_key(&limit.figure) {
                 let known: Vec<&str> = first.record.figures.keys().map(String::as_str).collect();
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "study/unknown-figure",
                     format!("there is no figure `{}` to limit", limit.figure),
                     format!("this design has: {}", known.join(", ")),
                 ));
@@ -246,7 +247,8 @@ impl Plan {
         if design > 0 && limits != self.limits {
             let setting = bench.tolerance.setting(design).into_iter();
             let setting: Vec<String> = setting.map(|(key, value)| format!("{key} = {value}")).collect();
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/limits-differ",
                 format!(
                     "with {} other limits count than with the first values of the grid",
                     setting.join(", ")

@@ -77,7 +77,8 @@ impl Sharding {
     /// If there is none of this number.
     pub fn shard(&self, number: u64) -> Result<Shard> {
         if number >= self.shards() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/unknown-shard",
                 format!("there is no shard {number}"),
                 format!("this plan has shards 0 to {}", self.shards() - 1),
             ));
@@ -217,7 +218,8 @@ impl Sharding {
         for (file, path) in files.iter().enumerate() {
             for (k, part) in self.read(path, number)? {
                 let Some(place) = found.get_mut(k as usize) else {
-                    return Err(Error::invalid(
+                    return Err(Error::refused(
+                        "study/unknown-draw",
                         format!(
                             "{} holds {} {k}, and the plan has {}",
                             path.display(),
@@ -234,7 +236,8 @@ impl Sharding {
             }
         }
         if let Some((k, a, b)) = twice.first() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/draws-twice",
                 format!(
                     "{} {}s are there twice, the first is {k}: in {} and in {}",
                     twice.len(),
@@ -247,7 +250,8 @@ impl Sharding {
         }
         let missing: Vec<u64> = (0..self.parts).filter(|k| found[*k as usize].is_none()).collect();
         if !missing.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/draws-missing",
                 format!(
                     "{} of {} {}s are missing in {}: {}",
                     missing.len(),
@@ -296,7 +300,8 @@ fn line(value: &impl Serialize) -> String {
 }
 
 fn refused(path: &Path, why: &str) -> Error {
-    Error::invalid(
+    Error::refused(
+        "study/shard-refused",
         format!("{} {why}", path.display()),
         "remove the file if it came here by mistake; its shard is then made again",
     )

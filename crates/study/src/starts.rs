@@ -111,7 +111,8 @@ impl StartsPlan {
         }
         let folder = self.folder.join(CELLS);
         if let Some(gone) = self.cells.iter().map(|name| folder.join(name)).find(|p| !p.is_file()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/input-missing",
                 format!("{} is not there", gone.display()),
                 "plan the starts again; a shard makes no tables of its own",
             ));
@@ -147,8 +148,13 @@ impl StartsPlan {
         let task = OptimiseTask::of(&design)?;
         let finite = starts.iter().enumerate().filter(|(_, s)| s.merit.is_finite());
         let best = finite.max_by(|(i, a), (j, b)| a.merit.total_cmp(&b.merit).then(j.cmp(i)));
-        let (best, found) =
-            best.ok_or_else(|| Error::invalid("no start has a merit", "look at [optimise] of the design"))?;
+        let (best, found) = best.ok_or_else(|| {
+            Error::refused(
+                "study/no-merit",
+                "no start has a merit",
+                "look at [optimise] of the design",
+            )
+        })?;
         let phase = self.folder.join("phase.csv");
         let remarks = [
             format!(

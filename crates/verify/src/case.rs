@@ -36,9 +36,13 @@ impl<'a> SimulationCases<'a> {
     /// # Errors
     /// If there is no cell.
     pub fn of_cells(cells: &'a [Box<dyn CellModel>]) -> Result<Self> {
-        let (judge, beside) = cells
-            .split_first()
-            .ok_or_else(|| Error::invalid("there is no cell to judge a layout by", "ask for at least one fidelity"))?;
+        let (judge, beside) = cells.split_first().ok_or_else(|| {
+            Error::refused(
+                "verify/no-model",
+                "there is no cell to judge a layout by",
+                "ask for at least one fidelity",
+            )
+        })?;
         Ok(Self::judged_by(judge.as_ref()).with_cells(beside))
     }
 
@@ -296,7 +300,8 @@ impl TransmissionTables {
 
 /// Neighbours and chips as made are looked at site by site in all directions.
 pub(super) fn not_held() -> Error {
-    Error::invalid(
+    Error::refused(
+        "verify/too-large",
         "an element whose pillars are too many to be held is judged as made, or among its unlike neighbours",
         "judge it by the cell of a lattice of equal pillars, as drawn",
     )

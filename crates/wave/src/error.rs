@@ -117,6 +117,28 @@ fn degrees(rad: f64) -> f64 {
 }
 
 impl WaveError {
+    /// Identity of the error, `subject/cause`: the text may change, the identity stays.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Window { .. } => "wave/window",
+            Self::Fade { .. } => "wave/fade",
+            Self::Wave { .. } => "wave/wave",
+            Self::Lattice { .. } => "wave/lattice",
+            Self::Band { .. } => "wave/band",
+            Self::Shape { .. } => "wave/shape",
+            Self::Count { .. } => "wave/count",
+            Self::Width { .. } => "wave/width",
+            Self::Rings { .. } => "wave/rings",
+            Self::Incidence { .. } => "wave/incidence",
+            Self::MissesSensor { .. } => "wave/misses-sensor",
+            Self::Pixels { .. } => "wave/pixels",
+            Self::Samples => "wave/samples",
+            Self::Kernels { .. } => "wave/kernels",
+            Self::Map { .. } => "wave/map",
+            Self::SmallImage { .. } => "wave/small-image",
+        }
+    }
+
     /// What to do about it.
     pub fn hint(&self) -> String {
         match self {
@@ -152,7 +174,7 @@ impl WaveError {
 
 impl From<WaveError> for metalith_core::Error {
     fn from(error: WaveError) -> Self {
-        Self::invalid(error.to_string(), error.hint())
+        Self::refused(error.id(), error.to_string(), error.hint())
     }
 }
 

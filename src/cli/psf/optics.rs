@@ -37,7 +37,8 @@ impl PsfArgs {
         let mut under = Vec::new();
         if self.spacer_nm > 0.0 {
             let name = self.spacer_material.as_ref().ok_or_else(|| {
-                Error::invalid(
+                Error::refused(
+                    "option/spacer-without-material",
                     format!("a spacer of {} nm of no material", exact(self.spacer_nm)),
                     "add --spacer-material: a name or the path of a CSV table",
                 )
@@ -266,7 +267,8 @@ impl PsfArgs {
     pub(super) fn wedge(&self) -> Result<Wedge> {
         let sines = [self.wedge_x_deg, self.wedge_y_deg].map(|deg| deg.to_radians().sin());
         if !(self.wedge_wavelength_nm > 0.0 && sines[0].hypot(sines[1]) < 1.0) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "option/wedge",
                 "a wedge that steers beyond the horizon or at no wavelength",
                 "give smaller --wedge-x-deg and --wedge-y-deg, and a positive --wedge-wavelength-nm",
             ));

@@ -64,7 +64,8 @@ impl DiffuserSpec {
                 opening,
                 ..Self::standard()
             }),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "diffusercam/geometry",
                 format!("a rough surface of grain {grain_um} um at {distance_um} um with an opening of {opening}"),
                 "give a distance from 1, a grain from 5 to 100000 um, an opening from 0.01 to 2",
             )),
@@ -112,7 +113,8 @@ impl DiffuserCam {
         let caustic = opening.map(|n| n + 2 * surface.border(pixel));
         let places = FineGrid::places(&view, step, caustic);
         if places > MOST_PLACES {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "diffusercam/too-large",
                 format!("a scene and a caustic of {places} places along an axis, more than {MOST_PLACES}"),
                 "bring the rough surface nearer to the sensor, make its grain finer, or give a narrower field",
             ));

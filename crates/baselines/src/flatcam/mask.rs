@@ -33,7 +33,8 @@ impl MaskSpec {
                 feature_um,
                 distance_um,
             }),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "flatcam/geometry",
                 format!("a mask with openings of {feature_um} um at {distance_um} um"),
                 "give lengths from 1 to 100000 um",
             )),
@@ -53,7 +54,8 @@ impl MaskSpec {
     pub fn check_reach(&self, reach_um: f64) -> Result<()> {
         match self.samples(reach_um) {
             count if count <= MOST_SAMPLES => Ok(()),
-            count => Err(Error::invalid(
+            count => Err(Error::refused(
+                "flatcam/too-large",
                 format!("a shadow of {count} samples along an axis, more than {MOST_SAMPLES}"),
                 "give wider openings, a nearer mask or a narrower field",
             )),

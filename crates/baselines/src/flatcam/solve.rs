@@ -29,7 +29,8 @@ impl Factor {
             all[(2 * i + first, j)]
         });
         let svd = (&own * &root).thin_svd().map_err(|e| {
-            Error::invalid(
+            Error::refused(
+                "flatcam/singular-values",
                 format!("no singular values of a mask: {e:?}"),
                 "use another size of the scene",
             )

@@ -30,7 +30,8 @@ pub(super) fn digests(folder: &Path) -> Result<BTreeMap<String, String>> {
 /// If there are frames in it, or a file that a person fills in is not as it was planned.
 pub fn check_not_begun(folder: &Path) -> Result<()> {
     let refuse = |what: String| {
-        Err(Error::invalid(
+        Err(Error::refused(
+            "plan/folder-in-use",
             what,
             "give another folder with --out, or move what is there away",
         ))

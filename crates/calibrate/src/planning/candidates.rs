@@ -48,7 +48,8 @@ pub fn candidates(
     let layer = design.layout.layers.pillars.number();
     let maps = reader.pillars(layout, layer, design.cell.shape, &sites, progress)?;
     if let Some(empty) = maps.iter().zip(&sites).find(|(map, _)| map.pillars() == 0) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "measured-set/element-not-in-layout",
             format!("the layout has no pillars of element {}", empty.1.name),
             "give the layout that was written from this design",
         ));
@@ -56,7 +57,8 @@ pub fn candidates(
     let set = session(design, bench, layout, &chosen, maps)?;
     let (captures, unseen) = captures(design, bench, &set, &chosen);
     if captures.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "plan/no-light",
             "no capture of this bench would see light",
             "name angles in `field_deg` that the elements look at",
         ));
@@ -73,7 +75,8 @@ pub fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element
     let all = design.elements();
     let is_round = |e: &Element| design.lens_of(e).outline.is_none();
     let not_round = |what: String| {
-        Error::invalid(
+        Error::refused(
+            "plan/element-not-round",
             what,
             "name round elements by `elements` of the bench: captures are predicted through round openings",
         )
@@ -90,7 +93,8 @@ pub fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element
     }
     for index in &bench.elements {
         let Some(own) = all.iter().find(|e| index_of(e) == *index) else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "plan/unknown-element",
                 format!("the design has no element {index:?}"),
                 "correct `elements` of the bench",
             ));

@@ -15,7 +15,8 @@ use crate::set::read;
 /// What stands against it, with the limit and what to do.
 pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
     if design.cell.shape.rectangles().is_some() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "plan/rectangles",
             format!("{} is a design of rectangles", design.path.display()),
             "plan sessions of squares or circles: sets are read of these alone",
         ));
@@ -49,7 +50,11 @@ pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
         .iter()
         .find_map(|led| Some((led, read::beyond_tables(led, &cell)?)));
     beyond.map_or(Ok(()), |(led, (what, hint))| {
-        Err(Error::invalid(format!("the LED of {} nm: {what}", led.name()), hint))
+        Err(Error::refused(
+            "plan/led-out-of-range",
+            format!("the LED of {} nm: {what}", led.name()),
+            hint,
+        ))
     })
 }
 
@@ -61,7 +66,8 @@ fn check(design: &Design, numbers: Vec<(&str, f64, Limits)>, hint: &str) -> Resu
     };
     let (low, high) = range.into_inner();
     let path = design.path.display();
-    Err(Error::invalid(
+    Err(Error::refused(
+        "plan/out-of-range",
         format!("{what} of {path} is {value} {unit}: a measured set may say {low} to {high} {unit}"),
         hint,
     ))

@@ -303,7 +303,8 @@ fn check_memory(model: &dyn ForwardModel, nodes: &[Vec<f64>], smooth: bool) -> R
     if bytes <= MOST_BYTES {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "calibrate/memory",
         format!(
             "the images of these captures under {images} changes of chip and bench take about {:.0} GB of memory, and a search \
              as much again; at most {:.0} GB are taken for them",

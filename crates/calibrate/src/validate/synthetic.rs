@@ -143,7 +143,8 @@ impl<'a> Synthesizer<'a> {
                 let tables = match &self.simulator.cells {
                     CellSource::Rigorous(cells) => cells.anisotropic(nm, progress)?,
                     CellSource::Model(_) => {
-                        return Err(Error::invalid(
+                        return Err(Error::refused(
+                            "calibrate/no-rigorous-cells",
                             "no rigorous cells",
                             "synthetic sets are made with rigorous cells",
                         ));

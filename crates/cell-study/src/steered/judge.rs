@@ -40,7 +40,8 @@ pub(super) fn judge(
         width_nm,
     );
     if rows.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "cells/lens-too-small",
             format!("a lens of {half_um:.1} um radius has no row of pillars to be solved"),
             "choose mappings for a larger one",
         ));

@@ -65,7 +65,8 @@ impl SteeredStudy {
 /// one, a cell cannot be solved, or the user stopped it.
 pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Vec<SteeredStudy>> {
     if design.mapping.table.is_some() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "cells/steered-table",
             "mappings of steered elements start from the polynomial of the design, which has a table instead",
             "give `coefficients` in [mapping]",
         ));
@@ -74,7 +75,8 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
     design.one_lens(who)?;
     design.radial_phase(who)?;
     if !design.array.placed.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "cells/steered-places",
             format!("{who} tells elements by their steps on a grid, and those of the design are placed one by one"),
             "use `elements`, `spacing_um` and `steering_deg` of [array] in place of [[element]]",
         ));

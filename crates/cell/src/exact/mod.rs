@@ -55,7 +55,8 @@ impl MappingTable {
             .filter(|&i| !avoid.contains(&curve.widths_nm[i]))
             .collect();
         let Some(&first) = allowed.first() else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "mapping/no-width-left",
                 "a mapping that avoids every width",
                 "lower the threshold below which a width is avoided",
             ));

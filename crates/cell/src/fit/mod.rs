@@ -53,7 +53,8 @@ fn check_degree(degree: usize) -> Result<()> {
     if (1..=HIGHEST_DEGREE).contains(&degree) {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "fit/degree",
         format!("a polynomial of degree {degree}"),
         format!("use a degree from 1 to {HIGHEST_DEGREE}"),
     ))

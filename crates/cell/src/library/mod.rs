@@ -69,7 +69,8 @@ impl PillarLibrary {
     /// If there is none.
     pub fn new(pillars: Vec<LibraryPillar>) -> Result<Self> {
         if pillars.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "library/empty",
                 "a library without pillars",
                 "give at least one: `metalith cells` makes one of a design",
             ));

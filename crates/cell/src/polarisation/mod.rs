@@ -169,7 +169,8 @@ fn named_or_linear<T: Copy>(text: &str, choices: &[(&str, T)], linear: fn(f64) -
 
 fn refusal<T>(what: String, choices: &[(&str, T)]) -> Error {
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-    Error::invalid(
+    Error::refused(
+        "light/unknown-polarisation",
         what,
         format!(
             "use {}, or the angle of linear polarisation from x towards y, from -{most} to {most} degrees",

@@ -50,7 +50,8 @@ impl CellStack {
     fn birefringent_layers(&self, edges_nm: [f64; 2], wavelength_um: f64) -> Result<LayerStack> {
         let [x, y] = edges_nm;
         if edges_nm.iter().any(|edge| !(edge.is_finite() && *edge > 0.0)) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/rectangle-does-not-fit",
                 format!("a pillar of {x} x {y} nm"),
                 "give both edges in nm, above zero",
             ));

@@ -9,7 +9,7 @@ mod fault;
 mod scalar;
 mod section;
 
-pub use fault::{Fault, Faults};
+pub use fault::{Fault, FaultKind, Faults};
 pub use scalar::{NoPlace, Scalar, with_values};
 pub use section::{Limits, Section};
 
@@ -46,7 +46,8 @@ const MOST_HELD: usize = 1000;
 /// If it cannot be read, is longer than 4 MiB, or is not UTF-8. Of a file of another kind it is said what it is.
 pub fn load(path: &Path) -> Result<String> {
     load_text(path).map_err(|error| match crate::file::binary_kind(path) {
-        Some(kind) => Error::invalid(
+        Some(kind) => Error::refused(
+            "file/not-text",
             format!("{} is {kind}, and a text is asked for here", path.display()),
             "check which file is given where: `--help` says the order",
         ),
@@ -88,7 +89,13 @@ impl<'t> Document<'t> {
             Ok(table) => table,
             Err(error) => {
                 let span = error.span().unwrap_or(0..0);
-                document.fault(span, error.message().trim(), "mend the TOML syntax here or just before");
+                document.fault(
+                    FaultKind::Syntax,
+                    String::new(),
+                    span,
+                    error.message().trim(),
+                    "mend the TOML syntax here or just before",
+                );
                 return Err(document.into_error());
             }
         };
@@ -102,9 +109,11 @@ impl<'t> Document<'t> {
         }
     }
 
-    /// Record a fault at a byte range of the text. Its number, if it is held and not only counted.
+    /// Record a fault of the value at a key, at a byte range of the text. Its number, if it is held and not only counted.
     pub fn fault(
         &self,
+        kind: FaultKind,
+        key: String,
         span: std::ops::Range<usize>,
         what: impl Into<String>,
         hint: impl Into<String>,
@@ -115,6 +124,8 @@ impl<'t> Document<'t> {
         }
         let mut faults = self.faults.borrow_mut();
         faults.push(Some(Fault {
+            kind,
+            key,
             span,
             what: what.into(),
             hint: hint.into(),

@@ -77,7 +77,8 @@ impl AtomicFolder {
         let places = Places::of(target, archive)?;
         // What lies there is removed in the end: it must be what an earlier run may have left.
         if is_there(target)? && !target.is_dir() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "file/not-a-folder",
                 format!("{} is not a folder", target.display()),
                 "name a folder with --out, or remove what lies there",
             ));
@@ -154,7 +155,8 @@ fn remove_tree(path: &Path) -> Result<()> {
 impl Places {
     fn of(target: &Path, archive: &Path) -> Result<Self> {
         let Some(name) = target.file_name() else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "file/folder-name",
                 format!("{} is not the name of a folder", target.display()),
                 "name a folder with --out",
             ));

@@ -72,14 +72,16 @@ pub(super) fn claim(file: &File, part: &Path, target: &Path) -> Result<bool> {
 }
 
 fn busy(target: &Path) -> Error {
-    Error::invalid(
+    Error::refused(
+        "file/busy",
         format!("another process is writing {}", target.display()),
         "wait for it, or write elsewhere with --out",
     )
 }
 
 fn not_ordinary(part: &Path) -> Error {
-    Error::invalid(
+    Error::refused(
+        "file/not-ordinary",
         format!("{} is not an ordinary file", part.display()),
         "remove it: a file of this name is made while a file is being written",
     )

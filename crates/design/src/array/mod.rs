@@ -83,7 +83,8 @@ impl PillarArray {
     /// If there is none, they are not of one lattice, a place is farther than 1 m from the middle, or the user stopped it.
     pub fn of_maps(shape: PillarShape, maps: Vec<(PillarMap, (i64, i64))>, progress: &dyn Progress) -> Result<Self> {
         let Some(lattice) = maps.first().map(|(map, _)| map.lattice) else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "array/empty",
                 "an array without elements",
                 "give at least one map of widths",
             ));
@@ -102,7 +103,8 @@ impl PillarArray {
             }
             if map.lattice != lattice {
                 let sites = [map.lattice.sites(), lattice.sites()];
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "array/sizes-differ",
                     format!(
                         "map {k} has {} sites along an axis, the first has {}",
                         sites[0], sites[1]
@@ -111,7 +113,8 @@ impl PillarArray {
                 ));
             }
             if centre_nm.0.abs().max(centre_nm.1.abs()) > FARTHEST_NM {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "array/off-grid",
                     format!("element {k} at ({}, {}) nm", centre_nm.0, centre_nm.1),
                     "place elements within 1 m of the middle",
                 ));

@@ -72,7 +72,8 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
     let most = Allowance::of([a, b]).sites;
     if total > most {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "diff/too-many-sites",
             format!("{} elements with {total} lattice sites together", sites.len()),
             format!("up to {most} sites are compared; compare the cells of the elements one by one"),
         ));
@@ -104,7 +105,8 @@ fn both(first: PillarShape, second: PillarShape) -> Result<PillarShape> {
     };
     let united = UprightRectangles::of_lengths(a.lengths_nm().chain(b.lengths_nm()));
     let united = united.ok_or_else(|| {
-        Error::invalid(
+        Error::refused(
+            "diff/kinds-differ",
             format!(
                 "upright rectangles with edges of {} to {} nm in steps of {} nm, and of {} to {} nm in steps of {} nm",
                 a.shortest_nm,

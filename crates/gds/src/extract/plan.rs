@@ -105,7 +105,8 @@ impl<W> Extraction<W> {
         let Some(other) = self.elements.iter().find(|e| of(e) != of(&self.elements[0])) else {
             return Ok(());
         };
-        Err(Error::invalid(
+        Err(Error::refused(
+            "extract/lattices-differ",
             format!(
                 "{}: {} stands on another lattice than the elements before it",
                 file.display(),

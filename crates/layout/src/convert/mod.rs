@@ -59,5 +59,5 @@ const LONGEST_NAME: usize = 32;
 
 /// What does not fit the format that is written.
 fn does_not_fit(what: String, hint: &str) -> Error {
-    Error::invalid(what, hint)
+    Error::refused("convert/does-not-fit", what, hint)
 }

@@ -140,7 +140,8 @@ impl CellBank {
         let mut bank = Self::empty(stated, range)?;
         let bytes = metalith_core::file::read_at_most(path, LONGEST, "a table of cells")?;
         let unusable = |why: String| {
-            Error::invalid(
+            Error::refused(
+                "study/tables-unreadable",
                 format!("the tables of cells in {} cannot be used: {why}", path.display()),
                 "plan the study again into another folder; a shard makes no tables of its own",
             )
@@ -212,7 +213,8 @@ impl CellBank {
             tables,
         };
         if bank.stacks() > MOST_STACKS {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/tables-too-many",
                 format!(
                     "tables of {} pillars would have to be solved, for every width and wavelength",
                     bank.stacks()
@@ -227,7 +229,8 @@ impl CellBank {
                 .map(|colour| bank.sizes_s(colour, sizes))
                 .sum();
             if seconds > MOST_UPRIGHT_S {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "study/tables-too-many",
                     format!(
                         "tables of {} upright rectangles, each in {}, would take {:.1} hours of CPU time",
                         sizes.first(),
@@ -324,7 +327,8 @@ impl CellBank {
     }
 
     fn outside(what: String) -> Error {
-        Error::invalid(
+        Error::refused(
+            "study/outside-tables",
             format!("the tables of cells hold no {what}"),
             "plan the study again; a shard makes no tables of its own",
         )

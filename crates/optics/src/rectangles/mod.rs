@@ -107,7 +107,8 @@ impl MadeRectangles {
                 | (Some(Rectangles::Upright(_)), FocusedLight::Linear(_))
         );
         let Some(pillars) = pillars.filter(|_| fits) else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "light/not-focused",
                 "light of a polarisation that these pillars do not focus",
                 "say circular light of rotated rectangles, linear light of upright ones, and none of others",
             ));
@@ -215,13 +216,15 @@ impl CalibratedModel {
 fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     let (geometry, cell) = (&model.perturbation.geometry, &model.perturbation.cell);
     if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "model/transmission-of-rectangles",
             "the pillars are rectangles, and the transmission of the model goes by one width",
             "give a model without `transmission` and `transmission_phase_rad`: rectangles are told by no one width",
         ));
     }
     if cell.corner_rounding_nm != 0.0 {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "model/rounded-rectangles",
             "the pillars are rectangles, and the model rounds corners",
             "set `corner_rounding_nm = 0` in [perturbation.cell] of the model: rectangles are solved with sharp corners",
         ));
@@ -231,7 +234,8 @@ fn check_rectangles(model: &CalibratedModel) -> Result<()> {
         of_width && term.compiled().is_ok_and(|compiled| compiled.uses("w"))
     });
     match by_width {
-        Some(term) => Err(Error::invalid(
+        Some(term) => Err(Error::refused(
+            "model/declared-width-of-rectangles",
             format!(
                 "the declared width `{}` goes by the drawn width `w`, of rectangles",
                 term.name

@@ -63,7 +63,8 @@ impl Pupil {
         let needed = cells.0.max(2 * cells.1) + window.pixels / 2 + 1;
         let size = fft_size(needed);
         if size > 8192 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/window",
                 format!(
                     "a window of {} um needs a transform of {size} points an axis",
                     window.side_um()

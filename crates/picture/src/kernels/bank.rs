@@ -58,7 +58,8 @@ impl BankSpec {
         if bytes <= MOST_BYTES {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "imaging/memory",
             format!(
                 "images of points at {places} places of elements, in {channels} channels and {bases} spectra of {} x {} pixels, would take {} MB",
                 self.window,

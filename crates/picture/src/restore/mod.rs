@@ -92,7 +92,8 @@ impl FromStr for RestorationMethod {
     fn from_str(text: &str) -> Result<Self> {
         let known = |m: &Self| m.name() == text || (*m == Self::Tikhonov && text == "wiener");
         Self::ALL.into_iter().find(known).ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "restore/unknown-method",
                 format!("`{text}` is no way to restore a picture"),
                 "use tikhonov (or wiener, which is the same here), tv, richardson-lucy, hqs or prior",
             )

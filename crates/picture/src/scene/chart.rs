@@ -26,7 +26,8 @@ impl FromStr for BuiltIn {
             "chart" => Ok(Self::Chart),
             "star" => Ok(Self::Star),
             "edge" => Ok(Self::Edge),
-            _ => Err(Error::invalid(
+            _ => Err(Error::refused(
+                "imaging/unknown-scene",
                 format!("`{text}` is not a built-in scene"),
                 "use chart, star or edge, or the path of an image",
             )),

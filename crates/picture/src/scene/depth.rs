@@ -17,7 +17,8 @@ impl SceneImage {
     pub fn with_depth(mut self, depth_um: Array2<f32>) -> Result<Self> {
         let (rows, columns) = depth_um.dim();
         if (rows, columns) != (self.view.rows, self.view.columns) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "imaging/depth-size",
                 format!(
                     "the depth map has {columns} x {rows} pixels, the scene {} x {}",
                     self.view.columns, self.view.rows
@@ -38,7 +39,8 @@ impl SceneImage {
 pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
     let bytes = read_at_most(path, LONGEST, "a depth map")?;
     let fault = |what: &str| {
-        Error::invalid(
+        Error::refused(
+            "imaging/depth-unreadable",
             format!("{}: {what}", path.display()),
             "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances of a millimetre and more, in millimetres; `inf` in an NPY is far away",
         )

@@ -17,7 +17,8 @@ pub fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(known).collect();
     images.sort();
     if images.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "imaging/no-images",
             format!("{} holds no image", folder.display()),
             "give a folder of PNG, JPEG or NPY files",
         ));

@@ -62,7 +62,8 @@ impl StrayLight {
         if bytes <= MOST_BYTES {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "imaging/memory",
             format!(
                 "a sensor of {} x {} pixels: light beside the images would take {} MB",
                 sensor.columns,

@@ -45,7 +45,8 @@ impl Line {
         check_shape(design.cell.shape)?;
         let directed = model.perturbation.geometry.directed_widths();
         if !directed.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "compensate/copies-differ",
                 format!(
                     "widths as declared by `{}` differ between copies of an element",
                     directed.join("`, `")
@@ -54,7 +55,8 @@ impl Line {
             ));
         }
         if model.perturbation.cell.rim_height_nm != 0.0 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "compensate/height-varies",
                 "pillars that are higher at the rim of a lens are not compensated: a width is chosen for its cell, not for its place",
                 "take `rim_height_nm` out of the model; `metalith run --model` shows what it does",
             ));
@@ -164,7 +166,8 @@ fn made(
 /// Nothing, if another pillar of a design may come out as the intended one.
 fn check_shape(shape: PillarShape) -> Result<()> {
     match shape.rectangles() {
-        Some(Rectangles::Rotated(_)) => Err(Error::invalid(
+        Some(Rectangles::Rotated(_)) => Err(Error::refused(
+            "compensate/rotated-rectangles",
             "the pillars are rotated rectangles of one size: no other of them is nearer to what was intended",
             "draw edges that come out as intended: `width_nm` and `length_nm` of [cell], less the bias of the model; `metalith run --model` \
              judges the chip that they give",

@@ -10,7 +10,7 @@ use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Document;
+use super::{Document, FaultKind};
 use crate::text::quoted;
 pub(super) use values::number as float_of;
 use words::{article, describe, nearest};
@@ -70,9 +70,14 @@ impl<'d, 't> Section<'d, 't> {
     /// Record a fault at a key of this section, or at the section itself if the key is absent. Silent where the
     /// value of the key has a fault already and was replaced.
     pub fn fault(&self, key: &str, what: impl Into<String>, hint: impl Into<String>) {
+        self.fault_of(FaultKind::Inconsistent, key, what, hint);
+    }
+
+    /// As [`Section::fault`], of another kind than a value that is inconsistent.
+    pub(super) fn fault_of(&self, kind: FaultKind, key: &str, what: impl Into<String>, hint: impl Into<String>) {
         let path = self.place_of(key);
         if !self.vacant && !self.document.is_replaced(&path) {
-            self.document.fault(self.span_of(key), what, hint);
+            self.document.fault(kind, path.clone(), self.span_of(key), what, hint);
             self.document.doubt(path);
         }
     }
@@ -84,7 +89,8 @@ impl<'d, 't> Section<'d, 't> {
             let span = self.span_of(key);
             // After the quotation mark.
             let at = (span.start + 1 + byte).min(span.end.saturating_sub(1));
-            self.document.fault(at..at + 1, what, hint);
+            self.document
+                .fault(FaultKind::Inconsistent, path.clone(), at..at + 1, what, hint);
             self.document.doubt(path);
         }
     }
@@ -220,7 +226,8 @@ impl<'d, 't> Section<'d, 't> {
                 format!("known here: {known}{meant}")
             };
             let what = format!("unknown key `{}` {place}", quoted(name));
-            self.document.fault(key.span(), what, hint);
+            self.document
+                .fault(FaultKind::Unknown, self.place_of(name), key.span(), what, hint);
         }
     }
 
@@ -248,6 +255,8 @@ impl<'d, 't> Section<'d, 't> {
             format!("[{}]", self.name)
         };
         let number = self.document.fault(
+            FaultKind::Missing,
+            self.place_of(key),
             self.span.clone(),
             format!("{place} lacks `{key}`"),
             format!("add `{key}`: {expected}"),
@@ -260,6 +269,8 @@ impl<'d, 't> Section<'d, 't> {
     fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'t>>, expected: &str) {
         self.document.replace(self.place_of(key));
         self.document.fault(
+            FaultKind::WrongType,
+            self.place_of(key),
             value.span(),
             format!("`{key}` is {}", article(value.get_ref().type_str())),
             format!("it must be {expected}"),
@@ -269,6 +280,8 @@ impl<'d, 't> Section<'d, 't> {
     fn out_of_range(&self, span: Range<usize>, key: &str, value: &str, limits: &Limits) {
         self.document.replace(self.place_of(key));
         self.document.fault(
+            FaultKind::OutOfRange,
+            self.place_of(key),
             span,
             format!("`{key}` cannot be {}", quoted(value)),
             format!("it must be a number{}", describe(limits)),

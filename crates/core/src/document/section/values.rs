@@ -8,7 +8,7 @@ use toml::de::DeValue;
 
 use super::words::{describe, did_you_mean};
 use super::{Limits, Section};
-use crate::document::Scalar;
+use crate::document::{FaultKind, Scalar};
 use crate::text::{first_unprintable, quoted};
 
 impl<'t> Section<'_, 't> {
@@ -92,6 +92,8 @@ impl<'t> Section<'_, 't> {
         };
         self.document.replace(self.place_of(key));
         self.document.fault(
+            FaultKind::Unprintable,
+            self.place_of(key),
             span,
             format!("`{key}` contains the character U+{:04X}", u32::from(c)),
             "write it in one line of printable characters",
@@ -139,6 +141,8 @@ impl<'t> Section<'_, 't> {
             || {
                 self.document.replace(self.place_of(key));
                 self.document.fault(
+                    FaultKind::UnknownChoice,
+                    self.place_of(key),
                     value.span(),
                     format!("`{key}` cannot be \"{}\"", quoted(word)),
                     format!(
@@ -222,7 +226,8 @@ impl<'t> Section<'_, 't> {
         let values = self.floats(key, limits.clone());
         let count = values.len();
         Some(values.try_into().unwrap_or_else(|_| {
-            self.fault(
+            self.fault_of(
+                FaultKind::WrongLength,
                 key,
                 format!("`{key}` has {count} entries"),
                 format!("give exactly {N} numbers"),
@@ -242,7 +247,12 @@ impl<'t> Section<'_, 't> {
         let text = self.text(key);
         let path = self.document.folder().join(&text);
         if !text.is_empty() && !path.is_file() {
-            self.fault(key, format!("there is no file {}", path.display()), hint);
+            self.fault_of(
+                FaultKind::NoFile,
+                key,
+                format!("there is no file {}", path.display()),
+                hint,
+            );
         }
         path
     }
