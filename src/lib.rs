@@ -19,7 +19,7 @@
 //! | [`CellModel`] | [`cell`] | a pillar's width and a wavelength: published, fitted or rigorous |
 //! | [`Propagator`](wave::Propagator) | [`wave`] | transmissions on a lattice: folded, direct, by rings |
 //! | [`Psf`](wave::Psf) | [`wave::psf`] | a field |
-//! | [`Photograph`](wave::Photograph) | [`wave::camera`], [`wave::restore`] | a scene through PSFs, with noise, restored |
+//! | [`ImagingSystem`](picture::ImagingSystem) | [`picture`] | a layout, a camera and a scene: a frame, and the picture restored from it |
 //! | [`verify()`] | [`mod@verify`] | a design, its array and the bytes of a layout |
 //! | [`report`] | [`report`] | anything found: one HTML page and one JSON file |
 //!
