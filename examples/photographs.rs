@@ -10,9 +10,9 @@
 
 use std::path::PathBuf;
 
-use metalith::picture::restore::RestorationMethod;
-use metalith::picture::scene::{images_in, read_far_scene};
-use metalith::picture::{ImagingSystem, Rehearsal, ScenePower, Zone, ZoneScore, scores};
+use metalith::imaging::restore::RestorationMethod;
+use metalith::imaging::scene::{images_in, read_far_scene};
+use metalith::imaging::{ImagingSystem, Rehearsal, ScenePower, Zone, ZoneScore, scores};
 use metalith::sensor::Camera;
 use metalith::{Design, Error, Result, Silent};
 

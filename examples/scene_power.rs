@@ -8,8 +8,8 @@
 
 use std::path::PathBuf;
 
-use metalith::picture::ScenePower;
-use metalith::picture::scene::{images_in, read_far_scene};
+use metalith::imaging::ScenePower;
+use metalith::imaging::scene::{images_in, read_far_scene};
 use metalith::{Error, Result};
 use ndarray::Array3;
 

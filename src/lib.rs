@@ -19,7 +19,7 @@
 //! | [`CellModel`] | [`cell`] | a pillar's width and a wavelength: published, fitted or rigorous |
 //! | [`Propagator`](wave::Propagator) | [`wave`] | transmissions on a lattice: folded, direct, by rings |
 //! | [`Psf`](wave::Psf) | [`wave::psf`] | a field |
-//! | [`Photograph`](wave::Photograph) | [`wave::camera`], [`wave::restore`] | a scene through PSFs, with noise, restored |
+//! | [`ImagingSystem`](imaging::ImagingSystem) | [`imaging`] | a layout, a camera and a scene: a frame, and the picture restored from it |
 //! | [`verify()`] | [`mod@verify`] | a design, its array and the bytes of a layout |
 //! | [`report`] | [`report`] | anything found: one HTML page and one JSON file |
 //!
@@ -96,10 +96,10 @@ pub use metalith_gds as gds;
 pub use metalith_gds::extract;
 pub use metalith_grating as grating;
 pub use metalith_handoff as handoff;
+pub use metalith_imaging as imaging;
 pub use metalith_layout as layout;
 pub use metalith_optics as optics;
 pub use metalith_optimise as optimise;
-pub use metalith_picture as picture;
 pub use metalith_prior as prior;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;

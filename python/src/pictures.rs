@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
-use metalith::picture::scene::SceneImage;
-use metalith::picture::{self, OperatorError, Rehearsal};
+use metalith::imaging::restore::{LearnedDenoiser, RestorationMethod};
+use metalith::imaging::scene::SceneImage;
+use metalith::imaging::{self, OperatorError, Rehearsal};
 use metalith::prior::NetworkDenoiser;
 use metalith::sensor::Camera;
 use metalith::{CalibratedModel, Error, Result};
@@ -22,7 +22,7 @@ const FAR: f64 = f64::INFINITY;
 /// A layout behind a camera, and the field of its scenes.
 #[pyclass(frozen)]
 pub struct ImagingSystem {
-    studio: picture::ImagingSystem,
+    studio: imaging::ImagingSystem,
     /// What the operator of the restoration errs by; found when it is first needed.
     operator_error: OnceLock<OperatorError>,
 }
@@ -30,7 +30,7 @@ pub struct ImagingSystem {
 /// A frame that was recorded.
 #[pyclass(frozen)]
 pub struct Frame {
-    frame: picture::Frame,
+    frame: imaging::Frame,
 }
 
 #[pymethods]
@@ -75,7 +75,7 @@ impl ImagingSystem {
             let prior = prior.as_deref().map(LearnedDenoiser::read).transpose()?;
             let black = Array3::zeros((rows, columns, 3));
             let scene = SceneImage::of_rgb("scene", &black, field_deg, distance_mm.map_or(FAR, |mm| mm * 1e3));
-            let mut studio = picture::ImagingSystem::open(design, &layout, &camera, model.as_ref(), &scene, p)?;
+            let mut studio = imaging::ImagingSystem::open(design, &layout, &camera, model.as_ref(), &scene, p)?;
             if let Some(prior) = prior {
                 studio.prior = prior;
             }
@@ -174,7 +174,7 @@ impl ImagingSystem {
         Ok(SceneImage::of_rgb("scene", rgb, view.field_deg, view.distance_um))
     }
 
-    fn operator_error(&self, operator: &picture::FrameOperator<'_>) -> &OperatorError {
+    fn operator_error(&self, operator: &imaging::FrameOperator<'_>) -> &OperatorError {
         self.operator_error
             .get_or_init(|| Rehearsal::new(&self.studio, operator).operator_error)
     }

@@ -7,7 +7,7 @@ use clap::Args;
 use metalith::baselines::{
     Comparison, ComparisonResult, DiffuserSpec, Lensless, ListedDesign, MaskSpec, write_comparison,
 };
-use metalith::picture::KernelCache;
+use metalith::imaging::KernelCache;
 use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 

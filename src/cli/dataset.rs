@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::picture::scene::{images_in, read_far_scene};
-use metalith::picture::{DatasetManifest, DatasetOrigin, ImagingSystem, check_images, write_dataset};
+use metalith::imaging::scene::{images_in, read_far_scene};
+use metalith::imaging::{DatasetManifest, DatasetOrigin, ImagingSystem, check_images, write_dataset};
 use metalith::study::{PairsRequest, is_planned, plan_pairs};
 use metalith::{Error, Result};
 

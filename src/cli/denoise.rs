@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::picture::scene::read_picture;
-use metalith::picture::write_picture;
+use metalith::imaging::scene::read_picture;
+use metalith::imaging::write_picture;
 use metalith::prior::{NetworkDenoiser, with_noise};
 use metalith::wave::restore::{psnr_db, ssim_colour};
 use metalith::{Error, Result};

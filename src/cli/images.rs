@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::builder::RangedI64ValueParser;
 use metalith::Result;
-use metalith::picture::SCORED_SIDES;
-use metalith::picture::scene::images_in;
+use metalith::imaging::SCORED_SIDES;
+use metalith::imaging::scene::images_in;
 
 /// Several files, and the images of folders, in the order in which they are given.
 ///

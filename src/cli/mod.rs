@@ -18,7 +18,6 @@ mod new;
 mod optimise;
 mod output;
 mod paths;
-mod photographs;
 mod picture;
 mod plan;
 mod psf;
@@ -84,7 +83,6 @@ enum Command {
     Layout(layout::LayoutArgs),
     #[command(visible_alias = "optimize")]
     Optimise(optimise::OptimiseArgs),
-    Photographs(photographs::PhotographsArgs),
     Picture(picture::PictureArgs),
     Restore(restore::RestoreArgs),
     Dataset(dataset::DatasetArgs),
@@ -104,6 +102,12 @@ enum Command {
     Completions(completions::CompletionsArgs),
     #[command(hide = true)]
     Manual(completions::ManualArgs),
+    /// Names the commands that do its work.
+    #[command(hide = true)]
+    Photographs {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+        _ignored: Vec<OsString>,
+    },
 }
 
 /// How the program is started again, if it was started by another name than that of its file.
@@ -173,7 +177,10 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Run(args) => run::run(args, terminal),
         Command::Layout(args) => layout::run(args, terminal),
         Command::Optimise(args) => optimise::run(args, terminal),
-        Command::Photographs(args) => photographs::run(args, terminal),
+        Command::Photographs { .. } => Err(Error::invalid(
+            "there is no command `photographs` any more",
+            "use `picture` for one scene, `compare` for a table of many photographs and several designs",
+        )),
         Command::Dataset(args) => dataset::run(args, terminal),
         Command::Train(args) => train::run(args, terminal),
         Command::Denoise(args) => denoise::run(args, terminal),

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::optics::CalibratedModel;
-use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
-use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
-use metalith::picture::{
+use metalith::imaging::restore::{LearnedDenoiser, RestorationMethod};
+use metalith::imaging::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
+use metalith::imaging::{
     Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport, Rehearsal,
     RestorationReport, ScenePower, Uncertainty, ZoneScore, check_scored, contrast_curves, picture_file, psnr_words,
     scores, worth_of_assumptions, write_pages,
 };
+use metalith::optics::CalibratedModel;
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
@@ -308,9 +308,9 @@ mod tests {
     fn scenes_and_their_options_fit_or_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let small = folder.path().join("small.png").display().to_string();
-        metalith::picture::write_picture(small.as_ref(), &ndarray::Array3::from_elem((32, 40, 3), 0.5)).unwrap();
+        metalith::imaging::write_picture(small.as_ref(), &ndarray::Array3::from_elem((32, 40, 3), 0.5)).unwrap();
         let tiny = folder.path().join("tiny.png").display().to_string();
-        metalith::picture::write_picture(tiny.as_ref(), &ndarray::Array3::from_elem((8, 8, 3), 0.5)).unwrap();
+        metalith::imaging::write_picture(tiny.as_ref(), &ndarray::Array3::from_elem((8, 8, 3), 0.5)).unwrap();
         let scene = |of: &[&str]| {
             let files = [
                 "picture",

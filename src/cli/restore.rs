@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::Result;
-use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
-use metalith::picture::scene::SceneImage;
-use metalith::picture::{
+use metalith::imaging::restore::{LearnedDenoiser, RestorationMethod};
+use metalith::imaging::scene::SceneImage;
+use metalith::imaging::{
     FrameNumbers, FrameStatement, ImagingSystem, Rehearsal, RestoredPicture, RestoredReport, check_scored, read_signals,
 };
 use ndarray::Array3;

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::baselines::{Comparison, StageKind};
-use metalith::picture::KernelCache;
-use metalith::picture::scene::images_in;
-use metalith::picture::scene::read_picture;
+use metalith::imaging::KernelCache;
+use metalith::imaging::scene::images_in;
+use metalith::imaging::scene::read_picture;
 use metalith::prior::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_finisher};
 use metalith::{Error, Result};
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::cell::{cache_folder, oblique_refused};
 use metalith::design::{CellIncidence, LatticeOrders};
-use metalith::picture::thumbnail;
+use metalith::imaging::thumbnail;
 use metalith::report::{Figure, sig};
 use metalith::sensor::Camera;
 use metalith::{

@@ -1,9 +1,9 @@
 //! The chip of a design before its sensor, as a contender.
 
 use metalith_core::{Progress, Result};
-use metalith_picture::restore::{Blend, Recorded, RestorationMethod, restore_each};
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal};
+use metalith_imaging::restore::{Blend, Recorded, RestorationMethod, restore_each};
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal};
 use ndarray::{Array2, Array3, Zip};
 
 use crate::baseline_camera::{BaselineCamera, Method, no_stage};

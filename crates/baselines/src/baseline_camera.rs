@@ -1,8 +1,8 @@
 //! What a camera must be able to do to be compared.
 
 use metalith_core::{Progress, Result};
-use metalith_picture::Frame;
-use metalith_picture::scene::SceneImage;
+use metalith_imaging::Frame;
+use metalith_imaging::scene::SceneImage;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 

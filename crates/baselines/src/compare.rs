@@ -2,8 +2,8 @@
 
 use metalith_core::srgb::encoded;
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, Zone, ZoneScore, scores};
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{Frame, Zone, ZoneScore, scores};
 use metalith_prior::PerceptualDistance;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::{Error, Progress, Result, part};
 use metalith_design::Design;
-use metalith_picture::restore::RestorationMethod;
-use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{ApproximationSet, ImagingSystem, KernelCache, SceneView, check_scored, simulated_view};
+use metalith_imaging::restore::RestorationMethod;
+use metalith_imaging::scene::{SceneImage, read_far_scene};
+use metalith_imaging::{ApproximationSet, ImagingSystem, KernelCache, SceneView, check_scored, simulated_view};
 use metalith_prior::PerceptualDistance;
 use metalith_sensor::Camera;
 use ndarray::Array2;
@@ -366,7 +366,7 @@ mod tests {
     fn fine_photographs_are_averaged_for_all_cameras() {
         let folder = tempfile::tempdir().unwrap();
         let photograph = folder.path().join("fine.png");
-        metalith_picture::write_picture(&photograph, &Array3::from_elem((100, 1500, 3), 0.5)).unwrap();
+        metalith_imaging::write_picture(&photograph, &Array3::from_elem((100, 1500, 3), 0.5)).unwrap();
         let lineup = Comparison {
             camera: "../../cameras/gt1930.toml".into(),
             designs: vec![ListedDesign {

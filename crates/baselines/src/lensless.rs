@@ -1,9 +1,9 @@
 //! What cameras without a lens have in common: a sensor, light of a flat scene on its pixels, exposure, colours.
 
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::scene::SceneImage;
-use metalith_picture::spectra::{SceneSpectrum, rgb_basis};
-use metalith_picture::{
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::spectra::{SceneSpectrum, rgb_basis};
+use metalith_imaging::{
     ChannelColours, Frame, SceneView, counts_channel, expose, gains, sensitivity, without_dispersion,
 };
 use metalith_sensor::{Camera, Sampling};
@@ -302,7 +302,7 @@ pub fn falloff([tx, ty]: [f64; 2]) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use metalith_picture::restore::SceneStatistics;
+    use metalith_imaging::restore::SceneStatistics;
     use metalith_sensor::ColourFilter;
 
     /// A small camera, a scene of the statistics of photographs.

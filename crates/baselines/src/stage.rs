@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use metalith_core::text::hex;
 use metalith_core::{Error, Result, srgb};
-use metalith_picture::SceneView;
+use metalith_imaging::SceneView;
 use metalith_prior::{PostProcessor, Provenance};
 use metalith_sensor::Camera;
 use ndarray::Array3;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use metalith_picture::Zone;
+use metalith_imaging::Zone;
 
 use crate::compare::{ComparisonResult, MethodScores};
 
@@ -52,7 +52,7 @@ impl ComparisonResult {
         );
         for camera in &self.cameras {
             for way in &camera.ways {
-                let list = |digits: usize, of: fn(&metalith_picture::ZoneScore) -> f64| {
+                let list = |digits: usize, of: fn(&metalith_imaging::ZoneScore) -> f64| {
                     let all = way.mean.iter().map(|s| format!("{:.digits$}", of(s)));
                     all.collect::<Vec<_>>().join(" / ")
                 };

@@ -6,7 +6,7 @@ use std::path::Path;
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result, Silent};
-use metalith_picture::{KernelCache, SceneView};
+use metalith_imaging::{KernelCache, SceneView};
 use metalith_prior::{Provenance, Stack};
 
 use crate::baseline_camera::no_stage;

@@ -4,8 +4,8 @@
 //! Kernels are those of a grey surface. The veil of a grey scene is subtracted; what neighbours' sub-images overlap stays.
 
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::restore::{Recorded, SceneStatistics, without_veil};
-use metalith_picture::{FftScratch, FrameOperator, ImagingSystem, SquareFft, sensor_um};
+use metalith_imaging::restore::{Recorded, SceneStatistics, without_veil};
+use metalith_imaging::{FftScratch, FrameOperator, ImagingSystem, SquareFft, sensor_um};
 use metalith_wave::kernels::fft_size;
 use ndarray::{Array2, Zip};
 use num_complex::Complex32;

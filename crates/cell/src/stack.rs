@@ -105,7 +105,7 @@ impl CellStack {
             return Err(Error::refused(
                 "cell/rectangle-by-width",
                 "rectangular pillars, where those of a width are asked for",
-                "use squares or circles here: `photographs` and calibration know no rectangles, `optimise` no upright ones; the other commands do",
+                "use squares or circles here: calibration knows no rectangles, `optimise` no upright ones; the other commands do",
             ));
         }
         self.layers_of(wavelength_um, |wider_nm| self.outline((width_nm + wider_nm).max(0.0)))

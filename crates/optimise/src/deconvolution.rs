@@ -129,7 +129,7 @@ impl Deconvolution {
 
     /// Transfer function of each view, `[angle][wavelength]`, with pillars of `widths_nm[k]` in ring `k`.
     /// Shape of each: `[j][i]`, frequencies (i, j) / window from zero to the pixels' Nyquist.
-    pub fn transfers(&self, widths_nm: &[f64]) -> Vec<Vec<OpticalTransfer>> {
+    fn transfers(&self, widths_nm: &[f64]) -> Vec<Vec<OpticalTransfer>> {
         (0..self.pupils.len())
             .into_par_iter()
             .map(|angle| {

@@ -7,7 +7,7 @@ use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
-use metalith_picture::KernelCache;
+use metalith_imaging::KernelCache;
 use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

@@ -7,12 +7,12 @@ use metalith_core::file::{file_digest, read_at_most};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
-use metalith_optics::CalibratedModel;
-use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{
+use metalith_imaging::scene::{SceneImage, read_far_scene};
+use metalith_imaging::{
     DatasetManifest, DatasetOrigin, DatasetPair, ImagingSystem, KernelCache, PairWriter, check_images,
     write_dataset_manifest,
 };
+use metalith_optics::CalibratedModel;
 use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

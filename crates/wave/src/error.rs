@@ -89,14 +89,6 @@ pub enum WaveError {
     #[error("PSFs on windows of different samples cannot be compared")]
     Samples,
 
-    /// Kernels of a blur that do not fit together.
-    #[error("{kernels} kernels, the first of {shape:?} pixels, for {grid:?} patches")]
-    Kernels {
-        kernels: usize,
-        shape: (usize, usize),
-        grid: [usize; 2],
-    },
-
     /// A map of the sensor's plane without a size, or too large for memory.
     #[error("a map of {0} x {0} squares of {1} um at {2} um", grid.cells, grid.cell_um, grid.distance_um)]
     Map { grid: LandingGrid, most: usize },
@@ -163,9 +155,6 @@ impl WaveError {
             Self::MissesSensor { .. } => "keep wedge and field angle smaller at the longest wavelength".into(),
             Self::Pixels { .. } => "use fewer pixels, or form the PSF on a larger window".into(),
             Self::Samples => "form both on the same number of samples and with the same step".into(),
-            Self::Kernels { .. } => {
-                "give one kernel for each patch, all of the same odd number of pixels and with energy in them".into()
-            }
             Self::Map { most, .. } => format!("use positive lengths and at most {most} squares"),
             Self::SmallImage { least, .. } => format!("give an image of at least {least} x {least} pixels"),
         }

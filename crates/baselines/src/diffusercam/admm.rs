@@ -3,8 +3,8 @@
 //! al., Optica 5, 1 (2018)).
 
 use metalith_core::{Error, Progress, Result, part};
-use metalith_picture::SquareFft;
-use metalith_picture::restore::{ExponentialSlopes, squared_frequencies};
+use metalith_imaging::SquareFft;
+use metalith_imaging::restore::{ExponentialSlopes, squared_frequencies};
 use ndarray::{Array2, Zip};
 use num_complex::Complex32;
 

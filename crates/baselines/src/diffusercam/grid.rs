@@ -1,7 +1,7 @@
 //! Grids of places of the scene: one for each pixel of the sensor in the simulation, every second in the restoration.
 
-use metalith_picture::scene::averaged;
-use metalith_picture::{FftScratch, SceneView, SquareFft};
+use metalith_imaging::scene::averaged;
+use metalith_imaging::{FftScratch, SceneView, SquareFft};
 use metalith_wave::kernels::fft_size;
 use ndarray::Array2;
 use num_complex::Complex32;

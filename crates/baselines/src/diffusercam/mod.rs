@@ -9,10 +9,10 @@ mod grid;
 mod surface;
 
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::restore::SceneStatistics;
-use metalith_picture::scene::SceneImage;
-use metalith_picture::spectra::rgb_basis;
-use metalith_picture::{Frame, OperatorError, SceneView};
+use metalith_imaging::restore::SceneStatistics;
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::spectra::rgb_basis;
+use metalith_imaging::{Frame, OperatorError, SceneView};
 use metalith_sensor::Camera;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -260,7 +260,7 @@ mod tests {
     use crate::baseline_camera::BaselineCamera;
     use crate::lensless::tests::small;
     use metalith_core::Silent;
-    use metalith_picture::scores;
+    use metalith_imaging::scores;
 
     #[test]
     fn a_picture_comes_out_of_a_caustic() {

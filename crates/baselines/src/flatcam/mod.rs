@@ -10,9 +10,9 @@ mod solve;
 
 use faer::Mat;
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::restore::SceneStatistics;
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, SceneView};
+use metalith_imaging::restore::SceneStatistics;
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{Frame, SceneView};
 use metalith_sensor::Camera;
 use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
@@ -257,7 +257,7 @@ mod tests {
     use crate::lensless::of_one_wavelength;
     use crate::lensless::tests::small;
     use metalith_core::Silent;
-    use metalith_picture::scores;
+    use metalith_imaging::scores;
 
     #[test]
     fn a_picture_comes_out_of_the_shadows_of_a_mask() {

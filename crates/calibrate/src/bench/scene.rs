@@ -6,12 +6,12 @@ use metalith_cell::PublishedCell;
 use metalith_core::Silent;
 use metalith_design::Design;
 use metalith_gds::extract::GdsPillars;
-use metalith_layout::read_pillars;
-use metalith_optics::{Perturbation, SimulationCase};
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{
     BankSpec, BetweenNodes, ChipInLight, Detail, FrameOperator, KernelBank, SceneSpace, StrayLight, element_views,
 };
+use metalith_layout::read_pillars;
+use metalith_optics::{Perturbation, SimulationCase};
 use metalith_sensor::{Blend, Camera, Channel, Illuminant, Led, Response, Spectrum};
 use metalith_testing::session::{PIXELS, middle_set, small_design, small_set};
 use ndarray::{Array2, Array3};

@@ -1,9 +1,9 @@
-//! Images restored from their blur, and how near they come.
+//! The error of a Wiener filter, and how near an image is to another.
 //!
 //! | question | file |
 //! | --- | --- |
 //! | what is expected of a scene | `scene` |
-//! | the filter, at one frequency and of an image | `wiener` |
+//! | the filter at one frequency | `wiener` |
 //! | how near an image is to another | `quality` |
 
 mod quality;
@@ -12,4 +12,4 @@ mod wiener;
 
 pub use quality::{psnr_db, ssim, ssim_colour};
 pub use scene::Scene;
-pub use wiener::{Restoration, Wiener};
+pub use wiener::Wiener;

@@ -1,8 +1,8 @@
 //! The operator of a part of a sensor, and on any number of threads.
 
 use metalith_core::{Silent, part};
-use metalith_picture::restore::SceneStatistics;
-use metalith_picture::{
+use metalith_imaging::restore::SceneStatistics;
+use metalith_imaging::{
     Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, StrayLight, element_views,
 };
 use metalith_sensor::Camera;

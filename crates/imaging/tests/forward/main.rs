@@ -4,9 +4,9 @@ mod parts;
 mod setup;
 
 use metalith_core::Silent;
-use metalith_picture::restore::SceneStatistics;
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{
+use metalith_imaging::restore::SceneStatistics;
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{
     ApproximationSet, BetweenNodes, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints,
     SceneSpace, StrayLight, element_views,
 };
@@ -361,7 +361,7 @@ fn all_light_is_accounted_for() {
         let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
         let veil = setup.veil(&chip, &bank);
         for shares in veil.budget.chunks(3) {
-            let all = metalith_picture::LightShares::sum(shares);
+            let all = metalith_imaging::LightShares::sum(shares);
             let found = all.in_kernels + all.veil + all.beyond + all.evanescent + all.not_passed;
             println!("{all:?}");
             assert!((found / all.arrives - 1.0).abs() < ACCOUNT);

@@ -5,10 +5,10 @@ use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
 use metalith_gds::extract::Extraction;
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{BankSpec, ChipInLight, KernelBank, StrayLight};
 use metalith_layout::{read_pillars, write_pillars};
 use metalith_optics::SimulationCase;
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{BankSpec, ChipInLight, KernelBank, StrayLight};
 use metalith_sensor::{Camera, Channel, Illuminant, Response, Sensor};
 use ndarray::Array3;
 
