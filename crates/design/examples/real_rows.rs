@@ -4,7 +4,7 @@
 //! Rows of 20 consecutive pillars along x and of 12 along y or the diagonal, at four radii, without the three at either end; of the centre element in light
 //! along the normal, and of an element that is steered by the angle asked for in light from where it looks. Prints the
 //! share of the light that each model puts elsewhere than the supercell of the row does, and of all rows together the first
-//! order by equal neighbours, neighbours and supercells. From the folder `crates/grating`: `cargo run --release --example
+//! order by equal neighbours, neighbours and supercells. `cargo run --release -p metalith-design --example
 //! real_rows -- 0 15 15,15`; some minutes on one core.
 
 #[allow(dead_code, reason = "tests compare blazed rows by it")]

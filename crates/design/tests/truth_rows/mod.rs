@@ -1,10 +1,14 @@
-//! The blazed rows of golden/truth/supercell.csv, beside what single cells and [`Blaze`] make of them.
+//! The blazed rows of golden/truth/supercell.csv, beside what single cells and supercells with few orders make of them.
+
+#[path = "../blazed_orders/mod.rs"]
+pub mod blazed_orders;
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use blazed_orders::{BlazeOrders, first_order_sines};
+use metalith_cell::{Blaze, CoarseCell};
 use metalith_design::{Design, PillarRule};
-use metalith_grating::{Blaze, BlazeOrders, CoarseCell};
 use num_complex::Complex64;
 
 /// A line of the table; its columns are described in golden/truth/README.md.
@@ -32,11 +36,11 @@ pub struct Row {
 pub struct Summary {
     pub rows: usize,
     /// Mean share of the first order: by the truth, by single cells at normal incidence, by single cells at the angle
-    /// of arrival, by [`Blaze`].
+    /// of arrival, by [`BlazeOrders`].
     pub shares: [f64; 4],
-    /// Difference of that share from the truth: single cells at normal incidence, as lit, [`Blaze`].
+    /// Difference of that share from the truth: single cells at normal incidence, as lit, [`BlazeOrders`].
     pub first: [f64; 3],
-    /// Difference of the share of the zero order, by [`Blaze`].
+    /// Difference of the share of the zero order, by [`BlazeOrders`].
     pub zero: f64,
     /// Mean of the phase of the first order less that of the truth (rad).
     pub phase_mean: f64,
@@ -88,11 +92,11 @@ fn summary(rows: &[&Row], design: &Design, cell: &CoarseCell<'_>) -> Summary {
             sites: row.cells,
             offset_turns: f64::from(row.turns) * row.offset / row.cells as f64,
         };
-        let wedge = blaze.sines(cell.wavelength_over_pitch());
+        let wedge = first_order_sines(&blaze, cell.wavelength_over_pitch());
         let sines = if row.looks { wedge.map(|s| -s) } else { [0.0, 0.0] };
         let orders = solved
             .entry((row.looks, row.offset.to_string()))
-            .or_insert_with(|| blaze.solve(cell, |u| f64::from(rule.width_nm(u)), sines).unwrap());
+            .or_insert_with(|| BlazeOrders::solve(&blaze, cell, |u| f64::from(rule.width_nm(u)), sines));
         let (first, zero) = (orders.order(1), orders.order(0));
         let shares = [
             row.share_first,

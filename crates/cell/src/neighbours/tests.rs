@@ -1,9 +1,10 @@
-//! Gratings in any direction, and what sites of a supercell transmit.
+//! What sites of a supercell transmit.
 
-use metalith_cell::CellStack;
-use metalith_grating::{Blaze, CoarseCell, RealRow, site_transmissions};
 use metalith_rcwa::SiteLattice;
 use num_complex::Complex64;
+
+use super::{CoarseCell, RealRow};
+use crate::CellStack;
 
 /// Two ways to one number differ by the rounding of eigenvectors of a few hundred unknowns.
 const ROUNDING: f64 = 1e-9;
@@ -19,60 +20,6 @@ fn stack() -> CellStack {
     CellStack::paper(350.0, 700.0).unwrap()
 }
 
-fn linear(u: f64) -> f64 {
-    WIDTHS_NM.0 + u * (WIDTHS_NM.1 - WIDTHS_NM.0)
-}
-
-fn blaze(turns: [i32; 2], sites: usize, offset_turns: f64) -> Blaze {
-    Blaze {
-        turns,
-        sites,
-        offset_turns,
-    }
-}
-
-#[test]
-fn a_fraction_that_reduces_is_the_same_grating() {
-    let stack = stack();
-    let cell = CoarseCell::new(&stack, WAVELENGTH_UM, WIDTHS_NM).unwrap();
-    let solve = |blaze: Blaze| blaze.solve(&cell, linear, [0.1, 0.0]).unwrap();
-    let (whole, reduced) = (solve(blaze([2, 0], 6, 0.1)), solve(blaze([1, 0], 3, 0.1)));
-    for m in -2..=2 {
-        let (a, b) = (whole.order(m), reduced.order(m));
-        for pol in [0, 1] {
-            assert!((a.amplitude[pol] - b.amplitude[pol]).norm() < ROUNDING, "{m}");
-            assert!((a.amplitude[pol].norm_sqr() - a.share[pol]).abs() < ROUNDING, "{m}");
-        }
-    }
-    assert!(whole.order(1).share[0] > 0.1);
-    assert_eq!(whole.order(i32::MAX).share, [0.0; 2]);
-    for impossible in [
-        blaze([1, 0], 0, 0.0),
-        blaze([1, 0], 65, 0.0),
-        blaze([1, 0], 3, f64::NAN),
-    ] {
-        assert!(impossible.solve(&cell, linear, [0.0, 0.0]).is_err(), "{impossible:?}");
-    }
-}
-
-#[test]
-fn a_quarter_turn_and_a_shift_leave_the_orders() {
-    let stack = stack();
-    let cell = CoarseCell::new(&stack, WAVELENGTH_UM, WIDTHS_NM).unwrap();
-    let sine = -0.2;
-    let along_x = blaze([1, 0], 4, 0.05).solve(&cell, linear, [sine, 0.0]).unwrap();
-    let along_y = blaze([0, 1], 4, 0.05).solve(&cell, linear, [0.0, sine]).unwrap();
-    // A quarter of a turn more is the same grating one site further on.
-    let shifted = blaze([1, 0], 4, 0.30).solve(&cell, linear, [sine, 0.0]).unwrap();
-    for m in -1..=2 {
-        let [x, y, s] = [&along_x, &along_y, &shifted].map(|orders| orders.order(m));
-        for pol in [0, 1] {
-            assert!((x.amplitude[pol] - y.amplitude[pol]).norm() < ROUNDING, "{m}");
-            assert!((x.amplitude[pol] - s.amplitude[pol]).norm() < ROUNDING, "{m}");
-        }
-    }
-}
-
 #[test]
 fn sites_hold_the_power_of_the_orders_that_they_can_tell_apart() {
     let stack = stack();
@@ -81,7 +28,7 @@ fn sites_hold_the_power_of_the_orders_that_they_can_tell_apart() {
     // In the x-z plane a row does not couple s and p, so that all power is polarised as the incident wave.
     let response = cell.solve(row, &[110.0, 150.0, 200.0, 260.0], [-0.1, 0.0]).unwrap();
     let (step, full) = (cell.wavelength_over_pitch(), cell.full_transmission().unwrap());
-    let sites = site_transmissions(&row, &response, step, full);
+    let sites = cell.transmissions(&row, &response, full);
     for pol in [0, 1] {
         let mean = sites[pol].iter().map(Complex64::norm_sqr).sum::<f64>() / 4.0;
         let within = response.orders.iter().filter(|o| o.sines[0].abs() < 0.5 * step);
@@ -96,14 +43,14 @@ fn single_cells_are_right_for_equal_pillars_and_not_for_jumps() {
     let cell = CoarseCell::new(&stack, WAVELENGTH_UM, WIDTHS_NM).unwrap();
     let full = cell.full_transmission().unwrap();
     let one = SiteLattice::row(1).unwrap();
-    let local = |_: &SiteLattice, widths: &[f64]| {
+    let local = |widths: &[f64]| {
         let mut t = [Vec::new(), Vec::new()];
         for &width in widths {
-            let response = cell.solve(one, &[width], [0.0, 0.0])?;
-            let single = site_transmissions(&one, &response, cell.wavelength_over_pitch(), full);
+            let response = cell.solve(one, &[width], [0.0, 0.0]).unwrap();
+            let single = cell.transmissions(&one, &response, full);
             t.iter_mut().zip(single).for_each(|(all, s)| all.extend(s));
         }
-        Ok(t)
+        t
     };
     let misfit = |direction: [i32; 2], widths_nm: Vec<f64>| {
         let row = RealRow {
@@ -111,7 +58,8 @@ fn single_cells_are_right_for_equal_pillars_and_not_for_jumps() {
             widths_nm,
             repeats: true,
         };
-        row.misfit(&cell, [0.0, 0.0], local)
+        let solved = row.solve(&cell, [0.0, 0.0])?;
+        Ok::<_, metalith_core::Error>(solved.misfit(&local(&solved.widths_nm)))
     };
     for direction in [[1, 0], [0, 1], [1, 1]] {
         assert!(misfit(direction, vec![180.0; 3]).unwrap() < ROUNDING);

@@ -6,10 +6,11 @@ mod truth_rows;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use metalith_cell::Blaze;
 use metalith_design::{Design, PillarRule};
-use metalith_grating::Blaze;
 use metalith_rcwa::{Incidence, Side, SiteLattice, Supercell, SupercellResponse, solve_supercell};
 use num_complex::Complex64;
+use truth_rows::blazed_orders::first_order_sines;
 use truth_rows::{Row, read};
 
 /// Share of the zero and the first order, and amplitude of the first. Both solvers have the same unknowns, and the table
@@ -65,7 +66,7 @@ fn solve(row: &Row, blaze: &Blaze, design: &Design) -> SupercellResponse {
     let cells = widths_nm.iter().map(|w| stack.layers(*w, wavelength_um));
     let cells = cells.collect::<Result<Vec<_>, _>>().unwrap();
     let supercell = Supercell::of_cells(lattice, &cells).unwrap();
-    let wedge = blaze.sines(wavelength_um * 1e3 / stack.pitch_nm);
+    let wedge = first_order_sines(blaze, wavelength_um * 1e3 / stack.pitch_nm);
     let sines = if row.looks { wedge.map(|s| -s) } else { [0.0; 2] };
     let incidence = Incidence::of_sines(wavelength_um, Side::Below, sines);
     solve_supercell(&supercell, &incidence, row.highest_order).unwrap()

@@ -1,17 +1,20 @@
 //! A figure of the light in the first order of blazed rows of pillars: supercells, equal neighbours, `neighbours`.
 //!
 //! The mapping is that of `designs/prototype_3x3.toml`. Run it with
-//! `cargo run --release -p metalith-grating --example first_order -- FILE.svg [NM]`; 530 nm if left out, and one of the wavelengths
+//! `cargo run --release -p metalith-design --example first_order -- FILE.svg [NM]`; 530 nm if left out, and one of the wavelengths
 //! whose tables are shipped for light along the normal.
 
+#[allow(dead_code, reason = "tests compare by the rest")]
+#[path = "../tests/blazed_orders/mod.rs"]
+mod blazed_orders;
 #[allow(dead_code, reason = "tests compare by it")]
 #[path = "../tests/prototype_rows/mod.rs"]
 mod prototype_rows;
 
 use std::path::Path;
 
-use metalith_cell::{CellModel, PointwiseCell};
-use metalith_grating::{Blaze, CoarseCell};
+use blazed_orders::BlazeOrders;
+use metalith_cell::{Blaze, CellModel, CoarseCell, PointwiseCell};
 use metalith_rcwa::SiteLattice;
 use metalith_report::{Axis, Chart};
 use num_complex::Complex64;
@@ -50,7 +53,7 @@ fn main() {
             let width = |u: f64| prototype.mapping.width_nm(u);
             let widths = blaze.widths_nm(&lattice, width);
             let first = |sites: &[Complex64], full: f64| (order(&blaze, sites, 1.0) / full).norm_sqr();
-            let solved = blaze.solve(&coarse, width, ALONG_NORMAL).unwrap().order(1).share;
+            let solved = BlazeOrders::solve(&blaze, &coarse, width, ALONG_NORMAL).order(1).share;
             let alone: Vec<Complex64> = widths.iter().map(|w| equal[w.round() as usize]).collect();
             let pairs = table.sites(&lattice, &widths, 1.0);
             let found = [

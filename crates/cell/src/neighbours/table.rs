@@ -6,16 +6,15 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_cell::kept::{self, CacheEntry};
-use metalith_cell::{CellStack, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourResponse, SiteResponse};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::SiteLattice;
 
-use crate::cell::coarse;
-use crate::fit::{Fitted, fit, neighbours_nm, samples};
-use crate::shipped;
-use crate::training::{self, TrainingCell};
-use crate::{CoarseCell, Mapping, SiteGrid};
+use super::coarse_cell::coarse;
+use super::fit::{Fitted, fit, neighbours_nm, samples};
+use super::training::{self, TrainingCell};
+use super::{CoarseCell, Mapping, NEIGHBOUR_TERMS, NeighbourBasis, NeighbourResponse, SiteGrid, SiteResponse, shipped};
+use crate::CellStack;
+use crate::kept::{self, CacheEntry};
 
 /// Raised whenever the supercells or the fit change: kept tables are then of no use.
 const VERSION: u32 = 3;

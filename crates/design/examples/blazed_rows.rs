@@ -1,7 +1,7 @@
 //! Share of the first order of blazed rows of pillars: truth, single cells, supercells.
 //!
 //! The mapping is that of `designs/prototype_3x3.toml`, the truth golden/truth/supercell.csv. Run it with
-//! `cargo run --release -p metalith-grating --example blazed_rows`; about 20 s on one core.
+//! `cargo run --release -p metalith-design --example blazed_rows`; about 20 s on one core.
 
 #[path = "../tests/truth_rows/mod.rs"]
 mod truth_rows;

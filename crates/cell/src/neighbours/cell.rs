@@ -6,12 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use num_complex::Complex64;
 
-use metalith_cell::{
-    BandNode, BandResponse, CellModel, CellStack, Fidelity, FittedNeighbours, NEIGHBOURS, ObliqueTables, PointwiseCell,
-};
 use metalith_core::{Progress, Result};
 
-use crate::{Mapping, NeighbourTable, NeighbourTableSpec};
+use super::{BandNode, BandResponse, FittedNeighbours, Mapping, NEIGHBOURS, NeighbourTable, NeighbourTableSpec};
+use crate::{CellModel, CellStack, Fidelity, ObliqueTables, PointwiseCell};
 
 /// Pillars among unlike neighbours, by [`NeighbourTable`]. Where it is asked for the transmission of a width alone, it
 /// answers as [`PointwiseCell`]: that of a lattice of equal pillars.

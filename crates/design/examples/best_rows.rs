@@ -6,10 +6,10 @@
 //! from where it looks. Any widths that `designs/wide_5x5.toml` may write, whatever the phase that they leave: what a lens
 //! asks of the phase can only take light away. Widths are climbed one by one from many random starts, so that the best
 //! found is the best there is if several starts end there. Beside it the mapping of the design, mean over where its phase
-//! starts. From the folder `crates/grating`: `cargo run --release --example best_rows`; 5 CPU minutes.
+//! starts. `cargo run --release -p metalith-design --example best_rows`; 5 CPU minutes.
 
+use metalith_cell::{Blaze, CoarseCell};
 use metalith_design::{Design, PillarRule};
-use metalith_grating::{Blaze, CoarseCell};
 use metalith_rcwa::SiteLattice;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,10 +1,10 @@
 //! How the sites of supercells lie in the plane, and on the grid of an element.
 
-use metalith_cell::{CellStack, NEIGHBOURS, neighbours};
 use metalith_pillars::LatticeKind;
 use metalith_rcwa::CellLattice;
 
-use crate::table::images;
+use super::{NEIGHBOURS, neighbours};
+use crate::CellStack;
 
 /// A square lattice of sites, or staggered rows of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +87,29 @@ impl SiteGrid {
     }
 }
 
-/// Images of a vector by mirrors of the axes alone: the first of [`images`].
+/// A vector and its mirror images that are the same to light of this direction (sines) on a square lattice; whether s and p
+/// change places.
+pub(crate) fn images(sines: [f64; 2], k: [f64; 2]) -> Vec<([f64; 2], bool)> {
+    let mut all = vec![(k, false)];
+    for axis in [0, 1] {
+        if sines[axis] == 0.0 {
+            for (mut image, swapped) in all.clone() {
+                image[axis] = -image[axis];
+                all.push((image, swapped));
+            }
+        }
+    }
+    if sines[0] == sines[1] {
+        // Along the normal p is x and s is y; else s and p go with the plane of incidence, which is its own image.
+        let normal = sines[0] == 0.0;
+        for ([x, y], swapped) in all.clone() {
+            all.push(([y, x], swapped ^ normal));
+        }
+    }
+    all
+}
+
+/// Number of images of a vector by mirrors of the axes alone: the first of [`images`].
 fn mirrors(sines: [f64; 2]) -> usize {
     sines.iter().map(|sine| if *sine == 0.0 { 2 } else { 1 }).product()
 }

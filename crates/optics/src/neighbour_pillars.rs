@@ -2,12 +2,10 @@
 
 use num_complex::{Complex32, Complex64};
 
-use metalith_cell::{NEIGHBOURS, NeighbourResponse, SiteResponse};
+use metalith_cell::{NEIGHBOURS, NeighbourResponse, Orientation, SiteResponse};
 use metalith_core::{Error, Result};
 use metalith_pillars::{Lattice, PillarMap};
 use metalith_wave::Aperture;
-
-use crate::Orientation;
 
 /// Rows and columns around a site that hold its neighbours.
 const REACH: usize = 2;

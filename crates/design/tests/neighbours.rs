@@ -7,14 +7,14 @@ mod truth_rows;
 
 use std::collections::BTreeMap;
 
-use metalith_cell::Fidelity;
+use metalith_cell::{Blaze, CoarseCell, Fidelity, NeighbourTable, NeighbourTableSpec, sites_by};
 use metalith_core::Silent;
 use metalith_design::cell_models;
-use metalith_grating::{Blaze, CoarseCell, NeighbourTable, NeighbourTableSpec, sites_by};
 use metalith_rcwa::SiteLattice;
 use num_complex::Complex64;
 use prototype_rows::{Prototype, order};
 use truth_rows::Row;
+use truth_rows::blazed_orders::BlazeOrders;
 
 /// Light that the sum over pairs puts elsewhere than the supercells of real rows, mean over the rows of one light.
 /// Measured: 0.009 to 0.014.
@@ -245,7 +245,7 @@ fn between_the_tables_blazed_rows_are_met_as_well() {
                         offset_turns: start as f64 / (STARTS * cells) as f64,
                     };
                     let width = |u: f64| prototype.mapping.width_nm(u);
-                    let solved = blaze.solve(&coarse, width, looks(um)).unwrap().order(1).share;
+                    let solved = BlazeOrders::solve(&blaze, &coarse, width, looks(um)).order(1).share;
                     let widths = blaze.widths_nm(&lattice, width);
                     let first = |sites: &[Complex64]| (order(&blaze, sites, 1.0) / full).norm_sqr();
                     let alone: Vec<Complex64> = widths.iter().map(|w| equal[*w as usize]).collect();

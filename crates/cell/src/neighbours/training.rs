@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use metalith_core::Result;
 use metalith_rcwa::SiteLattice;
 
-use crate::{Blaze, Mapping, SiteGrid};
+use super::{Blaze, Mapping, SiteGrid};
 
 /// Supercells drawn by chance along the normal, where each of their sites counts for eight by symmetry, and for other
 /// directions. With half as many, what is left over grows by a tenth.

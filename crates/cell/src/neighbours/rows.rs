@@ -8,8 +8,8 @@ use num_complex::Complex64;
 use metalith_core::{Error, Result};
 use metalith_rcwa::SiteLattice;
 
-use crate::table::images;
-use crate::{CoarseCell, Orientation, SiteGrid};
+use super::site_grid::images;
+use super::{CoarseCell, Orientation, SiteGrid};
 
 /// Pillars of a row along x, where a mirror plane halves the unknowns, and of others.
 const PILLARS: usize = 20;
@@ -197,23 +197,6 @@ impl RealRow {
         }
     }
 
-    /// Light that a model puts elsewhere than the supercell does, as [`SolvedRow::misfit`].
-    ///
-    /// `sines` is the direction of arrival in air. `model` gives the transmission of every site of the lattice from
-    /// its widths (nm).
-    ///
-    /// # Errors
-    /// As [`RealRow::solve`], or those of the model.
-    pub fn misfit(
-        &self,
-        cell: &CoarseCell<'_>,
-        sines: [f64; 2],
-        model: impl Fn(&SiteLattice, &[f64]) -> Result<[Vec<Complex64>; 2]>,
-    ) -> Result<f64> {
-        let solved = self.solve(cell, sines)?;
-        Ok(solved.misfit(&model(&solved.lattice, &solved.widths_nm)?))
-    }
-
     /// Solve its supercell for light from a direction (sines in air).
     ///
     /// # Errors
@@ -337,7 +320,7 @@ mod tests {
 
     #[test]
     fn a_row_of_which_nothing_counts_is_refused() {
-        let stack = metalith_cell::CellStack::paper(350.0, 700.0).unwrap();
+        let stack = crate::CellStack::paper(350.0, 700.0).unwrap();
         let cell = CoarseCell::new(&stack, 0.53, (100.0, 300.0)).unwrap();
         let row = RealRow {
             direction: [1, 0],

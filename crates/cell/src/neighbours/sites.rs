@@ -6,25 +6,15 @@ use num_complex::Complex64;
 
 use metalith_rcwa::{SiteLattice, SupercellOrder, SupercellResponse};
 
-use crate::SiteGrid;
+use super::SiteGrid;
 
-/// Transmission of every site of a supercell on a square lattice, for s and p incident, `[polarisation][site]`: the samples on the lattice
+/// Transmission of every site of a supercell, for s and p incident, `[polarisation][site]`: the samples on the lattice
 /// of sites whose diffraction orders are those of the supercell. A lattice of samples tells apart only directions with
 /// |sine| below half the wavelength over the pitch; orders beyond are left out.
 ///
 /// |t|^2, averaged over the sites, is the power of these orders times `full`^2. With `full` the root of the index of
 /// the substrate over that of the air, t is scaled as the transmission of a single cell. Of each order only the part
 /// polarised as the incident wave counts.
-pub fn site_transmissions(
-    lattice: &SiteLattice,
-    response: &SupercellResponse,
-    wavelength_over_pitch: f64,
-    full: f64,
-) -> [Vec<Complex64>; 2] {
-    transmissions_on(SiteGrid::SQUARE, lattice, response, wavelength_over_pitch, full)
-}
-
-/// As [`site_transmissions`], of sites that lie so.
 pub(crate) fn transmissions_on(
     grid: SiteGrid,
     lattice: &SiteLattice,

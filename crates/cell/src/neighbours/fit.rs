@@ -3,13 +3,11 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use metalith_cell::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse};
 use metalith_core::{Error, Result};
 use metalith_rcwa::SiteLattice;
 
-use crate::SiteGrid;
-use crate::linear;
-use crate::training::TrainingCell;
+use super::training::TrainingCell;
+use super::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteGrid, linear};
 
 /// Added to the mean square of each term, as a part of it: sites are a few for each weight, and widths of neighbours are
 /// often nearly those of a grating. Terms of high degree are held back more, by the fourth power of their degree in parts
@@ -207,9 +205,8 @@ fn symmetries(grid: SiteGrid, sines: [f64; 2]) -> Vec<Symmetry> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Mapping;
-    use crate::training::random;
-    use metalith_cell::SiteResponse;
+    use crate::neighbours::training::random;
+    use crate::{Mapping, SiteResponse};
 
     /// The ridge keeps back one part in 1e4 of each weight, and more of those of high degree, which are small here.
     const KEPT_BACK: f64 = 1e-3;

@@ -3,11 +3,13 @@
 
 use std::f64::consts::TAU;
 
-use metalith_cell::{CellModel, PointwiseCell};
+use metalith_cell::{
+    Blaze, CellModel, CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, PointwiseCell, RealRow,
+    SiteGrid,
+};
 use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarRule};
-use metalith_grating::{Blaze, CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, RealRow, SiteGrid};
 use num_complex::Complex64;
 
 /// Where rows begin, from the middle of the element (um).

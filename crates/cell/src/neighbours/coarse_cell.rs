@@ -2,18 +2,18 @@
 
 use num_complex::Complex64;
 
-use metalith_cell::CellStack;
 use metalith_core::{Error, Result};
 use metalith_rcwa::{Incidence, Orders, Side, SiteLattice, Supercell, SupercellResponse, solve_supercell};
 
-use crate::SiteGrid;
-use crate::sites::transmissions_on;
+use super::SiteGrid;
+use super::sites::transmissions_on;
+use crate::CellStack;
 
 /// Highest order of a single cell that supercells keep along each axis: -2..=2. With widths corrected by
 /// [`CoarseCell::shift_nm`] the first order of blazed rows of 3 to 18 pillars differs by 0.010 rms in share and
 /// 0.010 rad in phase from that with 3 to 7 (`examples/blazed_rows.rs`). With highest order 3 it is about 0.006 and
 /// 0.008, at (7/5)^6, about eight times the cost.
-pub const COARSE: usize = 2;
+const COARSE: usize = 2;
 
 /// The same on a hexagonal lattice, whose pillars are of silicon for the most part: with 2 the first order of blazed rows of these
 /// differs by up to 0.17 in share from that with 5, with 3 by 0.02 (`hexagonal_supercells` in the tests of the solver).
@@ -37,7 +37,7 @@ const SHIFT_STEPS: i32 = 12;
 /// Widths at which coarse and fine cells are compared, so many that no single resonance decides.
 const COMPARED_WIDTHS: usize = 21;
 
-/// A pillar of any width at one wavelength, solved with few orders, [`COARSE`] on a square lattice, and a width corrected for that.
+/// A pillar of any width at one wavelength, solved with few orders, 5 along each axis on a square lattice, and a width corrected for that.
 #[derive(Clone, Debug)]
 pub struct CoarseCell<'a> {
     stack: &'a CellStack,
@@ -68,11 +68,6 @@ impl<'a> CoarseCell<'a> {
         })
     }
 
-    /// Wavelength in vacuum (um).
-    pub fn wavelength_um(&self) -> f64 {
-        self.wavelength_um
-    }
-
     /// By how much wider a pillar is solved than it is (nm), so that few orders transmit as many do, in
     /// the mean square over the widths, along the normal. Too few orders act mostly like a pillar that is a little too
     /// thin.
@@ -90,7 +85,7 @@ impl<'a> CoarseCell<'a> {
         SiteGrid::of(self.stack)
     }
 
-    /// What every site of a solved supercell transmits, as [`site_transmissions`](crate::site_transmissions) has it.
+    /// What every site of a solved supercell transmits: see [`transmissions_on`].
     pub(crate) fn transmissions(
         &self,
         lattice: &SiteLattice,

@@ -1,7 +1,7 @@
 //! Rows of pillars on a hexagonal lattice.
 
+use metalith_cell::{CoarseCell, RealRow};
 use metalith_design::Design;
-use metalith_grating::{CoarseCell, RealRow};
 use metalith_rcwa::Orders;
 
 /// A row of equal pillars is the single cell, with as many orders, at each of its sites, whichever way it goes.
