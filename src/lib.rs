@@ -25,8 +25,8 @@
 //!
 //! Beside the line stand [`optimise`], which finds the radial phase; [`drc`], [`mod@diff`] and [`handoff`], which
 //! start from layouts too; [`calibrate`], which learns from captures what the model lacks; and [`compensate`],
-//! which draws what comes out as meant on the line that was so measured. [`grating`] solves supercells of unlike
-//! pillars; layouts of the cell of the paper are judged by its cell of pillars among unlike neighbours, unless a design says
+//! which draws what comes out as meant on the line that was so measured. [`cell`] holds supercells of unlike
+//! pillars too; layouts of the cell of the paper are judged by its cell of pillars among unlike neighbours, unless a design says
 //! otherwise. The names at the root are those that the line itself needs; each room has its own.
 //!
 //! # Conventions
@@ -94,7 +94,6 @@ pub use metalith_drc as drc;
 pub use metalith_drc::diff;
 pub use metalith_gds as gds;
 pub use metalith_gds::extract;
-pub use metalith_grating as grating;
 pub use metalith_handoff as handoff;
 pub use metalith_imaging as imaging;
 pub use metalith_layout as layout;

@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use metalith::cell::{
-    Analyser, CellStack, FittedCell, FocusedLight, Handedness, PointwiseCell, Polarisation, PolarisationAxis,
-    PolarisedLight, PublishedCell, RotatedCell, UprightCell, cache_folder,
+    Analyser, CellStack, FittedCell, FocusedLight, Handedness, Mapping, NeighbourCell, PointwiseCell, Polarisation,
+    PolarisationAxis, PolarisedLight, PublishedCell, RotatedCell, UprightCell, cache_folder,
 };
 use metalith::design::band_about;
-use metalith::grating::{Mapping, NeighbourCell};
 use metalith::{CalibratedModel, CellModel, Error, Fidelity, LatticeKind, PillarMap, PillarShape, Rectangles, Result};
 
 /// What pillars are simulated as.

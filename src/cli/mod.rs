@@ -177,7 +177,8 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Run(args) => run::run(args, terminal),
         Command::Layout(args) => layout::run(args, terminal),
         Command::Optimise(args) => optimise::run(args, terminal),
-        Command::Photographs { .. } => Err(Error::invalid(
+        Command::Photographs { .. } => Err(Error::refused(
+            "command/removed",
             "there is no command `photographs` any more",
             "use `picture` for one scene, `compare` for a table of many photographs and several designs",
         )),

@@ -74,7 +74,7 @@ pub(super) fn numbers(report: &Value) -> Value {
 }
 
 /// Share of the light that the sum over pairs puts elsewhere than supercells that it was not fitted to: as of real rows in
-/// crates/grating/tests/neighbours.rs. Measured for the shipped tables: 0.012 to 0.024.
+/// crates/design/tests/neighbours.rs. Measured for the shipped tables: 0.012 to 0.024.
 const LEFT_OUT: f64 = 0.035;
 
 #[test]

@@ -8,7 +8,6 @@ mod fit;
 pub mod kept;
 mod library;
 mod model;
-mod neighbour_band;
 mod neighbours;
 mod pointwise;
 mod polarisation;
@@ -32,10 +31,10 @@ pub use fit::{
 pub use library::{LibraryErrors, LibraryPillar, PillarLibrary};
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
-pub use neighbour_band::{BandNode, BandResponse};
 pub use neighbours::{
-    FittedNeighbours, NEIGHBOUR_DEGREE, NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteResponse,
-    neighbours,
+    BandNode, BandResponse, Blaze, CoarseCell, ElementRow, FittedNeighbours, Mapping, NEIGHBOUR_DEGREE,
+    NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourCell, NeighbourResponse, NeighbourTable, NeighbourTableSpec,
+    Orientation, RealRow, SiteGrid, SiteResponse, SolvedRow, neighbours, sites_by,
 };
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};

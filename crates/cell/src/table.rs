@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::cache;
 use super::column::{WidthSpectrum, lagrange};
+use super::kept;
 use super::stack::CellStack;
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
@@ -162,7 +163,7 @@ impl CellTable {
     /// As [`CellTable::compute`].
     pub fn obtain(spec: &TableSpec, folder: Option<&Path>, progress: &dyn Progress) -> Result<(Self, Origin)> {
         spec.check()?;
-        let inputs = cache::inputs(spec);
+        let inputs = inputs(spec);
         let widths = spec.columns_nm();
         let file = folder.map(|folder| folder.join(cache::file_name(&inputs)));
         if let Some(file) = &file {
@@ -270,6 +271,17 @@ impl TableSpec {
         let nearest = self.stack.lattice.nearest_nm(self.stack.pitch_nm);
         f64::from(width_nm).min(nearest - lean).max(0.0)
     }
+}
+
+/// The inputs as text: equal if and only if the table is the same.
+fn inputs(spec: &TableSpec) -> Vec<u8> {
+    #[derive(Serialize)]
+    struct Inputs<'a> {
+        solver: u32,
+        spec: &'a TableSpec,
+    }
+    let solver = kept::solver_of(spec.stack.shape);
+    serde_json::to_vec(&Inputs { solver, spec }).expect("plain data serialises")
 }
 
 #[cfg(test)]

@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use metalith_cell::{
-    CellModel, CellStack, Fidelity, FittedCell, LitStack, PointwiseCell, PublishedCell, RotatedCell, TableSpec,
-    UniformLayer, UprightCell, cache_folder,
+    CellModel, CellStack, Fidelity, FittedCell, LitStack, Mapping, NeighbourCell, PointwiseCell, PublishedCell,
+    RotatedCell, TableSpec, UniformLayer, UprightCell, cache_folder,
 };
 use metalith_core::{Error, Result};
-use metalith_grating::{Mapping, NeighbourCell};
 use metalith_pillars::Rectangles;
 use metalith_rcwa::{CellLattice, Material};
 

@@ -11,5 +11,5 @@ pub use array::{PillarArray, PillarRule};
 pub use cells::{VISIBLE_UM, band_about, cell_models, mappings, neighbour_cell};
 pub use design::Design;
 pub use lattice_orders::{AskedLight, LatticeOrders, Medium};
-pub use metalith_grating::NeighbourCell;
+pub use metalith_cell::NeighbourCell;
 pub use spec::*;

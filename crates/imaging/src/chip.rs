@@ -6,10 +6,9 @@ use metalith_design::array::Symmetry;
 use metalith_design::phase::OpenAreas;
 use metalith_design::{Design, Element};
 use metalith_gds::extract::Extraction;
-use metalith_grating::NeighbourPillars;
 use metalith_optics::{
-    ArrivingLight, AsBuiltElement, AsBuiltOptics, CameraChange, ClassTable, DrawnElement, PathChange, Perturbation,
-    SimulationCase, cell_direction,
+    ArrivingLight, AsBuiltElement, AsBuiltOptics, CameraChange, ClassTable, DrawnElement, NeighbourPillars, PathChange,
+    Perturbation, SimulationCase, cell_direction,
 };
 use metalith_pillars::PillarMap;
 use metalith_sensor::{Camera, Sampling, WavelengthSteps};

@@ -7,7 +7,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, NeighbourCell, cell_models, neighbour_cell};
 use num_complex::Complex64;
 
-use crate::robust::cells_off_height;
+use crate::merit::robust::cells_off_height;
 
 /// Cells that a design is optimised and judged with.
 pub struct TaskCells {
@@ -136,7 +136,7 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
 ///
 /// # Errors
 /// If they are upright rectangles.
-pub(super) fn check_shape(design: &Design) -> Result<()> {
+pub(crate) fn check_shape(design: &Design) -> Result<()> {
     match design.cell.shape.upright() {
         None => Ok(()),
         Some(_) => Err(Error::refused(

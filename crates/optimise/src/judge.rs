@@ -4,10 +4,10 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::focus::{Strehl, judging_wavelengths};
-use super::limit::{largest_step, largest_step_in_layout};
-use super::robust;
-use super::run::OptimiseTask;
+use crate::merit::focus::{Strehl, judging_wavelengths};
+use crate::merit::robust;
+use crate::rings::limit::{largest_step, largest_step_in_layout};
+use crate::run::OptimiseTask;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Result};
 use metalith_design::Design;
@@ -109,8 +109,8 @@ impl OptimiseTask {
             .into_iter()
             .map(|error| {
                 let rows = self.lens.focal_rows(&band, error, cells)?;
-                let blocks = vec![(super::MeritKind::Log, 1.0, rows)];
-                let problem = super::FieldProblem::new(blocks, cells, self.mapping.clone(), 1 << 30)?;
+                let blocks = vec![(crate::MeritKind::Log, 1.0, rows)];
+                let problem = crate::FieldProblem::new(blocks, cells, self.mapping.clone(), 1 << 30)?;
                 Ok(problem.merit_of_widths(&widths).exp())
             })
             .collect()

@@ -5,8 +5,8 @@ use std::path::Path;
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::judge::Judged;
-use super::mapping::step;
+use crate::judge::Judged;
+use crate::rings::mapping::step;
 use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, Verdict, sig, write_json};

@@ -2,14 +2,15 @@
 
 use rayon::prelude::*;
 
-use super::PixelWindow;
-use super::deconvolution::Deconvolution;
-use super::field::{FieldPoint, FieldProblem, MeritKind};
-use super::focus::{FabricationError, Lens, wavelengths};
-use super::kernel::RingField;
-use super::mapping::Mapping;
-use super::robust;
-use super::views::Views;
+use crate::PixelWindow;
+use crate::image::deconvolution::Deconvolution;
+use crate::image::views::Views;
+use crate::merit::field::{FieldProblem, MeritKind};
+use crate::merit::field_point::FieldPoint;
+use crate::merit::focus::{FabricationError, Lens, wavelengths};
+use crate::merit::robust;
+use crate::rings::kernel::RingField;
+use crate::rings::mapping::Mapping;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Progress, Result};
 use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};

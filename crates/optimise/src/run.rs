@@ -1,14 +1,14 @@
 //! From a design to its optimised phase.
 
-use super::cells::check_shape;
-use super::checkpoint::Checkpoint;
-use super::field::FieldProblem;
-use super::focus::Lens;
-use super::limit::StepLimit;
-use super::mapping::Mapping;
-use super::problem;
-use super::rings::Rings;
-use super::start::Start;
+use crate::cells::check_shape;
+use crate::merit::field::FieldProblem;
+use crate::merit::focus::Lens;
+use crate::problem;
+use crate::rings::limit::StepLimit;
+use crate::rings::mapping::Mapping;
+use crate::rings::sites::Rings;
+use crate::solvers::checkpoint::Checkpoint;
+use crate::solvers::start::Start;
 use metalith_cell::CellModel;
 use metalith_core::{Error, Result};
 use metalith_design::array::PillarRule;
@@ -46,7 +46,7 @@ pub struct OptimiseTask {
     /// What gains are counted from: the design's own phase, or where that is a table, which may well be an
     /// optimised one, a hyperbolic lens for the middle of the band.
     pub reference_turns: Vec<f64>,
-    pub(super) limit: StepLimit,
+    pub(crate) limit: StepLimit,
 }
 
 impl OptimiseTask {
@@ -103,12 +103,12 @@ impl OptimiseTask {
             .collect()
     }
 
-    pub(super) fn field_problem(&self, merit: &MeritSpec, cells: &[&dyn CellModel]) -> Result<Option<FieldProblem>> {
+    pub(crate) fn field_problem(&self, merit: &MeritSpec, cells: &[&dyn CellModel]) -> Result<Option<FieldProblem>> {
         problem::field_problem(&self.lens, &self.spec, merit, cells, &self.mapping)
     }
 
     /// The start of one chain of several.
-    pub(super) fn start(&self, chain: u32) -> Result<Start> {
+    pub(crate) fn start(&self, chain: u32) -> Result<Start> {
         let band_um = self.spec.band_um;
         let log_asphere = Start::LogAsphere { band_um };
         let hyperbolic = Start::Hyperbolic {

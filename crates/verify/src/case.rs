@@ -10,8 +10,7 @@ use metalith_cell::{
     PolarisedTables,
 };
 use metalith_core::{Error, Progress, Result};
-use metalith_grating::NeighbourPillars;
-use metalith_optics::{SimulationCase, cell_direction};
+use metalith_optics::{NeighbourPillars, SimulationCase, cell_direction};
 use metalith_pillars::{LatticeKind, PillarRows};
 use metalith_wave::{Aperture, FoldedPropagator, Pillars, PlaneWave, Psf, Scratch};
 

@@ -109,9 +109,9 @@ fn up_to(rows: &[Row], turns: f64) -> [f64; 3] {
 mod tests {
     use std::collections::BTreeMap;
 
+    use metalith_cell::{Blaze, NeighbourTable, NeighbourTableSpec};
     use metalith_core::Silent;
     use metalith_design::mappings;
-    use metalith_grating::{Blaze, NeighbourTable, NeighbourTableSpec};
     use metalith_rcwa::SiteLattice;
     use num_complex::Complex64;
 

@@ -1,7 +1,7 @@
 //! A first run of a shipped 3 x 3 solves no table of unlike neighbours: they come with the program.
 
+use metalith_cell::{NeighbourTable, NeighbourTableSpec};
 use metalith_design::{Design, mappings};
-use metalith_grating::{NeighbourTable, NeighbourTableSpec};
 use metalith_optics::cell_direction;
 use metalith_wave::propagation::incident;
 

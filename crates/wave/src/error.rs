@@ -125,7 +125,6 @@ impl WaveError {
             Self::MissesSensor { .. } => "wave/misses-sensor",
             Self::Pixels { .. } => "wave/pixels",
             Self::Samples => "wave/samples",
-            Self::Kernels { .. } => "wave/kernels",
             Self::Map { .. } => "wave/map",
             Self::SmallImage { .. } => "wave/small-image",
         }

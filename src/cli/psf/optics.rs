@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use metalith::cell::{
-    CellStack, FittedCell, FocusedLight, Handedness, LitStack, PointwiseCell, Polarisation, PolarisationAxis,
-    PolarisedLight, PublishedCell, RotatedCell, UniformLayer, UprightCell, cache_folder,
+    CellStack, FittedCell, FocusedLight, Handedness, LitStack, Mapping, NeighbourCell, PointwiseCell, Polarisation,
+    PolarisationAxis, PolarisedLight, PublishedCell, RotatedCell, UniformLayer, UprightCell, cache_folder,
 };
-use metalith::grating::{Mapping, NeighbourCell};
 use metalith::rcwa::{CellLattice, Material};
 use metalith::report::{exact, sig};
 use metalith::verify::Lighting;

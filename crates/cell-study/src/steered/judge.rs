@@ -2,10 +2,9 @@
 
 use rayon::prelude::*;
 
-use metalith_cell::CellStack;
+use metalith_cell::{CellStack, CoarseCell, ElementRow, RealRow, SiteGrid};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_grating::{CoarseCell, ElementRow, RealRow, SiteGrid};
 
 /// Where rows begin, over the radius of the lens.
 const RADII: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.88];

@@ -15,11 +15,12 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_cell::{CellStack, InversePolynomial, NeighbourResponse, simplex};
+use metalith_cell::{
+    CellStack, InversePolynomial, Mapping, NeighbourResponse, NeighbourTable, NeighbourTableSpec, simplex,
+};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_design::phase::LensPhase;
 use metalith_design::{Design, Element, SteeringSteps};
-use metalith_grating::{Mapping, NeighbourTable, NeighbourTableSpec};
 
 use judge::judge;
 use sample::SiteSample;

@@ -8,8 +8,6 @@ use metalith_cell::{
     PublishedCell, bad_cells, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
 };
 use metalith_core::Result;
-use metalith_design::Design;
-use metalith_design::array::PillarRule;
 use metalith_rcwa::Orders;
 use num_complex::Complex64;
 
@@ -43,9 +41,7 @@ struct Solved(CellStack, Mutex<HashMap<u64, Vec<Complex64>>>);
 
 impl Solved {
     fn paper() -> Self {
-        let path = metalith_testing::root().join("designs/prototype_3x3.toml");
-        let design = Design::read(&path).unwrap();
-        Self(design.cell_stack().unwrap(), Mutex::default())
+        Self(CellStack::paper(PITCH_NM, 700.0).unwrap(), Mutex::default())
     }
 }
 
@@ -215,23 +211,4 @@ fn mappings_go_through_files_and_bad_ones_name_the_line() {
         let error = MappingTable::read_csv(&file, &widths).unwrap_err().to_string();
         assert!(error.contains(word), "{error}");
     }
-
-    // A design may take its mapping from such a file; its layout then has just those widths.
-    std::fs::write(&file, exact.to_csv()).unwrap();
-    let shipped = metalith_testing::root().join("designs/mini_3x3.toml");
-    let text = std::fs::read_to_string(shipped).unwrap();
-    let kept: Vec<_> = text.lines().filter(|line| !line.starts_with("coefficients")).collect();
-    let text = kept
-        .join("\n")
-        .replace("[mapping]", "[mapping]\ntable = \"mapping.csv\"");
-    let path = folder.path().join("design.toml");
-    std::fs::write(&path, text).unwrap();
-    let design = Design::read(&path).unwrap();
-    assert_eq!(design.mapping.table.as_ref(), Some(&exact));
-    let rule = PillarRule::new(&design.cell, &design.mapping);
-    assert!(
-        (0..1000)
-            .map(|i| f64::from(i) / 1000.0)
-            .all(|u| rule.width_nm(u) == exact.width_nm(u))
-    );
 }
