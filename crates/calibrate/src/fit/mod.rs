@@ -6,8 +6,10 @@
 mod capture_equations;
 mod cross_validation;
 mod data;
+mod intervals;
 mod model_error;
 mod normal_equations;
+mod nuisance_fit;
 mod nuisances;
 mod null_test;
 mod problem;
@@ -15,15 +17,13 @@ mod registration;
 
 mod widths;
 
-pub use cross_validation::{
-    Gain, HeldOutErrors, SIGMAS_95, beam_groups, cautious_half_widths, error_of_capture, gain, half_widths, held_out,
-    mean_error,
-};
+pub use cross_validation::{Gain, HeldOutErrors, beam_groups, error_of_capture, gain, held_out, mean_error};
 pub use data::{CaptureSetup, Data};
+pub use intervals::{cautious_half_widths, half_widths};
 #[cfg(test)]
 pub use model_error::ModelError;
-pub use model_error::{WidthParts, change_energy, projected};
-pub use normal_equations::{covariance, minimise};
+pub use model_error::{WidthParts, change_energy};
+pub use normal_equations::{SIGMAS_95, covariance, minimise, projected};
 pub use nuisances::Nuisances;
 pub use null_test::null_gain;
 pub use problem::{Fit, FitProblem};

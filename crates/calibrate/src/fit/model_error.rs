@@ -6,11 +6,10 @@
 //! difference is therefore added to the intervals: amplitude and phase over width for each LED, and the path over the
 //! lens, each with a standard deviation of its own, are propagated through the fit; and a share of what was found itself.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use serde::Serialize;
 
-use super::cross_validation::SIGMAS_95;
-use super::normal_equations::covariance;
+use super::normal_equations::{SIGMAS_95, covariance, projected};
 use super::problem::{Fit, FitProblem};
 use crate::forward_model::{PATH_TERMS, Slot, TRANSMISSION_TERMS};
 
@@ -228,17 +227,6 @@ pub fn change_energy(problem: &FitProblem<'_>, fit: &Fit) -> f64 {
             problem.model.error_share(effect).powi(2) * energy.max(0.0)
         })
         .sum()
-}
-
-/// The inner products of all columns but the shared nuisances and the residual, with the nuisances projected out.
-pub fn projected(form: &DMatrix<f64>, shared: usize) -> DMatrix<f64> {
-    let n = form.nrows() - 1 - shared;
-    let nuisances = form.view((0, 0), (shared, shared)).into_owned();
-    let cross = form.view((0, shared), (shared, n)).into_owned();
-    let inverse = nuisances
-        .try_inverse()
-        .unwrap_or_else(|| DMatrix::zeros(shared, shared));
-    form.view((shared, shared), (n, n)) - cross.transpose() * inverse * &cross
 }
 
 #[cfg(test)]

@@ -7,6 +7,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::set::PerCapture;
 
+/// Half of a 95 % interval in standard deviations, as it is rounded in reports.
+pub const SIGMAS_95: f64 = 2.0;
+
 /// The forms of all data over the same columns: flux of each LED, black level, further parameters, residual.
 #[derive(Clone)]
 pub struct NormalEquations {
@@ -96,6 +99,17 @@ pub fn covariance(form: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
         out.set_column(j, &solve(a.clone(), &identity.column(j).into_owned()));
     }
     out
+}
+
+/// The inner products of all columns but the shared nuisances and the residual, with the nuisances projected out.
+pub fn projected(form: &DMatrix<f64>, shared: usize) -> DMatrix<f64> {
+    let n = form.nrows() - 1 - shared;
+    let nuisances = form.view((0, 0), (shared, shared)).into_owned();
+    let cross = form.view((0, shared), (shared, n)).into_owned();
+    let inverse = nuisances
+        .try_inverse()
+        .unwrap_or_else(|| DMatrix::zeros(shared, shared));
+    form.view((shared, shared), (n, n)) - cross.transpose() * inverse * &cross
 }
 
 /// Ridge that keeps a singular system solvable, relative to columns of norm one; far below any precision of the

@@ -252,7 +252,7 @@ impl FitProblem<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::{covariance, half_widths};
-    use crate::fit::cross_validation::SIGMAS_95;
+    use crate::fit::SIGMAS_95;
     use crate::linear_model::{LinearModel, Term, beams, image, information};
 
     /// Captures of two LEDs, two elements and two distances.

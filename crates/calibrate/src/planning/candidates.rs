@@ -8,7 +8,6 @@ use metalith_pillars::{PillarMap, PillarReader};
 use ndarray::Array2;
 
 use super::bench_file::{BenchFile, SemOffer};
-use super::limits::check_plannable;
 use crate::set::read::WINDOW_CENTRE_UM;
 use crate::set::{
     Capture, ElementIndex, LedIndex, MeasuredElement, MeasuredSet, PerCapture, PerElement, SemSite, Stack,
@@ -31,10 +30,10 @@ pub struct Candidates {
     pub unseen: usize,
 }
 
-/// All that the bench could take of a design, whose layout is at `layout`.
+/// All that the bench could take of a design that can be planned, whose layout is at `layout`.
 ///
 /// # Errors
-/// As [`check_plannable`]; if the layout cannot be read, or nothing can be seen of any element.
+/// If the layout cannot be read, or nothing can be seen of any element.
 pub fn candidates(
     design: &Design,
     bench: &BenchFile,
@@ -42,7 +41,6 @@ pub fn candidates(
     reader: &dyn PillarReader,
     progress: &dyn Progress,
 ) -> Result<Candidates> {
-    check_plannable(design, bench)?;
     let chosen = chosen_elements(design, bench)?;
     let sites = design.sites_of(&chosen);
     let layer = design.layout.layers.pillars.number();

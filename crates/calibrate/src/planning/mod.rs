@@ -144,6 +144,7 @@ impl CapturePlan {
 /// cannot be solved, a calibration of the set would not fit into memory, a file cannot be written, or the user stopped it.
 pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn Progress) -> Result<CapturePlan> {
     let (design, bench) = (request.design, request.bench);
+    check_plannable(design, bench)?;
     let candidates = candidates::candidates(design, bench, request.layout, reader, progress)?;
     let effects = |set: &MeasuredSet| wanted_effects(set, request);
     let cells = cells_of(&candidates.set, SAMPLING, request.cache.clone());

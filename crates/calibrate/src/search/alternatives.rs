@@ -2,8 +2,9 @@
 
 use metalith_core::{Progress, Result};
 
+use super::residual::LEAST_GAIN;
 use super::state::SearchState;
-use super::stepwise::{LEAST_GAIN, physical};
+use super::stepwise::physical;
 use crate::fit::{Fit, Gain, HeldOutErrors, WidthParts, gain, half_widths, held_out, mean_error};
 
 /// Difference in the chi-square of the SEM widths that decides between two explanations: three sigma.

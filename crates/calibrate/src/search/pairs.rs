@@ -6,9 +6,10 @@
 
 use metalith_core::{Progress, Result};
 
+use super::residual::LEAST_GAIN;
 use super::signatures::score_pairs;
 use super::state::{MORE_IS_LEFT, SearchState};
-use super::stepwise::{Candidate, LEAST_GAIN, TriedEffect, fit_with};
+use super::stepwise::{Candidate, TriedEffect, fit_with};
 use crate::fit::{Fit, change_energy, held_out, mean_error, null_gain};
 
 /// Pairs that are fitted on the surrogate.

@@ -2,6 +2,10 @@
 
 use crate::fit::{Fit, FitProblem, change_energy};
 
+/// Smaller gains of reduced chi-square per pixel are within the error of the forward model itself: two
+/// independent programs differ by 0.005 on a chip without effects.
+pub const LEAST_GAIN: f64 = 0.006;
+
 /// Nothing is left unexplained if the reduced chi-square per pixel is this, or less: chips with nothing undeclared have up to
 /// 1.01, and a weak effect, such as a half of every lens displaced by 30 nm, has little more.
 pub const EXPLAINED: f64 = 1.05;

@@ -2,8 +2,7 @@
 
 use metalith_core::{Progress, Result};
 
-use super::residual::may_leave;
-use super::stepwise::{LEAST_GAIN, fit_with};
+use super::residual::{LEAST_GAIN, may_leave};
 use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, held_out, mean_error};
 
 /// What noise alone leaves varies so much: by this many standard deviations of the mean square of so many pixels.
@@ -30,27 +29,6 @@ pub struct SearchState<'a> {
     pub fit: Fit,
     /// The error of the fit on captures left out.
     pub held_out: HeldOutErrors,
-}
-
-/// Fit some effects and no others, all of which there is. With `full`, they are refined with full simulations, twice as often as in a
-/// search: its surrogate is not centred on them.
-///
-/// # Errors
-/// If a simulation fails, or the user stopped it.
-pub fn fit_of<'a>(
-    problem: FitProblem<'a>,
-    effects: &[usize],
-    full: bool,
-    progress: &dyn Progress,
-) -> Result<SearchState<'a>> {
-    let nothing = problem.nuisance_fit();
-    let fit = fit_with(&problem, &nothing, &[], effects).unwrap_or(nothing);
-    let mut state = SearchState::new(problem, fit);
-    if full {
-        state.refine(progress)?;
-        state.refine(progress)?;
-    }
-    Ok(state)
 }
 
 impl<'a> SearchState<'a> {

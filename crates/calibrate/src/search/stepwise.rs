@@ -2,7 +2,7 @@
 
 use metalith_core::{Progress, Result};
 
-use super::residual::EXPLAINED;
+use super::residual::{EXPLAINED, LEAST_GAIN};
 use super::signatures::score_effects;
 use super::state::SearchState;
 use crate::effects::Parameter;
@@ -12,10 +12,6 @@ use crate::fit::{
 
 /// Candidates that are fitted in full at each step.
 pub const LEADERS: usize = 6;
-
-/// Smaller gains of reduced chi-square per pixel are within the error of the forward model itself: two
-/// independent programs differ by 0.005 on a chip without effects.
-pub const LEAST_GAIN: f64 = 0.006;
 
 /// Share of the error above noise that an effect must remove.
 const LEAST_SHARE: f64 = 0.15;
@@ -257,6 +253,27 @@ pub fn fit_with(problem: &FitProblem<'_>, now: &Fit, chosen: &[usize], effects: 
     let fits = effects.iter().fold(vec![now.clone()], begin).into_iter();
     fits.map(|from| problem.fit(&active, &from))
         .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// Fit some effects and no others, all of which there is. With `full`, they are refined with full simulations, twice as often as in a
+/// search: its surrogate is not centred on them.
+///
+/// # Errors
+/// If a simulation fails, or the user stopped it.
+pub fn fit_of<'a>(
+    problem: FitProblem<'a>,
+    effects: &[usize],
+    full: bool,
+    progress: &dyn Progress,
+) -> Result<SearchState<'a>> {
+    let nothing = problem.nuisance_fit();
+    let fit = fit_with(&problem, &nothing, &[], effects).unwrap_or(nothing);
+    let mut state = SearchState::new(problem, fit);
+    if full {
+        state.refine(progress)?;
+        state.refine(progress)?;
+    }
+    Ok(state)
 }
 
 /// Starting points for fits of an effect: the present fit, or both sides of a kink at zero.
