@@ -57,8 +57,8 @@ pub enum Outcome {
 /// More threads than any machine here has cores; each takes memory of its own.
 const MOST_THREADS: i64 = 512;
 
-/// From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
-/// image it makes.
+/// Turn the phase of a metalens array into a layout that a cleanroom can write, read that file back, and simulate the
+/// image that the chip makes.
 #[derive(Parser)]
 #[command(version, propagate_version = true, arg_required_else_help = true)]
 #[command(after_help = "Exit codes: 0 fine, 1 outside limits, 2 bad input, 3 could not be done.")]
@@ -66,11 +66,11 @@ struct Arguments {
     #[command(subcommand)]
     command: Command,
 
-    /// Threads to use; all cores if left out. The answer does not depend on it.
+    /// Number of threads; all cores if left out. Results do not depend on it.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
     threads: Option<u16>,
 
-    /// Print nothing but errors and what was asked for.
+    /// Print only errors and requested output.
     #[arg(long, short, global = true)]
     quiet: bool,
 }

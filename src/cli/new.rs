@@ -91,10 +91,10 @@ impl StartCell {
     after_help = "Examples:\n  metalith new mine.toml --diameter-um 200 --focal-length-um 480\n  metalith run mine.toml\n  metalith new pair.toml --like birefringent_532"
 )]
 pub struct NewArgs {
-    /// The file to write; the design has its name. An existing file is never replaced.
+    /// The file to write, which gives the design its name. An existing file is never replaced.
     design: PathBuf,
 
-    /// Elements along an axis.
+    /// Number of elements along an axis.
     #[arg(long, value_name = "N", default_value_t = 3)]
     elements: u32,
 
@@ -106,17 +106,17 @@ pub struct NewArgs {
     #[arg(long, value_name = "UM")]
     focal_length_um: Option<f64>,
 
-    /// Wavelength that the phase focuses and the wedges are made for (nm); the cell is one of silicon nitride for 400 to 700 nm, from
-    /// 850 to 1600 nm one of amorphous silicon for that wavelength.
+    /// Wavelength of the phase and of the wedges (nm). The pillars are silicon nitride for 400 to 700 nm, amorphous
+    /// silicon from 850 to 1600 nm.
     #[arg(long, value_name = "NM", default_value_t = 550.0)]
     wavelength_nm: f64,
 
-    /// Angle that each step from the centre element adds (degrees).
+    /// Steering angle that each step from the centre element adds (degrees).
     #[arg(long, value_name = "DEG", default_value_t = 15.0)]
     steering_deg: f64,
 
-    /// Begin with a design that comes with the program, and the files that it names, instead: other shapes of pillars, lattices,
-    /// materials, waves, phases and arrays.
+    /// Begin with a shipped design and the files that it reads instead: other pillars, lattices, materials,
+    /// wavelengths, phases and arrays.
     #[arg(long, value_name = "DESIGN", value_parser = ShippedDesign::names(), conflicts_with_all = ["elements", "diameter_um",
         "focal_length_um", "wavelength_nm", "steering_deg"])]
     like: Option<String>,

@@ -18,13 +18,12 @@ use super::paths::{apart, name_of};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
-/// Simulate the frame that the camera of a layout records of a scene, and restore the picture from it.
+/// Simulate the frame that a camera with the chip records of a scene, and restore the picture from it.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith picture out/prototype_3x3/prototype_3x3_pillars.gds --camera cameras/gt1930.toml \\\n    --design designs/prototype_3x3.toml scene.png --out out/picture\n\n\
     The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in \
-    scenes chart, star and edge; with pixels finer than half of one of the sensor it is averaged to these. Kernels are kept on the \
-    disk and used again."
+    scenes chart, star and edge; a scene with pixels finer than half a sensor pixel is averaged. Kernels are cached."
 )]
 pub struct PictureArgs {
     /// The pillar layout; `-` for standard input.
@@ -40,55 +39,57 @@ pub struct PictureArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// Distance of the scene (mm); far if left out.
+    /// Distance of the scene (mm); infinite if left out.
     #[arg(long)]
     distance_mm: Option<f64>,
 
-    /// Distance of each pixel of the scene: an NPY of millimetres, `inf` for what is far, or a grey PNG of 16 bits with whole
+    /// Distance of each pixel of the scene: an NPY in millimetres (`inf` is far), or a grey PNG of 16 bits in whole
     /// millimetres.
     #[arg(long, value_name = "FILE")]
     depth: Option<PathBuf>,
 
-    /// Wavelengths of the bands of a spectral cube (nm), separated by commas. They must hold 95 % of the light that each channel
-    /// of the camera counts.
+    /// Wavelengths of the bands of a spectral cube (nm), separated by commas. They must contain 95 % of the light that
+    /// each channel of the camera counts.
     #[arg(long, value_delimiter = ',', value_name = "NM,NM,...")]
     wavelengths_nm: Option<Vec<f64>>,
 
-    /// Pixels an axis of a built-in scene; 800 if left out.
+    /// Pixels along an axis of a built-in scene; 800 if left out.
     #[arg(long, value_parser = super::images::scored_sides())]
     pixels: Option<u16>,
 
-    /// Ways to restore: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs); the picture of the page is that of the first.
+    /// Restorations: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs), separated by commas. The page
+    /// shows the first.
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
-    /// Leave the forecast out: it costs as much as two restorations by Tikhonov.
+    /// Leave out the forecast, which costs as much as two restorations by Tikhonov.
     #[arg(long)]
     no_forecast: bool,
 
-    /// Restore by each element alone too.
+    /// Restore by each element alone too, and blend.
     #[arg(long)]
     separate: bool,
 
-    /// File of weights for the learnt prior that `metalith train` wrote, or a denoiser of one's own as `.onnx`; those of
-    /// the program if left out.
+    /// Weights of the learnt prior from `metalith train`, or another denoiser as `.onnx`; the shipped weights if left
+    /// out.
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
 
-    /// Draw so many pictures that the frame may be of, by the learnt prior, for their mean and a map of doubt.
+    /// Sample this number of pictures that the frame may show, with the learnt prior: their mean, and an uncertainty
+    /// map.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=64))]
     samples: Option<u8>,
 
-    /// Say too what the assumptions of others are worth: `paper`, those of the array that the prototype follows.
+    /// Also compute the effect of simplifications: `paper`, those of the paper that the prototype follows.
     #[arg(long, value_name = "WHOSE")]
     assume: Option<Assume>,
 
-    /// Folder for `picture.html` and `picture.json`, and beside them `frame.png` and a `restored_METHOD.png` for each way to restore,
-    /// both of 16 bits.
+    /// Folder for `picture.html`, `picture.json`, `frame.png` and a `restored_METHOD.png` for each method, images of 16
+    /// bits.
     #[arg(long, short, default_value = "out/picture", value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Print the numbers of `picture.json` to standard output: all its fields but the first two, `report` and `metalith`.
+    /// Print `picture.json` to standard output, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }

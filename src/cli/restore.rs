@@ -16,13 +16,12 @@ use super::paths::{apart, name_of};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
-/// Restore the picture from a frame that a camera with the chip has recorded.
+/// Restore the picture from a frame that a real camera with the chip recorded.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith restore out/prototype_3x3/prototype_3x3_pillars.gds out/picture/frame.png \\\n    --design designs/prototype_3x3.toml --camera cameras/gt1930.toml --out out/restored\n\n\
-    The frame is a grey PNG of 8 or 16 bits of all pixels of the sensor: the mosaic of its colour filter array, without one \
-    channel by channel below one another. How bright the picture is follows from `white` in [exposure] of the camera. Kernels \
-    are those of `metalith picture`, kept on the disk."
+    The frame is a grey PNG of 8 or 16 bits with all pixels of the sensor: the mosaic of its colour filter array, else one \
+    channel below the other. `white` in [exposure] of the camera sets the brightness of the picture. Kernels are cached."
 )]
 pub struct RestoreArgs {
     /// The pillar layout; `-` for standard input.
@@ -34,40 +33,41 @@ pub struct RestoreArgs {
     #[command(flatten)]
     with: CameraArgs,
 
-    /// Number in the frame's file that stands for no signal; 0 if left out. Frames by `metalith picture` need none.
+    /// Pixel value of no signal; 0 if left out. Frames of `metalith picture` do not need it.
     #[arg(long, value_name = "N")]
     black_level: Option<u16>,
 
-    /// Number in the frame's file that stands for full scale, such as 4095; 255 of 8 bits if left out.
+    /// Pixel value of full scale, such as 4095; for 8 bits 255 if left out. Frames of `metalith picture` do not need
+    /// it.
     #[arg(long, value_name = "N")]
     white: Option<u16>,
 
-    /// Distance of the scene (mm); far if left out.
+    /// Distance of the scene (mm); infinite if left out.
     #[arg(long)]
     distance_mm: Option<f64>,
 
-    /// Pixels of the picture an axis.
+    /// Pixels of the picture along an axis.
     #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u16).range(64..=4096))]
     pixels: u16,
 
-    /// Ways to restore: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs).
+    /// Restorations: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs), separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
-    /// Restore by each element alone too.
+    /// Restore by each element alone too, and blend.
     #[arg(long)]
     separate: bool,
 
-    /// File of weights for the learnt prior that `metalith train` wrote, or a denoiser of one's own as `.onnx`; those of
-    /// the program if left out.
+    /// Weights of the learnt prior from `metalith train`, or another denoiser as `.onnx`; the shipped weights if left
+    /// out.
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
 
-    /// Folder for `restored.html` and `restored.json`, and beside them a `restored_METHOD.png` of 16 bits for each way to restore.
+    /// Folder for `restored.html`, `restored.json` and a `restored_METHOD.png` of 16 bits for each method.
     #[arg(long, short, default_value = "out/restored", value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Print the numbers of `restored.json` to standard output: all its fields but the first two, `report` and `metalith`.
+    /// Print `restored.json` to standard output, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }

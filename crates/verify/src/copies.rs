@@ -196,7 +196,7 @@ mod tests {
         let (design, array) = read("mini_3x3", &[]);
         assert_eq!(all_are_covered(&design, &array), [(4, 3), (4, 4), (1, 2)]);
         // In the middle of the field all are alike, and so they are for a field that is symmetric.
-        let angles = "field_x_deg = [0, 15]         # counted from where an element looks\nfield_y_deg = [0, 0]";
+        let angles = "field_x_deg = [0, 15]         # from the viewing direction of an element\nfield_y_deg = [0, 0]";
         let (design, array) = read("mini_3x3", &[(angles, "field_x_deg = [0]")]);
         assert_eq!(all_are_covered(&design, &array), [(4, 1), (4, 1), (1, 1)]);
         let cross = "field_x_deg = [0, 8, -8, 0, 0]\nfield_y_deg = [0, 0, 0, 8, -8]";
