@@ -60,10 +60,10 @@ pub struct Judging {
     #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
     model: Option<PathBuf>,
 
-    /// Solve the cells at the angles that light arrives at, for both polarisations, as `incidence = "as_lit"` in
+    /// Solve the cells at the angles that light arrives at, for both polarisations, as `incidence = "oblique"` in
     /// [verify] of the design asks for; else along the normal.
     #[arg(long)]
-    as_lit: bool,
+    oblique: bool,
 
     /// Memory that reading back and simulating may take (MB). What takes more is simulated in parts, in more time, by the
     /// cell that judges alone; what takes more even so is compared with its design pillar by pillar, and not simulated.
@@ -113,7 +113,7 @@ impl Judging {
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
         let fidelity = self.fidelity(design);
         design.check_fidelity(fidelity)?;
-        if self.as_lit && design.cell.shape.rectangles().is_some() {
+        if self.oblique && design.cell.shape.rectangles().is_some() {
             return Err(oblique_refused());
         }
         if let Some(model) = self.model()? {
@@ -170,7 +170,7 @@ impl Judging {
         terminal: &Terminal,
     ) -> Result<Outcome> {
         let mut design = design.clone();
-        if self.as_lit {
+        if self.oblique {
             design.verify.incidence = CellIncidence::AsLit;
         }
         // One cell judges, in the picture too.

@@ -143,7 +143,7 @@ impl RealisedCells {
     pub(super) fn along_normal_alone() -> Error {
         Error::invalid(
             "tables of cells are for light along the normal",
-            "leave out `incidence = \"as_lit\"`",
+            "leave out `incidence = \"oblique\"`",
         )
     }
 

@@ -165,7 +165,7 @@ impl Bench {
         if design.verify.incidence == CellIncidence::AsLit {
             return Err(Error::invalid(
                 "a study takes the cells along the normal, and the design asks for them as they are lit",
-                "leave out `incidence = \"as_lit\"` in [verify] of the design of the study",
+                "leave out `incidence = \"oblique\"` in [verify] of the design of the study",
             ));
         }
         check_rectangles(&design, &self.made, self.picture.is_some())?;
