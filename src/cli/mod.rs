@@ -21,6 +21,7 @@ mod paths;
 mod picture;
 mod plan;
 mod psf;
+mod renamed;
 mod restore;
 mod run;
 mod shipped_designs;
@@ -133,6 +134,9 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             // Help is no error, and goes to standard output.
             let _ = error.print();
+            if let Some(hint) = renamed::hint(&error, &given) {
+                output::tell(&format!("\n  help: {hint}\n"));
+            }
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };

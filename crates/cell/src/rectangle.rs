@@ -118,7 +118,7 @@ impl CellStack {
 /// What cells of rectangles are not solved for, and what to do instead.
 pub const OBLIQUE_RECTANGLES: [&str; 2] = [
     "rectangular pillars in light that arrives at an angle",
-    "leave out --as-lit, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
+    "leave out --oblique, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
 ];
 
 /// Why cells of rectangles are not solved in light that arrives at an angle.

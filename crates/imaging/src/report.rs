@@ -315,7 +315,7 @@ impl ImagingSystem {
                 "wavelengths",
                 format!(
                     "at most {} nm apart, nearer in the light of narrow lamps; between them the PSF is blended and moves with the chief ray",
-                    crate::chip::STEP_NM
+                    metalith_sensor::WavelengthSteps::USUAL_NM
                 ),
             ),
             assumption("sensor", place_of_sensor(&self.design, &self.camera)),

@@ -31,7 +31,7 @@ impl StrayLight {
         view: &SceneView,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let stride = (VEIL_STEP_NM / crate::chip::STEP_NM) as usize;
+        let stride = (VEIL_STEP_NM / metalith_sensor::WavelengthSteps::USUAL_NM) as usize;
         let all = &chip.sampling.wavelengths_nm;
         let mut chosen: Vec<usize> = (0..all.len()).step_by(stride.max(1)).collect();
         chosen.extend((chosen.last() != Some(&(all.len() - 1))).then_some(all.len() - 1));

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, lagrange_weight};
 use metalith_pillars::{Lattice, LatticeKind, PillarMap};
 
 use super::links::{Link, Links, distance_of, neighbour};
@@ -227,7 +227,7 @@ fn lagrange(at: &[f64; NODES], units2: i64) -> [f64; NODES] {
     let s = units2 as f64;
     std::array::from_fn(|j| {
         let others = at.iter().enumerate().filter(|(i, _)| *i != j);
-        others.map(|(_, other)| (s - other) / (at[j] - other)).product()
+        lagrange_weight(s, at[j], others.map(|(_, other)| *other))
     })
 }
 
