@@ -10,9 +10,9 @@
 
 use std::path::PathBuf;
 
-use metalith::imaging::restore::RestorationMethod;
 use metalith::imaging::scene::{images_in, read_far_scene};
 use metalith::imaging::{ImagingSystem, Rehearsal, ScenePower, Zone, ZoneScore, scores};
+use metalith::restoration::RestorationMethod;
 use metalith::sensor::Camera;
 use metalith::{Design, Error, Result, Silent};
 

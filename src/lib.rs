@@ -19,7 +19,7 @@
 //! | [`CellModel`] | [`cell`] | a pillar's width and a wavelength: published, fitted or rigorous |
 //! | [`Propagator`](wave::Propagator) | [`wave`] | transmissions on a lattice: folded, direct, by rings |
 //! | [`Psf`](wave::Psf) | [`wave::psf`] | a field |
-//! | [`ImagingSystem`](imaging::ImagingSystem) | [`imaging`] | a layout, a camera and a scene: a frame, and the picture restored from it |
+//! | [`ImagingSystem`](imaging::ImagingSystem) | [`imaging`], [`restoration`] | a layout, a camera and a scene: a frame, and the picture restored from it |
 //! | [`verify()`] | [`mod@verify`] | a design, its array and the bytes of a layout |
 //! | [`report`] | [`report`] | anything found: one HTML page and one JSON file |
 //!
@@ -103,6 +103,7 @@ pub use metalith_optimise as optimise;
 pub use metalith_prior as prior;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
+pub use metalith_restoration as restoration;
 pub use metalith_sensor as sensor;
 pub use metalith_study as study;
 pub use metalith_verify as verify;

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use metalith::imaging::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::imaging::scene::SceneImage;
 use metalith::imaging::{self, OperatorError, Rehearsal};
 use metalith::prior::NetworkDenoiser;
+use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use metalith::sensor::Camera;
 use metalith::{CalibratedModel, Error, Result};
 use ndarray::Array3;

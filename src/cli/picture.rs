@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::imaging::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::imaging::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::imaging::{
     Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport, Rehearsal,
@@ -11,6 +10,7 @@ use metalith::imaging::{
     scores, worth_of_assumptions, write_pages,
 };
 use metalith::optics::CalibratedModel;
+use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};

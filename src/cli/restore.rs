@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::Result;
-use metalith::imaging::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::imaging::scene::SceneImage;
 use metalith::imaging::{
     FrameNumbers, FrameStatement, ImagingSystem, Rehearsal, RestoredPicture, RestoredReport, check_scored, read_signals,
 };
+use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use ndarray::Array3;
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};

@@ -1,9 +1,9 @@
 //! The chip of a design before its sensor, as a contender.
 
 use metalith_core::{Progress, Result};
-use metalith_imaging::restore::{Blend, Recorded, RestorationMethod, restore_each};
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal};
+use metalith_restoration::{Blend, FrameModel, Recorded, RestorationMethod, restore_each};
 use ndarray::{Array2, Array3, Zip};
 
 use crate::baseline_camera::{BaselineCamera, Method, no_stage};
@@ -144,7 +144,7 @@ impl BaselineCamera for ArrayCamera<'_> {
         };
         match kind {
             StageKind::MultiWiener => {
-                let all = wiener::pictures(self.studio, &recorded, progress)?;
+                let all = wiener::pictures(self.studio, &self.restoration, &recorded, progress)?;
                 Ok(all.iter().map(|planes| self.studio.colours.rgb(planes)).collect())
             }
             StageKind::Blending => {

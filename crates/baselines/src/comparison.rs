@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::{Error, Progress, Result, part};
 use metalith_design::Design;
-use metalith_imaging::restore::RestorationMethod;
 use metalith_imaging::scene::{SceneImage, read_far_scene};
 use metalith_imaging::{ApproximationSet, ImagingSystem, KernelCache, SceneView, check_scored, simulated_view};
 use metalith_prior::PerceptualDistance;
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};

@@ -4,9 +4,9 @@
 //! Kernels are those of a grey surface. The veil of a grey scene is subtracted; what neighbours' sub-images overlap stays.
 
 use metalith_core::{Error, Progress, Result};
-use metalith_imaging::restore::{Recorded, SceneStatistics, without_veil};
-use metalith_imaging::{FftScratch, FrameOperator, ImagingSystem, SquareFft, sensor_um};
-use metalith_wave::kernels::fft_size;
+use metalith_imaging::{FrameOperator, ImagingSystem, sensor_um};
+use metalith_restoration::{FrameModel, Recorded, SceneStatistics, without_stray_light};
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use ndarray::{Array2, Zip};
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -35,19 +35,16 @@ struct Tiles<'a> {
 /// If the user stopped it.
 pub fn pictures(
     studio: &ImagingSystem,
+    operator: &FrameOperator<'_>,
     recorded: &Recorded<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<Array2<f32>>>> {
-    let operator = recorded.operator;
     let tiles = Tiles::new(studio, operator);
-    let view = operator.view();
-    let ones = vec![Array2::<f32>::ones((view.rows, view.columns)); operator.inputs()];
-    let all: Vec<usize> = (0..operator.elements()).collect();
-    let white = operator.apply_elements(&ones, &all, false);
+    let white = operator.apply_elements(&operator.white(), &operator.all_elements(), false);
     let [rows, columns] = operator.frame();
     let everywhere = vec![Array2::<f32>::ones((rows, columns)); operator.channels()];
     let reference = operator.unrestored(&white, &everywhere);
-    let light = without_veil(recorded);
+    let light = without_stray_light(recorded);
     let noise: Vec<f32> = recorded
         .trust
         .iter()

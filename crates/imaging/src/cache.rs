@@ -11,16 +11,13 @@ use metalith_core::{Error, Result};
 use metalith_design::array::Symmetry;
 use serde::{Deserialize, Serialize};
 
-use crate::kernels::{BankSpec, DistinctKernels, KernelBank};
+use crate::kernels::{BankSpec, DistinctKernels, KernelBank, MOST_BYTES};
 use crate::layout::PillarCount;
 use crate::stray_light::{LightShares, SCENE_CELLS, StrayLight};
 
 const BANK_MAGIC: [u8; 8] = *b"MLKERN\0\x02";
 const VEIL_MAGIC: [u8; 8] = *b"MLVEIL\0\x05";
 const PILLARS_MAGIC: [u8; 8] = *b"MLPILL\0\x01";
-/// Most bytes that the numbers of a bank or of a veil may have: both are held in memory, and refused before they are made if
-/// they would be more.
-pub const MOST_BYTES: u64 = 4 << 30;
 /// Longest kept file (bytes): the numbers, and some megabytes for what is said of them, a few bytes for each place and element.
 const LONGEST: u64 = MOST_BYTES + (64 << 20);
 

@@ -4,6 +4,7 @@ use metalith_core::{Error, Result};
 use metalith_report::sig;
 use metalith_sensor::{Camera, ColourFilter};
 use metalith_wave::camera::Noise;
+use metalith_wave::kernels::box_sums;
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -245,26 +246,6 @@ impl Frame {
 
 /// Pixels on both sides over which a mean signal is taken: about what the window of a kernel holds.
 const NEAR: usize = 16;
-
-/// Sums over squares about each pixel, as far as they are in the plane.
-pub(crate) fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
-    let along = |line: ndarray::ArrayView1<'_, f64>| -> Vec<f64> {
-        let mut running = vec![0.0];
-        line.iter().for_each(|v| running.push(running[running.len() - 1] + v));
-        let n = line.len();
-        (0..n)
-            .map(|i| running[(i + near + 1).min(n)] - running[i.saturating_sub(near)])
-            .collect()
-    };
-    let mut out = plane.clone();
-    for axis in [1, 0] {
-        for mut lane in out.lanes_mut(ndarray::Axis(axis)) {
-            let sums = along(lane.view());
-            lane.iter_mut().zip(sums).for_each(|(to, sum)| *to = sum);
-        }
-    }
-    out
-}
 
 #[cfg(test)]
 mod tests {

@@ -4,10 +4,11 @@ use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_sensor::{Camera, ChannelSampling};
 
+use crate::chip::element_views;
+use crate::geometry::{ElementView, SceneView};
 use crate::kernels::BankSpec;
 use crate::scene::SceneImage;
 use crate::stray_light::{LightShares, StrayLight};
-use crate::{ElementView, SceneView, element_views};
 
 /// Least share of the light that travels to the sensor in the windows of the kernels: with less there is no image.
 /// `prototype_3x3` has 40 %.

@@ -2,14 +2,15 @@
 //! any picture.
 
 use metalith_core::{Progress, Result};
+use metalith_restoration::{FrameModel, SceneStatistics};
 use ndarray::Array2;
 
+use crate::colour::ChannelColours;
 use crate::exposure::{counts_channel, expose};
 use crate::forecast::{Exposed, Forecast};
 use crate::imaging_system::ImagingSystem;
 use crate::operator::{Detail, FrameOperator, SceneInputs};
 use crate::operator_error::OperatorError;
-use crate::restore::SceneStatistics;
 use crate::scene::SceneImage;
 use crate::spectra::rgb_basis;
 
@@ -31,7 +32,7 @@ impl Rehearsal {
             name: "random".into(),
             view: studio.view,
             basis: rgb_basis().to_vec(),
-            planes: SceneStatistics::colours().random_scene(&studio.view, SEED),
+            planes: SceneStatistics::colours().random_scene((studio.view.rows, studio.view.columns), SEED),
             left_out: 0.0,
             depth_um: None,
         };
@@ -43,7 +44,7 @@ impl Rehearsal {
         drop(simulation);
         let known = match restoration.sees_colours() {
             true => restoration.apply(&scene.planes),
-            false => restoration.apply(&crate::ChannelColours::ideal(&studio.channels, &scene)),
+            false => restoration.apply(&ChannelColours::ideal(&studio.channels, &scene)),
         };
         let names = studio.camera.channel_names();
         let filter = studio.camera.sensor.filter;

@@ -4,23 +4,25 @@ use std::borrow::Cow;
 
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
+use metalith_restoration::{
+    FrameModel, LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples,
+    restore_separate,
+};
 use metalith_sensor::{Camera, ChannelSampling};
 use ndarray::{Array2, Array3};
 use sha2::{Digest, Sha256};
 
 use crate::approximation_set::ApproximationSet;
+use crate::colour::ChannelColours;
 use crate::exposure::{Frame, expose, gains, sensitivity};
+use crate::geometry::{ElementView, SceneSpace, SceneView};
 use crate::kernels::KernelBank;
 use crate::layout::PillarCount;
 use crate::operator::{BetweenNodes, Detail, FrameOperator, SceneInputs, ScenePoints};
 use crate::operator_error::OperatorError;
-use crate::restore::{
-    LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples, restore_separate,
-};
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::stray_light::StrayLight;
-use crate::{ChannelColours, ElementView, SceneSpace, SceneView};
 
 /// What pictures are taken with.
 #[derive(Clone)]
@@ -69,8 +71,7 @@ impl ImagingSystem {
     /// With the gain of each channel that the exposure of the camera asks for.
     pub(crate) fn exposed(mut self) -> Result<Self> {
         let operator = self.restoration();
-        let ones = vec![Array2::<f32>::ones((self.view.rows, self.view.columns)); operator.inputs()];
-        let white = operator.apply(&ones);
+        let white = operator.apply(&operator.white());
         drop(operator);
         self.gain = gains(&self.camera, &sensitivity(&self.camera, &self.channels), &white)?;
         Ok(self)

@@ -7,19 +7,21 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_gds::extract::Extraction;
 use metalith_optics::{CalibratedModel, SimulationCase};
+use metalith_restoration::LearnedDenoiser;
 use metalith_sensor::{Blend, Camera, ChannelSampling, Sampling};
 use serde::Serialize;
 
 use crate::approximation_set::ApproximationSet;
+use crate::chip::{ChipInLight, element_views, sampling_of, sensor_um};
+use crate::colour::ChannelColours;
 use crate::field_of_view::{check_coverage, check_view, check_windows};
+use crate::geometry::{ElementView, SceneView};
 use crate::imaging_system::ImagingSystem;
-use crate::kernels::{BankSpec, KernelBank};
+use crate::kernels::{BankSpec, KernelBank, SMALL_UM};
 use crate::operator::BetweenNodes;
-use crate::restore::LearnedDenoiser;
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::stray_light::StrayLight;
-use crate::{ChannelColours, ChipInLight, ElementView, SceneView, element_views, sampling_of, sensor_um};
 
 /// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
 /// steeply is the veil's. A lens of the paper sees 60 degrees.
@@ -33,9 +35,6 @@ const NODES_OF_NARROW: usize = 2 * (NODES - 1) + 1;
 const NODES_OF_SIXFOLD: usize = 5 * (NODES - 1) / 2 + 1;
 /// Steps an axis between the nodes that a restoration knows.
 const RESTORED_STEPS: usize = (NODES - 1) / 2;
-/// Radius of lenses whose fast fields err by more than accurate ones, which cost as much there: what is seen of them is mostly the
-/// window of a kernel (um).
-pub(crate) const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
 

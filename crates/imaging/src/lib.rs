@@ -6,6 +6,7 @@
 //! both, and a view             ->  FrameOperator: planes of the scene to the frame, and its adjoint
 //! ```
 
+mod approximation_scores;
 mod approximation_set;
 mod cache;
 mod chip;
@@ -32,7 +33,6 @@ mod point_image;
 mod recorded_frame;
 mod report;
 mod resolution;
-pub mod restore;
 mod restored_page;
 pub mod scene;
 mod score;
@@ -41,7 +41,8 @@ mod stray_light;
 mod thumbnail;
 mod uncertainty;
 
-pub use approximation_set::{ApproximationSet, AssumedScore, without_dispersion, worth_of_assumptions};
+pub use approximation_scores::{AssumedScore, without_dispersion, worth_of_assumptions};
+pub use approximation_set::ApproximationSet;
 pub use chip::{ChipInLight, ElementInLight, element_views, sampling_of, sensor_um};
 pub use colour::ChannelColours;
 pub use dataset::{DatasetManifest, DatasetOrigin, DatasetPair, PairWriter, write_dataset, write_dataset_manifest};
@@ -56,7 +57,7 @@ pub use kept::KernelCache;
 pub use kernel_plan::simulated_view;
 pub use kernels::{BankSpec, KernelBank};
 pub use layout::PillarCount;
-pub use operator::{BetweenNodes, Detail, FftScratch, FrameOperator, SceneInputs, ScenePoints, SquareFft};
+pub use operator::{BetweenNodes, Detail, FrameOperator, SceneInputs, ScenePoints};
 pub use operator_error::OperatorError;
 pub use page::{PicturePages, pictures_side_by_side, shown, write_pages};
 pub use png16::write_picture;
@@ -65,7 +66,8 @@ pub use recorded_frame::{FrameNumbers, read_signals};
 pub use report::{Assumption, ChannelBudget, FrameStatement, HomographyResidual, PictureReport, RestorationReport};
 pub use resolution::{ContrastCurve, contrast_curves};
 pub use restored_page::{RestoredPicture, RestoredReport};
-pub use score::{MOST_DB, SCORED_SIDES, Zone, ZoneScore, check_scored, psnr_words, scores};
+pub use scene::SCORED_SIDES;
+pub use score::{MOST_DB, Zone, ZoneScore, check_scored, psnr_words, scores};
 pub use stray_light::{LightShares, StrayLight};
 pub use thumbnail::thumbnail;
 pub use uncertainty::{DoubtReport, Uncertainty};

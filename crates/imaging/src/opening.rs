@@ -12,12 +12,13 @@ use metalith_layout::read_pillars;
 use metalith_optics::{AsBuiltChip, CalibratedModel, SimulationCase};
 use metalith_sensor::Camera;
 
+use crate::cache;
+use crate::geometry::SceneView;
 use crate::imaging_system::ImagingSystem;
 use crate::kept::KernelCache;
 use crate::kernel_plan::Wanted;
 use crate::layout::{PillarCount, check_elements};
 use crate::scene::SceneImage;
-use crate::{SceneView, cache};
 
 impl ImagingSystem {
     /// For a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes of a field. Kernels

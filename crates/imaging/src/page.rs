@@ -7,7 +7,7 @@ use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table,
 use metalith_sensor::{Camera, ColourFilter};
 use ndarray::{Array2, Array3};
 
-use crate::approximation_set::AssumedScore;
+use crate::approximation_scores::AssumedScore;
 use crate::exposure::Frame;
 use crate::files::write_restored;
 use crate::point_image;

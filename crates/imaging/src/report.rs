@@ -1,15 +1,15 @@
 //! What is found of a picture.
 
+use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
+use metalith_design::Design;
+use metalith_optics::{CalibratedModel, ModelStatement};
+use metalith_restoration::RestorationMethod;
+use metalith_sensor::Camera;
 use nalgebra::DMatrix;
 use ndarray::Array3;
 use serde::Serialize;
 
-use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
-use metalith_design::Design;
-use metalith_optics::{CalibratedModel, ModelStatement};
-use metalith_sensor::Camera;
-
-use crate::approximation_set::AssumedScore;
+use crate::approximation_scores::AssumedScore;
 use crate::chip::sensor_um;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
@@ -19,7 +19,6 @@ use crate::layout::PillarCount;
 use crate::operator::BetweenNodes;
 use crate::point_image::PointImage;
 use crate::resolution::ContrastCurve;
-use crate::restore::RestorationMethod;
 use crate::scene::SceneImage;
 use crate::score::ZoneScore;
 use crate::spectra::rgb_basis;

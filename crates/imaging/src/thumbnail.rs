@@ -6,13 +6,13 @@ use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_optics::CalibratedModel;
 use metalith_report::{Figure, fixed};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 
 use crate::field_of_view::widest_field_deg;
 use crate::forecast_scene::Rehearsal;
 use crate::imaging_system::ImagingSystem;
 use crate::page::pictures_side_by_side;
-use crate::restore::RestorationMethod;
 use crate::scene::{BuiltIn, chart};
 use crate::score::scores;
 

@@ -1,5 +1,9 @@
 //! The merit that a design asks for.
 
+use metalith_cell::{CellModel, Fidelity};
+use metalith_core::{Progress, Result};
+use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
+use metalith_wave::camera::Noise;
 use rayon::prelude::*;
 
 use super::PixelWindow;
@@ -10,11 +14,7 @@ use super::kernel::RingField;
 use super::mapping::Mapping;
 use super::robust;
 use super::views::Views;
-use metalith_cell::{CellModel, Fidelity};
-use metalith_core::{Progress, Result};
-use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
-use metalith_wave::camera::Noise;
-use metalith_wave::restore::Scene;
+use crate::scene::Scene;
 
 /// Radii at which side lobes are sampled, out to four times the radius where they begin.
 const SIDE_LOBE_POINTS: usize = 48;

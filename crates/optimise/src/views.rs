@@ -1,10 +1,11 @@
 //! What expected image errors are taken over: wavelengths, field angles, the window, the scene.
 
+use metalith_wave::camera::Noise;
+
 use super::PixelWindow;
 use super::focus::Lens;
 use super::pupil::USED;
-use metalith_wave::camera::Noise;
-use metalith_wave::restore::Scene;
+use crate::scene::Scene;
 
 /// What the merit is taken over.
 #[derive(Clone, Debug, PartialEq)]

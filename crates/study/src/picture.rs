@@ -7,13 +7,13 @@ use metalith_core::document::{Limits, Section};
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_gds::extract::Extraction;
-use metalith_imaging::restore::RestorationMethod;
 use metalith_imaging::scene::{BuiltIn, SceneImage, chart, read_far_scene};
 use metalith_imaging::{
     Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal, SCORED_SIDES, ScenePower, Zone, ZoneScore,
     check_scored, sampling_of, scores,
 };
 use metalith_optics::{AsBuiltChip, SimulationCase};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array3;
 

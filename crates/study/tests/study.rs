@@ -8,10 +8,10 @@ use std::path::Path;
 use common::{SMALL_CAMERA, tolerance};
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
-use metalith_imaging::restore::RestorationMethod;
 use metalith_imaging::scene::{BuiltIn, chart};
 use metalith_imaging::{ImagingSystem, Rehearsal, scores};
 use metalith_optics::{CalibratedModel, Perturbation};
+use metalith_restoration::RestorationMethod;
 use metalith_study::{Plan, PlanSettings, Run, Work, merge, plan, write_page};
 
 fn run_shard(plan: &Plan, number: u64) -> metalith_core::Result<()> {

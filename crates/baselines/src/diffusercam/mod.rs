@@ -8,20 +8,20 @@ mod admm;
 mod grid;
 mod surface;
 
+use admm::{Deconvolution, Descent};
+use grid::{CoarseGrid, FineGrid, on_scene};
 use metalith_core::{Error, Progress, Result};
-use metalith_imaging::restore::SceneStatistics;
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::spectra::rgb_basis;
 use metalith_imaging::{Frame, OperatorError, SceneView};
+use metalith_restoration::SceneStatistics;
 use metalith_sensor::Camera;
 use ndarray::Array2;
 use rayon::prelude::*;
+use surface::RoughSurface;
 
 use crate::lensless::{Lensless, LenslessBench};
 use crate::stage::{PICTURES, Stage, StageKind};
-use admm::{Deconvolution, Descent};
-use grid::{CoarseGrid, FineGrid, on_scene};
-use surface::RoughSurface;
 
 /// A rough surface before a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -194,7 +194,7 @@ impl DiffuserCam {
 
     /// Root mean square difference of what the restoration knows and the simulation on a random scene, over the light.
     fn operator_error(&self) -> OperatorError {
-        let planes = SceneStatistics::colours().random_scene(&self.bench.view, SEED);
+        let planes = SceneStatistics::colours().random_scene(self.bench.shape(), SEED);
         let scene = self.bench.scene_of(planes);
         let light = self.light(&scene);
         let ideal = self.bench.ideal(&scene);

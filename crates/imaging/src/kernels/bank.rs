@@ -6,7 +6,12 @@ use metalith_core::{Error, Result};
 use metalith_design::array::Symmetry;
 use serde::{Deserialize, Serialize};
 
-use crate::cache::MOST_BYTES;
+/// Most bytes that the numbers of a bank or of its stray light may have: both are held in memory, and refused before they are
+/// made if they would be more.
+pub const MOST_BYTES: u64 = 4 << 30;
+/// Radius of lenses whose fast fields err by more than accurate ones, which cost as much there: what is seen of them is mostly the
+/// window of a kernel (um).
+pub(crate) const SMALL_UM: f64 = 150.0;
 
 /// What a bank is sampled with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,15 +1,14 @@
 //! Kernels from the field behind each element.
 
 use metalith_core::{Error, Progress, Result};
+use metalith_wave::kernels::FftScratch;
 use metalith_wave::{Accuracy, Scratch, Window};
 use rayon::prelude::*;
 
-use super::bank::{BankSpec, DistinctKernels, KernelBank};
+use super::bank::{BankSpec, DistinctKernels, KernelBank, SMALL_UM};
 use super::spectrum::{KernelPlan, MovedPart, QUARTERS};
-use crate::ElementView;
 use crate::chip::{ChipInLight, ElementInLight};
-use crate::kernel_plan::SMALL_UM;
-use crate::operator::FftScratch;
+use crate::geometry::ElementView;
 use crate::spectra::SceneSpectrum;
 
 impl KernelBank {

@@ -10,8 +10,8 @@ use std::ops::Range;
 use metalith_sensor::ChannelPart;
 use num_complex::Complex32;
 
-use crate::operator::{FftScratch, SquareFft};
 use crate::spectra::SceneSpectrum;
+use metalith_wave::kernels::{FftScratch, SquareFft};
 
 /// Squares an axis of a pixel.
 pub const QUARTERS: usize = 4;

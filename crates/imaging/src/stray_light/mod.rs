@@ -19,7 +19,7 @@ use metalith_sensor::Sensor;
 use metalith_wave::kernels::sum_of_products;
 use pulp::Arch;
 
-use crate::cache::MOST_BYTES;
+use crate::kernels::MOST_BYTES;
 
 pub use shares::LightShares;
 pub use squares::{gather, lay, lift, spread};

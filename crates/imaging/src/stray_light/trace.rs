@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use super::squares::solid_angle;
 use super::{CELL_PIXELS, LightShares, SCENE_CELLS, StrayLight, sensor_cells};
 use crate::chip::ChipInLight;
+use crate::geometry::{ElementView, SceneView};
 use crate::kernels::KernelBank;
 use crate::spectra::SceneSpectrum;
-use crate::{ElementView, SceneView};
 
 /// Blocks an axis of an element.
 const BLOCKS: usize = 20;

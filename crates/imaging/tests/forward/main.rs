@@ -4,12 +4,12 @@ mod parts;
 mod setup;
 
 use metalith_core::Silent;
-use metalith_imaging::restore::SceneStatistics;
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{
     ApproximationSet, BetweenNodes, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints,
     SceneSpace, StrayLight, element_views,
 };
+use metalith_restoration::{FrameModel, SceneStatistics};
 use metalith_sensor::{Camera, Sensor};
 use metalith_wave::{Accuracy, Scratch, Window};
 use ndarray::Array2;

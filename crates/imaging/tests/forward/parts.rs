@@ -1,10 +1,10 @@
 //! The operator of a part of a sensor, and on any number of threads.
 
 use metalith_core::{Silent, part};
-use metalith_imaging::restore::SceneStatistics;
 use metalith_imaging::{
     Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, StrayLight, element_views,
 };
+use metalith_restoration::{FrameModel, SceneStatistics};
 use metalith_sensor::Camera;
 use ndarray::Array2;
 

@@ -5,22 +5,20 @@
 
 use metalith_core::{Error, Progress, Result};
 use metalith_wave::kernels::sum_of_products;
-use ndarray::{Array2, Axis, Slice};
+use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::Recorded;
-use super::precondition::Preconditioner;
-use super::prior::SceneStatistics;
-use crate::operator::FrameOperator;
-
-/// Planes of a picture.
-pub type Planes = Vec<Array2<f32>>;
+use crate::frame_model::{FrameModel, Planes};
+use crate::precondition::Preconditioner;
+use crate::recorded::Recorded;
+use crate::scene_statistics::{SceneStatistics, Terms};
+use crate::slopes::bends;
 
 /// A* W A of a frame, for independent planes.
 struct DataTerm<'a> {
-    operator: &'a FrameOperator<'a>,
+    operator: &'a dyn FrameModel,
     elements: Vec<usize>,
-    veil: bool,
+    stray_light: bool,
     /// Weights of the pixels, scaled.
     weight: Planes,
     statistics: SceneStatistics,
@@ -29,9 +27,9 @@ struct DataTerm<'a> {
 impl DataTerm<'_> {
     fn apply(&self, x: &[Array2<f32>]) -> Planes {
         let picture = self.statistics.picture(x);
-        let mut seen = self.operator.apply_elements(&picture, &self.elements, self.veil);
+        let mut seen = self.operator.apply_elements(&picture, &self.elements, self.stray_light);
         seen.iter_mut().zip(&self.weight).for_each(|(s, w)| *s *= w);
-        let back = self.operator.adjoint_elements(&seen, &self.elements, self.veil);
+        let back = self.operator.adjoint_elements(&seen, &self.elements, self.stray_light);
         self.statistics.adjoint(&back)
     }
 }
@@ -46,34 +44,16 @@ pub struct NormalSystem<'a> {
     preconditioner: Preconditioner,
 }
 
-/// Strengths of a system.
-#[derive(Clone, Copy)]
-pub struct Terms {
-    /// Of squared slopes.
-    pub slopes: f64,
-    /// Of squared sums of the slopes that meet at a pixel.
-    pub bends: f64,
-    /// Of the picture itself, whose planes are mixed from those of the system.
-    pub identity: f64,
-}
-
 /// A place that sends less light than this share of the best is preconditioned as if it sent so much.
 const LEAST_SHARE: f32 = 0.02;
 
 impl<'a> NormalSystem<'a> {
-    /// For some of the elements, with or without the veil.
-    pub fn new(recorded: &Recorded<'a>, elements: &[usize], veil: bool) -> Self {
+    /// For some of the elements, with or without the stray light.
+    pub fn new(recorded: &Recorded<'a>, elements: &[usize], stray_light: bool) -> Self {
         let operator = recorded.operator;
-        let view = operator.view();
-        let shape = (view.rows, view.columns);
-        let ones = vec![Array2::<f32>::ones(shape); operator.inputs()];
-        let seen = operator.apply_elements(&ones, elements, veil);
-        let weighted: Planes = seen.iter().zip(recorded.trust).map(|(s, t)| s * t).collect();
-        let lumped = operator.adjoint_elements(&weighted, elements, veil);
-        let mut light = Array2::<f32>::zeros(shape);
-        lumped
-            .iter()
-            .for_each(|p| light.scaled_add(1.0 / lumped.len() as f32, p));
+        let sums = operator.row_sums(recorded.trust, elements, stray_light);
+        let mut light = Array2::<f32>::zeros(operator.picture_shape());
+        sums.iter().for_each(|p| light.scaled_add(1.0 / sums.len() as f32, p));
         let most = light.iter().copied().fold(0.0f32, f32::max).max(f32::MIN_POSITIVE);
         let weight: Planes = recorded.trust.iter().map(|t| t.mapv(|v| v / most)).collect();
         let products: Planes = weight.iter().zip(recorded.light).map(|(w, s)| w * s).collect();
@@ -85,14 +65,14 @@ impl<'a> NormalSystem<'a> {
         let term = DataTerm {
             operator,
             elements: elements.to_vec(),
-            veil,
+            stray_light,
             weight,
             statistics,
         };
         Self {
             data: term
                 .statistics
-                .adjoint(&operator.adjoint_elements(&products, elements, veil)),
+                .adjoint(&operator.adjoint_elements(&products, elements, stray_light)),
             scale: f64::from(most),
             preconditioner: Preconditioner::new(&share, operator.inputs(), |x| term.apply(x)),
             term,
@@ -101,8 +81,7 @@ impl<'a> NormalSystem<'a> {
 
     /// Rows and columns of the picture.
     pub fn shape(&self) -> (usize, usize) {
-        let view = self.term.operator.view();
-        (view.rows, view.columns)
+        self.term.operator.picture_shape()
     }
 
     /// A black picture.
@@ -191,57 +170,6 @@ fn dot(a: &[Array2<f32>], b: &[Array2<f32>]) -> f64 {
     of_planes.iter().sum()
 }
 
-/// Slopes towards the next row and the next column; zero at the last.
-pub fn slopes(x: &Array2<f32>) -> [Array2<f32>; 2] {
-    let (rows, columns) = x.dim();
-    let down = Array2::from_shape_fn((rows, columns), |(i, j)| {
-        if i + 1 < rows { x[[i + 1, j]] - x[[i, j]] } else { 0.0 }
-    });
-    let right = Array2::from_shape_fn((rows, columns), |(i, j)| {
-        if j + 1 < columns {
-            x[[i, j + 1]] - x[[i, j]]
-        } else {
-            0.0
-        }
-    });
-    [down, right]
-}
-
-/// The adjoint of [`slopes`].
-pub fn slopes_adjoint([down, right]: &[Array2<f32>; 2]) -> Array2<f32> {
-    let (rows, columns) = down.dim();
-    Array2::from_shape_fn((rows, columns), |(i, j)| {
-        let mut sum = 0.0;
-        if i + 1 < rows {
-            sum -= down[[i, j]];
-        }
-        if i > 0 {
-            sum += down[[i - 1, j]];
-        }
-        if j + 1 < columns {
-            sum -= right[[i, j]];
-        }
-        if j > 0 {
-            sum += right[[i, j - 1]];
-        }
-        sum
-    })
-}
-
-/// Sums of the slopes that meet at a pixel: the adjoint of [`slopes`] of the slopes.
-fn bends(x: &Array2<f32>) -> Array2<f32> {
-    let mut out = Array2::zeros(x.dim());
-    for axis in [Axis(0), Axis(1)] {
-        let [near, far] = [Slice::from(..-1), Slice::from(1..)];
-        let slope = &x.slice_axis(axis, far) - &x.slice_axis(axis, near);
-        let mut to = out.slice_axis_mut(axis, far);
-        to += &slope;
-        let mut to = out.slice_axis_mut(axis, near);
-        to -= &slope;
-    }
-    out
-}
-
 fn add_prior(to: &mut Array2<f32>, x: &Array2<f32>, terms: Terms) {
     if terms.slopes == 0.0 && terms.bends == 0.0 {
         return;
@@ -265,16 +193,5 @@ mod tests {
         let sum: f64 = rows.iter().map(|v| f64::from(v * v)).sum();
         // Sums of whole numbers.
         assert_eq!(dot(&[rows.clone(), columns.clone()], &[columns, rows]), 2.0 * sum);
-    }
-
-    #[test]
-    fn slopes_have_their_adjoint() {
-        let x = Array2::from_shape_fn((7, 9), |(i, j)| ((i * 5 + j * 3) % 7) as f32);
-        let y = [3, 4].map(|k| Array2::from_shape_fn((7, 9), |(i, j)| ((i * k + j) % 5) as f32));
-        let a: f32 = slopes(&x).iter().zip(&y).map(|(s, y)| (s * y).sum()).sum();
-        let b = (&x * &slopes_adjoint(&y)).sum();
-        // Sums of whole numbers.
-        assert_eq!(a, b);
-        assert_eq!(bends(&x), slopes_adjoint(&slopes(&x)));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use ndarray::Array2;
 use num_complex::Complex32;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
@@ -76,6 +77,26 @@ impl SquareFft {
         transpose(&lines[..filled * half], half, spectrum, n);
         let need = self.columns.get_inplace_scratch_len();
         self.columns.process_with_scratch(spectrum, &mut work[..need]);
+    }
+
+    /// Spectrum of a plane in the first corner of a square of zeros.
+    pub fn of_plane(&self, plane: &Array2<f32>, scratch: &mut FftScratch) -> Vec<Complex32> {
+        let n = self.size;
+        let mut square = vec![0.0f32; n * n];
+        for (line, row) in square.chunks_exact_mut(n).zip(plane.rows()) {
+            line.iter_mut().zip(row).for_each(|(to, v)| *to = *v);
+        }
+        let mut spectrum = vec![Complex32::ZERO; self.entries()];
+        self.forward(&mut square, plane.nrows(), &mut spectrum, scratch);
+        spectrum
+    }
+
+    /// The plane of so many rows and columns in the first corner of the square of a spectrum, which is used up.
+    pub fn to_plane(&self, spectrum: &mut [Complex32], shape: (usize, usize), scratch: &mut FftScratch) -> Array2<f32> {
+        let n = self.size;
+        let mut square = vec![0.0f32; n * n];
+        self.inverse(spectrum, &mut square, shape.0, scratch);
+        Array2::from_shape_fn(shape, |(y, x)| square[y * n + x])
     }
 
     /// The first `wanted` rows of the square of a spectrum, which is used up. Scaled so that it undoes

@@ -1,6 +1,6 @@
 //! What is known of a picture before it is taken: how scenes vary from place to place and from colour to colour.
 
-use metalith_wave::kernels::fft_size;
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use nalgebra::DMatrix;
 use ndarray::Array2;
 use num_complex::Complex32;
@@ -8,9 +8,18 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::normal::{Planes, Terms};
-use crate::SceneView;
-use crate::operator::{FftScratch, SquareFft};
+use crate::frame_model::Planes;
+
+/// Strengths of a system.
+#[derive(Clone, Copy)]
+pub struct Terms {
+    /// Of squared slopes.
+    pub slopes: f64,
+    /// Of squared sums of the slopes that meet at a pixel.
+    pub bends: f64,
+    /// Of the picture itself, whose planes are mixed from those of the system.
+    pub identity: f64,
+}
 
 /// Statistics of natural scenes in linear light.
 ///
@@ -105,7 +114,6 @@ impl SceneStatistics {
 
     /// Expected mean square of each independent plane in bands of frequency that end at these, the first from zero (cycles a
     /// pixel); the first band holds the mean of the light.
-    #[cfg(test)]
     pub fn band_powers<const N: usize>(&self, ends: &[f64; N]) -> Vec<[f64; N]> {
         /// Fine enough for the first band to hold some frequencies.
         const SIZE: usize = 1024;
@@ -130,13 +138,13 @@ impl SceneStatistics {
         of_mean.iter().map(plane).collect()
     }
 
-    /// A scene with these statistics, and none of a photograph's edges: planes of the picture.
+    /// A scene of so many rows and columns with these statistics, and none of a photograph's edges: planes of the picture.
     ///
     /// Light is positive and often dark, as in photographs: its logarithm is normal. A correlation C of light of mean m
     /// is one of ln(1 + C / m^2) of the logarithm (Coles and Jones, Mon. Not. R. Astron. Soc. 248, 1 (1991)). What this
     /// makes of planes together, beyond the mixing, is left out: a hundredth of their power.
-    pub fn random_scene(&self, view: &SceneView, seed: u64) -> Planes {
-        let size = fft_size(view.rows.max(view.columns));
+    pub fn random_scene(&self, shape: (usize, usize), seed: u64) -> Planes {
+        let size = fft_size(shape.0.max(shape.1));
         let fft = SquareFft::new(size);
         let mut scratch = FftScratch::default();
         let correlations = self.logarithms(&fft, &mut scratch);
@@ -151,8 +159,8 @@ impl SceneStatistics {
                 // The mean is stated by itself.
                 *v *= if i == 0 { 0.0 } else { power.sqrt() };
             }
-            fft.inverse(&mut spectrum, &mut square, view.rows, &mut scratch);
-            Array2::from_shape_fn((view.rows, view.columns), |(y, x)| square[y * size + x])
+            fft.inverse(&mut spectrum, &mut square, shape.0, &mut scratch);
+            Array2::from_shape_fn(shape, |(y, x)| square[y * size + x])
         };
         let independent: Planes = correlations.iter().map(&mut plane).collect();
         let mut picture = self.picture(&independent);
@@ -209,7 +217,7 @@ pub fn squared_frequencies(size: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::restore::normal::slopes;
+    use crate::slopes::{SlopeBorder, slopes};
 
     #[test]
     fn colours_mix_and_have_their_adjoint() {
@@ -226,15 +234,9 @@ mod tests {
     fn random_scenes_have_the_slopes_that_are_expected() {
         /// Of the mean over forty draws: 0.007, 0.001 and 0.007 are found, one draw errs by a tenth.
         const DRAW: f64 = 0.03;
-        let view = SceneView {
-            rows: 240,
-            columns: 240,
-            field_deg: 60.0,
-            distance_um: f64::INFINITY,
-        };
         let statistics = SceneStatistics::colours();
         let squares = |plane: &Array2<f32>| -> f64 {
-            let all = slopes(plane);
+            let all = slopes(plane, SlopeBorder::Even);
             all.iter().flatten().map(|v| f64::from(*v).powi(2)).sum::<f64>() / (240.0 * 240.0)
         };
         // The mean over the frequencies of s power / (s + s^2).
@@ -243,7 +245,7 @@ mod tests {
         let want = POWER * sum / (240.0 * 240.0);
         let mut found = [0.0; 3];
         for seed in 0..40 {
-            let scene = statistics.random_scene(&view, seed);
+            let scene = statistics.random_scene((240, 240), seed);
             assert!(scene.iter().flatten().all(|light| *light > 0.0));
             let independent = statistics.independent(&scene);
             found

@@ -10,7 +10,7 @@
 //! borders of the elements' fields belong to no frequency. A thousandth of the mean response only keeps what is smooth
 //! from being overdone, and that is what the solution waits for.
 
-use metalith_wave::kernels::fft_size;
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use ndarray::Array2;
 use num_complex::Complex32;
 use rand::SeedableRng;
@@ -18,9 +18,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::normal::{Planes, Terms, slopes};
-use super::prior::squared_frequencies;
-use crate::operator::{FftScratch, SquareFft};
+use crate::frame_model::Planes;
+use crate::scene_statistics::{Terms, squared_frequencies};
+use crate::slopes::{SlopeBorder, slopes};
 
 /// Pixels between a picture and its periodic copies: beyond them little of it is correlated.
 const BORDER: usize = 40;
@@ -72,7 +72,7 @@ impl Preconditioner {
         // Slopes of a random picture: little that is smooth, which would drown what is fine.
         let mut probe = || {
             let white = Array2::from_shape_fn(light.dim(), |_| StandardNormal.sample(&mut random));
-            let [down, right] = slopes(&white);
+            let [down, right] = slopes(&white, SlopeBorder::Even);
             down + right
         };
         let probe: Planes = (0..planes).map(|_| probe()).collect();
@@ -99,15 +99,7 @@ impl Preconditioner {
     }
 
     fn spectrum(&self, plane: &Array2<f32>) -> Vec<Complex32> {
-        let size = self.fft.size();
-        let mut square = vec![0.0f32; size * size];
-        for (line, row) in square.chunks_exact_mut(size).zip(plane.rows()) {
-            line.iter_mut().zip(row).for_each(|(to, v)| *to = *v);
-        }
-        let mut spectrum = vec![Complex32::ZERO; self.fft.entries()];
-        self.fft
-            .forward(&mut square, plane.nrows(), &mut spectrum, &mut FftScratch::default());
-        spectrum
+        self.fft.of_plane(plane, &mut FftScratch::default())
     }
 
     /// One over the prior and a share of the response, for each frequency of a plane's spectrum.
@@ -141,12 +133,11 @@ impl Preconditioner {
     }
 
     fn apply_to(&self, right: &Array2<f32>, filter: &[f32]) -> Array2<f32> {
-        let size = self.fft.size();
         let mut spectrum = self.spectrum(&(right * &self.unit));
         spectrum.iter_mut().zip(filter).for_each(|(v, f)| *v *= f);
-        let mut square = vec![0.0f32; size * size];
-        self.fft
-            .inverse(&mut spectrum, &mut square, right.nrows(), &mut FftScratch::default());
-        Array2::from_shape_fn(right.dim(), |(y, x)| square[y * size + x] * self.unit[[y, x]])
+        let plane = self
+            .fft
+            .to_plane(&mut spectrum, right.dim(), &mut FftScratch::default());
+        plane * &self.unit
     }
 }

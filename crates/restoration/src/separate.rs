@@ -3,8 +3,9 @@
 use metalith_core::{Progress, Result};
 use ndarray::{Array2, Zip};
 
-use super::normal::Planes;
-use super::{Recorded, RestorationMethod, restore_by};
+use crate::frame_model::Planes;
+use crate::method::{RestorationMethod, restore_elements};
+use crate::recorded::Recorded;
 
 /// The blend of pictures by how much each is to be trusted at each place.
 pub struct Blend {
@@ -47,7 +48,7 @@ impl Blend {
 /// Restore by each element alone, then blend.
 pub fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dyn Progress) -> Result<Planes> {
     let operator = recorded.operator;
-    let mut blend = Blend::new((operator.view().rows, operator.view().columns), operator.inputs());
+    let mut blend = Blend::new(operator.picture_shape(), operator.inputs());
     restore_each(recorded, method, progress, &mut |_, picture, trust| {
         blend.add(picture, trust)
     })?;
@@ -74,11 +75,10 @@ pub fn restore_each(
 ) -> Result<()> {
     let operator = recorded.operator;
     let grey = GreyLight::of(recorded);
-    let view = operator.view();
-    let ones = vec![Array2::<f32>::ones((view.rows, view.columns)); operator.inputs()];
+    let ones = operator.white();
     for element in 0..operator.elements() {
         let seen = operator.apply_elements(&ones, &[element], false);
-        let (mut light, mut trust) = (grey.without_veil(recorded), recorded.trust.to_vec());
+        let (mut light, mut trust) = (grey.without_stray_light(recorded), recorded.trust.to_vec());
         for c in 0..light.len() {
             let others = (&grey.images[c] - &seen[c]) * grey.level[c];
             light[c] -= &others;
@@ -100,23 +100,23 @@ pub fn restore_each(
         };
         take(
             element,
-            &restore_by(&own, method, &[element], false, progress)?,
+            &restore_elements(&own, method, &[element], false, progress)?,
             &weight,
         );
     }
     Ok(())
 }
 
-/// Light of a frame less the veil that a grey scene of as much light as the frame has would bring.
-pub fn without_veil(recorded: &Recorded<'_>) -> Planes {
-    GreyLight::of(recorded).without_veil(recorded)
+/// Light of a frame less the stray light that a grey scene of as much light as the frame has would bring.
+pub fn without_stray_light(recorded: &Recorded<'_>) -> Planes {
+    GreyLight::of(recorded).without_stray_light(recorded)
 }
 
 /// What a white scene would bring, and how grey the scene of a frame is.
 struct GreyLight {
     /// Of all sub-images, by channel.
     images: Planes,
-    veil: Planes,
+    stray_light: Planes,
     /// Light of the frame over that of a white scene, by channel.
     level: Vec<f32>,
 }
@@ -124,9 +124,8 @@ struct GreyLight {
 impl GreyLight {
     fn of(recorded: &Recorded<'_>) -> Self {
         let operator = recorded.operator;
-        let view = operator.view();
-        let ones = vec![Array2::<f32>::ones((view.rows, view.columns)); operator.inputs()];
-        let all: Vec<usize> = (0..operator.elements()).collect();
+        let ones = operator.white();
+        let all = operator.all_elements();
         let with = operator.apply_elements(&ones, &all, true);
         let images = operator.apply_elements(&ones, &all, false);
         let level = |c: usize| {
@@ -138,15 +137,15 @@ impl GreyLight {
         };
         Self {
             level: (0..with.len()).map(level).collect(),
-            veil: with.iter().zip(&images).map(|(a, b)| a - b).collect(),
+            stray_light: with.iter().zip(&images).map(|(a, b)| a - b).collect(),
             images,
         }
     }
 
-    fn without_veil(&self, recorded: &Recorded<'_>) -> Planes {
-        let channels = recorded.light.iter().zip(&self.veil).zip(&self.level);
+    fn without_stray_light(&self, recorded: &Recorded<'_>) -> Planes {
+        let channels = recorded.light.iter().zip(&self.stray_light).zip(&self.level);
         channels
-            .map(|((light, veil), level)| Zip::from(light).and(veil).map_collect(|s, v| s - level * v))
+            .map(|((light, stray_light), level)| Zip::from(light).and(stray_light).map_collect(|s, v| s - level * v))
             .collect()
     }
 }

@@ -4,10 +4,10 @@ use metalith_core::Result;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::SceneStatistics;
-use super::normal::{Planes, slopes, slopes_adjoint};
-use super::splitting::{Denoiser, Schedule};
-use super::total_variation::shrunk;
+use crate::denoiser::{Denoiser, Schedule};
+use crate::frame_model::Planes;
+use crate::scene_statistics::SceneStatistics;
+use crate::slopes::{SlopeBorder, shrunk, slopes, slopes_adjoint};
 
 /// By gradients of its dual (Chambolle, J. Math. Imaging Vis. 20, 89 (2004)), for each of the planes that vary independently.
 #[derive(Clone, Debug)]
@@ -37,8 +37,8 @@ impl SlopeDenoiser {
         }
         let mut dual = [Array2::<f32>::zeros(plane.dim()), Array2::zeros(plane.dim())];
         for _ in 0..self.rounds {
-            let now = plane - &slopes_adjoint(&dual);
-            let step = slopes(&now);
+            let now = plane - &slopes_adjoint(&dual, SlopeBorder::Even);
+            let step = slopes(&now, SlopeBorder::Even);
             for a in 0..2 {
                 dual[a].scaled_add(0.125, &step[a]);
             }
@@ -48,7 +48,7 @@ impl SlopeDenoiser {
                 dual[a] -= &off[a];
             }
         }
-        plane - &slopes_adjoint(&dual)
+        plane - &slopes_adjoint(&dual, SlopeBorder::Even)
     }
 }
 

@@ -1,8 +1,7 @@
 //! How near an image is to another.
 
+use metalith_core::{Error, Result};
 use ndarray::{Array2, ArrayView, ArrayView2, ArrayView3, Axis, Dimension};
-
-use crate::error::{Result, WaveError};
 
 /// Half of the window of structural similarity, without its middle (pixels).
 const REACH: usize = 5;
@@ -31,11 +30,11 @@ pub fn ssim(image: ArrayView2<'_, f64>, reference: ArrayView2<'_, f64>) -> Resul
     same_shape(image.shape(), reference.shape())?;
     let (rows, columns) = image.dim();
     if rows.min(columns) <= 2 * REACH {
-        return Err(WaveError::SmallImage {
-            rows,
-            columns,
-            least: 2 * REACH + 1,
-        });
+        let least = 2 * REACH + 1;
+        return Err(Error::invalid(
+            format!("an image of {rows} x {columns} pixels"),
+            format!("give an image of at least {least} x {least} pixels"),
+        ));
     }
     let mean_a = smooth(image);
     let mean_b = smooth(reference);
@@ -67,11 +66,14 @@ fn same_shape(image: &[usize], reference: &[usize]) -> Result<()> {
     if image == reference {
         return Ok(());
     }
-    Err(WaveError::Shape {
-        what: "an image",
-        given: plane(image),
-        wanted: plane(reference),
-    })
+    Err(Error::invalid(
+        format!(
+            "an image of shape {:?} where {:?} is needed",
+            plane(image),
+            plane(reference)
+        ),
+        "give two images of one shape",
+    ))
 }
 
 /// Mean under the window at all places where it fits.
@@ -131,13 +133,12 @@ mod tests {
     #[test]
     fn what_cannot_be_compared_is_refused() {
         let (small, wide) = (Array2::zeros((10, 20)), Array2::zeros((20, 10)));
-        assert!(matches!(
-            psnr_db(small.view(), wide.view()),
-            Err(WaveError::Shape { .. })
-        ));
-        assert!(matches!(
-            ssim(small.view(), small.view()),
-            Err(WaveError::SmallImage { least: 11, .. })
-        ));
+        let of_shapes = psnr_db(small.view(), wide.view()).unwrap_err().to_string();
+        assert!(
+            of_shapes.contains("[10, 20]") && of_shapes.contains("[20, 10]"),
+            "{of_shapes}"
+        );
+        let of_size = ssim(small.view(), small.view()).unwrap_err().to_string();
+        assert!(of_size.contains("at least 11 x 11"), "{of_size}");
     }
 }

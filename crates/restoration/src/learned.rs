@@ -4,11 +4,11 @@ use std::path::Path;
 
 use metalith_core::{Result, srgb};
 use metalith_prior::{COLOURS, NetworkDenoiser};
+use metalith_wave::kernels::box_sums;
 use ndarray::{Array2, Array3};
 
-use super::normal::Planes;
-use super::splitting::{Denoiser, Schedule};
-use crate::exposure::box_sums;
+use crate::denoiser::{Denoiser, Schedule};
+use crate::frame_model::Planes;
 
 /// The network's denoiser for pictures in linear light.
 ///

@@ -5,45 +5,15 @@
 use metalith_core::{Progress, Result};
 use ndarray::Array2;
 
-use super::learned::LearnedDenoiser;
-use super::normal::{NormalSystem, Planes, Terms};
-use super::tikhonov;
-
-/// What takes noise out of a picture.
-pub trait Denoiser: Sync {
-    /// Planes of a picture in linear light, white being one, without noise of this standard deviation, which is the same
-    /// everywhere. `near` is the picture as it was known before, if it was.
-    ///
-    /// # Errors
-    /// If it cannot take a picture of this size.
-    fn denoise(&self, picture: &[Array2<f32>], near: Option<&[Array2<f32>]>, deviation: f64) -> Result<Planes>;
-
-    /// Deviations of the noise that is left in the picture, round by round.
-    fn schedule(&self) -> Schedule;
-}
+use crate::denoiser::{Denoiser, Schedule};
+use crate::frame_model::Planes;
+use crate::learned::LearnedDenoiser;
+use crate::normal_system::NormalSystem;
+use crate::scene_statistics::Terms;
+use crate::tikhonov;
 
 /// Rounds before samples are drawn.
 const DRAWN_AFTER: usize = 2;
-
-/// Rounds of a splitting.
-#[derive(Clone, Copy, Debug)]
-pub struct Schedule {
-    /// Deviation of the noise in the first round and after the last, in linear light; between them it falls evenly in its
-    /// logarithm.
-    pub deviations: [f64; 2],
-    pub rounds: usize,
-    /// Steps of conjugate gradients in each.
-    pub steps: usize,
-    /// How much the denoised picture weighs: over one by the variance of the noise.
-    pub trust: f64,
-}
-
-impl Schedule {
-    fn deviation(&self, round: usize) -> f64 {
-        let [first, last] = self.deviations;
-        first * (last / first).powf(round as f64 / self.rounds as f64)
-    }
-}
 
 /// Where a splitting stands.
 #[derive(Clone)]

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 /// W = conj(mean H) S / (mean |H|^2 S + N): Wiener's for a blur H that is known, the best one for all where one of
 /// several acts, each as likely as the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wiener {
+pub(crate) struct Wiener {
     signal: f64,
     total: f64,
 }
