@@ -84,6 +84,7 @@ extern crate self as metalith;
 pub mod cli;
 mod session;
 
+#[cfg(feature = "baselines")]
 pub use metalith_baselines as baselines;
 pub use metalith_calibrate as calibrate;
 pub use metalith_cell as cell;
@@ -106,6 +107,8 @@ pub use metalith_report as report;
 pub use metalith_restoration as restoration;
 pub use metalith_sensor as sensor;
 pub use metalith_study as study;
+#[cfg(feature = "training")]
+pub use metalith_training as training;
 pub use metalith_verify as verify;
 pub use metalith_verify::compensate;
 pub use metalith_wave as wave;

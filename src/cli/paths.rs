@@ -33,6 +33,7 @@ pub fn name_of(path: &Path) -> String {
         .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
+#[cfg(feature = "training")]
 /// Find out whether files can be written, before the work that they are for. What stands there stays, and folders are made.
 ///
 /// # Errors

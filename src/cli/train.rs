@@ -7,7 +7,7 @@ use metalith::baselines::{Comparison, StageKind};
 use metalith::imaging::KernelCache;
 use metalith::imaging::scene::images_in;
 use metalith::imaging::scene::read_picture;
-use metalith::prior::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_finisher};
+use metalith::training::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_post_processor};
 use metalith::{Error, Result};
 
 use super::compare::{ComparedDesign, LenslessArgs, Rival};
@@ -130,7 +130,7 @@ impl TrainArgs {
         let kept = KernelCache::of_user();
         let (stacks, taught) = open.lessons(0, kind, &beside(out, ".pictures"), &kept, terminal)?;
         let stacks = Stacks::new(stacks, taught, spec.piece)?;
-        train_finisher(&stacks, spec, out, state, terminal)
+        train_post_processor(&stacks, spec, out, state, terminal)
     }
 }
 

@@ -12,7 +12,7 @@
 //! | what cameras without a lens have in common | `lensless` |
 //! | a mask that is a product of two sequences | `flatcam/` |
 //! | the caustic of a random surface | `diffusercam/` |
-//! | learnt last stages, what they are taught by, and pictures by Wiener filters for one of them | `stage`, `teaching`, `wiener` |
+//! | learnt last stages, what they are taught by, and pictures by Wiener filters for one of them | `stage`, `taught_for`, `lessons` (feature `training`), `wiener` |
 //! | which cameras, from their files | `lineup` |
 //! | scores of all photographs | `compare` |
 //! | the table, the page | `table`, `page` |
@@ -25,10 +25,12 @@ mod cpu;
 mod diffusercam;
 mod flatcam;
 mod lensless;
+#[cfg(feature = "training")]
+mod lessons;
 mod page;
 mod stage;
 mod table;
-mod teaching;
+mod taught_for;
 mod wiener;
 
 pub use array::ArrayCamera;

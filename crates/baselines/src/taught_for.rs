@@ -1,25 +1,23 @@
-//! Learnt last stages in a lineup: which camera each was taught for, and what another is taught by.
+//! Learnt last stages in a comparison: which camera each was taught for.
 
 use std::collections::HashSet;
-use std::path::Path;
 
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result, Silent};
-use metalith_imaging::{KernelCache, SceneView};
-use metalith_prior::{Provenance, Stack};
+use metalith_core::{Error, Result};
+use metalith_imaging::SceneView;
+use metalith_prior::Provenance;
 
-use crate::baseline_camera::no_stage;
 use crate::comparison::{Lensless, OpenLineup};
-use crate::stage::{Stage, StageKind, camera_digest, encoded};
+use crate::stage::{Stage, StageKind, camera_digest};
 
 /// A camera of the table that a last stage can follow.
-struct Followed {
+pub(crate) struct Followed {
     /// Digest of what decides its frames: layout, sensor, light, field.
-    camera: String,
+    pub camera: String,
     /// Digest of what its layout does to light, if it has one.
-    optics: Option<String>,
-    kinds: Vec<StageKind>,
+    pub optics: Option<String>,
+    pub kinds: Vec<StageKind>,
 }
 
 impl Followed {
@@ -37,7 +35,7 @@ impl Followed {
 impl OpenLineup<'_> {
     /// What a last stage must be taught for to follow camera `k` of the table, counted without those that have the assumptions of
     /// others: no stage follows these.
-    fn followed(&self, k: usize) -> Result<Followed> {
+    pub(crate) fn followed(&self, k: usize) -> Result<Followed> {
         let first = self.photographs[0].view;
         if let Some(k) = k.checked_sub(self.designs.len()) {
             let spec = &self.of.lensless[k];
@@ -118,65 +116,12 @@ impl OpenLineup<'_> {
         let fits = |stage: &&Stage| followed.is_of(stage.kind, stage.taught());
         Ok(self.stages.iter().filter(fits).cloned().collect())
     }
-
-    /// Pictures of all photographs by camera `k` for a last stage, each with its scene, and what is taught by them. Each is kept in a file
-    /// of a folder, and taken from there if it is of the same camera, photograph and noise. Camera `k` is counted without assumptions.
-    ///
-    /// # Errors
-    /// If the camera has no such stage or cannot be made ready, a file cannot be written, or the user stopped it.
-    pub fn lessons(
-        &self,
-        k: usize,
-        kind: StageKind,
-        folder: &Path,
-        kept: &KernelCache,
-        progress: &dyn Progress,
-    ) -> Result<(Vec<Stack>, Provenance)> {
-        let Followed { camera, optics, kinds } = self.followed(k)?;
-        if !kinds.contains(&kind) {
-            return no_stage(kind, "this camera");
-        }
-        let mut stacks = Vec::new();
-        let mut pictures = 0;
-        self.ready(k * self.of.kinds(), kept, progress, &mut |contender, _, photographs| {
-            progress.begin("pictures to learn from", photographs.len() as u64);
-            for (i, (scene, path)) in photographs.iter().zip(&self.of.photographs).enumerate() {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
-                let seed = self.of.seed.wrapping_add(i as u64);
-                let light = optics.as_deref().unwrap_or_default();
-                let of = format!("{} {camera} {light} {} {seed}", kind.name(), hex(&file_digest(path)?));
-                let file = folder.join(format!("{i:06}.safetensors"));
-                let stack = match Stack::kept(&file, &of) {
-                    Some(stack) => stack,
-                    None => {
-                        let frame = contender.record(scene, seed)?;
-                        let made = contender.pictures(&frame, kind, &Silent)?;
-                        let shown: Vec<_> = made.iter().map(encoded).collect();
-                        let stack = Stack::new(&shown, &encoded(&contender.truth(scene)))?;
-                        stack.write(&file, &of)?;
-                        stack
-                    }
-                };
-                pictures = stack.pictures();
-                stacks.push(stack);
-                progress.advance(1);
-            }
-            Ok(())
-        })?;
-        let taught = Provenance {
-            kind: kind.name().into(),
-            camera,
-            pictures,
-            optics,
-        };
-        Ok((stacks, taught))
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     /// Weights are of the camera whose layout does to light what they were taught with; those that came before this was kept, such

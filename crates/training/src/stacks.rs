@@ -7,18 +7,16 @@ use half::f16;
 use metalith_core::file::read_at_most;
 use metalith_core::text::hex;
 use metalith_core::{AtomicFile, Error, Result};
-use ndarray::{Array2, Array3, Axis, concatenate};
+use metalith_prior::parts::{Network, STAGE, Size, cut, piled, seen};
+use metalith_prior::{COLOURS, PostProcessor, Provenance};
+use ndarray::Array3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 
 use crate::examples::is_held_out;
-use crate::features::Features;
 use crate::learning::{Lessons, Sample, TrainingSpec, psnr_db};
-use crate::network::{COLOURS, Network, Size};
-use crate::post_processor::{PostProcessor, Provenance, STAGE};
-use crate::squares::{cut, squares};
 
 /// Longest file of the pictures of a frame (bytes).
 const LONGEST: u64 = 4 << 30;
@@ -121,32 +119,6 @@ fn digest(bytes: &[Vec<u8>; 2], of: &str) -> String {
     hex(&hasher.finalize())
 }
 
-/// Pictures behind one another: `[row, column, colour]`.
-pub(crate) fn piled(pictures: &[Array3<f32>], size: (usize, usize, usize)) -> Result<Array3<f32>> {
-    if pictures.is_empty() || pictures.iter().any(|p| p.dim() != size) || size.2 != COLOURS {
-        return Err(Error::invalid(
-            "pictures of one frame that differ in size, or none",
-            "give pictures in colour of the size of the scene",
-        ));
-    }
-    let views: Vec<_> = pictures.iter().map(|p| p.view()).collect();
-    Ok(concatenate(Axis(2), &views).expect("all are of one size"))
-}
-
-/// What the last stage sees of a piece of such pictures whose first pixel is at `place` of a whole of so many rows and columns: the
-/// squared distance from its middle, a corner's being one, tells where it is.
-pub(crate) fn seen(piece: &Array3<f32>, place: [usize; 2], whole: [usize; 2]) -> Features {
-    let (rows, columns, _) = piece.dim();
-    let from_middle = |i: usize, a: usize| {
-        let half = 0.5 * whole[a] as f32;
-        ((place[a] + 2 * i + 1) as f32 - half) / half
-    };
-    let map = Array2::from_shape_fn((rows / 2, columns / 2), |(y, x)| {
-        0.5 * (from_middle(y, 0).powi(2) + from_middle(x, 1).powi(2))
-    });
-    squares(piece, &[map])
-}
-
 /// Stacks of one camera to learn from, and others to be judged by.
 #[derive(Clone, Debug)]
 pub struct Stacks {
@@ -219,7 +191,7 @@ impl Stacks {
 
 impl Lessons for Stacks {
     fn size(&self) -> Size {
-        Size::finisher(self.taught.pictures)
+        Size::post_processor(self.taught.pictures)
     }
 
     fn origin(&self, spec: &TrainingSpec) -> serde_json::Value {
@@ -247,9 +219,9 @@ impl Lessons for Stacks {
     }
 
     fn held_out(&self, network: Network) -> f64 {
-        let finisher = PostProcessor::of_network(network, self.taught.clone());
+        let post_processor = PostProcessor::of_network(network, self.taught.clone());
         let all = self.held_out.iter().map(|stack| {
-            let found = finisher.corrected(&stack.pictures.mapv(f16::to_f32));
+            let found = post_processor.corrected(&stack.pictures.mapv(f16::to_f32));
             psnr_db(&found, &stack.clean.mapv(f16::to_f32))
         });
         all.sum::<f64>() / self.held_out.len() as f64

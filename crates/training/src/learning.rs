@@ -4,6 +4,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_prior::COLOURS;
+use metalith_prior::parts::{Features, Network, Plan, Size, write_weights};
 use ndarray::{Array3, Axis};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -12,9 +14,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::checkpoint::Checkpoint;
-use crate::features::Features;
-use crate::network::{COLOURS, Network, Plan, Size};
-use crate::weights::write_weights;
 
 /// How long and from what is learnt.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use metalith_core::{Progress, Result};
 
-use crate::denoiser::{NetworkDenoiser, input};
 use crate::examples::Photographs;
 use crate::learning::{Lessons, Sample, TrainingReport, TrainingSpec, learn, psnr_db};
-use crate::network::{Network, Size};
+use metalith_prior::NetworkDenoiser;
+use metalith_prior::parts::{Network, Size, input};
 
 /// Errors where noise of this deviation is are weighted by one, others by one over theirs.
 const EQUAL: f32 = 0.1;

@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use sha2::{Digest, Sha256};
 
-use crate::denoiser::over_squares;
-use crate::network::COLOURS;
+use metalith_prior::parts::over_squares;
+use metalith_prior::{COLOURS, with_noise};
 
 /// Least and largest deviation of the noise, of white being one; drawn evenly in its logarithm.
 const NOISE: [f32; 2] = [0.01, 0.4];
@@ -134,15 +134,6 @@ impl Photographs {
             .enumerate()
             .map(move |(i, clean)| (clean, with_noise(clean, deviation, i as u64)))
     }
-}
-
-/// A picture with independent normal noise.
-pub fn with_noise(clean: &Array3<f32>, deviation: f32, seed: u64) -> Array3<f32> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    clean.mapv(|v| {
-        let noise: f32 = StandardNormal.sample(&mut random);
-        v + deviation * noise
-    })
 }
 
 /// Half of the pieces have noise of one strength, the others noise that changes over the piece and from colour to colour, as
