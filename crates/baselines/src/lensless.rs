@@ -54,7 +54,7 @@ pub trait Lensless {
 }
 
 impl<T: Lensless> BaselineCamera for T {
-    fn ways(&self) -> Vec<Method> {
+    fn methods(&self) -> Vec<Method> {
         let learnt = self.stage().map(|stage| stage.kind.words());
         let way = |method: &str| Method {
             method: method.into(),

@@ -7,10 +7,10 @@ use metalith_sensor::{Camera, Channel, ChannelSampling, Illuminant, Response};
 use serde::Serialize;
 
 use crate::approximation_set::{ApproximationSet, PATCH};
-use crate::forecast_scene::Rehearsal;
+use crate::forecast_scene::ForecastScene;
 use crate::imaging_system::ImagingSystem;
-use crate::kept::KernelCache;
-use crate::kernel_plan::Wanted;
+use crate::kernel_cache::KernelCache;
+use crate::kernel_plan::KernelPlan;
 use crate::scene::SceneImage;
 use crate::score::{ZoneScore, scores};
 use crate::stray_light::StrayLight;
@@ -56,12 +56,12 @@ pub struct AssumedScore {
 }
 
 /// Scores of a scene under the paper's assumptions: none of them, each alone, and all; joint and by Tikhonov. `narrow` is
-/// the same studio with one wavelength a channel.
+/// the same imaging system with one wavelength a channel.
 ///
 /// # Errors
 /// If no light reaches the sensor, or the user stopped it.
 pub fn worth_of_assumptions(
-    studio: &ImagingSystem,
+    system: &ImagingSystem,
     narrow: &ImagingSystem,
     scene: &SceneImage,
     seed: u64,
@@ -76,32 +76,35 @@ pub fn worth_of_assumptions(
         butterworth: true,
         ..none
     };
-    let clear = ApproximationSet { no_veil: true, ..none };
+    let clear = ApproximationSet {
+        no_stray_light: true,
+        ..none
+    };
     let patches = ApproximationSet {
         patch_pixels: Some(PATCH),
         ..none
     };
     let all = ApproximationSet::paper();
     let cases = [
-        ("none: all of the physics", studio, none),
-        ("one kernel for each element and colour", studio, fixed),
-        ("brightness by a Butterworth filter", studio, fading),
+        ("none: all of the physics", system, none),
+        ("one kernel for each element and colour", system, fixed),
+        ("brightness by a Butterworth filter", system, fading),
         ("one wavelength for each colour", narrow, none),
-        ("no veil", studio, clear),
-        ("patches of 420 x 420 pixels", studio, patches),
+        ("no stray light", system, clear),
+        ("patches of 420 x 420 pixels", system, patches),
         ("all of them: the setting of the paper", narrow, all),
     ];
     cases
         .into_iter()
-        .map(|(assumption, studio, assumed)| {
-            let studio = studio.assuming(assumed)?;
-            let frame = studio.record(&studio.simulation_of(scene), scene, seed)?;
-            let operator = studio.restoration();
-            let error = Rehearsal::new(&studio, &operator).operator_error;
-            let picture = studio.restore(&operator, &error, &frame, RestorationMethod::Tikhonov, true, progress)?;
+        .map(|(assumption, system, assumed)| {
+            let system = system.assuming(assumed)?;
+            let frame = system.record(&system.simulation_of(scene), scene, seed)?;
+            let operator = system.restoration();
+            let error = ForecastScene::new(&system, &operator).operator_error;
+            let picture = system.restore(&operator, &error, &frame, RestorationMethod::Tikhonov, true, progress)?;
             Ok(AssumedScore {
                 assumption,
-                scores: scores(&picture, &studio.truth(scene))?,
+                scores: scores(&picture, &system.truth(scene))?,
                 operator_error: error.overall,
             })
         })
@@ -114,16 +117,16 @@ impl ImagingSystem {
     /// # Errors
     /// If no light reaches the sensor.
     pub fn assuming(&self, assumed: ApproximationSet) -> Result<Self> {
-        let veil = match assumed.no_veil {
+        let stray_light = match assumed.no_stray_light {
             true => StrayLight::none(&self.camera.sensor, self.channels.len(), self.bank.bases),
-            false => self.veil.clone(),
+            false => self.stray_light.clone(),
         };
         let mut other = self.clone();
-        (other.assumed, other.veil) = (assumed, veil);
+        (other.assumed, other.stray_light) = (assumed, stray_light);
         other.exposed()
     }
 
-    /// The studio of the same chip and scene with a camera that has no dispersion.
+    /// The imaging system of the same chip and scene with a camera that has no dispersion.
     ///
     /// # Errors
     /// As [`ImagingSystem::open`].
@@ -133,12 +136,12 @@ impl ImagingSystem {
         layout: &std::path::Path,
         model: Option<&metalith_optics::CalibratedModel>,
         scene: &SceneImage,
-        kept: &KernelCache,
+        cache: &KernelCache,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let camera = without_dispersion(&self.camera, &self.channels);
-        let wanted = Wanted::new(design, &camera, scene)?.for_wide_bands();
-        Self::open_wanted(wanted, design, layout, model, kept, progress)
+        let plan = KernelPlan::new(design, &camera, scene)?.for_wide_bands();
+        Self::open_planned(plan, design, layout, model, cache, progress)
     }
 }
 

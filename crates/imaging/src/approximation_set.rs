@@ -14,7 +14,7 @@ pub struct ApproximationSet {
     /// Light falls with the angle as `butterworth` says, and not by what elements pass and flat surfaces send.
     pub butterworth: bool,
     /// Nothing lands outside of the kernels.
-    pub no_veil: bool,
+    pub no_stray_light: bool,
     /// Each element has a square of so many pixels to itself, and no light lands beside it.
     pub patch_pixels: Option<u32>,
 }
@@ -25,7 +25,7 @@ impl ApproximationSet {
         Self {
             fixed_kernels: true,
             butterworth: true,
-            no_veil: true,
+            no_stray_light: true,
             patch_pixels: Some(PATCH),
         }
     }

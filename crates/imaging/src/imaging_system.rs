@@ -34,7 +34,7 @@ pub struct ImagingSystem {
     pub between: BetweenNodes,
     /// Every how many-th of these nodes a restoration knows.
     pub(crate) restored_step: usize,
-    pub veil: StrayLight,
+    pub stray_light: StrayLight,
     pub elements: Vec<ElementView>,
     pub channels: Vec<ChannelSampling>,
     /// Spectra of the bank: those of the scenes, and the primaries of the restoration among or after them.
@@ -53,7 +53,7 @@ pub struct ImagingSystem {
     /// Signal of a unit of light in each channel.
     pub gain: Vec<f64>,
     pub colours: ChannelColours,
-    /// Whether kernels and veil were found on the disk.
+    /// Whether kernels and stray light were found on the disk.
     pub from_cache: [bool; 2],
     /// What is assumed instead of what is known; nothing, unless asked for.
     pub assumed: ApproximationSet,
@@ -87,7 +87,14 @@ impl ImagingSystem {
             assumed: self.assumed,
             ..detail
         };
-        FrameOperator::new(&self.bank, &self.veil, &self.elements, &self.camera, space, detail)
+        FrameOperator::new(
+            &self.bank,
+            &self.stray_light,
+            &self.elements,
+            &self.camera,
+            space,
+            detail,
+        )
     }
 
     /// Of scenes as finely as they are known.
@@ -160,11 +167,11 @@ impl ImagingSystem {
         Ok(expose(&self.camera, &self.gain, &light, seed))
     }
 
-    /// SHA-256 of all that decides the frame of a scene but its noise: kernels and veil, elements, camera, field, exposure.
+    /// SHA-256 of all that decides the frame of a scene but its noise: kernels and stray light, elements, camera, field, exposure.
     pub fn digest(&self) -> [u8; 32] {
         let mut hasher = Sha256::new();
         let distinct = self.bank.distinct.iter().map(|d| &d.values);
-        for number in distinct.chain([&self.veil.values]).flatten() {
+        for number in distinct.chain([&self.stray_light.values]).flatten() {
             hasher.update(number.to_le_bytes());
         }
         let camera = serde_json::to_vec(&self.camera).expect("plain data serialises");
@@ -192,11 +199,11 @@ impl ImagingSystem {
         joint: bool,
         progress: &dyn Progress,
     ) -> Result<Array3<f64>> {
-        let [light, trust] = match (method, joint) {
+        let [light, inverse_variance] = match (method, joint) {
             (RestorationMethod::Tikhonov, true) => self.known(operator, &error.times(TOGETHER), frame)?,
             _ => self.known(operator, error, frame)?,
         };
-        let recorded = self.recorded(operator, &light, &trust);
+        let recorded = self.recorded(operator, &light, &inverse_variance);
         let planes = match joint {
             true => restore_joint(&recorded, method, progress)?,
             false => restore_separate(&recorded, method, progress)?,
@@ -217,9 +224,9 @@ impl ImagingSystem {
         light: &[Array2<f32>],
         progress: &dyn Progress,
     ) -> Result<[Array3<f64>; 2]> {
-        let [recorded, trust] = self.known(operator, &error.times(TOGETHER), frame)?;
+        let [recorded, inverse_variance] = self.known(operator, &error.times(TOGETHER), frame)?;
         let restored = |light: &[Array2<f32>]| -> Result<Array3<f64>> {
-            let recorded = self.recorded(operator, light, &trust);
+            let recorded = self.recorded(operator, light, &inverse_variance);
             let planes = restore_joint(&recorded, RestorationMethod::Tikhonov, progress)?;
             Ok(self.picture(operator, &planes))
         };
@@ -238,8 +245,8 @@ impl ImagingSystem {
         seeds: std::ops::Range<u64>,
         progress: &dyn Progress,
     ) -> Result<Vec<Array3<f64>>> {
-        let [light, trust] = self.known(operator, error, frame)?;
-        let recorded = self.recorded(operator, &light, &trust);
+        let [light, inverse_variance] = self.known(operator, error, frame)?;
+        let recorded = self.recorded(operator, &light, &inverse_variance);
         let drawn = restore_samples(&recorded, seeds, progress)?;
         Ok(drawn.iter().map(|planes| self.picture(operator, planes)).collect())
     }
@@ -248,12 +255,12 @@ impl ImagingSystem {
         &'a self,
         operator: &'a FrameOperator<'a>,
         light: &'a [Array2<f32>],
-        trust: &'a [Array2<f32>],
+        inverse_variance: &'a [Array2<f32>],
     ) -> Recorded<'a> {
         Recorded {
             operator,
             light,
-            trust,
+            inverse_variance,
             prior: &self.prior,
         }
     }
@@ -266,9 +273,9 @@ impl ImagingSystem {
         frame: &Frame,
     ) -> Result<[Vec<Array2<f32>>; 2]> {
         frame.is_of(operator.frame(), self.gain.len())?;
-        let (light, trust) = frame.light(&self.camera, error);
-        match trust.iter().flatten().any(|t| *t > 0.0) {
-            true => Ok([light, trust]),
+        let (light, inverse_variance) = frame.light(&self.camera, error);
+        match inverse_variance.iter().flatten().any(|t| *t > 0.0) {
+            true => Ok([light, inverse_variance]),
             false => Err(Error::invalid(
                 "nothing is known of the scene: every pixel that counts light is at full scale",
                 "give a scene of which white is 1, or a lower `white` in [exposure] of the camera",
@@ -289,8 +296,8 @@ impl ImagingSystem {
     /// A frame as a picture without any restoration, linear sRGB `[row, column, colour]`: pixels where they look, over those
     /// of a white scene.
     pub fn unrestored(&self, operator: &FrameOperator<'_>, frame: &Frame) -> Array3<f64> {
-        let (light, trust) = frame.light(&self.camera, &OperatorError::none(self.gain.len()));
-        self.colours.rgb(&operator.unrestored(&light, &trust))
+        let (light, inverse_variance) = frame.light(&self.camera, &OperatorError::none(self.gain.len()));
+        self.colours.rgb(&operator.unrestored(&light, &inverse_variance))
     }
 
     /// What a perfect camera with these channels would give of a scene: the truth that pictures are held to.

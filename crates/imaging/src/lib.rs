@@ -8,7 +8,7 @@
 
 mod approximation_scores;
 mod approximation_set;
-mod cache;
+mod cache_file;
 mod chip;
 mod colour;
 mod dataset;
@@ -20,7 +20,7 @@ mod forecast_scene;
 mod geometry;
 mod image_check;
 mod imaging_system;
-mod kept;
+mod kernel_cache;
 mod kernel_plan;
 mod kernels;
 mod layout;
@@ -49,11 +49,11 @@ pub use dataset::{DatasetManifest, DatasetOrigin, DatasetPair, PairWriter, write
 pub use exposure::{Frame, channel_at, counts_channel, expose, gains, sensitivity};
 pub use files::{FrameFile, picture_file};
 pub use forecast::{Forecast, ScenePower};
-pub use forecast_scene::Rehearsal;
+pub use forecast_scene::ForecastScene;
 pub use geometry::{ElementView, SceneSpace, SceneView};
 pub use image_check::check_images;
 pub use imaging_system::ImagingSystem;
-pub use kept::KernelCache;
+pub use kernel_cache::KernelCache;
 pub use kernel_plan::simulated_view;
 pub use kernels::{BankSpec, KernelBank};
 pub use layout::PillarCount;
@@ -70,4 +70,4 @@ pub use scene::SCORED_SIDES;
 pub use score::{MOST_DB, Zone, ZoneScore, check_scored, psnr_words, scores};
 pub use stray_light::{LightShares, StrayLight};
 pub use thumbnail::thumbnail;
-pub use uncertainty::{DoubtReport, Uncertainty};
+pub use uncertainty::{Uncertainty, UncertaintyReport};

@@ -38,7 +38,7 @@ pub struct Provenance {
 #[derive(Clone, Debug)]
 pub struct PostProcessor {
     network: Network,
-    taught: Provenance,
+    provenance: Provenance,
 }
 
 impl PostProcessor {
@@ -47,23 +47,23 @@ impl PostProcessor {
     /// # Errors
     /// If the file cannot be read, is damaged, or is of a denoiser.
     pub fn read(path: &Path) -> Result<Self> {
-        let (taught, weights) = read_described(path, |training| {
-            let taught = Provenance::deserialize(training.get(STAGE)?).ok()?;
-            let size = Size::post_processor(taught.pictures);
-            (1..=MOST).contains(&taught.pictures).then_some((taught, size))
+        let (provenance, weights) = read_described(path, |training| {
+            let provenance = Provenance::deserialize(training.get(STAGE)?).ok()?;
+            let size = Size::post_processor(provenance.pictures);
+            (1..=MOST).contains(&provenance.pictures).then_some((provenance, size))
         })?;
-        let plan = Plan::new(Size::post_processor(taught.pictures));
-        Ok(Self::of_network(Network::new(&plan, &weights), taught))
+        let plan = Plan::new(Size::post_processor(provenance.pictures));
+        Ok(Self::of_network(Network::new(&plan, &weights), provenance))
     }
 
     /// With a network that is at hand.
-    pub fn of_network(network: Network, taught: Provenance) -> Self {
-        Self { network, taught }
+    pub fn of_network(network: Network, provenance: Provenance) -> Self {
+        Self { network, provenance }
     }
 
     /// What it was taught for.
-    pub fn taught(&self) -> &Provenance {
-        &self.taught
+    pub fn provenance(&self) -> &Provenance {
+        &self.provenance
     }
 
     /// The picture that is expected of a scene, `[row, column, colour]` in sRGB values, from pictures of one frame of it in the
@@ -72,12 +72,12 @@ impl PostProcessor {
     /// # Errors
     /// If there are more or fewer of them, or they differ in size.
     pub fn finish(&self, pictures: &[Array3<f32>]) -> Result<Array3<f32>> {
-        if pictures.len() != self.taught.pictures {
+        if pictures.len() != self.provenance.pictures {
             return Err(metalith_core::Error::invalid(
                 format!(
                     "{} pictures of a frame for a network that was taught by {}",
                     pictures.len(),
-                    self.taught.pictures
+                    self.provenance.pictures
                 ),
                 "give the weights that were taught for this camera",
             ));
@@ -105,8 +105,8 @@ mod tests {
     #[test]
     fn weights_of_before_can_be_read() {
         let text = r#"{"kind":"blending","camera":"a1","pictures":10}"#;
-        let taught: Provenance = serde_json::from_str(text).unwrap();
-        assert_eq!(taught.optics, None);
-        assert_eq!(serde_json::to_string(&taught).unwrap(), text);
+        let provenance: Provenance = serde_json::from_str(text).unwrap();
+        assert_eq!(provenance.optics, None);
+        assert_eq!(serde_json::to_string(&provenance).unwrap(), text);
     }
 }

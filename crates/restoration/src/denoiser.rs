@@ -28,7 +28,7 @@ pub struct Schedule {
     /// Steps of conjugate gradients in each.
     pub steps: usize,
     /// How much the denoised picture weighs: over one by the variance of the noise.
-    pub trust: f64,
+    pub weight: f64,
 }
 
 impl Schedule {

@@ -49,7 +49,7 @@ impl Standing {
         let terms = Terms {
             slopes: 0.0,
             bends: 0.0,
-            identity: schedule.trust / (deviation * deviation * system.scale),
+            identity: schedule.weight / (deviation * deviation * system.scale),
         };
         let mut right = system.data.clone();
         for (r, z) in right.iter_mut().zip(statistics.adjoint(&near)) {

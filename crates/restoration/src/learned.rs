@@ -128,7 +128,7 @@ impl Denoiser for LearnedDenoiser {
             deviations: [0.04, 0.01],
             rounds: 5,
             steps: 6,
-            trust: 0.25,
+            weight: 0.25,
         }
     }
 }

@@ -51,11 +51,11 @@ impl<'a> NormalSystem<'a> {
     /// For some of the elements, with or without the stray light.
     pub fn new(recorded: &Recorded<'a>, elements: &[usize], stray_light: bool) -> Self {
         let operator = recorded.operator;
-        let sums = operator.row_sums(recorded.trust, elements, stray_light);
+        let sums = operator.row_sums(recorded.inverse_variance, elements, stray_light);
         let mut light = Array2::<f32>::zeros(operator.picture_shape());
         sums.iter().for_each(|p| light.scaled_add(1.0 / sums.len() as f32, p));
         let most = light.iter().copied().fold(0.0f32, f32::max).max(f32::MIN_POSITIVE);
-        let weight: Planes = recorded.trust.iter().map(|t| t.mapv(|v| v / most)).collect();
+        let weight: Planes = recorded.inverse_variance.iter().map(|t| t.mapv(|v| v / most)).collect();
         let products: Planes = weight.iter().zip(recorded.light).map(|(w, s)| w * s).collect();
         let statistics = match operator.sees_colours() {
             true => SceneStatistics::colours(),

@@ -11,7 +11,7 @@ pub struct Recorded<'a> {
     /// Light of each channel in the unit of the operator.
     pub light: &'a [Array2<f32>],
     /// One over the variance of the light of each pixel; zero where nothing is known.
-    pub trust: &'a [Array2<f32>],
+    pub inverse_variance: &'a [Array2<f32>],
     /// What is known of pictures from photographs.
     pub prior: &'a LearnedDenoiser,
 }

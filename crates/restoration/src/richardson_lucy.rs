@@ -18,7 +18,7 @@ pub fn restore(
     let operator = recorded.operator;
     progress.begin("restoring by Richardson and Lucy", ROUNDS as u64);
     let known: Planes = recorded
-        .trust
+        .inverse_variance
         .iter()
         .map(|t| t.mapv(|v| f32::from(u8::from(v > 0.0))))
         .collect();

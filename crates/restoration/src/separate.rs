@@ -10,7 +10,7 @@ use crate::recorded::Recorded;
 /// The blend of pictures by how much each is to be trusted at each place.
 pub struct Blend {
     sums: Planes,
-    trusts: Planes,
+    weights: Planes,
 }
 
 impl Blend {
@@ -19,14 +19,14 @@ impl Blend {
         let black = || vec![Array2::zeros(shape); planes];
         Self {
             sums: black(),
-            trusts: black(),
+            weights: black(),
         }
     }
 
     /// Add a picture, and one over the variance of each of its values.
-    pub fn add(&mut self, picture: &[Array2<f32>], trust: &[Array2<f32>]) {
-        let to = self.sums.iter_mut().zip(&mut self.trusts);
-        for (((sum, all), p), t) in to.zip(picture).zip(trust) {
+    pub fn add(&mut self, picture: &[Array2<f32>], inverse_variance: &[Array2<f32>]) {
+        let to = self.sums.iter_mut().zip(&mut self.weights);
+        for (((sum, all), p), t) in to.zip(picture).zip(inverse_variance) {
             Zip::from(sum).and(all).and(p).and(t).for_each(|sum, all, p, t| {
                 *sum += t * p;
                 *all += t;
@@ -36,7 +36,7 @@ impl Blend {
 
     /// The blend, black where no picture says anything.
     pub fn finished(mut self) -> Planes {
-        for (sum, all) in self.sums.iter_mut().zip(&self.trusts) {
+        for (sum, all) in self.sums.iter_mut().zip(&self.weights) {
             Zip::from(sum)
                 .and(all)
                 .for_each(|s, t| *s = if *t > 0.0 { *s / t } else { 0.0 });
@@ -49,8 +49,8 @@ impl Blend {
 pub fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dyn Progress) -> Result<Planes> {
     let operator = recorded.operator;
     let mut blend = Blend::new(operator.picture_shape(), operator.inputs());
-    restore_each(recorded, method, progress, &mut |_, picture, trust| {
-        blend.add(picture, trust)
+    restore_each(recorded, method, progress, &mut |_, picture, inverse_variance| {
+        blend.add(picture, inverse_variance)
     })?;
     Ok(blend.finished())
 }
@@ -78,15 +78,16 @@ pub fn restore_each(
     let ones = operator.white();
     for element in 0..operator.elements() {
         let seen = operator.apply_elements(&ones, &[element], false);
-        let (mut light, mut trust) = (grey.without_stray_light(recorded), recorded.trust.to_vec());
+        let (mut light, mut inverse_variance) =
+            (grey.without_stray_light(recorded), recorded.inverse_variance.to_vec());
         for c in 0..light.len() {
             let others = (&grey.images[c] - &seen[c]) * grey.level[c];
             light[c] -= &others;
-            Zip::from(&mut trust[c]).and(&others).for_each(|t, o| {
+            Zip::from(&mut inverse_variance[c]).and(&others).for_each(|t, o| {
                 *t /= 1.0 + *t * (OTHERS_UNKNOWN * o).powi(2);
             });
         }
-        let weighted: Planes = seen.iter().zip(&trust).map(|(s, t)| s * t).collect();
+        let weighted: Planes = seen.iter().zip(&inverse_variance).map(|(s, t)| s * t).collect();
         // The light that this element sends to pixels that are trusted.
         let weight = operator.adjoint_elements(&weighted, &[element], false);
         if weight.iter().flatten().all(|w| *w <= 0.0) {
@@ -95,7 +96,7 @@ pub fn restore_each(
         let own = Recorded {
             operator,
             light: &light,
-            trust: &trust,
+            inverse_variance: &inverse_variance,
             prior: recorded.prior,
         };
         take(
@@ -130,7 +131,7 @@ impl GreyLight {
         let images = operator.apply_elements(&ones, &all, false);
         let level = |c: usize| {
             let known = |f: &Array2<f32>| {
-                let pairs = f.iter().zip(&recorded.trust[c]).filter(|(_, t)| **t > 0.0);
+                let pairs = f.iter().zip(&recorded.inverse_variance[c]).filter(|(_, t)| **t > 0.0);
                 pairs.map(|(v, _)| f64::from(*v)).sum::<f64>()
             };
             (known(&recorded.light[c]) / known(&with[c]).max(f64::MIN_POSITIVE)) as f32

@@ -69,7 +69,7 @@ impl Denoiser for SlopeDenoiser {
             deviations: [0.03, 0.007],
             rounds: 6,
             steps: 2,
-            trust: 0.25,
+            weight: 0.25,
         }
     }
 }

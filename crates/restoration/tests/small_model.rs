@@ -116,12 +116,12 @@ fn each_method_restores_what_a_frame_tells() {
     const ALONE_DB: f64 = 15.0;
     let truth = scene();
     let light = TwoBlurs.apply(&[truth.clone()]);
-    let trust = vec![Array2::from_elem((SIDE, SIDE), 1e4)];
+    let inverse_variance = vec![Array2::from_elem((SIDE, SIDE), 1e4)];
     let prior = LearnedDenoiser::shipped().unwrap();
     let recorded = Recorded {
         operator: &TwoBlurs,
         light: &light,
-        trust: &trust,
+        inverse_variance: &inverse_variance,
         prior: &prior,
     };
     let db = |planes: &Planes| {

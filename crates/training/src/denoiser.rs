@@ -5,7 +5,7 @@ use std::path::Path;
 use metalith_core::{Progress, Result};
 
 use crate::examples::Photographs;
-use crate::learning::{Lessons, Sample, TrainingReport, TrainingSpec, learn, psnr_db};
+use crate::learning::{Sample, TrainingReport, TrainingSet, TrainingSpec, learn, psnr_db};
 use metalith_prior::NetworkDenoiser;
 use metalith_prior::parts::{Network, Size, input};
 
@@ -31,7 +31,7 @@ pub fn train(
     learn(photographs, spec, out, state, progress)
 }
 
-impl Lessons for Photographs {
+impl TrainingSet for Photographs {
     fn size(&self) -> Size {
         Size::DENOISER
     }
@@ -40,7 +40,7 @@ impl Lessons for Photographs {
         serde_json::json!({ "spec": spec, "photographs": self.digest() })
     }
 
-    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Sample {
+    fn sample(&self, spec: &TrainingSpec, k: u64) -> Sample {
         let example = self.example(spec.piece, spec.seed, k);
         let mean = example.deviation.mean().unwrap_or(EQUAL);
         Sample {
@@ -83,7 +83,7 @@ mod tests {
             seed: 5,
             ..TrainingSpec::default()
         };
-        gradients_hold(Size::DENOISER, || photographs().lesson(&spec, 9));
+        gradients_hold(Size::DENOISER, || photographs().sample(&spec, 9));
     }
 
     #[test]

@@ -68,7 +68,7 @@ pub(crate) struct Sample {
 }
 
 /// What is learnt from.
-pub(crate) trait Lessons: Sync {
+pub(crate) trait TrainingSet: Sync {
     /// Of the network that is taught.
     fn size(&self) -> Size;
 
@@ -76,7 +76,7 @@ pub(crate) trait Lessons: Sync {
     fn origin(&self, spec: &TrainingSpec) -> serde_json::Value;
 
     /// Example number `k`, with pieces and seed of a specification: the same whatever was drawn before.
-    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Sample;
+    fn sample(&self, spec: &TrainingSpec, k: u64) -> Sample;
 
     /// Mean peak signal to noise ratio of what is held out (dB).
     fn held_out(&self, network: Network) -> f64;
@@ -115,7 +115,7 @@ impl TrainingSpec {
 /// # Errors
 /// If the state is of another training, files cannot be written, or the user stopped it.
 pub(crate) fn learn(
-    lessons: &dyn Lessons,
+    lessons: &dyn TrainingSet,
     spec: &TrainingSpec,
     out: &Path,
     state: &Path,
@@ -194,12 +194,12 @@ fn begun(plan: &Plan, seed: u64) -> Vec<f32> {
 }
 
 /// Loss and gradient of a step: those of its pieces, added up in their order.
-fn step(lessons: &dyn Lessons, spec: &TrainingSpec, plan: &Plan, at: &Checkpoint) -> (f64, Vec<f32>) {
+fn step(lessons: &dyn TrainingSet, spec: &TrainingSpec, plan: &Plan, at: &Checkpoint) -> (f64, Vec<f32>) {
     let network = Network::for_learning(plan, &at.weights);
     let first = at.step * spec.batch as u64;
     let pieces: Vec<(f64, Vec<f32>)> = (0..spec.batch as u64)
         .into_par_iter()
-        .map(|k| loss(&network, lessons.lesson(spec, first + k)))
+        .map(|k| loss(&network, lessons.sample(spec, first + k)))
         .collect();
     let share = 1.0 / spec.batch as f32;
     let mut sum = vec![0.0; plan.weights()];
@@ -210,16 +210,16 @@ fn step(lessons: &dyn Lessons, spec: &TrainingSpec, plan: &Plan, at: &Checkpoint
 }
 
 /// Mean squared error of an example by its weight, and its gradient.
-fn loss(network: &Network, lesson: Sample) -> (f64, Vec<f32>) {
-    let (answer, trace) = network.traced(lesson.input);
+fn loss(network: &Network, sample: Sample) -> (f64, Vec<f32>) {
+    let (answer, trace) = network.traced(sample.input);
     let found = answer.shuffled();
-    let share = lesson.weight / lesson.clean.len() as f32;
+    let share = sample.weight / sample.clean.len() as f32;
     let mut sum = 0.0;
     let mut back = Features::zero(COLOURS, found.rows, found.columns);
     for c in 0..COLOURS {
         let (picture, clean) = (
-            lesson.picture.index_axis(Axis(2), c),
-            lesson.clean.index_axis(Axis(2), c),
+            sample.picture.index_axis(Axis(2), c),
+            sample.clean.index_axis(Axis(2), c),
         );
         for (y, (picture, clean)) in picture.rows().into_iter().zip(clean.rows()).enumerate() {
             let row = found.row(c, y).iter().zip(picture.iter().zip(clean));
@@ -246,12 +246,12 @@ pub(crate) mod tests {
     use super::*;
 
     /// That the gradient of every layer is what difference quotients say, on one example.
-    pub fn gradients_hold(size: Size, lesson: impl Fn() -> Sample) {
+    pub fn gradients_hold(size: Size, sample: impl Fn() -> Sample) {
         /// A difference quotient in single precision of a loss of some thousand terms.
         const QUOTIENT: f64 = 0.02;
         let plan = Plan::new(size);
         let weights: Vec<f32> = begun(&plan, 3).iter().map(|w| 1.5 * w).collect();
-        let (_, gradient) = loss(&Network::for_learning(&plan, &weights), lesson());
+        let (_, gradient) = loss(&Network::for_learning(&plan, &weights), sample());
         // Along a direction in every layer: each must have its share of the gradient.
         for layer in &plan.layers {
             let range = layer.start..layer.start + layer.shape.weights();
@@ -264,7 +264,7 @@ pub(crate) mod tests {
                 for k in range.clone() {
                     weights[k] += sign * step * gradient[k] / norm;
                 }
-                loss(&Network::for_learning(&plan, &weights), lesson()).0
+                loss(&Network::for_learning(&plan, &weights), sample()).0
             };
             let quotient = (moved(1.0) - moved(-1.0)) / f64::from(2.0 * step);
             let found = f64::from(norm);

@@ -25,7 +25,7 @@ pub fn train_post_processor(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learning::Lessons;
+    use crate::learning::TrainingSet;
     use crate::learning::tests::{gradients_hold, picture};
     use crate::stacks::Stack;
     use metalith_core::Silent;
@@ -42,13 +42,13 @@ mod tests {
             let grey = Array3::from_shape_fn(clean.dim(), |(y, x, _)| clean[[y, x, 1]]);
             Stack::new(&[dark, grey], &clean).unwrap()
         };
-        let taught = Provenance {
+        let provenance = Provenance {
             kind: "test".into(),
             camera: "none".into(),
             pictures: 2,
             optics: Some("light".into()),
         };
-        Stacks::new((0..count).map(stack).collect(), taught, PIECE).unwrap()
+        Stacks::new((0..count).map(stack).collect(), provenance, PIECE).unwrap()
     }
 
     fn spec(steps: u64) -> TrainingSpec {
@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn gradients_are_those_of_differences() {
         let stacks = stacks(3);
-        gradients_hold(stacks.size(), || stacks.lesson(&spec(1), 7));
+        gradients_hold(stacks.size(), || stacks.sample(&spec(1), 7));
     }
 
     #[test]
@@ -87,7 +87,7 @@ mod tests {
         assert!(bytes == again, "weights depend on the number of threads");
         assert!(one - begun > LEAST_GAIN_DB, "{begun} {one}");
         let post_processor = PostProcessor::read(&folder.path().join("one")).unwrap();
-        assert_eq!(post_processor.taught(), stacks.taught());
+        assert_eq!(post_processor.provenance(), stacks.provenance());
         // Sides that are no multiples of eight come back as they were.
         let odd = picture(1, 45);
         assert_eq!(

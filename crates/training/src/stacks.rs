@@ -16,7 +16,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 
 use crate::examples::is_held_out;
-use crate::learning::{Lessons, Sample, TrainingSpec, psnr_db};
+use crate::learning::{Sample, TrainingSet, TrainingSpec, psnr_db};
 
 /// Longest file of the pictures of a frame (bytes).
 const LONGEST: u64 = 4 << 30;
@@ -124,7 +124,7 @@ fn digest(bytes: &[Vec<u8>; 2], of: &str) -> String {
 pub struct Stacks {
     learnt: Vec<Stack>,
     held_out: Vec<Stack>,
-    taught: Provenance,
+    provenance: Provenance,
 }
 
 impl Stacks {
@@ -146,15 +146,15 @@ impl Stacks {
     ///
     /// # Errors
     /// If there are fewer than two, one has another number of pictures, or is smaller than a piece.
-    pub fn new(stacks: Vec<Stack>, taught: Provenance, piece: usize) -> Result<Self> {
+    pub fn new(stacks: Vec<Stack>, provenance: Provenance, piece: usize) -> Result<Self> {
         let least = |axis: usize| stacks.iter().map(|s| s.size()[axis]).min().unwrap_or(0);
         Self::check(stacks.len(), [least(0), least(1)], piece)?;
-        if let Some(other) = stacks.iter().find(|s| s.pictures() != taught.pictures) {
+        if let Some(other) = stacks.iter().find(|s| s.pictures() != provenance.pictures) {
             return Err(Error::invalid(
                 format!(
                     "{} pictures of a frame, and {} of others",
                     other.pictures(),
-                    taught.pictures
+                    provenance.pictures
                 ),
                 "give as many of each frame",
             ));
@@ -169,13 +169,13 @@ impl Stacks {
         Ok(Self {
             learnt,
             held_out,
-            taught,
+            provenance,
         })
     }
 
     /// What the network is taught for.
-    pub fn taught(&self) -> &Provenance {
-        &self.taught
+    pub fn provenance(&self) -> &Provenance {
+        &self.provenance
     }
 
     /// SHA-256 of all pixels.
@@ -189,16 +189,16 @@ impl Stacks {
     }
 }
 
-impl Lessons for Stacks {
+impl TrainingSet for Stacks {
     fn size(&self) -> Size {
-        Size::post_processor(self.taught.pictures)
+        Size::post_processor(self.provenance.pictures)
     }
 
     fn origin(&self, spec: &TrainingSpec) -> serde_json::Value {
-        serde_json::json!({ "spec": spec, STAGE: self.taught, "pictures": self.digest() })
+        serde_json::json!({ "spec": spec, STAGE: self.provenance, "pictures": self.digest() })
     }
 
-    fn lesson(&self, spec: &TrainingSpec, k: u64) -> Sample {
+    fn sample(&self, spec: &TrainingSpec, k: u64) -> Sample {
         let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
         random.set_stream(k);
         let stack = &self.learnt[random.random_range(0..self.learnt.len())];
@@ -219,7 +219,7 @@ impl Lessons for Stacks {
     }
 
     fn held_out(&self, network: Network) -> f64 {
-        let post_processor = PostProcessor::of_network(network, self.taught.clone());
+        let post_processor = PostProcessor::of_network(network, self.provenance.clone());
         let all = self.held_out.iter().map(|stack| {
             let found = post_processor.corrected(&stack.pictures.mapv(f16::to_f32));
             psnr_db(&found, &stack.clean.mapv(f16::to_f32))

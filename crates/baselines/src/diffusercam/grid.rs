@@ -180,8 +180,8 @@ impl CoarseGrid {
     }
 
     /// Mean variance of the light of a square, for how much each pixel is to be trusted.
-    pub fn variance(&self, trust: &Array2<f32>) -> f64 {
-        let known = trust.iter().filter(|t| **t > 0.0);
+    pub fn variance(&self, inverse_variance: &Array2<f32>) -> f64 {
+        let known = inverse_variance.iter().filter(|t| **t > 0.0);
         let (sum, count) = known.fold((0.0, 0.0), |(s, n), t| (s + 1.0 / f64::from(*t), n + 1.0));
         sum / f64::max(count, 1.0) / self.places.len() as f64
     }

@@ -172,7 +172,7 @@ impl DiffuserCam {
 
     /// By descent, sent light of each channel.
     fn sent_by(&self, frame: &Frame, descents: &[Descent], progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
-        let (_, trust) = frame.light(&self.bench.camera, &self.error);
+        let (_, inverse_variance) = frame.light(&self.bench.camera, &self.error);
         let light = frame.recorded_light(&self.bench.camera);
         let rounds: usize = descents.iter().map(|d| d.rounds).sum();
         progress.begin("restoring by total variation", (rounds * light.len()) as u64);
@@ -180,10 +180,10 @@ impl DiffuserCam {
         let one = |descent: &Descent| {
             light
                 .par_iter()
-                .zip(&trust)
+                .zip(&inverse_variance)
                 .zip(&self.solvers)
-                .map(|((light, trust), solver)| {
-                    let variance = solver.grid().variance(trust);
+                .map(|((light, inverse_variance), solver)| {
+                    let variance = solver.grid().variance(inverse_variance);
                     let found = solver.solve(&solver.grid().data(light), variance, *descent, progress)?;
                     Ok(on_scene(&found, step, &self.bench.view))
                 })

@@ -2,7 +2,7 @@
 //!
 //! A restoration by Tikhonov's method is linear. Of each frequency of a scene, in each cell of the field and each plane of colour,
 //! it loses a share of the power; what it makes of noise comes to that, whatever power the scene has. Both are found on one random
-//! scene ([`crate::Rehearsal`]). The shares times the power that scenes have, and the noise of as much light as they have, are the
+//! scene ([`crate::ForecastScene`]). The shares times the power that scenes have, and the noise of as much light as they have, are the
 //! expected error.
 
 mod bands;

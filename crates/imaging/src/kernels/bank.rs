@@ -18,11 +18,11 @@ pub(crate) const SMALL_UM: f64 = 150.0;
 pub struct BankSpec {
     /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
-    /// Pixels an axis of a kernel, even. What lands outside is the veil's.
+    /// Pixels an axis of a kernel, even. What lands outside is the stray light's.
     pub window: usize,
     /// Places an axis of the field of each element, odd, at which kernels are formed.
     pub nodes: usize,
-    /// From the element's axis to the last of these places (um): light whose chief ray lands farther off is the veil's.
+    /// From the element's axis to the last of these places (um): light whose chief ray lands farther off is the stray light's.
     pub reach_um: f64,
     /// Fields of all elements to 1e-5 of the matched peak, those of small lenses always, instead of to 1e-3; see [`metalith_wave::Accuracy`].
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

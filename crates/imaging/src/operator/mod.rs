@@ -2,7 +2,7 @@
 //!
 //! Each element samples the scene on the pixels of its sub-image. Each node of its kernels takes its share of that, by
 //! weights over the field, and spreads it by its kernel, through transforms of small squares. Sub-images add up where they
-//! overlap; light that no kernel holds is laid over the frame by the veil.
+//! overlap; light that no kernel holds is laid over the frame by the stray light.
 //!
 //! | question | file |
 //! | --- | --- |
@@ -53,7 +53,7 @@ pub struct FrameOperator<'a> {
     channels: usize,
     inputs: SceneInputs,
     elements: Vec<ElementOperator<'a>>,
-    veil: Cow<'a, StrayLight>,
+    stray_light: Cow<'a, StrayLight>,
     smoothing: Smoothing,
 }
 
@@ -62,7 +62,7 @@ impl<'a> FrameOperator<'a> {
     /// memory.
     pub fn new(
         bank: &'a KernelBank,
-        veil: &'a StrayLight,
+        stray_light: &'a StrayLight,
         elements: &[ElementView],
         camera: &Camera,
         space: &SceneSpace,
@@ -88,9 +88,9 @@ impl<'a> FrameOperator<'a> {
             view: *view,
             frame: [sensor.rows as usize, sensor.columns as usize],
             channels: bank.channel_um.len(),
-            veil: match &detail.inputs {
-                SceneInputs::Spectra(_) => Cow::Borrowed(veil),
-                SceneInputs::Channels(spectra) => Cow::Owned(veil.grey(spectra.clone())),
+            stray_light: match &detail.inputs {
+                SceneInputs::Spectra(_) => Cow::Borrowed(stray_light),
+                SceneInputs::Channels(spectra) => Cow::Owned(stray_light.grey(spectra.clone())),
             },
             inputs: detail.inputs,
             elements,
@@ -108,25 +108,25 @@ impl<'a> FrameOperator<'a> {
         self.frame
     }
 
-    fn add_veil(&self, scene: &[Array2<f32>], frames: &mut [Array2<f32>]) {
+    fn add_stray_light(&self, scene: &[Array2<f32>], frames: &mut [Array2<f32>]) {
         let gathered: Vec<Vec<f64>> = scene
             .par_iter()
             .map(|p| stray_light::gather(&self.view, p.view()))
             .collect();
         frames.par_iter_mut().enumerate().for_each(|(channel, frame)| {
-            let mut cells = vec![0.0; self.veil.cells[0] * self.veil.cells[1]];
+            let mut cells = vec![0.0; self.stray_light.cells[0] * self.stray_light.cells[1]];
             for (input, light) in gathered.iter().enumerate() {
-                if let Some(basis) = self.veil_basis(channel, input) {
-                    let own = self.veil.apply(channel, basis, light);
+                if let Some(basis) = self.stray_light_basis(channel, input) {
+                    let own = self.stray_light.apply(channel, basis, light);
                     cells.iter_mut().zip(own).for_each(|(c, v)| *c += v);
                 }
             }
-            stray_light::lay(&cells, self.veil.cells, frame);
+            stray_light::lay(&cells, self.stray_light.cells, frame);
         });
     }
 
-    /// Which spectrum of the veil takes an input to a channel.
-    fn veil_basis(&self, channel: usize, input: usize) -> Option<usize> {
+    /// Which spectrum of the stray light takes an input to a channel.
+    fn stray_light_basis(&self, channel: usize, input: usize) -> Option<usize> {
         match &self.inputs {
             SceneInputs::Spectra(spectra) => Some(spectra.start + input),
             SceneInputs::Channels(_) => (channel == input).then_some(0),
@@ -209,7 +209,7 @@ impl FrameModel for FrameOperator<'_> {
             image.add_to(&mut frames);
         }
         if stray_light {
-            self.add_veil(scene, &mut frames);
+            self.add_stray_light(scene, &mut frames);
         }
         frames
     }
@@ -235,13 +235,13 @@ impl FrameModel for FrameOperator<'_> {
         if stray_light {
             let lifted: Vec<Vec<f64>> = frames
                 .par_iter()
-                .map(|f| stray_light::lift(f, self.veil.cells))
+                .map(|f| stray_light::lift(f, self.stray_light.cells))
                 .collect();
             planes.par_iter_mut().enumerate().for_each(|(input, plane)| {
                 let mut cells = vec![0.0; stray_light::SCENE_CELLS * stray_light::SCENE_CELLS];
                 for (channel, light) in lifted.iter().enumerate() {
-                    if let Some(basis) = self.veil_basis(channel, input) {
-                        let own = self.veil.adjoint(channel, basis, light);
+                    if let Some(basis) = self.stray_light_basis(channel, input) {
+                        let own = self.stray_light.adjoint(channel, basis, light);
                         cells.iter_mut().zip(own).for_each(|(c, v)| *c += v);
                     }
                 }

@@ -8,7 +8,7 @@ use metalith_core::{Error, Result};
 use metalith_imaging::SceneView;
 use metalith_prior::Provenance;
 
-use crate::comparison::{Lensless, OpenLineup};
+use crate::comparison::{Lensless, OpenComparison};
 use crate::stage::{Stage, StageKind, camera_digest};
 
 /// A camera of the table that a last stage can follow.
@@ -22,17 +22,17 @@ pub(crate) struct Followed {
 
 impl Followed {
     /// Whether a last stage was taught for it. One that does not say what the layout did to light is taken at its word.
-    fn is_of(&self, kind: StageKind, taught: &Provenance) -> bool {
-        self.is_like(kind, taught) && (taught.optics.is_none() || taught.optics == self.optics)
+    fn is_of(&self, kind: StageKind, provenance: &Provenance) -> bool {
+        self.is_like(kind, provenance) && (provenance.optics.is_none() || provenance.optics == self.optics)
     }
 
     /// The same whatever the layout does to light.
-    fn is_like(&self, kind: StageKind, taught: &Provenance) -> bool {
-        self.kinds.contains(&kind) && self.camera == taught.camera
+    fn is_like(&self, kind: StageKind, provenance: &Provenance) -> bool {
+        self.kinds.contains(&kind) && self.camera == provenance.camera
     }
 }
 
-impl OpenLineup<'_> {
+impl OpenComparison<'_> {
     /// What a last stage must be taught for to follow camera `k` of the table, counted without those that have the assumptions of
     /// others: no stage follows these.
     pub(crate) fn followed(&self, k: usize) -> Result<Followed> {
@@ -70,16 +70,16 @@ impl OpenLineup<'_> {
         for (stage, path) in self.stages.iter().zip(&self.of.learnt) {
             let refused = |what: String, hint: &str| Err(Error::invalid(format!("{}: {what}", path.display()), hint));
             let kind = stage.kind.name();
-            if !seen.insert((kind, &stage.taught().camera)) {
+            if !seen.insert((kind, &stage.provenance().camera)) {
                 return refused(
                     format!("a second last stage `{kind}` for one camera"),
                     "compare them one after the other",
                 );
             }
-            if followed.iter().any(|f| f.is_of(stage.kind, stage.taught())) {
+            if followed.iter().any(|f| f.is_of(stage.kind, stage.provenance())) {
                 continue;
             }
-            let why = match followed.iter().any(|f| f.is_like(stage.kind, stage.taught())) {
+            let why = match followed.iter().any(|f| f.is_like(stage.kind, stage.provenance())) {
                 true => {
                     "for this layout with other materials, another cell, polarisation, analyser or wavelengths of its design"
                 }
@@ -95,7 +95,7 @@ impl OpenLineup<'_> {
 
     /// What is to be known of the last stages that are used: those of arrays whose weights do not say what the layout did to light.
     pub fn notes(&self) -> Vec<String> {
-        let silent = |stage: &Stage| stage.kind.is_of_design() && stage.taught().optics.is_none();
+        let silent = |stage: &Stage| stage.kind.is_of_design() && stage.provenance().optics.is_none();
         let all = self.stages.iter().zip(&self.of.learnt);
         all.filter(|(stage, _)| silent(stage))
             .map(|(_, path)| {
@@ -113,7 +113,7 @@ impl OpenLineup<'_> {
             return Ok(Vec::new());
         }
         let followed = self.followed(k)?;
-        let fits = |stage: &&Stage| followed.is_of(stage.kind, stage.taught());
+        let fits = |stage: &&Stage| followed.is_of(stage.kind, stage.provenance());
         Ok(self.stages.iter().filter(fits).cloned().collect())
     }
 }
@@ -130,19 +130,21 @@ mod tests {
     fn last_stages_know_what_their_layout_does_to_light() {
         let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights/multi-wiener.safetensors");
         let shipped = Stage::read(&weights).unwrap();
-        let before = shipped.taught();
+        let before = shipped.provenance();
         assert_eq!(before.optics, None);
         let camera = Followed {
             camera: before.camera.clone(),
             optics: Some("nitride".into()),
             kinds: vec![StageKind::MultiWiener],
         };
-        let taught = |optics: &str| Provenance {
+        let provenance = |optics: &str| Provenance {
             optics: Some(optics.into()),
             ..before.clone()
         };
-        assert!(camera.is_of(shipped.kind, before) && camera.is_of(shipped.kind, &taught("nitride")));
-        assert!(!camera.is_of(shipped.kind, &taught("oxide")) && camera.is_like(shipped.kind, &taught("oxide")));
+        assert!(camera.is_of(shipped.kind, before) && camera.is_of(shipped.kind, &provenance("nitride")));
+        assert!(
+            !camera.is_of(shipped.kind, &provenance("oxide")) && camera.is_like(shipped.kind, &provenance("oxide"))
+        );
         assert!(!camera.is_like(StageKind::Blending, before));
     }
 }

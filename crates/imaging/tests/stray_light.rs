@@ -7,7 +7,7 @@ use metalith_design::{Design, cell_models};
 use metalith_wave::propagation::{LandingGrid, LocalAngularSpectrum, leaving};
 use metalith_wave::{Accuracy, FoldedPropagator, Pillars, PlaneWave, Psf, Scratch, Window};
 
-/// Squares of the veil: 16 pixels of 5.86 um.
+/// Squares of the stray light: 16 pixels of 5.86 um.
 const CELL_UM: f64 = 93.76;
 /// Distances of the squares from where the image is, along x and along the diagonal: beyond the window of a kernel, which has half
 /// an edge of 188 um, up to the neighbouring element's place (squares).
@@ -16,13 +16,13 @@ const STEPS: [i32; 5] = [3, 4, 6, 9, 14];
 /// by together, and root mean square over them in parts of their mean. Along the axis it is 0.015 and 0.051 at most. At 24
 /// degrees 0.03 and 0.15: light of a tile that leaves obliquely is bent too little on its way.
 const DIRECTIONS: [(f64, f64, f64); 2] = [(0.0, 0.02, 0.1), (0.4, 0.035, 0.2)];
-/// As the veil of pictures has them.
+/// As the stray light of pictures has them.
 const BLOCKS: usize = 20;
 
 /// An element of 1 mm that looks ahead, and one that is steered by 15 degrees along y.
 #[test]
 #[ignore = "second tier: fields of elements of 1 mm, some minutes"]
-fn the_veil_of_an_element_is_that_of_its_field() {
+fn the_stray_light_of_an_element_is_that_of_its_field() {
     let design = Design::read("../../designs/prototype_3x3.toml".as_ref()).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let cells = cell_models(&design, &[Fidelity::Rigorous]).unwrap();

@@ -1,4 +1,4 @@
-//! Where kernels and veil are kept between runs.
+//! Where kernels and stray light are kept between runs.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use metalith_core::{Progress, Result};
 /// Folder of kernels within that of a plan.
 const KERNELS: &str = "kernels";
 
-/// Where kernels and veil are kept between runs.
+/// Where kernels and stray light are kept between runs.
 #[derive(Clone, Debug)]
 pub struct KernelCache {
     /// Nowhere, if left out.
@@ -66,7 +66,7 @@ impl KernelCache {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cache;
+    use crate::cache_file;
     use crate::stray_light::StrayLight;
     use metalith_sensor::Camera;
     use std::sync::Mutex;
@@ -91,19 +91,19 @@ mod tests {
         let file = place.path().join("file");
         std::fs::write(&file, "").unwrap();
         let sensor = Camera::three_bands(5.86).sensor;
-        let veil = StrayLight::none(&sensor, 1, 1);
-        let write = |folder: &Path| cache::keep_veil(folder, b"inputs", &veil);
+        let stray_light = StrayLight::none(&sensor, 1, 1);
+        let write = |folder: &Path| cache_file::cache_stray_light(folder, b"inputs", &stray_light);
         let listener = Listener(Mutex::default());
         let asked = KernelCache::made(&file);
-        assert!(asked.keep("the veil is", write, &listener).is_err());
+        assert!(asked.keep("the stray light is", write, &listener).is_err());
         let of_user = KernelCache {
             folder: asked.folder.clone(),
             ..KernelCache::of_user()
         };
-        of_user.keep("the veil is", write, &listener).unwrap();
+        of_user.keep("the stray light is", write, &listener).unwrap();
         let notes = listener.0.into_inner().unwrap();
         assert!(
-            notes.len() == 1 && notes[0].starts_with("the veil is not kept: "),
+            notes.len() == 1 && notes[0].starts_with("the stray light is not kept: "),
             "{notes:?}"
         );
     }

@@ -1,4 +1,4 @@
-//! Kernels and veils that are kept on the disk between runs, by the digests of all that they follow from.
+//! Kernels and stray light that are kept on the disk between runs, by the digests of all that they follow from.
 //!
 //! The content of a kept file ([`metalith_cell::kept`]) is JSON of what is small, its length before it (u32), and the
 //! numbers (f32), all little-endian.
@@ -16,7 +16,7 @@ use crate::layout::PillarCount;
 use crate::stray_light::{LightShares, SCENE_CELLS, StrayLight};
 
 const BANK_MAGIC: [u8; 8] = *b"MLKERN\0\x02";
-const VEIL_MAGIC: [u8; 8] = *b"MLVEIL\0\x05";
+const STRAY_LIGHT_MAGIC: [u8; 8] = *b"MLVEIL\0\x06";
 const PILLARS_MAGIC: [u8; 8] = *b"MLPILL\0\x01";
 /// Longest kept file (bytes): the numbers, and some megabytes for what is said of them, a few bytes for each place and element.
 const LONGEST: u64 = MOST_BYTES + (64 << 20);
@@ -41,7 +41,7 @@ struct DistinctHead {
 }
 
 #[derive(Serialize, Deserialize)]
-struct VeilHead {
+struct StrayLightHead {
     cells: [usize; 2],
     channels: usize,
     bases: usize,
@@ -128,7 +128,7 @@ fn read<T>(
 }
 
 /// The bank that was kept for these inputs in a folder; none if there is none that can be used.
-pub fn kept_bank(folder: &Path, inputs: &[u8]) -> Option<KernelBank> {
+pub fn cached_bank(folder: &Path, inputs: &[u8]) -> Option<KernelBank> {
     read(&file_of(folder, "kernels", inputs), BANK_MAGIC, inputs, |content| {
         let head: BankHead = content.head()?;
         let turn = |(of, place): &(usize, usize)| Some((*of, *Symmetry::ALL.get(*place)?));
@@ -154,7 +154,7 @@ pub fn kept_bank(folder: &Path, inputs: &[u8]) -> Option<KernelBank> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn keep_bank(folder: &Path, inputs: &[u8], bank: &KernelBank) -> Result<()> {
+pub fn cache_bank(folder: &Path, inputs: &[u8], bank: &KernelBank) -> Result<()> {
     let pairs = |all: &[(usize, Symmetry)]| all.iter().map(|(of, turn)| (*of, place(*turn))).collect::<Vec<_>>();
     let head = BankHead {
         spec: bank.spec,
@@ -179,10 +179,10 @@ pub fn keep_bank(folder: &Path, inputs: &[u8], bank: &KernelBank) -> Result<()> 
     write(&file_of(folder, "kernels", inputs), BANK_MAGIC, inputs, &head, &numbers)
 }
 
-/// The veil that was kept for these inputs in a folder; none if there is none that can be used.
-pub fn kept_veil(folder: &Path, inputs: &[u8]) -> Option<StrayLight> {
-    read(&file_of(folder, "veil", inputs), VEIL_MAGIC, inputs, |content| {
-        let head: VeilHead = content.head()?;
+/// The stray light that was kept for these inputs in a folder; none if there is none that can be used.
+pub fn cached_stray_light(folder: &Path, inputs: &[u8]) -> Option<StrayLight> {
+    read(&file_of(folder, "veil", inputs), STRAY_LIGHT_MAGIC, inputs, |content| {
+        let head: StrayLightHead = content.head()?;
         let sizes = [head.cells[0], head.cells[1], head.channels, head.bases];
         let size = sizes.iter().try_fold(SCENE_CELLS.pow(2), |n, m| n.checked_mul(*m))?;
         Some(StrayLight {
@@ -195,28 +195,28 @@ pub fn kept_veil(folder: &Path, inputs: &[u8]) -> Option<StrayLight> {
     })
 }
 
-/// Keep a veil.
+/// Keep a stray light.
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn keep_veil(folder: &Path, inputs: &[u8], veil: &StrayLight) -> Result<()> {
-    let head = VeilHead {
-        cells: veil.cells,
-        channels: veil.channels,
-        bases: veil.bases,
-        budget: veil.budget.clone(),
+pub fn cache_stray_light(folder: &Path, inputs: &[u8], stray_light: &StrayLight) -> Result<()> {
+    let head = StrayLightHead {
+        cells: stray_light.cells,
+        channels: stray_light.channels,
+        bases: stray_light.bases,
+        budget: stray_light.budget.clone(),
     };
     write(
         &file_of(folder, "veil", inputs),
-        VEIL_MAGIC,
+        STRAY_LIGHT_MAGIC,
         inputs,
         &head,
-        &[&veil.values],
+        &[&stray_light.values],
     )
 }
 
 /// What a layout was counted to have of the pillars of a design; none if that was not kept.
-pub fn kept_pillars(folder: &Path, inputs: &[u8]) -> Option<PillarCount> {
+pub fn cached_pillars(folder: &Path, inputs: &[u8]) -> Option<PillarCount> {
     read(&file_of(folder, "pillars", inputs), PILLARS_MAGIC, inputs, |content| {
         content.head()
     })
@@ -226,7 +226,7 @@ pub fn kept_pillars(folder: &Path, inputs: &[u8]) -> Option<PillarCount> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn keep_pillars(folder: &Path, inputs: &[u8], pillars: &PillarCount) -> Result<()> {
+pub fn cache_pillars(folder: &Path, inputs: &[u8], pillars: &PillarCount) -> Result<()> {
     write(&file_of(folder, "pillars", inputs), PILLARS_MAGIC, inputs, pillars, &[])
 }
 
@@ -263,9 +263,9 @@ mod tests {
     fn what_is_kept_comes_back_and_damage_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let bank = bank();
-        assert!(kept_bank(folder.path(), b"inputs").is_none());
-        keep_bank(folder.path(), b"inputs", &bank).unwrap();
-        let back = kept_bank(folder.path(), b"inputs").unwrap();
+        assert!(cached_bank(folder.path(), b"inputs").is_none());
+        cache_bank(folder.path(), b"inputs", &bank).unwrap();
+        let back = cached_bank(folder.path(), b"inputs").unwrap();
         assert_eq!(
             (back.spec, &back.channel_um, back.bases),
             (bank.spec, &bank.channel_um, 3)
@@ -284,26 +284,30 @@ mod tests {
         let mut damaged = bytes.clone();
         damaged[bytes.len() / 2] ^= 1;
         std::fs::write(&file, damaged).unwrap();
-        assert!(kept_bank(folder.path(), b"inputs").is_none());
+        assert!(cached_bank(folder.path(), b"inputs").is_none());
 
         let sensor = metalith_sensor::Camera::three_bands(5.86).sensor;
-        let mut veil = StrayLight::none(&sensor, 1, 1);
-        veil.values.iter_mut().enumerate().for_each(|(i, v)| *v = i as f32);
-        keep_veil(folder.path(), b"inputs", &veil).unwrap();
-        let back = kept_veil(folder.path(), b"inputs").unwrap();
-        assert!(back.values == veil.values && back.cells == veil.cells);
+        let mut stray_light = StrayLight::none(&sensor, 1, 1);
+        stray_light
+            .values
+            .iter_mut()
+            .enumerate()
+            .for_each(|(i, v)| *v = i as f32);
+        cache_stray_light(folder.path(), b"inputs", &stray_light).unwrap();
+        let back = cached_stray_light(folder.path(), b"inputs").unwrap();
+        assert!(back.values == stray_light.values && back.cells == stray_light.cells);
         // A head that speaks of more numbers than there are.
-        veil.values.pop();
-        keep_veil(folder.path(), b"inputs", &veil).unwrap();
-        assert!(kept_veil(folder.path(), b"inputs").is_none());
+        stray_light.values.pop();
+        cache_stray_light(folder.path(), b"inputs", &stray_light).unwrap();
+        assert!(cached_stray_light(folder.path(), b"inputs").is_none());
 
         let pillars = PillarCount {
             pillars: 7,
             why: "3 off the lattice".into(),
             ..PillarCount::default()
         };
-        keep_pillars(folder.path(), b"inputs", &pillars).unwrap();
-        assert_eq!(kept_pillars(folder.path(), b"inputs"), Some(pillars));
-        assert_eq!(kept_pillars(folder.path(), b"others"), None);
+        cache_pillars(folder.path(), b"inputs", &pillars).unwrap();
+        assert_eq!(cached_pillars(folder.path(), b"inputs"), Some(pillars));
+        assert_eq!(cached_pillars(folder.path(), b"others"), None);
     }
 }

@@ -10,22 +10,22 @@ use metalith_prior::Provenance;
 use metalith_training::Stack;
 
 use crate::baseline_camera::no_stage;
-use crate::comparison::OpenLineup;
+use crate::comparison::OpenComparison;
+use crate::provenance::Followed;
 use crate::stage::{StageKind, encoded};
-use crate::taught_for::Followed;
 
-impl OpenLineup<'_> {
+impl OpenComparison<'_> {
     /// Pictures of all photographs by camera `k` for a last stage, each with its scene, and what is taught by them. Each is kept in a file
     /// of a folder, and taken from there if it is of the same camera, photograph and noise. Camera `k` is counted without assumptions.
     ///
     /// # Errors
     /// If the camera has no such stage or cannot be made ready, a file cannot be written, or the user stopped it.
-    pub fn lessons(
+    pub fn training_stacks(
         &self,
         k: usize,
         kind: StageKind,
         folder: &Path,
-        kept: &KernelCache,
+        cache: &KernelCache,
         progress: &dyn Progress,
     ) -> Result<(Vec<Stack>, Provenance)> {
         let Followed { camera, optics, kinds } = self.followed(k)?;
@@ -34,7 +34,7 @@ impl OpenLineup<'_> {
         }
         let mut stacks = Vec::new();
         let mut pictures = 0;
-        self.ready(k * self.of.kinds(), kept, progress, &mut |contender, _, photographs| {
+        self.ready(k * self.of.kinds(), cache, progress, &mut |ready, _, photographs| {
             progress.begin("pictures to learn from", photographs.len() as u64);
             for (i, (scene, path)) in photographs.iter().zip(&self.of.photographs).enumerate() {
                 if progress.stopped() {
@@ -47,10 +47,10 @@ impl OpenLineup<'_> {
                 let stack = match Stack::kept(&file, &of) {
                     Some(stack) => stack,
                     None => {
-                        let frame = contender.record(scene, seed)?;
-                        let made = contender.pictures(&frame, kind, &Silent)?;
+                        let frame = ready.record(scene, seed)?;
+                        let made = ready.pictures(&frame, kind, &Silent)?;
                         let shown: Vec<_> = made.iter().map(encoded).collect();
-                        let stack = Stack::new(&shown, &encoded(&contender.truth(scene)))?;
+                        let stack = Stack::new(&shown, &encoded(&ready.truth(scene)))?;
                         stack.write(&file, &of)?;
                         stack
                     }
@@ -61,12 +61,12 @@ impl OpenLineup<'_> {
             }
             Ok(())
         })?;
-        let taught = Provenance {
+        let provenance = Provenance {
             kind: kind.name().into(),
             camera,
             pictures,
             optics,
         };
-        Ok((stacks, taught))
+        Ok((stacks, provenance))
     }
 }
