@@ -308,10 +308,10 @@ def test_a_picture_is_of_its_scene(array: ml.Array, tmp_path: Path) -> None:
     camera = tmp_path / "camera.toml"
     camera.write_text(text)
     design = array.design or pytest.fail()
-    studio = ml.ImagingSystem(design, tmp_path / "chip.oas", camera, shape=shape, field_deg=30.0)
+    system = ml.ImagingSystem(design, tmp_path / "chip.oas", camera, shape=shape, field_deg=30.0)
     scene = np.full((*shape, 3), 0.02)
     scene[4:12, 18:28] = 0.9
-    restored, truth = studio.restore(studio.record(scene)), studio.truth(scene)
+    restored, truth = system.restore(system.record(scene)), system.truth(scene)
     assert restored.shape == truth.shape
     # A mirrored, shifted or blurred picture is less like the scene than this.
     assert np.corrcoef(restored.ravel(), truth.ravel())[0, 1] > 0.8

@@ -4,6 +4,7 @@ mod calibrate;
 mod camera_args;
 mod cells;
 mod check;
+#[cfg(feature = "baselines")]
 mod compare;
 mod compensated;
 mod completions;
@@ -28,6 +29,7 @@ mod shipped_designs;
 mod standard_input;
 mod study;
 mod terminal;
+#[cfg(feature = "training")]
 mod train;
 mod verify;
 
@@ -87,8 +89,10 @@ enum Command {
     Picture(picture::PictureArgs),
     Restore(restore::RestoreArgs),
     Dataset(dataset::DatasetArgs),
+    #[cfg(feature = "training")]
     Train(train::TrainArgs),
     Denoise(denoise::DenoiseArgs),
+    #[cfg(feature = "baselines")]
     Compare(compare::CompareArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
@@ -187,8 +191,10 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
             "use `picture` for one scene, `compare` for a table of many photographs and several designs",
         )),
         Command::Dataset(args) => dataset::run(args, terminal),
+        #[cfg(feature = "training")]
         Command::Train(args) => train::run(args, terminal),
         Command::Denoise(args) => denoise::run(args, terminal),
+        #[cfg(feature = "baselines")]
         Command::Compare(args) => compare::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
         Command::Restore(args) => restore::run(args, terminal),

@@ -1,4 +1,4 @@
-//! Where all the light of an element lands on the sensor's plane, coarsely: its veil as well as its image.
+//! Where all the light of an element lands on the sensor's plane, coarsely: its stray light as well as its image.
 //!
 //! The aperture is cut into overlapping tiles whose squared windows add up to one everywhere, so that no power is
 //! lost or counted twice. A tile is bent towards the plane before it is transformed: its spectrum then says how much power
