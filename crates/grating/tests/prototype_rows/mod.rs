@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use metalith_cell::{CellModel, PointwiseCell};
+use metalith_cell::{CellModel, CellResponse, Illumination, JonesTables, PointwiseCell};
 use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarRule};
@@ -88,7 +88,11 @@ impl Prototype {
         let as_lit = if along_normal {
             [normal.clone(), normal.clone()]
         } else {
-            equal.oblique(um, sines, widest).unwrap().unwrap().kept
+            let light = Illumination::from_direction(um, sines).oblique();
+            match equal.response(&light, widest, &Silent).unwrap() {
+                CellResponse::Jones(JonesTables::Oblique(tables)) => tables.kept,
+                other => panic!("{other:?}"),
+            }
         };
         let normal = [normal.clone(), normal];
         let table = self.neighbours(um, sines);
