@@ -67,9 +67,9 @@ impl fmt::Display for PolarisationAxis {
 }
 
 /// What pillars whose sides are along the axes do to light along x and along y, which keeps its polarisation: transmissions as
-/// those of [`CellModel::transmissions`], by the number of the pillar.
+/// those of [`CellResponse`], by the number of the pillar.
 ///
-/// [`CellModel::transmissions`]: crate::CellModel::transmissions
+/// [`CellResponse`]: crate::CellResponse
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisTables {
     /// The light whose phase is that of the design.
