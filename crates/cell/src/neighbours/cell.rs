@@ -4,7 +4,6 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-
 use metalith_core::{Progress, Result, Silent};
 
 use super::{BandNode, BandResponse, FittedNeighbours, Mapping, NEIGHBOURS, NeighbourTable, NeighbourTableSpec};
