@@ -52,7 +52,7 @@ pub struct TrainArgs {
     #[arg(long, default_value_t = TrainingSpec::default().seed)]
     seed: u64,
 
-    /// Teach the last stage of a camera instead: of the rivals `flatnet` (a mask), `unrolled-diffuser` (a rough surface) and
+    /// Teach the last stage of a camera instead: of the baseline cameras `flatnet` (a mask), `unrolled-diffuser` (a rough surface) and
     /// `multi-wiener` (the array of --design), or `blending`, the picture of one element alone after the other.
     #[arg(long, value_name = "KIND", requires = "camera")]
     stage: Option<StageKind>,
