@@ -69,7 +69,7 @@ pub(super) struct TransmissionTables {
     oblique: HashMap<[u64; 2], ObliqueTables>,
     /// By direction, of a cell that knows unlike neighbours.
     neighbours: HashMap<[u64; 2], Neighbourhood>,
-    /// Whether it is one of many wavelengths of a band.
+    /// True if it is one of many wavelengths of a band.
     in_band: bool,
     /// What the pillars stand on.
     lattice: LatticeKind,

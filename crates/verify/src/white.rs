@@ -47,7 +47,7 @@ impl CameraStatement {
         }
     }
 
-    /// Where the contrast of its channels is told.
+    /// Frequencies at which the contrast of its channels is stated.
     pub fn frequencies(&self) -> PixelFrequencies {
         PixelFrequencies::of(self.pixel_um)
     }
@@ -83,7 +83,7 @@ pub(super) fn wavelengths_um(design: &Design) -> Result<Vec<f64>> {
     Ok(sampling.map_or_else(Vec::new, |s| s.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect()))
 }
 
-/// Where the light of one wavelength lands from a point that an element looks at (um).
+/// Place where the light of one wavelength lands from a point in the viewing direction of an element (um).
 ///
 /// # Errors
 /// As [`Point::landing_um`].
@@ -101,11 +101,11 @@ struct Colour {
     wavelength_um: f64,
     /// |t| of a cell that passes everything.
     full: f64,
-    /// Of a cell, by drawn width; a chip as made has its own by site.
+    /// Transmissions of a cell, by drawn width; a chip as fabricated has its own by site.
     tables: Option<TransmissionTables>,
 }
 
-/// What the elements of a design are simulated with in white light.
+/// Simulator of the elements of a design in white light.
 pub(super) struct WhiteSimulator<'a> {
     design: &'a Design,
     lattice: Lattice,
@@ -213,7 +213,7 @@ impl<'a> WhiteSimulator<'a> {
         self.colours.len()
     }
 
-    /// What the figures are for.
+    /// Statement of the camera that the figures are for.
     pub fn statement(&self) -> CameraStatement {
         CameraStatement::of(&self.camera, &self.sampling)
     }
