@@ -1,4 +1,4 @@
-//! What the rest of the program knows of a cell: complex transmission by width.
+//! Interface of a cell: complex transmission by width.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,7 +11,7 @@ use metalith_pillars::{LatticeKind, PillarShape};
 
 use crate::{BandResponse, FittedNeighbours, PolarisedTables, RotatedCell};
 
-/// How truly a cell is described. Every result names the one it was made with.
+/// Fidelity of the description of a cell. Every result names the one it was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fidelity {
@@ -28,7 +28,7 @@ pub enum Fidelity {
 }
 
 impl Fidelity {
-    /// Those that a design alone has, from the least to the most true.
+    /// Fidelities that a design alone has, from the least to the most true.
     pub const ALL: [Self; 4] = [Self::Published, Self::Fitted, Self::Rigorous, Self::Neighbours];
 
     /// The cell that answers where the width of a pillar is all that is known: neighbours are then taken for equals.
@@ -40,7 +40,8 @@ impl Fidelity {
         }
     }
 
-    /// Why pillars of a shape on such a lattice cannot be judged by it, and what to do instead; none if they can.
+    /// Reason why pillars of a shape on such a lattice cannot be simulated with it, and what to do instead; `None` if
+    /// they can.
     pub fn refusal(self, shape: PillarShape, lattice: LatticeKind) -> Option<(String, &'static str)> {
         let square_lattices_alone = matches!(self, Self::Published | Self::Neighbours);
         let for_rectangles = matches!(self, Self::Rigorous | Self::Calibrated);
@@ -109,14 +110,14 @@ impl FromStr for Fidelity {
 /// mean over those that arrive of the sum over those that leave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObliqueTables {
-    /// What leaves in the polarisation in which it arrived: across the plane of incidence (s), and in it (p).
+    /// Light that leaves in the polarisation in which it arrived: across the plane of incidence (s), and in it (p).
     pub kept: [Vec<Complex64>; 2],
-    /// What arrives as s and leaves as p, and what arrives as p and leaves as s. All zero in planes of symmetry of the
-    /// cell.
+    /// Light that arrives as s and leaves as p, and light that arrives as p and leaves as s. All zero in planes of
+    /// symmetry of the cell.
     pub turned: [Vec<Complex64>; 2],
 }
 
-/// Of light that is not polarised, what arrives in either polarisation.
+/// Share of unpolarised light that arrives in either polarisation.
 pub const POLARISATION_SHARE: f64 = 0.5;
 
 impl ObliqueTables {
@@ -130,14 +131,14 @@ impl ObliqueTables {
 /// Transmissions below this are rounding errors of what symmetry forbids.
 const DARK: f64 = 1e-9;
 
-/// Whether a table passes nothing.
+/// True if a table passes nothing.
 pub fn dark(table: &[Complex64]) -> bool {
     table.iter().all(|t| t.norm() < DARK)
 }
 
-/// How a cell of the lattice passes light into its zero order, by the width of its pillar.
+/// Transmission of a cell of the lattice into its zeroth order, by the width of its pillar.
 pub trait CellModel: Sync {
-    /// What the model is.
+    /// Fidelity of the model.
     fn fidelity(&self) -> Fidelity;
 
     /// Complex transmission of the zero order at one wavelength, with the width (nm) as index from zero
@@ -151,8 +152,8 @@ pub trait CellModel: Sync {
     /// If the wavelength is outside what the model or its materials cover, or a width does not fit.
     fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>>;
 
-    /// The same for one of many wavelengths that a band is averaged over, where a resonance that is off its place by a
-    /// fraction of a nanometre does not show: a model may solve it more coarsely.
+    /// Transmissions for one of many wavelengths that a band is averaged over, where a resonance that is off its place
+    /// by a fraction of a nanometre does not show: a model may solve it more coarsely.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`].
@@ -160,8 +161,8 @@ pub trait CellModel: Sync {
         self.transmissions(wavelength_um, max_width_nm)
     }
 
-    /// Of a cell that tells polarisations apart: what it does to light of both. Its transmissions are of the light that it
-    /// focuses. Nothing of cells that tell none apart.
+    /// Tables of both polarisations, for a cell that distinguishes them. Its transmissions are of the light that it
+    /// focuses. `None` for cells that distinguish none.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`].
@@ -174,7 +175,7 @@ pub trait CellModel: Sync {
         None
     }
 
-    /// As [`CellModel::polarised`], for one of many wavelengths that a band is averaged over.
+    /// Variant of [`CellModel::polarised`] for one of many wavelengths that a band is averaged over.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`].
@@ -182,8 +183,8 @@ pub trait CellModel: Sync {
         self.polarised(wavelength_um, max_width_nm)
     }
 
-    /// The same as [`CellModel::transmissions`] for light that arrives obliquely, by polarisation. `sines` are those of
-    /// the direction in air along x and y.
+    /// Variant of [`CellModel::transmissions`] for light that arrives obliquely, by polarisation. `sines` are the sines
+    /// of the direction in air along x and y.
     ///
     /// Scaled so that |t| of a cell that passes all its power in the zero order is that of
     /// [`CellModel::full_transmission`], as at normal incidence. Nothing if the model knows no angles.
@@ -194,8 +195,8 @@ pub trait CellModel: Sync {
         Ok(None)
     }
 
-    /// As [`CellModel::oblique`], for one of many wavelengths that a band is averaged over; a model may solve it more
-    /// coarsely.
+    /// Variant of [`CellModel::oblique`] for one of many wavelengths that a band is averaged over; a model may solve it
+    /// more coarsely.
     ///
     /// # Errors
     /// As [`CellModel::oblique`].
@@ -203,9 +204,9 @@ pub trait CellModel: Sync {
         self.oblique(wavelength_um, sines, max_width_nm)
     }
 
-    /// What pillars transmit among unlike neighbours, for light that arrives from the direction with these sines in air
-    /// along x and y, x >= y >= 0. Nothing if the model takes all neighbours for
-    /// equals; one that does not gives the answers above as a lattice of equal pillars would.
+    /// Transmission of pillars by the coupled model, for light that arrives from the direction with these sines in air
+    /// along x and y, x >= y >= 0. Nothing if the model takes all neighbours for equals; one that does not gives the
+    /// answers above as a lattice of equal pillars would.
     ///
     /// # Errors
     /// As [`CellModel::transmissions`]; also if no light arrives so steeply, or the user stopped it.
@@ -218,9 +219,9 @@ pub trait CellModel: Sync {
         Ok(None)
     }
 
-    /// The same for one of many wavelengths that a band is averaged over, s and p as one: without a table of its own, between
-    /// the wavelengths that have one. `looks` is the direction that light of a wavelength (um) arrives from, as above. Nothing
-    /// also of a model that knows no wavelengths with tables.
+    /// Variant of [`CellModel::among_neighbours`] for one of many wavelengths that a band is averaged over, s and p as
+    /// one: without a table of its own, between the wavelengths that have one. `looks` is the direction that light of a
+    /// wavelength (um) arrives from, as above. Nothing also of a model that knows no wavelengths with tables.
     ///
     /// # Errors
     /// As [`CellModel::among_neighbours`].

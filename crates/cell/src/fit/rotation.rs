@@ -62,7 +62,7 @@ impl<'a> RotationCurve<'a> {
         Ok(converted * Complex64::cis(-2.0 * rotation))
     }
 
-    /// What the lattice adds to twice a rotation (rad).
+    /// Phase that the lattice adds to twice a rotation (rad).
     ///
     /// # Errors
     /// As [`RotatedCell::response`].
@@ -140,7 +140,8 @@ mod tests {
     use super::super::super::rectangle::tests::{PILLARS, titania};
     use super::*;
 
-    /// What is left of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is 0.014.
+    /// Residual of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is
+    /// 0.014.
     const LEFT: f64 = 0.005;
 
     #[test]
