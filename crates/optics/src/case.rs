@@ -5,12 +5,12 @@ use metalith_core::Result;
 
 use super::AsBuiltChip;
 
-/// What the pillars of a layout are simulated as.
+/// Simulation case of the pillars of a layout.
 #[derive(Clone, Copy)]
 pub enum SimulationCase<'a> {
-    /// As drawn, by a cell; chip, light and sensor are where the design has them.
+    /// Pillars as drawn, by a cell; chip, light and sensor are where the design has them.
     Cell(&'a dyn CellModel),
-    /// As made on a measured line and bench.
+    /// Pillars as fabricated on a measured line and bench.
     Made(&'a AsBuiltChip),
 }
 
@@ -27,7 +27,7 @@ impl<'a> From<&'a AsBuiltChip> for SimulationCase<'a> {
 }
 
 impl SimulationCase<'_> {
-    /// How truly the cell is described.
+    /// Fidelity of the description of the cell.
     pub fn fidelity(&self) -> Fidelity {
         match self {
             Self::Cell(cell) => cell.fidelity(),
@@ -35,7 +35,7 @@ impl SimulationCase<'_> {
         }
     }
 
-    /// Whether what is seen of elements that are alike by a symmetry is alike by it.
+    /// True if images of elements that are equal by a symmetry are equal by it.
     pub fn keeps_symmetry(&self) -> bool {
         match self {
             Self::Cell(_) => true,

@@ -24,25 +24,25 @@ use metalith_wave::{Accuracy, FoldedPropagator, PlaneWave, Propagator, Scratch, 
 pub struct AsBuiltChip {
     model: CalibratedModel,
     cells: RealisedCells,
-    /// Of rectangles, what stands for the cells.
+    /// Rectangles, which stand for the cells where pillars are rectangles.
     rectangles: Option<MadeRectangles>,
 }
 
-/// What a report says of the model that it rests on.
+/// Statement in a report of the model that it rests on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModelStatement {
     /// The session that the model comes from.
     pub set: String,
-    /// What was found there.
+    /// Finding of the calibration.
     pub finding: String,
-    /// What it changes of what is stated.
+    /// Changes by the model to what is stated.
     pub applied: Vec<Applied>,
-    /// What the model says that was not simulated, each with the reason.
+    /// Parts of the model that were not simulated, each with the reason.
     pub not_applied: Vec<NotApplied>,
 }
 
 impl ModelStatement {
-    /// Of simulations at single wavelengths by a model.
+    /// Statement of simulations at single wavelengths by a model.
     pub fn of(model: &CalibratedModel) -> Self {
         Self {
             set: model.set.clone(),
@@ -56,10 +56,10 @@ impl ModelStatement {
 /// One made element in one light: everything between a wave that arrives and the PSF on the sensor.
 pub struct AsBuiltOptics<'a> {
     pub element: &'a AsBuiltElement,
-    /// What sites transmit, as [`SolvedWidths`] has it.
+    /// Transmissions of sites, as [`SolvedWidths`] has them.
     pub tables: Vec<ClassTable>,
-    /// Of the light that arrives, what is in the polarisation of each table. What leaves by different tables does not
-    /// interfere: intensities are added.
+    /// Share of the light that arrives that is in the polarisation of each table. What leaves by different tables does
+    /// not interfere: intensities are added.
     pub share: f64,
     pub light: ArrivingLight,
     /// Added to the distance of the sensor (um).
@@ -90,7 +90,7 @@ impl AsBuiltChip {
         })
     }
 
-    /// The same of pillars in their light, also of those that tell polarisations apart.
+    /// Chip of pillars in their light, also of pillars that distinguish polarisations.
     ///
     /// # Errors
     /// As [`AsBuiltChip::new`]; also if the pillars are no rectangles that focus this, or the model has what rectangles have no meaning for.
@@ -104,8 +104,8 @@ impl AsBuiltChip {
         })
     }
 
-    /// The same whose rectangles, which take longer to solve than pillars of one width, are kept in a folder from one run to the next: see
-    /// [`metalith_cell::cache_folder`].
+    /// Same chip, whose rectangles, which take longer to solve than pillars of one width, are cached in a folder from
+    /// one run to the next: see [`metalith_cell::cache_folder`].
     #[must_use]
     pub fn kept_in(self, folder: Option<&Path>) -> Self {
         Self {
@@ -114,7 +114,7 @@ impl AsBuiltChip {
         }
     }
 
-    /// The same with all cells from a bank of the stated pillar: nothing is solved.
+    /// Same chip with all cells from a bank of the stated pillar: nothing is solved.
     #[must_use]
     pub fn from_bank(self, bank: &Arc<CellBank>) -> Self {
         Self {
@@ -129,7 +129,7 @@ impl AsBuiltChip {
         &self.model.perturbation
     }
 
-    /// As [`CalibratedModel::check_drawn`], of pillars of the chip.
+    /// Check as [`CalibratedModel::check_drawn`], of pillars of the chip.
     ///
     /// # Errors
     /// As [`CalibratedModel::check_drawn`].
@@ -142,7 +142,7 @@ impl AsBuiltChip {
         &self.cells
     }
 
-    /// What to say in a report of simulations at single wavelengths.
+    /// Statement for a report of simulations at single wavelengths.
     pub fn statement(&self) -> ModelStatement {
         ModelStatement::of(&self.model)
     }
@@ -191,7 +191,8 @@ impl AsBuiltChip {
         Ok(self.viewed(element, stated, &solved))
     }
 
-    /// The same along the normal, of pillars that tell polarisations apart in this light instead of that of the chip.
+    /// Variant of [`AsBuiltChip::view`] along the normal, for pillars that distinguish polarisations, in this light
+    /// instead of the chip's.
     ///
     /// # Errors
     /// As [`AsBuiltChip::view`].
@@ -211,8 +212,8 @@ impl AsBuiltChip {
         Ok(self.viewed(element, stated, &solved))
     }
 
-    /// The same for one of many wavelengths that a band is averaged over: cells are solved more coarsely, see
-    /// [`RealisedCells::solve_in_band`].
+    /// Variant of [`AsBuiltChip::view`] for one of many wavelengths that a band is averaged over: cells are solved more
+    /// coarsely, see [`RealisedCells::solve_in_band`].
     ///
     /// # Errors
     /// As [`AsBuiltChip::view`].
@@ -234,7 +235,7 @@ impl AsBuiltChip {
         Ok(self.viewed(element, stated, &solved))
     }
 
-    /// What reaches the sensor behind the classes of rectangles; none of other pillars.
+    /// Light that reaches the sensor behind the classes of rectangles; `None` for other pillars.
     fn passed(
         &self,
         element: &AsBuiltElement,
@@ -252,7 +253,7 @@ impl AsBuiltChip {
         self.through(rectangles, element, colour, &passed, progress).map(Some)
     }
 
-    /// What `leaving` takes of the light behind the classes of rectangles.
+    /// Part of the light behind the classes of rectangles that `leaving` takes.
     fn through(
         &self,
         rectangles: &MadeRectangles,
@@ -294,8 +295,9 @@ impl AsBuiltChip {
 }
 
 impl AsBuiltChip {
-    /// What each class of rectangles transmits along the normal of light whose direction is asked for, for one of many wavelengths of a
-    /// band, each table with how often it has the phase of the element: as [`PolarisedTables::departing`]. None of other pillars.
+    /// Transmission of each class of rectangles along the normal by the direction in which light leaves, for one of
+    /// many wavelengths of a band. Each table has the multiple of the phase of the element in it, as
+    /// [`PolarisedTables::departing`]. None of other pillars.
     ///
     /// # Errors
     /// As [`AsBuiltChip::view`].
@@ -320,8 +322,8 @@ impl AsBuiltChip {
         Ok(Some(view.tables.into_iter().zip(orders.into_inner()).collect()))
     }
 
-    /// What each class of an element transmits along the normal of the light that has the phase of the design, in whatever light the
-    /// chip is simulated.
+    /// Transmission of each class of an element along the normal of the light that has the phase of the design, in
+    /// whatever light the chip is simulated.
     ///
     /// # Errors
     /// As [`AsBuiltChip::view`].
@@ -340,9 +342,9 @@ impl AsBuiltChip {
         Ok(tables.next().expect("light that is focused passes"))
     }
 
-    /// What rectangles with these numbers do to light of both polarisations along the normal, by their number, missing
-    /// pillars and light that sees none mixed in, and the light that they are in; none of other pillars. `density_steps` as for
-    /// [`AsBuiltChip::drawn_widths`].
+    /// Response of rectangles with these numbers to light of both polarisations along the normal, by their number, with
+    /// missing pillars and unmodulated light mixed in, and the light that they are in; `None` for other pillars.
+    /// `density_steps` as for [`AsBuiltChip::drawn_widths`].
     ///
     /// # Errors
     /// As [`AsBuiltChip::view`].
@@ -377,8 +379,8 @@ impl AsBuiltChip {
         Ok(Some((tables, rectangles.polarised)))
     }
 
-    /// What pillars drawn this wide (nm) transmit along the normal where so many steps of density are added to
-    /// their width (see [`super::realised_nm`]), missing pillars and light that sees none mixed in.
+    /// Transmission of pillars drawn this wide (nm) along the normal where so many steps of density are added to their
+    /// width (see [`super::realised_nm`]), with missing pillars and unmodulated light mixed in.
     ///
     /// # Errors
     /// As [`AsBuiltChip::view`].
@@ -456,7 +458,7 @@ impl<'a> AsBuiltOptics<'a> {
             .map(|psf| Psf { window: stated, ..psf })
     }
 
-    /// The same by a propagator of one's own, whose window is at the distance as made.
+    /// PSF by a propagator of the caller's, whose window is at the distance as fabricated.
     ///
     /// # Errors
     /// As [`Propagator::field`].

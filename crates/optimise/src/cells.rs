@@ -12,14 +12,14 @@ use crate::merit::robust::cells_off_height;
 /// Cells that a design is optimised and judged with.
 pub struct TaskCells {
     own: Box<dyn CellModel>,
-    /// If there is a report, and the own one is another.
+    /// Cell of the report, if there is a report and the own cell is another.
     judge: Option<Box<dyn CellModel>>,
     off_height: Vec<RigorousCell>,
 }
 
 impl TaskCells {
-    /// Those that a design names; tables are taken from the folder `cache`, or made and kept there. `report`: also what a
-    /// report judges with.
+    /// Cells that a design names; tables are taken from the folder `cache`, or made and kept there. `report`: also what
+    /// a report judges with.
     ///
     /// # Errors
     /// If a material is not known over the band, unlike neighbours have one table alone, or the user stopped it.
@@ -54,7 +54,7 @@ impl TaskCells {
         Ok(Self { own, judge, off_height })
     }
 
-    /// What is optimised with.
+    /// Cell that is optimised with.
     pub fn own(&self) -> &dyn CellModel {
         self.own.as_ref()
     }
@@ -64,7 +64,7 @@ impl TaskCells {
         self.judge.as_deref().unwrap_or(self.own())
     }
 
-    /// What layouts are judged with: the truest of these.
+    /// Cell that layouts are simulated with: the truest of these.
     pub fn judge(&self) -> &dyn CellModel {
         match self.own.fidelity() {
             Fidelity::Neighbours => self.own(),
@@ -132,7 +132,7 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
     cell.among_neighbours_in_band(band.0, &|_| [0.0; 2], progress)?;
     Ok(cell)
 }
-/// Nothing, if the pillars of a design are such as a phase is found for.
+/// Succeeds if the pillars of a design are such as a phase is found for.
 ///
 /// # Errors
 /// If they are upright rectangles.
