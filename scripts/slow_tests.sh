@@ -6,4 +6,4 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo test --release -p metalith-prior --features onnx --lib onnx
 cargo test --release -p metalith-baselines -p metalith-calibrate -p metalith-optics --lib -- --ignored "$@"
-cargo test --release --test program --test neighbours --test equal_orders --test forward --test veil --test rectangles -- --ignored "$@"
+cargo test --release --test program --test table --test neighbours --test forward --test stray_light --test rectangles -- --ignored "$@"

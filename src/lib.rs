@@ -19,7 +19,7 @@
 //! | [`CellModel`] | [`cell`] | a pillar's width and a wavelength: published, fitted or rigorous |
 //! | [`Propagator`](wave::Propagator) | [`wave`] | transmissions on a lattice: folded, direct, by rings |
 //! | [`Psf`](wave::Psf) | [`wave::psf`] | a field |
-//! | [`ImagingSystem`](imaging::ImagingSystem) | [`imaging`] | a layout, a camera and a scene: a frame, and the picture restored from it |
+//! | [`ImagingSystem`](imaging::ImagingSystem) | [`imaging`], [`restoration`] | a layout, a camera and a scene: a frame, and the picture restored from it |
 //! | [`verify()`] | [`mod@verify`] | a design, its array and the bytes of a layout |
 //! | [`report`] | [`report`] | anything found: one HTML page and one JSON file |
 //!
@@ -84,6 +84,7 @@ extern crate self as metalith;
 pub mod cli;
 mod session;
 
+#[cfg(feature = "baselines")]
 pub use metalith_baselines as baselines;
 pub use metalith_calibrate as calibrate;
 pub use metalith_cell as cell;
@@ -102,8 +103,11 @@ pub use metalith_optimise as optimise;
 pub use metalith_prior as prior;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
+pub use metalith_restoration as restoration;
 pub use metalith_sensor as sensor;
 pub use metalith_study as study;
+#[cfg(feature = "training")]
+pub use metalith_training as training;
 pub use metalith_verify as verify;
 pub use metalith_verify::compensate;
 pub use metalith_wave as wave;

@@ -230,7 +230,7 @@ impl ComparedDesign {
 
 impl CompareArgs {
     /// Comparison that is asked for, as the library has it.
-    fn lineup(&self) -> Result<Comparison> {
+    fn comparison(&self) -> Result<Comparison> {
         Ok(Comparison {
             camera: self.camera.clone(),
             designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
@@ -254,14 +254,14 @@ impl CompareArgs {
 
 pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let lineup = args.lineup()?;
+    let comparison = args.comparison()?;
     let outputs = ["compare.html", "compare.json"].map(|n| args.out.join(n));
     apart(
-        lineup.photographs.iter().map(PathBuf::as_path),
+        comparison.photographs.iter().map(PathBuf::as_path),
         &[&outputs[0], &outputs[1]],
     )?;
     if args.plan {
-        let plan = plan_comparison(&lineup, &args.out, terminal)?;
+        let plan = plan_comparison(&comparison, &args.out, terminal)?;
         terminal.clear();
         print_line!(
             "{} cameras in as many shards: {}",
@@ -270,11 +270,11 @@ pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
         );
         return Ok(Outcome::Fine);
     }
-    let open = lineup.open()?;
+    let open = comparison.open()?;
     open.notes().iter().for_each(|note| terminal.say(note));
-    let kept = KernelCache::of_user();
-    let take = |k| open.take(k, &kept, terminal);
-    let comparison = open.comparison((0..lineup.count()).map(take).collect::<Result<_>>()?);
+    let cache = KernelCache::of_user();
+    let take = |k| open.take(k, &cache, terminal);
+    let comparison = open.comparison((0..comparison.count()).map(take).collect::<Result<_>>()?);
     terminal.clear();
     match args.json {
         true => {

@@ -93,10 +93,10 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let read = |path: &Path| read_far_scene(path, args.with.field_deg);
     let layout = InputFile::of(&args.layout)?;
     let origin = DatasetOrigin::of(&design, &layout, &camera, args.with.model.as_deref())?;
-    let studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
-    let operator = studio.simulation();
-    let head = DatasetManifest::of(&studio, origin, args.seed);
-    let manifest = write_dataset(&studio, &operator, &images, &read, head, &args.out, terminal)?;
+    let system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
+    let operator = system.simulation();
+    let head = DatasetManifest::of(&system, origin, args.seed);
+    let manifest = write_dataset(&system, &operator, &images, &read, head, &args.out, terminal)?;
     terminal.clear();
     print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());
     Ok(Outcome::Fine)

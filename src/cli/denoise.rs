@@ -6,7 +6,7 @@ use clap::Args;
 use metalith::imaging::scene::read_picture;
 use metalith::imaging::write_picture;
 use metalith::prior::{NetworkDenoiser, with_noise};
-use metalith::wave::restore::{psnr_db, ssim_colour};
+use metalith::restoration::{psnr_db, ssim_colour};
 use metalith::{Error, Result};
 use ndarray::Array3;
 use serde::Serialize;

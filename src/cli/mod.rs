@@ -4,6 +4,7 @@ mod calibrate;
 mod camera_args;
 mod cells;
 mod check;
+#[cfg(feature = "baselines")]
 mod compare;
 mod compensated;
 mod completions;
@@ -21,12 +22,14 @@ mod paths;
 mod picture;
 mod plan;
 mod psf;
+mod renamed;
 mod restore;
 mod run;
 mod shipped_designs;
 mod standard_input;
 mod study;
 mod terminal;
+#[cfg(feature = "training")]
 mod train;
 mod verify;
 
@@ -86,8 +89,10 @@ enum Command {
     Picture(picture::PictureArgs),
     Restore(restore::RestoreArgs),
     Dataset(dataset::DatasetArgs),
+    #[cfg(feature = "training")]
     Train(train::TrainArgs),
     Denoise(denoise::DenoiseArgs),
+    #[cfg(feature = "baselines")]
     Compare(compare::CompareArgs),
     Verify(verify::VerifyArgs),
     Psf(psf::PsfArgs),
@@ -133,6 +138,9 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             // Help is no error, and goes to standard output.
             let _ = error.print();
+            if let Some(hint) = renamed::hint(&error, &given) {
+                output::tell(&format!("\n  help: {hint}\n"));
+            }
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
@@ -183,8 +191,10 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
             "use `picture` for one scene, `compare` for a table of many photographs and several designs",
         )),
         Command::Dataset(args) => dataset::run(args, terminal),
+        #[cfg(feature = "training")]
         Command::Train(args) => train::run(args, terminal),
         Command::Denoise(args) => denoise::run(args, terminal),
+        #[cfg(feature = "baselines")]
         Command::Compare(args) => compare::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
         Command::Restore(args) => restore::run(args, terminal),

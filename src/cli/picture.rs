@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::imaging::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::imaging::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::imaging::{
-    Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport, Rehearsal,
+    ForecastScene, Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport,
     RestorationReport, ScenePower, Uncertainty, ZoneScore, check_scored, contrast_curves, picture_file, psnr_words,
     scores, worth_of_assumptions, write_pages,
 };
 use metalith::optics::CalibratedModel;
+use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
@@ -162,22 +162,22 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     apart(inputs.into_iter().chain(others), &written)?;
     let layout = InputFile::of(&args.layout)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
-    let mut studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {
-        studio.prior = prior;
+        system.prior = prior;
     }
     // Once: it is asked for again and again.
-    let scene = studio.simulated(&scene).into_owned();
-    let simulation = studio.simulation_of(&scene);
-    let frame = studio.record(&simulation, &scene, args.seed)?;
-    let truth = studio.truth(&scene);
+    let scene = system.simulated(&scene).into_owned();
+    let simulation = system.simulation_of(&scene);
+    let frame = system.record(&simulation, &scene, args.seed)?;
+    let truth = system.truth(&scene);
     drop(simulation);
     if let Some(note) = frame.saturation_note(&truth) {
         terminal.say(&note);
     }
-    let operator = studio.restoration();
-    let rehearsal = Rehearsal::new(&studio, &operator);
-    let error = &rehearsal.operator_error;
+    let operator = system.restoration();
+    let forecast_scene = ForecastScene::new(&system, &operator);
+    let error = &forecast_scene.operator_error;
     let limited = error.note(&camera.channel_names());
     if let Some(note) = &limited {
         terminal.say(note);
@@ -187,11 +187,11 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     for method in methods {
         for joint in [true, false] {
             if joint || args.separate {
-                let picture = studio.restore(&operator, error, &frame, method, joint, terminal)?;
+                let picture = system.restore(&operator, error, &frame, method, joint, terminal)?;
                 let mut restoration = RestorationReport::new(method, joint, scores(&picture, &truth)?);
                 // What is lost by other methods depends on more than the spectrum of a scene.
                 if method == RestorationMethod::Tikhonov && joint && !args.no_forecast {
-                    let forecast = rehearsal.forecast(&studio, &operator, terminal)?;
+                    let forecast = forecast_scene.forecast(&system, &operator, terminal)?;
                     restoration.forecast_db = forecast.psnr_linear_db(&ScenePower::natural());
                     restoration.forecast_of_scene_db = forecast.psnr_linear_db(&ScenePower::of(&truth));
                 }
@@ -200,13 +200,13 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             }
         }
     }
-    let mut report = report(args, &studio, &scene, &frame, found, model.as_ref());
+    let mut report = report(args, &system, &scene, &frame, found, model.as_ref());
     report.of_frame.operator_error.clone_from(&error.overall);
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
-        report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
+        report.contrast = contrast_curves(&system, kind, &truth, &frame, &pictures[0]);
     }
-    let doubt = match args.samples {
-        Some(n) => Some(Uncertainty::of(&studio.samples(
+    let uncertainty = match args.samples {
+        Some(n) => Some(Uncertainty::of(&system.samples(
             &operator,
             error,
             &frame,
@@ -215,10 +215,10 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         )?)),
         None => None,
     };
-    report.doubt = doubt.as_ref().map(|d| d.report(&truth)).transpose()?;
+    report.uncertainty = uncertainty.as_ref().map(|d| d.report(&truth)).transpose()?;
     if let Some(Assume::Paper) = args.assume {
         drop(operator);
-        let narrow = studio.open_without_dispersion(
+        let narrow = system.open_without_dispersion(
             &design,
             &layout,
             model.as_ref(),
@@ -226,9 +226,9 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             &KernelCache::of_user(),
             terminal,
         )?;
-        report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.seed, terminal)?;
+        report.worth = worth_of_assumptions(&system, &narrow, &scene, args.seed, terminal)?;
     }
-    report.of_frame.notes = studio.notes(&frame, &truth);
+    report.of_frame.notes = system.notes(&frame, &truth);
     report.of_frame.notes.extend(limited);
     let pages = PicturePages {
         report: &report,
@@ -236,7 +236,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         frame: &frame,
         restored: &pictures,
         camera: &camera,
-        doubt: doubt.as_ref(),
+        uncertainty: uncertainty.as_ref(),
     };
     write_pages(&pages, &args.out)?;
     terminal.clear();
@@ -256,12 +256,12 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         };
         print_line!("{}, {way}: {}", restoration.method, score(&restoration.scores[0]));
     }
-    if let Some(doubt) = &report.doubt {
+    if let Some(uncertainty) = &report.uncertainty {
         print_line!(
-            "mean of {} samples: {}; rank correlation of doubt and error {:.2}",
-            doubt.samples,
-            score(&doubt.scores[0]),
-            doubt.rank_correlation
+            "mean of {} samples: {}; rank correlation of uncertainty and error {:.2}",
+            uncertainty.samples,
+            score(&uncertainty.scores[0]),
+            uncertainty.rank_correlation
         );
     }
     print_line!("page: {}", outputs[0].display());
@@ -274,7 +274,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
 
 fn report(
     args: &PictureArgs,
-    studio: &ImagingSystem,
+    system: &ImagingSystem,
     scene: &SceneImage,
     frame: &Frame,
     restorations: Vec<RestorationReport>,
@@ -282,14 +282,14 @@ fn report(
 ) -> PictureReport {
     PictureReport {
         scene: scene.name.clone(),
-        of_frame: FrameStatement::new(studio, name_of(&args.layout), scene, frame, model),
-        frame: FrameFile::of(&studio.camera, frame),
+        of_frame: FrameStatement::new(system, name_of(&args.layout), scene, frame, model),
+        frame: FrameFile::of(&system.camera, frame),
         restorations,
-        budget: studio.budget(),
-        points: studio.point_images(),
-        homographies: studio.homographies(),
+        budget: system.budget(),
+        points: system.point_images(),
+        homographies: system.homographies(),
         contrast: Vec::new(),
-        doubt: None,
+        uncertainty: None,
         worth: Vec::new(),
     }
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use metalith::cell::{Analyser, Fidelity, Handedness, Polarisation};
-use metalith::design::TALLEST_NM;
+use metalith::design::CellFile;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
@@ -22,7 +22,7 @@ use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
 /// Find the elements of any layout in GDSII or OASIS, read their pillars, and simulate their PSFs.
-#[derive(Args)]
+#[derive(Args, Clone)]
 #[command(
     after_help = "Example:\n  metalith psf lens.gds --layer 1/0 --distance-um 2400 --wavelength-nm 530 --out out/lens\n\n\
     Light has normal incidence unless --angle-x-deg, --angle-y-deg say otherwise. The window is about the element's axis \
@@ -69,37 +69,13 @@ pub struct PsfArgs {
     #[arg(long, default_value_t = 256, value_parser = samples)]
     samples: usize,
 
-    /// Height of the pillars (nm), for all cells but the published one.
-    #[arg(long, default_value_t = 700.0, value_parser = between(10.0, TALLEST_NM))]
-    height_nm: f64,
+    /// The pillar and what surrounds it, for all cells but the published one: a file with a section [cell] as in a design, or a whole
+    /// design. Pitch and lattice must be the layout's. Silicon nitride 700 nm high on fused silica in air if left out.
+    #[arg(long, value_name = "FILE")]
+    cell: Option<PathBuf>,
 
-    /// Material of the pillars: a name that a design file takes, or a CSV table of its index.
-    #[arg(long, default_value = "sin_luke_2015")]
-    pillar_material: String,
-
-    /// Material of the substrate, likewise.
-    #[arg(long, default_value = "fused_silica_malitson_1965")]
-    substrate_material: String,
-
-    /// Thickness of a layer between substrate and film (nm).
-    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, TALLEST_NM))]
-    spacer_nm: f64,
-
-    /// Its material.
-    #[arg(long, value_name = "MATERIAL")]
-    spacer_material: Option<String>,
-
-    /// Thickness of the film that the etch left between the pillars (nm).
-    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, TALLEST_NM))]
-    residual_nm: f64,
-
-    /// Refractive index between the pillars and towards the sensor; that of air if left out.
-    #[arg(long, value_parser = between(1.0, 3.0))]
-    ambient_index: Option<f64>,
-
-    /// Material there, in place of --ambient-index.
-    #[arg(long, value_name = "MATERIAL", conflicts_with = "ambient_index")]
-    ambient_material: Option<String>,
+    #[arg(skip)]
+    stated: Option<CellFile>,
 
     /// Edge of a sensor pixel (um); if left out, the one of --camera, else 5.86.
     #[arg(long, value_parser = between(0.1, 100.0))]
@@ -122,7 +98,7 @@ pub struct PsfArgs {
     /// Solve the unit cell at oblique incidence, the angle at which light arrives, for both polarisations; else at
     /// normal incidence.
     #[arg(long)]
-    as_lit: bool,
+    oblique: bool,
 
     /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
     #[arg(long)]
@@ -157,8 +133,8 @@ pub struct PsfArgs {
     #[arg(long, value_name = "ANALYSER", allow_negative_numbers = true, value_parser = analyser)]
     analyser: Option<Analyser>,
 
-    /// Handedness of the light that the layout focuses, which decides what a circular --analyser passes; the one of
-    /// --arriving if left out.
+    /// Circular polarisation of the light that the layout focuses, which decides what a circular --analyser passes; if left out
+    /// `arriving` of --cell, where its pillars are rotated rectangles, else that of --arriving.
     #[arg(long, value_enum, requires = "analyser")]
     focused: Option<CircularArg>,
 
@@ -261,6 +237,28 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
         &args.layout,
         "name a cell with elements of one kind by --top, or look at what is there with --extract-only --json",
     )?;
+    if let (Some(stated), Some(element)) = (&args.stated, found.elements.first()) {
+        let (own, lattice) = (&stated.cell, element.site.lattice);
+        if (own.pitch_nm, own.lattice) != (lattice.pitch_nm(), lattice.kind()) {
+            let named = |kind: LatticeKind| match kind {
+                LatticeKind::Square => "square",
+                LatticeKind::Hexagonal => "hexagonal",
+            };
+            return Err(Error::refused(
+                "psf/lattices-differ",
+                format!(
+                    "{}: pillars on a {} lattice of {} nm, and {} is of a {} lattice of {} nm",
+                    args.layout.display(),
+                    named(lattice.kind()),
+                    lattice.pitch_nm(),
+                    stated.path.display(),
+                    named(own.lattice),
+                    own.pitch_nm
+                ),
+                "give by --cell the cell of the design that the layout is of",
+            ));
+        }
+    }
     if args.model.is_none()
         && !args.extract_only
         && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))
@@ -320,6 +318,8 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
 }
 
 pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
+    let stated = args.cell.as_deref().map(CellFile::read).transpose()?;
+    let args = &PsfArgs { stated, ..args.clone() };
     terminal.stop_on_interrupt();
     let layout = Layout::open_with(&InputFile::of(&args.layout)?, ReadLimits::default(), terminal)?;
     let plan = ExtractionPlan {

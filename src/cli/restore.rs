@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::Result;
-use metalith::imaging::restore::{LearnedDenoiser, RestorationMethod};
 use metalith::imaging::scene::SceneImage;
 use metalith::imaging::{
-    FrameNumbers, FrameStatement, ImagingSystem, Rehearsal, RestoredPicture, RestoredReport, check_scored, read_signals,
+    ForecastScene, FrameNumbers, FrameStatement, ImagingSystem, RestoredPicture, RestoredReport, check_scored,
+    read_signals,
 };
+use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use ndarray::Array3;
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
@@ -101,27 +102,27 @@ pub fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     let signals = read_signals(&args.frame, &camera, numbers)?;
     let layout = InputFile::of(&args.layout)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
-    let mut studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {
-        studio.prior = prior;
+        system.prior = prior;
     }
-    let frame = studio.frame_of(signals)?;
-    let operator = studio.restoration();
-    let rehearsal = Rehearsal::new(&studio, &operator);
-    let error = &rehearsal.operator_error;
-    let mut notes = studio.notes(&frame, &Array3::zeros((1, 1, 3)));
+    let frame = system.frame_of(signals)?;
+    let operator = system.restoration();
+    let forecast_scene = ForecastScene::new(&system, &operator);
+    let error = &forecast_scene.operator_error;
+    let mut notes = system.notes(&frame, &Array3::zeros((1, 1, 3)));
     notes.extend(error.note(&camera.channel_names()));
     for note in &notes {
         terminal.say(note);
     }
     let mut restored = Vec::new();
     for (picture, method) in &wanted {
-        restored.push(studio.restore(&operator, error, &frame, *method, picture.joint, terminal)?);
+        restored.push(system.restore(&operator, error, &frame, *method, picture.joint, terminal)?);
     }
     let of_frame = FrameStatement {
         notes,
         operator_error: error.overall.clone(),
-        ..FrameStatement::new(&studio, name_of(&args.layout), &scene, &frame, model.as_ref())
+        ..FrameStatement::new(&system, name_of(&args.layout), &scene, &frame, model.as_ref())
     };
     let report = RestoredReport {
         frame: name_of(&args.frame),

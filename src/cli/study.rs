@@ -6,8 +6,8 @@ use std::process::{Child, Command};
 use clap::{Args, Subcommand};
 use metalith::report::sig;
 use metalith::study::{
-    ComparisonPlan, MANIFEST, PairsPlan, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan,
-    submissions, write_page,
+    MANIFEST, PairsPlan, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan, submissions,
+    write_page,
 };
 use metalith::{Error, Progress, Result};
 
@@ -261,6 +261,7 @@ fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     match Work::open(&args.study)? {
         Work::Study(plan) => merge_study(&plan, args, terminal),
         Work::Pairs(plan) => merge_pairs(&plan, args, terminal),
+        #[cfg(feature = "baselines")]
         Work::Comparison(plan) => merge_comparison(&plan, args, terminal),
         Work::Starts(plan) => merge_starts(&plan, args),
     }
@@ -286,7 +287,8 @@ fn merge_pairs(plan: &PairsPlan, args: &MergeArgs, terminal: &Terminal) -> Resul
     Ok(Outcome::Fine)
 }
 
-fn merge_comparison(plan: &ComparisonPlan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
+#[cfg(feature = "baselines")]
+fn merge_comparison(plan: &metalith::study::ComparisonPlan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     without_table(args)?;
     let comparison = plan.merge(terminal)?;
     terminal.clear();

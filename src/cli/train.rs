@@ -7,7 +7,7 @@ use metalith::baselines::{Comparison, StageKind};
 use metalith::imaging::KernelCache;
 use metalith::imaging::scene::images_in;
 use metalith::imaging::scene::read_picture;
-use metalith::prior::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_finisher};
+use metalith::training::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_post_processor};
 use metalith::{Error, Result};
 
 use super::compare::{ComparedDesign, LenslessArgs, Rival};
@@ -91,7 +91,7 @@ impl TrainArgs {
     }
 
     /// The camera that a last stage is for.
-    fn lineup(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Comparison> {
+    fn comparison(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Comparison> {
         let wrong = |what: &str, hint: &str| Err(Error::refused("train/stage-camera", what, hint));
         let lensless = match (kind, &self.design) {
             (StageKind::FlatNet, None) => vec![self.bare.camera(Rival::Flatcam)?],
@@ -125,13 +125,13 @@ impl TrainArgs {
         [out, state]: [&Path; 2],
         terminal: &Terminal,
     ) -> Result<TrainingReport> {
-        let lineup = self.lineup(kind, photographs)?;
-        let open = lineup.open()?;
-        Stacks::check(lineup.photographs.len(), open.size(), spec.piece)?;
-        let kept = KernelCache::of_user();
-        let (stacks, taught) = open.lessons(0, kind, &beside(out, ".pictures"), &kept, terminal)?;
+        let comparison = self.comparison(kind, photographs)?;
+        let open = comparison.open()?;
+        Stacks::check(comparison.photographs.len(), open.size(), spec.piece)?;
+        let cache = KernelCache::of_user();
+        let (stacks, taught) = open.training_stacks(0, kind, &beside(out, ".pictures"), &cache, terminal)?;
         let stacks = Stacks::new(stacks, taught, spec.piece)?;
-        train_finisher(&stacks, spec, out, state, terminal)
+        train_post_processor(&stacks, spec, out, state, terminal)
     }
 }
 

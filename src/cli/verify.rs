@@ -63,7 +63,7 @@ pub struct Judging {
     /// Solve the unit cells at oblique incidence, the angles at which light arrives, for both polarisations, like
     /// `incidence = "oblique"` in [verify] of the design; else at normal incidence.
     #[arg(long)]
-    as_lit: bool,
+    oblique: bool,
 
     /// Memory for reading back and simulating (MB). Larger layouts are simulated in parts, which takes more time, and
     /// without other models for comparison. If that does not suffice, all pillars are compared with the design and
@@ -114,7 +114,7 @@ impl Judging {
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
         let fidelity = self.fidelity(design);
         design.check_fidelity(fidelity)?;
-        if self.as_lit && design.cell.shape.rectangles().is_some() {
+        if self.oblique && design.cell.shape.rectangles().is_some() {
             return Err(oblique_refused());
         }
         if let Some(model) = self.model()? {
@@ -171,7 +171,7 @@ impl Judging {
         terminal: &Terminal,
     ) -> Result<Outcome> {
         let mut design = design.clone();
-        if self.as_lit {
+        if self.oblique {
             design.verify.incidence = CellIncidence::AsLit;
         }
         // One cell judges, in the picture too.

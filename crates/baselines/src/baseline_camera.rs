@@ -31,7 +31,7 @@ impl Method {
 /// A camera that is ready to take scenes of one size and field.
 pub trait BaselineCamera {
     /// Ways of making a picture of its frames.
-    fn ways(&self) -> Vec<Method>;
+    fn methods(&self) -> Vec<Method>;
 
     /// Names of its channels, in the order of the planes of a frame without a colour filter array.
     fn channel_names(&self) -> Vec<String>;

@@ -81,7 +81,7 @@ pub struct ComparisonResult {
 /// # Errors
 /// If there are none, they differ in size, or the user stopped it.
 pub fn compare(
-    contender: &dyn BaselineCamera,
+    camera: &dyn BaselineCamera,
     (name, words): (&str, &str),
     photographs: &[SceneImage],
     seed: u64,
@@ -91,11 +91,11 @@ pub fn compare(
     let first = photographs
         .first()
         .ok_or_else(|| Error::refused("compare/no-photographs", "no photographs", "give at least one"))?;
-    let limits = contender.limits();
+    let limits = camera.limits();
     if let Some(limits) = &limits {
         progress.warn(&format!("{name}: {limits}"));
     }
-    let ways = contender.ways();
+    let ways = camera.methods();
     let mut bare = Judged::default();
     let mut found: Vec<Judged> = ways.iter().map(|_| Judged::default()).collect();
     let mut seconds: Vec<Option<f64>> = vec![Some(0.0); ways.len()];
@@ -104,13 +104,13 @@ pub fn compare(
     let add = |sum: &mut Option<f64>, moment: Option<f64>| *sum = sum.zip(since(moment)).map(|(a, b)| a + b);
     for photograph in photographs {
         let begun = cpu_seconds();
-        let frame = contender.record(photograph, seed)?;
+        let frame = camera.record(photograph, seed)?;
         add(&mut frame_s, begun);
-        let truth = contender.truth(photograph);
+        let truth = camera.truth(photograph);
         if let Some(note) = frame.saturation_note(&truth) {
             progress.warn(&format!("{name}, {}: {note}", photograph.name));
         }
-        if let Some(picture) = contender.unrestored(&frame) {
+        if let Some(picture) = camera.unrestored(&frame) {
             bare.add(&picture, &truth, perceptual)?;
         }
         let mut pictures = Vec::new();
@@ -119,7 +119,7 @@ pub fn compare(
                 return Err(Error::Interrupted);
             }
             let begun = cpu_seconds();
-            let picture = contender.restore(&frame, k, progress)?;
+            let picture = camera.restore(&frame, k, progress)?;
             add(&mut seconds[k], begun);
             found[k].add(&picture, &truth, perceptual)?;
             let scores = &found[k].scores;
@@ -137,7 +137,7 @@ pub fn compare(
         shown.get_or_insert(Shown {
             scene: truth,
             frame,
-            channel_names: contender.channel_names(),
+            channel_names: camera.channel_names(),
             pictures,
         });
     }

@@ -54,7 +54,7 @@ pub trait Lensless {
 }
 
 impl<T: Lensless> BaselineCamera for T {
-    fn ways(&self) -> Vec<Method> {
+    fn methods(&self) -> Vec<Method> {
         let learnt = self.stage().map(|stage| stage.kind.words());
         let way = |method: &str| Method {
             method: method.into(),
@@ -257,6 +257,11 @@ impl LenslessBench {
         self.sampling.channels.len()
     }
 
+    /// Rows and columns of the scene.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.view.rows, self.view.columns)
+    }
+
     /// Rows and columns of the sensor.
     pub fn frame(&self) -> [usize; 2] {
         [self.camera.sensor.rows as usize, self.camera.sensor.columns as usize]
@@ -302,7 +307,7 @@ pub fn falloff([tx, ty]: [f64; 2]) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use metalith_imaging::restore::SceneStatistics;
+    use metalith_restoration::SceneStatistics;
     use metalith_sensor::ColourFilter;
 
     /// A small camera, a scene of the statistics of photographs.
@@ -320,7 +325,7 @@ pub(crate) mod tests {
             distance_um: f64::INFINITY,
         };
         let bench = LenslessBench::new(&camera, view, 50.0).unwrap();
-        let planes = SceneStatistics::colours().random_scene(&view, 7);
+        let planes = SceneStatistics::colours().random_scene((view.rows, view.columns), 7);
         let scene = bench.scene_of(planes.iter().map(|p| p.mapv(|v| v.clamp(0.0, 1.0))).collect());
         (camera, scene)
     }

@@ -80,7 +80,7 @@ impl FromStr for StageKind {
 #[derive(Clone, Debug)]
 pub struct Stage {
     pub kind: StageKind,
-    finisher: PostProcessor,
+    post_processor: PostProcessor,
 }
 
 impl Stage {
@@ -89,16 +89,16 @@ impl Stage {
     /// # Errors
     /// If it cannot be read, is damaged, or is of another network.
     pub fn read(path: &Path) -> Result<Self> {
-        let finisher = PostProcessor::read(path)?;
+        let post_processor = PostProcessor::read(path)?;
         Ok(Self {
-            kind: finisher.taught().kind.parse()?,
-            finisher,
+            kind: post_processor.provenance().kind.parse()?,
+            post_processor,
         })
     }
 
     /// What it was taught for.
-    pub fn taught(&self) -> &Provenance {
-        self.finisher.taught()
+    pub fn provenance(&self) -> &Provenance {
+        self.post_processor.provenance()
     }
 
     /// One picture of those that were restored from a frame, all linear sRGB `[row, column, colour]`.
@@ -107,7 +107,7 @@ impl Stage {
     /// If there are more or fewer than it was taught by.
     pub fn finish(&self, pictures: &[Array3<f64>]) -> Result<Array3<f64>> {
         let shown: Vec<Array3<f32>> = pictures.iter().map(encoded).collect();
-        let found = self.finisher.finish(&shown)?;
+        let found = self.post_processor.finish(&shown)?;
         Ok(found.mapv(|v| srgb::linear(f64::from(v).clamp(0.0, 1.0))))
     }
 }

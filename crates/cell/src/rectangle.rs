@@ -119,7 +119,7 @@ impl CellStack {
 /// Message on what cells of rectangles are not solved for, and what to do instead.
 pub const OBLIQUE_RECTANGLES: [&str; 2] = [
     "rectangular pillars in light that arrives at an angle",
-    "leave out --as-lit, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
+    "leave out --oblique, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
 ];
 
 /// Error for cells of rectangles in light that arrives at an angle.

@@ -10,7 +10,7 @@ use metalith_core::{Error, Result};
 use metalith_pillars::Rectangles;
 use metalith_rcwa::{CellLattice, Material};
 
-use crate::spec::UnderSpec;
+use crate::spec::{CellSpec, UnderSpec};
 use crate::{Design, PillarRule};
 
 /// The band of designs whose wavelengths are all visible (um): that of colour sensors.
@@ -70,26 +70,7 @@ impl Design {
     /// # Errors
     /// If a material is not known or its table cannot be read.
     pub fn cell_stack(&self) -> Result<CellStack> {
-        let material = |name: &str| Material::resolve(name, self.folder());
-        let layer = |under: &UnderSpec| -> Result<UniformLayer> {
-            Ok(UniformLayer {
-                material: material(&under.material)?,
-                height_nm: under.height_nm,
-            })
-        };
-        let cell = &self.cell;
-        Ok(CellStack {
-            lattice: CellLattice::drawn(cell.lattice, cell.pitch_nm),
-            shape: cell.shape,
-            film: material(&cell.pillar_material)?,
-            substrate: material(&cell.substrate_material)?,
-            under: cell.under.iter().map(layer).collect::<Result<_>>()?,
-            ambient: match &cell.ambient_material {
-                Some(name) => material(name)?,
-                None => Material::constant(cell.ambient_index, 0.0)?,
-            },
-            ..CellStack::paper(f64::from(cell.pitch_nm), cell.pillar_height_nm)?
-        })
+        self.cell.stack(self.folder())
     }
 
     /// The table of the cell that the design needs, over its band.
@@ -118,6 +99,34 @@ impl Design {
             Some(band) => named.fold(band, |(short, long), &l| (short.min(l), long.max(l))),
             None => band_about(named.copied(), stack.range_um()),
         }
+    }
+}
+
+impl CellSpec {
+    /// The cell with upright walls, sharp corners and no mask. Paths of materials count from `folder`.
+    ///
+    /// # Errors
+    /// If a material is not known or its table cannot be read.
+    pub fn stack(&self, folder: &Path) -> Result<CellStack> {
+        let material = |name: &str| Material::resolve(name, folder);
+        let layer = |under: &UnderSpec| -> Result<UniformLayer> {
+            Ok(UniformLayer {
+                material: material(&under.material)?,
+                height_nm: under.height_nm,
+            })
+        };
+        Ok(CellStack {
+            lattice: CellLattice::drawn(self.lattice, self.pitch_nm),
+            shape: self.shape,
+            film: material(&self.pillar_material)?,
+            substrate: material(&self.substrate_material)?,
+            under: self.under.iter().map(layer).collect::<Result<_>>()?,
+            ambient: match &self.ambient_material {
+                Some(name) => material(name)?,
+                None => Material::constant(self.ambient_index, 0.0)?,
+            },
+            ..CellStack::paper(f64::from(self.pitch_nm), self.pillar_height_nm)?
+        })
     }
 }
 

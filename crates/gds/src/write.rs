@@ -11,9 +11,6 @@ const POINTS: usize = 20;
 pub struct SquareRecord([u8; BOUNDARY_BYTES]);
 
 impl SquareRecord {
-    /// Length of the element in the file.
-    pub const BYTES: usize = BOUNDARY_BYTES;
-
     /// The template for squares on a layer.
     pub fn on(layer: LayerNumber) -> Self {
         let mut record = [0; BOUNDARY_BYTES];

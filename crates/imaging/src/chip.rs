@@ -68,9 +68,6 @@ struct Tables {
     camera: CameraChange,
 }
 
-/// Largest distance of the wavelengths that are simulated (nm), as in the figures of white light of a run.
-pub const STEP_NM: f64 = 12.5;
-
 /// From the pillar tops of a design to the sensor of a camera, below the middle of the chip (um): as the camera says, else in the
 /// focus of the lens that elements share.
 pub fn sensor_um(design: &Design, camera: &Camera) -> f64 {
@@ -104,7 +101,7 @@ fn views_of(design: &Design, camera: &Camera, areas: &OpenAreas) -> Vec<ElementV
 /// If a channel counts no light at which the design's materials are known.
 pub fn sampling_of(design: &Design, camera: &Camera) -> Result<Sampling> {
     let (low, high) = design.band_um()?;
-    let steps = WavelengthSteps::from(STEP_NM).behind(design.lens_sizes_um(), camera.sensor.pixel_um);
+    let steps = WavelengthSteps::from(WavelengthSteps::USUAL_NM).behind(design.lens_sizes_um(), camera.sensor.pixel_um);
     camera.sampling([low * 1e3, high * 1e3], steps)
 }
 

@@ -4,6 +4,7 @@ use metalith_core::{Error, Result};
 use metalith_report::sig;
 use metalith_sensor::{Camera, ColourFilter};
 use metalith_wave::camera::Noise;
+use metalith_wave::kernels::box_sums;
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -226,7 +227,7 @@ impl Frame {
     /// made dark would be trusted more than its neighbours.
     pub fn light(&self, camera: &Camera, error: &OperatorError) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
         let names = camera.channel_names();
-        let (mut light, mut trust) = (Vec::new(), Vec::new());
+        let (mut light, mut inverse_variance) = (Vec::new(), Vec::new());
         for (channel, gain) in self.gain.iter().enumerate() {
             let plane = self.plane(channel);
             let known = |y: usize, x: usize| self.counts(channel, &names, y, x) && plane[[y, x]] < self.full;
@@ -235,38 +236,18 @@ impl Frame {
             let (sums, numbers) = (box_sums(&signal, NEAR), box_sums(&known, NEAR));
             let overall = signal.sum() / known.sum().max(1.0);
             light.push(signal.mapv(|v| (v / gain) as f32));
-            trust.push(Array2::from_shape_fn(plane.dim(), |at| {
+            inverse_variance.push(Array2::from_shape_fn(plane.dim(), |at| {
                 let mean = (sums[at] / numbers[at].max(1.0)).max(0.0);
                 let variance = self.noise.variance(mean) + (error.about(channel, at) * mean.max(overall)).powi(2);
                 (known[at] * gain * gain / variance.max(f64::MIN_POSITIVE)) as f32
             }));
         }
-        (light, trust)
+        (light, inverse_variance)
     }
 }
 
 /// Pixels on both sides over which a mean signal is taken: about what the window of a kernel holds.
 const NEAR: usize = 16;
-
-/// Sums over squares about each pixel, as far as they are in the plane.
-pub(crate) fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
-    let along = |line: ndarray::ArrayView1<'_, f64>| -> Vec<f64> {
-        let mut running = vec![0.0];
-        line.iter().for_each(|v| running.push(running[running.len() - 1] + v));
-        let n = line.len();
-        (0..n)
-            .map(|i| running[(i + near + 1).min(n)] - running[i.saturating_sub(near)])
-            .collect()
-    };
-    let mut out = plane.clone();
-    for axis in [1, 0] {
-        for mut lane in out.lanes_mut(ndarray::Axis(axis)) {
-            let sums = along(lane.view());
-            lane.iter_mut().zip(sums).for_each(|(to, sum)| *to = sum);
-        }
-    }
-    out
-}
 
 #[cfg(test)]
 mod tests {
@@ -294,13 +275,19 @@ mod tests {
             for words in ["66.7 %", "light up to 2", "the frame is lost"] {
                 assert!(note.contains(words), "{note}");
             }
-            let (light, trust) = frame.light(&camera, &OperatorError::none(3));
+            let (light, inverse_variance) = frame.light(&camera, &OperatorError::none(3));
             // Unknown light is none; as it was recorded it is that of full scale.
             let recorded = frame.recorded_light(&camera);
             assert!(light[0].iter().all(|v| *v == 0.0) && recorded[1].iter().all(|v| *v == frame.full));
             assert!(light[2] == recorded[2]);
-            assert!(trust[0].iter().chain(&trust[1]).all(|t| *t == 0.0), "{gain_e}");
-            assert!(trust[2].iter().all(|t| *t > 0.0), "{gain_e}");
+            assert!(
+                inverse_variance[0]
+                    .iter()
+                    .chain(&inverse_variance[1])
+                    .all(|t| *t == 0.0),
+                "{gain_e}"
+            );
+            assert!(inverse_variance[2].iter().all(|t| *t > 0.0), "{gain_e}");
         }
     }
 
@@ -342,12 +329,17 @@ mod tests {
         // A quarter, of a scene whose white is one.
         let note = frame.saturation_note(&Array3::from_elem((1, 1, 3), 1.0)).unwrap();
         assert!(note.starts_with("25.0 %") && note.ends_with("fell on them"), "{note}");
-        let (light, trust) = frame.light(&camera, &OperatorError::none(3));
+        let (light, inverse_variance) = frame.light(&camera, &OperatorError::none(3));
         assert!(frame.is_of([40, 40], 3).is_ok());
         for (size, channels) in [([40, 41], 3), ([40, 40], 1)] {
             let error = frame.is_of(size, channels).unwrap_err().to_string();
             assert!(error.contains("another camera"), "{error}");
         }
-        assert!(light[0][[1, 1]] > 0.1 && trust[0][[1, 1]] > 0.0 && trust[0][[0, 0]] == 0.0 && trust[2][[0, 0]] == 0.0);
+        assert!(
+            light[0][[1, 1]] > 0.1
+                && inverse_variance[0][[1, 1]] > 0.0
+                && inverse_variance[0][[0, 0]] == 0.0
+                && inverse_variance[2][[0, 0]] == 0.0
+        );
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use metalith_core::{AtomicFile, Result, srgb};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array3;
 use serde::Serialize;
@@ -10,7 +11,6 @@ use serde::Serialize;
 use crate::dataset::black_level;
 use crate::exposure::Frame;
 use crate::png16;
-use crate::restore::RestorationMethod;
 
 /// A frame as a PNG of 16 bits.
 #[derive(Clone, Debug, PartialEq, Serialize)]

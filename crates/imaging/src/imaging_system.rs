@@ -4,23 +4,25 @@ use std::borrow::Cow;
 
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
+use metalith_restoration::{
+    FrameModel, LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples,
+    restore_separate,
+};
 use metalith_sensor::{Camera, ChannelSampling};
 use ndarray::{Array2, Array3};
 use sha2::{Digest, Sha256};
 
 use crate::approximation_set::ApproximationSet;
+use crate::colour::ChannelColours;
 use crate::exposure::{Frame, expose, gains, sensitivity};
+use crate::geometry::{ElementView, SceneSpace, SceneView};
 use crate::kernels::KernelBank;
 use crate::layout::PillarCount;
 use crate::operator::{BetweenNodes, Detail, FrameOperator, SceneInputs, ScenePoints};
 use crate::operator_error::OperatorError;
-use crate::restore::{
-    LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples, restore_separate,
-};
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::stray_light::StrayLight;
-use crate::{ChannelColours, ElementView, SceneSpace, SceneView};
 
 /// What pictures are taken with.
 #[derive(Clone)]
@@ -32,7 +34,7 @@ pub struct ImagingSystem {
     pub between: BetweenNodes,
     /// Every how many-th of these nodes a restoration knows.
     pub(crate) restored_step: usize,
-    pub veil: StrayLight,
+    pub stray_light: StrayLight,
     pub elements: Vec<ElementView>,
     pub channels: Vec<ChannelSampling>,
     /// Spectra of the bank: those of the scenes, and the primaries of the restoration among or after them.
@@ -51,7 +53,7 @@ pub struct ImagingSystem {
     /// Signal of a unit of light in each channel.
     pub gain: Vec<f64>,
     pub colours: ChannelColours,
-    /// Whether kernels and veil were found on the disk.
+    /// Whether kernels and stray light were found on the disk.
     pub from_cache: [bool; 2],
     /// What is assumed instead of what is known; nothing, unless asked for.
     pub assumed: ApproximationSet,
@@ -69,8 +71,7 @@ impl ImagingSystem {
     /// With the gain of each channel that the exposure of the camera asks for.
     pub(crate) fn exposed(mut self) -> Result<Self> {
         let operator = self.restoration();
-        let ones = vec![Array2::<f32>::ones((self.view.rows, self.view.columns)); operator.inputs()];
-        let white = operator.apply(&ones);
+        let white = operator.apply(&operator.white());
         drop(operator);
         self.gain = gains(&self.camera, &sensitivity(&self.camera, &self.channels), &white)?;
         Ok(self)
@@ -86,7 +87,14 @@ impl ImagingSystem {
             assumed: self.assumed,
             ..detail
         };
-        FrameOperator::new(&self.bank, &self.veil, &self.elements, &self.camera, space, detail)
+        FrameOperator::new(
+            &self.bank,
+            &self.stray_light,
+            &self.elements,
+            &self.camera,
+            space,
+            detail,
+        )
     }
 
     /// Of scenes as finely as they are known.
@@ -160,11 +168,11 @@ impl ImagingSystem {
         Ok(expose(&self.camera, &self.gain, &light, seed))
     }
 
-    /// SHA-256 of all that decides the frame of a scene but its noise: kernels and veil, elements, camera, field, exposure.
+    /// SHA-256 of all that decides the frame of a scene but its noise: kernels and stray light, elements, camera, field, exposure.
     pub fn digest(&self) -> [u8; 32] {
         let mut hasher = Sha256::new();
         let distinct = self.bank.distinct.iter().map(|d| &d.values);
-        for number in distinct.chain([&self.veil.values]).flatten() {
+        for number in distinct.chain([&self.stray_light.values]).flatten() {
             hasher.update(number.to_le_bytes());
         }
         let camera = serde_json::to_vec(&self.camera).expect("plain data serialises");
@@ -192,11 +200,11 @@ impl ImagingSystem {
         joint: bool,
         progress: &dyn Progress,
     ) -> Result<Array3<f64>> {
-        let [light, trust] = match (method, joint) {
+        let [light, inverse_variance] = match (method, joint) {
             (RestorationMethod::Tikhonov, true) => self.known(operator, &error.times(TOGETHER), frame)?,
             _ => self.known(operator, error, frame)?,
         };
-        let recorded = self.recorded(operator, &light, &trust);
+        let recorded = self.recorded(operator, &light, &inverse_variance);
         let planes = match joint {
             true => restore_joint(&recorded, method, progress)?,
             false => restore_separate(&recorded, method, progress)?,
@@ -217,9 +225,9 @@ impl ImagingSystem {
         light: &[Array2<f32>],
         progress: &dyn Progress,
     ) -> Result<[Array3<f64>; 2]> {
-        let [recorded, trust] = self.known(operator, &error.times(TOGETHER), frame)?;
+        let [recorded, inverse_variance] = self.known(operator, &error.times(TOGETHER), frame)?;
         let restored = |light: &[Array2<f32>]| -> Result<Array3<f64>> {
-            let recorded = self.recorded(operator, light, &trust);
+            let recorded = self.recorded(operator, light, &inverse_variance);
             let planes = restore_joint(&recorded, RestorationMethod::Tikhonov, progress)?;
             Ok(self.picture(operator, &planes))
         };
@@ -238,8 +246,8 @@ impl ImagingSystem {
         seeds: std::ops::Range<u64>,
         progress: &dyn Progress,
     ) -> Result<Vec<Array3<f64>>> {
-        let [light, trust] = self.known(operator, error, frame)?;
-        let recorded = self.recorded(operator, &light, &trust);
+        let [light, inverse_variance] = self.known(operator, error, frame)?;
+        let recorded = self.recorded(operator, &light, &inverse_variance);
         let drawn = restore_samples(&recorded, seeds, progress)?;
         Ok(drawn.iter().map(|planes| self.picture(operator, planes)).collect())
     }
@@ -248,12 +256,12 @@ impl ImagingSystem {
         &'a self,
         operator: &'a FrameOperator<'a>,
         light: &'a [Array2<f32>],
-        trust: &'a [Array2<f32>],
+        inverse_variance: &'a [Array2<f32>],
     ) -> Recorded<'a> {
         Recorded {
             operator,
             light,
-            trust,
+            inverse_variance,
             prior: &self.prior,
         }
     }
@@ -266,9 +274,9 @@ impl ImagingSystem {
         frame: &Frame,
     ) -> Result<[Vec<Array2<f32>>; 2]> {
         frame.is_of(operator.frame(), self.gain.len())?;
-        let (light, trust) = frame.light(&self.camera, error);
-        match trust.iter().flatten().any(|t| *t > 0.0) {
-            true => Ok([light, trust]),
+        let (light, inverse_variance) = frame.light(&self.camera, error);
+        match inverse_variance.iter().flatten().any(|t| *t > 0.0) {
+            true => Ok([light, inverse_variance]),
             false => Err(Error::refused(
                 "restore/all-saturated",
                 "nothing is known of the scene: every pixel that counts light is at full scale",
@@ -290,8 +298,8 @@ impl ImagingSystem {
     /// A frame as a picture without any restoration, linear sRGB `[row, column, colour]`: pixels where they look, over those
     /// of a white scene.
     pub fn unrestored(&self, operator: &FrameOperator<'_>, frame: &Frame) -> Array3<f64> {
-        let (light, trust) = frame.light(&self.camera, &OperatorError::none(self.gain.len()));
-        self.colours.rgb(&operator.unrestored(&light, &trust))
+        let (light, inverse_variance) = frame.light(&self.camera, &OperatorError::none(self.gain.len()));
+        self.colours.rgb(&operator.unrestored(&light, &inverse_variance))
     }
 
     /// What a perfect camera with these channels would give of a scene: the truth that pictures are held to.

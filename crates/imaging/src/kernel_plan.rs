@@ -1,4 +1,4 @@
-//! What scenes in a camera ask of the kernels and the veil of a chip.
+//! What scenes in a camera ask of the kernels and the stray light of a chip.
 
 use std::borrow::Cow;
 
@@ -7,22 +7,24 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_gds::extract::Extraction;
 use metalith_optics::{CalibratedModel, SimulationCase};
+use metalith_restoration::LearnedDenoiser;
 use metalith_sensor::{Blend, Camera, ChannelSampling, Sampling};
 use serde::Serialize;
 
 use crate::approximation_set::ApproximationSet;
+use crate::chip::{ChipInLight, element_views, sampling_of, sensor_um};
+use crate::colour::ChannelColours;
 use crate::field_of_view::{check_coverage, check_view, check_windows};
+use crate::geometry::{ElementView, SceneView};
 use crate::imaging_system::ImagingSystem;
-use crate::kernels::{BankSpec, KernelBank};
+use crate::kernels::{BankSpec, KernelBank, SMALL_UM};
 use crate::operator::BetweenNodes;
-use crate::restore::LearnedDenoiser;
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::stray_light::StrayLight;
-use crate::{ChannelColours, ChipInLight, ElementView, SceneView, element_views, sampling_of, sensor_um};
 
 /// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
-/// steeply is the veil's. A lens of the paper sees 60 degrees.
+/// steeply is the stray light's. A lens of the paper sees 60 degrees.
 const FIELD_DEG: f64 = 30.0;
 /// Nodes an axis of this field.
 const NODES: usize = 17;
@@ -33,9 +35,6 @@ const NODES_OF_NARROW: usize = 2 * (NODES - 1) + 1;
 const NODES_OF_SIXFOLD: usize = 5 * (NODES - 1) / 2 + 1;
 /// Steps an axis between the nodes that a restoration knows.
 const RESTORED_STEPS: usize = (NODES - 1) / 2;
-/// Radius of lenses whose fast fields err by more than accurate ones, which cost as much there: what is seen of them is mostly the
-/// window of a kernel (um).
-pub(crate) const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
 
@@ -77,7 +76,7 @@ impl BankSpec {
 }
 
 /// What scenes in a camera ask of kernels.
-pub(crate) struct Wanted<'a> {
+pub(crate) struct KernelPlan<'a> {
     design: &'a Design,
     camera: &'a Camera,
     /// In the pixels that it is simulated in.
@@ -128,7 +127,7 @@ struct Inputs<'a> {
     cubic_nm: Option<&'a [f64]>,
 }
 
-impl<'a> Wanted<'a> {
+impl<'a> KernelPlan<'a> {
     pub(crate) fn new(design: &'a Design, camera: &'a Camera, scene: &'a SceneImage) -> Result<Self> {
         let elements = element_views(design, camera);
         let given = scene.view;
@@ -242,7 +241,7 @@ impl<'a> Wanted<'a> {
         KernelBank::build(chip, &self.basis, spec, progress)
     }
 
-    pub(crate) fn veil(
+    pub(crate) fn stray_light(
         &self,
         chip: &ChipInLight<'_>,
         bank: &KernelBank,
@@ -251,16 +250,16 @@ impl<'a> Wanted<'a> {
         StrayLight::build(chip, bank, &self.basis, &self.camera.sensor, &self.scene.view, progress)
     }
 
-    pub(crate) fn studio(self, bank: KernelBank, veil: StrayLight) -> Result<ImagingSystem> {
-        check_windows(&veil, bank.bases, &self.channels, &bank.spec)?;
+    pub(crate) fn system(self, bank: KernelBank, stray_light: StrayLight) -> Result<ImagingSystem> {
+        check_windows(&stray_light, bank.bases, &self.channels, &bank.spec)?;
         let restored_step = self.restored_step(&bank.spec);
-        let studio = ImagingSystem {
+        let system = ImagingSystem {
             design: self.design.clone(),
             camera: self.camera.clone(),
             bank,
             between: self.between,
             restored_step,
-            veil,
+            stray_light,
             elements: self.elements,
             colours: ChannelColours::of(&self.channels),
             channels: self.channels,
@@ -275,7 +274,7 @@ impl<'a> Wanted<'a> {
             assumed: ApproximationSet::default(),
             prior: LearnedDenoiser::shipped()?,
         };
-        studio.exposed()
+        system.exposed()
     }
 }
 
@@ -303,20 +302,20 @@ mod tests {
         let scene = SceneImage::of_rgb("dark", &Array3::zeros((64, 64, 3)), 80.0, f64::INFINITY);
         for (camera, narrow) in [("gt1930", false), ("gt1930_mono", false), ("gt1930_narrow", true)] {
             let camera = Camera::read(format!("../../cameras/{camera}.toml").as_ref()).unwrap();
-            let wanted = Wanted::new(&design, &camera, &scene).unwrap();
+            let plan = KernelPlan::new(&design, &camera, &scene).unwrap();
             let (nodes, step) = if narrow { (NODES_OF_NARROW, 4) } else { (NODES, 2) };
-            assert_eq!(wanted.spec.nodes, nodes);
-            assert_eq!(wanted.fewer_nodes.is_some(), narrow);
+            assert_eq!(plan.spec.nodes, nodes);
+            assert_eq!(plan.fewer_nodes.is_some(), narrow);
             // A restoration knows as many of both, and of those behind small lenses.
-            assert_eq!(wanted.restored_step(&wanted.spec), step);
+            assert_eq!(plan.restored_step(&plan.spec), step);
             let small = BankSpec {
                 accurate: true,
-                ..wanted.spec
+                ..plan.spec
             };
             let small = small.in_light(if narrow { Blend::Cubic } else { Blend::Linear });
-            assert_eq!(wanted.restored_step(&small), if narrow { 5 } else { 2 });
-            let inputs = wanted.inputs("layout", None).unwrap();
-            let wide = wanted.for_wide_bands();
+            assert_eq!(plan.restored_step(&small), if narrow { 5 } else { 2 });
+            let inputs = plan.inputs("layout", None).unwrap();
+            let wide = plan.for_wide_bands();
             assert_eq!((wide.spec.nodes, wide.between), (NODES, BetweenNodes::Linear));
             assert_eq!(wide.inputs("layout", None).unwrap() == inputs, !narrow);
         }
@@ -344,13 +343,13 @@ mod tests {
         );
         let rgb = Array3::from_shape_fn((100, 2748, 3), |(y, x, _)| f64::from(u8::from((x + y) % 2 == 0)));
         let scene = SceneImage::of_rgb("fine", &rgb, 80.0, f64::INFINITY);
-        let wanted = Wanted::new(&design, &camera, &scene).unwrap();
+        let plan = KernelPlan::new(&design, &camera, &scene).unwrap();
         // Each pixel is the mean of four.
-        let SceneView { rows, columns, .. } = wanted.scene.view;
-        assert_eq!((wanted.given, rows, columns), (scene.view, 50, 1374));
-        assert!(wanted.scene.planes[0].iter().all(|v| *v == 0.5) && wanted.averaging().is_some());
+        let SceneView { rows, columns, .. } = plan.scene.view;
+        assert_eq!((plan.given, rows, columns), (scene.view, 50, 1374));
+        assert!(plan.scene.planes[0].iter().all(|v| *v == 0.5) && plan.averaging().is_some());
         let coarse = SceneImage::of_rgb("coarse", &Array3::zeros((64, 64, 3)), 80.0, f64::INFINITY);
-        let wanted = Wanted::new(&design, &camera, &coarse).unwrap();
-        assert!(matches!(wanted.scene, Cow::Borrowed(_)) && wanted.averaging().is_none());
+        let plan = KernelPlan::new(&design, &camera, &coarse).unwrap();
+        assert!(matches!(plan.scene, Cow::Borrowed(_)) && plan.averaging().is_none());
     }
 }

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use crate::exposure::box_sums;
+use metalith_wave::kernels::box_sums;
 
 /// Errors of an operator as shares of the light, root mean square.
 #[derive(Clone, Debug, Default)]

@@ -1,15 +1,15 @@
 //! What is found of a picture.
 
+use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
+use metalith_design::Design;
+use metalith_optics::{CalibratedModel, ModelStatement};
+use metalith_restoration::RestorationMethod;
+use metalith_sensor::Camera;
 use nalgebra::DMatrix;
 use ndarray::Array3;
 use serde::Serialize;
 
-use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
-use metalith_design::Design;
-use metalith_optics::{CalibratedModel, ModelStatement};
-use metalith_sensor::Camera;
-
-use crate::approximation_set::AssumedScore;
+use crate::approximation_scores::AssumedScore;
 use crate::chip::sensor_um;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
@@ -19,12 +19,11 @@ use crate::layout::PillarCount;
 use crate::operator::BetweenNodes;
 use crate::point_image::PointImage;
 use crate::resolution::ContrastCurve;
-use crate::restore::RestorationMethod;
 use crate::scene::SceneImage;
 use crate::score::ZoneScore;
 use crate::spectra::rgb_basis;
 use crate::stray_light::LightShares;
-use crate::uncertainty::DoubtReport;
+use crate::uncertainty::UncertaintyReport;
 
 /// What is said of a frame, simulated or recorded, whatever is made of it.
 #[derive(Clone, Debug, Serialize)]
@@ -44,7 +43,7 @@ pub struct FrameStatement {
     /// What is to be known before anything else: pixels that were lost, scenes and layouts that are not what they seem.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// What the operator of the restoration errs by, by channel; see [`crate::Rehearsal::operator_error`].
+    /// What the operator of the restoration errs by, by channel; see [`crate::ForecastScene::operator_error`].
     pub operator_error: Vec<f64>,
     pub assumptions: Vec<Assumption>,
 }
@@ -71,7 +70,7 @@ impl FrameStatement {
     /// Of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. Notes and what the
     /// operator errs by are added.
     pub fn new(
-        studio: &ImagingSystem,
+        system: &ImagingSystem,
         layout: String,
         scene: &SceneImage,
         frame: &Frame,
@@ -79,16 +78,16 @@ impl FrameStatement {
     ) -> Self {
         let fidelity = match model {
             Some(_) => Fidelity::Calibrated,
-            None => studio.design.verify.fidelity,
+            None => system.design.verify.fidelity,
         };
         let model = model.map(ModelStatement::of);
-        let mut assumptions = studio.assumptions(scene, fidelity);
+        let mut assumptions = system.assumptions(scene, fidelity);
         assumptions.extend(model.iter().flat_map(Assumption::of_model));
         let distance_mm = scene.view.distance_um * 1e-3;
         Self {
-            design: studio.design.name.clone(),
+            design: system.design.name.clone(),
             layout,
-            camera: studio.camera.name.clone(),
+            camera: system.camera.name.clone(),
             field_deg: scene.view.field_deg,
             distance_mm: distance_mm.is_finite().then_some(distance_mm),
             saturated: frame.saturated,
@@ -119,7 +118,7 @@ pub struct PictureReport {
     pub contrast: Vec<ContrastCurve>,
     /// What samples say, if any were drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub doubt: Option<DoubtReport>,
+    pub uncertainty: Option<UncertaintyReport>,
     /// What the assumptions of others are worth, if asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub worth: Vec<AssumedScore>,
@@ -207,7 +206,10 @@ impl ImagingSystem {
 
     /// Light budget of each channel for a white scene.
     pub fn budget(&self) -> Vec<ChannelBudget> {
-        let channels = self.channels.iter().zip(self.veil.budget.chunks(self.bank.bases));
+        let channels = self
+            .channels
+            .iter()
+            .zip(self.stray_light.budget.chunks(self.bank.bases));
         channels
             .map(|(channel, shares)| ChannelBudget {
                 channel: channel.name.clone(),
@@ -306,7 +308,7 @@ impl ImagingSystem {
             assumption(
                 "window of a kernel",
                 format!(
-                    "{} pixels; what lands outside is the veil, in squares of {} pixels",
+                    "{} pixels; what lands outside is the stray light, in squares of {} pixels",
                     spec.window,
                     crate::stray_light::CELL_PIXELS
                 ),
@@ -315,7 +317,7 @@ impl ImagingSystem {
                 "wavelengths",
                 format!(
                     "at most {} nm apart, nearer in the light of narrow lamps; between them the PSF is blended and moves with the chief ray",
-                    crate::chip::STEP_NM
+                    metalith_sensor::WavelengthSteps::USUAL_NM
                 ),
             ),
             assumption("sensor", place_of_sensor(&self.design, &self.camera)),
@@ -390,7 +392,7 @@ fn polarised(focused: FocusedLight, light: PolarisedLight) -> String {
         true => format!("all light arrives {arriving}, as behind a filter"),
         false => format!("all light arrives {arriving}, and pillars focus what arrives {own}"),
     };
-    format!("{source}; {}, in image and veil", light.detector(focused))
+    format!("{source}; {}, in image and stray light", light.detector(focused))
 }
 
 /// Where the spectra of a scene come from.

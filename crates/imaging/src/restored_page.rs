@@ -4,6 +4,7 @@ use std::path::Path;
 
 use metalith_core::{Result, srgb};
 use metalith_report::{Page, PhotoRow, fixed, write_json};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array3;
 use serde::Serialize;
@@ -12,7 +13,6 @@ use crate::exposure::Frame;
 use crate::files::{picture_file, write_restored};
 use crate::page::{list_assumptions, shown};
 use crate::report::FrameStatement;
-use crate::restore::RestorationMethod;
 
 /// What the page of a restored frame says, in numbers.
 #[derive(Clone, Debug, Serialize)]

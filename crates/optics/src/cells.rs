@@ -145,7 +145,7 @@ impl RealisedCells {
         Error::refused(
             "study/oblique",
             "tables of cells are for light along the normal",
-            "leave out `incidence = \"as_lit\"`",
+            "leave out `incidence = \"oblique\"`",
         )
     }
 

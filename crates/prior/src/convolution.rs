@@ -18,7 +18,7 @@ const PIECE: usize = 128 * BLOCK;
 
 /// Shape of a convolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shape {
+pub struct Shape {
     pub inputs: usize,
     /// A multiple of four.
     pub outputs: usize,
@@ -44,7 +44,7 @@ impl Shape {
 
 /// Weights in the order in which they are used.
 #[derive(Clone, Debug)]
-pub(crate) struct Packed {
+pub struct Packed {
     shape: Shape,
     /// `[output / 4][input][tap][output % 4]`
     values: Vec<f32>,
@@ -184,7 +184,7 @@ impl WithSimd for Piece<'_> {
 }
 
 /// Add the gradient of the weights to `gradient`: of each the sum over positions of input times gradient of output.
-pub(crate) fn add_weight_gradient(shape: Shape, input: &Features, output: &Features, gradient: &mut [f32]) {
+pub fn add_weight_gradient(shape: Shape, input: &Features, output: &Features, gradient: &mut [f32]) {
     Arch::new().dispatch(WeightGradient {
         shape,
         input,

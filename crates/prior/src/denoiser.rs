@@ -64,7 +64,8 @@ impl NetworkDenoiser {
         Self::of_network(Network::new(&Plan::new(Size::DENOISER), weights))
     }
 
-    pub(crate) fn of_network(network: Network) -> Self {
+    /// With a network that is at hand.
+    pub fn of_network(network: Network) -> Self {
         Self {
             network: Kind::Own(network),
         }
@@ -118,13 +119,13 @@ impl NetworkDenoiser {
 }
 
 /// What the network sees.
-pub(crate) fn input(picture: &Array3<f32>, deviation: &Array3<f32>) -> Features {
+pub fn input(picture: &Array3<f32>, deviation: &Array3<f32>) -> Features {
     let means: Vec<Array2<f32>> = deviation.axis_iter(Axis(2)).map(over_squares).collect();
     squares(picture, &means)
 }
 
 /// Means over squares of 2 x 2.
-pub(crate) fn over_squares(plane: ArrayView2<'_, f32>) -> Array2<f32> {
+pub fn over_squares(plane: ArrayView2<'_, f32>) -> Array2<f32> {
     let (rows, columns) = plane.dim();
     Array2::from_shape_fn((rows / 2, columns / 2), |(y, x)| {
         let row = |y: usize| plane[[y, 2 * x]] + plane[[y, 2 * x + 1]];

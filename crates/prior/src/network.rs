@@ -13,11 +13,11 @@ const LEVELS: usize = 3;
 /// Colours of a picture.
 pub const COLOURS: usize = 3;
 /// Rows and columns that the network takes are multiples of this, in its own resolution: half of the picture's.
-pub(crate) const MULTIPLE: usize = 1 << (LEVELS - 1);
+pub const MULTIPLE: usize = 1 << (LEVELS - 1);
 
 /// How large a network is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Size {
+pub struct Size {
     /// Channels that it sees, in its own resolution.
     pub inputs: usize,
     /// Channels at each resolution.
@@ -35,7 +35,7 @@ impl Size {
     };
 
     /// Of the last stage of a camera that sees so many pictures, and one map of where it is.
-    pub fn finisher(pictures: usize) -> Self {
+    pub fn post_processor(pictures: usize) -> Self {
         Self {
             inputs: 4 * COLOURS * pictures + 1,
             channels: [24, 48, 64],
@@ -58,7 +58,7 @@ enum Step {
 
 /// One convolution of the network.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Layer {
+pub struct Layer {
     /// Name in files of weights.
     pub name: String,
     pub shape: Shape,
@@ -68,7 +68,7 @@ pub(crate) struct Layer {
 
 /// What a network does, without its weights.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan {
+pub struct Plan {
     pub layers: Vec<Layer>,
     steps: Vec<Step>,
 }
@@ -140,7 +140,7 @@ impl Plan {
 
 /// The network with its weights, made ready for use.
 #[derive(Clone, Debug)]
-pub(crate) struct Network {
+pub struct Network {
     plan: Plan,
     forward: Vec<Packed>,
     /// For gradients only.
@@ -148,7 +148,7 @@ pub(crate) struct Network {
 }
 
 /// What the way forward leaves for the way back: of each step its input, and what is between two convolutions.
-pub(crate) struct Trace {
+pub struct Trace {
     inputs: Vec<Features>,
     between: Vec<Option<Features>>,
 }

@@ -167,7 +167,7 @@ impl Bench {
             return Err(Error::refused(
                 "study/oblique",
                 "a study takes the cells along the normal, and the design asks for them as they are lit",
-                "leave out `incidence = \"as_lit\"` in [verify] of the design of the study",
+                "leave out `incidence = \"oblique\"` in [verify] of the design of the study",
             ));
         }
         check_rectangles(&design, &self.made, self.picture.is_some())?;

@@ -7,13 +7,13 @@ use metalith_core::document::{Limits, Section};
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_gds::extract::Extraction;
-use metalith_imaging::restore::RestorationMethod;
 use metalith_imaging::scene::{BuiltIn, SceneImage, chart, read_far_scene};
 use metalith_imaging::{
-    Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal, SCORED_SIDES, ScenePower, Zone, ZoneScore,
+    ForecastScene, Frame, FrameOperator, ImagingSystem, OperatorError, SCORED_SIDES, ScenePower, Zone, ZoneScore,
     check_scored, sampling_of, scores,
 };
 use metalith_optics::{AsBuiltChip, SimulationCase};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array3;
 
@@ -112,7 +112,7 @@ pub(crate) struct PictureBench {
 
 /// The chip that a restoration knows when cameras are not calibrated.
 pub(crate) struct KnownChip {
-    studio: ImagingSystem,
+    system: ImagingSystem,
     operator_error: OperatorError,
 }
 
@@ -163,7 +163,7 @@ impl PictureBench {
         self.spec.kernels == KnownKernels::Design
     }
 
-    fn studio(
+    fn system(
         &self,
         design: &Design,
         extraction: &Extraction,
@@ -193,9 +193,9 @@ impl PictureBench {
         chip: &AsBuiltChip,
         progress: &dyn Progress,
     ) -> Result<KnownChip> {
-        let studio = self.studio(design, extraction, chip, progress)?;
-        let operator_error = Rehearsal::new(&studio, &studio.restoration()).operator_error;
-        Ok(KnownChip { studio, operator_error })
+        let system = self.system(design, extraction, chip, progress)?;
+        let operator_error = ForecastScene::new(&system, &system.restoration()).operator_error;
+        Ok(KnownChip { system, operator_error })
     }
 
     /// The picture that a chip takes; `known` is what its restoration knows, itself if left out.
@@ -210,23 +210,30 @@ impl PictureBench {
         known: Option<&KnownChip>,
         progress: &dyn Progress,
     ) -> Result<TakenPicture> {
-        let studio = self.studio(design, extraction, chip, progress)?;
-        let frame = studio.record(&studio.simulation(), &self.scene, self.spec.seed)?;
-        let operator: FrameOperator<'_> = known.map_or(&studio, |k| &k.studio).restoration();
-        let mut rehearsal = Rehearsal::new(&studio, &operator);
+        let system = self.system(design, extraction, chip, progress)?;
+        let frame = system.record(&system.simulation(), &self.scene, self.spec.seed)?;
+        let operator: FrameOperator<'_> = known.map_or(&system, |k| &k.system).restoration();
+        let mut forecast_scene = ForecastScene::new(&system, &operator);
         if let Some(known) = known {
             // Nobody knows by how much this chip is another one.
-            rehearsal.operator_error.clone_from(&known.operator_error);
+            forecast_scene.operator_error.clone_from(&known.operator_error);
         }
         let method = self.spec.method;
-        let restored = studio.restore(&operator, &rehearsal.operator_error, &frame, method, true, progress)?;
+        let restored = system.restore(
+            &operator,
+            &forecast_scene.operator_error,
+            &frame,
+            method,
+            true,
+            progress,
+        )?;
         let forecast_db = match method {
-            RestorationMethod::Tikhonov => rehearsal
-                .forecast(&studio, &operator, progress)?
+            RestorationMethod::Tikhonov => forecast_scene
+                .forecast(&system, &operator, progress)?
                 .psnr_linear_db(&ScenePower::natural()),
             _ => Vec::new(),
         };
-        let truth = studio.truth(&self.scene);
+        let truth = system.truth(&self.scene);
         let channels = self.camera.channel_names();
         Ok(TakenPicture {
             scores: scores(&restored, &truth)?,
@@ -234,7 +241,7 @@ impl PictureBench {
             frame,
             restored,
             forecast_db,
-            note: rehearsal.operator_error.note(&channels),
+            note: forecast_scene.operator_error.note(&channels),
             channels,
         })
     }

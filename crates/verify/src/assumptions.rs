@@ -130,7 +130,7 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
             if design.cell.shape.rectangles().is_some() {
                 "rectangles are solved along the normal alone"
             } else {
-                "--as-lit solves them at the angle at which light arrives, both polarisations"
+                "--oblique solves them at the angle at which light arrives, both polarisations"
             },
         );
         return;
@@ -147,7 +147,7 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
                 sig(widest_deg, 3)
             ))
         },
-        "--as-lit solves them for each field angle: a table of 50 to 60 CPU s for each wavelength and direction that has none yet",
+        "--oblique solves them for each field angle: a table of 50 to 60 CPU s for each wavelength and direction that has none yet",
     );
     if let Some(camera) = &found.camera {
         let ends = [camera.wavelengths_nm.first(), camera.wavelengths_nm.last()];
@@ -155,7 +155,7 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
         row(
             "In white light, which arrives from one direction, cells are lit from where the element looks at each wavelength",
             in_degrees(apart.fold(0.0, f64::max)),
-            "angle between both directions for the outermost element; --as-lit lights cells from the point itself",
+            "angle between both directions for the outermost element; --oblique lights cells from the point itself",
         );
     }
 }

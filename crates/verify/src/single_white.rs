@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::case::TransmissionTables;
 use super::single::{Lighting, distinct, kind_of, largest_number};
-use super::white::{CameraStatement, STEP_NM, step_nm};
+use super::white::{CameraStatement, step_nm};
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
@@ -30,9 +30,9 @@ pub struct SingleWhite {
 /// As [`Camera::sampling`].
 pub fn white_sampling(camera: &Camera, known_nm: [f64; 2], lenses_um: &[[f64; 2]]) -> Result<Sampling> {
     let steps = |most_nm: f64| WavelengthSteps::from(most_nm).behind(lenses_um.iter().copied(), camera.sensor.pixel_um);
-    let sampling = camera.sampling(known_nm, steps(STEP_NM))?;
+    let sampling = camera.sampling(known_nm, steps(WavelengthSteps::USUAL_NM))?;
     let most_nm = step_nm(sampling.ends_nm());
-    if most_nm > STEP_NM {
+    if most_nm > WavelengthSteps::USUAL_NM {
         return camera.sampling(known_nm, steps(most_nm));
     }
     Ok(sampling)

@@ -19,10 +19,6 @@ use metalith_sensor::{Camera, Sampling, WavelengthSteps};
 use metalith_wave::psf::{BandSample, PixelFrequencies};
 use metalith_wave::{Accuracy, FoldedPropagator, PlaneWave, Scratch, Window};
 
-/// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
-/// this weighs is reported for each channel.
-pub(super) const STEP_NM: f64 = 12.5;
-
 /// Steps that the visible has.
 const MOST_STEPS: f64 = 24.0;
 
@@ -93,7 +89,7 @@ pub(super) fn landing_um(element: &Element, wavelength_um: f64, distance_um: f64
 
 /// Distance of the wavelengths (nm): a band that is much wider than the visible has as many as that.
 pub(super) fn step_nm([short, long]: [f64; 2]) -> f64 {
-    STEP_NM.max((long - short) / MOST_STEPS)
+    WavelengthSteps::USUAL_NM.max((long - short) / MOST_STEPS)
 }
 
 /// One wavelength, with what all elements share.

@@ -1,8 +1,8 @@
 //! Grids of places of the scene: one for each pixel of the sensor in the simulation, every second in the restoration.
 
+use metalith_imaging::SceneView;
 use metalith_imaging::scene::averaged;
-use metalith_imaging::{FftScratch, SceneView, SquareFft};
-use metalith_wave::kernels::fft_size;
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use ndarray::Array2;
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -33,7 +33,7 @@ impl FineGrid {
         let kernel = [rows, columns];
         let first = [0, 1].map(|a| (half[a] + kernel[a] / 2) as i64 - (frame[a] / 2) as i64);
         let fft = SquareFft::new(fft_size(Self::places(view, step, kernel)));
-        let spectrum = |k: &Array2<f32>| transformed(&fft, k);
+        let spectrum = |k: &Array2<f32>| fft.of_plane(k, &mut FftScratch::default());
         Self {
             half,
             step,
@@ -64,7 +64,10 @@ impl FineGrid {
 
     /// Frames of all channels from planes of the scene on the grid.
     pub fn frames(&self, planes: &[Array2<f32>]) -> Vec<Array2<f32>> {
-        let spectra: Vec<Vec<Complex32>> = planes.par_iter().map(|p| transformed(&self.fft, p)).collect();
+        let spectra: Vec<Vec<Complex32>> = planes
+            .par_iter()
+            .map(|p| self.fft.of_plane(p, &mut FftScratch::default()))
+            .collect();
         self.kernels
             .par_iter()
             .map(|own| {
@@ -75,7 +78,9 @@ impl FineGrid {
                         .zip(plane)
                         .for_each(|((s, k), p)| *s += k * p);
                 }
-                let whole = inverse(&self.fft, &mut sum);
+                let whole = self
+                    .fft
+                    .to_plane(&mut sum, (self.fft.size(), self.fft.size()), &mut FftScratch::default());
                 let n = self.fft.size() as i64;
                 let [rows, columns] = self.frame;
                 Array2::from_shape_fn((rows, columns), |(y, x)| {
@@ -175,8 +180,8 @@ impl CoarseGrid {
     }
 
     /// Mean variance of the light of a square, for how much each pixel is to be trusted.
-    pub fn variance(&self, trust: &Array2<f32>) -> f64 {
-        let known = trust.iter().filter(|t| **t > 0.0);
+    pub fn variance(&self, inverse_variance: &Array2<f32>) -> f64 {
+        let known = inverse_variance.iter().filter(|t| **t > 0.0);
         let (sum, count) = known.fold((0.0, 0.0), |(s, n), t| (s + 1.0 / f64::from(*t), n + 1.0));
         sum / f64::max(count, 1.0) / self.places.len() as f64
     }
@@ -226,26 +231,6 @@ fn sampled(plane: &Array2<f32>, view: &SceneView, half: [usize; 2], step: f64) -
         let (y, x) = (y as i64, x as i64);
         (1.0 - s) * ((1.0 - t) * at(y, x) + t * at(y, x + 1)) + s * ((1.0 - t) * at(y + 1, x) + t * at(y + 1, x + 1))
     })
-}
-
-/// The spectrum of a plane in the first corner of a square.
-pub fn transformed(fft: &SquareFft, plane: &Array2<f32>) -> Vec<Complex32> {
-    let n = fft.size();
-    let mut square = vec![0.0f32; n * n];
-    for (row, line) in plane.rows().into_iter().zip(square.chunks_exact_mut(n)) {
-        line.iter_mut().zip(row).for_each(|(to, v)| *to = *v);
-    }
-    let mut spectrum = vec![Complex32::ZERO; fft.entries()];
-    fft.forward(&mut square, plane.nrows(), &mut spectrum, &mut FftScratch::default());
-    spectrum
-}
-
-/// The square of a spectrum, which is used up.
-pub fn inverse(fft: &SquareFft, spectrum: &mut [Complex32]) -> Array2<f32> {
-    let n = fft.size();
-    let mut square = vec![0.0f32; n * n];
-    fft.inverse(spectrum, &mut square, fft.size(), &mut FftScratch::default());
-    Array2::from_shape_vec((n, n), square).expect("as many values")
 }
 
 #[cfg(test)]

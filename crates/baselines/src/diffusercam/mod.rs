@@ -8,20 +8,20 @@ mod admm;
 mod grid;
 mod surface;
 
+use admm::{Deconvolution, Descent};
+use grid::{CoarseGrid, FineGrid, on_scene};
 use metalith_core::{Error, Progress, Result};
-use metalith_imaging::restore::SceneStatistics;
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::spectra::rgb_basis;
 use metalith_imaging::{Frame, OperatorError, SceneView};
+use metalith_restoration::SceneStatistics;
 use metalith_sensor::Camera;
 use ndarray::Array2;
 use rayon::prelude::*;
+use surface::RoughSurface;
 
 use crate::lensless::{Lensless, LenslessBench};
 use crate::stage::{PICTURES, Stage, StageKind};
-use admm::{Deconvolution, Descent};
-use grid::{CoarseGrid, FineGrid, on_scene};
-use surface::RoughSurface;
 
 /// A rough surface before a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -174,7 +174,7 @@ impl DiffuserCam {
 
     /// By descent, sent light of each channel.
     fn sent_by(&self, frame: &Frame, descents: &[Descent], progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
-        let (_, trust) = frame.light(&self.bench.camera, &self.error);
+        let (_, inverse_variance) = frame.light(&self.bench.camera, &self.error);
         let light = frame.recorded_light(&self.bench.camera);
         let rounds: usize = descents.iter().map(|d| d.rounds).sum();
         progress.begin("restoring by total variation", (rounds * light.len()) as u64);
@@ -182,10 +182,10 @@ impl DiffuserCam {
         let one = |descent: &Descent| {
             light
                 .par_iter()
-                .zip(&trust)
+                .zip(&inverse_variance)
                 .zip(&self.solvers)
-                .map(|((light, trust), solver)| {
-                    let variance = solver.grid().variance(trust);
+                .map(|((light, inverse_variance), solver)| {
+                    let variance = solver.grid().variance(inverse_variance);
                     let found = solver.solve(&solver.grid().data(light), variance, *descent, progress)?;
                     Ok(on_scene(&found, step, &self.bench.view))
                 })
@@ -196,7 +196,7 @@ impl DiffuserCam {
 
     /// Root mean square difference of what the restoration knows and the simulation on a random scene, over the light.
     fn operator_error(&self) -> OperatorError {
-        let planes = SceneStatistics::colours().random_scene(&self.bench.view, SEED);
+        let planes = SceneStatistics::colours().random_scene(self.bench.shape(), SEED);
         let scene = self.bench.scene_of(planes);
         let light = self.light(&scene);
         let ideal = self.bench.ideal(&scene);

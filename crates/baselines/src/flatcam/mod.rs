@@ -10,9 +10,9 @@ mod solve;
 
 use faer::Mat;
 use metalith_core::{Error, Progress, Result};
-use metalith_imaging::restore::SceneStatistics;
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{Frame, SceneView};
+use metalith_restoration::SceneStatistics;
 use metalith_sensor::Camera;
 use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
@@ -128,7 +128,7 @@ impl FlatCam {
     fn chosen_strengths(&self) -> Vec<f64> {
         let scene = self
             .bench
-            .scene_of(SceneStatistics::colours().random_scene(&self.bench.view, SEED));
+            .scene_of(SceneStatistics::colours().random_scene(self.bench.shape(), SEED));
         let frame = self.bench.record(&self.light(&scene), SEED);
         let truth = self.bench.ideal(&scene);
         let light = frame.recorded_light(&self.bench.camera);

@@ -12,6 +12,7 @@ use metalith_imaging::{
 };
 use metalith_layout::read_pillars;
 use metalith_optics::{Perturbation, SimulationCase};
+use metalith_restoration::FrameModel;
 use metalith_sensor::{Blend, Camera, Channel, Illuminant, Led, Response, Spectrum};
 use metalith_testing::session::{PIXELS, middle_set, small_design, small_set};
 use ndarray::{Array2, Array3};

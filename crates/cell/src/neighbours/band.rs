@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use crate::{CellStack, NEIGHBOUR_DEGREE, NEIGHBOURS, NeighbourResponse, SiteResponse};
-use metalith_core::Result;
+use metalith_core::{Result, lagrange_weight};
 
 /// A wavelength that has a table, s and p as one.
 #[derive(Clone, Debug)]
@@ -127,10 +127,8 @@ impl BandResponse {
 fn lagrange(nodes: &[BandNode], wavelength_um: f64) -> Vec<f64> {
     let of = |i: usize| {
         let others = nodes.iter().enumerate().filter(|(j, _)| *j != i);
-        let own = nodes[i].wavelength_um;
-        others
-            .map(|(_, other)| (wavelength_um - other.wavelength_um) / (own - other.wavelength_um))
-            .product()
+        let others = others.map(|(_, other)| other.wavelength_um);
+        lagrange_weight(wavelength_um, nodes[i].wavelength_um, others)
     };
     (0..nodes.len()).map(of).collect()
 }

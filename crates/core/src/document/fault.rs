@@ -25,6 +25,8 @@ pub enum FaultKind {
     OutOfRange,
     /// A word that is not among the choices of its key.
     UnknownChoice,
+    /// A key or a word of an earlier version, which has another name now.
+    Renamed,
     /// A list of another length than the key has.
     WrongLength,
     /// A text with characters that no line may hold.

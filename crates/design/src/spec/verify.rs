@@ -45,8 +45,9 @@ pub struct VerifySpec {
 pub enum CellIncidence {
     /// Along the normal, whatever the field angle; the same cell everywhere.
     Normal,
-    /// Oblique incidence: the angle at which light arrives at each element from each field angle, both polarisations;
-    /// the cells are solved once for each direction and wavelength.
+    /// Oblique incidence: the angle at which light arrives at each element from each field angle, both polarisations; the
+    /// cells are solved once for each direction and wavelength.
+    #[serde(rename = "oblique")]
     AsLit,
 }
 
@@ -184,8 +185,9 @@ fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) {
 }
 
 fn read_incidence(s: &Section<'_, '_>, cell: &CellSpec) -> CellIncidence {
-    let choices = [("normal", CellIncidence::Normal), ("as_lit", CellIncidence::AsLit)];
-    let incidence = s.choice("incidence", &choices, Some(CellIncidence::Normal));
+    let choices = [("normal", CellIncidence::Normal), ("oblique", CellIncidence::AsLit)];
+    let renamed = [("as_lit", "oblique")];
+    let incidence = s.choice_renamed("incidence", &choices, &renamed, Some(CellIncidence::Normal));
     if incidence == CellIncidence::AsLit && cell.shape.rectangles().is_some() {
         let [what, hint] = OBLIQUE_RECTANGLES;
         s.fault_given(&["cell.shape"], "incidence", what, hint);

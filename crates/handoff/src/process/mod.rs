@@ -4,6 +4,7 @@ mod read;
 
 use std::path::{Path, PathBuf};
 
+use include_dir::{Dir, File, include_dir};
 use serde::Serialize;
 
 use metalith_core::Result;
@@ -12,29 +13,10 @@ use metalith_design::Design;
 use metalith_drc::Deck;
 use metalith_pillars::PillarShape;
 
-/// The processes that ship with the program, by the names of their files; the first is the standard one.
-const SHIPPED: [(&str, &str); 5] = [
-    (
-        "processes/jbx6300_zep520a.toml",
-        include_str!("../../../../processes/jbx6300_zep520a.toml"),
-    ),
-    (
-        "processes/jbx6300_asi.toml",
-        include_str!("../../../../processes/jbx6300_asi.toml"),
-    ),
-    (
-        "processes/jbx6300_asi_900.toml",
-        include_str!("../../../../processes/jbx6300_asi_900.toml"),
-    ),
-    (
-        "processes/jbx6300_tio2.toml",
-        include_str!("../../../../processes/jbx6300_tio2.toml"),
-    ),
-    (
-        "processes/jbx6300_csi.toml",
-        include_str!("../../../../processes/jbx6300_csi.toml"),
-    ),
-];
+/// The processes that ship with the program.
+static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../processes");
+
+const STANDARD: &str = "jbx6300_zep520a.toml";
 
 /// Doses of a matrix: three by three blocks.
 pub(super) const DOSES: usize = 9;
@@ -276,21 +258,24 @@ impl Process {
     /// # Panics
     /// Never: it is tested.
     pub fn standard() -> Self {
-        Self::shipped(0)
+        Self::shipped(SHIPPED.get_file(STANDARD).expect("it is one of them"))
     }
 
     /// The process that ships with the program and etches a film of a material, as designs name it: one for its thickness (nm)
     /// before others; the standard one where none does.
     pub fn of_film(film: &str, thickness_nm: f64) -> Self {
-        let all = (0..SHIPPED.len()).map(Self::shipped);
+        let mut files: Vec<_> = SHIPPED.files().collect();
+        files.sort_by_key(|file| file.path());
+        let all = files.into_iter().map(Self::shipped);
         let mut fitting: Vec<Self> = all.filter(|process| process.transfer.etches(film)).collect();
         fitting.sort_by_key(|process| !process.transfer.reaches(thickness_nm));
         fitting.into_iter().next().unwrap_or_else(Self::standard)
     }
 
-    fn shipped(k: usize) -> Self {
-        let (name, text) = SHIPPED[k];
-        read::process(Path::new(name), text.to_owned(), true).expect("the processes of the program are sound")
+    fn shipped(file: &File<'_>) -> Self {
+        let text = file.contents_utf8().expect("processes are text");
+        let path = Path::new("processes").join(file.path());
+        read::process(&path, text.to_owned(), true).expect("the processes of the program are sound")
     }
 
     /// Wavelength of the hyperbolic reference lens and of the small lenses of the dose matrix (nm).
@@ -349,8 +334,7 @@ mod tests {
             steps: 180,
         };
         let rectangles = PillarShape::Rectangle(rectangles.into());
-        for k in 0..SHIPPED.len() {
-            let process = Process::shipped(k);
+        for process in SHIPPED.files().map(Process::shipped) {
             for shape in [PillarShape::Square, PillarShape::Circle, rectangles] {
                 for rules in process.checks.decks(shape) {
                     // The same deck, built in and from its file.
@@ -376,8 +360,10 @@ mod tests {
 
     #[test]
     fn all_mistakes_are_reported_at_once_with_their_places() {
-        let text = SHIPPED[0]
-            .1
+        let standard = SHIPPED.get_file(STANDARD).unwrap();
+        let text = standard
+            .contents_utf8()
+            .unwrap()
             .replace("tone = \"positive\"", "tone = \"possitive\"")
             .replace("field_used_um = 499.8", "field_used_um = 600")
             .replace("dose_uc_cm2 = 280", "dose = 280");

@@ -1,6 +1,6 @@
 //! What photographs have on the mean.
 
-use super::power::{Bands, ZONES};
+use super::bands::{Bands, ZONES};
 
 /// Of a zone of the field.
 pub struct NaturalZone {

@@ -1,15 +1,14 @@
 //! Kernels from the field behind each element.
 
 use metalith_core::{Error, Progress, Result};
+use metalith_wave::kernels::FftScratch;
 use metalith_wave::{Accuracy, Scratch, Window};
 use rayon::prelude::*;
 
-use super::bank::{BankSpec, DistinctKernels, KernelBank};
-use super::spectrum::{KernelPlan, MovedPart, QUARTERS};
-use crate::ElementView;
+use super::bank::{BankSpec, DistinctKernels, KernelBank, SMALL_UM};
+use super::spectrum::{MovedPart, QUARTERS, SpectrumPlan};
 use crate::chip::{ChipInLight, ElementInLight};
-use crate::kernel_plan::SMALL_UM;
-use crate::operator::FftScratch;
+use crate::geometry::ElementView;
 use crate::spectra::SceneSpectrum;
 
 impl KernelBank {
@@ -39,7 +38,7 @@ impl KernelBank {
         let wavelengths = chip.sampling.wavelengths_nm.len();
         spec.check_size(count, channel_um.len(), basis.len(), wavelengths)?;
         progress.begin("simulating kernels", (count * wavelengths) as u64);
-        let plan = KernelPlan::new(spec.window);
+        let plan = SpectrumPlan::new(spec.window);
         let all: Vec<usize> = (0..wavelengths).collect();
         let mut distinct = Vec::new();
         // One element after the other: what its sites transmit at all wavelengths is held while it is at work.
@@ -128,7 +127,7 @@ struct Builder<'a> {
     view: ElementView,
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
-    plan: &'a KernelPlan,
+    plan: &'a SpectrumPlan,
     channel_um: &'a [f64],
 }
 

@@ -10,14 +10,14 @@ use std::ops::Range;
 use metalith_sensor::ChannelPart;
 use num_complex::Complex32;
 
-use crate::operator::{FftScratch, SquareFft};
 use crate::spectra::SceneSpectrum;
+use metalith_wave::kernels::{FftScratch, SquareFft};
 
 /// Squares an axis of a pixel.
 pub const QUARTERS: usize = 4;
 
 /// What kernels are made with: transforms of one window size.
-pub struct KernelPlan {
+pub struct SpectrumPlan {
     /// Pixels an axis of a kernel, even.
     pub window: usize,
     fft: SquareFft,
@@ -50,13 +50,13 @@ impl MovedPart {
         }
     }
 
-    /// Whether its PSF is in a kernel of so many pixels: parts that land farther off belong to the veil.
+    /// Whether its PSF is in a kernel of so many pixels: parts that land farther off belong to the stray light.
     pub fn inside(&self, window: usize) -> bool {
         self.offset.iter().all(|o| o.abs() <= 0.5 * window as f64)
     }
 }
 
-impl KernelPlan {
+impl SpectrumPlan {
     /// For kernels of `window` pixels an axis, an even number.
     pub fn new(window: usize) -> Self {
         // Half a window more than the kernel: what parts that have moved put beyond it comes back outside of it.
@@ -237,7 +237,7 @@ mod tests {
         /// Of the peak: single precision, and a Gaussian of 3 quarters that is summed over them.
         const SHARE: f32 = 2e-3;
         let window = 16;
-        let plan = KernelPlan::new(window);
+        let plan = SpectrumPlan::new(window);
         let mut scratch = FftScratch::default();
         let sigma = 0.8;
         let n = window * QUARTERS;

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use metalith_sensor::Sensor;
-use metalith_wave::kernels::fft_size;
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use ndarray::Array2;
 use num_complex::Complex32;
 
@@ -12,9 +12,7 @@ use super::between::BetweenNodes;
 use super::mixed::MixedKernels;
 use super::source::KernelSource;
 use super::warp::{CellPoint, Warp};
-use super::{FftScratch, SquareFft};
-use crate::ElementView;
-use crate::geometry::SceneSpace;
+use crate::geometry::{ElementView, SceneSpace};
 
 /// One element of an operator.
 pub struct ElementOperator<'a> {

@@ -9,7 +9,8 @@ use std::ops::Range;
 use metalith_sensor::{ColourFilter, Sensor};
 use nalgebra::DMatrix;
 
-use super::{BetweenNodes, Detail, SceneInputs, ScenePoints};
+use super::between::BetweenNodes;
+use super::detail::{Detail, SceneInputs, ScenePoints};
 use crate::approximation_set::ApproximationSet;
 use crate::exposure::channel_at;
 use crate::kernels::{BankSpec, KernelBank, TurnedKernel};

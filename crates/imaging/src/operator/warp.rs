@@ -5,8 +5,8 @@ use ndarray::Array2;
 
 use super::between::BetweenNodes;
 use super::sub_image::PixelGrid;
-use crate::ElementView;
 use crate::approximation_set::{ApproximationSet, butterworth};
+use crate::geometry::ElementView;
 use crate::geometry::SceneSpace;
 use crate::kernels::BankSpec;
 
@@ -263,7 +263,7 @@ fn extent(element: &ElementView, spec: &BankSpec, channel_um: f64) -> ([f64; 2],
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SceneView;
+    use crate::geometry::SceneView;
     use metalith_core::Wedge;
     use metalith_sensor::Camera;
 

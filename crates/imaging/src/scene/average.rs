@@ -3,8 +3,8 @@
 use ndarray::{Array2, Axis};
 
 use super::SceneImage;
-use crate::SceneView;
-use crate::score::SCORED_SIDES;
+use super::sides::SCORED_SIDES;
+use crate::geometry::SceneView;
 
 /// Of a number of pixels that fit: a view is no finer than its own pixels.
 const ROUNDING: f64 = 1e-9;

@@ -1,8 +1,8 @@
-//! The veil: all light that lands outside of the kernels' windows, laid over the sensor coarsely.
+//! The stray light: all light that lands outside of the kernels' windows, laid over the sensor coarsely.
 //!
 //! Where light of a direction lands follows from the local spectra of the element, by rays
 //! ([`metalith_wave::propagation::LocalAngularSpectrum`]). What the kernel of that direction holds is taken out of it, so that image
-//! and veil together are all the light that travels to the sensor.
+//! and stray light together are all the light that travels to the sensor.
 //!
 //! | question | file |
 //! | --- | --- |
@@ -19,7 +19,7 @@ use metalith_sensor::Sensor;
 use metalith_wave::kernels::sum_of_products;
 use pulp::Arch;
 
-use crate::cache::MOST_BYTES;
+use crate::kernels::MOST_BYTES;
 
 pub use shares::LightShares;
 pub use squares::{gather, lay, lift, spread};
@@ -50,7 +50,7 @@ pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
 }
 
 impl StrayLight {
-    /// Whether the veil of a sensor can be held.
+    /// Whether the stray light of a sensor can be held.
     ///
     /// # Errors
     /// If it has too many pixels.
@@ -74,7 +74,7 @@ impl StrayLight {
         ))
     }
 
-    /// No veil, for tests and for those who leave it out.
+    /// No stray light, for tests and for those who leave it out.
     pub fn none(sensor: &Sensor, channels: usize, bases: usize) -> Self {
         let cells = sensor_cells(sensor);
         Self {
@@ -111,7 +111,7 @@ impl StrayLight {
             .collect()
     }
 
-    /// The veil of a surface whose spectrum is the sum of some of the basis, in each channel.
+    /// The stray light of a surface whose spectrum is the sum of some of the basis, in each channel.
     pub fn grey(&self, spectra: std::ops::Range<usize>) -> Self {
         let size = SCENE_CELLS * SCENE_CELLS * self.cells[0] * self.cells[1];
         let mut values = vec![0.0f32; self.channels * size];
@@ -136,7 +136,7 @@ mod tests {
     use metalith_sensor::Camera;
 
     #[test]
-    fn a_sensor_whose_veil_cannot_be_held_is_refused() {
+    fn a_sensor_whose_stray_light_cannot_be_held_is_refused() {
         let mut sensor = Camera::three_bands(5.86).sensor;
         assert!(StrayLight::check_size(&sensor, 3, 6).is_ok());
         (sensor.rows, sensor.columns) = (100_000, 100_000);

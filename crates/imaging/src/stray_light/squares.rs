@@ -3,7 +3,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use super::{CELL_PIXELS, SCENE_CELLS};
-use crate::SceneView;
+use crate::geometry::SceneView;
 
 /// Gather the light of a plane of the scene into squares: hats about their middles, times projected solid angle.
 pub fn gather(view: &SceneView, plane: ArrayView2<'_, f32>) -> Vec<f64> {

@@ -9,17 +9,17 @@ use rayon::prelude::*;
 use super::squares::solid_angle;
 use super::{CELL_PIXELS, LightShares, SCENE_CELLS, StrayLight, sensor_cells};
 use crate::chip::ChipInLight;
+use crate::geometry::{ElementView, SceneView};
 use crate::kernels::KernelBank;
 use crate::spectra::SceneSpectrum;
-use crate::{ElementView, SceneView};
 
 /// Blocks an axis of an element.
 const BLOCKS: usize = 20;
-/// Wavelengths of the veil are at most so far apart (nm): it moves with the chief ray by less than a square.
-const VEIL_STEP_NM: f64 = 38.0;
+/// Wavelengths of the stray light are at most so far apart (nm): it moves with the chief ray by less than a square.
+const STRAY_LIGHT_STEP_NM: f64 = 38.0;
 
 impl StrayLight {
-    /// Trace the veil of a scene's field.
+    /// Trace the stray light of a scene's field.
     ///
     /// # Errors
     /// If the user stopped it, or a map is too large.
@@ -31,11 +31,11 @@ impl StrayLight {
         view: &SceneView,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let stride = (VEIL_STEP_NM / crate::chip::STEP_NM) as usize;
+        let stride = (STRAY_LIGHT_STEP_NM / metalith_sensor::WavelengthSteps::USUAL_NM) as usize;
         let all = &chip.sampling.wavelengths_nm;
         let mut chosen: Vec<usize> = (0..all.len()).step_by(stride.max(1)).collect();
         chosen.extend((chosen.last() != Some(&(all.len() - 1))).then_some(all.len() - 1));
-        progress.begin("tracing the veil", (chosen.len() * chip.elements.len()) as u64);
+        progress.begin("tracing the stray light", (chosen.len() * chip.elements.len()) as u64);
         let weights = weights(chip, basis, &chosen);
         let cells = sensor_cells(sensor);
         let tracer = Tracer {
@@ -85,7 +85,7 @@ impl StrayLight {
                 .collect();
             for element in (0..chip.elements.len()).filter(|e| chip.copies[*e].0 == distinct) {
                 let area = chip.elements[element].area;
-                // Row by row: the light of all squares is larger than the veil itself.
+                // Row by row: the light of all squares is larger than the stray light itself.
                 for row in 0..SCENE_CELLS {
                     let squares = row * SCENE_CELLS..(row + 1) * SCENE_CELLS;
                     let traced: Vec<Traced> = squares
@@ -157,7 +157,7 @@ struct Departed {
     zero_order: f64,
 }
 
-/// The veil of one square of the scene through one element, of what arrives there.
+/// The stray light of one square of the scene through one element, of what arrives there.
 struct Traced {
     /// By channel and spectrum: light on each square of the sensor.
     light: Vec<Vec<f64>>,
@@ -225,7 +225,7 @@ impl Tracer<'_> {
             traced.shares[pair] = LightShares {
                 arrives,
                 in_kernels: in_kernel,
-                veil: on_sensor,
+                stray_light: on_sensor,
                 beyond: scale * outside - on_sensor,
                 evanescent: sum(&|m| m.evanescent),
                 zero_order: sum(&|m| m.zero_order),

@@ -70,7 +70,7 @@ impl Setup {
         .unwrap()
     }
 
-    pub fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> StrayLight {
+    pub fn stray_light(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> StrayLight {
         let (sensor, scene) = (&self.camera.sensor, &self.scene);
         StrayLight::build(chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
     }

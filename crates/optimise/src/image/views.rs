@@ -2,9 +2,9 @@
 
 use crate::PixelWindow;
 use crate::image::pupil::USED;
+use crate::image::scene::Scene;
 use crate::merit::focus::Lens;
 use metalith_wave::camera::Noise;
-use metalith_wave::restore::Scene;
 
 /// Views that the merit is taken over.
 #[derive(Clone, Debug, PartialEq)]

@@ -72,11 +72,6 @@ impl Mapping {
             })
             .unwrap_or(0)
     }
-
-    /// The choice that makes a width, if any does.
-    pub fn choice_of_width(&self, width_nm: u16) -> Option<usize> {
-        self.choices.iter().position(|c| c.width_nm == width_nm)
-    }
 }
 
 /// Phase step from one ring to the next, wrapped to [-1/2, 1/2) turn.
@@ -166,7 +161,6 @@ pub mod tests {
         for (i, choice) in mapping.choices().iter().enumerate() {
             assert_eq!(rule.width_nm(choice.turns), choice.width_nm);
             assert_eq!(mapping.nearest(choice.turns), i);
-            assert_eq!(mapping.choice_of_width(choice.width_nm), Some(i));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, lagrange_weight};
 use metalith_pillars::{Lattice, LatticeKind, PillarMap};
 
 use super::links::{Link, Links, distance_of, neighbour};
@@ -167,15 +167,6 @@ impl Rings {
         &self.nodes[ring]
     }
 
-    /// Every distinct distance of a ring's sites (um) with its number of sites: the oracle of [`Node`].
-    #[cfg(test)]
-    pub fn distances(&self, ring: usize) -> impl Iterator<Item = (f64, u32)> {
-        let unit_um = self.lattice.unit_um();
-        self.of_ring(ring)
-            .iter()
-            .map(move |&(r2, n)| ((r2 as f64).sqrt() * unit_um, n))
-    }
-
     /// floor(r / pitch) from the square of a distance in units, exactly.
     fn ring_of(&self, units2: i64) -> usize {
         (units2 as u64).isqrt() as usize / units_of_pitch(self.lattice) as usize
@@ -227,7 +218,7 @@ fn lagrange(at: &[f64; NODES], units2: i64) -> [f64; NODES] {
     let s = units2 as f64;
     std::array::from_fn(|j| {
         let others = at.iter().enumerate().filter(|(i, _)| *i != j);
-        others.map(|(_, other)| (s - other) / (at[j] - other)).product()
+        lagrange_weight(s, at[j], others.map(|(_, other)| *other))
     })
 }
 
@@ -279,6 +270,16 @@ mod tests {
 
     fn lens() -> Rings {
         Rings::new(Lattice::covering(1_000_000, 350).unwrap(), 1_000_000).unwrap()
+    }
+
+    impl Rings {
+        /// Every distinct distance of a ring's sites (um) with its number of sites: the oracle of [`Node`].
+        fn distances(&self, ring: usize) -> impl Iterator<Item = (f64, u32)> {
+            let unit_um = self.lattice.unit_um();
+            self.of_ring(ring)
+                .iter()
+                .map(move |&(r2, n)| ((r2 as f64).sqrt() * unit_um, n))
+        }
     }
 
     #[test]

@@ -231,6 +231,11 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
+    /// Accept all keys that nobody asked for: they are for other readers of the file.
+    pub fn accept_others(&self) {
+        self.asked.borrow_mut().extend(self.keys());
+    }
+
     fn get(&self, key: &str) -> Option<&'d Spanned<DeValue<'t>>> {
         self.asked.borrow_mut().insert(key.to_owned());
         self.table.get(key)
