@@ -1,4 +1,4 @@
-//! From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
+//! Metalens design, from the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
 //! image it makes.
 //!
 //! Data runs one way. The first line makes a file; the second begins at the bytes of that file, so that

@@ -23,7 +23,7 @@ const FAR: f64 = f64::INFINITY;
 #[pyclass(frozen)]
 pub struct ImagingSystem {
     system: imaging::ImagingSystem,
-    /// What the operator of the restoration errs by; found when it is first needed.
+    /// Error of the operator of the restoration; computed when it is first needed.
     operator_error: OnceLock<OperatorError>,
 }
 
@@ -111,7 +111,7 @@ impl ImagingSystem {
         Ok(Frame { frame })
     }
 
-    /// What an ideal camera of the same channels gives of a scene, linear sRGB.
+    /// Image of a scene by an ideal camera of the same channels, linear sRGB.
     fn truth<'py>(&self, py: Python<'py>, scene: PyReadonlyArray3<'py, f64>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let scene = self.scene(&scene.as_array().to_owned()).map_err(error)?;
         Ok(PyArray3::from_owned_array(py, self.system.truth(&scene)))

@@ -30,7 +30,7 @@ const PIXELS_UM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 /// Diameters of openings that are taken (um), as by the program.
 const APERTURES_UM: std::ops::RangeInclusive<f64> = 0.1..=1e5;
 
-/// Nothing, if a length that is given lies within a range (um).
+/// Succeeds if a length that is given lies within a range (um).
 fn within(what: &str, um: Option<f64>, range: &std::ops::RangeInclusive<f64>) -> Result<()> {
     match um.filter(|um| !range.contains(um)) {
         Some(um) => Err(Error::refused(
@@ -56,19 +56,19 @@ struct Lit {
     shape: PillarShape,
     widths: PillarMap,
     wedge: Wedge,
-    /// From the pillars to the plane that is looked at (um).
+    /// Distance from the pillars to the plane that is viewed (um).
     distance_um: f64,
 }
 
 impl Lit {
-    /// What elements have alike that are simulated together; `by_place` where what is made of one depends on where it stands.
+    /// Properties that elements simulated together share; `by_place` where the result for one depends on its place.
     fn like(&self, by_place: bool) -> (Wedge, f64, Option<f64>, Option<[i64; 2]>) {
         let place = by_place.then_some(self.centre_nm);
         (self.wedge, self.distance_um, self.aperture_radius_um, place)
     }
 }
 
-/// In what light elements are looked at.
+/// Light in which elements are viewed.
 struct Looked {
     wavelengths_nm: Vec<f64>,
     fields_deg: Vec<(f64, f64)>,
@@ -185,7 +185,7 @@ fn simulate_together(
 /// PSFs for Python: a dictionary for each. With the statement of the model that they rest on, if any, as JSON.
 type ToldPsfs<'py> = (Vec<Bound<'py, PyDict>>, Option<String>);
 
-/// What is simulated as made, if anything, with the PSFs.
+/// PSFs with what is simulated as fabricated, if anything.
 fn told<'py>(py: Python<'py>, (found, made): (Vec<Found>, Option<AsBuiltChip>)) -> PyResult<ToldPsfs<'py>> {
     let one = |f: Found| {
         let dict = PyDict::new(py);

@@ -28,7 +28,7 @@ pub struct CameraArgs {
     pub field_deg: f64,
 }
 
-/// What the files of [`CameraArgs`] hold.
+/// Contents of the files of [`CameraArgs`].
 pub struct CameraFiles {
     pub design: Design,
     pub camera: Camera,

@@ -84,7 +84,7 @@ impl CheckArgs {
         super::paths::apart(inputs.map(PathBuf::as_path), &files)
     }
 
-    /// Where to write the result in which form.
+    /// Paths of the results, each with its form.
     fn outputs(&self) -> impl Iterator<Item = (&Path, Form)> {
         let all: [(&Option<PathBuf>, Form); 3] = [
             (&self.lyrdb, drc::lyrdb),

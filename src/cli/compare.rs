@@ -121,7 +121,7 @@ pub struct LenslessArgs {
 }
 
 impl LenslessArgs {
-    /// Whether nobody asked for another mask or surface.
+    /// True if nobody asked for another mask or surface.
     pub fn is_standard(&self) -> bool {
         let (mask, surface) = (MaskSpec::standard(), DiffuserSpec::standard());
         let own = [self.mask_distance_um, self.mask_feature_um];
@@ -194,7 +194,7 @@ impl FromStr for ComparedDesign {
 }
 
 impl ComparedDesign {
-    /// As the library has it.
+    /// Design as the library lists it.
     ///
     /// # Errors
     /// If the design cannot be read, or has no layout.
@@ -229,7 +229,7 @@ impl ComparedDesign {
 }
 
 impl CompareArgs {
-    /// What is asked for, as the library has it.
+    /// Comparison that is asked for, as the library has it.
     fn comparison(&self) -> Result<Comparison> {
         Ok(Comparison {
             camera: self.camera.clone(),

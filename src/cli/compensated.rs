@@ -9,7 +9,7 @@ use metalith::{CalibratedModel, Design, Error, PillarArray, Result};
 use super::Terminal;
 use super::verify::FidelityArg;
 
-/// What a layout is compared with.
+/// Design that a layout is compared with.
 #[derive(Args)]
 pub struct CompensatedFor {
     /// `metalith layout --compensate MODEL` made the layout: its pillars are compared with the compensated design.

@@ -48,7 +48,7 @@ pub struct DenoiseArgs {
     json: bool,
 }
 
-/// How near the pictures are to the one without noise.
+/// Similarity of the pictures to the one without noise.
 #[derive(Serialize)]
 struct Scores {
     noisy_psnr_db: f64,

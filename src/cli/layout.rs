@@ -111,7 +111,7 @@ impl FormatArgs {
     }
 }
 
-/// What was written.
+/// Files that were written.
 pub struct Files {
     pub pillars: Written,
     pub apertures: Written,

@@ -46,7 +46,7 @@ use metalith::{Error, Faults};
 use output::{print_json, print_line};
 pub use terminal::Terminal;
 
-/// What every command answers with when it did its work.
+/// Outcome of a command that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Exit code 0.
@@ -115,7 +115,7 @@ enum Command {
     },
 }
 
-/// How the program is started again, if it was started by another name than that of its file.
+/// Command by which the program is started again, if it was started by another name than its file's.
 static STARTED_AS: OnceLock<PathBuf> = OnceLock::new();
 
 /// The program as a process of its own can be started.

@@ -14,7 +14,7 @@ const TEMPLATE: &str = include_str!("new.toml");
 /// Marks and the edge of the chip lie this far outside the outermost lens (um): local marks, global marks, edge.
 const OUTSIDE_UM: [f64; 3] = [60.0, 150.0, 220.0];
 
-/// From the rim of a lens to the metal (um).
+/// Distance from the rim of a lens to the metal (um).
 const MARGIN_UM: f64 = 2.0;
 
 /// Sides of an opening, below the 200 vertices that the template allows.
@@ -23,10 +23,10 @@ const MOST_SIDES: u32 = 190;
 /// Finer than this no writer places an edge of metal (nm).
 const FINEST_CHORD_NM: f64 = 5.0;
 
-/// What the cell of silicon nitride is made for (nm).
+/// Wavelengths that the cell of silicon nitride is made for (nm).
 const VISIBLE_NM: std::ops::RangeInclusive<f64> = 400.0..=700.0;
 
-/// What that of amorphous silicon is (nm).
+/// Wavelengths that the cell of amorphous silicon is made for (nm).
 const INFRARED_NM: std::ops::RangeInclusive<f64> = 850.0..=1600.0;
 
 /// Designs of the repository whose cells are for other long waves, each up to a wavelength (nm).
@@ -52,7 +52,7 @@ struct StartCell {
 }
 
 impl StartCell {
-    /// That for a wavelength (nm).
+    /// Cell for a wavelength (nm).
     fn for_nm(nm: f64) -> Self {
         if !INFRARED_NM.contains(&nm) {
             return Self {

@@ -227,8 +227,8 @@ fn findings(
     })
 }
 
-/// Of a robust design: what it begins from, what is best without errors in mind, and what was found, each
-/// with the same drawn errors.
+/// Figures of a robust design: what it begins from, what is best without errors in mind, and what was found, each with
+/// the same drawn errors.
 fn with_errors(
     task: &OptimiseTask,
     cells: &TaskCells,

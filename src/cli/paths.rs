@@ -45,7 +45,7 @@ pub fn writable(outputs: &[&Path]) -> Result<()> {
         .try_for_each(|output| metalith::AtomicFile::create(output).map(drop))
 }
 
-/// What tells a file from others, whatever its path says.
+/// Identity of a file, whatever its path says.
 struct Identity {
     path: PathBuf,
     #[cfg(unix)]

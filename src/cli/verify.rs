@@ -107,7 +107,7 @@ impl From<FidelityArg> for Fidelity {
 }
 
 impl Judging {
-    /// How a layout of this design, at `path`, will be simulated; asked before work is spent.
+    /// Simulation of a layout of this design, at `path`, decided before work is spent.
     ///
     /// # Errors
     /// If it could be neither simulated nor compared with its design, or its pillars cannot be judged by the cell.
@@ -124,7 +124,7 @@ impl Judging {
         Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
     }
 
-    /// Nothing, if the pillars of an array can be as the model says; asked before anything is written.
+    /// Succeeds if the pillars of an array can be as the model says; called before anything is written.
     ///
     /// # Errors
     /// If they cannot.

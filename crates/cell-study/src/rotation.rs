@@ -13,27 +13,27 @@ use metalith_report::{Axis, Cell, Chart, Column, Page, Table, counted, fixed, si
 /// Terms that mappings are fitted with; designs take no more.
 const TERMS: [usize; 4] = [1, 2, 3, 4];
 
-/// What one rotation does.
+/// Response at one rotation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RotationPoint {
     pub number: u16,
-    /// As drawn (degrees).
+    /// Rotation as drawn (degrees).
     pub rotation_deg: f64,
-    /// What the lattice adds to twice the rotation, in phase of the converted light (rad).
+    /// Phase that the lattice adds to twice the rotation, in the converted light (rad).
     pub added_rad: f64,
     /// Power of the converted and of the unconverted light over the arriving.
     pub converted: f64,
     pub unconverted: f64,
 }
 
-/// What a cell of rectangles does at the wavelength of the mapping.
+/// Study of a cell of rectangles at the wavelength of the mapping.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RotationStudy {
     pub name: String,
     pub wavelength_um: f64,
     /// All rotations that the design may write.
     pub points: Vec<RotationPoint>,
-    /// What the mapping of the design leaves, and half of the phase.
+    /// Error of the mapping of the design, and of half of the phase.
     pub design: MappingError,
     pub half: MappingError,
     /// Mappings by the number of their terms.

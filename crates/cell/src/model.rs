@@ -1,4 +1,4 @@
-//! What the rest of the program knows of a cell: complex transmission by width.
+//! Interface of a cell: complex transmission by width.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,7 +11,7 @@ use metalith_pillars::{LatticeKind, PillarShape};
 
 use crate::{CellResponse, Illumination};
 
-/// How truly a cell is described. Every result names the one it was made with.
+/// Fidelity of the description of a cell. Every result names the one it was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fidelity {
@@ -28,7 +28,7 @@ pub enum Fidelity {
 }
 
 impl Fidelity {
-    /// Those that a design alone has, from the least to the most true.
+    /// Fidelities that a design alone has, from the least to the most true.
     pub const ALL: [Self; 4] = [Self::Published, Self::Fitted, Self::Rigorous, Self::Neighbours];
 
     /// The cell that answers where the width of a pillar is all that is known: neighbours are then taken for equals.
@@ -40,7 +40,8 @@ impl Fidelity {
         }
     }
 
-    /// Why pillars of a shape on such a lattice cannot be judged by it, and what to do instead; none if they can.
+    /// Reason why pillars of a shape on such a lattice cannot be simulated with it, and what to do instead; `None` if
+    /// they can.
     pub fn refusal(self, shape: PillarShape, lattice: LatticeKind) -> Option<(String, &'static str)> {
         let square_lattices_alone = matches!(self, Self::Published | Self::Neighbours);
         let for_rectangles = matches!(self, Self::Rigorous | Self::Calibrated);
@@ -106,7 +107,7 @@ impl FromStr for Fidelity {
 /// How pillars of a lattice pass light into its zero order. A model is one implementation of this: [`CellModel::response`] answers, the
 /// others are facts.
 pub trait CellModel: Sync {
-    /// What the model is.
+    /// Fidelity of the model.
     fn fidelity(&self) -> Fidelity;
 
     /// What pillars up to a width (nm) or number do to light.

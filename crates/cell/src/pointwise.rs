@@ -11,13 +11,14 @@ use metalith_rcwa::Orders;
 /// wavelengths faster than making one.
 pub const ORDERS: usize = 17;
 
-/// The same for oblique light, where less is saved by symmetry: median error 0.007 rad.
+/// Number of orders for oblique light, where less is saved by symmetry: median error 0.007 rad.
 pub const OBLIQUE_ORDERS: usize = 11;
 
-/// For one of many wavelengths of a band: resonances move by some 0.3 nm, which no average over a band tells.
+/// Number of orders for one of many wavelengths of a band: resonances move by some 0.3 nm, which no average over a band
+/// shows.
 pub const BAND_ORDERS: usize = 9;
 
-/// The same for oblique light.
+/// Number of orders for oblique light of one of many wavelengths of a band.
 pub const OBLIQUE_BAND_ORDERS: usize = 7;
 
 /// Solves every width of a list at each wavelength that is asked for.
@@ -39,7 +40,7 @@ impl PointwiseCell {
         Self::with_orders(stack, widths_nm, orders)
     }
 
-    /// The same with another number of diffraction orders.
+    /// Cell with another number of diffraction orders.
     pub fn with_orders(stack: CellStack, widths_nm: impl IntoIterator<Item = u16>, orders: Orders) -> Self {
         let mut widths_nm = widths_nm.into_iter().filter(|w| *w > 0).collect::<Vec<_>>();
         widths_nm.sort_unstable();
@@ -51,7 +52,7 @@ impl PointwiseCell {
         }
     }
 
-    /// At most as many orders as the cell was made with.
+    /// Orders, at most as many as the cell was made with.
     fn at_most(&self, orders: usize) -> Result<Orders> {
         Ok(Orders::new(orders.min(self.orders.along_axis()))?)
     }
@@ -141,10 +142,10 @@ mod tests {
     use crate::Material;
     use metalith_core::Silent;
 
-    /// What a band passes is the same as by many orders.
+    /// Mean power of a band by few orders equals the result by many orders.
     #[test]
     fn fewer_orders_do_for_the_mean_over_a_band() {
-        /// Of the mean power that passes over 400 to 700 nm and all widths; of the mean |t - t exact| / |t|.
+        /// Tolerance of the mean power that passes over 400 to 700 nm and all widths; of the mean |t - t exact| / |t|.
         const POWER: f64 = 0.005;
         const AMPLITUDE: f64 = 0.05;
         let cell = PointwiseCell::new(crate::stack::tests::paper(), (100..=300).step_by(20));
@@ -169,7 +170,7 @@ mod tests {
 
     #[test]
     fn fewer_orders_do_for_the_mean_of_oblique_light() {
-        /// Of the mean power that passes over 410 to 690 nm, some widths and both polarisations.
+        /// Tolerance of the mean power that passes over 410 to 690 nm, some widths and both polarisations.
         const POWER: f64 = 0.02;
         let cell = PointwiseCell::new(crate::stack::tests::paper(), [120, 160, 200, 240]);
         let power = |light: Illumination<'_>| -> f64 {

@@ -41,9 +41,9 @@ impl PublishedCell {
         }
     }
 
-    /// Why it does not judge other pillars than those of the paper.
+    /// Reason why it does not simulate other pillars than the paper's.
     pub const OTHERS: &str = "the `published` cell is of squares of silicon nitride alone, 700 nm high and 350 nm apart, on fused silica, in air";
-    /// What to do instead.
+    /// Remedy: what to do instead.
     pub const ANOTHER_CELL: &str =
         "ask for `rigorous` or `fitted`, as `fidelity` in [verify] of a design or with --fidelity";
 }

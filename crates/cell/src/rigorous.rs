@@ -29,7 +29,7 @@ impl RigorousCell {
         Self { table }
     }
 
-    /// What it looks up.
+    /// Table that it looks values up in.
     pub fn table(&self) -> &CellTable {
         &self.table
     }

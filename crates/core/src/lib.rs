@@ -1,4 +1,4 @@
-//! What every room of the project stands on: errors, progress, whole files, documents with spans, tables, NPY.
+//! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY.
 
 mod cross;
 #[cfg(feature = "documents")]

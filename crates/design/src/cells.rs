@@ -41,7 +41,7 @@ impl Design {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// The same pillars in the light that the design is verified in.
+    /// Stack of the same pillars in the light that the design is verified in.
     ///
     /// # Errors
     /// As [`Design::cell_stack`].
@@ -207,7 +207,7 @@ pub fn neighbour_cell(design: &Design, cache: Option<PathBuf>) -> Result<Neighbo
     Ok(cell.tabulated_at(&design.verify.wavelengths_um))
 }
 
-/// How often the elements of a design draw each width beside which others: one mapping for each rule.
+/// Mappings of a design, one for each rule: how often its elements draw each width next to which others.
 pub fn mappings(design: &Design) -> Vec<Mapping> {
     let rules = PillarRule::all(design);
     rules.iter().map(|rule| Mapping::new(|u| rule.width_nm(u))).collect()

@@ -23,14 +23,15 @@ use truth_rows::blazed_orders::BlazeOrders;
 /// Measured: 0.009 to 0.014.
 const MISFIT: f64 = 0.02;
 
-/// The same of supercells that the sum was not fitted to, whose pillars jump more.
+/// Limit for supercells that the sum was not fitted to, whose pillars jump more.
 const LEFT_OUT: f64 = 0.035;
 
 /// Share of the light in the first order of all rows together, against their supercells. Measured: 0.008 at most.
 const FIRST_OF_ROWS: f64 = 0.015;
 
-/// At 530 nm, where resonances of equal pillars are strongest, it is at most this share of that of equal neighbours.
-/// Measured: 0.12 along the normal; 0.30 and 0.27 of that of steered elements, solved as they are lit.
+/// Largest error at 530 nm, where resonances of equal pillars are strongest, as a share of the error of the local
+/// periodic approximation. Measured: 0.12 along the normal; 0.30 and 0.27 for steered elements, solved at oblique
+/// incidence.
 const OF_EQUAL: f64 = 0.5;
 
 /// No row along the normal is met worse than by equal neighbours, but for this: a third of
@@ -43,8 +44,9 @@ const WORSE: f64 = 0.005;
 const FIRST: [f64; 2] = [0.02, 0.045];
 const GAIN: f64 = 6.0;
 
-/// Of single rows: the share of the first order, that of the zero order, and the phase (rad) less its mean. Resonances of
-/// a row that repeats exactly are not in a sum over pairs. Measured: 0.039 along the normal and 0.058, 0.015, 0.049.
+/// Limits for single rows: the share of the first order, the share of the zeroth order, and the phase (rad) less its
+/// mean. Resonances of a row that repeats exactly are not in a sum over pairs. Measured: 0.039 along the normal and
+/// 0.058, 0.015, 0.049.
 const FIRST_OF_A_ROW: f64 = 0.065;
 const ZERO: f64 = 0.02;
 const PHASE: f64 = 0.055;
@@ -287,7 +289,7 @@ fn between_the_tables_blazed_rows_are_met_as_well() {
     }
 }
 
-/// Where the phase of a row starts, so many times.
+/// Number of places where the phase of a row starts.
 const STARTS: usize = 4;
 
 /// Mathematical libraries of machines differ in their last digits, which a fit over thousands of sites adds up.

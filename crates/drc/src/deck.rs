@@ -36,7 +36,7 @@ pub struct Deck {
     pub pillars: Vec<LayerNumber>,
     path: PathBuf,
     text: String,
-    /// In the order of the file; shared by all clones.
+    /// Rules in the order of the file; shared by all clones.
     rules: Arc<[DeckRule]>,
 }
 

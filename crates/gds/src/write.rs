@@ -3,7 +3,7 @@
 use crate::LayerNumber;
 use crate::fast::BOUNDARY_BYTES;
 
-/// Where the points of a BOUNDARY without optional record begin.
+/// Offset at which the points of a BOUNDARY without optional record begin.
 const POINTS: usize = 20;
 
 /// A square on one layer: a BOUNDARY with five points and no optional record.

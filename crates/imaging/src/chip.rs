@@ -31,7 +31,7 @@ pub struct DistinctChipElement<'a> {
 /// All elements of a chip, with what decides what they transmit at the wavelengths of a camera.
 pub struct ChipInLight<'a> {
     pub elements: Vec<ElementView>,
-    /// For each element the distinct one that it is a copy of, and what turns that one into it.
+    /// Distinct element that each element is a copy of, and the symmetry that turns the distinct one into it.
     pub copies: Vec<(usize, Symmetry)>,
     pub distinct: Vec<DistinctChipElement<'a>>,
     pub sampling: Sampling,
@@ -53,13 +53,13 @@ pub struct ElementInLight<'c> {
     classes: Vec<Option<ClassFields>>,
 }
 
-/// From the pillar tops of a design to the sensor of a camera, below the middle of the chip (um): as the camera says, else in the
-/// focus of the lens that elements share.
+/// Distance from the pillar tops of a design to the sensor of a camera, below the middle of the chip (um): as the
+/// camera says, else in the focus of the lens that elements share.
 pub fn sensor_um(design: &Design, camera: &Camera) -> f64 {
     camera.sensor.distance_um.unwrap_or(design.lens.focal_length_um)
 }
 
-/// Where the elements of a design are before a sensor: one plane for all, whatever their focal lengths.
+/// Views of the elements of a design before a sensor: one plane for all, whatever their focal lengths.
 pub fn element_views(design: &Design, camera: &Camera) -> Vec<ElementView> {
     views_of(design, camera, &OpenAreas::of(design))
 }
@@ -182,12 +182,12 @@ impl<'a> ChipInLight<'a> {
 }
 
 impl ElementInLight<'_> {
-    /// As [`ChipInLight::arriving_um2`].
+    /// Area of the light that arrives (um^2), as [`ChipInLight::arriving_um2`].
     pub fn arriving_um2(&self, wavelength: usize) -> f64 {
         self.chip.arriving_um2(self.distinct, wavelength)
     }
 
-    /// In the light of one wavelength, by its index, from a direction.
+    /// Element in the light of one wavelength, by its index, from a direction.
     ///
     /// # Panics
     /// If it was not made for this wavelength.

@@ -15,12 +15,12 @@ use metalith_cell::{CellModel, CellResponse, Fidelity, Illumination};
 use metalith_core::{Error, Progress, Result};
 use metalith_pillars::{LatticeKind, PillarMap, PillarRows};
 
-/// What the pillars of a layout are simulated as.
+/// Simulation case of the pillars of a layout.
 #[derive(Clone, Copy)]
 pub enum SimulationCase<'a> {
-    /// As drawn, by a cell; chip, light and sensor are where the design has them.
+    /// Pillars as drawn, by a cell; chip, light and sensor are where the design has them.
     Cell(&'a dyn CellModel),
-    /// As made on a measured line and bench.
+    /// Pillars as fabricated on a measured line and bench.
     Made(&'a AsBuiltChip),
 }
 

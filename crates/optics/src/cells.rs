@@ -19,18 +19,18 @@ use metalith_rcwa::Orders;
 /// four neighbours, or solved themselves where that is not good enough: near resonances and cutoffs.
 pub const NODE_STEP_NM: f64 = 0.5;
 
-/// Where a node is farther than this from the cubic through its four neighbours, transmission is not smooth: a
-/// guided-mode resonance or a cutoff is near, and widths beside the node are solved themselves. Between other nodes
-/// a cubic errs by about a sixteenth of it.
+/// Distance of a node from the cubic through its four neighbours above which transmission is not smooth: a guided-mode
+/// resonance or a cutoff is near, and widths next to the node are solved individually. Between other nodes a cubic errs
+/// by about a sixteenth of it.
 const ROUGH: f64 = 0.01;
 
 /// A width this near to a node is that node [steps].
 const ON_NODE: f64 = 1e-6;
 
-/// The same four times for light along the normal; else s into s, p into p, s into p and p into s.
+/// Transmissions from s into s, p into p, s into p and p into s; for light along the normal, four equal ones.
 type Polarised = [Complex64; 4];
 
-/// What is solved of a cell.
+/// Quantity of a cell that is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 enum Solve {
     /// A site without pillar.
@@ -51,7 +51,7 @@ pub struct RealisedCells {
     /// under a bias common to all are solved exactly at their width.
     offset_nm: f64,
     known: Mutex<HashMap<(WaveKey, Solve), Polarised>>,
-    /// Where transmissions are taken from instead of being solved.
+    /// Bank from which transmissions are taken instead of being solved.
     bank: Option<(Arc<CellBank>, CellChange)>,
     /// The cells at the rim of a lens, where they differ from these in its middle, and how much higher they are (nm).
     rim: Option<(Box<Self>, f64)>,
@@ -61,26 +61,27 @@ pub struct RealisedCells {
 /// kept (s, p), and one for each that is turned into the other where the direction is in no plane of symmetry of the
 /// cell. See [`super::IncoherentFields::weight`].
 pub struct SolvedWidths {
-    /// In the order of the widths that were asked for.
+    /// Transmissions in the order of the widths that were asked for.
     pub pillars: Vec<Vec<Complex64>>,
-    /// Of a site without pillar, for each table.
+    /// Transmission of a site without pillar, for each table.
     pub bare: Vec<Complex64>,
-    /// Of light that passes a site as it is, for each table: what is left of it in the light of that table.
+    /// Amplitude of light that passes a site unmodulated in the light of each table.
     pub unseen: Vec<Complex64>,
-    /// Of the light that arrives, what the light of each table is a part of. What leaves by different tables does not interfere.
+    /// Share of the light that arrives of which the light of each table is a part. What leaves by different tables does
+    /// not interfere.
     pub share: f64,
-    /// The same at the rim of a lens, to the tops of the pillars in its middle; none where it is alike.
+    /// Transmissions at the rim of a lens, to the tops of the pillars in its middle; `None` where they are equal.
     pub rim: Option<Box<Self>>,
 }
 
 impl SolvedWidths {
-    /// Of light that is not polarised, what arrives for each of so many tables: one table is for either polarisation alike.
+    /// Share of unpolarised light that arrives for each of so many tables: one table is for both polarisations.
     pub fn share_of(tables: usize) -> f64 {
         if tables == 1 { 1.0 } else { POLARISATION_SHARE }
     }
 }
 
-/// Where a width lies among the nodes.
+/// Place of a width among the nodes.
 #[derive(Clone, Copy)]
 enum Among {
     On(i64),
@@ -141,7 +142,7 @@ impl RealisedCells {
         }
     }
 
-    /// That a bank has no answer.
+    /// Error that a bank has no answer.
     pub(super) fn along_normal_alone() -> Error {
         Error::refused(
             "study/oblique",
@@ -286,7 +287,7 @@ impl RealisedCells {
     }
 }
 
-/// Whether a node is off the cubic through its four neighbours, for any polarisation.
+/// True if a node is off the cubic through its four neighbours, for any polarisation.
 fn rough(node: i64, at: &impl Fn(i64) -> Polarised) -> bool {
     let [a, b, c, d, e] = [-2, -1, 0, 1, 2].map(|k| at(node + k));
     (0..4).any(|p| ((b[p] + d[p]) * (2.0 / 3.0) - (a[p] + e[p]) / 6.0 - c[p]).norm() > ROUGH)

@@ -25,25 +25,25 @@ use metalith_pillars::PillarMap;
 pub struct AsBuiltChip {
     model: CalibratedModel,
     cells: RealisedCells,
-    /// Of rectangles, what stands for the cells.
+    /// Rectangles, which stand for the cells where pillars are rectangles.
     rectangles: Option<MadeRectangles>,
 }
 
-/// What a report says of the model that it rests on.
+/// Statement in a report of the model that it rests on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModelStatement {
     /// The session that the model comes from.
     pub set: String,
-    /// What was found there.
+    /// Finding of the calibration.
     pub finding: String,
-    /// What it changes of what is stated.
+    /// Changes by the model to what is stated.
     pub applied: Vec<Applied>,
-    /// What the model says that was not simulated, each with the reason.
+    /// Parts of the model that were not simulated, each with the reason.
     pub not_applied: Vec<NotApplied>,
 }
 
 impl ModelStatement {
-    /// Of simulations at single wavelengths by a model.
+    /// Statement of simulations at single wavelengths by a model.
     pub fn of(model: &CalibratedModel) -> Self {
         Self {
             set: model.set.clone(),
@@ -91,8 +91,8 @@ impl AsBuiltChip {
         })
     }
 
-    /// The same whose rectangles, which take longer to solve than pillars of one width, are kept in a folder from one run to the next: see
-    /// [`metalith_cell::cache_folder`].
+    /// Same chip, whose rectangles, which take longer to solve than pillars of one width, are cached in a folder from
+    /// one run to the next: see [`metalith_cell::cache_folder`].
     #[must_use]
     pub fn kept_in(self, folder: Option<&Path>) -> Self {
         Self {
@@ -101,7 +101,7 @@ impl AsBuiltChip {
         }
     }
 
-    /// The same with all cells from a bank of the stated pillar: nothing is solved.
+    /// Same chip with all cells from a bank of the stated pillar: nothing is solved.
     #[must_use]
     pub fn from_bank(self, bank: &Arc<CellBank>) -> Self {
         Self {
@@ -116,7 +116,7 @@ impl AsBuiltChip {
         &self.model.perturbation
     }
 
-    /// As [`CalibratedModel::check_drawn`], of pillars of the chip.
+    /// Check as [`CalibratedModel::check_drawn`], of pillars of the chip.
     ///
     /// # Errors
     /// As [`CalibratedModel::check_drawn`].
@@ -129,7 +129,7 @@ impl AsBuiltChip {
         &self.cells
     }
 
-    /// What to say in a report of simulations at single wavelengths.
+    /// Statement for a report of simulations at single wavelengths.
     pub fn statement(&self) -> ModelStatement {
         ModelStatement::of(&self.model)
     }
@@ -197,7 +197,7 @@ impl AsBuiltChip {
         self.through(rectangles, element, light, &passed, progress)
     }
 
-    /// What `leaving` takes of the light behind the classes of rectangles.
+    /// Part of the light behind the classes of rectangles that `leaving` takes.
     fn through(
         &self,
         rectangles: &MadeRectangles,

@@ -28,8 +28,9 @@ pub(crate) fn wave_of(light: &Illumination<'_>) -> PlaneWave {
 }
 
 impl ArrivingLight {
-    /// What a stated wave is on a path with a change: the angle in each plane of incidence is larger by the tilt. Where that is
-    /// a right angle or more its sine is one: a wave along the chip, which [`Propagator`](metalith_wave::Propagator)s refuse.
+    /// Light of a stated wave on a path with a change: the angle in each plane of incidence is larger by the tilt.
+    /// Where that is a right angle or more its sine is one: a wave along the chip, which
+    /// [`Propagator`](metalith_wave::Propagator)s refuse.
     pub fn new(stated: &PlaneWave, path: &PathChange) -> Self {
         let turn = |sine: f64, mrad: f64| {
             if mrad == 0.0 {
@@ -67,7 +68,7 @@ impl ArrivingLight {
             .collect()
     }
 
-    /// What curvature alone makes of the wave along x and along y; nothing for a plane wave.
+    /// Factors of the curvature along x and along y; `None` for a plane wave.
     pub fn sphere(&self, lattice: Lattice) -> Option<[Vec<Complex32>; 2]> {
         let turns = |axis, i| self.sag_um(lattice.place_um(axis, i)) / self.plane.wavelength_um;
         let along = |axis| (0..lattice.sites()).map(|i| cis(turns(axis, i))).collect();

@@ -21,7 +21,7 @@ const SMOOTH: f64 = 2.5e-3;
 /// And of all: of one width in thirty a resonance passes between the two heights.
 const ALL: f64 = 0.02;
 
-/// What a site at a radius transmits is that of the pillar solved with the height that it has there.
+/// Transmission of a site at a radius equals the pillar solved with the height that it has there.
 #[test]
 fn heights_between_middle_and_rim_are_those_of_solved_pillars() {
     let stack = CellStack::paper(350.0, 700.0).unwrap();

@@ -12,7 +12,7 @@ use crate::merit::robust::cells_off_height;
 /// Cells that a design is optimised and judged with.
 pub struct TaskCells {
     own: Box<dyn CellModel>,
-    /// If there is a report, and the own one is another.
+    /// Cell of the report, if there is a report and the own cell is another.
     judge: Option<Box<dyn CellModel>>,
     /// Of rotated rectangles, the own one solved for single wavelengths.
     at_single_wavelengths: Option<Arc<RotatedCell>>,
@@ -20,8 +20,8 @@ pub struct TaskCells {
 }
 
 impl TaskCells {
-    /// Those that a design names; tables are taken from the folder `cache`, or made and kept there. `report`: also what a
-    /// report judges with.
+    /// Cells that a design names; tables are taken from the folder `cache`, or made and kept there. `report`: also what
+    /// a report judges with.
     ///
     /// # Errors
     /// If a material is not known over the band, unlike neighbours have one table alone, or the user stopped it.
@@ -63,7 +63,7 @@ impl TaskCells {
         })
     }
 
-    /// What is optimised with.
+    /// Cell that is optimised with.
     pub fn own(&self) -> &dyn CellModel {
         self.own.as_ref()
     }
@@ -78,7 +78,7 @@ impl TaskCells {
         self.judge.as_deref().unwrap_or(self.own())
     }
 
-    /// What layouts are judged with: the truest of these.
+    /// Cell that layouts are simulated with: the truest of these.
     pub fn judge(&self) -> &dyn CellModel {
         match self.own.fidelity() {
             Fidelity::Neighbours => self.own(),
@@ -142,7 +142,7 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
     cell.response(&Illumination::normal(band.0).in_band(), 0, progress)?;
     Ok(cell)
 }
-/// Nothing, if the pillars of a design are such as a phase is found for.
+/// Succeeds if the pillars of a design are such as a phase is found for.
 ///
 /// # Errors
 /// If they are upright rectangles.

@@ -15,7 +15,7 @@ use super::{CellLattice, Result};
 pub(super) struct Section {
     pub family: Family,
     pub kept: RetainedOrders,
-    /// Of the incident wave over k0.
+    /// Transverse wave vector of the incident wave over k0.
     pub k: [f64; 2],
     pub steps: [f64; 2],
     pub pitch_nm: f64,

@@ -1,4 +1,4 @@
-//! How near an image is to another.
+//! Similarity of one image to another.
 
 use metalith_core::{Error, Result};
 use ndarray::{Array2, ArrayView, ArrayView2, ArrayView3, Axis, Dimension};
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
     use ndarray::Array3;
 
-    /// Of sums over a few thousand values of size one.
+    /// Tolerance of sums over a few thousand values of size one.
     const ROUNDING: f64 = 1e-12;
 
     #[test]

@@ -47,7 +47,7 @@ impl Manifest for ComparisonPlan {
 }
 
 impl ComparisonPlan {
-    /// What stands in the manifest under `work`.
+    /// Value of `work` in the manifest.
     pub(crate) const WORK: &'static str = "compare";
 
     /// The plan in a folder.
@@ -58,7 +58,7 @@ impl ComparisonPlan {
         Self::open_in(folder)
     }
 
-    /// How it is cut: each camera for itself.
+    /// Division of the work: each camera for itself.
     pub fn cut(&self) -> Sharding {
         Sharding {
             key: self.key.clone(),
@@ -162,7 +162,7 @@ pub fn plan_comparison(comparison: &Comparison, folder: &Path, progress: &dyn Pr
     Ok(plan)
 }
 
-/// The same with paths that hold wherever a shard is made.
+/// Copy with paths that hold wherever a shard is made.
 fn placed(comparison: &Comparison) -> Result<Comparison> {
     let design = |listed: &ListedDesign| {
         Ok(ListedDesign {

@@ -25,7 +25,7 @@ const SCHEMA: u32 = 2;
 /// Longest image (bytes).
 const LONGEST: u64 = 1 << 30;
 
-/// What a set for learning is made of.
+/// Request for a data set for learning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PairsRequest {
@@ -36,9 +36,9 @@ pub struct PairsRequest {
     pub model: Option<PathBuf>,
     /// Angle from the left to the right edge of a scene (degrees).
     pub field_deg: f64,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
-    /// In the order of the pairs.
+    /// Paths in the order of the pairs.
     pub images: Vec<PathBuf>,
 }
 
@@ -82,7 +82,7 @@ impl Manifest for PairsPlan {
 }
 
 impl PairsPlan {
-    /// What stands in the manifest under `work`.
+    /// Value of `work` in the manifest.
     pub(crate) const WORK: &'static str = "dataset";
 
     /// The plan in a folder.
@@ -93,7 +93,7 @@ impl PairsPlan {
         Self::open_in(folder)
     }
 
-    /// How it is cut.
+    /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {
         Sharding {
             key: self.key.clone(),
@@ -149,7 +149,7 @@ impl PairsPlan {
 }
 
 impl PairsPlan {
-    /// Whether the files of all pairs have the digests that their shards state.
+    /// Checks that the files of all pairs have the digests that their shards state.
     fn check_files(&self, pairs: &[DatasetPair], progress: &dyn Progress) -> Result<()> {
         progress.begin("checking the pairs", pairs.len() as u64);
         let is =
@@ -292,7 +292,7 @@ pub fn plan_pairs(
 }
 
 impl PairsRequest {
-    /// The same with paths that hold wherever a shard is made.
+    /// Copy with paths that hold wherever a shard is made.
     fn placed(&self) -> Result<Self> {
         Ok(Self {
             design: absolute(&self.design)?,

@@ -34,11 +34,11 @@ pub struct PictureSpec {
     pub kernels: KnownKernels,
     /// Places an axis of the field of each element at which kernels are formed; as `metalith picture` has them if left out.
     pub nodes: Option<usize>,
-    /// Of the noise, the same in all draws: they differ by the chip alone.
+    /// Seed of the noise, equal in all draws: they differ by the chip alone.
     pub seed: u64,
 }
 
-/// What pictures are taken of.
+/// Scene that pictures are taken of.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneChoice {
     /// A built-in scene of so many pixels an axis.
@@ -49,9 +49,9 @@ pub enum SceneChoice {
 /// Whose kernels the restoration knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KnownKernels {
-    /// Those of the draw: every camera is calibrated.
+    /// Kernels of the draw: every camera is calibrated.
     Draw,
-    /// Those of the chip as designed, or as the model of the study has it: no camera is calibrated.
+    /// Kernels of the chip as designed, or as the model of the study has it: no camera is calibrated.
     Design,
 }
 
@@ -118,23 +118,23 @@ pub(crate) struct KnownChip {
 
 /// The picture of one draw.
 pub struct TakenPicture {
-    /// What an ideal camera gives, linear sRGB `[row, column, colour]`.
+    /// Image by an ideal camera, linear sRGB `[row, column, colour]`.
     pub truth: Array3<f64>,
     pub frame: Frame,
     /// Linear sRGB `[row, column, colour]`.
     pub restored: Array3<f64>,
-    /// By zone.
+    /// Scores by zone.
     pub scores: Vec<ZoneScore>,
     /// Expected PSNR of linear light of natural scenes (dB), by zone; none of methods without a forecast.
     pub forecast_db: Vec<f64>,
-    /// What to say of the restoration, if its operator limits it.
+    /// Note on the restoration, if its operator limits it.
     pub note: Option<String>,
     /// Names of the channels of the camera.
     pub channels: Vec<String>,
 }
 
 impl PictureBench {
-    /// With the camera and the scene that are named.
+    /// Bench with the camera and the scene that are named.
     ///
     /// # Errors
     /// If one of them cannot be read, or the scene is too small to be scored.
@@ -158,7 +158,7 @@ impl PictureBench {
         Ok(nm.into_iter().map(|nm| (nm * 1e-3, BAND_ORDERS)).collect())
     }
 
-    /// Whether restorations know the chip as designed, and not that of the draw.
+    /// True if restorations know the chip as designed, not the chip of the draw.
     pub fn knows_design(&self) -> bool {
         self.spec.kernels == KnownKernels::Design
     }

@@ -51,7 +51,7 @@ impl Work {
         }
     }
 
-    /// How it is cut.
+    /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {
         match self {
             Self::Study(plan) => plan.cut(),

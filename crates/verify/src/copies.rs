@@ -1,4 +1,4 @@
-//! Which elements are simulated, and what of their figures is that of copies too.
+//! Choice of elements that are simulated, and of their figures that hold for copies too.
 //!
 //! Pillars that are the same up to a symmetry do the same to light that is turned with them. Field angles are those of the chip:
 //! a copy is asked for the same ones, which for the element that is simulated come from other sides.
@@ -30,7 +30,7 @@ pub(super) struct Chosen {
     pub element: Element,
     /// Number of elements that it stands for, itself among them.
     pub copies: usize,
-    /// Those of the design, then those of its copies.
+    /// Field angles of the design, then field angles of its copies.
     pub angles: Vec<AskedAngle>,
 }
 
@@ -60,8 +60,9 @@ impl Chosen {
         missing
     }
 
-    /// What turns it into another element, pillars and wedge, and the field angles that are then to be simulated besides: by that of
-    /// several symmetries which leaves fewest; none if nothing does, or the other has another lens.
+    /// Symmetry that turns it into another element, pillars and wedge, and the field angles that are then to be
+    /// simulated besides: of several symmetries, the one that leaves fewest. `None` if no symmetry does, or the other
+    /// has another lens.
     fn turned_into(&self, design: &Design, array: &PillarArray, other: usize) -> Option<(Symmetry, Vec<AskedAngle>)> {
         let [from, to] = [self.index, other].map(|k| &array.placed[k]);
         if from.class != to.class {
@@ -126,7 +127,7 @@ pub(super) fn turned(symmetry: Symmetry, field: FieldAngle) -> FieldAngle {
     FieldAngle { x_deg, y_deg }
 }
 
-/// Where a symmetry takes the place (x, y), in words.
+/// Place to which a symmetry takes (x, y), in words.
 pub(super) fn place_words(symmetry: Symmetry) -> String {
     let ((ax, ay), (bx, by)) = (symmetry.point(1, 0), symmetry.point(0, 1));
     let name = |of_x: i64, of_y: i64| match (of_x, of_y) {

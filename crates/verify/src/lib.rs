@@ -1,5 +1,5 @@
-//! From the bytes of a layout to a verdict: what was written is read back, compared with what was meant,
-//! and simulated.
+//! Verification of a layout, from its bytes to a verdict: the file is read back, compared with the design, and
+//! simulated.
 
 mod assumptions;
 mod birefringence;
@@ -58,7 +58,7 @@ pub use single_white::{SingleWhite, single_white, white_sampling};
 pub use white::CameraStatement;
 pub use white_channels::{Contrast, WhiteChannel};
 
-/// What the file is, in number.
+/// Facts of the file, in numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct LayoutFacts {
     pub file: String,
@@ -80,7 +80,7 @@ pub struct ElementCheck {
     /// Index into [`Verification::distinct`] of the element that it is simulated as, itself or one that it is a copy of, if it is
     /// as intended.
     pub copy_of: Option<usize>,
-    /// What turns that element into this one: pillars, field angles, and the places where light lands.
+    /// Symmetry that turns that element into this one: pillars, field angles, and the places where light lands.
     pub turned: Option<Symmetry>,
 }
 
@@ -91,9 +91,9 @@ pub struct DistinctElement {
     /// Number of elements that it stands for.
     pub copies: usize,
     pub phase: PhaseErrors,
-    /// Where the design phase is too steep for the lattice.
+    /// Places where the design phase is too steep for the lattice.
     pub steepness: Steepness,
-    /// Where light goes by the mapping's own account, one entry a wavelength.
+    /// Orders that the mapping sends light into by its own transmission, one entry a wavelength.
     pub orders: Vec<OrderEfficiencies>,
     /// One entry for each wavelength and field angle of the design; then for each wavelength those that are asked of copies
     /// and come from other sides than these.
@@ -115,7 +115,7 @@ pub struct Verification {
     /// The calibrated model that the layout is judged by, if it is judged as made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelStatement>,
-    /// Whether the layout is compared with an array whose widths were moved on purpose.
+    /// True if the layout is compared with an array whose widths were moved on purpose.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub compensated: bool,
     /// `accurate` or `fast`.
@@ -127,13 +127,13 @@ pub struct Verification {
     pub elements: Vec<ElementCheck>,
     pub foreign: UnrecognisedShapes,
     pub distinct: Vec<DistinctElement>,
-    /// Of a design of rotated rectangles: how near their lattice is to the phase that is asked.
+    /// Error of the lattice of a design of rotated rectangles against the phase that is asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotations: Option<EqualRotations>,
     /// Light of the design of which the lattice of the pillars sends some into oblique orders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lattice_orders: Vec<LatticeOrders>,
-    /// Why nothing was simulated, if nothing was.
+    /// Reason why nothing was simulated, if nothing was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_simulated: Option<String>,
     /// Every limit of the design, held or not.
@@ -141,7 +141,7 @@ pub struct Verification {
 }
 
 impl Verification {
-    /// Whether all limits hold.
+    /// True if all limits hold.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(Check::passed)
     }
@@ -160,7 +160,7 @@ impl Verification {
     }
 }
 
-/// Whether a layout of this design, at `path`, can be simulated: asked before work is spent on one that cannot.
+/// Checks that a layout of this design, at `path`, can be simulated, before work is spent on one that cannot.
 ///
 /// # Errors
 /// If the elements have more lattice sites together than are held at a time, or the camera of the design cannot be
@@ -188,7 +188,7 @@ pub fn verify(
     verify_layout(design, array, &layout, cases, accuracy, progress)
 }
 
-/// As [`verify`], of a layout that is open.
+/// Variant of [`verify`] for a layout that is open.
 ///
 /// # Errors
 /// As [`verify`].
@@ -275,7 +275,7 @@ pub fn wavelengths_um(design: &Design) -> Result<(Vec<f64>, Vec<f64>)> {
     Ok((single, white::wavelengths_um(design)?))
 }
 
-/// What was read of a layout.
+/// Contents read of a layout.
 struct Found<'a> {
     layout: LayoutFacts,
     elements: Vec<ElementCheck>,

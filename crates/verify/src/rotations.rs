@@ -1,4 +1,4 @@
-//! What a lattice of rectangles that are all rotated alike does to the phase that is asked of them.
+//! Effect of a lattice of equally rotated rectangles on the phase that is asked of them.
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ use metalith_optics::CaseOptics;
 pub struct EqualRotations {
     /// Phase errors of the mapping of the design, for pillars as drawn.
     pub own: MappingError,
-    /// The same of a rotation by half of the phase.
+    /// Error of a rotation by half of the phase.
     pub half: MappingError,
     /// Diffraction orders that the cell is solved with, and how sure they are; not said of a cell for bands alone.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -22,7 +22,7 @@ pub struct EqualRotations {
 }
 
 impl EqualRotations {
-    /// By the cell that a layout is judged by, if that is one of rotated rectangles.
+    /// Rotations by the simulation model, if that is a cell of rotated rectangles.
     ///
     /// # Errors
     /// If the cell has no answer.

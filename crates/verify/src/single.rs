@@ -21,16 +21,16 @@ use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, s
 use metalith_wave::psf::{IdealPsf, PixelFrequencies, Psf, PsfMetrics};
 use metalith_wave::{Accuracy, Pillars, Scratch, Window};
 
-/// In what light, and where on the sensor.
+/// Lighting: the light, and the place on the sensor.
 #[derive(Clone, Debug)]
 pub struct Lighting {
     /// Wavelengths (um).
     pub wavelengths_um: Vec<f64>,
     /// Direction sines of the incident light, in air.
     pub incidence_sin: [f64; 2],
-    /// Whether cells are solved at that angle, for both polarisations, or along the normal.
+    /// True if cells are solved at that angle, for both polarisations; false for along the normal.
     pub cells_as_lit: bool,
-    /// From the pillar tops to the sensor (um).
+    /// Distance from the pillar tops to the sensor (um).
     pub distance_um: f64,
     /// Middle of the window, from the axis of an element (um).
     pub at_um: [f64; 2],
@@ -148,7 +148,7 @@ impl Lighting {
         optics.element(widths, &placement)
     }
 
-    /// Where contrast is reported (line pairs a millimetre).
+    /// Frequencies at which contrast is reported (line pairs a millimetre).
     fn reported_lp_mm(&self) -> [f64; 2] {
         PixelFrequencies::of(self.pixel_um).reported()
     }
@@ -169,21 +169,21 @@ pub(super) fn distinct(found: &Extraction) -> Vec<(&ElementSite, &PillarMap)> {
     kept
 }
 
-/// What is reported of the PSFs of one layout.
+/// Report of the PSFs of one layout.
 pub struct SinglePsfReport<'a> {
     /// Name of the layout file.
     pub file: &'a str,
     pub found: &'a Extraction,
     pub psfs: &'a [SinglePsf],
-    /// What no layout says and was taken for granted, and its value.
+    /// Assumptions that no layout states, each with its value.
     pub assumptions: &'a [(&'static str, String)],
-    /// Of the model that chips were made by, if any.
+    /// Model that chips were made by, if any.
     pub model: Option<&'a ModelStatement>,
     /// White light for a camera, if one was named.
     pub white: Option<&'a (CameraStatement, Vec<SingleWhite>)>,
 }
 
-/// What Strehl ratios of a layout without a design are against, in words for people.
+/// Reference of Strehl ratios of a layout without a design, in words for people.
 pub const STREHL_AGAINST: &str = "Strehl ratios are against the sites that hold a pillar; `run` and `verify` divide by the whole \
      aperture, so that both differ where pillars are missing.";
 

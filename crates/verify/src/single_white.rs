@@ -115,7 +115,8 @@ pub fn single_white(
 mod tests {
     use super::*;
 
-    /// What a camera counts is simulated, whatever its band: of short-wave infrared, and of the visible between 390 and 720 nm.
+    /// Light that a camera counts is simulated, whatever its band: of short-wave infrared, and of the visible between
+    /// 390 and 720 nm.
     #[test]
     fn a_camera_is_sampled_over_its_own_light() {
         let sampled = |name: &str, known_nm: [f64; 2]| {

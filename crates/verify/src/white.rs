@@ -43,7 +43,7 @@ impl CameraStatement {
         }
     }
 
-    /// Where the contrast of its channels is told.
+    /// Frequencies at which the contrast of its channels is stated.
     pub fn frequencies(&self) -> PixelFrequencies {
         PixelFrequencies::of(self.pixel_um)
     }
@@ -79,7 +79,7 @@ pub(super) fn wavelengths_um(design: &Design) -> Result<Vec<f64>> {
     Ok(sampling.map_or_else(Vec::new, |s| s.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect()))
 }
 
-/// Where the light of one wavelength lands from a point that an element looks at (um).
+/// Place where the light of one wavelength lands from a point in the viewing direction of an element (um).
 ///
 /// # Errors
 /// As [`Point::landing_um`].
@@ -168,7 +168,7 @@ impl<'a> WhiteSimulator<'a> {
         self.colours.len()
     }
 
-    /// What the figures are for.
+    /// Statement of the camera that the figures are for.
     pub fn statement(&self) -> CameraStatement {
         CameraStatement::of(&self.camera, &self.sampling)
     }

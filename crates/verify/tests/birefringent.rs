@@ -12,7 +12,7 @@ use metalith_verify::{Lighting, SimulationCase, SimulationCases, SinglePsf, Veri
 use metalith_wave::Accuracy;
 use num_complex::Complex64;
 
-/// Of the largest sample: tables and fields are in single precision.
+/// Tolerance as a share of the largest sample: tables and fields are in single precision.
 const ROUNDING: f64 = 1e-5;
 
 const WAVELENGTH_UM: f64 = 0.532;
@@ -148,12 +148,13 @@ fn judged((design, array, folder): &Lens, polarisation: Option<Polarisation>) ->
     verify(&design, array, &path, &cases, Accuracy::Accurate, &Silent).unwrap()
 }
 
-/// By the rigorous cell and the limits of the design: light along y is judged by its own phase, and both are mirror images.
+/// Results by the rigorous cell and the limits of the design: light along y is judged by its own phase, and both are
+/// mirror images.
 #[test]
 fn each_polarisation_is_judged_by_its_own_phase() {
-    /// Of two pillars that are as near the library takes one.
+    /// Tolerance for two pillars that are as near: the library takes one.
     const MIRRORED: f64 = 0.01;
-    /// What cells pass of the phases that are asked for, of all pairs and of this lens.
+    /// Tolerance of what cells pass of the phases that are asked for, of all pairs and of this lens.
     const FOLLOWS: f64 = 0.03;
     let lens = lens();
     let [x, y] = [None, Some(Polarisation::Linear(90.0))].map(|light| judged(&lens, light));

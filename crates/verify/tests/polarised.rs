@@ -13,7 +13,7 @@ use metalith_verify::{Lighting, SimulationCase, SimulationCases, SinglePsf, Veri
 use metalith_wave::{Accuracy, Psf};
 use num_complex::Complex64;
 
-/// Of the largest sample: tables and fields are in single precision.
+/// Tolerance as a share of the largest sample: tables and fields are in single precision.
 const ROUNDING: f64 = 1e-5;
 
 /// A quarter as large as the shipped one, so that it is simulated at once.
@@ -182,7 +182,8 @@ fn judged(
     .unwrap()
 }
 
-/// By the rigorous cell, in all figures that are energies: of one wavelength, of white light, and of where light goes.
+/// Results by the rigorous cell, in all figures that are energies: of one wavelength, of white light, and of where
+/// light goes.
 #[test]
 fn unpolarised_light_is_the_mean_of_both_hands_and_of_both_axes() {
     let lens = lens();

@@ -1,4 +1,4 @@
-//! What can go wrong on the way of light, as causes that a caller can match on.
+//! Errors of simulating light, as causes that a caller can match on.
 
 use metalith_pillars::Lattice;
 
@@ -8,7 +8,7 @@ use crate::{PlaneWave, Window};
 /// Result of every fallible operation of this crate.
 pub type Result<T, E = WaveError> = std::result::Result<T, E>;
 
-/// What went wrong. The text says what and where; [`WaveError::hint`] says what to do.
+/// Error of a simulation. The text says what and where; [`WaveError::hint`] says what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WaveError {
@@ -120,7 +120,7 @@ impl WaveError {
         }
     }
 
-    /// What to do about it.
+    /// Remedy for the error.
     pub fn hint(&self) -> String {
         match self {
             Self::Window { .. } => {

@@ -20,14 +20,14 @@ pub(super) struct PsfLight {
 /// White light for a camera.
 pub(super) struct WhiteLight {
     pub camera: Camera,
-    /// What of it is simulated.
+    /// Sampling of it that is simulated.
     pub sampling: Sampling,
     /// Single wavelengths that stand for its channels (um).
     colours_um: Vec<f64>,
 }
 
 impl WhiteLight {
-    /// What a camera counts behind lenses of these radii and focal lengths (um), as far as cells are known.
+    /// Light that a camera counts behind lenses of these radii and focal lengths (um), as far as cells are known.
     fn of(camera: Camera, known_um: (f64, f64), lenses_um: &[[f64; 2]]) -> Result<Self> {
         let sampling = white_sampling(&camera, [known_um.0 * 1e3, known_um.1 * 1e3], lenses_um)?;
         let [short, long] = sampling.ends_nm();
@@ -126,7 +126,7 @@ mod tests {
         PsfArgs { stated, ..options }
     }
 
-    /// Of pillars of this shape on a square lattice of 350 nm.
+    /// Extraction without pillars, of this shape on a square lattice of 350 nm.
     fn nothing(shape: PillarShape) -> Extraction {
         Extraction {
             top: String::new(),

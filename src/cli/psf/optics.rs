@@ -1,4 +1,4 @@
-//! What the options of `metalith psf` say of cells, light and sensor, and what is taken for granted.
+//! Cells, light and sensor by the options of `metalith psf`, and the assumptions beside them.
 
 use metalith::cell::{
     CellStack, FittedCell, FocusedLight, Handedness, LitStack, Mapping, NeighbourCell, PointwiseCell, Polarisation,
@@ -45,7 +45,7 @@ impl PsfArgs {
         })
     }
 
-    /// What pillars are of, in words.
+    /// Material of the pillars, in words.
     fn pillars(&self) -> String {
         let Some(CellFile { cell, .. }) = &self.stated else {
             return format!("{USUAL_HEIGHT_NM} nm of sin_luke_2015 on fused_silica_malitson_1965, lit from there");
@@ -70,7 +70,7 @@ impl PsfArgs {
         words
     }
 
-    /// What no layout says, and is taken from the options or their defaults. Without light nothing is simulated.
+    /// Assumptions that no layout states, taken from the options or their defaults. Without light nothing is simulated.
     pub(super) fn assumptions(&self, found: &Extraction, light: Option<&PsfLight>) -> Vec<(&'static str, String)> {
         let mut all = vec![
             (
@@ -201,7 +201,7 @@ impl PsfArgs {
         Ok(AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref()))
     }
 
-    /// What solves it for the pillars as drawn.
+    /// Cell that solves it for the pillars as drawn.
     pub(super) fn cell(&self, found: &Extraction, light: &PsfLight) -> Result<Box<dyn CellModel>> {
         let stack = self.stack(found)?;
         match (found.shape.rectangles(), self.focused(found.shape)) {

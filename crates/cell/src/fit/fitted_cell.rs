@@ -14,7 +14,7 @@ pub struct FittedCell {
     forward: ForwardPolynomial,
 }
 
-/// Where [`FittedCell::of_stack`] looks: ten and more points for every coefficient and resonance.
+/// Step of the widths that [`FittedCell::of_stack`] samples: ten and more points for every coefficient and resonance.
 const FIT_WIDTH_STEP_NM: usize = 4;
 const FIT_BAND_STEP_UM: f64 = 0.010;
 const FIT_ORDERS: usize = 11;

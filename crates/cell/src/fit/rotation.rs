@@ -122,7 +122,8 @@ mod tests {
     use super::*;
     use crate::RotatedCell;
 
-    /// What is left of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is 0.014.
+    /// Residual of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is
+    /// 0.014.
     const LEFT: f64 = 0.005;
 
     #[test]

@@ -25,12 +25,12 @@ const PARTS: usize = 6;
 pub(crate) struct SiteSample {
     /// Number of its supercell.
     pub supercell: usize,
-    /// As so many sites does it count.
+    /// Weight, as so many sites.
     pub weight: f64,
     pub own_nm: f64,
-    /// In the order of [`SiteGrid::neighbours`].
+    /// Widths in the order of [`SiteGrid::neighbours`].
     pub neighbours_nm: [f64; NEIGHBOURS.len()],
-    /// For s and p.
+    /// Transmission for s and p.
     pub transmitted: [Complex64; 2],
 }
 
@@ -171,9 +171,9 @@ pub(crate) fn fit(grid: SiteGrid, basis: NeighbourBasis, sines: [f64; 2], sample
 
 /// A mirror of the lattice that leaves the direction of the light.
 struct Symmetry {
-    /// Where the neighbour of each number goes.
+    /// Number to which the neighbour of each number goes.
     to: [usize; NEIGHBOURS.len()],
-    /// Whether s and p change places.
+    /// True if s and p change places.
     swapped: bool,
 }
 

@@ -1,4 +1,4 @@
-//! From the orders of a supercell to what each of its sites transmits.
+//! Transmission of each site of a supercell, from its orders.
 
 use std::f64::consts::TAU;
 

@@ -16,9 +16,9 @@ use crate::{Handedness, RotationResponse};
 pub struct HandTables {
     /// The hand of the light that is focused.
     pub focused: Handedness,
-    /// What leaves in the other hand than it arrived in.
+    /// Light that leaves in the other hand than it arrived in.
     pub converted: [Vec<Complex64>; 2],
-    /// What leaves in the hand that it arrived in.
+    /// Light that leaves in the hand that it arrived in.
     pub unconverted: [Vec<Complex64>; 2],
     /// The same at any rotation, of a model of one size of pillars.
     pub rotation: Option<RotationResponse>,

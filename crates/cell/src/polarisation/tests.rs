@@ -34,7 +34,7 @@ fn tables(focused: Handedness) -> PolarisedTables {
     PolarisedTables::Hands(hands(focused))
 }
 
-/// The same pillars as if they turned no polarisation.
+/// Tables of the same pillars as if they turned no polarisation.
 fn axes(focused: PolarisationAxis) -> PolarisedTables {
     let along = [0, 1].map(|axis| pillars().iter().map(|j| j[axis][axis]).collect::<Vec<_>>());
     PolarisedTables::Axes(AxisTables { focused, along })

@@ -24,15 +24,16 @@ use super::{
 /// Intervals of an eighth of a turn whose ends are solved.
 const INTERVALS: usize = 6;
 
-/// The same where numbers of orders are compared: what more orders change is small, and varies slowly with rotation.
+/// Number of intervals where numbers of orders are compared: what more orders change is small, and varies slowly with
+/// rotation.
 const COMPARED_INTERVALS: usize = 2;
 
-/// How many diffraction orders an axis a cell is solved with.
+/// Numbers of diffraction orders an axis that a cell is solved with.
 #[derive(Clone, Copy, Debug)]
 struct OrderChoice {
-    /// For most cells.
+    /// Number for most cells.
     usual: usize,
-    /// Those that tell whether more are needed.
+    /// Number that shows whether more are needed.
     fewer: usize,
     /// Distance in the complex transmission between these two, at most, where the usual ones will do.
     close: f64,
@@ -40,9 +41,9 @@ struct OrderChoice {
     more: usize,
 }
 
-/// Of fifteen sizes of rectangles of three materials (`examples/shapes.rs`, docs/method/cells.md) ten are close: their 25 orders are
-/// within 0.0018 of 41. Of the others, with thin sides or of a high index, 25 orders are off by up to 0.008, and 41 are within
-/// 0.0023 of 57.
+/// Choice for all cells. Of fifteen sizes of rectangles of three materials (`examples/shapes.rs`, docs/method/cells.md)
+/// ten are close: their 25 orders are within 0.0018 of 41. Of the others, with thin sides or of a high index, 25 orders
+/// are off by up to 0.008, and 41 are within 0.0023 of 57.
 const CHOICE: OrderChoice = OrderChoice {
     usual: 25,
     fewer: 17,
@@ -53,7 +54,7 @@ const CHOICE: OrderChoice = OrderChoice {
 /// Orders for one of many wavelengths of a band.
 const BAND_ORDERS: usize = 9;
 
-/// How many diffraction orders a cell was solved with, and what the last of them changed.
+/// Number of diffraction orders that a cell was solved with, and the change by the last of them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Truncation {
     /// Orders an axis.
@@ -68,14 +69,15 @@ pub struct Truncation {
 #[derive(Clone, Debug, PartialEq)]
 struct Solved {
     series: Series,
-    /// What more orders add to it, where they are needed.
+    /// Series that more orders add to it, where they are needed.
     finer: Option<Series>,
-    /// Of a wavelength of a band not known.
+    /// Truncation; not known for a wavelength of a band.
     truncation: Option<Truncation>,
 }
 
-/// What rectangular pillars do to circularly polarised light, in an infinite lattice of pillars that are all rotated alike. By its
-/// number a pillar is rotated as it is drawn, with its corners on the grid; that these also shear it a little is left out.
+/// Response of rectangular pillars to circularly polarised light, in an infinite lattice of equally rotated pillars. By
+/// its number a pillar is rotated as it is drawn, with its corners on the grid; that these also shear it a little is
+/// left out.
 ///
 /// A pillar that is rotated by an angle converts light to the other circular polarisation with twice that angle as phase, more
 /// or less: the lattice does not turn with it. What the lattice adds repeats every quarter turn, and is solved at a few
@@ -85,7 +87,7 @@ pub struct RotatedCell {
     stack: CellStack,
     pillars: RotatedRectangles,
     arriving: Handedness,
-    /// By wavelength, and whether it is one of a band.
+    /// Solutions by wavelength, and whether it is one of a band.
     solved: Mutex<HashMap<(u64, bool), Arc<Solved>>>,
 }
 
@@ -148,7 +150,7 @@ impl RotatedCell {
         })
     }
 
-    /// With as many orders as this cell needs.
+    /// Solves with as many orders as this cell needs.
     fn solve(&self, wavelength_um: f64, choice: OrderChoice) -> Result<Solved> {
         Solved::converged(choice, |intervals, orders| {
             self.samples(intervals, wavelength_um, orders)
@@ -163,7 +165,7 @@ impl RotatedCell {
             .map(RotationSamples::channels)
     }
 
-    /// Of converted (0) or unconverted (1) light.
+    /// Table of converted (0) or unconverted (1) light.
     fn table(&self, solved: &Solved, most: u16, hand: Hand, channel: usize) -> Vec<Complex64> {
         let of = |number: u16| {
             let rotation = self.pillars.drawn_rotation(number);
@@ -227,7 +229,8 @@ enum Hand {
 }
 
 impl Solved {
-    /// With as many orders as are needed, from what `samples` has over a quarter turn of so many intervals with so many orders.
+    /// Solution with as many orders as are needed, from what `samples` has over a quarter turn of so many intervals
+    /// with so many orders.
     fn converged(choice: OrderChoice, samples: impl Fn(usize, usize) -> Result<Vec<Channels>>) -> Result<Self> {
         let own = samples(INTERVALS, choice.usual)?;
         let compared = |orders: usize| -> Result<(Vec<Channels>, f64)> {

@@ -22,13 +22,13 @@ use crate::{
 /// Diffraction orders along an axis of upright rectangles: the longer edge asks for more than squares do.
 pub const UPRIGHT_ORDERS: usize = 25;
 
-/// What upright rectangular pillars do to light along x and along y, in infinite lattices of pillars of one size.
+/// Response of upright rectangular pillars to light along x and along y, in infinite lattices of pillars of one size.
 #[derive(Debug)]
 pub struct UprightCell {
     stack: CellStack,
     pillars: UprightRectangles,
     focused: PolarisationAxis,
-    /// Where what is solved for single wavelengths is kept.
+    /// Folder of the cache of what is solved for single wavelengths.
     folder: Option<PathBuf>,
     /// Along both axes, by wavelength, and whether it is one of a band.
     solved: Mutex<HashMap<(u64, bool), Arc<Along>>>,
@@ -132,7 +132,7 @@ impl UprightCell {
         }
     }
 
-    /// The same, whose answers for single wavelengths are kept in a folder from one run to the next.
+    /// Same cell, whose answers for single wavelengths are cached in a folder from one run to the next.
     #[must_use]
     pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
         self.folder = folder.map(Path::to_owned);
@@ -186,7 +186,7 @@ impl UprightCell {
         }))
     }
 
-    /// Of light along one axis, up to a number.
+    /// Table of light along one axis, up to a number.
     fn table(&self, of: &Along, axis: PolarisationAxis, last: u16) -> Vec<Complex64> {
         let own = &of[axis.index()];
         let at = |number: u16| own.get(usize::from(number)).copied().unwrap_or(Complex64::ZERO);

@@ -114,7 +114,7 @@ impl Faults {
         Self::new(path, text, placed, total)
     }
 
-    /// How many mistakes there are, listed or not.
+    /// Number of mistakes, listed or not.
     pub fn count(&self) -> usize {
         self.total
     }
@@ -129,7 +129,7 @@ impl Faults {
         &self.faults
     }
 
-    /// Whether there is a mistake of this kind at the key with this path from the top of the file.
+    /// True if there is a mistake of this kind at the key with this path from the top of the file.
     pub fn has(&self, kind: FaultKind, key: &str) -> bool {
         self.faults.iter().any(|fault| fault.kind == kind && fault.key == key)
     }

@@ -12,7 +12,7 @@ use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarRule};
 use num_complex::Complex64;
 
-/// Where rows begin, from the middle of the element (um).
+/// Places where rows begin, from the middle of the element (um).
 pub const RADII_UM: [f64; 4] = [60.0, 180.0, 300.0, 440.0];
 
 /// Share of the light that models put elsewhere than the supercell of a row, mean of s and p.

@@ -41,7 +41,7 @@ pub struct Process {
     path: PathBuf,
     #[serde(skip)]
     text: String,
-    /// Whether it is one of the program's own, and so are its decks.
+    /// True if it is one of the program's own, and so are its decks.
     #[serde(skip)]
     standard: bool,
 }
@@ -71,7 +71,7 @@ pub struct Writer {
     pub job_overhead_s: f64,
 }
 
-/// Whether the exposed resist goes or stays.
+/// Tone: whether the exposed resist goes or stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tone {
@@ -91,7 +91,7 @@ pub struct Resist {
     pub dose_range_uc_cm2: [f64; 2],
 }
 
-/// How the pattern gets from resist to film.
+/// Method of transfer of the pattern from resist to film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
@@ -116,12 +116,12 @@ pub struct PatternTransfer {
 }
 
 impl PatternTransfer {
-    /// Whether it is for a film of this material.
+    /// True if it is for a film of this material.
     pub(super) fn etches(&self, film: &str) -> bool {
         self.films.iter().any(|known| known == film)
     }
 
-    /// Whether it is for films of this thickness (nm).
+    /// True if it is for films of this thickness (nm).
     pub(super) fn reaches(&self, thickness_nm: f64) -> bool {
         let within = |[low, high]: [f64; 2]| (low..=high).contains(&thickness_nm);
         self.film_nm.is_none_or(within)
@@ -177,12 +177,12 @@ pub struct TestSpec {
     pub overlay_vernier_step_nm: f64,
     pub etch_pad_um: f64,
     pub film_witness_um: f64,
-    /// Of the reference lens; that of the mapping of the design where it is left out.
+    /// Wavelength of the reference lens; where it is left out, the wavelength of the mapping of the design.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_wavelength_nm: Option<f64>,
 }
 
-/// Where widths are to be measured, and how well they should fit.
+/// Places where widths are to be measured, and how well they should fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetrologySpec {
     pub sites_per_width: i64,
@@ -193,7 +193,7 @@ pub struct MetrologySpec {
 /// The decks of rules that layouts for this process must keep: their files, or those of the program.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckSpec {
-    /// For designs of squares, of circles and of rectangles.
+    /// Rules for designs of squares, of circles and of rectangles.
     #[serde(skip)]
     pub squares: Option<ShapeRules>,
     #[serde(skip)]
@@ -316,7 +316,7 @@ impl Process {
         }
     }
 
-    /// Whether the first step exposes the pillars; if not, the tone of the layout is wrong.
+    /// True if the first step exposes the pillars; if not, the tone of the layout is wrong.
     pub fn exposes_pillars(&self) -> bool {
         self.exposed_becomes().ends_with("pillar")
     }

@@ -28,12 +28,12 @@ use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles};
 pub struct RectangleClass {
     /// Its number; zero is a site without pillar.
     pub number: u16,
-    /// What both edges are off by (nm).
+    /// Error of both edges (nm).
     pub bias_nm: f64,
 }
 
 impl RectangleClass {
-    /// Of sites whose pillar is missing.
+    /// Class of sites whose pillar is missing.
     pub const WITHOUT_PILLAR: Self = Self {
         number: 0,
         bias_nm: 0.0,
@@ -55,7 +55,7 @@ pub fn bank_orders(shape: PillarShape) -> usize {
 /// A row for each bias, and one for a site without pillar: see [`rows`].
 pub(crate) type RowsOfBiases = (Vec<Vec<Complex64>>, Vec<Complex64>);
 
-/// Where rows are from.
+/// Source of rows.
 enum RowSource {
     Bank(Arc<CellBank>),
     Solved(Box<SolvedRectangles>),
@@ -69,7 +69,7 @@ pub(super) struct MadeRectangles {
 }
 
 impl MadeRectangles {
-    /// Of a stack of rectangles, which focus `focused`; solved where they are needed.
+    /// Rectangles of a stack, which focus `focused`; solved where they are needed.
     ///
     /// # Errors
     /// If they are no such rectangles, or the model has what they have no meaning for.
@@ -95,7 +95,7 @@ impl MadeRectangles {
         })
     }
 
-    /// The same, whose solved rows are kept in a folder from one run to the next.
+    /// Same rectangles, whose solved rows are cached in a folder from one run to the next.
     pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
         if let RowSource::Solved(solved) = &mut self.source {
             solved.folder = folder.map(Path::to_owned);
@@ -103,7 +103,7 @@ impl MadeRectangles {
         self
     }
 
-    /// The same with all rows from a bank of the same pillars.
+    /// Same rectangles with all rows from a bank of the same pillars.
     pub fn of_bank(self, bank: &Arc<CellBank>) -> Self {
         Self {
             source: RowSource::Bank(Arc::clone(bank)),
@@ -111,7 +111,8 @@ impl MadeRectangles {
         }
     }
 
-    /// What each class does to light of both polarisations; after them a site without pillar, and one that light passes as it is.
+    /// Tables of each class for light of both polarisations; after them a site without pillar, and one that light
+    /// passes as it is.
     ///
     /// # Errors
     /// If a cell cannot be solved, or is not in the bank; also if the user stopped it.
@@ -154,7 +155,8 @@ impl MadeRectangles {
         })
     }
 
-    /// Of tables of light that leaves such classes, what [`SolvedWidths`] has: one table for all light that interferes with no other.
+    /// Solved widths from tables of light that leaves such classes: one table for all light that interferes with no
+    /// other.
     pub fn solved(leaving: Vec<PassedTable>) -> SolvedWidths {
         let mut solved = SolvedWidths {
             pillars: Vec::new(),
@@ -173,7 +175,7 @@ impl MadeRectangles {
 }
 
 impl CalibratedModel {
-    /// Nothing, if all that the model says has a meaning for pillars of this shape.
+    /// Succeeds if all that the model says has a meaning for pillars of this shape.
     ///
     /// # Errors
     /// If they are rectangles and it says what counts for one width alone.
@@ -185,7 +187,7 @@ impl CalibratedModel {
     }
 }
 
-/// What rectangles have no meaning for.
+/// Fails for what has no meaning for rectangles.
 fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     let (geometry, cell) = (&model.perturbation.geometry, &model.perturbation.cell);
     if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {

@@ -26,13 +26,13 @@ const STEP_NM: f64 = 2.0;
 /// Pillars of one bias in one light: height of the change, wavelength and bias, bit by bit, and the orders.
 type Place = (u64, u64, u64, RowOrders);
 
-/// What was solved is kept for as long as this lives.
+/// Solutions of rectangles, kept in memory for as long as this lives.
 pub(crate) struct SolvedRectangles {
     stated: CellStack,
     pillars: Rectangles,
-    /// Where what is solved is kept from one run to the next.
+    /// Folder in which solutions are cached from one run to the next.
     pub folder: Option<PathBuf>,
-    /// By the number of the pillar: of rotated ones, which one solution is for all of, zero.
+    /// Solutions by the number of the pillar; zero for rotated ones, which share one solution.
     known: Mutex<BTreeMap<u16, HashMap<Place, Vec<Complex64>>>>,
 }
 

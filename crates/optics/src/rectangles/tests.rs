@@ -7,7 +7,7 @@ use metalith_core::Silent;
 use metalith_pillars::{PillarShape, UprightRectangles};
 use metalith_rcwa::{Material, Orders};
 
-/// What cubics leave between the nodes of edges and height, of transmissions near one.
+/// Error of cubics between the nodes of edges and height, for transmissions near one.
 const BETWEEN: f64 = 5e-3;
 
 const UM: f64 = 0.526;
@@ -155,8 +155,8 @@ fn upright_rectangles_between_the_nodes_are_those_solved_exactly_along_both_axes
     assert!(said.contains("no pillar of 100 x 100 nm"), "{said}");
 }
 
-/// What was kept is taken in place of what would be solved, to the last bit; what is damaged is made anew, and other pillars, biases and stacks have
-/// files of their own.
+/// Cached rows are taken in place of what would be solved, to the last bit; what is damaged is made anew, and other
+/// pillars, biases and stacks have files of their own.
 #[test]
 fn rows_that_are_kept_are_those_that_were_solved() {
     let folder = tempfile::tempdir().unwrap();

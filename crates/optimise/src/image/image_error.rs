@@ -85,7 +85,7 @@ fn wide(c: Complex32) -> Complex64 {
 mod tests {
     use super::*;
 
-    /// Of sums over 49 modes in double precision, through a difference of the size of one.
+    /// Tolerance of sums over 49 modes in double precision, through a difference of the size of one.
     const ROUNDING: f64 = 1e-9;
 
     const WINDOW: PixelWindow = PixelWindow {

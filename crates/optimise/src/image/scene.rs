@@ -1,4 +1,4 @@
-//! What is expected of a scene.
+//! Prior statistics of a scene.
 
 /// Mean and standard deviation of a natural image, its brightest white being one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,7 +10,7 @@ pub struct Scene {
 }
 
 impl Default for Scene {
-    /// Of photographs (van der Schaaf and van Hateren, Vision Research 36, 2759 (1996)).
+    /// Statistics of photographs (van der Schaaf and van Hateren, Vision Research 36, 2759 (1996)).
     fn default() -> Self {
         Self {
             mean: 0.4,

@@ -12,7 +12,7 @@ pub(crate) struct Wiener {
 }
 
 impl Wiener {
-    /// From the mean |H|^2 of the blurs and the powers S of the scene and N of the noise.
+    /// Filter from the mean |H|^2 of the blurs and the powers S of the scene and N of the noise.
     pub fn new(blur_power: f64, signal: f64, noise: f64) -> Self {
         Self {
             signal,

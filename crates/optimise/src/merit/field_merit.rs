@@ -256,7 +256,7 @@ mod tests {
         assert!((left - right).abs() < TOLERANCE * scale, "{left} {right} of {scale}");
     }
 
-    /// What a single choice gains to first order, against the merit with a small part of it in place.
+    /// Gain of a single choice to first order, against the merit with a small part of it in place.
     #[test]
     fn first_order_gains_are_slopes_of_the_merit() {
         /// Single precision over a hundred rows.

@@ -17,17 +17,17 @@ use metalith_cell::{CellModel, NEIGHBOUR_DEGREE};
 use metalith_core::{Error, Result};
 use num_complex::Complex64;
 
-/// What neighbours add at each row.
+/// Terms that neighbours add at each row.
 pub struct NeighbourTerms {
     links: Links,
     rows: usize,
     /// Field of what a neighbour adds, `[link][row]`.
     kernel: Planes,
-    /// Of the own width, `[width_nm][product][row]`.
+    /// Factors of the own width, `[width_nm][product][row]`.
     factors: Planes,
-    /// Of neighbours in the same ring, whose width is the own one: `[width_nm][distance][row]`.
+    /// Terms of neighbours in the same ring, whose width is the own one: `[width_nm][distance][row]`.
     same: Planes,
-    /// Of a neighbour's width, by it.
+    /// Factors of a neighbour's width, by it.
     neighbour: Vec<[f32; NEIGHBOUR_DEGREE]>,
 }
 
@@ -44,7 +44,7 @@ pub struct RingContext {
 /// Terms of neighbours with what each pillar transmits on the mean over its neighbours.
 pub struct PairTerms {
     pub terms: NeighbourTerms,
-    /// Of each row, by width (nm) as far as it was asked for; none of padding.
+    /// Transmissions of each row, by width (nm) as far as it was asked for; `None` for padding.
     pub own: Vec<Option<Vec<Complex64>>>,
 }
 
@@ -147,7 +147,7 @@ impl NeighbourTerms {
         }
     }
 
-    /// What the width of a ring is multiplied with, whatever it is, while others have these widths.
+    /// Context of a ring: what its width, whatever it is, is multiplied with, while others have these widths.
     pub fn visit(&self, ring: usize, widths_nm: &[u16]) -> RingContext {
         let mut visit = RingContext {
             around: Planes::zeros(PRODUCTS * self.rows),
@@ -407,7 +407,7 @@ mod tests {
         }
     }
 
-    /// At the end of a cold exchange no single ring has a better width: by the merit over all pairs.
+    /// Test that at the end of a cold exchange no single ring has a better width, by the merit over all pairs.
     #[test]
     fn an_exchange_ends_where_no_ring_gains() {
         let setup = Setup::new(30_000);

@@ -1,4 +1,4 @@
-//! From the phase of a ring to the width of its pillars, and the widths there are to choose from.
+//! Mapping from the phase of a ring to the width of its pillars, and the widths there are to choose from.
 
 use metalith_design::array::PillarRule;
 

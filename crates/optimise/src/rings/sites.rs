@@ -73,7 +73,7 @@ impl Rings {
         self.sites.len()
     }
 
-    /// Whether there are no rings; a lens has at least one.
+    /// True if there are no rings; a lens has at least one.
     pub fn is_empty(&self) -> bool {
         self.sites.is_empty()
     }
@@ -120,7 +120,7 @@ impl Rings {
         map
     }
 
-    /// Which rings have pillars that stand next to one another. The lattice must be square.
+    /// Links between rings whose pillars stand next to one another. The lattice must be square.
     pub fn links(&self) -> &Links {
         debug_assert!(
             self.lattice.is_square(),
@@ -172,7 +172,7 @@ impl Rings {
         (units2 as u64).isqrt() as usize / units_of_pitch(self.lattice) as usize
     }
 
-    /// Those of `counts` that are of a ring.
+    /// Entries of `counts` for a ring.
     fn of_ring(&self, ring: usize) -> &[(i64, u32)] {
         let first = |k: usize| {
             let least = (units_of_pitch(self.lattice) * k as i64).pow(2);
@@ -191,7 +191,7 @@ impl Rings {
         })
     }
 
-    /// By how much each radius of [`Rings::nodes`] stands for a site of the ring.
+    /// Weight with which each radius of [`Rings::nodes`] stands for a site of the ring.
     pub fn shares_of(&self, ring: usize, units2: i64) -> [f64; NODES] {
         lagrange(&self.node_units2(ring), units2)
     }
@@ -314,7 +314,7 @@ mod tests {
         }
     }
 
-    /// What is optimised is what is written: the table of a phase, one row a ring, gives every site its own ring, those on the
+    /// Layouts are what is optimised: the table of a phase, one row a ring, gives every site its own ring, those on the
     /// borders of rings as well, which are many on a hexagonal lattice.
     #[test]
     fn a_layout_gives_every_site_its_ring() {

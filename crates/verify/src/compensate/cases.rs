@@ -28,7 +28,7 @@ pub(super) const CHIPS: usize = 3;
 pub struct CompensationCase {
     pub element: String,
     pub wavelength_um: f64,
-    /// Of upright rectangles, the axis that the light is polarised along.
+    /// Axis that the light is polarised along, for upright rectangles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<PolarisationAxis>,
     /// `intended` as stated, `made, uncorrected` and `made, corrected`.

@@ -1,4 +1,4 @@
-//! How a line makes pillars: transmission as stated and as made, and what density adds at each site.
+//! Pillars as a line fabricates them: transmission as stated and as fabricated, and what density adds at each site.
 
 use num_complex::Complex64;
 
@@ -14,13 +14,14 @@ use metalith_pillars::{PillarMap, PillarShape, Rectangles};
 #[derive(Clone, Debug)]
 pub struct ColourTransmissions {
     pub wavelength_um: f64,
-    /// Of upright rectangles, which have a phase for each: the axis that the light is polarised along.
+    /// Axis that the light is polarised along, for upright rectangles, which have a phase for each.
     pub axis: Option<PolarisationAxis>,
     /// |t| of a stated cell that passes everything.
     pub full: f64,
-    /// Of intended pillars as stated, by width (nm) or number.
+    /// Transmission of intended pillars as stated, by width (nm) or number.
     pub stated: Vec<Complex64>,
-    /// Of made pillars, by the place of the drawn pillar in [`Line::drawn`] and then by step of density.
+    /// Transmission of fabricated pillars, by the place of the drawn pillar in [`Line::drawn`] and then by step of
+    /// density.
     made: Vec<Vec<Complex64>>,
 }
 
@@ -80,7 +81,7 @@ impl Line {
         Ok(line)
     }
 
-    /// What intended pillars transmit as stated at a wavelength (um).
+    /// Transmission of intended pillars as stated, at a wavelength (um).
     fn stated_colours(
         &self,
         lit: &LitStack,
@@ -105,7 +106,7 @@ impl Line {
         Ok(vec![colour(None, cell.transmissions(wavelength_um, wide)?)])
     }
 
-    /// Whether the width of a pillar depends on what is drawn around it.
+    /// True if the width of a pillar depends on what is drawn around it.
     pub fn varies_by_site(&self) -> bool {
         self.chip.perturbation().geometry.varies_by_site()
     }
@@ -137,14 +138,14 @@ impl Line {
         Ok(())
     }
 
-    /// What a pillar transmits at one of the colours, drawn at a place of [`Line::drawn`], at a step of density
-    /// that was solved for.
+    /// Transmission of a pillar at one of the colours, drawn at a place of [`Line::drawn`], at a step of density that
+    /// was solved for.
     pub fn made(&self, colour: &ColourTransmissions, place: usize, step: i32) -> Complex64 {
         colour.made[place][(step - self.first_step) as usize]
     }
 }
 
-/// What pillars of a chip transmit at one of the colours where so many steps of density are added.
+/// Transmission of pillars of a chip at one of the colours where so many steps of density are added.
 fn made(
     chip: &AsBuiltChip,
     drawn: &[u16],
@@ -175,7 +176,7 @@ fn along_axes(
     }
 }
 
-/// Nothing, if another pillar of a design may come out as the intended one.
+/// Succeeds if another pillar of a design may come out as the intended one.
 fn check_shape(shape: PillarShape) -> Result<()> {
     match shape.rectangles() {
         Some(Rectangles::Rotated(_)) => Err(Error::refused(

@@ -24,7 +24,7 @@ pub use page::write_compensation_report;
 /// Passes over the layout: the second sees the density of what the first has drawn.
 const PASSES: usize = 2;
 
-/// What the name of a design ends in when its layout is compensated.
+/// Ending of the name of a design whose layout is compensated.
 const SUFFIX: &str = "_compensated";
 
 /// The name of the compensated layout of a design, and of its folder.
@@ -42,7 +42,7 @@ pub struct Compensated {
 }
 
 impl Compensated {
-    /// What the model says that neither the compensation nor its report applies.
+    /// Parts of the model that neither the compensation nor its report applies.
     pub fn not_applied(&self) -> Vec<NotApplied> {
         self.line.chip.perturbation().not_applied()
     }

@@ -1,4 +1,4 @@
-//! What lies below every way that light takes here: each of these exists once.
+//! Numerical kernels that every propagation shares.
 //!
 //! | file | holds |
 //! | --- | --- |

@@ -89,7 +89,7 @@ impl Hankel {
         &self.radii_um
     }
 
-    /// What each ring, transmitting 1, brings to a point `rho_um` from the axis.
+    /// Contribution of each ring, transmitting 1, to a point `rho_um` from the axis.
     pub fn kernel(&self, rho_um: f64) -> Vec<Complex64> {
         self.radii_um
             .iter()

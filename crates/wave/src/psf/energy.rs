@@ -23,8 +23,8 @@ impl Psf {
             .sum()
     }
 
-    /// What a camera with square, gapless pixels sees of a point: the energy in each of `pixels` x `pixels` (um^2),
-    /// with the middle of the array at `centre_um`.
+    /// Image of a point on square, gapless pixels: the energy in each of `pixels` x `pixels` (um^2), with the middle of
+    /// the array at `centre_um`.
     ///
     /// # Errors
     /// If the pixels have no size or reach beyond the window.
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn a_square_holds_nothing_from_beyond_the_window() {
-        /// What a cut Gaussian, 1e-4 of its peak at the border, leaves there of its series.
+        /// Tolerance for the series at the border of a cut Gaussian, which is 1e-4 of its peak there.
         const RIM: f64 = 1e-3;
         let total = std::f64::consts::TAU * SIGMA * SIGMA;
         let psf = gaussian(SIGMA, AT);

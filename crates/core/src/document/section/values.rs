@@ -268,7 +268,7 @@ impl<'t> Section<'_, 't> {
         self.file_else(key, "relative paths count from the folder of this file")
     }
 
-    /// The same of a file that is made by what `hint` says.
+    /// Variant of the path of a file for a file that is made by what `hint` says.
     pub fn file_else(&self, key: &str, hint: &str) -> PathBuf {
         let text = self.text(key);
         let path = self.document.folder().join(&text);
@@ -297,7 +297,7 @@ impl<'t> Section<'_, 't> {
     }
 }
 
-/// As a number, if it is one.
+/// Number that a TOML value is, if it is one.
 pub(in crate::document) fn number(value: &DeValue<'_>) -> Option<f64> {
     match value {
         DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok().map(|v| v as f64),

@@ -12,7 +12,7 @@ const KEPT: [(u8, [bool; 2]); 3] = [(2, [true, true]), (4, [false, true]), (6, [
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Images {
     element: u32,
-    /// Which of [`KEPT`] each placement after the first is by.
+    /// Entry of [`KEPT`] that each placement after the first is by.
     by: [usize; KEPT.len()],
     count: usize,
 }

@@ -1,5 +1,5 @@
-//! From the cells of a pupil to the point spread function over a window and its transform on the
-//! pixels' frequencies, and the adjoint of both.
+//! Imaging from the cells of a pupil to the point spread function over a window and its transform on the pixels'
+//! frequencies, and the adjoint of both.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -66,7 +66,8 @@ fn brute_force(lens: &Lens, phases: &[f64], wavelength: f64, angle: f64, places:
 
 #[test]
 fn intensities_are_those_of_all_sites() {
-    /// Of the peak: what the expansion of the path leaves out at 10 um from the chief ray, 30 degrees.
+    /// Tolerance as a share of the peak: what the expansion of the path leaves out at 10 um from the chief ray, 30
+    /// degrees.
     const TOLERANCE: f64 = 0.02;
     let wavelength = 0.5;
     let cases = [LatticeKind::Square, LatticeKind::Hexagonal].map(|kind| [0.0f64, 15.0, 30.0].map(|deg| (kind, deg)));

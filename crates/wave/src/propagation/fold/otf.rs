@@ -234,7 +234,8 @@ mod tests {
 
     #[test]
     fn a_veil_outside_of_the_window_takes_contrast() {
-        /// Of the power that passes: light that a window of 210 um does not hold either, and interpolation of bins.
+        /// Tolerance as a share of the power that passes: light that a window of 210 um does not hold either, and
+        /// interpolation of bins.
         const WIDE_WINDOW: f64 = 3e-3;
         let wave = PlaneWave::normal(WAVELENGTH_UM);
         let blurred = lens(0.8);
