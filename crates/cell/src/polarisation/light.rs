@@ -34,14 +34,12 @@ pub struct PolarisedLight {
     pub analyser: Option<Analyser>,
 }
 
-/// Pillars, and the light that they are in.
+/// Pillars, and the light that they focus.
 #[derive(Clone, Debug)]
 pub struct LitStack {
     pub stack: CellStack,
     /// The light that has the phase of a design behind them, if they tell polarisations apart.
     pub focused: Option<FocusedLight>,
-    /// Which light arrives, and what of it reaches the sensor, of such pillars.
-    pub polarised: PolarisedLight,
 }
 
 impl PolarisedLight {
