@@ -346,7 +346,6 @@ pub fn psf_of_widths<'py>(
             Wanted::Model(model) => {
                 let stated = LitStack {
                     focused: shape.rectangles().map(|_| focused(light, shape)),
-                    polarised: light,
                     stack,
                 };
                 let chip = AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());

@@ -49,7 +49,6 @@ impl Design {
         Ok(LitStack {
             stack: self.cell_stack()?,
             focused: self.focused(),
-            polarised: self.verify.light(),
         })
     }
 

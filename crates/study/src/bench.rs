@@ -278,7 +278,6 @@ fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Re
     let stated = LitStack {
         stack: bank.stated().clone(),
         focused: design.focused(),
-        polarised: design.verify.light(),
     };
     Ok(AsBuiltChip::in_light(&stated, model)?.from_bank(bank))
 }

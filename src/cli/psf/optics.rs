@@ -195,7 +195,6 @@ impl PsfArgs {
         let stated = LitStack {
             stack: self.stack(found)?,
             focused: shape.rectangles().map(|_| self.focused(shape)),
-            polarised: self.polarised_light(shape),
         };
         model.check_drawn(&stated.stack, found.elements.iter().map(|e| e.widths.histogram()))?;
         Ok(AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref()))

@@ -34,14 +34,12 @@ pub struct PolarisedLight {
     pub analyser: Option<Analyser>,
 }
 
-/// Pillars, and the light that they are in.
+/// Pillars, and the light that they focus.
 #[derive(Clone, Debug)]
 pub struct LitStack {
     pub stack: CellStack,
     /// The light that has the phase of a design behind them, if they tell polarisations apart.
     pub focused: Option<FocusedLight>,
-    /// Light that arrives at such pillars, and the part of it that reaches the sensor.
-    pub polarised: PolarisedLight,
 }
 
 impl PolarisedLight {
