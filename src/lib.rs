@@ -84,6 +84,7 @@ extern crate self as metalith;
 pub mod cli;
 mod session;
 
+pub use metalith_attribution as attribution;
 #[cfg(feature = "baselines")]
 pub use metalith_baselines as baselines;
 pub use metalith_calibrate as calibrate;
