@@ -1,4 +1,4 @@
-//! What each approximation of such cameras is worth: scores of pictures under each.
+//! Scores of pictures under each approximation of such cameras, which show what the approximation is worth.
 
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
@@ -48,10 +48,10 @@ pub fn without_dispersion(camera: &Camera, channels: &[ChannelSampling]) -> Came
 /// A picture as it would be if something that is assumed were so.
 #[derive(Clone, Debug, Serialize)]
 pub struct AssumedScore {
-    /// In words.
+    /// Assumption in words.
     pub assumption: &'static str,
     pub scores: Vec<ZoneScore>,
-    /// What the operator of the restoration errs by, by channel.
+    /// Error of the operator of the restoration, by channel.
     pub operator_error: Vec<f64>,
 }
 
@@ -112,7 +112,7 @@ pub fn worth_of_assumptions(
 }
 
 impl ImagingSystem {
-    /// The same with other assumptions, and the exposure that suits them.
+    /// Same system with other assumptions, and the exposure that suits them.
     ///
     /// # Errors
     /// If no light reaches the sensor.

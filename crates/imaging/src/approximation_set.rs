@@ -1,4 +1,4 @@
-//! What others assume of such cameras, so that it can be said what each assumption is worth.
+//! Approximations that others make of such cameras, so that the worth of each can be stated.
 //!
 //! The array of Chakravarthula et al. (ACM Trans. Graph. 42, 257 (2023)) was trained on frames with one kernel for each
 //! element and colour, whatever the place in its field, brightness that falls as a Butterworth filter of the angle, one
@@ -6,14 +6,14 @@
 
 use serde::Serialize;
 
-/// What is assumed of the way from a scene to the frame, instead of what is known.
+/// Assumptions on the way from a scene to the frame, in place of what is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ApproximationSet {
     /// The kernel on the axis of an element holds over its whole field.
     pub fixed_kernels: bool,
     /// Light falls with the angle as `butterworth` says, and not by what elements pass and flat surfaces send.
     pub butterworth: bool,
-    /// Nothing lands outside of the kernels.
+    /// True if nothing lands outside of the kernels.
     pub no_stray_light: bool,
     /// Each element has a square of so many pixels to itself, and no light lands beside it.
     pub patch_pixels: Option<u32>,

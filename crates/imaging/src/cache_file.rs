@@ -113,7 +113,8 @@ impl Content<'_> {
     }
 }
 
-/// What is made of the content of a kept file, which must be read to its end; none if there is none that can be used.
+/// Result of decoding the content of a cached file, which must be read to its end; `None` if there is none that can be
+/// used.
 fn read<T>(
     file: &Path,
     magic: [u8; 8],
@@ -216,7 +217,7 @@ pub fn cache_stray_light(folder: &Path, inputs: &[u8], stray_light: &StrayLight)
     )
 }
 
-/// What a layout was counted to have of the pillars of a design; none if that was not kept.
+/// Count of the pillars of a design that a layout has; `None` if it is not cached.
 pub fn cached_pillars(folder: &Path, inputs: &[u8]) -> Option<PillarCount> {
     read(&file_of(folder, "pillars", inputs), PILLARS_MAGIC, inputs, |content| {
         content.head()

@@ -27,21 +27,21 @@ pub struct DistinctChipElement<'a> {
     pub symmetries: Vec<Symmetry>,
     /// Area of its sites (um^2).
     open_um2: f64,
-    /// What its pillars transmit among unlike neighbours, of a cell that knows; one for each wavelength.
+    /// Transmission of its pillars by the coupled model, where the cell has one; one for each wavelength.
     among_neighbours: Vec<Option<BandResponse>>,
 }
 
 /// All elements of a chip, with what decides what they transmit at the wavelengths of a camera.
 pub struct ChipInLight<'a> {
     pub elements: Vec<ElementView>,
-    /// For each element the distinct one that it is a copy of, and what turns that one into it.
+    /// Distinct element that each element is a copy of, and the symmetry that turns the distinct one into it.
     pub copies: Vec<(usize, Symmetry)>,
     pub distinct: Vec<DistinctChipElement<'a>>,
     pub sampling: Sampling,
     case: SimulationCase<'a>,
     /// Transmission of a cell by wavelength and width.
     by_width: Vec<Vec<Complex64>>,
-    /// Of a cell that changes polarisation, what reaches the sensor, by wavelength.
+    /// Light that reaches the sensor, by wavelength, for a cell that changes polarisation.
     polarised: Vec<Option<Polarised>>,
     perturbation: Perturbation,
     /// Share of the light that cells send on that pass everything, at each wavelength.
@@ -54,27 +54,28 @@ pub struct ChipInLight<'a> {
 pub struct ElementInLight<'c> {
     chip: &'c ChipInLight<'c>,
     distinct: usize,
-    /// By wavelength of the camera; of those that were not asked for, nothing.
+    /// Tables by wavelength of the camera; `None` for wavelengths that were not asked for.
     tables: Vec<Option<Tables>>,
 }
 
 struct Tables {
     classes: Vec<ClassTable>,
-    /// As [`ElementInLight::departing`], where these are not `classes`, each once with the phase of the element.
+    /// Tables as [`ElementInLight::departing`] has them, where these are not `classes`, each once with the phase of the
+    /// element.
     departing: Option<Vec<(ClassTable, i32)>>,
-    /// As [`AsBuiltOptics::share`].
+    /// Share of the light as [`AsBuiltOptics::share`].
     share: f64,
     gap_um: f64,
     camera: CameraChange,
 }
 
-/// From the pillar tops of a design to the sensor of a camera, below the middle of the chip (um): as the camera says, else in the
-/// focus of the lens that elements share.
+/// Distance from the pillar tops of a design to the sensor of a camera, below the middle of the chip (um): as the
+/// camera says, else in the focus of the lens that elements share.
 pub fn sensor_um(design: &Design, camera: &Camera) -> f64 {
     camera.sensor.distance_um.unwrap_or(design.lens.focal_length_um)
 }
 
-/// Where the elements of a design are before a sensor: one plane for all, whatever their focal lengths.
+/// Views of the elements of a design before a sensor: one plane for all, whatever their focal lengths.
 pub fn element_views(design: &Design, camera: &Camera) -> Vec<ElementView> {
     views_of(design, camera, &OpenAreas::of(design))
 }
@@ -244,12 +245,12 @@ impl<'a> ChipInLight<'a> {
 }
 
 impl ElementInLight<'_> {
-    /// As [`ChipInLight::arriving_um2`].
+    /// Area of the light that arrives (um^2), as [`ChipInLight::arriving_um2`].
     pub fn arriving_um2(&self, wavelength: usize) -> f64 {
         self.chip.arriving_um2(self.distinct, wavelength)
     }
 
-    /// In the light of one wavelength, by its index, from a direction.
+    /// Element in the light of one wavelength, by its index, from a direction.
     ///
     /// # Panics
     /// If it was not made for this wavelength.
@@ -346,7 +347,8 @@ fn last_index(design: &Design) -> u16 {
     shape.map_or(design.cell.pitch_nm as u16, |pillars| pillars.last())
 }
 
-/// Where light of an element as made goes, with the power of what passes: as [`Polarised::departing_from`].
+/// Tables of light of an element as fabricated by direction of departure, with the power of what passes: as
+/// [`Polarised::departing_from`].
 fn scaled_to(passed: &[ClassTable], departing: Vec<(ClassTable, i32)>, classes: &[u16]) -> Vec<(ClassTable, i32)> {
     let all: f64 = departing.iter().map(|(table, _)| table.power(classes)).sum();
     let passes: f64 = passed.iter().map(|table| table.power(classes)).sum();
@@ -355,15 +357,15 @@ fn scaled_to(passed: &[ClassTable], departing: Vec<(ClassTable, i32)>, classes: 
     scaled.collect()
 }
 
-/// What reaches the sensor of light whose polarisations pillars tell apart, and the same for where it goes.
+/// Light that reaches the sensor where pillars distinguish polarisations, and the same light by direction of departure.
 struct Polarised {
     passed: Vec<PassedTable>,
     departing: Vec<PassedTable>,
 }
 
 impl Polarised {
-    /// Where light of these pillars goes: over one element light of unlike orders may interfere a little, and all of it is what
-    /// passes.
+    /// Tables of light of these pillars by direction of departure: over one element light of unlike orders may
+    /// interfere a little, and all of it is what passes.
     fn departing_from(&self, pillars: &PillarMap) -> Vec<PassedTable> {
         let counts = pillars.histogram();
         let power = |all: &[PassedTable]| -> f64 {
@@ -387,7 +389,7 @@ impl Polarised {
     }
 }
 
-/// Of the light of a design.
+/// Polarised tables for the light of a design.
 fn polarised(cell: &dyn CellModel, sampling: &Sampling, design: &Design) -> Result<Vec<Option<Polarised>>> {
     let light = design.verify.light();
     let of = |nm: &f64| {
@@ -419,8 +421,8 @@ fn by_width(
     .collect()
 }
 
-/// What the pillars of an element transmit among unlike neighbours, at each wavelength; nothing of cells that take them for
-/// equals.
+/// Transmission of the pillars of an element by the coupled model, at each wavelength; `None` for cells that take
+/// neighbours for equals.
 fn among_neighbours(
     case: SimulationCase<'_>,
     sampling: &Sampling,
@@ -437,7 +439,7 @@ fn among_neighbours(
     sampling.wavelengths_nm.iter().map(of).collect()
 }
 
-/// Whether a symmetry turns the wedge of one element into that of another.
+/// True if a symmetry turns the wedge of one element into the wedge of another.
 fn same_wedge(turn: Symmetry, from: &ElementView, to: &ElementView) -> bool {
     /// Sines of the same angle, computed for both signs.
     const ROUNDING: f64 = 1e-12;

@@ -24,19 +24,19 @@ use crate::scene::SceneImage;
 
 /// Images of one shard: a folder named by the range of their numbers.
 const SHARD: usize = 1000;
-/// What files of a set hold, in a word that changes with it: those of before are made anew.
+/// Format of the files of a set, in words that change with it: files of an older format are made anew.
 const FORMAT: &str = "frames above a black level";
 /// Black level over the deviation of what reading adds: one dark pixel of a thousand million is cut at zero.
 const DEVIATIONS: f64 = 6.0;
 /// Least and largest black level (numbers of the file).
 const BLACK: [f64; 2] = [64.0, 32_768.0];
 
-/// What stands in `manifest.json`.
+/// Contents of `manifest.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetManifest {
     pub design: String,
     pub camera: String,
-    /// What the frames were made with; nothing in sets that have no black level.
+    /// Origin of the frames; empty in sets that have no black level.
     #[serde(default)]
     pub made_from: DatasetOrigin,
     pub seed: u64,
@@ -55,18 +55,18 @@ pub struct DatasetManifest {
 /// Digests of what frames were made with, each a SHA-256 in hexadecimal.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DatasetOrigin {
-    /// Of what the design says of layout, materials and cell ([`Design::simulation_digest`]).
+    /// Digest of layout, materials and cell of the design ([`Design::simulation_digest`]).
     pub design_sha256: String,
-    /// Of the file.
+    /// Digest of the layout file.
     pub layout_sha256: String,
-    /// Of what the camera file and its curves say.
+    /// Digest of the camera file and its curves.
     pub camera_sha256: String,
-    /// Of the file, if the chip is taken as made.
+    /// Digest of the model file, if the chip is taken as fabricated.
     pub model_sha256: Option<String>,
 }
 
 impl DatasetOrigin {
-    /// Of a design, the file of its layout, a camera and the file of a model, if there is one.
+    /// Origin from a design, the file of its layout, a camera and the file of a model, if there is one.
     ///
     /// # Errors
     /// If a material is not known, or a file cannot be read.
@@ -114,7 +114,7 @@ pub(crate) fn black_level(camera: &Camera) -> u16 {
 }
 
 impl DatasetManifest {
-    /// Of a set that has no pairs yet.
+    /// Manifest of a set that has no pairs yet.
     pub fn of(system: &ImagingSystem, made_from: DatasetOrigin, seed: u64) -> Self {
         Self {
             design: system.design.name.clone(),
@@ -166,19 +166,19 @@ pub fn write_dataset_manifest(folder: &Path, manifest: &DatasetManifest) -> Resu
     metalith_report::write_json(&folder.join("manifest.json"), "dataset", manifest)
 }
 
-/// What writes the pairs of a set.
+/// Writer of the pairs of a set.
 pub struct PairWriter<'a> {
     system: &'a ImagingSystem,
     operator: &'a FrameOperator<'a>,
     seed: u64,
     folder: &'a Path,
-    /// Of chip and camera.
+    /// Digest of chip and camera.
     system_digest: [u8; 32],
     black: u16,
 }
 
 impl<'a> PairWriter<'a> {
-    /// For the simulation of an imaging system, noise of a seed, and a folder.
+    /// Writer for the simulation of an imaging system, noise of a seed, and a folder.
     pub fn new(system: &'a ImagingSystem, operator: &'a FrameOperator<'a>, seed: u64, folder: &'a Path) -> Self {
         Self {
             system,

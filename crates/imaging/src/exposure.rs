@@ -1,4 +1,4 @@
-//! From light in the pixels to the numbers that a camera gives out.
+//! Exposure: from light in the pixels to the numbers that a camera records.
 
 use metalith_core::{Error, Result};
 use metalith_report::sig;
@@ -14,7 +14,8 @@ use crate::operator_error::OperatorError;
 /// A frame as it was recorded.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Of full scale, quantised; one plane for a sensor with a colour filter array, else one for each channel.
+    /// Signals as shares of full scale, quantised; one plane for a sensor with a colour filter array, else one for each
+    /// channel.
     pub planes: Vec<Array2<f32>>,
     pub filter: ColourFilter,
     /// Signal, of full scale, of a unit of light in each channel.
@@ -26,7 +27,7 @@ pub struct Frame {
     pub saturated: usize,
 }
 
-/// What each channel counts of the light of the scene, against the one that counts most.
+/// Sensitivity of each channel to the light of the scene, relative to the channel that counts most.
 pub fn sensitivity(camera: &Camera, channels: &[metalith_sensor::ChannelSampling]) -> Vec<f64> {
     let counted: Vec<f64> = channels
         .iter()
@@ -37,7 +38,7 @@ pub fn sensitivity(camera: &Camera, channels: &[metalith_sensor::ChannelSampling
     counted.iter().map(|c| c / most).collect()
 }
 
-/// Which channel a pixel counts; none for a sensor whose pixels count all.
+/// Channel that a pixel counts; `None` for a sensor whose pixels count all.
 pub fn channel_at(filter: ColourFilter, names: &[String], row: usize, column: usize) -> Option<usize> {
     let pattern = match filter {
         ColourFilter::None => return None,
@@ -50,7 +51,7 @@ pub fn channel_at(filter: ColourFilter, names: &[String], row: usize, column: us
     names.iter().position(|n| n == wanted)
 }
 
-/// Whether a pixel counts a channel; pixels of a sensor without a filter count all.
+/// True if a pixel counts a channel; pixels of a sensor without a filter count all.
 pub fn counts_channel(filter: ColourFilter, names: &[String], [row, column]: [usize; 2], channel: usize) -> bool {
     channel_at(filter, names, row, column).is_none_or(|c| c == channel)
 }
@@ -109,7 +110,7 @@ pub(crate) fn recorded(camera: &Camera, signal: f64) -> f32 {
     ((signal.min(camera.sensor.largest_signal()) / step).round() * step) as f32
 }
 
-/// How many planes the frames of a camera have: one behind a colour filter array, else one for each channel.
+/// Number of planes of the frames of a camera: one behind a colour filter array, else one for each channel.
 pub(crate) fn planes_of(camera: &Camera) -> usize {
     match camera.sensor.filter {
         ColourFilter::None => camera.channels.len(),
@@ -118,7 +119,8 @@ pub(crate) fn planes_of(camera: &Camera) -> usize {
 }
 
 impl Frame {
-    /// Of signals that were recorded, of full scale, in the planes that the sensor of a camera has; `gain` as [`gains`] has it.
+    /// Frame of signals that were recorded, as shares of full scale, in the planes that the sensor of a camera has;
+    /// `gain` as [`gains`] has it.
     pub fn of_signals(camera: &Camera, gain: &[f64], planes: Vec<Array2<f32>>) -> Self {
         let full = recorded(camera, f64::INFINITY);
         Self {
@@ -131,7 +133,7 @@ impl Frame {
         }
     }
 
-    /// Whether it can be of a sensor of so many rows and columns behind so many channels.
+    /// Checks that the frame can be of a sensor of so many rows and columns behind so many channels.
     ///
     /// # Errors
     /// If it is of another camera.
@@ -156,12 +158,12 @@ impl Frame {
         self.saturated as f64 / self.pixels() as f64
     }
 
-    /// Whether most pixels are at full scale: what is restored then says nothing of the camera.
+    /// True if most pixels are at full scale: what is restored then says nothing of the camera.
     pub fn is_lost(&self) -> bool {
         self.saturated_share() > 0.5
     }
 
-    /// What is to be known of pixels at full scale, if there are more than a few; `truth` is the scene in linear sRGB.
+    /// Note on pixels at full scale, if there are more than a few; `truth` is the scene in linear sRGB.
     pub fn saturation_note(&self, truth: &Array3<f64>) -> Option<String> {
         /// Share that is told.
         const TOLD: f64 = 0.01;
@@ -210,12 +212,12 @@ impl Frame {
         self.gain.iter().enumerate().map(of).collect()
     }
 
-    /// What was recorded of a channel.
+    /// Plane that a channel was recorded in.
     fn plane(&self, channel: usize) -> &Array2<f32> {
         &self.planes[if self.filter == ColourFilter::None { channel } else { 0 }]
     }
 
-    /// Whether a pixel counts a channel.
+    /// True if a pixel counts a channel.
     fn counts(&self, channel: usize, names: &[String], row: usize, column: usize) -> bool {
         counts_channel(self.filter, names, [row, column], channel)
     }

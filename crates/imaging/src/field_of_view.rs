@@ -1,4 +1,4 @@
-//! What a camera, an array and its kernels can see: asked before and after work is spent on it.
+//! Field of view of a camera, an array and its kernels, checked before and after work is spent on it.
 
 use metalith_core::{Error, Result};
 use metalith_design::Design;

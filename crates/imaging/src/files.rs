@@ -29,7 +29,7 @@ impl FrameFile {
     /// Name of the file.
     pub const NAME: &'static str = "frame.png";
 
-    /// Of a frame of a camera.
+    /// File of a frame of a camera.
     pub fn of(camera: &Camera, frame: &Frame) -> Self {
         Self {
             file: Self::NAME.into(),

@@ -18,15 +18,15 @@ use crate::spectra::rgb_basis;
 pub struct ForecastScene {
     scene: SceneImage,
     light: Vec<Array2<f32>>,
-    /// What the operator of the restoration errs by against the simulation.
+    /// Error of the operator of the restoration against the simulation.
     pub operator_error: OperatorError,
 }
 
-/// Of the scene and of its noise.
+/// Seed of the scene and of its noise.
 const SEED: u64 = 1;
 
 impl ForecastScene {
-    /// For the operator of a restoration.
+    /// Forecast scene for the operator of a restoration.
     pub fn new(system: &ImagingSystem, restoration: &FrameOperator<'_>) -> Self {
         let scene = SceneImage {
             name: "random".into(),
@@ -56,9 +56,9 @@ impl ForecastScene {
         }
     }
 
-    /// What is lost of scenes by Tikhonov and all elements: everything that the simulation knows and the restoration does
-    /// not, noise, and unfinished iterations. The random scene is restored twice, with and without noise: what noise adds does not
-    /// grow with the power of a scene.
+    /// Forecast of what is lost of scenes by Tikhonov and all elements: everything that the simulation knows and the
+    /// restoration does not, noise, and unfinished iterations. The random scene is restored twice, with and without
+    /// noise: what noise adds does not grow with the power of a scene.
     ///
     /// # Errors
     /// If the user stopped it.

@@ -24,13 +24,13 @@ use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::stray_light::StrayLight;
 
-/// What pictures are taken with.
+/// Imaging system that takes pictures: a chip, its kernels and a camera.
 #[derive(Clone)]
 pub struct ImagingSystem {
     pub design: Design,
     pub camera: Camera,
     pub bank: KernelBank,
-    /// Which kernels of the bank are in force between its nodes, as scenes are simulated.
+    /// Rule for the kernels between the nodes of the bank, as scenes are simulated.
     pub between: BetweenNodes,
     /// Every how many-th of these nodes a restoration knows.
     pub(crate) restored_step: usize,
@@ -39,25 +39,25 @@ pub struct ImagingSystem {
     pub channels: Vec<ChannelSampling>,
     /// Spectra of the bank: those of the scenes, and the primaries of the restoration among or after them.
     pub basis: Vec<SceneSpectrum>,
-    /// How many of them are the scenes'.
+    /// Number of them that are the scenes'.
     pub(crate) scene_spectra: usize,
-    /// Where the primaries begin.
+    /// Index where the primaries begin.
     pub(crate) primaries: usize,
-    /// Of scenes as they are simulated, and of the pictures that are restored.
+    /// View of scenes as they are simulated, and of the pictures that are restored.
     pub view: SceneView,
-    /// Of scenes as they are given: another one if their pixels are finer than the points that the sensor's pixels look at. Then their
-    /// means over larger ones are simulated, and are the truth that pictures are held to.
+    /// View of scenes as they are given: another one if their pixels are finer than the points that the sensor's pixels
+    /// look at. Then their means over larger ones are simulated, and are the truth that pictures are held to.
     pub given: SceneView,
-    /// What the layout has of the pillars of its design, if it was counted.
+    /// Count of the pillars of its design that the layout has, if it was counted.
     pub pillars: Option<PillarCount>,
     /// Signal of a unit of light in each channel.
     pub gain: Vec<f64>,
     pub colours: ChannelColours,
-    /// Whether kernels and stray light were found on the disk.
+    /// True if kernels and stray light were found on the disk.
     pub from_cache: [bool; 2],
-    /// What is assumed instead of what is known; nothing, unless asked for.
+    /// Assumptions in place of what is known; none, unless asked for.
     pub assumed: ApproximationSet,
-    /// What is known of pictures from photographs; as it comes with the program, unless another is put here.
+    /// Learned denoiser, trained on photographs: the shipped one, unless another is put here.
     pub prior: LearnedDenoiser,
 }
 
@@ -68,7 +68,7 @@ pub struct ImagingSystem {
 const TOGETHER: f64 = 2.0;
 
 impl ImagingSystem {
-    /// With the gain of each channel that the exposure of the camera asks for.
+    /// Same system with the gain of each channel that the exposure of the camera asks for.
     pub(crate) fn exposed(mut self) -> Result<Self> {
         let operator = self.restoration();
         let white = operator.apply(&operator.white());
@@ -97,7 +97,7 @@ impl ImagingSystem {
         )
     }
 
-    /// Of scenes as finely as they are known.
+    /// Detail of scenes as finely as they are known.
     pub(crate) fn finest(&self) -> Detail {
         Detail {
             between: self.between,
@@ -110,7 +110,7 @@ impl ImagingSystem {
         self.operator(self.finest())
     }
 
-    /// The same for one scene, with the distances of its pixels if it has them.
+    /// Operator for one scene, with the distances of its pixels if it has them.
     pub fn simulation_of(&self, scene: &SceneImage) -> FrameOperator<'_> {
         let scene = self.simulated(scene);
         let space = match &scene.depth_um {
@@ -120,8 +120,8 @@ impl ImagingSystem {
         self.operator_in(&space, self.finest())
     }
 
-    /// What a restoration knows of the same way: to it, colours of a scene are sums of three primaries. A camera that
-    /// tells no colours apart sees grey.
+    /// Operator of a restoration, which takes colours of a scene for sums of three primaries. A camera that
+    /// distinguishes no colours sees grey.
     pub fn restoration(&self) -> FrameOperator<'_> {
         let primaries = self.primaries();
         let inputs = match self.colours.has_colours() {
@@ -135,7 +135,7 @@ impl ImagingSystem {
         })
     }
 
-    /// Which spectra of the bank are the primaries of a restoration: red, green and blue.
+    /// Range of the spectra of the bank that are the primaries of a restoration: red, green and blue.
     pub fn primaries(&self) -> std::ops::Range<usize> {
         self.primaries..self.primaries + rgb_basis().len()
     }
@@ -266,7 +266,7 @@ impl ImagingSystem {
         }
     }
 
-    /// What a frame says: its light, and how far each pixel is to be trusted.
+    /// Light of a frame, and the weight of each pixel.
     fn known(
         &self,
         operator: &FrameOperator<'_>,
@@ -302,7 +302,7 @@ impl ImagingSystem {
         self.colours.rgb(&operator.unrestored(&light, &inverse_variance))
     }
 
-    /// What a perfect camera with these channels would give of a scene: the truth that pictures are held to.
+    /// Image of a scene by a perfect camera with these channels: the truth that pictures are compared with.
     pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
         self.colours
             .rgb(&ChannelColours::ideal(&self.channels, &self.simulated(scene)))

@@ -1,4 +1,4 @@
-//! Where kernels and stray light are kept between runs.
+//! Cache of kernels and stray light between runs.
 
 use std::path::{Path, PathBuf};
 
@@ -8,18 +8,18 @@ use metalith_core::{Progress, Result};
 /// Folder of kernels within that of a plan.
 const KERNELS: &str = "kernels";
 
-/// Where kernels and stray light are kept between runs.
+/// Cache of kernels and stray light between runs.
 #[derive(Clone, Debug)]
 pub struct KernelCache {
     /// Nowhere, if left out.
     pub(crate) folder: Option<PathBuf>,
     pub(crate) make: bool,
-    /// Whether the folder was asked for: what cannot be kept there is an error. That of a user only saves time.
+    /// True if the folder was asked for: what cannot be stored there is an error. The folder of a user only saves time.
     asked: bool,
 }
 
 impl KernelCache {
-    /// Where this user keeps tables of cells too.
+    /// Cache in the folder in which this user keeps tables of cells too.
     pub fn of_user() -> Self {
         Self {
             folder: cache_folder(),
@@ -28,7 +28,7 @@ impl KernelCache {
         }
     }
 
-    /// In a folder; made if they are not there.
+    /// Cache in a folder; kernels are made if they are not there.
     pub fn made(folder: &Path) -> Self {
         Self {
             folder: Some(folder.join(KERNELS)),
@@ -37,7 +37,7 @@ impl KernelCache {
         }
     }
 
-    /// In a folder where they were made.
+    /// Cache in a folder where the kernels were made.
     pub fn only(folder: &Path) -> Self {
         Self {
             make: false,

@@ -1,4 +1,4 @@
-//! What scenes in a camera ask of the kernels and the stray light of a chip.
+//! Plan of the kernels and the stray light of a chip that scenes in a camera need.
 
 use std::borrow::Cow;
 
@@ -28,10 +28,11 @@ use crate::stray_light::StrayLight;
 const FIELD_DEG: f64 = 30.0;
 /// Nodes an axis of this field.
 const NODES: usize = 17;
-/// The same in light of narrow bands, where nothing but the sensor's pixels smooths the images, if so many can be held: two steps for
-/// one. A restoration knows no more of them than of the others.
+/// Number of nodes in light of narrow bands, where nothing but the sensor's pixels smooths the images, if so many can
+/// be held: two steps for one. A restoration knows no more of them than of the others.
 const NODES_OF_NARROW: usize = 2 * (NODES - 1) + 1;
-/// The same where six of them are to hold the rings of an image out of focus (455 nm behind a lens of 140 um) to a thousandth of its peak.
+/// Number of nodes where six of them are to hold the rings of an image out of focus (455 nm behind a lens of 140 um) to
+/// a thousandth of its peak.
 const NODES_OF_SIXFOLD: usize = 5 * (NODES - 1) / 2 + 1;
 /// Steps an axis between the nodes that a restoration knows.
 const RESTORED_STEPS: usize = (NODES - 1) / 2;
@@ -39,7 +40,7 @@ const RESTORED_STEPS: usize = (NODES - 1) / 2;
 const WINDOW: usize = 64;
 
 impl BankSpec {
-    /// For the elements of a design before a camera, in light of wide bands.
+    /// Specification for the elements of a design before a camera, in light of wide bands.
     pub fn standard(design: &Design, camera: &Camera) -> Self {
         Self {
             pixel_um: camera.sensor.pixel_um,
@@ -50,8 +51,8 @@ impl BankSpec {
         }
     }
 
-    /// With the nodes that light of a camera asks for, by how images follow from those at its wavelengths
-    /// ([`Sampling::blend`](metalith_sensor::Sampling)).
+    /// Same specification with the nodes that light of a camera asks for, by how images follow from those at its
+    /// wavelengths ([`Sampling::blend`](metalith_sensor::Sampling)).
     pub fn in_light(self, blend: Blend) -> Self {
         match blend {
             Blend::Linear => self,
@@ -65,8 +66,9 @@ impl BankSpec {
         }
     }
 
-    /// Which kernels are in force between its nodes in such light. What fields that are not accurate err by from node to node is no
-    /// polynomial: of kernels of `prototype_3x3` (530 nm, between 33 nodes) six err by 0.3 to 1.3 % of the peak, two by 0.8 to 1.1 %.
+    /// Rule for the kernels between its nodes in such light. The error of fields that are not accurate is no polynomial
+    /// from node to node: of kernels of `prototype_3x3` (530 nm, between 33 nodes) six err by 0.3 to 1.3 % of the peak,
+    /// two by 0.8 to 1.1 %.
     pub fn between_nodes(&self, blend: Blend) -> BetweenNodes {
         match blend {
             Blend::Cubic if self.accurate => BetweenNodes::Sixfold,
@@ -75,13 +77,13 @@ impl BankSpec {
     }
 }
 
-/// What scenes in a camera ask of kernels.
+/// Plan of the kernels that scenes in a camera need.
 pub(crate) struct KernelPlan<'a> {
     design: &'a Design,
     camera: &'a Camera,
-    /// In the pixels that it is simulated in.
+    /// Scene in the pixels that it is simulated in.
     pub(crate) scene: Cow<'a, SceneImage>,
-    /// As it was given.
+    /// View of the scene as it was given.
     given: SceneView,
     elements: Vec<ElementView>,
     channels: Vec<ChannelSampling>,
@@ -92,7 +94,7 @@ pub(crate) struct KernelPlan<'a> {
     fewer_nodes: Option<usize>,
     /// Spectra of the scenes, and the primaries of the restoration among or after them.
     basis: Vec<SceneSpectrum>,
-    /// Where the primaries begin.
+    /// Index where the primaries begin.
     primaries: usize,
     pub(crate) spec: BankSpec,
 }
@@ -103,7 +105,7 @@ pub fn simulated_view(design: &Design, camera: &Camera, view: &SceneView) -> Sce
     view.no_finer(0.5 * camera.sensor.pixel_um / sensor_um(design, camera))
 }
 
-/// What decides a bank, as text.
+/// Inputs that decide a bank, as text.
 #[derive(Serialize)]
 struct Inputs<'a> {
     solver: u32,
@@ -116,13 +118,13 @@ struct Inputs<'a> {
     /// The cell that pillars are simulated by, and the wavelengths that it has tables of unlike neighbours for.
     fidelity: Fidelity,
     tabulated_um: &'a [f64],
-    /// Of pillars that change polarisation, the light of the scene and what of it reaches the sensor.
+    /// Light of the scene, and the part of it that reaches the sensor, for pillars that change polarisation.
     #[serde(skip_serializing_if = "Option::is_none")]
     polarised: Option<PolarisedLight>,
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
     scene_distance_um: f64,
-    /// Where light of narrow bands asks for wavelengths of its own, these (nm).
+    /// Wavelengths of light of narrow bands (nm), where it asks for its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     cubic_nm: Option<&'a [f64]>,
 }
@@ -168,12 +170,12 @@ impl<'a> KernelPlan<'a> {
         })
     }
 
-    /// What is to be known of the pixels of the scene, if they are not those that were given.
+    /// Note on the pixels of the scene, if they are not those that were given.
     pub(crate) fn averaging(&self) -> Option<String> {
         averaging(&self.given, &self.scene.view)
     }
 
-    /// What decides the kernels of a layout.
+    /// Inputs that decide the kernels of a layout.
     pub(crate) fn inputs(&self, layout: &str, model: Option<&CalibratedModel>) -> Result<Vec<u8>> {
         let lens = &self.design.lens;
         let model_text = model.map_or_else(String::new, |m| format!("{:?}", m.perturbation));
@@ -211,13 +213,13 @@ impl<'a> KernelPlan<'a> {
         ChipInLight::new(self.design, extraction, case, self.camera, distance_um, progress)
     }
 
-    /// With so many nodes whatever the light, and linear between them.
+    /// Same plan with so many nodes whatever the light, and linear between them.
     pub(crate) fn with_nodes(mut self, nodes: usize) -> Self {
         (self.spec.nodes, self.between, self.fewer_nodes) = (nodes, BetweenNodes::Linear, None);
         self
     }
 
-    /// As in light of wide bands: where one wavelength only stands for such a band.
+    /// Same plan as in light of wide bands, for one wavelength that stands for such a band.
     pub(crate) fn for_wide_bands(self) -> Self {
         self.with_nodes(NODES)
     }
@@ -278,7 +280,7 @@ impl<'a> KernelPlan<'a> {
     }
 }
 
-/// In words, that scenes of a view are averaged to the larger pixels of another; none if both are the same.
+/// Words for scenes of a view that are averaged to the larger pixels of another; `None` if both views are equal.
 pub(crate) fn averaging(given: &SceneView, view: &SceneView) -> Option<String> {
     let size = |v: &SceneView| format!("{} x {}", v.columns, v.rows);
     (given != view).then(|| {

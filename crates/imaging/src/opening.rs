@@ -1,4 +1,4 @@
-//! How an imaging system is opened: kernels and stray light of a chip made, or taken from the disk.
+//! Opening of an imaging system: kernels and stray light of a chip made, or taken from the disk.
 
 use std::path::Path;
 
@@ -21,8 +21,8 @@ use crate::layout::{PillarCount, check_elements};
 use crate::scene::SceneImage;
 
 impl ImagingSystem {
-    /// For a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes of a field. Kernels
-    /// and stray light are kept on the disk.
+    /// Opens a system for a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes
+    /// of a field. Kernels and stray light are kept on the disk.
     ///
     /// # Errors
     /// If the layout cannot be read or has no pillars in one of the elements, the camera does not
@@ -40,7 +40,7 @@ impl ImagingSystem {
         Self::open_cached(design, layout, camera, model, scene, &KernelCache::of_user(), progress)
     }
 
-    /// The same with kernels and stray light that are kept elsewhere.
+    /// Variant of [`ImagingSystem::open`] with kernels and stray light that are cached elsewhere.
     ///
     /// # Errors
     /// As [`ImagingSystem::open`]; if nothing may be made and something is not there, or what was made cannot be kept in a folder that
@@ -64,7 +64,7 @@ impl ImagingSystem {
         )
     }
 
-    /// For what was said to be wanted of a design.
+    /// Opens a system by the plan of a design.
     pub(crate) fn open_planned(
         plan: KernelPlan<'_>,
         design: &Design,
@@ -163,9 +163,9 @@ impl ImagingSystem {
         })
     }
 
-    /// For pillars that were read and a case that is at hand, such as one of many draws of a chip: nothing is kept on the
-    /// disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as for [`ImagingSystem::open`]
-    /// if left out.
+    /// Opens a system for pillars that were read and a case in memory, such as one of many draws of a chip: nothing is
+    /// stored on the disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as
+    /// for [`ImagingSystem::open`] if left out.
     ///
     /// # Errors
     /// As [`ImagingSystem::open`].

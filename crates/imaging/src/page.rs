@@ -22,10 +22,10 @@ pub struct PicturePages<'a> {
     /// Linear sRGB.
     pub scene: &'a Array3<f64>,
     pub frame: &'a Frame,
-    /// By each way of restoring, linear sRGB, in the order of the report; the page shows the first.
+    /// Restored pictures by each method, linear sRGB, in the order of the report; the page shows the first.
     pub restored: &'a [Array3<f64>],
     pub camera: &'a Camera,
-    /// What samples say, if any were drawn.
+    /// Uncertainty from samples, if any were drawn.
     pub uncertainty: Option<&'a Uncertainty>,
 }
 
@@ -190,7 +190,7 @@ fn map(title: &str, values: &Array2<f64>, what: &str) -> HeatMap {
     HeatMap::new(title, upwards, axis("column", columns), axis("row from below", rows)).values(what, "")
 }
 
-/// What samples say: where they differ, detail is invented.
+/// Section of the samples: where they differ, detail is invented.
 fn uncertainty(page: &mut Page, uncertainty: &Uncertainty, report: &UncertaintyReport) {
     page.section("How sure the picture is");
     let mut row = PhotoRow::new("Mean of samples", 250.0);

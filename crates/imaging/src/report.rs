@@ -1,4 +1,4 @@
-//! What is found of a picture.
+//! Report of a picture.
 
 use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
 use metalith_design::Design;
@@ -25,7 +25,7 @@ use crate::spectra::rgb_basis;
 use crate::stray_light::LightShares;
 use crate::uncertainty::UncertaintyReport;
 
-/// What is said of a frame, simulated or recorded, whatever is made of it.
+/// Statement of a frame, simulated or recorded, whatever is made of it.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameStatement {
     pub design: String,
@@ -35,15 +35,15 @@ pub struct FrameStatement {
     /// Distance of the scene (mm); none for one that is far.
     pub distance_mm: Option<f64>,
     pub saturated: usize,
-    /// The same as a share of all pixels.
+    /// Share of all pixels that are saturated.
     pub saturated_share: f64,
     /// The calibrated model that the chip is made by, if one was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelStatement>,
-    /// What is to be known before anything else: pixels that were lost, scenes and layouts that are not what they seem.
+    /// Notes to read before anything else: pixels that were lost, scenes and layouts that are not what they seem.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// What the operator of the restoration errs by, by channel; see [`crate::ForecastScene::operator_error`].
+    /// Error of the operator of the restoration, by channel; see [`crate::ForecastScene::operator_error`].
     pub operator_error: Vec<f64>,
     pub assumptions: Vec<Assumption>,
 }
@@ -58,7 +58,7 @@ impl FrameStatement {
         )
     }
 
-    /// What the operator of the restoration errs by, channel by channel.
+    /// Words for the error of the operator of the restoration, channel by channel.
     pub(crate) fn error_words(&self) -> String {
         let each = self.operator_error.iter();
         let words: Vec<String> = each
@@ -67,8 +67,8 @@ impl FrameStatement {
         words.join(", ")
     }
 
-    /// Of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. Notes and what the
-    /// operator errs by are added.
+    /// Statement of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. The
+    /// notes and the error of the operator are added.
     pub fn new(
         system: &ImagingSystem,
         layout: String,
@@ -116,10 +116,10 @@ pub struct PictureReport {
     /// Contrast of fine detail, for scenes that say it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub contrast: Vec<ContrastCurve>,
-    /// What samples say, if any were drawn.
+    /// Uncertainty from samples, if any were drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<UncertaintyReport>,
-    /// What the assumptions of others are worth, if asked for.
+    /// Worth of the assumptions of others, if asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub worth: Vec<AssumedScore>,
 }
@@ -128,25 +128,25 @@ pub struct PictureReport {
 #[derive(Clone, Debug, Serialize)]
 pub struct RestorationReport {
     pub method: String,
-    /// By all elements at once, or each alone.
+    /// True if by all elements at once; false for each alone.
     pub joint: bool,
     /// Name of the file of the picture, 16 bits in sRGB.
     pub picture: String,
     pub scores: Vec<ZoneScore>,
     /// Expected PSNR of linear light in each zone (dB), of natural scenes, where there is a forecast.
     pub forecast_db: Vec<f64>,
-    /// The same of scenes with the spectrum of this one.
+    /// Forecast for scenes with the spectrum of this one (dB).
     pub forecast_of_scene_db: Vec<f64>,
 }
 
-/// Where the light of one channel goes.
+/// Budget of the light of one channel.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChannelBudget {
     pub channel: String,
     pub shares: LightShares,
 }
 
-/// How far chief rays are from the best homography.
+/// Distance of chief rays from the best homography.
 #[derive(Clone, Debug, Serialize)]
 pub struct HomographyResidual {
     pub element: String,
@@ -163,7 +163,7 @@ pub struct Assumption {
 }
 
 impl Assumption {
-    /// What a calibrated model says: where it comes from, what it changes, and what of it is not applied.
+    /// Assumptions of a calibrated model: where it comes from, what it changes, and what of it is not applied.
     pub fn of_model(model: &ModelStatement) -> Vec<Self> {
         let of = |quantity: &str, value: String| Self {
             what: format!("`{quantity}` of the model"),
@@ -183,7 +183,7 @@ impl Assumption {
 }
 
 impl RestorationReport {
-    /// Of a method.
+    /// Report of a method.
     pub fn new(method: RestorationMethod, joint: bool, scores: Vec<ZoneScore>) -> Self {
         Self {
             method: method.name().to_owned(),
@@ -197,7 +197,7 @@ impl RestorationReport {
 }
 
 impl ImagingSystem {
-    /// What is to be known of a frame before its picture is looked at; `truth` is the scene in linear sRGB.
+    /// Notes on a frame, to read before its picture is viewed; `truth` is the scene in linear sRGB.
     pub fn notes(&self, frame: &Frame, truth: &Array3<f64>) -> Vec<String> {
         let layout = self.pillars.as_ref().and_then(PillarCount::note);
         let all = [frame.saturation_note(truth), layout, averaging(&self.given, &self.view)];
@@ -218,7 +218,7 @@ impl ImagingSystem {
             .collect()
     }
 
-    /// What the best homography between scene and sub-image misses, for each element and channel.
+    /// Residual of the best homography between scene and sub-image, for each element and channel.
     pub fn homographies(&self) -> Vec<HomographyResidual> {
         let mut all = Vec::new();
         for (k, element) in self.design.elements().iter().enumerate() {
@@ -260,7 +260,7 @@ impl ImagingSystem {
         points
     }
 
-    /// What was assumed of a scene and of everything else, in words.
+    /// Assumptions on a scene and on everything else, in words.
     pub fn assumptions(&self, scene: &SceneImage, fidelity: Fidelity) -> Vec<Assumption> {
         let cell = match fidelity {
             Fidelity::Neighbours => {
@@ -357,7 +357,7 @@ impl ImagingSystem {
     }
 }
 
-/// Where the sensor is, against the focal lengths of lenses.
+/// Place of the sensor, relative to the focal lengths of lenses.
 fn place_of_sensor(design: &Design, camera: &Camera) -> String {
     let distance_um = sensor_um(design, camera);
     let source = match camera.sensor.distance_um {
@@ -384,7 +384,7 @@ fn place_of_sensor(design: &Design, camera: &Camera) -> String {
     format!("{distance_um} um behind the pillar tops in the middle of the chip, {source}{others}")
 }
 
-/// What is assumed of the polarisation of the scene, at pillars that give this light the phase of the design.
+/// Assumption on the polarisation of the scene, at pillars that give this light the phase of the design.
 fn polarised(focused: FocusedLight, light: PolarisedLight) -> String {
     let arriving = light.arriving_at(focused);
     let own = focused.polarisation();
@@ -395,7 +395,7 @@ fn polarised(focused: FocusedLight, light: PolarisedLight) -> String {
     format!("{source}; {}, in image and stray light", light.detector(focused))
 }
 
-/// Where the spectra of a scene come from.
+/// Source of the spectra of a scene.
 fn spectra_of(scene: &SceneImage) -> String {
     if scene.basis == rgb_basis() {
         return "smooth reflectances of sRGB after Mallett and Yuksel (2019)".into();

@@ -1,4 +1,4 @@
-//! How much contrast of fine detail a frame and a picture keep, from scenes whose truth is a formula.
+//! Resolution: the contrast of fine detail that a frame and a picture keep, from scenes whose truth is a formula.
 //!
 //! A slanted edge gives the whole curve: places near it are sorted by their distance from it into quarters of a pixel, the
 //! step is differentiated, and its spectrum is that of a line (ISO 12233). A Siemens star gives one frequency for each
@@ -136,7 +136,7 @@ fn between(plane: &Array2<f64>, y: f64, x: f64) -> f64 {
         + (plane[[i + 1, j]] * (1.0 - v) + plane[[i + 1, j + 1]] * v) * u
 }
 
-/// From the middle of a slanted edge: cycles a pixel, and contrast.
+/// Contrast from the middle of a slanted edge: cycles a pixel, and contrast.
 fn edge(samples: &[Sample]) -> Vec<(f64, f64)> {
     let lean = LEAN_DEG.to_radians();
     let bins = (2.0 * NEAR * BINS) as usize;
@@ -171,7 +171,8 @@ fn edge(samples: &[Sample]) -> Vec<(f64, f64)> {
     (1..=(0.5 / STEP) as usize).filter_map(contrast).collect()
 }
 
-/// From a star of a radius (pixels): cycles a pixel, and contrast. Rings of which a part is not seen say nothing.
+/// Contrast from a star of a radius (pixels): cycles a pixel, and contrast. Rings of which a part is not seen say
+/// nothing.
 fn star(samples: &[Sample], reach: f64) -> Vec<(f64, f64)> {
     let contrast = |k: usize| {
         let cycles = k as f64 * STEP;

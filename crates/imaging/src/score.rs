@@ -1,4 +1,4 @@
-//! How near a restored picture comes to its scene.
+//! Score of a restored picture: its similarity to its scene.
 
 use metalith_core::srgb::encoded;
 use metalith_core::{Error, Result, part};
@@ -60,7 +60,7 @@ pub struct ZoneScore {
     /// Peak signal to noise ratio of sRGB values (dB), at most [`MOST_DB`].
     #[serde(deserialize_with = "decibels")]
     pub psnr_db: f64,
-    /// The same of linear light (dB).
+    /// Peak signal-to-noise ratio of linear light (dB).
     #[serde(deserialize_with = "decibels")]
     pub psnr_linear_db: f64,
     /// Structural similarity of sRGB values, mean over the colours.
@@ -92,7 +92,7 @@ pub fn psnr_words(db: f64) -> String {
     }
 }
 
-/// Whether pictures of a scene can be scored: asked before they are taken.
+/// Checks that pictures of a scene can be scored, before they are taken.
 ///
 /// # Errors
 /// If it is too small for the zones of the field.

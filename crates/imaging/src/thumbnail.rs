@@ -20,7 +20,7 @@ use crate::score::scores;
 const PIXELS: usize = 512;
 /// Angle from its left to its right edge (degrees), or less where the array does not see as much.
 const MOST_DEG: u32 = 80;
-/// Of the noise.
+/// Seed of the noise.
 const SEED: u64 = 1;
 
 /// Scene, frame and picture of a Siemens star in the camera of a layout, by Tikhonov and all elements. The star fills 80 degrees,

@@ -1,4 +1,4 @@
-//! How sure a restored picture is: samples of the pictures that the frame may be of.
+//! Uncertainty of a restored picture: samples of the pictures that the frame may be of.
 
 use ndarray::{Array2, Array3, Axis};
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::score::{ZoneScore, scores};
 use metalith_core::{Result, srgb};
 
-/// What samples say together.
+/// Statistics of samples.
 #[derive(Clone, Debug)]
 pub struct Uncertainty {
     /// Their mean, linear sRGB `[row, column, colour]`.
@@ -20,18 +20,18 @@ pub struct Uncertainty {
 #[derive(Clone, Debug, Serialize)]
 pub struct UncertaintyReport {
     pub samples: usize,
-    /// Of the mean of the samples.
+    /// Scores of the mean of the samples.
     pub scores: Vec<ZoneScore>,
     /// Mean deviation of the samples (sRGB values).
     pub spread: f64,
     /// Mean error of their mean, in the same unit: more than the spread, as samples know nothing of what all of them miss.
     pub error: f64,
-    /// How well the order of the pixels by their uncertainty is that by their error (Spearman's rank correlation).
+    /// Rank correlation (Spearman's) of the order of the pixels by their uncertainty with the order by their error.
     pub rank_correlation: f64,
 }
 
 impl Uncertainty {
-    /// Of pictures in linear sRGB; at least two.
+    /// Uncertainty from pictures in linear sRGB; at least two.
     pub fn of(pictures: &[Array3<f64>]) -> Self {
         let n = pictures.len() as f64;
         let mut mean = Array3::zeros(pictures[0].dim());

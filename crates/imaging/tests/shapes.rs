@@ -173,7 +173,7 @@ fn a_hexagonal_lens_takes_pictures() {
     }
 }
 
-/// What rotated rectangles do not convert is in the picture, and behind an analyser it is not.
+/// Light that rotated rectangles do not convert is in the picture, and behind an analyser it is not.
 #[test]
 fn light_that_is_not_converted_is_in_the_stray_light() {
     let nm = 532.0;
@@ -213,8 +213,8 @@ fn light_that_is_not_converted_is_in_the_stray_light() {
     assert!(shares[0] > 0.1 && shares[1] < 0.02, "{shares:?}");
 }
 
-/// Where light goes, of a small lens of pillars that are no half-wave plates, as shares of what arrives: in kernels, in stray light and
-/// beyond, as one wave, not passed.
+/// Budget of the light of a small lens of pillars that are no half-wave plates, as shares of what arrives: in kernels,
+/// in stray light and beyond, as one wave, not passed.
 fn budget(light: &str) -> ([f64; 4], Vec<f32>) {
     let line = format!("[verify]\n{light}\n");
     let small = [

@@ -16,7 +16,7 @@ const STEPS: [i32; 5] = [3, 4, 6, 9, 14];
 /// by together, and root mean square over them in parts of their mean. Along the axis it is 0.015 and 0.051 at most. At 24
 /// degrees 0.03 and 0.15: light of a tile that leaves obliquely is bent too little on its way.
 const DIRECTIONS: [(f64, f64, f64); 2] = [(0.0, 0.02, 0.1), (0.4, 0.035, 0.2)];
-/// As the stray light of pictures has them.
+/// Number of blocks, as the stray light of pictures has them.
 const BLOCKS: usize = 20;
 
 /// An element of 1 mm that looks ahead, and one that is steered by 15 degrees along y.
@@ -76,7 +76,7 @@ fn the_stray_light_of_an_element_is_that_of_its_field() {
     }
 }
 
-/// What the field brings to a square about a place (um^2).
+/// Power that the field brings to a square about a place (um^2).
 fn power_of_field(design: &Design, pillars: &Pillars<'_>, wave: &PlaneWave, centre_um: [f64; 2]) -> f64 {
     let samples = (CELL_UM / 0.33).round() as usize;
     let window = Window {

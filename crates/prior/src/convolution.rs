@@ -51,12 +51,12 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// For the way forward.
+    /// Weights packed for the forward pass.
     pub fn forward(shape: Shape, weights: &[f32]) -> Self {
         Self::by(shape, |o, i, t| weights[(o * shape.inputs + i) * shape.taps + t])
     }
 
-    /// For the gradient of the inputs: channels exchanged, taps mirrored.
+    /// Weights packed for the gradient of the inputs: channels exchanged, taps mirrored.
     pub fn backward(shape: Shape, weights: &[f32]) -> Self {
         let mirrored = Shape {
             inputs: shape.outputs,
@@ -259,7 +259,7 @@ fn products<S: Simd, const N: usize>(simd: S, a: [&[f32]; OUTPUTS], b: [&[f32]; 
 mod tests {
     use super::*;
 
-    /// Of sums of some hundred products of order one in single precision.
+    /// Tolerance of sums of some hundred products of order one in single precision.
     const SINGLE: f32 = 2e-5;
 
     fn value(k: usize) -> f32 {

@@ -35,7 +35,7 @@ impl Features {
         self.columns + 1
     }
 
-    /// Where the first pixel of a plane is.
+    /// Index of the first pixel of a plane.
     pub fn origin(&self) -> usize {
         self.stride() + 1
     }

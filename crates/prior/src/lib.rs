@@ -1,4 +1,4 @@
-//! What pictures look like, as a small network learnt it from photographs.
+//! Prior of pictures that a small network learnt from photographs.
 //!
 //! ```text
 //! noisy picture, map of its noise    -> expected picture             (`NetworkDenoiser::denoise`)

@@ -15,7 +15,7 @@ pub const COLOURS: usize = 3;
 /// Rows and columns that the network takes are multiples of this, in its own resolution: half of the picture's.
 pub const MULTIPLE: usize = 1 << (LEVELS - 1);
 
-/// How large a network is.
+/// Size of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     /// Channels that it sees, in its own resolution.
@@ -27,14 +27,14 @@ pub struct Size {
 }
 
 impl Size {
-    /// Of the denoiser: four pixels of each colour, and the noise of each colour.
+    /// Size of the denoiser: four pixels of each colour, and the noise of each colour.
     pub const DENOISER: Self = Self {
         inputs: 4 * COLOURS + COLOURS,
         channels: [32, 64, 96],
         blocks: 2,
     };
 
-    /// Of the last stage of a camera that sees so many pictures, and one map of where it is.
+    /// Size of the last stage of a camera that sees so many pictures, and one map of where it is.
     pub fn post_processor(pictures: usize) -> Self {
         Self {
             inputs: 4 * COLOURS * pictures + 1,
@@ -62,11 +62,11 @@ pub struct Layer {
     /// Name in files of weights.
     pub name: String,
     pub shape: Shape,
-    /// Where its weights begin.
+    /// Index where its weights begin.
     pub start: usize,
 }
 
-/// What a network does, without its weights.
+/// Plan of a network, without its weights.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub layers: Vec<Layer>,
@@ -74,7 +74,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Of a network of this size.
+    /// Plan of a network of this size.
     pub fn new(size: Size) -> Self {
         let mut plan = Self {
             layers: Vec::new(),
@@ -143,18 +143,18 @@ impl Plan {
 pub struct Network {
     plan: Plan,
     forward: Vec<Packed>,
-    /// For gradients only.
+    /// Weights for gradients only.
     backward: Vec<Packed>,
 }
 
-/// What the way forward leaves for the way back: of each step its input, and what is between two convolutions.
+/// Trace of the forward pass for the backward pass: the input of each step, and what is between two convolutions.
 pub struct Trace {
     inputs: Vec<Features>,
     between: Vec<Option<Features>>,
 }
 
 impl Network {
-    /// With the weights of a plan.
+    /// Network with the weights of a plan.
     pub fn new(plan: &Plan, weights: &[f32]) -> Self {
         let of = |layer: &Layer| Packed::forward(layer.shape, Self::part(layer, weights));
         Self {
@@ -164,7 +164,7 @@ impl Network {
         }
     }
 
-    /// That can be taught.
+    /// Network that can be trained.
     pub fn for_learning(plan: &Plan, weights: &[f32]) -> Self {
         let of = |layer: &Layer| Packed::backward(layer.shape, Self::part(layer, weights));
         Self {
@@ -182,7 +182,7 @@ impl Network {
         self.walk(input, |_, _| ())
     }
 
-    /// The same, with what the way back needs.
+    /// Output of the network, with the trace that the backward pass needs.
     pub fn traced(&self, input: Features) -> (Features, Trace) {
         let mut trace = Trace {
             inputs: Vec::new(),

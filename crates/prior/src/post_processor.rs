@@ -13,12 +13,12 @@ use crate::network::{COLOURS, Network, Plan, Size};
 use crate::squares::{SIDE, corrected, cut, mirrored, piled, seen};
 use crate::weights::read_described;
 
-/// Where files of weights say what they were taught for.
+/// Key under which files of weights say what they were trained for.
 pub const STAGE: &str = "stage";
 /// Most pictures of a frame.
 const MOST: usize = 64;
 
-/// What a last stage is taught for.
+/// Provenance of a last stage: what it was trained for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
@@ -42,7 +42,7 @@ pub struct PostProcessor {
 }
 
 impl PostProcessor {
-    /// With the weights of a file that `metalith train --stage` wrote.
+    /// Post-processor with the weights of a file that `metalith train --stage` wrote.
     ///
     /// # Errors
     /// If the file cannot be read, is damaged, or is of a denoiser.
@@ -56,12 +56,12 @@ impl PostProcessor {
         Ok(Self::of_network(Network::new(&plan, &weights), provenance))
     }
 
-    /// With a network that is at hand.
+    /// Post-processor of a network in memory.
     pub fn of_network(network: Network, provenance: Provenance) -> Self {
         Self { network, provenance }
     }
 
-    /// What it was taught for.
+    /// Provenance: what it was trained for.
     pub fn provenance(&self) -> &Provenance {
         &self.provenance
     }
@@ -86,7 +86,7 @@ impl PostProcessor {
         Ok(self.corrected(&piled(pictures, pictures[0].dim())?))
     }
 
-    /// The same of pictures behind one another.
+    /// Corrected picture from pictures behind one another.
     pub fn corrected(&self, pile: &Array3<f32>) -> Array3<f32> {
         let (rows, columns, _) = pile.dim();
         let whole = |n: usize| n.next_multiple_of(SIDE).max(SIDE);

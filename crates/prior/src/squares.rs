@@ -62,8 +62,8 @@ pub fn piled(pictures: &[Array3<f32>], size: (usize, usize, usize)) -> Result<Ar
     Ok(concatenate(Axis(2), &views).expect("all are of one size"))
 }
 
-/// What the last stage sees of a piece of such pictures whose first pixel is at `place` of a whole of so many rows and columns: the
-/// squared distance from its middle, a corner's being one, tells where it is.
+/// Input of the last stage for a piece of such pictures whose first pixel is at `place` of a whole of so many rows and
+/// columns: the squared distance from its middle, a corner's being one, tells where it is.
 pub fn seen(piece: &Array3<f32>, place: [usize; 2], whole: [usize; 2]) -> Features {
     let (rows, columns, _) = piece.dim();
     let from_middle = |i: usize, a: usize| {

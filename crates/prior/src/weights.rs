@@ -12,23 +12,24 @@ use crate::network::{Layer, Plan, Size};
 
 /// The weights that come with the program: see its model card, `crates/prior/weights/README.md`.
 static SHIPPED: &[u8] = include_bytes!("../weights/denoiser.safetensors");
-/// Where a file says what its weights were learnt from: one word alone, so that the same weights are the same bytes.
+/// Key under which a file says what its weights were learnt from: one word alone, so that the same weights are the same
+/// bytes.
 const TRAINING: &str = "training";
 /// Longest file of weights (bytes): a hundred times what the network needs.
 const LONGEST: u64 = 256 << 20;
 
-/// Those that come with the program.
+/// Weights that are shipped with the program.
 pub fn shipped_weights() -> Result<Vec<f32>> {
     let path = Path::new("the shipped weights");
     parse(SHIPPED, path, &Plan::new(Size::DENOISER))
 }
 
-/// Those of a denoiser in a file.
+/// Weights of a denoiser in a file.
 pub fn read_weights(path: &Path) -> Result<Vec<f32>> {
     parse(&read(path)?, path, &Plan::new(Size::DENOISER))
 }
 
-/// Those of a network whose size follows from what the file says they were learnt from.
+/// Weights of a network whose size follows from what the file says they were learnt from.
 pub fn read_described<T>(
     path: &Path,
     described: impl Fn(&serde_json::Value) -> Option<(T, Size)>,

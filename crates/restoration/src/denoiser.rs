@@ -1,4 +1,4 @@
-//! What a denoiser does for a splitting.
+//! Denoisers of a splitting.
 
 use metalith_core::Result;
 use ndarray::Array2;
@@ -27,7 +27,7 @@ pub struct Schedule {
     pub rounds: usize,
     /// Steps of conjugate gradients in each.
     pub steps: usize,
-    /// How much the denoised picture weighs: over one by the variance of the noise.
+    /// Weight of the denoised picture: over one by the variance of the noise.
     pub weight: f64,
 }
 

@@ -25,7 +25,7 @@ pub trait FrameModel: Sync {
     /// Rows and columns of a frame.
     fn frame_shape(&self) -> (usize, usize);
 
-    /// Whether the planes of a picture are red, green and blue; else each is a grey picture.
+    /// True if the planes of a picture are red, green and blue; else each is a grey picture.
     fn sees_colours(&self) -> bool;
 
     /// The frame of a picture behind some of the elements, with or without the stray light of all.

@@ -15,7 +15,7 @@ use crate::tikhonov;
 /// Rounds before samples are drawn.
 const DRAWN_AFTER: usize = 2;
 
-/// Where a splitting stands.
+/// State of a splitting.
 #[derive(Clone)]
 struct Standing {
     /// Planes of the system.
@@ -74,7 +74,7 @@ impl Standing {
     }
 }
 
-/// By rounds of both steps.
+/// Restores by rounds of both steps.
 pub fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
     let schedule = denoiser.schedule();
     let standing = Standing::begin(system, progress)?;

@@ -28,7 +28,7 @@ const DARKEST: f32 = 0.01;
 const AROUND: usize = 3;
 
 impl LearnedDenoiser {
-    /// With the weights that come with the program.
+    /// Denoiser with the weights that are shipped with the program.
     ///
     /// # Errors
     /// If they are damaged.
@@ -38,7 +38,7 @@ impl LearnedDenoiser {
         })
     }
 
-    /// With the weights of a file that `metalith train` wrote.
+    /// Denoiser with the weights of a file that `metalith train` wrote.
     ///
     /// # Errors
     /// If the file cannot be read or is of another network.
@@ -148,7 +148,7 @@ fn linear(value: f32) -> f32 {
     srgb::linear(f64::from(value)) as f32
 }
 
-/// How fast values of sRGB rise with the light.
+/// Slope of values of sRGB over the light.
 fn slope(light: f32) -> f32 {
     srgb::slope(f64::from(light)) as f32
 }

@@ -1,4 +1,4 @@
-//! From a frame back to a picture, in linear light, for any linear model of the frame ([`FrameModel`]).
+//! Restoration of a picture from a frame, in linear light, for any linear model of the frame ([`FrameModel`]).
 //!
 //! ```text
 //! FrameModel, light of a frame, inverse variance of each pixel  ->  Recorded

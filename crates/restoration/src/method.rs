@@ -10,7 +10,7 @@ use crate::recorded::Recorded;
 use crate::slope_denoiser::SlopeDenoiser;
 use crate::{half_quadratic, richardson_lucy, tikhonov, total_variation};
 
-/// How a picture is restored.
+/// Method by which a picture is restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RestorationMethod {
     Tikhonov,
@@ -31,7 +31,7 @@ impl RestorationMethod {
         Self::LearnedPrior,
     ];
 
-    /// Those that are named, each once; `wiener` is another name of `tikhonov`, which knows the spectrum of scenes.
+    /// Methods of these names, each once; `wiener` is another name of `tikhonov`, which knows the spectrum of scenes.
     ///
     /// # Errors
     /// If one is no way to restore.

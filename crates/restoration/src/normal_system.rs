@@ -39,7 +39,7 @@ pub struct NormalSystem<'a> {
     term: DataTerm<'a>,
     /// A* W S.
     pub data: Planes,
-    /// What one unit of the data term is, in units of the inverse variance of the picture.
+    /// Unit of the data term, in units of the inverse variance of the picture.
     pub scale: f64,
     preconditioner: Preconditioner,
 }
@@ -48,7 +48,7 @@ pub struct NormalSystem<'a> {
 const LEAST_SHARE: f32 = 0.02;
 
 impl<'a> NormalSystem<'a> {
-    /// For some of the elements, with or without the stray light.
+    /// System of some of the elements, with or without the stray light.
     pub fn new(recorded: &Recorded<'a>, elements: &[usize], stray_light: bool) -> Self {
         let operator = recorded.operator;
         let sums = operator.row_sums(recorded.inverse_variance, elements, stray_light);
@@ -89,7 +89,7 @@ impl<'a> NormalSystem<'a> {
         vec![Array2::zeros(self.shape()); self.data.len()]
     }
 
-    /// What the planes are.
+    /// Statistics of the planes.
     pub fn statistics(&self) -> &SceneStatistics {
         &self.term.statistics
     }

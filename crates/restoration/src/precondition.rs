@@ -1,4 +1,4 @@
-//! What makes the linear systems of restoration easier: an approximate inverse.
+//! Preconditioner of the linear systems of restoration: an approximate inverse.
 //!
 //! It knows how much light each place of the scene sends into the frame, how scenes vary, and a little of what the frame
 //! says of each frequency: the first steps are smooth pictures, and fine detail follows. Without the statistics of scenes,
@@ -25,13 +25,14 @@ use crate::slopes::{SlopeBorder, slopes};
 /// Pixels between a picture and its periodic copies: beyond them little of it is correlated.
 const BORDER: usize = 40;
 
-/// What is added to the prior for all frequencies, over that of the highest. With less the first steps are spent on what is
-/// smooth: of 1e-4, 1e-3 and 1e-2 the last has the most of a photograph after 16 steps (17.7, 18.1 and 18.3 dB).
+/// Share that is added to the prior for all frequencies, relative to the prior of the highest. With less the first
+/// steps are spent on what is smooth: of 1e-4, 1e-3 and 1e-2 the last has the most of a photograph after 16 steps
+/// (17.7, 18.1 and 18.3 dB).
 const FLAT: f64 = 1e-2;
 
-/// How much of the mean response is added. Of 1e-4, 3e-4 and 1e-3 a camera with all of its physics has the most of a photograph
-/// of 800 x 800 with the last (22.1, 22.4 and 22.9 dB of linear light after 48 steps), and one of one kernel for each element and
-/// colour with the first (28.5 and 27.4 dB with 1e-4 and 1e-3).
+/// Share of the mean response that is added. Of 1e-4, 3e-4 and 1e-3 a camera with all of its physics has the most of a
+/// photograph of 800 x 800 with the last (22.1, 22.4 and 22.9 dB of linear light after 48 steps), and one of one kernel
+/// for each element and colour with the first (28.5 and 27.4 dB with 1e-4 and 1e-3).
 const RESPONSE: f64 = 5e-4;
 /// Power of the light of a place by which the inverse is weighed on both sides. Half of one is that of the data alone: of 0.5,
 /// 0.65 and 0.8 a photograph has 21.5, 21.7 and 21.7 dB of linear light after 32 steps; the camera of one kernel has 2 dB
@@ -41,15 +42,15 @@ const LIGHT_POWER: f32 = 0.65;
 const LOWEST: f64 = 1.0 / 64.0;
 const BINS_AN_OCTAVE: f64 = 2.0;
 const BINS: usize = 12;
-/// Of the random picture that finds the response.
+/// Seed of the random picture that finds the response.
 const SEED: u64 = 1;
 
-/// What an approximate inverse needs of a frame.
+/// Approximate inverse for a frame.
 pub struct Preconditioner {
     fft: SquareFft,
     /// The light of each place to the power of -[`LIGHT_POWER`].
     unit: Array2<f32>,
-    /// What the frame says of each frequency, between two of these: by plane and [`place`].
+    /// Response of the frame to each frequency, between two of these: by plane and [`place`].
     response: Vec<Vec<f64>>,
 }
 
@@ -60,7 +61,8 @@ fn place(squared: f64) -> f64 {
 }
 
 impl Preconditioner {
-    /// For the light of each place, one where most is and nowhere zero, and what a frame of so many planes comes back as.
+    /// Preconditioner for the light of each place, one where most is and nowhere zero, and for what a frame of so many
+    /// planes comes back as.
     pub fn new(light: &Array2<f32>, planes: usize, there_and_back: impl Fn(&[Array2<f32>]) -> Planes) -> Self {
         let (rows, columns) = light.dim();
         let mut own = Self {

@@ -12,6 +12,6 @@ pub struct Recorded<'a> {
     pub light: &'a [Array2<f32>],
     /// One over the variance of the light of each pixel; zero where nothing is known.
     pub inverse_variance: &'a [Array2<f32>],
-    /// What is known of pictures from photographs.
+    /// Prior knowledge of pictures, learnt from photographs.
     pub prior: &'a LearnedDenoiser,
 }

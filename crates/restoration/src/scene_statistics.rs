@@ -1,4 +1,4 @@
-//! What is known of a picture before it is taken: how scenes vary from place to place and from colour to colour.
+//! Prior statistics of a picture before it is taken: how scenes vary from place to place and from colour to colour.
 
 use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use nalgebra::DMatrix;
@@ -13,11 +13,11 @@ use crate::frame_model::Planes;
 /// Strengths of a system.
 #[derive(Clone, Copy)]
 pub struct Terms {
-    /// Of squared slopes.
+    /// Weight of squared slopes.
     pub slopes: f64,
-    /// Of squared sums of the slopes that meet at a pixel.
+    /// Weight of squared sums of the slopes that meet at a pixel.
     pub bends: f64,
-    /// Of the picture itself, whose planes are mixed from those of the system.
+    /// Weight of the picture, whose planes are mixed from the planes of the system.
     pub identity: f64,
 }
 
@@ -33,19 +33,19 @@ pub struct Terms {
 pub struct SceneStatistics {
     /// Planes of the picture (rows) from independent planes of one spectrum (columns).
     mix: Vec<Vec<f32>>,
-    /// Of this spectrum.
+    /// Power of this spectrum.
     power: f64,
 }
 
 /// Mean of the light.
 const MEAN: f32 = 0.2;
-/// Of the plane (red + green + blue) / sqrt(3).
+/// Power of the plane (red + green + blue) / sqrt(3).
 const POWER: f64 = 0.08;
 /// Deviations of the other two planes over that of the first.
 const OPPONENTS: [f32; 2] = [0.29, 0.15];
 
 impl SceneStatistics {
-    /// Of pictures of red, green and blue planes.
+    /// Statistics of pictures of red, green and blue planes.
     pub fn colours() -> Self {
         let (grey, blue, green) = (3f32.sqrt().recip(), 2f32.sqrt().recip(), 6f32.sqrt().recip());
         let [b, g] = OPPONENTS;
@@ -59,7 +59,7 @@ impl SceneStatistics {
         }
     }
 
-    /// Of pictures of grey planes, of which nothing is known together.
+    /// Statistics of pictures of grey planes, of which nothing is known together.
     pub fn grey(planes: usize) -> Self {
         let unit = |i: usize| (0..planes).map(|k| f32::from(u8::from(i == k))).collect();
         Self {
@@ -171,7 +171,8 @@ impl SceneStatistics {
         picture
     }
 
-    /// How the logarithm of light varies with itself at a distance, for each independent plane: squares of pixels, periodic.
+    /// Covariance of the logarithm of light with itself at a distance, for each independent plane: squares of pixels,
+    /// periodic.
     fn logarithms(&self, fft: &SquareFft, scratch: &mut FftScratch) -> Vec<Vec<f32>> {
         let size = fft.size();
         let squared = squared_frequencies(size);
@@ -208,7 +209,7 @@ fn weighted(weights: impl Iterator<Item = f32>, planes: &[Array2<f32>]) -> Array
     sum
 }
 
-/// What differences of neighbours count of each frequency of a periodic line, squared.
+/// Squared weights of the differences of neighbours at each frequency of a periodic line.
 pub fn squared_frequencies(size: usize) -> Vec<f64> {
     let of = |k: usize| 2.0 - 2.0 * (std::f64::consts::TAU * k as f64 / size as f64).cos();
     (0..size).map(of).collect()
@@ -232,7 +233,7 @@ mod tests {
 
     #[test]
     fn random_scenes_have_the_slopes_that_are_expected() {
-        /// Of the mean over forty draws: 0.007, 0.001 and 0.007 are found, one draw errs by a tenth.
+        /// Tolerance of the mean over forty draws: 0.007, 0.001 and 0.007 are found, one draw errs by a tenth.
         const DRAW: f64 = 0.03;
         let statistics = SceneStatistics::colours();
         let squares = |plane: &Array2<f32>| -> f64 {

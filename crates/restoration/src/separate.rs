@@ -14,7 +14,7 @@ pub struct Blend {
 }
 
 impl Blend {
-    /// Of nothing yet.
+    /// Blend of nothing yet.
     pub fn new(shape: (usize, usize), planes: usize) -> Self {
         let black = || vec![Array2::zeros(shape); planes];
         Self {
@@ -55,7 +55,8 @@ pub fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dy
     Ok(blend.finished())
 }
 
-/// What light of other elements differs from that of a grey scene, as a share of it: about the deviation of natural scenes over their mean.
+/// Deviation of the light of other elements from the light of a grey scene, as a share of it: about the deviation of
+/// natural scenes over their mean.
 const OTHERS_UNKNOWN: f32 = 1.0;
 
 /// Restore by each element alone: `take` gets its number, its picture and how much it is to be trusted at each place, one over the variance that
@@ -113,9 +114,9 @@ pub fn without_stray_light(recorded: &Recorded<'_>) -> Planes {
     GreyLight::of(recorded).without_stray_light(recorded)
 }
 
-/// What a white scene would bring, and how grey the scene of a frame is.
+/// Light that a white scene would bring, and how grey the scene of a frame is.
 struct GreyLight {
-    /// Of all sub-images, by channel.
+    /// Images of all sub-images, by channel.
     images: Planes,
     stray_light: Planes,
     /// Light of the frame over that of a white scene, by channel.

@@ -9,10 +9,11 @@ use crate::frame_model::Planes;
 use crate::scene_statistics::SceneStatistics;
 use crate::slopes::{SlopeBorder, shrunk, slopes, slopes_adjoint};
 
-/// By gradients of its dual (Chambolle, J. Math. Imaging Vis. 20, 89 (2004)), for each of the planes that vary independently.
+/// Denoiser by gradients of its dual (Chambolle, J. Math. Imaging Vis. 20, 89 (2004)), for each of the planes that vary
+/// independently.
 #[derive(Clone, Debug)]
 pub struct SlopeDenoiser {
-    /// What planes are.
+    /// Statistics of the planes.
     pub statistics: SceneStatistics,
     /// Strength, in standard deviations of the noise.
     pub strength: f64,
@@ -20,7 +21,7 @@ pub struct SlopeDenoiser {
 }
 
 impl SlopeDenoiser {
-    /// For pictures of these statistics.
+    /// Denoiser for pictures of these statistics.
     pub fn new(statistics: &SceneStatistics) -> Self {
         Self {
             statistics: statistics.clone(),

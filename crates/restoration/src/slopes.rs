@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, Axis, Slice, Zip};
 
-/// What follows the last row and the last column of a picture.
+/// Border: what follows the last row and the last column of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlopeBorder {
     /// The last one again: the slope at the border is zero.
@@ -107,7 +107,7 @@ impl ExponentialSlopes {
     }
 }
 
-/// What total variation adds up.
+/// Length that total variation adds up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlopeLength {
     /// The lengths of slopes as vectors.
@@ -132,7 +132,7 @@ pub struct SlopeSplit {
 }
 
 impl SlopeSplit {
-    /// Nothing yet, for pictures of this shape.
+    /// Split of nothing yet, for pictures of this shape.
     pub fn new(shape: (usize, usize), law: ExponentialSlopes, length: SlopeLength, border: SlopeBorder) -> Self {
         let zero = || [Array2::zeros(shape), Array2::zeros(shape)];
         Self {

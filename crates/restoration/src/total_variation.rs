@@ -11,7 +11,7 @@ use crate::tikhonov;
 /// Rounds, and steps of conjugate gradients in each.
 const ROUNDS: usize = 6;
 const STEPS: usize = 2;
-/// Of the grey plane of the statistics of scenes along one axis, and so of the others: photographs have 0.075.
+/// Slopes of the grey plane of the statistics of scenes along one axis, and so of the others: photographs have 0.075.
 const SLOPES: ExponentialSlopes = ExponentialSlopes { expected: 0.075 };
 
 pub fn restore(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Planes> {

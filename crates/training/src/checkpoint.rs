@@ -1,4 +1,4 @@
-//! Where learning stands, on the disk: it goes on from there.
+//! Checkpoint of training, on the disk, from which it goes on.
 
 use std::collections::HashMap;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What the network learns from: pieces of photographs, and noise on them.
+//! Examples that the network learns from: pieces of photographs, and noise on them.
 
 use metalith_core::text::hex;
 use metalith_core::{Error, Result};
@@ -13,7 +13,7 @@ use metalith_prior::{COLOURS, with_noise};
 
 /// Least and largest deviation of the noise, of white being one; drawn evenly in its logarithm.
 const NOISE: [f32; 2] = [0.01, 0.4];
-/// Of the logarithm of how noise differs from corner to corner of a piece, and from colour to colour.
+/// Deviation of the logarithm of how noise differs from corner to corner of a piece, and from colour to colour.
 const CORNERS: f32 = 0.5;
 const COLOUR: f32 = 0.3;
 /// Share of pieces that are darkened, and to what at most.
@@ -24,7 +24,7 @@ const EXCHANGED: f64 = 0.3;
 /// One picture of so many is held out, and at least one.
 const HELD_OUT: usize = 12;
 
-/// Whether the picture of this number is held out.
+/// True if the picture of this number is held out.
 pub(crate) fn is_held_out(number: usize) -> bool {
     number.is_multiple_of(HELD_OUT)
 }
@@ -40,7 +40,7 @@ pub struct Photographs {
 pub(crate) struct Example {
     pub clean: Array3<f32>,
     pub noisy: Array3<f32>,
-    /// Of the noise of each value.
+    /// Deviation of the noise of each value.
     pub deviation: Array3<f32>,
 }
 

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::checkpoint::Checkpoint;
 
-/// How long and from what is learnt.
+/// Specification of training: how long, and from what.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TrainingSpec {
     /// Steps down the gradient.
@@ -24,7 +24,7 @@ pub struct TrainingSpec {
     pub batch: usize,
     /// Pixels a side of a piece; a multiple of eight.
     pub piece: usize,
-    /// Of weights, pieces and noise.
+    /// Seed of weights, pieces and noise.
     pub seed: u64,
 }
 
@@ -39,12 +39,13 @@ impl Default for TrainingSpec {
     }
 }
 
-/// What came out.
+/// Result of training.
 #[derive(Clone, Debug, Serialize)]
 pub struct TrainingReport {
     pub steps: u64,
     pub weights: usize,
-    /// Of what nothing was learnt from (dB): photographs with noise of 25 / 255, or the pictures of a camera.
+    /// Peak signal-to-noise ratio on examples that nothing was learnt from (dB): photographs with noise of 25 / 255, or
+    /// the pictures of a camera.
     pub held_out_psnr_db: f64,
 }
 
@@ -67,9 +68,9 @@ pub(crate) struct Sample {
     pub weight: f32,
 }
 
-/// What is learnt from.
+/// Set that is learnt from.
 pub(crate) trait TrainingSet: Sync {
-    /// Of the network that is taught.
+    /// Size of the network that is trained.
     fn size(&self) -> Size;
 
     /// All that decides the weights but the numbers of [`TrainingSpec`], as JSON: a state goes on with the same alone.
@@ -83,7 +84,7 @@ pub(crate) trait TrainingSet: Sync {
 }
 
 impl TrainingSpec {
-    /// Whether it can be learnt by: to be asked before what is learnt from is made.
+    /// Checks that training by it is possible, before the training set is made.
     ///
     /// # Errors
     /// If there is nothing to learn, or pieces are too small, too large or no multiple of eight.
@@ -172,7 +173,7 @@ pub(crate) fn learn(
     })
 }
 
-/// How far learning is, in words.
+/// Progress of training, in words.
 fn words(at: &Checkpoint, held_out_db: Option<f64>) -> String {
     let loss = (at.step > 0).then(|| format!("loss {:.5}", at.loss));
     let held_out = held_out_db.map(|db| format!("held out {db:.2} dB"));
@@ -246,7 +247,7 @@ pub(crate) fn psnr_db(found: &Array3<f32>, clean: &Array3<f32>) -> f64 {
 pub(crate) mod tests {
     use super::*;
 
-    /// That the gradient of every layer is what difference quotients say, on one example.
+    /// Checks that the gradient of every layer is what difference quotients say, on one example.
     pub fn gradients_hold(size: Size, sample: impl Fn() -> Sample) {
         /// A difference quotient in single precision of a loss of some thousand terms.
         const QUOTIENT: f64 = 0.02;

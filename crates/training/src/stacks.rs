@@ -1,4 +1,4 @@
-//! What the last stage of a camera learns from: pictures of frames, and the scenes that they are of.
+//! Training set of the last stage of a camera: pictures of frames, and the scenes that they are of.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -32,7 +32,8 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// Of pictures `[row, column, colour]` and the clean one, all of one size; the first picture is the one that is corrected.
+    /// Stack of pictures `[row, column, colour]` and the clean one, all of one size; the first picture is the one that
+    /// is corrected.
     ///
     /// # Errors
     /// If there is no picture, or one has another size.
@@ -99,7 +100,7 @@ impl Stack {
         self.pictures.iter().chain(&self.clean).copied()
     }
 
-    /// How many pictures there are of the frame.
+    /// Number of pictures of the frame.
     pub fn pictures(&self) -> usize {
         self.pictures.dim().2 / COLOURS
     }
@@ -128,7 +129,8 @@ pub struct Stacks {
 }
 
 impl Stacks {
-    /// Whether so many photographs of these rows and columns are enough to learn pieces of them: to be asked before they are taken.
+    /// Checks that so many photographs of these rows and columns are enough to learn pieces of them, before they are
+    /// taken.
     ///
     /// # Errors
     /// If there are fewer than two, or they are smaller than a piece.
@@ -143,7 +145,7 @@ impl Stacks {
         ))
     }
 
-    /// Of what a network is taught for; every twelfth is held out.
+    /// Stacks of what a network is trained for; every twelfth is held out.
     ///
     /// # Errors
     /// If there are fewer than two, one has another number of pictures, or is smaller than a piece.
@@ -175,7 +177,7 @@ impl Stacks {
         })
     }
 
-    /// What the network is taught for.
+    /// Provenance of the network: what it is trained for.
     pub fn provenance(&self) -> &Provenance {
         &self.provenance
     }

@@ -17,7 +17,7 @@ use power::{CELLS, means_by_cell, zone_means, zone_of};
 
 pub use power::ScenePower;
 
-/// What a camera and a restoration lose of any scene, and what they make of noise.
+/// Forecast of what a camera and a restoration lose of any scene, and of what they make of noise.
 #[derive(Clone, Debug)]
 pub struct Forecast {
     /// Power of the error without noise over that of the scene.
@@ -32,7 +32,7 @@ pub struct Forecast {
     exposed: Exposed,
 }
 
-/// How much noise there is for how much light.
+/// Noise of an exposure, and its light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Exposed {
     noise: Noise,
@@ -41,7 +41,7 @@ pub(crate) struct Exposed {
 }
 
 impl Exposed {
-    /// Of the noise of a sensor, and the mean signal that a scene gave.
+    /// Exposure of the noise of a sensor, and the mean signal that a scene gave.
     pub fn of(noise: Noise, signal: f64) -> Self {
         Self { noise, signal }
     }
@@ -57,8 +57,8 @@ impl Exposed {
 }
 
 impl Forecast {
-    /// From a scene, the picture that was restored of it without noise, and what noise adds to that, all linear sRGB
-    /// `[row, column, colour]`.
+    /// Forecast from a scene, the picture that was restored of it without noise, and what noise adds to that, all
+    /// linear sRGB `[row, column, colour]`.
     pub(crate) fn between(truth: &Array3<f64>, picture: &Array3<f64>, noise: &Array3<f64>, exposed: Exposed) -> Self {
         let error = picture - truth;
         let mut lost = ScenePower::of(&error);
@@ -152,7 +152,7 @@ mod tests {
         }
     }
 
-    /// What a blur loses is found on one scene, and holds for another of other power.
+    /// Losses by a blur are found on one scene, and hold for another of other power.
     #[test]
     fn what_is_lost_of_one_scene_is_lost_of_another() {
         /// Decibels, of one draw.

@@ -39,7 +39,7 @@ pub struct ScenePower {
 }
 
 impl ScenePower {
-    /// Of linear sRGB `[row, column, colour]`.
+    /// Power of linear sRGB `[row, column, colour]`.
     pub fn of(picture: &Array3<f64>) -> Self {
         let colours = picture.axis_iter(Axis(2));
         let planes: Vec<Array2<f32>> = colours.map(|plane| plane.mapv(|v| v as f32)).collect();
@@ -62,7 +62,7 @@ impl ScenePower {
         }
     }
 
-    /// For each zone of which the field is made the mean light, and powers by plane of colour and band of frequency.
+    /// Mean light of each zone of which the field is made, and powers by plane of colour and band of frequency.
     pub fn by_zone(&self) -> Vec<(Zone, f64, Vec<Bands>)> {
         let light = zone_means(&self.light);
         let of_zone = |(zone, name): (usize, &Zone)| {
@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn power_of_random_scenes_is_that_of_their_statistics() {
-        /// Of forty draws, whose brightest places have much of the power.
+        /// Tolerance for forty draws, whose brightest places have much of the power.
         const DRAWS: f64 = 0.15;
         let view = SceneView {
             rows: 256,

@@ -12,7 +12,7 @@ use crate::geometry::ElementView;
 use crate::spectra::SceneSpectrum;
 
 impl KernelBank {
-    /// Whether the kernels of a chip can be held, for so many spectra of a scene.
+    /// Checks that the kernels of a chip can be held, for so many spectra of a scene.
     ///
     /// # Errors
     /// As [`BankSpec::check_size`].
@@ -86,7 +86,7 @@ type Turned = (usize, metalith_design::array::Symmetry);
 /// Nodes that no symmetry turns into one another, and for each node which of them it is, and turned how.
 type Orbits = (Vec<[usize; 2]>, Vec<Turned>);
 
-/// Of each distinct element.
+/// Orbits of each distinct element.
 fn orbits_of(chip: &ChipInLight<'_>, spec: &BankSpec) -> Vec<Orbits> {
     let of_each = chip.distinct.iter();
     of_each.map(|d| orbits(spec.nodes, &d.symmetries)).collect()

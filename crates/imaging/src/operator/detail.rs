@@ -1,11 +1,11 @@
-//! How finely an operator samples the scene, and what it knows.
+//! Detail of an operator: how finely it samples the scene, and what it knows.
 
 use nalgebra::DMatrix;
 
 use super::between::BetweenNodes;
 use crate::approximation_set::ApproximationSet;
 
-/// Which planes of the scene go into an operator, out of the spectra of its bank.
+/// Planes of the scene that go into an operator, out of the spectra of its bank.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SceneInputs {
     /// One plane for each of these spectra; every channel sees all of them.
@@ -15,7 +15,7 @@ pub enum SceneInputs {
     Channels(std::ops::Range<usize>),
 }
 
-/// At how many points the scene is sampled for the pixels of the sensor.
+/// Number of points at which the scene is sampled for the pixels of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScenePoints {
     FourAPixel,
@@ -43,18 +43,18 @@ impl ScenePoints {
     }
 }
 
-/// How finely an operator samples the scene, and which kernels it knows.
+/// Detail of an operator: how finely it samples the scene, and which kernels it knows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detail {
     pub points: ScenePoints,
     /// Every how many-th node of the bank along each axis is used; it divides the steps between the nodes.
     pub node_step: usize,
-    /// Which kernels are in force between these nodes.
+    /// Rule for the kernels between these nodes.
     pub between: BetweenNodes,
     pub inputs: SceneInputs,
     pub assumed: ApproximationSet,
-    /// How the inputs vary with one another: planes (rows) from independent ones (columns). With it kept kernels are as few
-    /// mixtures as see the same to 0.2 % of the light.
+    /// Variation of the inputs with one another: planes (rows) from independent ones (columns). With it the stored
+    /// kernels are as few mixtures as see the same to 0.2 % of the light.
     pub statistics: Option<DMatrix<f64>>,
 }
 
@@ -71,7 +71,7 @@ impl Detail {
         }
     }
 
-    /// What a restoration knows: kernels on a coarser grid over the field, and no more of the scene than they pass.
+    /// Detail of a restoration: kernels on a coarser grid over the field, and no more of the scene than they pass.
     pub fn restoration(points: ScenePoints, inputs: SceneInputs) -> Self {
         Self {
             points,

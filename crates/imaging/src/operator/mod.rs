@@ -1,4 +1,4 @@
-//! From a scene to the frame, and the adjoint: both matrix-free, for whole frames.
+//! Operator from a scene to the frame, and its adjoint: both matrix-free, for whole frames.
 //!
 //! Each element samples the scene on the pixels of its sub-image. Each node of its kernels takes its share of that, by
 //! weights over the field, and spreads it by its kernel, through transforms of small squares. Sub-images add up where they
@@ -58,8 +58,8 @@ pub struct FrameOperator<'a> {
 }
 
 impl<'a> FrameOperator<'a> {
-    /// For the elements of a bank before the sensor of a camera. With one point a cell spectra of kernels are kept in
-    /// memory.
+    /// Operator for the elements of a bank before the sensor of a camera. With one point a cell, spectra of kernels are
+    /// kept in memory.
     pub fn new(
         bank: &'a KernelBank,
         stray_light: &'a StrayLight,
@@ -125,7 +125,7 @@ impl<'a> FrameOperator<'a> {
         });
     }
 
-    /// Which spectrum of the stray light takes an input to a channel.
+    /// Spectrum of the stray light that takes an input to a channel.
     fn stray_light_basis(&self, channel: usize, input: usize) -> Option<usize> {
         match &self.inputs {
             SceneInputs::Spectra(spectra) => Some(spectra.start + input),
@@ -133,8 +133,8 @@ impl<'a> FrameOperator<'a> {
         }
     }
 
-    /// What a frame is as a picture of its channels, unrestored: light of the pixels laid on the places that they look at,
-    /// over that of a white scene. `weight` is zero for pixels that are not known. Needs an operator with one point a cell.
+    /// Picture of the channels of a frame, unrestored: light of the pixels laid on the places that they look at, over
+    /// that of a white scene. `weight` is zero for pixels that are not known. Needs an operator with one point a cell.
     pub fn unrestored(&self, light: &[Array2<f32>], weight: &[Array2<f32>]) -> Vec<Array2<f32>> {
         /// Pixels of the scene that a pixel of the sensor is laid over, on each side, twice: where they are far apart, none is
         /// left out.

@@ -1,4 +1,4 @@
-//! What stands before the camera: a picture of it, in light, with spectra.
+//! Scene before the camera: a picture of it, in light, with spectra.
 //!
 //! | question | file |
 //! | --- | --- |
@@ -50,7 +50,7 @@ pub struct SceneImage {
 }
 
 impl SceneImage {
-    /// Of linear sRGB, `[row, column, colour]`, white being one.
+    /// Scene of linear sRGB, `[row, column, colour]`, white being one.
     pub fn of_rgb(name: &str, rgb: &Array3<f64>, field_deg: f64, distance_um: f64) -> Self {
         let (rows, columns, _) = rgb.dim();
         Self {
@@ -70,7 +70,7 @@ impl SceneImage {
         }
     }
 
-    /// The same scene, white everywhere.
+    /// Same scene, white everywhere.
     pub fn white(&self) -> Self {
         let shape = (self.view.rows, self.view.columns);
         let mut white = Self::of_rgb(

@@ -235,7 +235,8 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     Ok(upright(stored, decoder.exif().map_or(1, |exif| orientation(exif))))
 }
 
-/// How a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if it does not say.
+/// Orientation in which a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if the file does not
+/// say.
 fn orientation(exif: &[u8]) -> u16 {
     const TAG: u16 = 274;
     /// Bytes of an entry, and those before its value.

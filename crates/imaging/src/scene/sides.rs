@@ -1,4 +1,4 @@
-//! How many pixels scenes may have.
+//! Number of pixels that scenes may have.
 
 use std::ops::RangeInclusive;
 
@@ -9,7 +9,7 @@ pub(crate) const SIDES: RangeInclusive<usize> = 16..=*SCORED_SIDES.end();
 /// 11 pixels wide.
 pub const SCORED_SIDES: RangeInclusive<usize> = 33..=4096;
 
-/// How many pixels scenes have, for messages.
+/// Words for the number of pixels of scenes, for messages.
 pub(crate) fn sides_words() -> String {
     format!(
         "{} to {} pixels a side; where pictures are not scored (`dataset`, `train`, `denoise`) {} are enough",

@@ -29,7 +29,7 @@ pub const SCENE_CELLS: usize = 20;
 /// Pixels an axis of a square of the sensor.
 pub const CELL_PIXELS: usize = 16;
 
-/// Where a channel's light of a scene's squares goes that no kernel holds.
+/// Stray light: where a channel's light of a scene's squares goes that no kernel holds.
 #[derive(Clone, Debug)]
 pub struct StrayLight {
     /// Rows and columns of squares of the sensor.
@@ -40,7 +40,7 @@ pub struct StrayLight {
     /// Channel, spectrum, square of the scene, square of the sensor: light on it, of what a lens receives from a white
     /// surface of that square.
     pub values: Vec<f32>,
-    /// By channel and spectrum: shares of the light that arrives.
+    /// Shares of the light that arrives, by channel and spectrum.
     pub budget: Vec<LightShares>,
 }
 
@@ -50,7 +50,7 @@ pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
 }
 
 impl StrayLight {
-    /// Whether the stray light of a sensor can be held.
+    /// Checks that the stray light of a sensor can be held.
     ///
     /// # Errors
     /// If it has too many pixels.
@@ -86,7 +86,7 @@ impl StrayLight {
         }
     }
 
-    /// For each square of the scene the light on those of the sensor.
+    /// Light on the squares of the sensor, for each square of the scene.
     fn block(&self, channel: usize, basis: usize) -> impl Iterator<Item = &[f32]> {
         let (rows, columns) = (SCENE_CELLS * SCENE_CELLS, self.cells[0] * self.cells[1]);
         let from = (channel * self.bases + basis) * rows * columns;

@@ -1,17 +1,17 @@
-//! How much of the light goes where.
+//! Shares of the light by destination.
 
 use serde::{Deserialize, Serialize};
 
-/// Where the light goes that arrives at all elements from a white scene.
+/// Shares by destination of the light that arrives at all elements from a white scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LightShares {
     /// Light that arrives, of any scale.
     pub arrives: f64,
-    /// Of it, what kernels hold, on or off the sensor.
+    /// Share that kernels hold, on or off the sensor.
     pub in_kernels: f64,
-    /// On the sensor, outside of kernels.
+    /// Share on the sensor, outside of kernels.
     pub stray_light: f64,
-    /// In the sensor's plane or beyond, but not on the sensor.
+    /// Share in the sensor's plane or beyond, but not on the sensor.
     pub beyond: f64,
     /// Held in frequencies that do not travel.
     pub evanescent: f64,

@@ -1,4 +1,4 @@
-//! Where the light of each square of the scene lands, by rays.
+//! Ray trace of the light of each square of the scene.
 
 use metalith_core::{Error, Progress, Result};
 use metalith_sensor::{ChannelSampling, Sensor};
@@ -151,15 +151,16 @@ struct Tracer<'a> {
 struct Departed {
     /// Each with how often it has the phase of the element.
     parts: Vec<(i32, LocalAngularSpectrum)>,
-    /// As [`ElementInLight::arriving_um2`](crate::chip::ElementInLight::arriving_um2).
+    /// Area of the light that arrives (um^2), as
+    /// [`ElementInLight::arriving_um2`](crate::chip::ElementInLight::arriving_um2).
     arriving_um2: f64,
-    /// As [`ElementInLight::zero_order`](crate::chip::ElementInLight::zero_order).
+    /// Zeroth order, as [`ElementInLight::zero_order`](crate::chip::ElementInLight::zero_order).
     zero_order: f64,
 }
 
 /// The stray light of one square of the scene through one element, of what arrives there.
 struct Traced {
-    /// By channel and spectrum: light on each square of the sensor.
+    /// Light on each square of the sensor, by channel and spectrum.
     light: Vec<Vec<f64>>,
     shares: Vec<LightShares>,
 }
@@ -326,11 +327,11 @@ impl Tracer<'_> {
 /// lacks has left it by diffraction, and is near it.
 const MOST_SCALE: f64 = 50.0;
 
-/// Where the light of one wavelength, square of the scene and element lands, as shares of what arrives.
+/// Light of one wavelength, square of the scene and element where it lands, as shares of what arrives.
 #[derive(Default)]
 struct LandedLight {
     cells: Vec<(u32, f32)>,
-    /// Without the window of the kernel.
+    /// Light without the window of the kernel.
     cells_outside: Vec<(u32, f32)>,
     travelling: f64,
     outside: f64,

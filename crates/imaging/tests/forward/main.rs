@@ -110,8 +110,8 @@ const SIZE: usize = 160;
 /// Places an axis, 4.3 um apart as in the program's own kernels for such light and lenses (41 over 166 um).
 const NODES: usize = 13;
 
-/// What the image behind an element is off the direct sum, of its range: root mean square and at any one pixel; `about`: where the
-/// scene is (degrees).
+/// Error of the image behind an element against the direct sum, relative to its range: root mean square and at any one
+/// pixel; `about`: where the scene is (degrees).
 fn off_direct_sum(setup: &Setup, bank: &KernelBank, element: usize, about: [f64; 2]) -> [f64; 2] {
     /// Pixels of the image of the scene: a disc of four degrees on both sides.
     const IMAGE: f64 = 100.0;
@@ -154,7 +154,8 @@ fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
     }
 }
 
-/// The same behind a hexagon that is larger than the shared lens, steers and is out of focus, and behind a rotated cubic phase.
+/// Frame behind a hexagon that is larger than the shared lens, steers and is out of focus, and behind a rotated cubic
+/// phase.
 #[test]
 #[ignore = "second tier: some minutes of CPU time, in scripts/slow_tests.sh"]
 fn a_frame_of_lenses_of_their_own_is_the_direct_sum() {

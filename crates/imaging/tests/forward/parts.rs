@@ -46,7 +46,8 @@ fn bank(setup: &Setup) -> KernelBank {
     KernelBank::build(&setup.chip(), &setup.scene.basis, spec(24, 5), &Silent).unwrap()
 }
 
-/// What a sensor does not see is not computed, and what it sees is the same: its frame, and what goes back from it.
+/// Parts of a sensor: what it does not see is not computed, and what it sees is equal: its frame, and what goes back
+/// from it.
 #[test]
 fn a_part_of_a_sensor_sees_what_the_whole_sees_there() {
     /// Single precision of transforms of other sizes, of the range.

@@ -17,7 +17,8 @@ pub const MIDDLE: usize = 4;
 pub const BELOW: usize = 1;
 pub const LEFT: usize = 3;
 
-/// Of lenses of their own: a hexagon of 80 um with a shorter focal length, which looks aside, and a cubic phase.
+/// Elements with individual lenses: a hexagon of 80 um with a shorter focal length, which looks aside, and a cubic
+/// phase.
 pub const HEXAGON: usize = 2;
 pub const CUBIC: usize = 3;
 
