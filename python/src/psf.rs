@@ -96,10 +96,7 @@ fn simulate(
     light: &Looked,
     progress: &dyn Progress,
 ) -> Result<Vec<Found>> {
-    let by_place = match case {
-        SimulationCase::Cell(_) => false,
-        SimulationCase::Made(chip) => chip.perturbation().depends_on_place(),
-    };
+    let by_place = case.perturbation().depends_on_place();
     let mut found: Vec<(usize, Vec<Found>)> = Vec::new();
     let mut waiting: Vec<(usize, Lit)> = elements.into_iter().enumerate().collect();
     while let Some((_, first)) = waiting.first() {
@@ -289,8 +286,8 @@ pub fn psf_of_array<'py>(
             fast,
         };
         let case = match &made {
-            Some(chip) => SimulationCase::Made(chip),
-            None => SimulationCase::Cell(cells[0].as_ref()),
+            Some(chip) => SimulationCase::from(chip),
+            None => SimulationCase::from(cells[0].as_ref()),
         };
         Ok((simulate(lit.collect(), case, &light, p)?, made))
     })?;
@@ -376,8 +373,8 @@ pub fn psf_of_widths<'py>(
             fast,
         };
         let case = match (&made, &cell) {
-            (Some(chip), _) => SimulationCase::Made(chip),
-            (None, cell) => SimulationCase::Cell(cell.as_deref().expect("a cell where there is no model")),
+            (Some(chip), _) => SimulationCase::from(chip),
+            (None, cell) => SimulationCase::from(cell.as_deref().expect("a cell where there is no model")),
         };
         Ok((simulate(lit.collect(), case, &light, p)?, made))
     })?;

@@ -173,7 +173,7 @@ fn findings(
     write_pillars(&alone, &array, Hierarchy::Folded, &layout, terminal)?;
     let read = read_pillars(&alone, &layout, terminal)?;
     after.push(task.judge_layout(&read.elements[0].widths, cells.judge())?);
-    let at_single_wavelengths = match cells.own().rotated() {
+    let at_single_wavelengths = match cells.at_single_wavelengths() {
         Some(cell) => {
             let single = &design.verify.wavelengths_um;
             let strehl = task.lens.strehl_of_layout(&read.elements[0].widths, cell, single)?;

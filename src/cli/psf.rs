@@ -353,8 +353,8 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let (psfs, white) = match (&light, &made) {
         (None, _) => (Vec::new(), None),
-        (Some(light), Some(chip)) => simulate(SimulationCase::Made(chip), light)?,
-        (Some(light), None) => simulate(SimulationCase::Cell(args.cell(&found, light)?.as_ref()), light)?,
+        (Some(light), Some(chip)) => simulate(SimulationCase::from(chip), light)?,
+        (Some(light), None) => simulate(SimulationCase::from(args.cell(&found, light)?.as_ref()), light)?,
     };
     let model = made.as_ref().map(AsBuiltChip::statement);
     if let Some(folder) = &args.out {

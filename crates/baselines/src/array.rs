@@ -189,7 +189,7 @@ mod tests {
             ..plain
         };
         let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
-        let case = SimulationCase::Cell(cells[0].as_ref());
+        let case = SimulationCase::from(cells[0].as_ref());
         let rgb = Array3::from_shape_fn((64, 64, 3), |(y, x, c)| {
             0.1 + 0.7 * f64::from(u8::from((x / 8 + y / 11 + c) % 3 == 0))
         });

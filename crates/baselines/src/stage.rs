@@ -29,7 +29,7 @@ pub enum StageKind {
     Blending,
 }
 
-/// Pictures of a frame that each of the rivals' last stages sees.
+/// Pictures of a frame that the last stage of each baseline camera sees.
 pub const PICTURES: usize = 5;
 
 impl StageKind {

@@ -57,26 +57,26 @@ impl RotationStudy {
         let wavelength_um = design.mapping.wavelength_um;
         let stack = design.cell_stack()?;
         let full = stack.full_transmission(wavelength_um)?.powi(2);
-        let cell = RotatedCell::new(stack, pillars, arriving);
-        let curve = RotationCurve::new(&cell, wavelength_um)?;
-        let point = |number: u16| -> Result<RotationPoint> {
+        let response = RotatedCell::new(stack, pillars, arriving).at(wavelength_um)?;
+        let curve = RotationCurve::new(response.clone());
+        let point = |number: u16| {
             let rotation = pillars.drawn_rotation(number);
-            let [converted, unconverted] = cell.response(rotation, wavelength_um)?;
-            Ok(RotationPoint {
+            let [converted, unconverted] = response.at(rotation);
+            RotationPoint {
                 number,
                 rotation_deg: rotation.to_degrees(),
-                added_rad: curve.added(arriving.geometric_phase(rotation) / 2.0)?,
+                added_rad: curve.added(arriving.geometric_phase(rotation) / 2.0),
                 converted: converted.norm_sqr() / full,
                 unconverted: unconverted.norm_sqr() / full,
-            })
+            }
         };
         Ok(Self {
             name: design.name.clone(),
             wavelength_um,
-            points: (1..=pillars.steps).map(point).collect::<Result<_>>()?,
-            design: curve.error(&design.mapping.rotation, pillars)?,
-            half: curve.error(&RotationMapping::default(), pillars)?,
-            fits: TERMS.into_iter().map(|terms| curve.fit(terms)).collect::<Result<_>>()?,
+            points: (1..=pillars.steps).map(point).collect(),
+            design: curve.error(&design.mapping.rotation),
+            half: curve.error(&RotationMapping::default()),
+            fits: TERMS.into_iter().map(|terms| curve.fit(terms)).collect(),
         })
     }
 

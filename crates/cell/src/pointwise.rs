@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{CellModel, CellStack, Fidelity, ObliqueTables};
-use metalith_core::Result;
+use super::{CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, ObliqueTables};
+use metalith_core::{Progress, Result};
 use metalith_rcwa::Orders;
 
 /// Median phase error over the cell's whole range 0.002 rad: finer than the table, and for a few
@@ -83,22 +83,15 @@ impl CellModel for PointwiseCell {
         Fidelity::Rigorous
     }
 
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        self.normal(self.orders.along_axis(), wavelength_um, max_width_nm)
-    }
-
-    fn transmissions_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        self.normal(BAND_ORDERS, wavelength_um, max_width_nm)
-    }
-
-    fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        self.tilted(OBLIQUE_ORDERS, wavelength_um, sines, max_width_nm)
-            .map(Some)
-    }
-
-    fn oblique_in_band(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        self.tilted(OBLIQUE_BAND_ORDERS, wavelength_um, sines, max_width_nm)
-            .map(Some)
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let (um, sines) = (light.wavelength_um, light.cell_sines());
+        if sines == [0.0; 2] {
+            let orders = light.spectral.choose(self.orders.along_axis(), BAND_ORDERS);
+            return self.normal(orders, um, widest_nm).map(CellResponse::Scalar);
+        }
+        let orders = light.spectral.choose(OBLIQUE_ORDERS, OBLIQUE_BAND_ORDERS);
+        let tables = self.tilted(orders, um, sines, widest_nm)?;
+        Ok(CellResponse::Jones(JonesTables::Oblique(tables)))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
@@ -147,6 +140,7 @@ fn spread(widths_nm: &[u16], solved: &[Complex64], max_width_nm: u16) -> Vec<Com
 mod tests {
     use super::*;
     use crate::Material;
+    use metalith_core::Silent;
 
     /// Mean power of a band by few orders equals the result by many orders.
     #[test]
@@ -157,7 +151,10 @@ mod tests {
         let cell = PointwiseCell::new(crate::stack::tests::paper(), (100..=300).step_by(20));
         let (mut power, mut exact, mut apart, mut count) = (0.0, 0.0, 0.0, 0.0);
         for um in (0..24).map(|i| 0.406_25 + 0.0125 * f64::from(i)) {
-            let coarse = cell.transmissions_in_band(um, 300).unwrap();
+            let coarse = cell
+                .response(&Illumination::normal(um).in_band(), 300, &Silent)
+                .unwrap();
+            let coarse = coarse.focused().unwrap();
             let fine = cell.transmissions(um, 300).unwrap();
             for w in (100..=300).step_by(20) {
                 power += coarse[w].norm_sqr();
@@ -176,15 +173,18 @@ mod tests {
         /// Tolerance of the mean power that passes over 410 to 690 nm, some widths and both polarisations.
         const POWER: f64 = 0.02;
         let cell = PointwiseCell::new(crate::stack::tests::paper(), [120, 160, 200, 240]);
-        let power = |tables: Option<ObliqueTables>| -> f64 {
-            let tables = tables.expect("the cell knows angles");
+        let power = |light: Illumination<'_>| -> f64 {
+            let CellResponse::Jones(JonesTables::Oblique(tables)) = cell.response(&light, 300, &Silent).unwrap() else {
+                panic!("the cell knows angles")
+            };
             let widths = [120, 160, 200, 240];
             tables.passed().flat_map(|t| widths.map(|w| t[w].norm_sqr())).sum()
         };
         let (mut coarse, mut fine) = (0.0, 0.0);
         for um in (0..8).map(|i| 0.41 + 0.04 * f64::from(i)) {
-            coarse += power(cell.oblique_in_band(um, [-0.2588, 0.0], 300).unwrap());
-            fine += power(cell.oblique(um, [-0.2588, 0.0], 300).unwrap());
+            let light = Illumination::from_direction(um, [-0.2588, 0.0]).oblique();
+            coarse += power(light.in_band());
+            fine += power(light);
         }
         println!("{coarse} {fine}");
         assert!((coarse / fine - 1.0).abs() < POWER, "{coarse} {fine}");

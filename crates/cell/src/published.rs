@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
-use super::{CellModel, CellStack, Fidelity, ForwardPolynomial};
-use metalith_core::{Error, Result};
+use super::{CellModel, CellResponse, CellStack, Fidelity, ForwardPolynomial, Illumination};
+use metalith_core::{Error, Progress, Result};
 
 /// Wavelengths that the polynomials were published for (um).
 const PUBLISHED_UM: (f64, f64) = (0.4, 0.7);
@@ -53,7 +53,8 @@ impl CellModel for PublishedCell {
         Fidelity::Published
     }
 
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let wavelength_um = light.wavelength_um;
         let (short, long) = PUBLISHED_UM;
         if !(short - ROUNDING_UM..=long + ROUNDING_UM).contains(&wavelength_um) {
             return Err(Error::refused(
@@ -68,11 +69,11 @@ impl CellModel for PublishedCell {
             ));
         }
         let mut table = vec![Complex64::new(0.0, 0.0)];
-        table.extend((1..=max_width_nm).map(|width| {
+        table.extend((1..=widest_nm).map(|width| {
             let turns = self.forward.turns(f64::from(width) / self.pitch_nm, wavelength_um);
             Complex64::cis(std::f64::consts::TAU * turns.fract())
         }));
-        Ok(table)
+        Ok(CellResponse::Scalar(table))
     }
 
     fn full_transmission(&self, _wavelength_um: f64) -> Result<f64> {

@@ -7,7 +7,10 @@ mod truth_rows;
 
 use std::collections::BTreeMap;
 
-use metalith_cell::{Blaze, CoarseCell, Fidelity, NeighbourTable, NeighbourTableSpec, sites_by};
+use metalith_cell::{
+    Blaze, CellResponse, CoarseCell, Fidelity, Illumination, NeighbourTable, NeighbourTableSpec, NeighbourTables,
+    sites_by,
+};
 use metalith_core::Silent;
 use metalith_design::cell_models;
 use metalith_rcwa::SiteLattice;
@@ -233,8 +236,18 @@ fn between_the_tables_blazed_rows_are_met_as_well() {
         for um in [0.41, 0.43, 0.48, 0.505, 0.545, 0.56, 0.59, 0.62, 0.675, 0.69] {
             let coarse = CoarseCell::new(&stack, um, prototype.mapping.range_nm()).unwrap();
             let full = coarse.full_transmission().unwrap();
-            let band = cells[0].among_neighbours_in_band(um, &looks, &Silent).unwrap().unwrap();
-            let equal = cells[1].transmissions_in_band(um, pitch_nm as u16).unwrap();
+            let light = Illumination {
+                viewing: Some(&looks),
+                ..Illumination::from_direction(um, looks(um)).in_band()
+            };
+            let CellResponse::Neighbours(NeighbourTables::Band(band)) = cells[0].response(&light, 0, &Silent).unwrap()
+            else {
+                panic!("it knows its neighbours")
+            };
+            let equal = cells[1]
+                .response(&light, pitch_nm as u16, &Silent)
+                .and_then(CellResponse::focused);
+            let equal = equal.unwrap();
             for (cells, turns) in &rows {
                 let lattice = SiteLattice::row(*cells).unwrap();
                 let mut sums = [0.0; 3];

@@ -20,6 +20,15 @@ pub struct ApproximationSet {
 }
 
 impl ApproximationSet {
+    /// The text of these approximations in the digest of a camera, which stands in files of sets for learning: names of fields
+    /// do not decide it, so that sets are the same and go on after a change of names.
+    pub(crate) fn digest_text(&self) -> String {
+        format!(
+            "Assumed {{ fixed_kernels: {}, butterworth: {}, no_veil: {}, patch_pixels: {:?} }}",
+            self.fixed_kernels, self.butterworth, self.no_stray_light, self.patch_pixels
+        )
+    }
+
     /// All of it: the setting of the paper.
     pub fn paper() -> Self {
         Self {
@@ -54,5 +63,13 @@ mod tests {
         // Rounding.
         assert!((at(CUTOFF_DEG).powi(2) - 0.5).abs() < 1e-12);
         assert!(at(0.0) == 1.0 && at(15.0) > 0.97 && at(45.0) < 0.07);
+    }
+
+    #[test]
+    fn the_text_of_a_digest_is_that_of_sets_on_the_disk() {
+        let none = "Assumed { fixed_kernels: false, butterworth: false, no_veil: false, patch_pixels: None }";
+        assert_eq!(ApproximationSet::default().digest_text(), none);
+        let all = "Assumed { fixed_kernels: true, butterworth: true, no_veil: true, patch_pixels: Some(420) }";
+        assert_eq!(ApproximationSet::paper().digest_text(), all);
     }
 }

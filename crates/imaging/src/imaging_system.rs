@@ -178,8 +178,12 @@ impl ImagingSystem {
         let camera = serde_json::to_vec(&self.camera).expect("plain data serialises");
         hasher.update(camera);
         hasher.update(format!(
-            "{:?} {:?} {:?} {:?} {:?}",
-            self.bank.elements, self.elements, self.view, self.gain, self.assumed
+            "{:?} {:?} {:?} {:?} {}",
+            self.bank.elements,
+            self.elements,
+            self.view,
+            self.gain,
+            self.assumed.digest_text()
         ));
         if self.between != BetweenNodes::Linear {
             hasher.update(format!("{:?}", self.between));

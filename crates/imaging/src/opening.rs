@@ -133,11 +133,11 @@ impl ImagingSystem {
                 let case = match model {
                     Some(model) => {
                         made = AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
-                        SimulationCase::Made(&made)
+                        SimulationCase::from(&made)
                     }
                     None => {
                         models = cell_models(design, &[design.verify.fidelity])?;
-                        SimulationCase::Cell(models[0].as_ref())
+                        models[0].as_ref().into()
                     }
                 };
                 let chip = plan.chip(&extraction, case, progress)?;

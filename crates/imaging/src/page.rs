@@ -320,7 +320,7 @@ pub(crate) fn list_assumptions(page: &mut Page, all: &[Assumption]) {
 fn worth(page: &mut Page, cases: &[AssumedScore]) {
     let Some(physics) = cases.first() else { return };
     page.section("What the assumptions of others are worth");
-    let mut columns = vec![Column::text("ApproximationSet")];
+    let mut columns = vec![Column::text("Approximation")];
     for zone in Zone::ALL {
         columns.push(Column::number(format!("PSNR, {}", zone.name()), "dB"));
     }

@@ -68,7 +68,7 @@ impl FrameStatement {
     }
 
     /// Statement of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. The
-    /// notes and the error of the operator are added.
+    /// caller adds notes and the error of the operator.
     pub fn new(
         system: &ImagingSystem,
         layout: String,

@@ -1,6 +1,6 @@
 //! Pictures of lenses that are no squares on a square lattice: where their light goes, against what their cells pass.
 
-use metalith_cell::{Analyser, CellModel, PolarisedTables};
+use metalith_cell::{Analyser, CellModel, CellResponse, Illumination, PolarisedTables};
 use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
@@ -63,7 +63,7 @@ struct Taken<'a> {
 fn taken<'a>(design: &Design, extraction: &'a Extraction, cell: &'a dyn CellModel, nm: f64) -> Taken<'a> {
     let camera = camera(nm);
     let scene = SceneImage::of_rgb("white", &Array3::from_elem((20, 20, 3), 1.0), FIELD_DEG, f64::INFINITY);
-    let case = SimulationCase::Cell(cell);
+    let case = SimulationCase::from(cell);
     let chip = ChipInLight::new(design, extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
     let spec = BankSpec {
         pixel_um: camera.sensor.pixel_um,
@@ -100,7 +100,13 @@ fn passed(
     nm.iter().map(of).sum::<f64>() / nm.len() as f64
 }
 
-/// Image, stray light and what is lost are all the light, and what is not passed is what the cells do not pass.
+/// What a cell answers for one wavelength (um) of a band.
+fn in_band(cell: &dyn CellModel, um: f64, last: u16) -> CellResponse {
+    cell.response(&Illumination::normal(um).in_band(), last, &Silent)
+        .unwrap()
+}
+
+/// Image, veil and what is lost are all the light, and what is not passed is what the cells do not pass.
 fn assert_all_light(taken: &Taken<'_>, wanted: f64) {
     /// Directions with next to no power are left out of blocks, tables are in single precision.
     const LIGHT: f64 = 2e-3;
@@ -129,9 +135,9 @@ fn a_hexagonal_lens_takes_pictures() {
     assert!(!design.cell.lattice.is_square());
     let cell = cell_models(&design, &[design.verify.fidelity]).unwrap().remove(0);
     let um = nm * 1e-3;
-    let table = cell.transmissions_in_band(um, design.cell.most()).unwrap();
+    let table = in_band(cell.as_ref(), um, design.cell.most()).focused().unwrap();
     let taken = taken(&design, &extraction, cell.as_ref(), nm);
-    let of = |um| cell.transmissions_in_band(um, design.cell.most()).unwrap();
+    let of = |um| in_band(cell.as_ref(), um, design.cell.most()).focused().unwrap();
     let wanted = passed(&extraction, &taken.chip.sampling.wavelengths_nm, cell.as_ref(), of);
     assert_all_light(&taken, wanted);
 
@@ -191,10 +197,10 @@ fn light_that_is_not_converted_is_in_the_stray_light() {
         let taken = taken(&design, &extraction, cell.as_ref(), nm);
         let (most, nm) = (design.cell.most(), &taken.chip.sampling.wavelengths_nm);
         let converted = passed(&extraction, nm, cell.as_ref(), |um| {
-            cell.transmissions_in_band(um, most).unwrap()
+            in_band(cell.as_ref(), um, most).focused().unwrap()
         });
         let other = passed(&extraction, nm, cell.as_ref(), |um| {
-            match cell.polarised_in_band(um, most).unwrap() {
+            match in_band(cell.as_ref(), um, most).polarised() {
                 Some(PolarisedTables::Hands(hands)) => hands.unconverted[0].clone(),
                 other => panic!("{other:?}"),
             }

@@ -9,7 +9,9 @@ use rayon::prelude::*;
 use super::CellChange;
 use super::bank::CellBank;
 use super::stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
-use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, POLARISATION_SHARE, dark};
+use metalith_cell::{
+    BAND_ORDERS, CellStack, Illumination, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, POLARISATION_SHARE, dark,
+};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 
@@ -55,9 +57,9 @@ pub struct RealisedCells {
     rim: Option<(Box<Self>, f64)>,
 }
 
-/// Transmission of sites of some widths: one table for light along the normal; else one for each polarisation that
-/// light keeps (s, p), and one for each that is turned into the other where the direction is in no plane of symmetry of
-/// the cell. See [`super::AsBuiltOptics::share`].
+/// What sites of some widths transmit: one table for light along the normal; else one for each polarisation that is
+/// kept (s, p), and one for each that is turned into the other where the direction is in no plane of symmetry of the
+/// cell. See [`super::IncoherentFields::weight`].
 pub struct SolvedWidths {
     /// Transmissions in the order of the widths that were asked for.
     pub pillars: Vec<Vec<Complex64>>,
@@ -154,51 +156,17 @@ impl RealisedCells {
         &self.stack
     }
 
-    /// Transmission of pillars of these widths (nm), zero-order, as `CellModel::transmissions` has it; and as
-    /// `CellModel::oblique` has it where `sines` are not zero: those of the direction in air along x and y.
-    /// Widths that no pillar can have are those of the nearest that can be.
+    /// Transmission of pillars of these widths (nm), zero-order, as [`metalith_cell::PointwiseCell`] has it, along the normal or in
+    /// oblique light. Widths that no pillar can have are those of the nearest that can be.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn solve(
-        &self,
-        widths_nm: &[f64],
-        wavelength_um: f64,
-        sines: [f64; 2],
-        progress: &dyn Progress,
-    ) -> Result<SolvedWidths> {
-        let orders = if sines == [0.0; 2] { ORDERS } else { OBLIQUE_ORDERS };
-        self.solve_with(orders, widths_nm, wavelength_um, sines, progress)
-    }
-
-    /// Variant of [`RealisedCells::solve`] for one of many wavelengths that a band is averaged over, as
-    /// `CellModel::transmissions_in_band`.
-    ///
-    /// # Errors
-    /// As [`RealisedCells::solve`].
-    pub fn solve_in_band(
-        &self,
-        widths_nm: &[f64],
-        wavelength_um: f64,
-        sines: [f64; 2],
-        progress: &dyn Progress,
-    ) -> Result<SolvedWidths> {
-        let orders = if sines == [0.0; 2] {
-            BAND_ORDERS
-        } else {
-            OBLIQUE_BAND_ORDERS
+    pub fn solve(&self, widths_nm: &[f64], light: &Illumination<'_>, progress: &dyn Progress) -> Result<SolvedWidths> {
+        let (wavelength_um, sines) = (light.wavelength_um, light.cell_sines());
+        let orders = match sines == [0.0; 2] {
+            true => light.spectral.choose(ORDERS, BAND_ORDERS),
+            false => light.spectral.choose(OBLIQUE_ORDERS, OBLIQUE_BAND_ORDERS),
         };
-        self.solve_with(orders, widths_nm, wavelength_um, sines, progress)
-    }
-
-    fn solve_with(
-        &self,
-        orders: usize,
-        widths_nm: &[f64],
-        wavelength_um: f64,
-        sines: [f64; 2],
-        progress: &dyn Progress,
-    ) -> Result<SolvedWidths> {
         let (mut solved, columns) = self.solve_columns(orders, widths_nm, wavelength_um, sines, None, progress)?;
         if let Some((cells, higher_nm)) = &self.rim {
             let asked = Some(columns.as_slice());
@@ -345,7 +313,7 @@ mod tests {
         for um in [0.455, 0.53, 0.66] {
             // Halfway between nodes, where a cubic errs most.
             let widths: Vec<f64> = (0..67).map(|k| 100.0 + 3.0 * f64::from(k)).collect();
-            let solved = cells.solve(&widths, um, [0.0; 2], &Silent).unwrap();
+            let solved = cells.solve(&widths, &Illumination::normal(um), &Silent).unwrap();
             for (w, t) in widths.iter().zip(&solved.pillars[0]) {
                 let error = (stack.transmission(*w, um, orders).unwrap() - t).norm();
                 squares += error * error;
@@ -365,7 +333,7 @@ mod tests {
         let orders = Orders::new(ORDERS).unwrap();
         let cells = RealisedCells::new(stack.clone(), -9.3);
         let widths = [150.0 - 9.3, 152.0 - 9.3];
-        let solved = cells.solve(&widths, 0.53, [0.0; 2], &Silent).unwrap();
+        let solved = cells.solve(&widths, &Illumination::normal(0.53), &Silent).unwrap();
         // Widths agree to rounding, and a transmission's slope is below one a nanometre.
         const ROUNDING: f64 = 1e-12;
         for (w, t) in widths.iter().zip(&solved.pillars[0]) {

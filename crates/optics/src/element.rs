@@ -13,7 +13,7 @@ use super::expression::Input;
 use super::pupil::PupilTerms;
 use super::shifted_aperture::ShiftedAperture;
 use super::stitching::displace;
-use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, RectangleClass, density, zernike};
+use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, RectangleClass, SolvedWidths, density, zernike};
 use metalith_core::{Error, Result};
 use metalith_pillars::{Lattice, PillarMap, PillarShape};
 use metalith_wave::Aperture;
@@ -344,6 +344,22 @@ impl AsBuiltElement {
             t.push(single(mixed(&self.geometry, self.missing, pillar, bare, unseen)));
         }
         ClassTable::of_widths(t, self.missing * (1.0 - self.missing) * scattered)
+    }
+
+    /// A table for each polarisation that was solved for the classes, to the rim of the lens where it differs there.
+    pub(crate) fn tables_of(&self, solved: &SolvedWidths) -> Vec<ClassTable> {
+        let tables = |solved: &SolvedWidths| -> Vec<ClassTable> {
+            let polarisations = solved.pillars.iter().zip(&solved.bare).zip(&solved.unseen);
+            polarisations
+                .map(|((t, bare), unseen)| self.table_of(t, *bare, *unseen))
+                .collect()
+        };
+        let mut own = tables(solved);
+        if let Some(rim) = &solved.rim {
+            let pairs = own.iter_mut().zip(tables(rim));
+            pairs.for_each(|(table, rim)| table.set_rim(&rim));
+        }
+        own
     }
 
     /// The element as an aperture at one wavelength (um), without the wave that arrives.

@@ -177,7 +177,7 @@ impl Network {
         &weights[layer.start..layer.start + layer.shape.weights()]
     }
 
-    /// The answer of the network: `[12, rows, columns]` of `[inputs, rows, columns]`, both sides multiples of [`MULTIPLE`].
+    /// The answer of the network: `[12, rows, columns]` of `[inputs, rows, columns]`, both sides multiples of `MULTIPLE`, four.
     pub fn apply(&self, input: Features) -> Features {
         self.walk(input, |_, _| ())
     }

@@ -170,7 +170,7 @@ impl PictureBench {
         chip: &AsBuiltChip,
         progress: &dyn Progress,
     ) -> Result<ImagingSystem> {
-        let case = SimulationCase::Made(chip);
+        let case = SimulationCase::from(chip);
         ImagingSystem::of_pillars(
             design,
             extraction,

@@ -300,7 +300,7 @@ fn pictures_are_figures_of_a_draw() {
     let layout = folder.path().join("draw/layout.gds");
     let pillars = metalith_layout::read_pillars(&design, &layout, &Silent).unwrap();
     let cells = metalith_design::cell_models(&design, &[metalith_cell::Fidelity::Rigorous]).unwrap();
-    let case = metalith_optics::SimulationCase::Cell(cells[0].as_ref());
+    let case = metalith_optics::SimulationCase::from(cells[0].as_ref());
     let system = ImagingSystem::of_pillars(&design, &pillars, case, &camera, &scene, Some(5), &Silent).unwrap();
     let frame = system.record(&system.simulation(), &scene, 1).unwrap();
     let operator = system.restoration();

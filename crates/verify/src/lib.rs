@@ -26,7 +26,6 @@ mod white_page;
 
 use std::path::Path;
 
-use num_complex::{Complex32, Complex64};
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
@@ -37,7 +36,7 @@ use metalith_design::{AskedLight, Design, Element, FieldAngle, LatticeOrders};
 use metalith_gds::extract::{ExtractedElement, Extraction, Survey, UnrecognisedShapes, extract};
 use metalith_gds::{self, Layout};
 use metalith_layout::extraction_plan;
-use metalith_optics::{AsBuiltChip, ModelStatement};
+use metalith_optics::ModelStatement;
 use metalith_pillars::PillarRows;
 use metalith_wave::Accuracy;
 use metalith_wave::propagation::Steepness;
@@ -298,14 +297,18 @@ fn judge(
 ) -> Result<Verification> {
     let mut elements = found.elements;
     let lens = LensPhase::of(&design.as_verified());
-    let responses = MappingResponse::new(design, cases.judge)?;
-    let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes)?;
-    let chosen = copies::choose(design, array, &mut elements, cases.judge.keeps_symmetry());
-    simulator.add_directions(&chosen, progress)?;
-    let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge, part_bytes)?;
-    if let Some(white) = &mut white {
+    let simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes);
+    let chosen = copies::choose(
+        design,
+        array,
+        &mut elements,
+        cases.judge.perturbation().keeps_symmetry(),
+    );
+    simulator.solve(&chosen, progress)?;
+    let white = white::WhiteSimulator::new(design, array.lattice, cases.judge)?;
+    if let Some(white) = &white {
         let shown: Vec<Element> = chosen.iter().map(|one| one.element).collect();
-        white.add_directions(&shown, progress)?;
+        white.solve(simulator.judge(), &shown, progress)?;
     }
     let in_white = white.as_ref().map_or(0, white::WhiteSimulator::psfs);
     let psfs: usize = chosen.iter().map(|one| simulator.psfs(one) + in_white).sum();
@@ -320,7 +323,7 @@ fn judge(
         simulated.push(DistinctElement {
             element,
             copies: one.copies,
-            phase: responses.errors(&read, &phase, &rule, progress)?,
+            phase: phase_errors(design, &read, &phase, &rule, progress)?,
             steepness: Steepness::of(&array.lattice, |ix, iy| phase.turns(ix, iy)),
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&one, &phase, &read, progress)?,
@@ -335,10 +338,7 @@ fn judge(
         design: design.name.clone(),
         design_digest: design.digest(),
         fidelity: cases.judge.fidelity(),
-        model: match cases.judge {
-            SimulationCase::Made(chip) => Some(chip.statement()),
-            SimulationCase::Cell(_) => None,
-        },
+        model: cases.judge.statement(),
         compensated: array.compensated,
         accuracy: match accuracy {
             Accuracy::Accurate => "accurate",
@@ -349,7 +349,7 @@ fn judge(
         elements,
         foreign: found.foreign,
         distinct: simulated,
-        rotations: EqualRotations::of(design, cases.judge)?,
+        rotations: EqualRotations::of(design, simulator.judge(), progress)?,
         lattice_orders: design.lattice_orders(AskedLight::All)?,
         not_simulated: None,
         checks: Vec::new(),
@@ -358,46 +358,20 @@ fn judge(
     Ok(verification)
 }
 
-/// Transmission of pillars at the wavelength of the mapping, in the case that judges.
-enum MappingResponse<'a> {
-    ByWidth(Vec<Complex64>),
-    Made(f64, &'a AsBuiltChip),
-}
-
-impl<'a> MappingResponse<'a> {
-    fn new(design: &Design, judge: SimulationCase<'a>) -> Result<Self> {
-        let um = design.mapping.wavelength_um;
-        Ok(match judge {
-            SimulationCase::Cell(cell) => Self::ByWidth(cell.transmissions(um, design.cell.most())?),
-            SimulationCase::Made(chip) => Self::Made(um, chip),
-        })
-    }
-
-    /// Phase errors of an element's pillars.
-    fn errors(
-        &self,
-        read: &optics::ReadElement<'_>,
-        phase: &ElementPhase<'_>,
-        rule: &PillarRule,
-        progress: &dyn Progress,
-    ) -> Result<PhaseErrors> {
-        let widths = read.widths;
-        let errors = |table: &[Complex64], class: &(dyn Fn(usize, u16) -> usize + Sync)| {
-            let response = PillarResponse { table, class };
-            PhaseErrors::of(widths, phase, rule, &response)
-        };
-        match (self, &read.made[0]) {
-            (Self::Made(um, chip), Some(made)) => {
-                let single = |t: &Complex32| Complex64::new(f64::from(t.re), f64::from(t.im));
-                let focused = chip.focused_table(made, *um, progress)?;
-                let table: Vec<_> = focused.t.iter().map(single).collect();
-                let classes = made.classes();
-                Ok(errors(&table, &|site, _| usize::from(classes[site])))
-            }
-            (Self::ByWidth(table), _) => Ok(errors(table, &|_, width_nm| usize::from(width_nm))),
-            (Self::Made(..), None) => unreachable!("a made chip has made elements"),
-        }
-    }
+/// Phase errors of an element's pillars at the wavelength of the mapping, in the case that judges.
+fn phase_errors(
+    design: &Design,
+    read: &optics::ReadElement<'_>,
+    phase: &ElementPhase<'_>,
+    rule: &PillarRule,
+    progress: &dyn Progress,
+) -> Result<PhaseErrors> {
+    let sites = read.cases[0].focused(design.mapping.wavelength_um, progress)?;
+    let response = PillarResponse {
+        table: &sites.table,
+        class: &|site, number| sites.class(site, number),
+    };
+    Ok(PhaseErrors::of(read.widths, phase, rule, &response))
 }
 
 fn compare<W>(

@@ -2,10 +2,12 @@
 
 use serde::Serialize;
 
-use metalith_cell::{MappingError, RotatedCell, RotationCurve, RotationMapping, Truncation};
-use metalith_core::Result;
+use metalith_cell::{
+    CellResponse, Illumination, MappingError, PolarisedTables, RotationCurve, RotationMapping, Truncation,
+};
+use metalith_core::{Progress, Result};
 use metalith_design::Design;
-use metalith_optics::SimulationCase;
+use metalith_optics::CaseOptics;
 
 /// Lattices of equal rotations, at the wavelength of the mapping.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -23,21 +25,22 @@ impl EqualRotations {
     /// Rotations by the simulation model, if that is a cell of rotated rectangles.
     ///
     /// # Errors
-    /// As [`RotatedCell::response`].
-    pub(super) fn of(design: &Design, judge: SimulationCase<'_>) -> Result<Option<Self>> {
-        match judge {
-            SimulationCase::Cell(cell) => cell.rotated().map(|cell| Self::by(design, cell)).transpose(),
-            SimulationCase::Made(_) => Ok(None),
+    /// If the cell has no answer.
+    pub(super) fn of(design: &Design, judge: &CaseOptics<'_>, progress: &dyn Progress) -> Result<Option<Self>> {
+        if design.cell.shape.rotated().is_none() {
+            return Ok(None);
         }
-    }
-
-    fn by(design: &Design, cell: &RotatedCell) -> Result<Self> {
-        let (wavelength_um, pillars) = (design.mapping.wavelength_um, cell.pillars());
-        let curve = RotationCurve::new(cell, wavelength_um)?;
-        Ok(Self {
-            own: curve.error(&design.mapping.rotation, pillars)?,
-            half: curve.error(&RotationMapping::default(), pillars)?,
-            truncation: cell.truncation(wavelength_um)?,
-        })
+        let response = judge.response(&Illumination::normal(design.mapping.wavelength_um), progress)?;
+        let Some(PolarisedTables::Hands(hands)) = response.as_deref().and_then(CellResponse::polarised) else {
+            return Ok(None);
+        };
+        Ok(hands.rotation.as_ref().map(|response| {
+            let curve = RotationCurve::new(response.clone());
+            Self {
+                own: curve.error(&design.mapping.rotation),
+                half: curve.error(&RotationMapping::default()),
+                truncation: response.truncation(),
+            }
+        }))
     }
 }

@@ -1,10 +1,10 @@
 //! Light along x and along y behind upright rectangles, from a design to its figures.
 
 use metalith_cell::{
-    Analyser, AxisTables, CellModel, Fidelity, PillarLibrary, Polarisation, PolarisationAxis, PolarisedLight,
-    PolarisedTables,
+    Analyser, AxisTables, CellModel, CellResponse, Fidelity, Illumination, JonesTables, PillarLibrary, Polarisation,
+    PolarisationAxis, PolarisedLight, PolarisedTables,
 };
-use metalith_core::{Result, Silent};
+use metalith_core::{Progress, Result, Silent};
 use metalith_design::{Design, PillarArray, cell_models};
 use metalith_layout::{read_pillars, write_pillars};
 use metalith_testing::design;
@@ -45,15 +45,12 @@ impl CellModel for IdealRetarders {
         Fidelity::Rigorous
     }
 
-    fn transmissions(&self, _wavelength_um: f64, last: u16) -> Result<Vec<Complex64>> {
-        Ok(self.table(PolarisationAxis::X, last))
-    }
-
-    fn polarised(&self, _wavelength_um: f64, last: u16) -> Result<Option<PolarisedTables>> {
-        Ok(Some(PolarisedTables::Axes(AxisTables {
+    fn response(&self, _light: &Illumination<'_>, last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let tables = PolarisedTables::Axes(AxisTables {
             focused: PolarisationAxis::X,
             along: PolarisationAxis::ALL.map(|axis| self.table(axis, last)),
-        })))
+        });
+        Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
     }
 
     fn full_transmission(&self, _wavelength_um: f64) -> Result<f64> {
@@ -81,7 +78,7 @@ fn image((design, _, folder): &Lens, arriving: Polarisation, analyser: Option<An
         aperture_radius_um: None,
         accuracy: Accuracy::Accurate,
     };
-    let case = SimulationCase::Cell(&cell);
+    let case = SimulationCase::from(&cell as &dyn CellModel);
     single_psfs(&found, case, &light, &Silent).unwrap().remove(0)
 }
 

@@ -25,7 +25,7 @@ fn tables_of_the_shipped_designs_come_with_the_program() {
                 let wave = incident(&element.wedge, wavelength_um, [0.0; 2]).unwrap();
                 let spec = NeighbourTableSpec {
                     wavelength_um,
-                    sines: cell_direction(&wave, design.cell.lattice),
+                    sines: cell_direction([wave.sin_x, wave.sin_y], design.cell.lattice),
                 };
                 assert!(
                     NeighbourTable::is_shipped(&spec, &stack, &mappings),

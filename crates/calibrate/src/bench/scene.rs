@@ -107,7 +107,7 @@ impl Lenses {
             let window = [0, 1].map(|a| element.centre_um[a] + capture.window_centre_um[a]);
             let camera = lamp(centre_nm, width_nm, window);
             let cell = published();
-            let case = SimulationCase::Cell(&cell);
+            let case = SimulationCase::from(&cell as &dyn metalith_cell::CellModel);
             let chip = ChipInLight::new(&self.design, &extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
             let scene = spot(capture.aoi_rad[0].sin(), focal_um);
             let views = element_views(&self.design, &camera);

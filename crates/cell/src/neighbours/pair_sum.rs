@@ -165,7 +165,7 @@ impl NeighbourBasis {
 pub struct NeighbourResponse {
     pub basis: NeighbourBasis,
     /// Weight of each term, in the order of [`NeighbourBasis::terms`]. The sum has the scale of
-    /// [`CellModel::transmissions`](crate::CellModel::transmissions).
+    /// [`CellResponse`](crate::CellResponse).
     pub weights: Vec<Complex64>,
 }
 

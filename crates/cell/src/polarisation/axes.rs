@@ -66,10 +66,10 @@ impl fmt::Display for PolarisationAxis {
     }
 }
 
-/// Tables of pillars whose sides are along the axes, for light along x and along y, which keeps its polarisation:
-/// transmissions as [`CellModel::transmissions`] gives them, by the number of the pillar.
+/// What pillars whose sides are along the axes do to light along x and along y, which keeps its polarisation: transmissions as
+/// those of [`CellResponse`], by the number of the pillar.
 ///
-/// [`CellModel::transmissions`]: crate::CellModel::transmissions
+/// [`CellResponse`]: crate::CellResponse
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisTables {
     /// The light whose phase is that of the design.

@@ -6,13 +6,12 @@ use num_complex::Complex64;
 
 use super::tables::{Part, there};
 use super::{Analyser, FocusedLight, PolarisedLight};
-use crate::Handedness;
+use crate::{Handedness, RotationResponse};
 
-/// Tables of pillars for light of both hands: transmissions as [`CellModel::transmissions`] gives them, by the number
-/// of the rotation. The first of each pair is for light that arrives in the hand that is focused, the second for the
-/// other.
+/// What pillars do to light of both hands: transmissions as those of [`CellResponse`], by the number of the rotation.
+/// The first of each pair is for light that arrives in the hand that is focused, the second for the other.
 ///
-/// [`CellModel::transmissions`]: crate::CellModel::transmissions
+/// [`CellResponse`]: crate::CellResponse
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandTables {
     /// The hand of the light that is focused.
@@ -21,6 +20,8 @@ pub struct HandTables {
     pub converted: [Vec<Complex64>; 2],
     /// Light that leaves in the hand that it arrived in.
     pub unconverted: [Vec<Complex64>; 2],
+    /// The same at any rotation, of a model of one size of pillars.
+    pub rotation: Option<RotationResponse>,
 }
 
 impl HandTables {

@@ -9,14 +9,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use num_complex::Complex64;
 use serde::Serialize;
 
-use metalith_core::Result;
+use metalith_core::{Progress, Result};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
 
 pub use self::samples::RotationSamples;
 
 use self::series::{Channels, Series, every};
-use super::{CellModel, CellStack, Fidelity, HandTables, Handedness, ObliqueTables, PolarisedTables};
+use super::{
+    CellModel, CellResponse, CellStack, Fidelity, HandTables, Handedness, Illumination, JonesTables, PolarisedTables,
+    Spectral,
+};
 
 /// Intervals of an eighth of a turn whose ends are solved.
 const INTERVALS: usize = 6;
@@ -63,7 +66,7 @@ pub struct Truncation {
 }
 
 /// A cell at a wavelength.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 struct Solved {
     series: Series,
     /// Series that more orders add to it, where they are needed.
@@ -109,20 +112,20 @@ impl RotatedCell {
         self.arriving
     }
 
-    /// Converted and unconverted light of a pillar of any rotation (rad), as ratios of fields.
+    /// The cell at a single wavelength (um).
     ///
     /// # Errors
     /// As [`CellStack::jones`].
-    pub fn response(&self, rotation: f64, wavelength_um: f64) -> Result<[Complex64; 2]> {
-        Ok(self.solved(wavelength_um, false)?.at(rotation, self.arriving))
+    pub fn at(&self, wavelength_um: f64) -> Result<RotationResponse> {
+        Ok(self.response_of(self.solved(wavelength_um, false)?))
     }
 
-    /// Number of orders that it takes at a wavelength (um), and how sure they are.
-    ///
-    /// # Errors
-    /// As [`CellStack::jones`].
-    pub fn truncation(&self, wavelength_um: f64) -> Result<Option<Truncation>> {
-        Ok(self.solved(wavelength_um, false)?.truncation)
+    fn response_of(&self, solved: Arc<Solved>) -> RotationResponse {
+        RotationResponse {
+            solved,
+            pillars: self.pillars,
+            arriving: self.arriving,
+        }
     }
 
     fn solved(&self, wavelength_um: f64, of_band: bool) -> Result<Arc<Solved>> {
@@ -183,11 +186,42 @@ impl RotatedCell {
             focused: self.arriving,
             converted: of(0),
             unconverted: of(1),
+            rotation: Some(self.response_of(solved)),
         }))
     }
 }
 
-/// Hand of the light that arrives.
+/// What a cell of rotated rectangles does at one wavelength, at any rotation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RotationResponse {
+    solved: Arc<Solved>,
+    pillars: RotatedRectangles,
+    arriving: Handedness,
+}
+
+impl RotationResponse {
+    /// The pillars.
+    pub fn pillars(&self) -> RotatedRectangles {
+        self.pillars
+    }
+
+    /// The handedness of the light.
+    pub fn arriving(&self) -> Handedness {
+        self.arriving
+    }
+
+    /// Converted and unconverted light of a pillar of any rotation (rad), as ratios of fields.
+    pub fn at(&self, rotation: f64) -> [Complex64; 2] {
+        self.solved.at(rotation, self.arriving)
+    }
+
+    /// How many orders it takes, and how sure they are; not known of one of many wavelengths of a band.
+    pub fn truncation(&self) -> Option<Truncation> {
+        self.solved.truncation
+    }
+}
+
+/// Of the light that arrives.
 #[derive(Clone, Copy)]
 enum Hand {
     Focused,
@@ -254,35 +288,16 @@ impl CellModel for RotatedCell {
         Fidelity::Rigorous
     }
 
-    /// Transmissions of the converted light, with the number of the rotation as index.
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let solved = self.solved(wavelength_um, false)?;
-        Ok(self.table(&solved, max_width_nm, Hand::Focused, 0))
-    }
-
-    fn transmissions_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let solved = self.solved(wavelength_um, true)?;
-        Ok(self.table(&solved, max_width_nm, Hand::Focused, 0))
-    }
-
-    fn polarised(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<PolarisedTables>> {
-        self.both_hands(wavelength_um, false, max_width_nm).map(Some)
-    }
-
-    fn polarised_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<PolarisedTables>> {
-        self.both_hands(wavelength_um, true, max_width_nm).map(Some)
-    }
-
-    fn oblique(&self, _wavelength_um: f64, _sines: [f64; 2], _max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        Err(super::rectangle::oblique_refused())
+    fn response(&self, light: &Illumination<'_>, last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        if light.cell_sines() != [0.0; 2] {
+            return Err(super::rectangle::oblique_refused());
+        }
+        let tables = self.both_hands(light.wavelength_um, light.spectral == Spectral::InBand, last)?;
+        Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
         self.stack.full_transmission(wavelength_um)
-    }
-
-    fn rotated(&self) -> Option<&RotatedCell> {
-        Some(self)
     }
 }
 
@@ -293,6 +308,7 @@ mod tests {
     use super::super::rectangle::tests::{PILLARS, titania};
     use super::super::{Polarisation, PolarisedLight, RotatedRectangle};
     use super::*;
+    use metalith_core::Silent;
     use metalith_rcwa::circular;
 
     /// Between the solved rotations, of |t| near 1.1: what the series leaves out; ten times more with five rotations.
@@ -327,8 +343,8 @@ mod tests {
     }
 
     fn in_band(cell: &RotatedCell, most: u16) -> HandTables {
-        match cell.polarised_in_band(0.532, most).unwrap() {
-            Some(PolarisedTables::Hands(hands)) => hands,
+        match cell.both_hands(0.532, true, most).unwrap() {
+            PolarisedTables::Hands(hands) => hands,
             other => panic!("{other:?}"),
         }
     }
@@ -346,7 +362,11 @@ mod tests {
     fn tables_have_the_series_at_drawn_rotations() {
         let cell = RotatedCell::new(titania(), PILLARS, Handedness::Left);
         let solved = cell.solved(0.532, true).unwrap();
-        let converted = cell.transmissions_in_band(0.532, 180).unwrap();
+        let light = Illumination::normal(0.532).in_band();
+        let converted = cell
+            .response(&light, 180, &Silent)
+            .and_then(CellResponse::focused)
+            .unwrap();
         let hands = in_band(&cell, 180);
         for number in [1, 37, 180] {
             let at = solved.at(PILLARS.drawn_rotation(number), Handedness::Left);

@@ -120,6 +120,7 @@ impl RotationSamples {
             focused,
             converted: signs.map(|sign| of(sign, 0)),
             unconverted: signs.map(|sign| of(sign, 1)),
+            rotation: None,
         }
     }
 }
@@ -130,7 +131,7 @@ mod tests {
     use super::super::BAND_ORDERS;
     use super::super::RotatedCell;
     use super::*;
-    use crate::{CellModel, PolarisedTables};
+    use crate::PolarisedTables;
 
     /// Sums of two dozen numbers of size one; the solver tells left from right to 1e-9.
     const SAME: f64 = 1e-6;
@@ -145,7 +146,7 @@ mod tests {
         let numbers: Vec<u16> = (0..=PILLARS.steps).collect();
         for focused in [Handedness::Left, Handedness::Right] {
             let cell = RotatedCell::new(titania(), PILLARS, focused);
-            let Some(PolarisedTables::Hands(wanted)) = cell.polarised_in_band(0.532, PILLARS.steps).unwrap() else {
+            let PolarisedTables::Hands(wanted) = cell.both_hands(0.532, true, PILLARS.steps).unwrap() else {
                 panic!("it knows both hands")
             };
             let found = kept.hands(PILLARS, &numbers, focused);

@@ -11,7 +11,7 @@ pub(super) type Channels = [Complex64; 2];
 
 /// Fourier series over a quarter turn, after which all repeats: coefficients of `exp(4 i m rotation)`, for m from minus half their
 /// number.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Series {
     coefficients: Vec<Channels>,
 }

@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use metalith_cell::{
-    Blaze, CellModel, CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, PointwiseCell, RealRow,
-    SiteGrid,
+    Blaze, CellModel, CellResponse, CoarseCell, ElementRow, Illumination, JonesTables, Mapping, NeighbourTable,
+    NeighbourTableSpec, PointwiseCell, RealRow, SiteGrid,
 };
 use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -90,7 +90,11 @@ impl Prototype {
         let as_lit = if along_normal {
             [normal.clone(), normal.clone()]
         } else {
-            equal.oblique(um, sines, widest).unwrap().unwrap().kept
+            let light = Illumination::from_direction(um, sines).oblique();
+            match equal.response(&light, widest, &Silent).unwrap() {
+                CellResponse::Jones(JonesTables::Oblique(tables)) => tables.kept,
+                other => panic!("{other:?}"),
+            }
         };
         let normal = [normal.clone(), normal];
         let table = self.neighbours(um, sines);

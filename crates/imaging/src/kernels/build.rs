@@ -190,7 +190,7 @@ impl Builder<'_> {
         };
         let lit = self.light.lit(wavelength, sines);
         // The PSF has no structure finer than wavelength / (2 NA).
-        let aperture = (lit.element.radius_um() / view.sensor_um).atan().sin();
+        let aperture = (lit.radius_um() / view.sensor_um).atan().sin();
         let quarter = self.spec.pixel_um / QUARTERS as f64;
         let within = (quarter * 4.0 * aperture / um).ceil().max(1.0) as usize;
         let window = Window {
@@ -199,7 +199,7 @@ impl Builder<'_> {
             samples: side * within,
             distance_um: view.distance_um(landing),
         };
-        let accuracy = match self.spec.accurate || lit.element.radius_um() < SMALL_UM {
+        let accuracy = match self.spec.accurate || lit.radius_um() < SMALL_UM {
             true => Accuracy::Accurate,
             false => Accuracy::Fast,
         };

@@ -64,13 +64,13 @@ impl StrayLight {
                     // Where light arrives in two polarisations one stands for both: their tables differ in obliquely lit
                     // cells alone.
                     let departing = light.departing(*i);
-                    let parts = if lit.share < 1.0 {
+                    let parts = if lit.weight < 1.0 {
                         &departing[..1]
                     } else {
                         &departing[..]
                     };
                     let of = |(table, order): &(&_, i32)| {
-                        let aperture = lit.element.lit_aperture(table, &lit.light);
+                        let aperture = chip.distinct[distinct].made.lit_aperture(table, &lit.light);
                         (
                             *order,
                             LocalAngularSpectrum::of(&aperture, all[*i] * 1e-3, distance_um, BLOCKS),

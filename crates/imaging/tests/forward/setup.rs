@@ -59,7 +59,7 @@ pub struct Setup {
 
 impl Setup {
     pub fn chip(&self) -> ChipInLight<'_> {
-        let case = SimulationCase::Cell(self.cells[0].as_ref());
+        let case = SimulationCase::from(self.cells[0].as_ref());
         ChipInLight::new(
             &self.design,
             &self.extraction,

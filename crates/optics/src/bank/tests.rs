@@ -3,7 +3,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::grid::change_of;
 use super::*;
 use crate::RealisedCells;
-use metalith_cell::BAND_ORDERS;
+use metalith_cell::{BAND_ORDERS, Illumination};
 use metalith_core::Silent;
 use metalith_pillars::{PillarShape, UprightRectangles};
 use metalith_rcwa::Material;
@@ -40,7 +40,9 @@ fn pillars_between_the_nodes_are_those_solved_exactly_and_none_beyond_them_is_th
     let widths: Vec<f64> = (0..24).map(|k| 150.4 + 2.0 * f64::from(k)).collect();
     let table = bank.transmissions(&change, BAND_ORDERS, &widths, 0.53).unwrap();
     let exact = RealisedCells::new(perturbed(bank.stated(), &change), 0.4);
-    let exact = exact.solve_in_band(&widths, 0.53, [0.0; 2], &Silent).unwrap();
+    let exact = exact
+        .solve(&widths, &Illumination::normal(0.53).in_band(), &Silent)
+        .unwrap();
     let pairs = table.pillars[0].iter().zip(&exact.pillars[0]);
     let rms = (pairs.map(|(a, b)| (a - b).norm_sqr()).sum::<f64>() / widths.len() as f64).sqrt();
     assert!(rms < RMS, "rms {rms}");

@@ -18,7 +18,7 @@ use super::cells::SolvedWidths;
 use super::{CalibratedModel, CellBank, CellChange, DeclaredQuantity};
 use metalith_cell::{
     AxisTables, BAND_ORDERS, CellStack, FocusedLight, HandTables, Handedness, ORDERS, PassedTable, PolarisationAxis,
-    PolarisedLight, PolarisedTables, RotationSamples, UPRIGHT_ORDERS,
+    PolarisedTables, RotationSamples, Spectral, UPRIGHT_ORDERS,
 };
 use metalith_core::{Error, Progress, Result};
 use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles};
@@ -40,28 +40,8 @@ impl RectangleClass {
     };
 }
 
-/// A wavelength (um): one of few, or one of many that a band is averaged over.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum RectangleColour {
-    Single(f64),
-    OfBand(f64),
-}
-
-impl RectangleColour {
-    pub fn um(self) -> f64 {
-        match self {
-            Self::Single(um) | Self::OfBand(um) => um,
-        }
-    }
-
-    /// Wavelength and orders that banks of pillars of a shape are solved with.
-    fn of_bank(self, shape: PillarShape) -> (f64, usize) {
-        match self {
-            Self::Single(um) => (um, bank_orders(shape)),
-            Self::OfBand(um) => (um, BAND_ORDERS),
-        }
-    }
-}
+/// A wavelength (um), and how closely it is looked at.
+pub(super) type Colour = (f64, Spectral);
 
 /// Diffraction orders an axis that a bank of pillars of a shape is solved with at single wavelengths. Those of upright rectangles are as many
 /// as of pillars as drawn: with fewer, those of a lens beside a resonance have a Strehl ratio that is off by two in a hundred.
@@ -81,11 +61,10 @@ enum RowSource {
     Solved(Box<SolvedRectangles>),
 }
 
-/// The rectangles of a chip, and the light that they are in.
+/// The rectangles of a chip.
 pub(super) struct MadeRectangles {
     pillars: Rectangles,
     focused: FocusedLight,
-    pub polarised: PolarisedLight,
     source: RowSource,
 }
 
@@ -94,12 +73,7 @@ impl MadeRectangles {
     ///
     /// # Errors
     /// If they are no such rectangles, or the model has what they have no meaning for.
-    pub fn new(
-        stated: &CellStack,
-        model: &CalibratedModel,
-        focused: FocusedLight,
-        polarised: PolarisedLight,
-    ) -> Result<Self> {
+    pub fn new(stated: &CellStack, model: &CalibratedModel, focused: FocusedLight) -> Result<Self> {
         let pillars = stated.shape.rectangles();
         let fits = matches!(
             (pillars, focused),
@@ -117,7 +91,6 @@ impl MadeRectangles {
         Ok(Self {
             pillars,
             focused,
-            polarised,
             source: RowSource::Solved(Box::new(SolvedRectangles::new(stated.clone(), pillars))),
         })
     }
@@ -147,7 +120,7 @@ impl MadeRectangles {
         &self,
         change: &CellChange,
         classes: &[RectangleClass],
-        colour: RectangleColour,
+        (um, spectral): Colour,
         progress: &dyn Progress,
     ) -> Result<PolarisedTables> {
         let mut places: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
@@ -161,10 +134,10 @@ impl MadeRectangles {
         numbers.dedup();
         let (rows, bare) = match &self.source {
             RowSource::Bank(bank) => {
-                let colour = colour.of_bank(bank.stated().shape);
-                bank.rectangles(change, colour, &biases, &numbers)?
+                let orders = spectral.choose(bank_orders(bank.stated().shape), BAND_ORDERS);
+                bank.rectangles(change, (um, orders), &biases, &numbers)?
             }
-            RowSource::Solved(solved) => solved.rows(change, colour, &biases, &numbers, progress)?,
+            RowSource::Solved(solved) => solved.rows(change, (um, spectral), &biases, &numbers, progress)?,
         };
         let found = Found {
             classes,
@@ -273,6 +246,7 @@ impl Found<'_> {
             focused,
             converted: bare.converted.each_ref().map(|t| self.room(t[0], Complex64::ZERO)),
             unconverted: bare.unconverted.each_ref().map(|t| self.room(t[0], Complex64::ONE)),
+            rotation: None,
         };
         for (row, members) in self.rows.iter().zip(self.members) {
             let numbers: Vec<u16> = members.iter().map(|class| self.classes[*class].number).collect();

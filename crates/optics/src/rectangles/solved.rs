@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use super::kept;
 use super::rows::{RowOrders, bare_row, row_length, solve_row};
-use super::{RectangleColour, RowsOfBiases};
+use super::{Colour, RowsOfBiases};
 use crate::bank::Axis;
 use crate::rational::{around, rational};
 use crate::{CellChange, perturbed};
@@ -53,15 +53,12 @@ impl SolvedRectangles {
     pub fn rows(
         &self,
         change: &CellChange,
-        colour: RectangleColour,
+        (um, spectral): Colour,
         biases_nm: &[f64],
         numbers: &[u16],
         progress: &dyn Progress,
     ) -> Result<RowsOfBiases> {
-        let (um, orders) = match colour {
-            RectangleColour::Single(um) => (um, RowOrders::AsDrawn),
-            RectangleColour::OfBand(um) => (um, RowOrders::Given(BAND_ORDERS)),
-        };
+        let orders = spectral.choose(RowOrders::AsDrawn, RowOrders::Given(BAND_ORDERS));
         let etched = perturbed(&self.stated, change);
         let row = |bias: &f64| self.row(&etched, (um, orders), *bias, numbers, progress);
         let bare = bare_row(&etched, self.pillars, numbers.len(), um)?;

@@ -225,7 +225,7 @@ fn add_scaled((re, im): (&mut [f32], &mut [f32]), by: f32, (a_re, a_im): (&[f32]
 
 #[cfg(test)]
 mod tests {
-    use metalith_cell::{CellModel, Fidelity, SiteResponse};
+    use metalith_cell::{CellModel, CellResponse, Fidelity, Illumination, NeighbourTables, SiteResponse};
     use metalith_core::Silent;
     use metalith_design::array::PillarRule;
     use metalith_design::{Design, cell_models};
@@ -282,10 +282,11 @@ mod tests {
 
         /// The field at the focus, site by site, each among the twelve pillars about it.
         fn of_sites(&self, widths: &PillarMap, wavelength_um: f64) -> Complex64 {
-            let response = self
-                .cell
-                .among_neighbours_in_band(wavelength_um, &|_| [0.0; 2], &Silent);
-            let response = response.unwrap().unwrap();
+            let light = Illumination::normal(wavelength_um).in_band();
+            let response = self.cell.response(&light, 0, &Silent).unwrap();
+            let CellResponse::Neighbours(NeighbourTables::Band(response)) = response else {
+                panic!("it knows its neighbours")
+            };
             let field = RingField::new(&self.lens.rings, wavelength_um, self.lens.gap_um);
             let n = widths.lattice.sites() as i32;
             let width = |x: i32, y: i32| {

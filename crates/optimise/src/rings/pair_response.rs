@@ -10,7 +10,9 @@ use num_complex::Complex64;
 use crate::rings::kernel::RingField;
 use crate::rings::links::{DISTANCES, distance_of};
 use crate::rings::sites::Rings;
-use metalith_cell::{CellModel, NEIGHBOUR_DEGREE, NEIGHBOURS, SiteResponse};
+use metalith_cell::{
+    CellModel, CellResponse, Illumination, NEIGHBOUR_DEGREE, NEIGHBOURS, NeighbourTables, SiteResponse,
+};
 use metalith_core::{Result, Silent};
 
 /// Products that a pair at any distance is a sum of: for each distance those of [`SiteResponse::pair_factors`].
@@ -31,13 +33,17 @@ impl PairResponse {
     /// Response of pillars of these widths (nm); `None` if the cell takes neighbours for equals.
     ///
     /// # Errors
-    /// As [`CellModel::among_neighbours_in_band`].
+    /// As [`CellModel::response`].
     pub fn of(
         cell: &dyn CellModel,
         wavelength_um: f64,
         widths_nm: impl IntoIterator<Item = u16>,
     ) -> Result<Option<Self>> {
-        let Some(response) = cell.among_neighbours_in_band(wavelength_um, &|_| [0.0; 2], &Silent)? else {
+        if cell.uncoupled().is_none() {
+            return Ok(None);
+        }
+        let light = Illumination::normal(wavelength_um).in_band();
+        let CellResponse::Neighbours(NeighbourTables::Band(response)) = cell.response(&light, 0, &Silent)? else {
             return Ok(None);
         };
         let widths: BTreeSet<u16> = widths_nm.into_iter().filter(|w| *w > 0).collect();

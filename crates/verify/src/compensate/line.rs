@@ -2,7 +2,9 @@
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder};
+use metalith_cell::{
+    CellModel, CellResponse, JonesTables, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder,
+};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_optics::{AsBuiltChip, CalibratedModel, Perturbation};
@@ -94,9 +96,9 @@ impl Line {
             stated,
             made: Vec::new(),
         };
-        let found = self.stated.drawn_rectangles(&self.drawn, 0, wavelength_um, progress)?;
-        if let Some((PolarisedTables::Axes(tables), _)) = found {
-            let both = PolarisationAxis::ALL.into_iter().zip(tables.along);
+        if lit.focused.is_some() {
+            let along = along_axes(&self.stated, &self.drawn, 0, wavelength_um, progress)?;
+            let both = PolarisationAxis::ALL.into_iter().zip(along);
             return Ok(both.map(|(axis, table)| colour(Some(axis), table)).collect());
         }
         let wide = self.drawn.last().copied().unwrap_or(0);
@@ -151,16 +153,26 @@ fn made(
     colour: &ColourTransmissions,
     progress: &dyn Progress,
 ) -> Result<Vec<Complex64>> {
-    let Some(axis) = colour.axis else {
-        return chip.drawn_widths(drawn, step, colour.wavelength_um, progress);
+    let um = colour.wavelength_um;
+    let table = match colour.axis {
+        None => chip.pillars(drawn, step, um, progress)?.focused()?,
+        // Those of both axes are solved together, and remembered.
+        Some(axis) => along_axes(chip, drawn, step, um, progress)?.swap_remove(axis.index()),
     };
-    // Those of both axes are solved together, and remembered.
-    match chip.drawn_rectangles(drawn, step, colour.wavelength_um, progress)? {
-        Some((PolarisedTables::Axes(tables), _)) => {
-            let table = &tables.along[axis.index()];
-            Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
-        }
-        _ => unreachable!("pillars that were told apart along this axis"),
+    Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
+}
+
+/// What upright rectangles of a chip transmit of light along x and along y, by their number.
+fn along_axes(
+    chip: &AsBuiltChip,
+    drawn: &[u16],
+    step: i32,
+    wavelength_um: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<Complex64>>> {
+    match chip.pillars(drawn, step, wavelength_um, progress)? {
+        CellResponse::Jones(JonesTables::Polarised(PolarisedTables::Axes(tables))) => Ok(tables.along.into()),
+        other => unreachable!("pillars that were told apart along both axes: {other:?}"),
     }
 }
 
