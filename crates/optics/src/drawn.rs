@@ -33,7 +33,7 @@ impl<'a> DrawnCells<'a> {
         }
     }
 
-    /// What pillars do to a light.
+    /// Response of pillars to a light.
     ///
     /// # Errors
     /// As [`CellModel::response`].
@@ -41,7 +41,7 @@ impl<'a> DrawnCells<'a> {
         self.ask(self.cell, light, progress)
     }
 
-    /// What pillars with equal neighbours do to a light.
+    /// Response of pillars with equal neighbours to a light.
     ///
     /// # Errors
     /// As [`CellModel::response`].

@@ -162,7 +162,7 @@ fn made(
     Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
 }
 
-/// What upright rectangles of a chip transmit of light along x and along y, by their number.
+/// Transmission of upright rectangles of a chip for light along x and along y, by their number.
 fn along_axes(
     chip: &AsBuiltChip,
     drawn: &[u16],
