@@ -68,7 +68,7 @@ pub struct ComparisonResult {
     /// Rows and columns that they were given in, if those are finer than a camera is simulated with: they are averaged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub averaged_from: Option<[usize; 2]>,
-    /// Digest of the sensor and its light.
+    /// Name of the camera file: its sensor and its light.
     pub camera: String,
     /// Seed of the noise.
     pub seed: u64,
