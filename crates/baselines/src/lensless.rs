@@ -125,8 +125,8 @@ impl LenslessBench {
     /// exposure.
     ///
     /// # Errors
-    /// If a channel counts no visible light, the camera tells no three colours apart, the sensor is one line of pixels, or the scene
-    /// is near.
+    /// If a channel counts no visible light, the camera distinguishes no three colours, the sensor is one line of
+    /// pixels, or the scene is near.
     pub fn new(camera: &Camera, view: SceneView, step_nm: f64) -> Result<Self> {
         if !(view.field_deg > 0.0 && view.field_deg < WIDEST_DEG) {
             return Err(Error::refused(

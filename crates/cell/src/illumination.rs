@@ -13,7 +13,7 @@ pub struct Illumination<'a> {
     /// The direction that an element looks in, by wavelength (um): coupled models, which have tables of one direction, are solved
     /// for it. None stands for the direction of the light that arrives, at all wavelengths.
     pub viewing: Option<&'a (dyn Fn(f64) -> [f64; 2] + Sync)>,
-    /// Polarisation of source and analyser, which counts where pillars tell polarisations apart.
+    /// Polarisation of source and analyser, which counts where pillars distinguish polarisations.
     pub polarised: PolarisedLight,
     pub spectral: Spectral,
 }

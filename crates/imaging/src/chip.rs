@@ -147,8 +147,8 @@ impl<'a> ChipInLight<'a> {
         })
     }
 
-    /// A distinct element in the light of some wavelengths, by their indices. Where pillars have unlike neighbours, each
-    /// wavelength takes two bytes a site.
+    /// A distinct element in the light of some wavelengths, by their indices. Where pillars have dissimilar neighbours,
+    /// each wavelength takes two bytes a site.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.

@@ -354,8 +354,8 @@ impl ClassFields {
     }
 
     /// Tables of light whose direction is asked for, each with how often it has the phase of the element: as those of
-    /// [`PolarisedTables::departing`](metalith_cell::PolarisedTables::departing) where pillars tell polarisations apart, with the power
-    /// of what passes; else those of all light.
+    /// [`PolarisedTables::departing`](metalith_cell::PolarisedTables::departing) where pillars distinguish
+    /// polarisations, with the power of what passes; else those of all light.
     pub fn departing(&self) -> Vec<(&ClassTable, i32)> {
         match &self.departing {
             Some(departing) => departing.iter().map(|(table, order)| (table, *order)).collect(),

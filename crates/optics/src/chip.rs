@@ -1,4 +1,4 @@
-//! The chip as made: a stated cell and a perturbation, for any layout and light.
+//! The chip as fabricated: a stated cell and a perturbation, for any layout and light.
 
 use std::cell::RefCell;
 use std::path::Path;

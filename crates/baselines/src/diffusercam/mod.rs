@@ -102,8 +102,8 @@ impl DiffuserCam {
     /// Camera of a surface before the sensor of a camera.
     ///
     /// # Errors
-    /// If the camera tells no colours apart, the scene is near, no light reaches the sensor, or scene and caustic have too many
-    /// places.
+    /// If the camera distinguishes no colours, the scene is near, no light reaches the sensor, or scene and caustic
+    /// have too many places.
     pub fn new(spec: &DiffuserSpec, camera: &Camera, view: SceneView, progress: &dyn Progress) -> Result<Self> {
         let bench = LenslessBench::new(camera, view, STEP_NM)?;
         let pixel = camera.sensor.pixel_um;

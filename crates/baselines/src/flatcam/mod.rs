@@ -51,7 +51,7 @@ impl FlatCam {
     /// those that will be taken.
     ///
     /// # Errors
-    /// If the camera tells no colours apart, the scene is near, a decomposition fails, or the user stopped it.
+    /// If the camera distinguishes no colours, the scene is near, a decomposition fails, or the user stopped it.
     pub fn new(mask: &MaskSpec, camera: &Camera, view: SceneView, progress: &dyn Progress) -> Result<Self> {
         let bench = LenslessBench::new(camera, view, STEP_NM)?;
         let [rows, columns] = bench.frame();

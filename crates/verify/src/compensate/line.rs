@@ -119,7 +119,7 @@ impl Line {
         steps.unwrap_or_else(|| vec![0; drawn.number.len()])
     }
 
-    /// Solve all pillars that may be drawn as made, for these steps of density at the least and at the most.
+    /// Solve all pillars that may be drawn as fabricated, for these steps of density at the least and at the most.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.

@@ -13,8 +13,8 @@ use metalith_wave::Aperture;
 
 impl ElementSimulator<'_> {
     /// Orders into which light goes, at each wavelength in each case, along the normal. Where widths follow density,
-    /// their mean over the element counts; where cells know unlike neighbours, the sites of the element in light from
-    /// the middle of its field.
+    /// their mean over the element counts; where cells are coupled, the sites of the element in light from the middle
+    /// of its field.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
