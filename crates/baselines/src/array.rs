@@ -24,7 +24,7 @@ pub struct ArrayCamera<'a> {
 const LEAST_WEIGHT: f32 = 0.02;
 
 impl<'a> ArrayCamera<'a> {
-    /// For an imaging system and these methods, by all elements at once and, if asked for, by each alone.
+    /// Camera for an imaging system and these methods, by all elements at once and, if asked for, by each alone.
     pub fn new(system: &'a ImagingSystem, methods: &[RestorationMethod], separate: bool) -> Self {
         let restoration = system.restoration();
         let error = ForecastScene::new(system, &restoration).operator_error;
@@ -43,7 +43,7 @@ impl<'a> ArrayCamera<'a> {
         }
     }
 
-    /// With learnt last stages, each a further way.
+    /// Same camera with learnt last stages, each a further method.
     #[must_use]
     pub fn with_stages(mut self, stages: Vec<Stage>) -> Self {
         self.stages = stages;

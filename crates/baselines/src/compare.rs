@@ -14,15 +14,15 @@ use crate::cpu::{cpu_seconds, since};
 /// Scores of one way of making pictures, in all zones.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MethodScores {
-    /// None for the bare frame.
+    /// Method; `None` for the bare frame.
     pub way: Option<Method>,
     /// Over the photographs: PSNR of the mean squared error, mean of SSIM.
     pub mean: Vec<ZoneScore>,
     /// One less the learned perceptual distance (LPIPS) of sRGB values, mean over the photographs; none without its weights.
     pub one_less_lpips: Option<f64>,
-    /// For a picture (s), if the system tells; of a bare frame, none.
+    /// CPU time for a picture (s), if the system reports it; `None` for a bare frame.
     pub cpu_s: Option<f64>,
-    /// Of each photograph, in their order.
+    /// Scores of each photograph, in their order.
     pub photographs: Vec<Vec<ZoneScore>>,
 }
 
@@ -31,7 +31,7 @@ pub struct MethodScores {
 pub struct ComparedCamera {
     /// Name in the table.
     pub name: String,
-    /// What it is, in a sentence.
+    /// Description in a sentence.
     pub words: String,
     /// Angle from the left to the right edge of its scenes (degrees).
     pub field_deg: f64,
@@ -39,7 +39,7 @@ pub struct ComparedCamera {
     pub ways: Vec<MethodScores>,
     /// To simulate a frame (s), if the system tells.
     pub frame_cpu_s: Option<f64>,
-    /// What limits its restorations, in words, if something but its frames does.
+    /// Limit of its restorations, in words, if something but its frames limits them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<String>,
     /// The first photograph; it is not kept with the scores.
@@ -54,7 +54,7 @@ pub struct Shown {
     pub scene: Array3<f64>,
     pub frame: Frame,
     pub channel_names: Vec<String>,
-    /// By each way, linear sRGB.
+    /// Pictures by each method, linear sRGB.
     pub pictures: Vec<Array3<f64>>,
 }
 
@@ -68,9 +68,9 @@ pub struct ComparisonResult {
     /// Rows and columns that they were given in, if those are finer than a camera is simulated with: they are averaged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub averaged_from: Option<[usize; 2]>,
-    /// Of the sensor and its light.
+    /// Name of the camera file: its sensor and its light.
     pub camera: String,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
     pub cameras: Vec<ComparedCamera>,
 }

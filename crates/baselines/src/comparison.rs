@@ -17,7 +17,7 @@ use crate::lensless::of_one_wavelength;
 use crate::stage::Stage;
 use crate::{ArrayCamera, BaselineCamera, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
 
-/// What is compared: designs, cameras without a lens, photographs, and how.
+/// Comparison: designs, cameras without a lens, photographs, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Comparison {
@@ -27,13 +27,13 @@ pub struct Comparison {
     pub lensless: Vec<Lensless>,
     /// Names of the ways to restore the frames of designs.
     pub methods: Vec<String>,
-    /// By each element of an array alone too.
+    /// True for pictures by each element of an array alone too.
     pub separate: bool,
     /// Each design also as the paper assumes such cameras to be, and those without a lens with one wavelength a colour.
     pub paper: bool,
     /// Angle from the left to the right edge of a photograph (degrees).
     pub field_deg: f64,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
     pub photographs: Vec<PathBuf>,
     /// Photographs are cut to the square of so many pixels in their middle.
@@ -51,7 +51,7 @@ pub struct Comparison {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ListedDesign {
-    /// That of the design if left out.
+    /// Name; the name of the design if left out.
     pub name: Option<String>,
     pub design: PathBuf,
     pub layout: PathBuf,
@@ -76,18 +76,18 @@ pub struct OpenComparison<'a> {
     pub(crate) of: &'a Comparison,
     pub(crate) camera: Camera,
     methods: Vec<RestorationMethod>,
-    /// With the camera of each.
+    /// Designs with the camera of each.
     pub(crate) designs: Vec<(Design, Camera)>,
-    /// In the pixels that all cameras are simulated in.
+    /// Photographs in the pixels that all cameras are simulated in.
     pub(crate) photographs: Vec<SceneImage>,
-    /// As they were given.
+    /// View of the photographs as they were given.
     given: SceneView,
     pub(crate) stages: Vec<Stage>,
-    /// What pictures are judged by too.
+    /// Perceptual distance that pictures are also scored by.
     perceptual: Option<PerceptualDistance>,
 }
 
-/// What is done with a camera that is ready: it, its name and words in the table, its photographs.
+/// Callback for a camera that is ready: it, its name and words in the table, its photographs.
 pub(crate) type Ready<'f> = dyn FnMut(&dyn BaselineCamera, (&str, &str), &[SceneImage]) -> Result<()> + 'f;
 
 impl Comparison {
@@ -209,7 +209,7 @@ impl OpenComparison<'_> {
         self.take_first(k, self.photographs.len(), cache, progress)
     }
 
-    /// The same of the first so many photographs, of all if there are no more.
+    /// Takes the first so many photographs, or all if there are no more.
     ///
     /// # Errors
     /// As [`OpenComparison::take`].

@@ -21,20 +21,21 @@ pub(crate) struct Followed {
 }
 
 impl Followed {
-    /// Whether a last stage was taught for it. One that does not say what the layout did to light is taken at its word.
+    /// True if a last stage was trained for it. One that does not say what the layout did to light is taken at its
+    /// word.
     fn is_of(&self, kind: StageKind, provenance: &Provenance) -> bool {
         self.is_like(kind, provenance) && (provenance.optics.is_none() || provenance.optics == self.optics)
     }
 
-    /// The same whatever the layout does to light.
+    /// True if a last stage was trained for it, whatever the layout does to light.
     fn is_like(&self, kind: StageKind, provenance: &Provenance) -> bool {
         self.kinds.contains(&kind) && self.camera == provenance.camera
     }
 }
 
 impl OpenComparison<'_> {
-    /// What a last stage must be taught for to follow camera `k` of the table, counted without those that have the assumptions of
-    /// others: no stage follows these.
+    /// Requirement on the training of a last stage to follow camera `k` of the table, counted without cameras that have
+    /// the assumptions of others: no stage follows these.
     pub(crate) fn followed(&self, k: usize) -> Result<Followed> {
         let first = self.photographs[0].view;
         if let Some(k) = k.checked_sub(self.designs.len()) {
@@ -99,7 +100,8 @@ impl OpenComparison<'_> {
         Ok(())
     }
 
-    /// What is to be known of the last stages that are used: those of arrays whose weights do not say what the layout did to light.
+    /// Notes on the last stages that are used: on stages of arrays whose weights do not say what the layout did to
+    /// light.
     pub fn notes(&self) -> Vec<String> {
         let silent = |stage: &Stage| stage.kind.is_of_design() && stage.provenance().optics.is_none();
         let all = self.stages.iter().zip(&self.of.learnt);

@@ -12,7 +12,8 @@ use ndarray::Array3;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-/// What a network makes one picture of. All have the same layers and, but for the blend, the same number of weights.
+/// Kind of the pictures that a network makes one picture of. All have the same layers and, but for the blend, the same
+/// number of weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StageKind {
     /// Pictures by Tikhonov of a mask's frame, by five strengths: after FlatNet (Khan et al., IEEE Trans. Pattern Anal. Mach.
@@ -56,7 +57,7 @@ impl StageKind {
         }
     }
 
-    /// Whether it is of the chip of a design.
+    /// True if it is of the chip of a design.
     pub fn is_of_design(self) -> bool {
         matches!(self, Self::MultiWiener | Self::Blending)
     }
@@ -84,7 +85,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Of a file that `metalith train --stage` wrote.
+    /// Stage of a file that `metalith train --stage` wrote.
     ///
     /// # Errors
     /// If it cannot be read, is damaged, or is of another network.
@@ -96,7 +97,7 @@ impl Stage {
         })
     }
 
-    /// What it was taught for.
+    /// Provenance: what it was trained for.
     pub fn provenance(&self) -> &Provenance {
         self.post_processor.provenance()
     }

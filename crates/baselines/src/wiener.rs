@@ -17,7 +17,7 @@ use crate::stage::PICTURES;
 /// half of the way to each corner.
 const PLACES: [[f64; 2]; PICTURES] = [[0.0, 0.0], [-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5]];
 
-/// What deconvolutions of one camera have in common.
+/// Parts that deconvolutions of one camera share.
 struct Tiles<'a> {
     system: &'a ImagingSystem,
     fft: SquareFft,
@@ -25,7 +25,7 @@ struct Tiles<'a> {
     first: Vec<[i64; 2]>,
     /// The element whose axis is nearest to each pixel.
     nearest: Array2<u16>,
-    /// What slopes and bends count of each frequency, over the power of scenes on this sensor.
+    /// Weights of slopes and bends at each frequency, over the power of scenes on this sensor.
     prior: Vec<f32>,
 }
 

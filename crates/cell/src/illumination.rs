@@ -13,7 +13,7 @@ pub struct Illumination<'a> {
     /// The direction that an element looks in, by wavelength (um): coupled models, which have tables of one direction, are solved
     /// for it. None stands for the direction of the light that arrives, at all wavelengths.
     pub viewing: Option<&'a (dyn Fn(f64) -> [f64; 2] + Sync)>,
-    /// Polarisation of source and analyser, which counts where pillars tell polarisations apart.
+    /// Polarisation of source and analyser, which counts where pillars distinguish polarisations.
     pub polarised: PolarisedLight,
     pub spectral: Spectral,
 }
@@ -28,14 +28,14 @@ pub enum Incidence {
     Oblique,
 }
 
-/// How closely resonances are looked at.
+/// Spectral resolution: how finely resonances are resolved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Spectral {
     /// A wavelength that figures are reported for.
     #[default]
     Exact,
-    /// One of many wavelengths that a band is averaged over, where a resonance that is off its place by a fraction of a nanometre does
-    /// not show: a model may solve it more coarsely.
+    /// Wavelength of many that a band is averaged over, where a resonance that is off its place by a fraction of a
+    /// nanometre does not show: a model may solve it more coarsely.
     InBand,
 }
 
@@ -67,7 +67,7 @@ impl Illumination<'_> {
         }
     }
 
-    /// The same at one of many wavelengths of a band.
+    /// Same light at one of many wavelengths of a band.
     #[must_use]
     pub fn in_band(self) -> Self {
         Self {
@@ -76,7 +76,7 @@ impl Illumination<'_> {
         }
     }
 
-    /// The same on cells that are solved for the direction of the light.
+    /// Same light on cells that are solved for its direction.
     #[must_use]
     pub fn oblique(self) -> Self {
         Self {

@@ -104,13 +104,13 @@ impl FromStr for Fidelity {
     }
 }
 
-/// How pillars of a lattice pass light into its zero order. A model is one implementation of this: [`CellModel::response`] answers, the
-/// others are facts.
+/// Model of how pillars of a lattice pass light into its zeroth order. A model is one implementation of this:
+/// [`CellModel::response`] answers, the others are facts.
 pub trait CellModel: Sync {
     /// Fidelity of the model.
     fn fidelity(&self) -> Fidelity;
 
-    /// What pillars up to a width (nm) or number do to light.
+    /// Response of pillars up to a width (nm) or number to light.
     ///
     /// A model of lattices of equal pillars that knows oblique light answers for [`Illumination::cell_sines`], one that does not answers
     /// for light along the normal. A coupled model answers for [`Illumination::coupled_sines`]. Directions of cells on a square
@@ -128,7 +128,8 @@ pub trait CellModel: Sync {
     /// If the wavelength is outside what the model or its materials cover.
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64>;
 
-    /// Of a coupled model, the model of lattices of equal pillars that answers where the neighbours of a pillar are not known.
+    /// Model of lattices of equal pillars, for a coupled model, that answers where the neighbours of a pillar are not
+    /// known.
     fn uncoupled(&self) -> Option<&dyn CellModel> {
         None
     }

@@ -1,4 +1,4 @@
-//! Rectangular pillars, rotated: cells that tell polarisations apart.
+//! Rectangular pillars, rotated: cells that distinguish polarisations.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! What a cell model answers.
+//! Response: the answer of a cell model.
 
 use num_complex::Complex64;
 
@@ -6,10 +6,10 @@ use metalith_core::{Error, Result};
 
 use crate::{BandResponse, FittedNeighbours, PolarisedLight, PolarisedTables};
 
-/// What pillars do to light. Transmissions are by the width (nm) or the number of the pillar, from zero to the largest that was asked
-/// for: field ratios, from a plane wave in the substrate at the plane of the pillar base to air at the plane of the pillar tops;
-/// exp(-i w t), so that a wider pillar has a larger phase. Entry 0 stands for a site without pillar, where the layout is blocked: it
-/// is 0.
+/// Response of pillars to light. Transmissions are by the width (nm) or the number of the pillar, from zero to the
+/// largest that was asked for: field ratios, from a plane wave in the substrate at the plane of the pillar base to air
+/// at the plane of the pillar tops; exp(-i w t), so that a wider pillar has a larger phase. Entry 0 stands for a site
+/// without pillar, where the layout is blocked: it is 0.
 #[derive(Clone, Debug)]
 pub enum CellResponse {
     /// Transmissions of light of any polarisation, which pillars keep.
@@ -23,18 +23,18 @@ pub enum CellResponse {
 /// Transmissions by the polarisation that arrives and the one that leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub enum JonesTables {
-    /// Of pillars in oblique light, for s and p.
+    /// Tables of pillars in oblique light, for s and p.
     Oblique(ObliqueTables),
-    /// Of pillars that give polarisations unlike phases, along the normal.
+    /// Tables of pillars that give polarisations dissimilar phases, along the normal.
     Polarised(PolarisedTables),
 }
 
 /// Transmissions of pillars among dissimilar neighbours.
 #[derive(Clone, Debug)]
 pub enum NeighbourTables {
-    /// At a single wavelength, for s and p.
+    /// Tables at a single wavelength, for s and p.
     Fitted(FittedNeighbours),
-    /// At one of many wavelengths of a band, between those that have tables, s and p as one.
+    /// Tables at one of many wavelengths of a band, between those that have tables, s and p as one.
     Band(BandResponse),
 }
 
@@ -55,7 +55,7 @@ impl CellResponse {
         }
     }
 
-    /// Of pillars that give polarisations unlike phases, their tables.
+    /// Tables of pillars that give polarisations dissimilar phases.
     pub fn polarised(&self) -> Option<&PolarisedTables> {
         match self {
             Self::Jones(JonesTables::Polarised(tables)) => Some(tables),
@@ -82,14 +82,14 @@ impl JonesTables {
 /// mean over those that arrive of the sum over those that leave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObliqueTables {
-    /// What leaves in the polarisation in which it arrived: across the plane of incidence (s), and in it (p).
+    /// Light that leaves in the polarisation in which it arrived: across the plane of incidence (s), and in it (p).
     pub kept: [Vec<Complex64>; 2],
-    /// What arrives as s and leaves as p, and what arrives as p and leaves as s. All zero in planes of symmetry of the
-    /// cell.
+    /// Light that arrives as s and leaves as p, and light that arrives as p and leaves as s. All zero in planes of
+    /// symmetry of the cell.
     pub turned: [Vec<Complex64>; 2],
 }
 
-/// Of light that is not polarised, what arrives in either polarisation.
+/// Share of unpolarised light that arrives in either polarisation.
 pub const POLARISATION_SHARE: f64 = 0.5;
 
 impl ObliqueTables {
@@ -103,7 +103,7 @@ impl ObliqueTables {
 /// Transmissions below this are rounding errors of what symmetry forbids.
 const DARK: f64 = 1e-9;
 
-/// Whether a table passes nothing.
+/// True if a table passes nothing.
 pub fn dark(table: &[Complex64]) -> bool {
     table.iter().all(|t| t.norm() < DARK)
 }

@@ -98,8 +98,8 @@ impl CellStack {
     /// zero leaves the bare substrate.
     ///
     /// # Errors
-    /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are rectangles,
-    /// which no width tells apart: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
+    /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are
+    /// rectangles, which no width distinguishes: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
         if self.shape.rectangles().is_some() {
             return Err(Error::refused(

@@ -195,7 +195,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
         .collect()
 }
 
-/// The cell of unlike neighbours, with tables at the wavelengths that the design is verified at, which are kept in the folder
+/// The coupled model, with tables at the wavelengths that the design is verified at, which are kept in the folder
 /// `cache`.
 ///
 /// # Errors

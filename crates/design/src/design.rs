@@ -198,7 +198,7 @@ impl Design {
         })
     }
 
-    /// The light that pillars give the phase of the design, if they tell polarisations apart.
+    /// The light that pillars give the phase of the design, if they distinguish polarisations.
     pub fn focused(&self) -> Option<FocusedLight> {
         self.cell.focused(self.verify.polarisation)
     }

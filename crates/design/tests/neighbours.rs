@@ -34,8 +34,7 @@ const FIRST_OF_ROWS: f64 = 0.015;
 /// incidence.
 const OF_EQUAL: f64 = 0.5;
 
-/// No row along the normal is met worse than by equal neighbours, but for this: a third of
-/// what is left over.
+/// No row along the normal is met worse than by equal neighbours, but for this: a third of the residual.
 const WORSE: f64 = 0.005;
 
 /// Share of the first order of blazed rows of the truth, mean over where their phase starts and over s and p, rms over

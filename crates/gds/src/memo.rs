@@ -15,7 +15,7 @@ const BOX_SETS: usize = 1 << 8;
 /// Bits of an edge of such a box; longer ones are asked about each time.
 const EDGE_BITS: u32 = 31;
 
-/// Outlines with numbers that are remembered: those with higher ones are told by their corners.
+/// Outlines with numbers that are remembered: those with higher ones are identified by their corners.
 const NUMBERED: usize = 1 << 12;
 
 /// Orientations that an outline may be asked about in.

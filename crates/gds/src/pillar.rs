@@ -178,7 +178,8 @@ mod tests {
         assert_eq!(found.number, Some(37));
     }
 
-    /// Each size in each orientation, twice, one unit longer too: boxes are told by their edges as placed, and by nothing else.
+    /// Each size in each orientation, twice, one unit longer too: boxes are identified by their edges as placed, and by
+    /// nothing else.
     #[test]
     fn upright_pillars_are_told_by_their_edges_in_every_orientation() {
         let pillars = UprightRectangles::of_lengths([90, 100, 150, 200].into_iter()).unwrap();

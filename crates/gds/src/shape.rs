@@ -213,8 +213,8 @@ pub struct Shape<'a> {
 }
 
 impl Shape<'_> {
-    /// The square around it, if it may be a pillar of this shape as it stands, by its box alone; rectangles are told by their
-    /// corners, where they are placed: see [`crate::pillar_of`].
+    /// The square around it, if it may be a pillar of this shape as it stands, by its box alone; rectangles are
+    /// identified by their corners, where they are placed: see [`crate::pillar_of`].
     #[inline]
     pub fn pillar(&self, shape: PillarShape) -> Option<&Rect> {
         match shape {

@@ -20,7 +20,7 @@ use crate::ElementView;
 pub struct DistinctChipElement<'a> {
     pub view: ElementView,
     widths: &'a PillarMap,
-    /// As fabricated.
+    /// Element as fabricated.
     pub made: AsBuiltElement,
     /// Symmetries that leave its pillars and its wedge as they are.
     pub symmetries: Vec<Symmetry>,
@@ -37,7 +37,7 @@ pub struct ChipInLight<'a> {
     pub sampling: Sampling,
     optics: CaseOptics<'a>,
     polarised: PolarisedLight,
-    /// On the path of the chip.
+    /// Change on the path of the chip.
     path: PathChange,
     /// Share of the light that cells send on that pass everything, at each wavelength.
     full: Vec<f64>,
@@ -49,7 +49,7 @@ pub struct ChipInLight<'a> {
 pub struct ElementInLight<'c> {
     chip: &'c ChipInLight<'c>,
     distinct: usize,
-    /// By wavelength of the camera; of those that were not asked for, nothing.
+    /// Fields by wavelength of the camera; `None` for wavelengths that were not asked for.
     classes: Vec<Option<ClassFields>>,
 }
 
@@ -147,8 +147,8 @@ impl<'a> ChipInLight<'a> {
         })
     }
 
-    /// A distinct element in the light of some wavelengths, by their indices. Where pillars have unlike neighbours, each
-    /// wavelength takes two bytes a site.
+    /// A distinct element in the light of some wavelengths, by their indices. Where pillars have dissimilar neighbours,
+    /// each wavelength takes two bytes a site.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
@@ -234,8 +234,8 @@ impl ElementInLight<'_> {
     }
 }
 
-/// What `with` makes of light along the normal at a wavelength of a band (um); cells among neighbours are solved for light from where
-/// the element looks.
+/// Result of `with` for light along the normal at a wavelength of a band (um); coupled cells are solved for light from
+/// the viewing direction of the element.
 fn in_band<T>(
     view: &ElementView,
     um: f64,
@@ -278,7 +278,7 @@ fn distinct_of(
     (distinct, copies)
 }
 
-/// Whether a symmetry turns the wedge of one element into that of another.
+/// True if a symmetry turns the wedge of one element into the wedge of another.
 fn same_wedge(turn: Symmetry, from: &ElementView, to: &ElementView) -> bool {
     /// Sines of the same angle, computed for both signs.
     const ROUNDING: f64 = 1e-12;

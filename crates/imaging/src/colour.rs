@@ -23,7 +23,7 @@ pub fn share(channel: &ChannelSampling, spectrum: &SceneSpectrum) -> f64 {
     sums.0 / sums.1
 }
 
-/// Channels whose colours are closer than this to one another cannot be told apart.
+/// Channels whose colours are closer than this to one another cannot be distinguished.
 const COLOURS: f64 = 1e-3;
 
 impl ChannelColours {

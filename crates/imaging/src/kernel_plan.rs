@@ -115,7 +115,7 @@ struct Inputs<'a> {
     elements: &'a [ElementView],
     camera: &'a Camera,
     model: &'a str,
-    /// The cell that pillars are simulated by, and the wavelengths that it has tables of unlike neighbours for.
+    /// The cell that pillars are simulated by, and the wavelengths that it has tables of dissimilar neighbours for.
     fidelity: Fidelity,
     tabulated_um: &'a [f64],
     /// Light of the scene, and the part of it that reaches the sensor, for pillars that change polarisation.

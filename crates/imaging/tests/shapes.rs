@@ -100,7 +100,7 @@ fn passed(
     nm.iter().map(of).sum::<f64>() / nm.len() as f64
 }
 
-/// What a cell answers for one wavelength (um) of a band.
+/// Answer of a cell for one wavelength (um) of a band.
 fn in_band(cell: &dyn CellModel, um: f64, last: u16) -> CellResponse {
     cell.response(&Illumination::normal(um).in_band(), last, &Silent)
         .unwrap()

@@ -1,4 +1,4 @@
-//! What elements are simulated as: as drawn, or as fabricated.
+//! Simulation case of elements: as drawn, or as fabricated.
 
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ impl<'a> From<&'a AsBuiltChip> for SimulationCase<'a> {
 }
 
 impl<'a> SimulationCase<'a> {
-    /// How truly the cell is described.
+    /// Fidelity of the description of the cell.
     pub fn fidelity(&self) -> Fidelity {
         match self {
             Self::Cell(cell) => cell.fidelity(),
@@ -45,7 +45,7 @@ impl<'a> SimulationCase<'a> {
         }
     }
 
-    /// What differs from the design; nothing as drawn.
+    /// Perturbation of the design; empty as drawn.
     pub fn perturbation(&self) -> Perturbation {
         match self {
             Self::Cell(_) => Perturbation::default(),
@@ -96,7 +96,7 @@ impl<'a> SimulationCase<'a> {
     }
 }
 
-/// Where an element is, and how large.
+/// Place of an element, and its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Radius of the circle that light passes as drawn (um).
@@ -115,15 +115,15 @@ pub trait ElementOptics: Sync {
     /// If a cell has no answer, or the user stopped it.
     fn in_light(&self, light: &Illumination<'_>, progress: &dyn Progress) -> Result<IncoherentFields<'_>>;
 
-    /// What its pillars of these widths (nm) or numbers do to light along the normal, on the mean over the element.
+    /// Mean response over the element of its pillars of these widths (nm) or numbers to light along the normal.
     ///
     /// # Errors
     /// As [`ElementOptics::in_light`].
     fn response(&self, light: &Illumination<'_>, numbers: &[u16], progress: &dyn Progress)
     -> Result<Arc<CellResponse>>;
 
-    /// What its sites transmit along the normal of the light that has the phase of the design, whatever light is simulated; with
-    /// equal neighbours.
+    /// Transmission of its sites along the normal of the light that has the phase of the design, whatever light is
+    /// simulated; with equal neighbours.
     ///
     /// # Errors
     /// As [`ElementOptics::in_light`].
@@ -157,18 +157,19 @@ enum Source<'a> {
 }
 
 impl<'a> CaseOptics<'a> {
-    /// The same with at most so many bytes of spectra for a thread at a time, if that is given.
+    /// Same optics with at most so many bytes of spectra for a thread at a time, if that is given.
     #[must_use]
     pub fn within(self, part_bytes: Option<usize>) -> Self {
         Self { part_bytes, ..self }
     }
 
-    /// What elements are simulated as.
+    /// Simulation case of the elements.
     pub fn case(&self) -> SimulationCase<'a> {
         self.case
     }
 
-    /// What pillars as drawn do to a light: found here, elements have it at hand. None of a chip as fabricated.
+    /// Response of pillars as drawn to a light, computed here so that elements have it in memory. `None` for a chip as
+    /// fabricated.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
@@ -182,7 +183,7 @@ impl<'a> CaseOptics<'a> {
         }
     }
 
-    /// The same at some wavelengths (um) of a light, at once where that does not solve anything twice.
+    /// Responses at some wavelengths (um) of a light, at once where that does not solve anything twice.
     ///
     /// # Errors
     /// As [`CaseOptics::response`].
@@ -275,7 +276,8 @@ impl ElementOptics for AsBuiltOptics<'_> {
     }
 }
 
-/// What the classes of an element transmit in one light, for pictures: from any direction, along which cells are not solved anew.
+/// Fields of the classes of an element in one light, for pictures: from any direction, along which cells are not solved
+/// anew.
 pub struct ClassFields {
     tables: Vec<ClassTable>,
     departing: Option<Vec<(ClassTable, i32)>>,
@@ -293,8 +295,8 @@ impl CaseOptics<'_> {
         AsBuiltElement::new(drawn, &self.case.perturbation().geometry)
     }
 
-    /// What the classes of an element of [`CaseOptics::as_built`], drawn with these pillars, transmit in a light. Where pillars have
-    /// dissimilar neighbours it takes two bytes a site.
+    /// Fields in a light of the classes of an element of [`CaseOptics::as_built`], drawn with these pillars. Where
+    /// pillars have dissimilar neighbours it takes two bytes a site.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
@@ -352,8 +354,8 @@ impl ClassFields {
     }
 
     /// Tables of light whose direction is asked for, each with how often it has the phase of the element: as those of
-    /// [`PolarisedTables::departing`](metalith_cell::PolarisedTables::departing) where pillars tell polarisations apart, with the power
-    /// of what passes; else those of all light.
+    /// [`PolarisedTables::departing`](metalith_cell::PolarisedTables::departing) where pillars distinguish
+    /// polarisations, with the power of what passes; else those of all light.
     pub fn departing(&self) -> Vec<(&ClassTable, i32)> {
         match &self.departing {
             Some(departing) => departing.iter().map(|(table, order)| (table, *order)).collect(),
@@ -370,7 +372,8 @@ impl ClassFields {
     }
 }
 
-/// Where light of an element goes, with the power of what passes: over one element light of unlike orders may interfere a little.
+/// Tables of light of an element by direction of departure, with the power of what passes: over one element light of
+/// unlike orders may interfere a little.
 fn scaled_to(passed: &[ClassTable], departing: Vec<(ClassTable, i32)>, classes: &[u16]) -> Vec<(ClassTable, i32)> {
     let all: f64 = departing.iter().map(|(table, _)| table.power(classes)).sum();
     let passes: f64 = passed.iter().map(|table| table.power(classes)).sum();

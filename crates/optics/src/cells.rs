@@ -57,7 +57,7 @@ pub struct RealisedCells {
     rim: Option<(Box<Self>, f64)>,
 }
 
-/// What sites of some widths transmit: one table for light along the normal; else one for each polarisation that is
+/// Transmission of sites of some widths: one table for light along the normal; else one for each polarisation that is
 /// kept (s, p), and one for each that is turned into the other where the direction is in no plane of symmetry of the
 /// cell. See [`super::IncoherentFields::weight`].
 pub struct SolvedWidths {

@@ -1,4 +1,4 @@
-//! The chip as made: a stated cell and a perturbation, for any layout and light.
+//! The chip as fabricated: a stated cell and a perturbation, for any layout and light.
 
 use std::cell::RefCell;
 use std::path::Path;
@@ -77,7 +77,7 @@ impl AsBuiltChip {
         })
     }
 
-    /// The same also of pillars that tell polarisations apart.
+    /// Chip of pillars in their light, also of pillars that distinguish polarisations.
     ///
     /// # Errors
     /// As [`AsBuiltChip::new`]; also if the pillars are no rectangles that focus this, or the model has what rectangles have no meaning for.
@@ -175,7 +175,7 @@ impl AsBuiltChip {
         ))
     }
 
-    /// What the classes of an element transmit in a light.
+    /// Transmission of the classes of an element in a light.
     pub(crate) fn solve(
         &self,
         element: &AsBuiltElement,
@@ -223,8 +223,8 @@ impl AsBuiltChip {
         Ok(solved)
     }
 
-    /// What each class of rectangles transmits along the normal of light whose direction is asked for, each table with how often it has
-    /// the phase of the element: as [`PolarisedTables::departing`]. None of other pillars.
+    /// Transmission of each class of rectangles along the normal by direction of departure, each table with the
+    /// multiple of the phase of the element in it: as [`PolarisedTables::departing`]. `None` for other pillars.
     ///
     /// # Errors
     /// As [`AsBuiltChip::view`].
@@ -248,8 +248,9 @@ impl AsBuiltChip {
         Ok(Some(tables.zip(orders.into_inner()).collect()))
     }
 
-    /// What pillars with these widths (nm) or numbers do to light along the normal, where so many steps of density are added to their
-    /// width (see [`super::realised_nm`]), missing pillars and light that sees none mixed in; by width or number.
+    /// Response of pillars with these widths (nm) or numbers to light along the normal, where so many steps of density
+    /// are added to their width (see [`super::realised_nm`]), with missing pillars and unmodulated light mixed in; by
+    /// width or number.
     ///
     /// # Errors
     /// As [`AsBuiltChip::view`].

@@ -14,7 +14,7 @@ use metalith_pillars::{LatticeKind, PillarMap, PillarRows};
 /// Wavelength, direction of equal and of coupled pillars, bit by bit; how closely it is looked at, and whether neighbours are equal.
 type Key = ([u64; 5], Spectral, bool);
 
-/// A cell model with all that it has answered. Light from directions that a cell cannot tell apart is asked for once.
+/// A cell model with all that it has answered. Light from directions that a cell cannot distinguish is asked for once.
 pub(crate) struct DrawnCells<'a> {
     pub cell: &'a dyn CellModel,
     lattice: LatticeKind,
@@ -33,7 +33,7 @@ impl<'a> DrawnCells<'a> {
         }
     }
 
-    /// What pillars do to a light.
+    /// Response of pillars to a light.
     ///
     /// # Errors
     /// As [`CellModel::response`].
@@ -41,7 +41,7 @@ impl<'a> DrawnCells<'a> {
         self.ask(self.cell, light, progress)
     }
 
-    /// What pillars with equal neighbours do to a light.
+    /// Response of pillars with equal neighbours to a light.
     ///
     /// # Errors
     /// As [`CellModel::response`].

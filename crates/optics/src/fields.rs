@@ -11,10 +11,10 @@ use metalith_core::Result;
 use metalith_pillars::{Lattice, PillarMap, PillarRows};
 use metalith_wave::{Accuracy, Aperture, FoldedPropagator, Pillars, Propagator, Psf, Scratch, Window};
 
-/// What an element makes of light that arrives: the sum of the intensities of its fields, each times the weight.
+/// Fields of an element in light that arrives: the sum of the intensities of its fields, each times the weight.
 pub struct IncoherentFields<'e> {
     pub fields: Vec<Field<'e>>,
-    /// Of the light that arrives, the share that is in the polarisation of each field.
+    /// Share of the light that arrives that is in the polarisation of each field.
     pub weight: f64,
     pub light: ArrivingLight,
     /// Added to the distance of the sensor (um).
@@ -146,7 +146,7 @@ impl<'e> IncoherentFields<'e> {
             .map(|psf| Psf { window: stated, ..psf })
     }
 
-    /// The same by a propagator of one's own, whose window is at the distance as made.
+    /// PSF by a propagator of the caller's, whose window is at the distance as fabricated.
     ///
     /// # Errors
     /// As [`Propagator::field`].

@@ -24,7 +24,7 @@ impl TaskCells {
     /// a report judges with.
     ///
     /// # Errors
-    /// If a material is not known over the band, unlike neighbours have one table alone, or the user stopped it.
+    /// If a material is not known over the band, dissimilar neighbours have one table alone, or the user stopped it.
     pub fn of(design: &Design, report: bool, cache: Option<&Path>, progress: &dyn Progress) -> Result<Self> {
         let rigorous = || -> Result<Box<dyn CellModel>> {
             Ok(Box::new(
@@ -111,7 +111,7 @@ impl CellModel for RotationBand {
     }
 }
 
-/// The cell of unlike neighbours, whose tables are solved here where there are none.
+/// The coupled model, whose tables are solved here where there are none.
 fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<NeighbourCell> {
     let tables = &design.verify.wavelengths_um;
     let ends = |all: &[f64]| {

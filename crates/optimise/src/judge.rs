@@ -88,7 +88,7 @@ impl OptimiseTask {
     /// draw. `cells` as in [`OptimiseTask::solve`].
     ///
     /// # Errors
-    /// If a cell does not cover the band, or knows unlike neighbours.
+    /// If a cell does not cover the band, or is coupled.
     pub fn judge_errors(
         &self,
         turns: &[f64],

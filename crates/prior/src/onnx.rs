@@ -33,7 +33,7 @@ pub enum Form {
     FourPlanes,
     /// Planes four to six of its only input.
     SixPlanes,
-    /// Not at all: it finds out by itself, or knows one.
+    /// Not at all: it finds out on its own, or knows one.
     Blind,
     /// Second input `[1, 1, rows, columns]`, the mean over colours.
     Map,

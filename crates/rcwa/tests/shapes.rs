@@ -86,7 +86,8 @@ fn an_upright_rectangle_by_either_rule() {
     assert!(turned[0][1].norm() < ROUNDING && turned[1][0].norm() < ROUNDING);
 }
 
-/// Stacks that are solved together, of which some differ in heights alone, have the answers that each has by itself, bit by bit.
+/// Stacks that are solved together, of which some differ in heights alone, have the answers that each has individually,
+/// bit by bit.
 #[test]
 fn stacks_that_are_solved_together_are_those_solved_one_by_one() {
     let of = |width_nm: f64, height_nm: f64, mask_nm: f64| {

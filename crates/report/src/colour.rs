@@ -1,4 +1,4 @@
-//! Colours: series that colour-blind readers can tell apart, and maps of equal perceived steps.
+//! Colours: series that colour-blind readers can distinguish, and maps of equal perceived steps.
 
 use metalith_core::srgb::encoded;
 

@@ -32,7 +32,7 @@ pub struct PairsRequest {
     pub design: PathBuf,
     pub layout: PathBuf,
     pub camera: PathBuf,
-    /// The chip as made; as drawn if left out.
+    /// The chip as fabricated; as drawn if left out.
     pub model: Option<PathBuf>,
     /// Angle from the left to the right edge of a scene (degrees).
     pub field_deg: f64,

@@ -38,7 +38,7 @@ fn as_drawn(small: &Small, folder: &Path) -> Design {
     design
 }
 
-/// A design judged by the pillars that are drawn, or with a model by the chip as made.
+/// A design judged by the pillars that are drawn, or with a model by the chip as fabricated.
 fn judged(small: &Small, model: Option<Perturbation>) -> Verification {
     judged_with(small, model, None)
 }

@@ -1,4 +1,5 @@
-//! Small lenses of rectangles that are drawn wider, higher or in other light: what chips as made are compared with.
+//! Small lenses of rectangles that are drawn wider, higher or in other light: what chips as fabricated are compared
+//! with.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What a layout is judged by: a cell, or a chip as made.
+//! Simulation of a layout: by a cell, or as a fabricated chip.
 
 use metalith_cell::CellModel;
 use metalith_core::{Error, Result};
@@ -35,7 +35,7 @@ impl<'a> SimulationCases<'a> {
         Ok(Self::judged_by(judge.as_ref()).with_cells(beside))
     }
 
-    /// The same with these cells beside.
+    /// Same cases with these cells besides.
     #[must_use]
     pub fn with_cells(mut self, cells: &'a [Box<dyn CellModel>]) -> Self {
         self.beside

@@ -81,9 +81,9 @@ impl Chosen {
     }
 }
 
-/// Choose the elements that are simulated: one of all that are alike by a symmetry which turns their light too, and of those
-/// that are not as intended the first, or all where some may be so; each by itself where what is made of them is not `symmetric`. Elements are
-/// told which one they are simulated as.
+/// Choose the elements that are simulated: one of all that are alike by a symmetry which turns their light too, and of
+/// those that are not as intended the first, or all where some may be so; each individually where what is made of them
+/// is not `symmetric`. Elements are told which one they are simulated as.
 pub(super) fn choose(
     design: &Design,
     array: &PillarArray,

@@ -43,8 +43,8 @@ pub enum Simulation {
 }
 
 impl Simulation {
-    /// Choose for a design whose layout is at `path`, with all threads of this program. `by_site` says that the case that
-    /// judges knows a chip as made, or unlike neighbours, and needs elements that are held in full.
+    /// Choose for a design whose layout is at `path`, with all threads of this program. `by_site` says that the case
+    /// that judges knows a chip as fabricated, or dissimilar neighbours, and needs elements that are held in full.
     ///
     /// # Errors
     /// If the pillars of the elements are more than can be held to be compared, or the camera of the design cannot be used.

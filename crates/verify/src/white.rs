@@ -92,7 +92,7 @@ pub(super) fn step_nm([short, long]: [f64; 2]) -> f64 {
     WavelengthSteps::USUAL_NM.max((long - short) / MOST_STEPS)
 }
 
-/// What the elements of a design are simulated with in white light.
+/// Simulator of the elements of a design in white light.
 pub(super) struct WhiteSimulator<'a> {
     design: &'a Design,
     lattice: Lattice,
@@ -104,7 +104,7 @@ pub(super) struct WhiteSimulator<'a> {
 }
 
 impl<'a> WhiteSimulator<'a> {
-    /// At the wavelengths of the camera; nothing if there is no camera to be had.
+    /// Simulator at the wavelengths of the camera; `None` if there is no camera to be had.
     ///
     /// # Errors
     /// As [`camera_of`]; also if a wavelength is outside what the cell covers.
@@ -145,8 +145,8 @@ impl<'a> WhiteSimulator<'a> {
         Ok(())
     }
 
-    /// What `with` makes of the light of a point at a wavelength (um). Coupled cells are solved for it in oblique incidence, else for
-    /// light from where the element looks at the wavelength.
+    /// Result of `with` for the light of a point at a wavelength (um). Coupled cells are solved for it in oblique
+    /// incidence, else for light from where the element looks at the wavelength.
     fn in_light<T>(&self, element: &Element, um: f64, with: impl FnOnce(&Illumination<'_>) -> Result<T>) -> Result<T> {
         let looks = |um| <[f64; 2]>::from(element.wedge.looks_at(um));
         let light = Illumination {

@@ -38,7 +38,7 @@ fn lens() -> (Design, PillarArray, tempfile::TempDir) {
     (design, array, folder)
 }
 
-/// Half-wave plates that nothing but their rotation tells apart.
+/// Half-wave plates that nothing but their rotation distinguishes.
 struct IdealPlates(RotatedRectangles);
 
 impl IdealPlates {

@@ -1,4 +1,4 @@
-//! A first run of a shipped 3 x 3 solves no table of unlike neighbours: they come with the program.
+//! A first run of a shipped 3 x 3 solves no table of dissimilar neighbours: they come with the program.
 
 use metalith_cell::{NeighbourTable, NeighbourTableSpec};
 use metalith_design::{Design, mappings};

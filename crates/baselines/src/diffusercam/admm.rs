@@ -10,10 +10,10 @@ use num_complex::Complex32;
 
 use super::grid::CoarseGrid;
 
-/// How far a scene is sought, and how strongly slopes are held down.
+/// Settings of a descent: how far a scene is sought, and how strongly slopes are held down.
 #[derive(Clone, Copy, Debug)]
 pub struct Descent {
-    /// Of all steps.
+    /// Rounds of all steps.
     pub rounds: usize,
     /// The penalty of slopes over that which follows from the noise.
     pub slopes: f32,
@@ -27,8 +27,8 @@ impl Descent {
     };
 }
 
-/// Of a channel from one place to the next: photographs have 0.043 between neighbouring pixels of 576, and twice as much
-/// between every second.
+/// Slopes of a channel from one place to the next: photographs have 0.043 between neighbouring pixels of 576, and twice
+/// as much between every second.
 const SLOPES: ExponentialSlopes = ExponentialSlopes { expected: 0.075 };
 /// The penalty of what the sensor would have seen beyond its border, over the weight of what it has seen.
 const CROP: f64 = 1.0;
@@ -43,12 +43,12 @@ pub struct Deconvolution {
     grid: CoarseGrid,
     fft: SquareFft,
     kernel: Vec<Complex32>,
-    /// What slopes count of each frequency.
+    /// Weights of slopes at each frequency.
     slopes: Vec<f32>,
 }
 
 impl Deconvolution {
-    /// On a grid.
+    /// Deconvolution on a grid.
     pub fn new(grid: CoarseGrid) -> Self {
         let fft = SquareFft::new(grid.size);
         let n = grid.size;
@@ -66,7 +66,7 @@ impl Deconvolution {
         &self.grid
     }
 
-    /// What squares of the sensor see of a scene on the grid.
+    /// Image of a scene on the grid in squares of the sensor.
     pub fn seen(&self, scene: &Array2<f32>) -> Array2<f32> {
         let [rows, columns] = self.grid.data;
         part(self.image(scene).view(), 0..rows, 0..columns).to_owned()

@@ -20,13 +20,13 @@ pub struct FineGrid {
     /// Place of the sensor's first pixel in the whole image.
     first: [i64; 2],
     fft: SquareFft,
-    /// By channel and plane of the scene.
+    /// Kernels by channel and plane of the scene.
     kernels: Vec<Vec<Vec<Complex32>>>,
 }
 
 impl FineGrid {
-    /// For a scene, the tangent of a step, rows and columns of the sensor, and kernels by channel and plane of the scene, all
-    /// of one shape.
+    /// Grid for a scene, the tangent of a step, rows and columns of the sensor, and kernels by channel and plane of the
+    /// scene, all of one shape.
     pub fn new(view: &SceneView, step: f64, frame: [usize; 2], kernels: &[Vec<Array2<f32>>]) -> Self {
         let half = half_of(view, step);
         let (rows, columns) = kernels[0][0].dim();
@@ -105,12 +105,13 @@ pub struct CoarseGrid {
     pub data: [usize; 2],
     /// Values an axis of the transforms.
     pub size: usize,
-    /// What a place of the scene sends to the squares, around the first one.
+    /// Kernel from a place of the scene to the squares, around the first one.
     pub kernel: Array2<f32>,
 }
 
 impl CoarseGrid {
-    /// For the kernel of a grey surface on the pixels of a sensor, and the pixels of a square that count the channel.
+    /// Grid for the kernel of a grey surface on the pixels of a sensor, and the pixels of a square that count the
+    /// channel.
     pub fn new(fine: &FineGrid, grey: &Array2<f32>, places: &[[usize; 2]]) -> Self {
         let half = fine.half.map(|h| h / 2);
         // The finer grid and this one have their middles together: its first place is that of `skipped`.
@@ -240,7 +241,7 @@ mod tests {
     /// Stripes of one pixel, three and a half of which are a step: a place sees their mean, and not the stripe that it is on.
     #[test]
     fn scenes_that_are_finer_than_the_steps_are_averaged() {
-        /// Of half of a stripe that a box has more of one kind.
+        /// Tolerance of half of a stripe that a box has more of one kind.
         const UNEVEN: f32 = 0.16;
         let view = SceneView {
             rows: 200,

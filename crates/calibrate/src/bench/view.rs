@@ -16,7 +16,7 @@ impl Bench<'_> {
         AsBuiltElement::new(drawn, &perturbation.geometry)
     }
 
-    /// That element under the light of the capture, at one wavelength (um). `solved`: transmission of its widths.
+    /// Element under the light of the capture, at one wavelength (um). `solved`: transmission of its widths.
     pub fn view<'a>(
         &self,
         capture: CaptureIndex,

@@ -1,4 +1,4 @@
-//! Mappings for steered elements, chosen by what their pillars do among unlike neighbours.
+//! Mappings for steered elements, chosen by what their pillars do among dissimilar neighbours.
 //!
 //! Where the phase is steep, neighbours differ from one to the next, and the mapping that brings most light into the first
 //! order of equal neighbours is not the best one. Here the pillars of a sample of sites, drawn by a polynomial, transmit by

@@ -55,7 +55,7 @@ impl RotationCurve {
         converted * Complex64::cis(-2.0 * rotation)
     }
 
-    /// What the lattice adds to twice a rotation (rad).
+    /// Phase that the lattice adds to twice a rotation (rad).
     pub fn added(&self, rotation: f64) -> f64 {
         (self.beyond(rotation) * Complex64::cis(-self.mean)).arg()
     }

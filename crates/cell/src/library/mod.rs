@@ -12,8 +12,8 @@ use super::{Along, MappingError, PolarisationAxis};
 use metalith_core::{Error, Result};
 use metalith_pillars::UprightRectangles;
 
-/// Parts of a turn that phases are told apart by, along either axis: 0.012 rad at most from the middle of one, where neighbouring
-/// pillars of a library are some tenths apart.
+/// Parts of a turn that phases are distinguished by, along either axis: 0.012 rad at most from the middle of one, where
+/// neighbouring pillars of a library are some tenths apart.
 const PARTS: usize = 256;
 
 /// Parts of a turn of each phase that constants are tried by, and phases that each is judged at along an axis.

@@ -9,8 +9,8 @@ use metalith_core::{Progress, Result, Silent};
 use super::{BandNode, BandResponse, FittedNeighbours, Mapping, NEIGHBOURS, NeighbourTable, NeighbourTableSpec};
 use crate::{CellModel, CellResponse, CellStack, Fidelity, Illumination, NeighbourTables, PointwiseCell, Spectral};
 
-/// Pillars among unlike neighbours, by [`NeighbourTable`]. [`PointwiseCell`] answers where the width of a
-/// pillar alone is known, as in a lattice of equal pillars.
+/// Pillars among dissimilar neighbours, by [`NeighbourTable`]. [`PointwiseCell`] answers where the width of a pillar
+/// alone is known, as in a lattice of equal pillars.
 #[derive(Debug)]
 pub struct NeighbourCell {
     equal: PointwiseCell,

@@ -9,10 +9,10 @@ use metalith_rcwa::SiteLattice;
 use super::training::TrainingCell;
 use super::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteGrid, linear};
 
-/// Added to the mean square of each term, as a part of it: sites are a few for each weight, and widths of neighbours are
-/// often nearly those of a grating. Terms of high degree are held back more, by the fourth power of their degree in parts
-/// of [`PLAIN_DEGREE`]: that takes a twentieth off what is left of rows of real pillars. Without the power, 1e-4 and 1e-3
-/// cannot be told apart.
+/// Added to the mean square of each term, as a part of it: sites are a few for each weight, and widths of neighbours
+/// are often nearly those of a grating. Terms of high degree are held back more, by the fourth power of their degree in
+/// parts of [`PLAIN_DEGREE`]: that takes a twentieth off what is left of rows of real pillars. Without the power, 1e-4
+/// and 1e-3 cannot be distinguished.
 const RIDGE: f64 = 1e-4;
 const RIDGE_OF_DEGREE: f64 = 1e-2;
 const PLAIN_DEGREE: f64 = 4.0;

@@ -1,4 +1,4 @@
-//! Coupled model: transmission of a pillar among unlike neighbours.
+//! Coupled model: transmission of a pillar among dissimilar neighbours.
 //!
 //! A lattice of equal pillars is one place in the space of all neighbourhoods, and a special one: its guided modes
 //! resonate. Here the transmission of a site is a sum over pairs,

@@ -1,4 +1,4 @@
-//! Responses of pillars among unlike neighbours for one light: fitted to supercells, and kept.
+//! Responses of pillars among dissimilar neighbours for one light: fitted to supercells, and kept.
 
 use std::path::Path;
 

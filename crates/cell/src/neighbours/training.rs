@@ -10,7 +10,7 @@ use metalith_rcwa::SiteLattice;
 use super::{Blaze, Mapping, SiteGrid};
 
 /// Supercells drawn by chance along the normal, where each of their sites counts for eight by symmetry, and for other
-/// directions. With half as many, what is left over grows by a tenth.
+/// directions. With half as many, the residual grows by a tenth.
 const RANDOM: [usize; 2] = [120, 280];
 
 /// Sites of oblique supercells, and of rows along x where those have a mirror plane, which halves the unknowns. The time

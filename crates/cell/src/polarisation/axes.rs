@@ -66,8 +66,8 @@ impl fmt::Display for PolarisationAxis {
     }
 }
 
-/// What pillars whose sides are along the axes do to light along x and along y, which keeps its polarisation: transmissions as
-/// those of [`CellResponse`], by the number of the pillar.
+/// Tables of pillars whose sides are along the axes, for light along x and along y, which keeps its polarisation:
+/// transmissions as [`CellResponse`] has them, by the number of the pillar.
 ///
 /// [`CellResponse`]: crate::CellResponse
 #[derive(Clone, Debug, PartialEq)]

@@ -8,8 +8,8 @@ use super::tables::{Part, there};
 use super::{Analyser, FocusedLight, PolarisedLight};
 use crate::{Handedness, RotationResponse};
 
-/// What pillars do to light of both hands: transmissions as those of [`CellResponse`], by the number of the rotation.
-/// The first of each pair is for light that arrives in the hand that is focused, the second for the other.
+/// Tables of pillars for light of both hands: transmissions as [`CellResponse`] has them, by the number of the
+/// rotation. The first of each pair is for light that arrives in the hand that is focused, the second for the other.
 ///
 /// [`CellResponse`]: crate::CellResponse
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct HandTables {
     pub converted: [Vec<Complex64>; 2],
     /// Light that leaves in the hand that it arrived in.
     pub unconverted: [Vec<Complex64>; 2],
-    /// The same at any rotation, of a model of one size of pillars.
+    /// Response at any rotation, of a model of one size of pillars.
     pub rotation: Option<RotationResponse>,
 }
 

@@ -38,7 +38,7 @@ pub struct PolarisedLight {
 #[derive(Clone, Debug)]
 pub struct LitStack {
     pub stack: CellStack,
-    /// The light that has the phase of a design behind them, if they tell polarisations apart.
+    /// The light that has the phase of a design behind them, if they distinguish polarisations.
     pub focused: Option<FocusedLight>,
 }
 

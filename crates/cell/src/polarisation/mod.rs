@@ -1,4 +1,4 @@
-//! Polarisation of source and detector, before and behind pillars that tell polarisations apart.
+//! Polarisation of source and detector, before and behind pillars that distinguish polarisations.
 
 mod axes;
 mod hands;

@@ -191,7 +191,7 @@ impl RotatedCell {
     }
 }
 
-/// What a cell of rotated rectangles does at one wavelength, at any rotation.
+/// Response of a cell of rotated rectangles at one wavelength, at any rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotationResponse {
     solved: Arc<Solved>,
@@ -215,13 +215,13 @@ impl RotationResponse {
         self.solved.at(rotation, self.arriving)
     }
 
-    /// How many orders it takes, and how sure they are; not known of one of many wavelengths of a band.
+    /// Number of orders that it takes, and how sure they are; `None` for one of many wavelengths of a band.
     pub fn truncation(&self) -> Option<Truncation> {
         self.solved.truncation
     }
 }
 
-/// Of the light that arrives.
+/// Hand of the light that arrives.
 #[derive(Clone, Copy)]
 enum Hand {
     Focused,

@@ -30,7 +30,7 @@ pub struct ArraySpec {
     pub placed: Vec<PlacedSpec>,
 }
 
-/// An element that is placed by itself.
+/// An element that is placed individually.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlacedSpec {
     /// Centre on the chip (nm).
@@ -166,7 +166,7 @@ impl ArraySpec {
         spec
     }
 
-    /// `[[element]]`: each by itself.
+    /// `[[element]]`: each individually.
     fn read_placed(
         s: &Section<'_, '_>,
         lens: &LensSpec,

@@ -195,8 +195,8 @@ impl CellSpec {
         }
     }
 
-    /// The light that pillars give the phase of the design where they tell polarisations apart, in the light that it is verified in:
-    /// of upright rectangles that along the nearer axis.
+    /// The light that pillars give the phase of the design where they distinguish polarisations, in the light that it
+    /// is verified in: of upright rectangles that along the nearer axis.
     pub fn focused(&self, verified: Option<Polarisation>) -> Option<FocusedLight> {
         let axis = || verified.map_or(PolarisationAxis::X, PolarisationAxis::nearest);
         match self.arriving {

@@ -59,8 +59,8 @@ impl LensSpec {
         it
     }
 
-    /// The lens of an element that is placed by itself, if it says anything of it; the rest is as in the lens that all share,
-    /// whose phase `shared_phase` says.
+    /// The lens of an element that is placed individually, if it says anything of it; the rest is as in the lens that
+    /// all share, whose phase `shared_phase` says.
     pub(super) fn read_own(
         s: &Section<'_, '_>,
         shared: &Self,

@@ -133,7 +133,7 @@ impl VerifySpec {
         spec
     }
 
-    /// Source and detector of light at pillars that tell polarisations apart.
+    /// Source and detector of light at pillars that distinguish polarisations.
     pub fn light(&self) -> PolarisedLight {
         PolarisedLight {
             arriving: self.polarisation,
@@ -172,7 +172,7 @@ fn read_analyser(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Analyser> {
     cell.shape.rectangles().map(|_| analyser)
 }
 
-/// A fault at what counts only for pillars that tell polarisations apart.
+/// A fault at what counts only for pillars that distinguish polarisations.
 fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) {
     if cell.shape.rectangles().is_none() {
         s.fault_given(
@@ -195,8 +195,8 @@ fn read_incidence(s: &Section<'_, '_>, cell: &CellSpec) -> CellIncidence {
     incidence
 }
 
-/// The cell that judges, if it is left out: unlike neighbours for the cell that they were compared with real rows of, else
-/// equal ones.
+/// The cell that judges, if it is left out: dissimilar neighbours for the cell that they were compared with real rows
+/// of, else equal ones.
 fn read_fidelity(s: &Section<'_, '_>, cell: &CellSpec) -> Fidelity {
     let usual = if cell.is_of_the_paper() {
         Fidelity::Neighbours

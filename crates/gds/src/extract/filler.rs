@@ -260,7 +260,7 @@ impl Filler {
         self.fill(element, row, column, number)
     }
 
-    /// Element, row and column of a pillar that is told by its corners.
+    /// Element, row and column of a pillar that is identified by its corners.
     #[inline]
     fn site_of_drawn(&mut self, pillar: &DrawnPillar, placement: usize) -> Result<(u32, usize, usize), Why> {
         let r = &pillar.around;

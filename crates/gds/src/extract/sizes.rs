@@ -7,7 +7,7 @@ use crate::memo::{BoxMemo, OutlineMemo};
 use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
 use metalith_pillars::{Rectangles, RotatedRectangles, UprightRectangles};
 
-/// Sizes that are told apart: a layout has one, and what its corners make of it.
+/// Sizes that are distinguished: a layout has one, and what its corners make of it.
 const MOST_SIZES: usize = 1 << 12;
 
 /// Edges that differ by less are of one size (nm): what rounding of corners to the grid makes of it.

@@ -12,10 +12,10 @@ use super::bands::{BANDS, Bands, ZONES};
 use super::natural::NATURAL;
 use crate::score::Zone;
 
-/// Cells an axis of the field that power is told apart in, two for each third of it. Within a zone what is lost changes, and
-/// where a scene happens to be bright in it would decide: with whole zones the forecast of twelve photographs differs by up to
-/// 0.6 dB with the seed of the random scene, with these by up to 0.2 dB. Cells of half the size tell the bands of frequency
-/// apart no better.
+/// Cells an axis of the field that power is distinguished in, two for each third of it. Within a zone what is lost
+/// changes, and where a scene happens to be bright in it would decide: with whole zones the forecast of twelve
+/// photographs differs by up to 0.6 dB with the seed of the random scene, with these by up to 0.2 dB. Cells of half the
+/// size tell the bands of frequency apart no better.
 pub(super) const CELLS: usize = 6;
 
 /// Index into [`ZONES`] of a cell, row by row.

@@ -44,7 +44,7 @@ const KNOWN_SHARE: f64 = 0.05;
 /// Range that a bank covers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BankRange {
-    /// Narrowest and widest pillar as made (nm); of rectangles the least and the most that both edges are off by.
+    /// Narrowest and widest pillar as fabricated (nm); of rectangles the least and the most that both edges are off by.
     pub widths_nm: [f64; 2],
     /// Numbers of the upright rectangles that it holds, rising; empty for other shapes.
     pub numbers: Vec<u16>,

@@ -1,8 +1,9 @@
 //! Tables of upright rectangles, which are of many sizes.
 //!
-//! A bias makes a pillar of 100 x 120 nm one that is drawn as 110 x 130 nm: pillars whose edges differ by the same are on one line, on which they are
-//! told by the shorter edge. Lines are solved every few nanometres, and between two nodes where rational functions through more and through fewer
-//! nodes do not agree. A pillar that is exchanged with its mirror image about the diagonal exchanges x and y: one of them is solved.
+//! A bias makes a pillar of 100 x 120 nm one that is drawn as 110 x 130 nm: pillars whose edges differ by the same are
+//! on one line, on which they are identified by the shorter edge. Lines are solved every few nanometres, and between
+//! two nodes where rational functions through more and through fewer nodes do not agree. A pillar that is exchanged
+//! with its mirror image about the diagonal exchanges x and y: one of them is solved.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +36,7 @@ pub(super) type Along = [Complex64; 2];
 struct Span {
     /// Length by which the longer edge is longer (nm).
     longer_nm: u16,
-    /// Shorter edges as made (nm), each from the least to the most, that are asked for: rising.
+    /// Shorter edges as fabricated (nm), each from the least to the most, that are asked for: rising.
     wanted: Vec<[f64; 2]>,
     /// Shorter edges that are solved at first (nm), rising.
     nodes_nm: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Rectangles as made: light of both polarisations that they tell apart, and what of it reaches the sensor.
+//! Rectangles as fabricated: light of both polarisations that they distinguish, and what of it reaches the sensor.
 
 mod kept;
 mod rows;

@@ -1,4 +1,4 @@
-//! Rectangles of one chip as made, solved where they are needed.
+//! Rectangles of one chip as fabricated, solved where they are needed.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;

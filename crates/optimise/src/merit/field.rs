@@ -46,7 +46,8 @@ pub struct FieldProblem {
     pub(crate) row_weight: Vec<f32>,
     /// `[ring][row]`.
     kernel: Planes,
-    /// Transmission, `[width_nm][row]`, made width taken from the designed one; among unlike neighbours its mean over them.
+    /// Transmission, `[width_nm][row]`, made width taken from the designed one; among dissimilar neighbours its mean
+    /// over them.
     pub(crate) table: Planes,
     pub(crate) mapping: Mapping,
     /// Condition of each row that is no padding.
@@ -133,8 +134,8 @@ impl FieldProblem {
     /// Same merit with the coupled model: of rows that are all of the focus, without errors of fabrication.
     ///
     /// # Errors
-    /// If it takes more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with errors, or the cell does
-    /// not know unlike neighbours at a wavelength.
+    /// If it takes more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with
+    /// errors, or the cell is not coupled at a wavelength.
     pub fn among_neighbours(mut self, lens: &Lens, cell: &dyn CellModel, memory_bytes: u64) -> Result<Self> {
         let widths: Vec<u16> = self.mapping.choices().iter().map(|c| c.width_nm).collect();
         let most = self.mapping.max_width_nm();

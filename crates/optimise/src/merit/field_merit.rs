@@ -26,7 +26,7 @@ impl FieldProblem {
     /// `gradient`.
     ///
     /// # Panics
-    /// Among unlike neighbours, whose widths are whole: designs with them and a solver that needs this are refused.
+    /// Among dissimilar neighbours, whose widths are whole: designs with them and a solver that needs this are refused.
     pub fn merit_of_phases(&self, turns: &[f64], gradient: Option<&mut [f64]>) -> f64 {
         assert!(self.surroundings.is_none(), "no slopes among unlike neighbours");
         let widths = turns.iter().map(|&t| self.mapping.width_nm(t)).collect::<Vec<_>>();

@@ -53,8 +53,8 @@ impl NeighbourTerms {
     /// most `max_width_nm` wide.
     ///
     /// # Errors
-    /// If they take more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with errors, or the
-    /// cell does not know unlike neighbours at a wavelength.
+    /// If they take more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with
+    /// errors, or the cell is not coupled at a wavelength.
     pub fn of(
         conditions: &[Option<Condition>],
         widths: &[u16],

@@ -78,7 +78,7 @@ pub(super) enum Sides {
 /// and by 0.009 rad.
 const CORNER_STEPS: usize = 4;
 
-/// Steps of the staircase that stands for a quarter of a circle among unlike neighbours.
+/// Steps of the staircase that stands for a quarter of a circle among dissimilar neighbours.
 const CIRCLE_STEPS: usize = 16;
 
 impl Outline {

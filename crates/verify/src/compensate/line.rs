@@ -119,7 +119,7 @@ impl Line {
         steps.unwrap_or_else(|| vec![0; drawn.number.len()])
     }
 
-    /// Solve all pillars that may be drawn as made, for these steps of density at the least and at the most.
+    /// Solve all pillars that may be drawn as fabricated, for these steps of density at the least and at the most.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
@@ -162,7 +162,7 @@ fn made(
     Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
 }
 
-/// What upright rectangles of a chip transmit of light along x and along y, by their number.
+/// Transmission of upright rectangles of a chip for light along x and along y, by their number.
 fn along_axes(
     chip: &AsBuiltChip,
     drawn: &[u16],

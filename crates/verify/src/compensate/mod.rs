@@ -1,8 +1,9 @@
 //! The layout whose pillars, as a measured line makes them, do what was intended.
 //!
-//! Each intended width is exchanged for the drawn one whose pillar, as made, transmits most like the intended
-//! pillar as stated, at the design's wavelengths together; of upright rectangles both widths, in light along both axes together. A
-//! phase common to all pillars of a wavelength and polarisation is free: it moves no light. Bias that follows density is looked up site by site, of the layout as drawn.
+//! Each intended width is exchanged for the drawn one whose pillar, as fabricated, transmits most like the intended
+//! pillar as stated, at the design's wavelengths together; of upright rectangles both widths, in light along both axes
+//! together. A phase common to all pillars of a wavelength and polarisation is free: it moves no light. Bias that
+//! follows density is looked up site by site, of the layout as drawn.
 
 mod cases;
 mod choose;

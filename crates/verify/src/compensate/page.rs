@@ -76,7 +76,7 @@ pub fn write_compensation_report(
     page.write(&folder.join("compensation.html"))
 }
 
-/// The element of a case, and the light that it is seen in where it tells polarisations apart.
+/// The element of a case, and the light that it is seen in where it distinguishes polarisations.
 fn named(case: &CompensationCase) -> String {
     match case.axis {
         None => case.element.clone(),

@@ -22,10 +22,10 @@ use metalith_wave::{
     Window,
 };
 
-/// Where an element looks.
+/// Viewing direction of an element in the middle of its field.
 const MIDDLE: FieldAngle = FieldAngle { x_deg: 0.0, y_deg: 0.0 };
 
-/// What the elements of a design are simulated with.
+/// Simulator of the elements of a design.
 pub(super) struct ElementSimulator<'a> {
     design: &'a Design,
     lattice: Lattice,
@@ -43,7 +43,7 @@ pub(super) struct ReadElement<'r> {
 }
 
 impl<'a> ElementSimulator<'a> {
-    /// For these cases.
+    /// Simulator for these cases.
     pub fn new(
         design: &'a Design,
         lattice: Lattice,
@@ -90,7 +90,7 @@ impl<'a> ElementSimulator<'a> {
         Ok(())
     }
 
-    /// What `with` makes of an element's light from one of its field angles.
+    /// Result of `with` for an element's light from one of its field angles.
     fn in_light<T>(
         &self,
         element: &Element,
@@ -112,8 +112,8 @@ impl<'a> ElementSimulator<'a> {
         })
     }
 
-    /// What `with` makes of light from the middle of an element's field, on cells that are solved along the normal: orders are
-    /// reported in it.
+    /// Result of `with` for light from the middle of an element's field, on cells that are solved along the normal:
+    /// orders are reported in it.
     fn in_middle<T>(&self, element: &Element, um: f64, with: impl FnOnce(&Illumination<'_>) -> Result<T>) -> Result<T> {
         let middle = arriving(element, um, MIDDLE)?;
         with(&Illumination {
@@ -276,7 +276,7 @@ struct Task<'a> {
     field: FieldAngle,
     copy: Option<CopyAngle>,
     wave: PlaneWave,
-    /// What the element makes of the light in each case.
+    /// Fields of the element in the light of each case.
     cases: Vec<IncoherentFields<'a>>,
 }
 
@@ -293,7 +293,7 @@ fn all_angles(one: &Chosen) -> impl Iterator<Item = (&Element, FieldAngle)> {
     one.angles.iter().map(|(field, _)| (&one.element, *field))
 }
 
-/// Where the chief ray of an element lands from one of its field angles, from the element's axis (um).
+/// Place where the chief ray of an element lands from one of its field angles, from the element's axis (um).
 ///
 /// # Errors
 /// If it does not reach the sensor.

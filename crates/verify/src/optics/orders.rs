@@ -1,4 +1,4 @@
-//! Where the light of an element goes, by orders of its mapping.
+//! Orders of the mapping of an element into which its light goes.
 
 use super::{ElementSimulator, ReadElement};
 use crate::psf_metrics::OrderEfficiencies;
@@ -12,8 +12,8 @@ use metalith_optics::CaseOptics;
 use metalith_wave::Aperture;
 
 impl ElementSimulator<'_> {
-    /// Where light goes, at each wavelength in each case, along the normal. Where widths follow density, their
-    /// mean over the element counts; where cells know unlike neighbours, the sites of the element in light from the middle
+    /// Orders into which light goes, at each wavelength in each case, along the normal. Where widths follow density,
+    /// their mean over the element counts; where cells are coupled, the sites of the element in light from the middle
     /// of its field.
     ///
     /// # Errors

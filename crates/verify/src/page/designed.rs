@@ -8,7 +8,7 @@ use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, 
 
 /// Pillars that the picture of the middle shows along an axis.
 const ZOOMED_PITCHES: f64 = 34.0;
-/// Sites along a radius that can be told apart in a figure.
+/// Sites along a radius that can be distinguished in a figure.
 const RADIUS_POINTS: usize = 600;
 
 /// The section of the design.

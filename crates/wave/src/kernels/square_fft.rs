@@ -25,7 +25,7 @@ pub struct FftScratch {
 }
 
 impl SquareFft {
-    /// For squares of an even `size`.
+    /// Transform for squares of an even `size`.
     pub fn new(size: usize) -> Self {
         let mut real = RealFftPlanner::new();
         let mut complex = FftPlanner::new();

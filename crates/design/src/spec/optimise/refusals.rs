@@ -6,7 +6,7 @@ use metalith_cell::Fidelity;
 use metalith_core::document::Section;
 
 impl OptimiseSpec {
-    /// Unlike neighbours are known to the exchange of rings for the field on the axis, of pillars as drawn.
+    /// Dissimilar neighbours are known to the exchange of rings for the field on the axis, of pillars as drawn.
     pub(super) fn check_neighbours(&self, s: &Section<'_, '_>, cell: &CellSpec) {
         if self.fidelity != Fidelity::Neighbours {
             return;

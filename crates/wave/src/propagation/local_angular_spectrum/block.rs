@@ -36,7 +36,7 @@ const GROUP: usize = 4;
 /// Share of the power of a block that may be left out with its weakest groups.
 const LEFT_OUT: f64 = 2e-3;
 
-/// Directions of tiles in pairs along both axes: squares of the plane tell no finer ones apart.
+/// Directions of tiles in pairs along both axes: squares of the plane distinguish no finer ones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pairs {
     /// Along an axis.
