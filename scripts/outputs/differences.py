@@ -81,7 +81,9 @@ def _values(old, new, tolerance, place, found):
 def _numbers(old, new, tolerance, place, found):
     if old == new or (math.isnan(old) and math.isnan(new)):
         return
-    allowed = tolerance * max(1.0, abs(old), abs(new))
+    # Whole numbers count something.
+    counts = isinstance(old, int) and isinstance(new, int)
+    allowed = 0.0 if counts else tolerance * max(1.0, abs(old), abs(new))
     if not abs(old - new) <= allowed:
         found.differences.append(f"{place}: {old!r}, {new!r}")
     else:

@@ -161,8 +161,8 @@ def main() -> int:
             begun = time.monotonic()
             try:
                 old, new = (r.answers(name, task) for r in recorded)
-            except AssertionError as error:
-                comparison.say(name, [str(error)])
+            except Exception as error:  # what a program writes may be anything
+                comparison.say(name, [f"{type(error).__name__}: {error}"])
                 continue
             comparison.values(name, old, new)
             print(f"         {name}: {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)

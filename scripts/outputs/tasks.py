@@ -34,6 +34,9 @@ SMALL = [
 # library takes minutes, are simulated only where nobody waits.
 SIMULATED = ["mini_3x3", "hexagonal_1550", "geometric_phase_532"]
 SLOWLY_SIMULATED = ["birefringent_532"]
+# Memory (MB) that a simulation of LARGER is given, on one thread: for the whole, for parts, for nothing.
+MEMORY_MB = [8000, 66, 10]
+LARGER = "neural_nano_optics"
 # Files of a folder whose words are free; pictures on pages are drawn from numbers that are compared.
 PAGES = {".html", ".svg", ".md", ".txt"}
 
@@ -237,8 +240,10 @@ def handed(path: Path) -> object:
         case ".json" if path.name == "manifest.json":
             # Sizes and digests are of pages too.
             return sorted(json.loads(path.read_text())["files"])
-        case ".json":
+        case ".json" if path.parent.name == "verification":
             return {"light": json.loads(path.read_text())}
+        case ".json":
+            return json.loads(path.read_text())
         case ".csv":
             return forms.table(path.read_text())
         case ".sdf" | ".jdf":
@@ -260,6 +265,21 @@ def run(name: str) -> Callable[[Program], Answers]:
         return {**ended(done), "report": {"light": as_json(done)}, **arrays(program.folder / out)}
 
     return task
+
+
+def verify(program: Program) -> Answers:
+    """A layout that is simulated whole, in parts and not at all, by what memory allows; and by other simulation models."""
+    answers: Answers = {}
+    larger = [program.design(LARGER), program.layout(LARGER, "--oasis", "compact"), "--fidelity", "rigorous", "--threads", 1]
+    cases = {f"{mb} MB": [*larger, "--memory-mb", mb] for mb in MEMORY_MB}
+    mini = [program.design("mini_3x3"), program.layout("mini_3x3")]
+    cases |= {model: [*mini, "--fidelity", model] for model in ("published", "fitted")}
+    for name, arguments in cases.items():
+        done = program.run("verify", *arguments, "--fast", "--out", "verified", "--json")
+        answers[name] = {**ended(done), "report": {"light": as_json(done)}}
+    done = program.run("verify", program.design("mini_3x3"), program.layout("array_2x4"), "--fast", "--out", "verified")
+    answers["another design"] = ended(done)
+    return answers
 
 
 def arrays(folder: Path) -> Answers:
@@ -298,6 +318,11 @@ def psf(program: Program) -> Answers:
         "foreign": (Path("golden/foreign/klayout_sref.gds"), ["--distance-um", 144, "--wavelength-nm", 530, "--samples", 64]),
     }
     foreign(program)
+    exact = option(program, "psf", "--oblique", "--as-lit")
+    cases["exact incidence"] = (
+        program.layout("mini_3x3"),
+        ["--distance-um", 144, "--wavelength-nm", 530, "--samples", 64, "--angle-x-deg", 10, "--fast", exact],
+    )
     for name, (layout, options) in cases.items():
         out = Path("psfs") / name
         done = program.run("psf", layout, *options, "--out", out, "--json")
@@ -305,6 +330,14 @@ def psf(program: Program) -> Answers:
     done = program.run("psf", program.layout("array_2x4"), "--extract-only", "--json")
     answers["extracted"] = {**ended(done), "report": as_json(done)}
     return answers
+
+
+def option(program: Program, command: str, *names: str) -> str:
+    """The first of these options that a command has: an option may have another name in the other program."""
+    text = program.must(command, "--help").out
+    found = [name for name in names if re.search(rf"{name}\b", text)]
+    assert found, f"`{command}` has none of the options {', '.join(names)}"
+    return found[0]
 
 
 def cells(program: Program) -> Answers:
@@ -323,6 +356,28 @@ def study(program: Program) -> Answers:
 
 
 def calibrate(program: Program) -> Answers:
+    """The diagnosis of a measured set by the two effects that it has, and what commands do with the model that it gives."""
+    session = program.take("golden/session")
+    for defocus in ("defocus", "gap"):
+        effects = ["--effects", f"cd_bias,{defocus}"]
+        done = program.run("calibrate", session, *effects, "--out", "diagnosis", "--json")
+        # An effect that has another name in the other program is bad input.
+        if done.code != 2:
+            break
+    answers: Answers = {**ended(done), "diagnosis": as_json(done)}
+    model, design, layout = Path("diagnosis/model.toml"), program.design("mini_3x3"), program.layout("mini_3x3")
+    assert (program.folder / model).exists(), "the diagnosis gives no model"
+    done, files = program.digests(Path("compensated"), "layout", design, "--compensate", model)
+    # The report beside it is drawn from figures of light.
+    layouts = {name: {"file": digests} for name, digests in files.items() if Path(name).suffix in (".gds", ".lyp")}
+    answers["compensated"] = {**ended(done), "files": layouts}
+    done = program.run("verify", design, layout, "--model", model, "--fast", "--out", "as_fabricated", "--json")
+    answers["as fabricated"] = {**ended(done), "report": {"light": as_json(done)}}
+    return answers
+
+
+def calibrate_all(program: Program) -> Answers:
+    """The diagnosis of a measured set by all effects."""
     done = program.run("calibrate", program.take("golden/session"), "--out", "diagnosis", "--json")
     return {**ended(done), "diagnosis": as_json(done)}
 
@@ -364,12 +419,13 @@ def all_tasks(names: list[str], slow: bool) -> dict[str, Callable[[Program], Ans
     """Tasks by their names."""
     tasks: dict[str, Callable[[Program], Answers]] = {"shipped designs": shipped, "refusals": refusals}
     tasks |= {f"layouts of {name}": layouts(name, False) for name in names}
-    tasks |= {"convert": convert, "check": check, "diff": diff, "tables": tables, "psf": psf, "cells": cells, "study": study}
+    tasks |= {"convert": convert, "check": check, "diff": diff, "tables": tables, "psf": psf, "cells": cells}
+    tasks |= {"verify": verify, "study": study, "calibrate": calibrate}
     tasks |= {f"hand-off of {name}": handoff(name) for name in SIMULATED}
     tasks |= {f"run of {name}": run(name) for name in SIMULATED}
     if slow:
         tasks |= {f"hand-off of {name}": handoff(name) for name in SLOWLY_SIMULATED}
         tasks |= {f"run of {name}": run(name) for name in SLOWLY_SIMULATED}
         tasks |= {f"other layouts of {name}": layouts(name, True) for name in names}
-        tasks |= {"calibrate": calibrate, "picture": picture}
+        tasks |= {"calibrate by all effects": calibrate_all, "picture": picture}
     return tasks
