@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 # Per cent of all doc comments.
-LIMIT = 24.5
+LIMIT = 5.0
 # Words that begin a clause, a phrase about a subject that stands elsewhere, or a pronoun for it.
 WITHOUT_SUBJECT = re.compile(
     r"""

@@ -19,23 +19,8 @@ ROOT = Path(__file__).resolve().parent.parent
 HISTORY = ROOT / "docs/history"
 LONGEST_CELL = 200
 # Pages with longer cells, and how many of them: to become fewer.
-LONGER_CELLS = {
-    "README.md": 1,
-    "docs/architecture.md": 4,
-    "docs/guide/calibrate.md": 8,
-    "docs/guide/check.md": 3,
-    "docs/guide/design.md": 6,
-    "docs/guide/handoff.md": 6,
-    "docs/guide/layout.md": 1,
-    "docs/guide/picture.md": 2,
-    "docs/guide/plan.md": 2,
-    "docs/guide/verify.md": 6,
-    "docs/measured-sets.md": 3,
-    "docs/method/calibrate.md": 1,
-    "docs/method/picture.md": 3,
-}
-# To become 150.
-LONGEST_README = 190
+LONGER_CELLS = {"docs/architecture.md": 3}
+LONGEST_README = 150
 FOLDERS = "benches|crates|designs|docs|examples|golden|processes|python|rules|scripts|src|tests"
 LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]*)?\)")
 PATH = re.compile(rf"`((?:{FOLDERS})/[\w./-]*)")
@@ -88,7 +73,7 @@ def too_long(pages: list[Path], listed: bool) -> list[str]:
             print("\n".join(found))
         excused = LONGER_CELLS.get(name, 0)
         if len(found) > excused:
-            wrong += [f"{name}: {len(found)} cells of tables are longer than {LONGEST_CELL} characters, {excused} are excused:", *found]
+            wrong += [f"{"docs/architecture.md": 3}: {len(found)} cells of tables are longer than {LONGEST_CELL} characters, {excused} are excused:", *found]
         elif len(found) < excused:
             print(f"{name}: {len(found)} long cells of tables, {excused} are excused: lower the number in {Path(__file__).name}")
     lines = len((ROOT / "README.md").read_text(encoding="utf-8").splitlines())
