@@ -95,7 +95,7 @@ enum Command {
     #[cfg(feature = "baselines")]
     Compare(compare::CompareArgs),
     Verify(verify::VerifyArgs),
-    Psf(psf::PsfArgs),
+    Psf(Box<psf::PsfArgs>),
     Handoff(handoff::HandoffArgs),
     Cells(cells::CellsArgs),
     Check(check::CheckArgs),

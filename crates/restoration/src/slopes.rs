@@ -177,8 +177,8 @@ impl SlopeSplit {
     /// Update the dual variable by the picture that was found for a goal.
     pub fn follow(&mut self, x: &Array2<f32>) {
         let own = slopes(x, self.border);
-        for a in 0..2 {
-            self.dual[a] += &(&own[a] - &self.split[a]);
+        for ((dual, own), split) in self.dual.iter_mut().zip(&own).zip(&self.split) {
+            *dual += &(own - split);
         }
     }
 }

@@ -115,7 +115,7 @@ fn each_method_restores_what_a_frame_tells() {
     /// Each element alone takes the other for noise.
     const ALONE_DB: f64 = 15.0;
     let truth = scene();
-    let light = TwoBlurs.apply(&[truth.clone()]);
+    let light = TwoBlurs.apply(std::slice::from_ref(&truth));
     let inverse_variance = vec![Array2::from_elem((SIDE, SIDE), 1e4)];
     let prior = LearnedDenoiser::shipped().unwrap();
     let recorded = Recorded {
