@@ -89,7 +89,7 @@ impl TrainingSpec {
     /// # Errors
     /// If there is nothing to learn, or pieces are too small, too large or no multiple of eight.
     pub fn check(&self) -> Result<()> {
-        let fault = |what: &str, hint: &str| Err(Error::refused("cell/model-not-for-pillar", what, hint));
+        let fault = |what: &str, hint: &str| Err(Error::refused("train/settings", what, hint));
         if !self.piece.is_multiple_of(8) || !(32..=512).contains(&self.piece) {
             return fault(
                 "pieces of this size cannot be learnt from",
