@@ -21,7 +21,7 @@ impl Parameter {
         }
     }
 
-    /// Whether it can only be positive.
+    /// True if it can only be positive.
     pub fn one_sided(&self) -> bool {
         self.range.0 >= 0.0
     }
@@ -32,7 +32,7 @@ impl Parameter {
 pub struct Slot {
     /// Number of the effect.
     pub effect: usize,
-    /// Which of its parameters.
+    /// Index of the parameter among those of the effect.
     pub index: usize,
     pub parameter: Parameter,
 }
@@ -46,7 +46,7 @@ pub struct ValueError {
     pub of_value: f64,
 }
 
-/// How far a refined fit is from its minimum, in typical sizes: it ends when a step is below 2e-2 of these, and the next one is
+/// Distance of a refined fit from its minimum, in typical sizes: it ends when a step is below 2e-2 of these, and the next one is
 /// at most a sixteenth of it (test `refinement_converges_to_the_minimum`). Effects of 0.5 to 2 typical sizes err by
 /// 3e-4 (rms), noise and what they change included.
 const OF_SEARCH: f64 = 1.5e-4;
@@ -71,7 +71,7 @@ impl ValueError {
         }
     }
 
-    /// As a standard deviation of a value whose typical size is given, with that of the search.
+    /// Standard deviation of a value whose typical size is given, with that of the search.
     pub fn sigma(&self, value: f64, typical: f64) -> f64 {
         let known = (self.of_typical * typical).hypot(self.of_value * value);
         known.hypot(OF_SEARCH * typical)

@@ -292,6 +292,6 @@ pub fn check_effects(known: &[Box<dyn Effect>], wanted: &[String]) -> Result<()>
     let known: Vec<String> = known.iter().map(|e| e.name()).collect();
     unknown_names(&known, wanted).map_or(Ok(()), |what| {
         let hint = format!("known effects are {}", known.join(", "));
-        Err(Error::invalid(what, hint))
+        Err(Error::refused("effects/unknown", what, hint))
     })
 }

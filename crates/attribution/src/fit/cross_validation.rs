@@ -30,7 +30,7 @@ pub const SEED: u64 = 0x6d65_7461;
 /// measurements that do not count, and where nothing could be learned from the others.
 pub type HeldOutErrors = PerMeasurement<Vec<Option<f64>>>;
 
-/// How much lower one error is than another.
+/// Gain of one error over another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gain {
     /// Mean difference of reduced chi-square per point; positive is better.
@@ -182,7 +182,7 @@ pub fn mean_error(errors: &HeldOutErrors) -> f64 {
     mean(errors.iter().filter_map(|own| error_of_measurement(own))).unwrap_or(0.0)
 }
 
-/// How much lower the error `after` is than that `before`, of what both predict, with a 95 % interval by a bootstrap over
+/// Gain of the error `after` over the error `before`, of what both predict, with a 95 % interval by a bootstrap over
 /// clusters: points are not independent, nor are measurements of one cluster.
 pub fn gain<M: Measurements>(problem: &FitProblem<'_, M>, before: &HeldOutErrors, after: &HeldOutErrors) -> Gain {
     let differences: Vec<(f64, f64)> = cluster_groups(problem)
@@ -214,7 +214,7 @@ pub fn gain<M: Measurements>(problem: &FitProblem<'_, M>, before: &HeldOutErrors
     }
 }
 
-/// How much lower an error of one measurement is in those ways of leaving it out that both fits know.
+/// Gain in the error of one measurement, in those ways of leaving it out that both fits know.
 fn difference(before: &[Option<f64>], after: &[Option<f64>]) -> Option<f64> {
     mean(before.iter().zip(after).filter_map(|(b, a)| Some((*b)? - (*a)?)))
 }

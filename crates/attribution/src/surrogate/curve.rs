@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use metalith_core::lagrange_weight;
+
 use crate::index::{MeasurementIndex, PerMeasurement};
 use crate::measurements::Measurements;
 
@@ -160,7 +162,7 @@ impl<M: Measurements> Curve<M> {
         if !self.counts(at, u) {
             return 0.0;
         }
-        self.roots(i, u).into_iter().map(|n| (u - n) / (at - n)).product()
+        lagrange_weight(u, at, self.roots(i, u))
     }
 
     fn lagrange_slope(&self, i: usize, u: f64) -> f64 {

@@ -297,7 +297,8 @@ fn check_memory<M: Measurements>(model: &Model<'_, M>, nodes: &[Vec<f64>], smoot
     if bytes <= MOST_BYTES {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "calibrate/memory",
         format!(
             "the predictions of these measurements for {simulated} points in parameters take about {:.0} GB of memory, and a search \
              as much again; at most {:.0} GB are taken for them",

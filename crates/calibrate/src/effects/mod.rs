@@ -191,7 +191,11 @@ pub fn with_declared(set: &MeasuredSet, declared: &[DeclaredEffect]) -> Result<V
         let is_reserved = StitchedFields::NAMES.contains(&own.name.as_str());
         if is_reserved || effects.iter().any(|e| e.name() == own.name) {
             let what = format!("there is an effect `{}` already", own.name);
-            return Err(Error::invalid(what, "give the declared effect another name"));
+            return Err(Error::refused(
+                "effects/name-taken",
+                what,
+                "give the declared effect another name",
+            ));
         }
         effects.push(Box::new(own.clone()));
     }
