@@ -109,7 +109,7 @@ fn the_program_predicts_and_compensates() {
     let path = folder.path().join("model.toml");
     model(|d| {
         d.geometry.cd_bias_nm = -10.0;
-        d.path.gap_um = 2.0;
+        d.path.defocus_um = 2.0;
     })
     .write(&path)
     .unwrap();

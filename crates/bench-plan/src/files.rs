@@ -46,13 +46,13 @@ pub fn write_set(folder: &Path, design: &Design, bench: &BenchFile, set: &Measur
     if !set.sem.is_empty() {
         AtomicFile::write(&folder.join("cd_sem.csv"), sem_table(set).as_bytes())?;
     }
-    let captures = folder.join("captures");
-    std::fs::create_dir_all(&captures).map_err(Error::io("make", &captures))?;
+    let frames = folder.join("captures");
+    std::fs::create_dir_all(&frames).map_err(Error::io("make", &frames))?;
     let text = text(design, bench, set, layout, &substrate, spacer);
     AtomicFile::write(&folder.join("measurement.toml"), text.as_bytes())
 }
 
-/// The file of a capture, from the folder of the set.
+/// The file of a measurement, from the folder of the set.
 pub fn frame_file(name: &str, bench: &BenchFile) -> String {
     format!("captures/{name}.{}", bench.ending)
 }
@@ -146,7 +146,7 @@ fn text(
         line("centre_um", format!("{:?}", e.centre_um));
         line("aperture_diameter_um", format!("{}", rounded(e.aperture_diameter_um)));
     }
-    for c in &set.captures {
+    for c in &set.measurements {
         line("[[capture]]", none());
         line("file", quoted(&frame_file(&c.name, bench)));
         line("element", format!("{:?}", set.elements[c.element].index));

@@ -39,7 +39,7 @@ pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
         of_lenses.push(("the diameter of an opening", opening_um, read::APERTURE_DIAMETER_UM));
         of_lenses.push(("the focal length", focal_um, read::FOCAL_LENGTH_UM));
         let distances = distances_um(bench, focal_um).into_iter();
-        of_lenses.extend(distances.map(|d| ("the distance of a capture", d, read::DISTANCE_UM)));
+        of_lenses.extend(distances.map(|d| ("the distance of a measurement", d, read::DISTANCE_UM)));
     }
     check(
         design,

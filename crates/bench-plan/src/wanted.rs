@@ -123,7 +123,7 @@ mod tests {
             "film_height = 10",
             "led_width = 0.3",
             "source_distance = 20000.0",
-            "gap = 2",
+            "defocus = 2",
         ] {
             assert!(checked(sound).is_ok(), "{sound}");
         }
@@ -134,8 +134,8 @@ mod tests {
             ),
             ("led_width = 2.6", ["0 to 1.50", "what is stated, 1"]),
             ("source_distance = 2000.0", ["source_distance = 2000", "5,000 to"]),
-            ("gap = 100", ["0 to 60.0 um", "may have"]),
-            ("gaap = 1", ["gaap", "did you mean"]),
+            ("defocus = 100", ["0 to 60.0 um", "may have"]),
+            ("defokus = 1", ["gaap", "did you mean"]),
         ] {
             let error = checked(wanted).unwrap_err().to_string();
             for part in parts {

@@ -1,4 +1,4 @@
-//! The statistics of attribution, of the captures of a set.
+//! The statistics of attribution, of the measurements of a set.
 
 pub use metalith_attribution::{
     EXPLAINED, ForwardModel, HeldOutErrors, IntervalParts, LEAST_GAIN, LinearTrend, Measurements, ModelError,
@@ -19,7 +19,7 @@ pub type SearchState<'a> = metalith_attribution::SearchState<'a, Data>;
 pub type EndsSearch<'f> = metalith_attribution::EndsSearch<'f, Data>;
 pub type Model<'a> = dyn ForwardModel<Prediction = PixelGrid> + 'a;
 
-/// Refuse captures whose images a calibration could not hold, before any work is spent on them.
+/// Refuse measurements whose images a calibration could not hold, before any work is spent on them.
 ///
 /// # Errors
 /// With what they would take, and what takes less.

@@ -409,10 +409,10 @@ start = 5.0
     #[test]
     fn a_declared_effect_has_the_error_of_its_stage() {
         let mut effect = read(SOUND).unwrap().remove(0);
-        effect.name = "gap_of_the_lid".into();
+        effect.name = "defocus_of_the_lid".into();
         assert_eq!(effect.value_error(), value_error_of(effect.stage()));
-        let gap = TABLE.iter().find(|e| e.name == "gap").unwrap();
-        assert_ne!(effect.value_error(), gap.value_error());
+        let defocus = TABLE.iter().find(|e| e.name == "defocus").unwrap();
+        assert_ne!(effect.value_error(), defocus.value_error());
     }
 
     /// Changes are counted from the start of the parameters: what is there already would come with the first of them.

@@ -60,7 +60,7 @@ pub trait Effect: Send + Sync {
         false
     }
 
-    /// Whether it acts on single pillars at random, so that its parameters do not determine the capture.
+    /// Whether it acts on single pillars at random, so that its parameters do not determine the measurement.
     fn random(&self) -> bool {
         false
     }
@@ -222,7 +222,7 @@ mod tests {
             with_declared(&set, &DeclaredEffect::read(&file).unwrap()).map(|all| all.len())
         };
         assert_eq!(declared("own").unwrap(), all(&set).len() + 1);
-        for name in ["stitching_x", "stitching_y", "gap"] {
+        for name in ["stitching_x", "stitching_y", "defocus"] {
             let error = declared(name).unwrap_err().to_string();
             assert!(error.contains(&format!("`{name}` already")), "{error}");
         }

@@ -126,7 +126,7 @@ pub static TABLE: [TableEffect; 18] = [
         apply: |p, to| to.cell.rim_height_nm = p[0],
         confusions: &[
             (
-                "gap",
+                "defocus",
                 "heights by AFM in the middle and at the rim of a lens, or the distance by another way",
             ),
             ("source_distance", HEIGHTS_OVER_THE_LENS),
@@ -204,21 +204,21 @@ pub static TABLE: [TableEffect; 18] = [
     },
     // The camera's plane is farther from the chip than stated: added to every distance.
     TableEffect {
-        name: "gap",
+        name: "defocus",
         unit: "um",
         stage: Stage::Diffraction,
         parameters: &[Parameter::new(-60.0, 60.0, 4.0)],
-        apply: |p, to| to.path.gap_um = p[0],
+        apply: |p, to| to.path.defocus_um = p[0],
         value_error: Some(ValueError::of_value(1e-4)),
         declared_form: Some((DeclaredQuantity::DistanceUm, "1")),
         as_gradient: Some("a sensor that is tilted against the chip: um per mm are mrad"),
         confusions: &[
-            ("source_distance", "a capture at another distance of the source"),
+            ("source_distance", "a measurement at another distance of the source"),
             ("led_centre", "the spectrum of the LED"),
         ],
         ..PLAIN
     },
-    // The angle of incidence along x and y differs from the stated one, by the same angle for every capture.
+    // The angle of incidence along x and y differs from the stated one, by the same angle for every measurement.
     TableEffect {
         name: "tilt",
         unit: "mrad",
@@ -240,7 +240,7 @@ pub static TABLE: [TableEffect; 18] = [
         value_error: Some(ValueError::of_value(2e-4)),
         parameter: |amount| 1e6 / amount,
         value: |parameter, _| 1e6 / parameter.max(1e-6),
-        confusions: &[("gap", "captures at two distances of the source")],
+        confusions: &[("defocus", "measurements at two distances of the source")],
         ..PLAIN
     },
     // Spectra are wider or narrower than stated: the ratio of the width of all spectra to the stated one less one is fitted.
@@ -266,7 +266,7 @@ pub static TABLE: [TableEffect; 18] = [
         value_error: Some(ValueError::of_value(1e-4)),
         value: |parameter, _| 1.0 + parameter,
         confusions: &[
-            ("pixel_blur", "a capture with the source stopped down"),
+            ("pixel_blur", "a measurement with the source stopped down"),
             ("led_width", "the spectra of the LEDs"),
         ],
         ..PLAIN
@@ -282,7 +282,7 @@ pub static TABLE: [TableEffect; 18] = [
         parameter: |amount| amount * amount.abs(),
         value: |parameter, _| parameter.max(0.0).sqrt(),
         confusions: &[
-            ("source_size", "a capture with the source stopped down"),
+            ("source_size", "a measurement with the source stopped down"),
             ("led_width", "the spectra of the LEDs"),
         ],
         ..PLAIN

@@ -1,14 +1,14 @@
 //! `measurement.toml` and the files that it names, with every fault found in one go.
 
-mod captures;
 mod elements;
+mod measurements;
 
 use std::path::Path;
 
 use super::frame::{self, Bayer, Channel, Recorded, SensorFrame, SensorFrames};
 use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
-use captures::{captures, widths};
 use elements::elements;
+use measurements::{measurements, widths};
 use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{LayerNumber, Progress, Result};
@@ -19,7 +19,7 @@ use ndarray::Array2;
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
 
-/// What a set may say of its cells and lenses, and of where captures were taken.
+/// What a set may say of its cells and lenses, and of where measurements were taken.
 pub const PITCH_NM: Limits = Limits::new(50.0..=20_000.0, "nm");
 pub const HEIGHT_NM: Limits = Limits::new(10.0..=TALLEST_NM, "nm");
 pub const AMBIENT_INDEX: Limits = Limits::new(1.0..=3.0, "");
@@ -37,7 +37,7 @@ impl MeasuredSet {
     /// Read the set in `folder`, or the `measurement.toml` given; `layouts` reads the layout that it names.
     ///
     /// # Errors
-    /// [`metalith_core::Error::Text`] with every fault of the text, the captures, the tables and the layout, each at
+    /// [`metalith_core::Error::Text`] with every fault of the text, the measurements, the tables and the layout, each at
     /// the line that names it.
     pub fn read(folder: &Path, layouts: &dyn PillarReader, progress: &dyn Progress) -> Result<Self> {
         let path = if folder.is_dir() {
@@ -74,7 +74,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, stack.cell.shape, sites, progress);
         elements(root, &stack, &layout, &read).into()
     };
-    let captures = captures(root, &camera, &frames, &leds, &elements);
+    let measurements = measurements(root, &camera, &frames, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
     let field_boundary_um = field_boundary(root);
     MeasuredSet {
@@ -86,7 +86,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         camera,
         leds,
         elements,
-        captures: captures.into(),
+        measurements: measurements.into(),
         field_boundary_um,
         sem,
         sem_offset_sigma_nm,
