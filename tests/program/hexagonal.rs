@@ -415,13 +415,13 @@ fn a_hexagonal_lens_is_optimised() {
     let alone = lens_alone(&design, &phase).unwrap();
     let (task, before) = (OptimiseTask::of(&alone).unwrap(), OptimiseTask::of(&design).unwrap());
     let cell = cell_models(&design, &[Fidelity::Fitted]).unwrap().remove(0);
-    let rings = task.judge_rings(&task.own_turns, cell.as_ref()).unwrap();
+    let rings = task.judge_rings(&task.own_waves, cell.as_ref()).unwrap();
     let array = PillarArray::build(&alone, &Silent).unwrap();
     let found = task
         .judge_layout(&array.widths(array.central()), cell.as_ref())
         .unwrap();
     assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
-    let hyperbola = before.judge_rings(&before.own_turns, cell.as_ref()).unwrap();
+    let hyperbola = before.judge_rings(&before.own_waves, cell.as_ref()).unwrap();
     assert!(
         rings.geometric_mean > hyperbola.geometric_mean,
         "{} {}",
