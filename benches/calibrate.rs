@@ -4,16 +4,16 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use metalith::Silent;
-use metalith::calibrate::{MeasuredSet, Sampling, Session, Settings, Synthesizer};
+use metalith::calibrate::{BenchSampling, MeasuredSet, Session, Settings, Synthesizer};
 
 fn calibration(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
     metalith_testing::session::small_set(folder.path());
     let like = MeasuredSet::read(folder.path(), &metalith::extract::GdsPillars, &Silent).expect("a set");
     let settings = Settings {
-        sampling: Sampling {
+        sampling: BenchSampling {
             spectrum: 0.34,
-            ..Sampling::default()
+            ..BenchSampling::default()
         },
         only: ["cd_bias", "defocus", "zero_order"].map(String::from).to_vec(),
         compare_fidelities: false,

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use metalith::calibrate::{DeclaredEffect, MeasuredSet, Sampling, Settings, Synthesizer};
+use metalith::calibrate::{BenchSampling, DeclaredEffect, MeasuredSet, Settings, Synthesizer};
 use metalith::extract::GdsPillars;
 use metalith::layout::{LayoutFormat, convert};
 use metalith::{Layout, Silent};
@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = Settings {
         only: effects.iter().map(|(name, _)| name.clone()).collect(),
         declared,
-        sampling: Sampling::default(),
+        sampling: BenchSampling::default(),
         ..Settings::default()
     };
     let synthesizer = match elements {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use metalith::calibrate::{Bench, MeasuredSet, Sampling, Stage, all_effects};
+use metalith::calibrate::{Bench, BenchSampling, MeasuredSet, Stage, all_effects};
 use metalith::compensate::{compensate, compensation_cases};
 use metalith::design::CellIncidence;
 use metalith::extract::GdsPillars;
@@ -152,7 +152,7 @@ impl Files {
         }
 
         // The forward model of a calibration, the first capture of which looks at the centre element along its axis.
-        let bench = Bench::new(&self.set, Sampling::default());
+        let bench = Bench::new(&self.set, BenchSampling::default());
         let element = bench.element_of(0.into(), perturbation).unwrap();
         let light = bench.direction_of(0.into(), perturbation, UM);
         let plane = light.plane;

@@ -7,7 +7,8 @@ use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 
 use metalith_calibrate::set_format as read;
-use metalith_calibrate::{Led, PerLed, RelayCamera};
+use metalith_calibrate::{BenchLed, PerLed};
+use metalith_sensor::RelayCamera;
 
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
@@ -18,7 +19,7 @@ pub struct BenchFile {
     /// Full angle of the uniform disc that the source is (rad).
     pub divergence_rad: f64,
     pub camera: RelayCamera,
-    pub leds: PerLed<Led>,
+    pub leds: PerLed<BenchLed>,
     /// Ending of the frames that the camera saves, without the dot.
     pub ending: String,
     /// Elements that may be looked at, by their place in the array; those of the design that differ most if empty.
@@ -87,7 +88,7 @@ fn sections(root: &Section<'_, '_>) -> BenchFile {
         }
     }
     let (camera, _) = read::camera(&s);
-    let leds: PerLed<Led> = read::leds(root, camera.bayer, None).into();
+    let leds: PerLed<BenchLed> = read::leds(root, camera.filter, None).into();
     let s = root.section("captures");
     let ending = s.choice(
         "format",

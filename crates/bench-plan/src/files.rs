@@ -11,7 +11,7 @@ use metalith_pillars::PillarShape;
 use crate::bench_file::BenchFile;
 use metalith_calibrate::MeasuredSet;
 use metalith_calibrate::set_format::SPECTRUM_SIGMAS;
-use metalith_calibrate::{Bayer, Channel};
+use metalith_sensor::{Colour, ColourFilter};
 
 /// Step of the tables of materials (nm).
 const TABLE_STEP_NM: f64 = 2.0;
@@ -129,14 +129,14 @@ fn text(
     if camera.relay_blur_um > 0.0 {
         line("relay_blur_um", format!("{}", camera.relay_blur_um));
     }
-    if let Some(bayer) = word(&Bayer::CHOICES, camera.bayer) {
+    if let Some(bayer) = word(&ColourFilter::BAYER, Some(camera.filter)) {
         line("bayer", quoted(bayer));
     }
     for led in &set.leds {
         line("[[led]]", none());
         line("centre_nm", format!("{}", led.centre_nm));
         line("fwhm_nm", format!("{}", led.fwhm_nm));
-        if let Some(channel) = word(&Channel::CHOICES, led.channel) {
+        if let Some(channel) = word(&Colour::CHOICES, led.channel) {
             line("channel", quoted(channel));
         }
     }
@@ -183,7 +183,7 @@ fn rounded(v: f64) -> f64 {
 /// The index of a material over the spectra of all LEDs.
 fn write_table(path: &Path, material: &Material, set: &MeasuredSet) -> Result<()> {
     let (known_low, known_high) = material.range_um();
-    let reach = |l: &metalith_calibrate::Led| SPECTRUM_SIGMAS * l.sigma_nm() * 1.2 + TABLE_MARGIN_NM;
+    let reach = |l: &metalith_calibrate::BenchLed| SPECTRUM_SIGMAS * l.sigma_nm() * 1.2 + TABLE_MARGIN_NM;
     let ends = set.leds.iter().fold((f64::MAX, 0.0f64), |(low, high), l| {
         (low.min(l.centre_nm - reach(l)), high.max(l.centre_nm + reach(l)))
     });

@@ -8,7 +8,7 @@ use crate::bench_file::BenchFile;
 use crate::candidates::{Candidates, sem_sites};
 use metalith_attribution::Measurements;
 use metalith_calibrate::Effect;
-use metalith_calibrate::{Bench, Sampling};
+use metalith_calibrate::{Bench, BenchSampling};
 use metalith_calibrate::{CellSource, RigorousCells};
 use metalith_calibrate::{Data, Nuisances};
 use metalith_calibrate::{FitProblem, Surrogate};
@@ -44,7 +44,7 @@ pub struct Information {
 pub type EffectsOf<'a> = dyn Fn(&MeasuredSet) -> Result<Vec<Box<dyn Effect>>> + 'a;
 
 /// Cells for a set, for simulators that follow one another.
-pub fn cells_of(set: &MeasuredSet, sampling: Sampling, cache: Option<std::path::PathBuf>) -> CellSource {
+pub fn cells_of(set: &MeasuredSet, sampling: BenchSampling, cache: Option<std::path::PathBuf>) -> CellSource {
     let bench = Bench::new(set, sampling);
     let (low, high) = bench.widths_nm();
     let widths = (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM);
@@ -63,7 +63,7 @@ pub fn cells_of(set: &MeasuredSet, sampling: Sampling, cache: Option<std::path::
 pub fn information(
     candidates: &Candidates,
     bench: &BenchFile,
-    sampling: Sampling,
+    sampling: BenchSampling,
     effects: &EffectsOf<'_>,
     mut cells: CellSource,
     progress: &dyn Progress,
@@ -114,12 +114,12 @@ pub fn exposed(set: &MeasuredSet, surrogate: &Surrogate, peak: f64) -> MeasuredS
         let brightest = light.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         // To three digits, as a person would note it.
         measurement.scale_dn = three_digits(room / f64::from(brightest));
-        let filter = camera.bayer.zip(set.leds[measurement.led].channel);
+        let filter = camera.filter.pixels_of(set.leds[measurement.led].channel);
         measurement.dn = light.mapv(|v| (camera.black_level_dn + measurement.scale_dn * f64::from(v).max(0.0)) as f32);
-        measurement.noise = filter.map(|(bayer, channel)| {
+        measurement.noise = filter.map(|pixels| {
             let signal = |v: f32| f64::from(v) - camera.black_level_dn;
             Array2::from_shape_fn(measurement.dn.dim(), |at| {
-                if bayer.has(at, channel) {
+                if pixels.has(at) {
                     camera.variance_dn2(signal(measurement.dn[at]), measurement.frames) as f32
                 } else {
                     f32::INFINITY

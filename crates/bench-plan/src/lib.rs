@@ -46,13 +46,13 @@ use information::{Information, cells_of, exposed};
 use metalith_calibrate::MeasuredSet;
 use metalith_calibrate::Simulator;
 use metalith_calibrate::check_effects;
-use metalith_calibrate::{Bench, Sampling};
+use metalith_calibrate::{Bench, BenchSampling};
 use metalith_calibrate::{Effect, all_effects};
 use metalith_calibrate::{Surrogate, check_calibration_fits};
 use wanted::{check_wanted, only_of_what_is_found, requirements};
 
 /// Spectra of a plan: steps in wavelength are coarser than those of a calibration, since nothing is fitted.
-const SAMPLING: Sampling = Sampling {
+const SAMPLING: BenchSampling = BenchSampling {
     spectrum: 0.3,
     step_nm: 6.0,
     step_um: 0.5,

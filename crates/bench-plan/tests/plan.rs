@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use metalith_bench_plan::{BenchFile, MeasurementPlan, PlanRequest, plan};
-use metalith_calibrate::{MeasuredSet, Sampling, Session, Settings, Synthesizer};
+use metalith_calibrate::{BenchSampling, MeasuredSet, Session, Settings, Synthesizer};
 use metalith_core::Silent;
 use metalith_design::{Design, PillarArray};
 use metalith_gds::extract::GdsPillars;
@@ -75,9 +75,9 @@ fn read(folder: &Path) -> MeasuredSet {
 
 fn settings(cache: PathBuf, only: &[&str]) -> Settings {
     Settings {
-        sampling: Sampling {
+        sampling: BenchSampling {
             spectrum: 0.34,
-            ..Sampling::default()
+            ..BenchSampling::default()
         },
         cache: Some(cache),
         only: only.iter().map(|n| (*n).into()).collect(),

@@ -5,7 +5,7 @@ use metalith_core::{Progress, Result};
 use ndarray::Array2;
 use serde::Serialize;
 
-use crate::bench::{Bench, Sampling};
+use crate::bench::{Bench, BenchSampling};
 use crate::cells::CellSource;
 use crate::set::{MeasuredSet, PerMeasurement};
 use crate::simulator::Simulator;
@@ -32,7 +32,7 @@ pub struct Rung {
 /// If a cell cannot be fitted or simulated, or the user stopped it.
 pub fn compare_fidelities(
     set: &MeasuredSet,
-    sampling: Sampling,
+    sampling: BenchSampling,
     problem: &FitProblem<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Rung>> {
@@ -47,7 +47,7 @@ pub fn compare_fidelities(
 /// The error of the cells that are polynomials: published, and fitted to the stack.
 fn polynomials(
     set: &MeasuredSet,
-    sampling: Sampling,
+    sampling: BenchSampling,
     problem: &FitProblem<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Rung>> {

@@ -42,7 +42,7 @@ mod statistics;
 mod validate;
 mod width_parts;
 
-pub use bench::{Bench, Sampling};
+pub use bench::{Bench, BenchSampling};
 pub use cells::{CellSource, RigorousCells};
 pub use data::{Data, Nuisances};
 pub use diagnosis::{
@@ -57,7 +57,7 @@ pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations, check_effects};
 pub use set::SEM_COLUMNS;
 pub use set::read as set_format;
-pub use set::{Bayer, Channel, Led, MeasuredElement, MeasuredSet, Measurement, RelayCamera, SemSite, Stack};
+pub use set::{BenchLed, MeasuredElement, MeasuredSet, Measurement, SemSite, Stack};
 pub use set::{ElementIndex, LedIndex, MeasurementIndex, PerElement, PerLed, PerMeasurement};
 pub use simulator::{Simulator, WIDTH_ROOM_NM};
 pub use simulator_model::separating_measurement;

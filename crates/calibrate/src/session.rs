@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use metalith_attribution::RandomNoise;
 use metalith_core::{Error, Progress, Result};
 
-use crate::bench::{Bench, Sampling};
+use crate::bench::{Bench, BenchSampling};
 use crate::cells::{CellSource, RigorousCells};
 use crate::data::Data;
 use crate::diagnosis::Diagnosis;
@@ -23,7 +23,7 @@ use crate::width_parts::WidthParts;
 /// How a set is worked on.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    pub sampling: Sampling,
+    pub sampling: BenchSampling,
     /// Where tables of cells are kept from one run to the next; nowhere if none.
     pub cache: Option<PathBuf>,
     /// Try these effects alone; all if empty.
@@ -43,7 +43,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            sampling: Sampling::default(),
+            sampling: BenchSampling::default(),
             cache: None,
             only: Vec::new(),
             declared: Vec::new(),

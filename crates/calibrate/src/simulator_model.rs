@@ -167,7 +167,7 @@ pub fn separating_measurement(simulator: &Simulator<'_>, effect: usize, others: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::{Bench, Sampling};
+    use crate::bench::{Bench, BenchSampling};
     use crate::cells::CellSource;
     use crate::effects;
     use crate::set::MeasuredSet;
@@ -186,9 +186,9 @@ mod tests {
     }
 
     fn simulator(set: &MeasuredSet) -> Simulator<'_> {
-        let sampling = Sampling {
+        let sampling = BenchSampling {
             spectrum: 3.0,
-            ..Sampling::default()
+            ..BenchSampling::default()
         };
         let cells = CellSource::Model(Box::new(PublishedCell::new(set.stack.cell.pitch_nm as u32)));
         Simulator::new(Bench::new(set, sampling), cells, effects::all(set))

@@ -2,8 +2,8 @@
 
 use metalith_core::{Error, Result};
 use metalith_report::sig;
+use metalith_sensor::Noise;
 use metalith_sensor::{Camera, ColourFilter};
-use metalith_wave::camera::Noise;
 use metalith_wave::kernels::box_sums;
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;
@@ -40,15 +40,8 @@ pub fn sensitivity(camera: &Camera, channels: &[metalith_sensor::ChannelSampling
 
 /// Channel that a pixel counts; `None` for a sensor whose pixels count all.
 pub fn channel_at(filter: ColourFilter, names: &[String], row: usize, column: usize) -> Option<usize> {
-    let pattern = match filter {
-        ColourFilter::None => return None,
-        ColourFilter::Rggb => ["red", "green", "green", "blue"],
-        ColourFilter::Bggr => ["blue", "green", "green", "red"],
-        ColourFilter::Grbg => ["green", "red", "blue", "green"],
-        ColourFilter::Gbrg => ["green", "blue", "red", "green"],
-    };
-    let wanted = pattern[(row % 2) * 2 + column % 2];
-    names.iter().position(|n| n == wanted)
+    let colour = filter.colour_at(row, column)?;
+    names.iter().position(|n| n == colour.name())
 }
 
 /// True if a pixel counts a channel; pixels of a sensor without a filter count all.

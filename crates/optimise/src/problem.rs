@@ -3,7 +3,7 @@
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Progress, Result};
 use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
-use metalith_wave::camera::Noise;
+use metalith_sensor::Noise;
 use rayon::prelude::*;
 
 use crate::PixelWindow;

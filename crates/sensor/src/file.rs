@@ -64,7 +64,7 @@ impl Camera {
         let [short, long] = VISIBLE_NM;
         let third = (long - short) / 3.0;
         let band = |name: &str, k: f64| flat_channel(name, [short + k * third, short + (k + 1.0) * third]);
-        let noise = metalith_wave::camera::Noise::default();
+        let noise = crate::Noise::default();
         Self {
             name: "three flat bands".into(),
             sensor: Sensor {
@@ -238,13 +238,7 @@ fn read_sensor(s: &Section<'_, '_>) -> Sensor {
             .map(f64::to_radians),
         filter: s.choice(
             "filter",
-            &[
-                ("none", ColourFilter::None),
-                ("rggb", ColourFilter::Rggb),
-                ("bggr", ColourFilter::Bggr),
-                ("grbg", ColourFilter::Grbg),
-                ("gbrg", ColourFilter::Gbrg),
-            ],
+            &[&[("none", ColourFilter::None)], &ColourFilter::BAYER[..]].concat(),
             None,
         ),
         bits,

@@ -4,6 +4,11 @@
 //! | --- | --- |
 //! | which keys a camera file has | `file`; the table is in `docs/guide/verify.md` |
 //! | what a sensor is, and which noise it has | `sensor` |
+//! | the camera of a bench, in DN | `relay` |
+//! | colour filters over pixels | `filter` |
+//! | photons and reading: one variance for all units | `noise` |
+//! | what source, blur and pixel area do to intensity; intensity read on pixels | `optic`, `pixels` |
+//! | frames from NPY, PNG and TIFF; exposures joined | `frame` |
 //! | which light a channel counts | `channel` |
 //! | how much light is let in | `exposure` |
 //! | the light of the scene | `illuminant` |
@@ -17,8 +22,14 @@
 mod channel;
 mod exposure;
 mod file;
+mod filter;
+pub mod frame;
 mod illuminant;
+mod noise;
 mod observer;
+mod optic;
+mod pixels;
+mod relay;
 mod sampling;
 mod sensor;
 mod spectrum;
@@ -26,8 +37,13 @@ mod spectrum;
 pub use channel::{Channel, Response};
 pub use exposure::Exposure;
 pub use file::Camera;
+pub use filter::{Colour, ColourFilter, ColourPixels};
 pub use illuminant::{Illuminant, Led};
+pub use noise::Noise;
 pub use observer::observer;
+pub use optic::Optic;
+pub use pixels::{PixelGrid, Reading};
+pub use relay::{RelayCamera, SATURATED};
 pub use sampling::{Blend, ChannelPart, ChannelSampling, Sampling, WavelengthSteps, lagrange};
-pub use sensor::{ColourFilter, Sensor, SensorNoise};
+pub use sensor::{Sensor, SensorNoise};
 pub use spectrum::Spectrum;

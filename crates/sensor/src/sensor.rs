@@ -1,7 +1,8 @@
 //! The sensor.
 
-use metalith_wave::camera::Noise;
 use serde::Serialize;
+
+use crate::{ColourFilter, Noise};
 
 /// The sensor and where it stands.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -24,19 +25,6 @@ pub struct Sensor {
     /// Electrons of one step of the pixel value.
     pub gain_e: f64,
     pub noise: SensorNoise,
-}
-
-/// Colour filter: the channel that each pixel counts, in the square of two by two pixels in the corner of the first row
-/// and column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ColourFilter {
-    /// Every pixel counts all channels; a sensor without a filter has one.
-    None,
-    Rggb,
-    Bggr,
-    Grbg,
-    Gbrg,
 }
 
 /// Sources of noise.
@@ -108,19 +96,9 @@ impl SensorNoise {
                 full_well_e,
                 read_noise_e,
                 dark_current_e_s,
-            } => Noise {
-                photon: 1.0 / full_well_e,
-                read: (read_noise_e.powi(2) + dark_current_e_s * time_s).sqrt() / full_well_e,
-            },
+            } => Noise::of_electrons(full_well_e, (read_noise_e.powi(2) + dark_current_e_s * time_s).sqrt()),
             Self::FullScale { photon, read } => Noise { photon, read },
         }
-    }
-}
-
-impl ColourFilter {
-    /// Names of the channels that a sensor with this filter has; nothing without a filter, where any name will do.
-    pub fn channels(self) -> Option<[&'static str; 3]> {
-        (self != Self::None).then_some(["red", "green", "blue"])
     }
 }
 

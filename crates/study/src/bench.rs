@@ -1,4 +1,4 @@
-//! Bench that judges draws: the designs, their layouts as read back, and tables of cells.
+//! StudyBench that judges draws: the designs, their layouts as read back, and tables of cells.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -35,7 +35,7 @@ impl Progress for Quiet<'_> {
 }
 
 /// Everything that judges a draw.
-pub(crate) struct Bench {
+pub(crate) struct StudyBench {
     pub tolerance: Tolerance,
     pub drawer: Sampler,
     picture: Option<PictureBench>,
@@ -76,8 +76,8 @@ struct MadeRange {
     changes: [CellChange; 2],
 }
 
-impl Bench {
-    /// Bench for a tolerance that was read. `key`: of the random numbers.
+impl StudyBench {
+    /// StudyBench for a tolerance that was read. `key`: of the random numbers.
     pub fn new(tolerance: Tolerance, key: [u8; 32], files: Files) -> Result<Self> {
         let base = match &tolerance.model {
             Some(path) => CalibratedModel::read(path)?.perturbation,

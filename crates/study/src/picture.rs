@@ -134,7 +134,7 @@ pub struct TakenPicture {
 }
 
 impl PictureBench {
-    /// Bench with the camera and the scene that are named.
+    /// StudyBench with the camera and the scene that are named.
     ///
     /// # Errors
     /// If one of them cannot be read, or the scene is too small to be scored.

@@ -17,7 +17,7 @@ use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::bench::{Bench, Files, Quiet};
+use crate::bench::{Files, Quiet, StudyBench};
 use crate::manifest::{Manifest, absolute, another_plan, is_planned};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
@@ -159,7 +159,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
         layouts: paths,
         cells: own.collect(),
     };
-    let bench = Bench::new(tolerance, key, files)?;
+    let bench = StudyBench::new(tolerance, key, files)?;
     let draws = bench.drawer.count();
     let mut plan = Plan {
         schema: SCHEMA,
@@ -204,7 +204,7 @@ fn layouts(tolerance: &Tolerance, folder: &Path, known: bool, progress: &dyn Pro
 
 impl Plan {
     /// Solve the tables of one design, or find those that an earlier one has, and judge its first draw.
-    fn take(&mut self, design: u64, designs: u64, bench: &Bench, progress: &dyn Progress) -> Result<()> {
+    fn take(&mut self, design: u64, designs: u64, bench: &StudyBench, progress: &dyn Progress) -> Result<()> {
         let name = named("cells", "bank", design, designs);
         let shared = Cell::new(None);
         let bank = |stated: &CellStack, range: BankRange| {

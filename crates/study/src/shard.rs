@@ -2,13 +2,13 @@
 
 use metalith_core::{Progress, Result};
 
-use crate::bench::{Bench, JudgedDraw, Quiet};
+use crate::bench::{JudgedDraw, Quiet, StudyBench};
 use crate::plan::Plan;
 
 /// Judges the draws of shards, one after the other.
 pub struct Run<'p> {
     plan: &'p Plan,
-    bench: Bench,
+    bench: StudyBench,
 }
 
 impl<'p> Run<'p> {
@@ -19,7 +19,7 @@ impl<'p> Run<'p> {
     pub fn open(plan: &'p Plan) -> Result<Self> {
         Ok(Self {
             plan,
-            bench: Bench::open(plan)?,
+            bench: StudyBench::open(plan)?,
         })
     }
 

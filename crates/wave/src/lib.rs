@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 
-pub mod camera;
 mod error;
 pub mod kernels;
 pub mod propagation;

@@ -1,7 +1,7 @@
 //! The propagators against one another, against the sum over all pillars, and against reference fields.
 
 use metalith_pillars::{Lattice, PillarMap};
-use metalith_wave::camera::{Optic, PixelGrid};
+use metalith_sensor::{Optic, PixelGrid};
 use metalith_wave::{
     Accuracy, Aperture, Direct, FoldedPropagator, Hankel, IdealPsf, PhaseFunction, Pillars, PlaneWave, Propagator, Psf,
     Scratch, WaveError, Window,

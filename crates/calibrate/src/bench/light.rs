@@ -231,8 +231,8 @@ mod tests {
     use num_complex::Complex64;
 
     use super::*;
-    use crate::bench::Sampling;
-    use crate::set::{ElementIndex, Led, LedIndex, MeasuredElement, MeasuredSet, Measurement, Stack};
+    use crate::bench::BenchSampling;
+    use crate::set::{BenchLed, ElementIndex, LedIndex, MeasuredElement, MeasuredSet, Measurement, Stack};
 
     /// A small lens of the shipped hexagonal design, as a session of one line of 1550 nm that looks at it from the side, on the
     /// axis and beside it.
@@ -263,7 +263,7 @@ mod tests {
             lens_diameter_um: 30.0,
             focal_length_um: 45.0,
         };
-        set.leds = vec![Led {
+        set.leds = vec![BenchLed {
             centre_nm: 1550.0,
             fwhm_nm: 0.5,
             channel: None,
@@ -306,7 +306,7 @@ mod tests {
         const OF_THE_PEAK: f64 = 1e-4;
         let set = hexagonal_set();
         assert_eq!(set.measurements.len(), 4);
-        let bench = Bench::new(&set, Sampling::default());
+        let bench = Bench::new(&set, BenchSampling::default());
         let wavelengths = bench.wavelengths_nm().len();
         let cells = Arc::new(PillarTable {
             first_nm: 100.0,

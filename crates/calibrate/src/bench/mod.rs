@@ -14,14 +14,15 @@ pub use light::Lit;
 
 use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{
-    ElementIndex, LedIndex, MeasuredSet, Measurement, MeasurementIndex, PerElement, PerLed, PerMeasurement, RelayCamera,
+    ElementIndex, LedIndex, MeasuredSet, Measurement, MeasurementIndex, PerElement, PerLed, PerMeasurement,
 };
 use metalith_optics::{DrawnElement, GeometryChange, KernelFilter, Perturbation, veiled};
+use metalith_sensor::RelayCamera;
 use metalith_wave::propagation::{Distances, DistancesPlan};
 
 /// Sampling of the simulated bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sampling {
+pub struct BenchSampling {
     /// Largest step in wavelength, as a share of the full width of the spectrum.
     pub spectrum: f64,
     /// Largest step in wavelength (nm).
@@ -32,7 +33,7 @@ pub struct Sampling {
     pub margin: usize,
 }
 
-impl Default for Sampling {
+impl Default for BenchSampling {
     fn default() -> Self {
         Self {
             spectrum: 0.13,
@@ -95,7 +96,7 @@ struct FocusSeries {
 
 impl<'a> Bench<'a> {
     /// Plan the simulation of a set.
-    pub fn new(set: &'a MeasuredSet, sampling: Sampling) -> Self {
+    pub fn new(set: &'a MeasuredSet, sampling: BenchSampling) -> Self {
         let (low, high) = set.stack.cell.range_um();
         let quadratures: PerLed<_> = set
             .leds
@@ -312,7 +313,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
         let mut set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
-        let usual = Sampling::default().margin;
+        let usual = BenchSampling::default().margin;
         for (pixels, pixel_um, is_usual) in [
             (48, 0.5, true),
             (128, 0.5, true),
@@ -321,7 +322,7 @@ mod tests {
             (512, 0.5, false),
         ] {
             (set.camera.rows, set.camera.cols, set.camera.pixel_um) = (pixels, pixels, pixel_um);
-            let bench = Bench::new(&set, Sampling::default());
+            let bench = Bench::new(&set, BenchSampling::default());
             let plan = &bench.groups[0].plan;
             let (n, step) = (plan.window() as f64, plan.step_um());
             let window_um = pixels as f64 * pixel_um;

@@ -17,7 +17,7 @@ use metalith_sensor::{Blend, Camera, Channel, Illuminant, Led, Response, Spectru
 use metalith_testing::session::{PIXELS, middle_set, small_design, small_set};
 use ndarray::{Array2, Array3};
 
-use super::{Bench, Sampling};
+use super::{Bench, BenchSampling};
 use crate::cells::CellSource;
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
@@ -91,7 +91,7 @@ impl Lenses {
         set.elements
             .iter_mut()
             .for_each(|e| e.aperture_diameter_um = 2.0 * self.design.aperture_radius_um());
-        let mut bench = Bench::new(&set, Sampling::default());
+        let mut bench = Bench::new(&set, BenchSampling::default());
         bench.follows = false;
         let published = || PublishedCell::new(set.stack.cell.pitch_nm as u32);
         let simulator = Simulator::new(bench, CellSource::Model(Box::new(published())), Vec::new());

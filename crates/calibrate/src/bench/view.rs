@@ -47,7 +47,7 @@ impl Bench<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Sampling;
+    use super::super::BenchSampling;
     use super::*;
     use crate::cells::CellSource;
     use crate::effects;
@@ -82,9 +82,9 @@ mod tests {
         set.leds.iter_mut().for_each(|led| led.fwhm_nm = 1e-6);
         set.divergence_rad = 0.0;
         set.field_boundary_um = Some([5.0, -4.0]);
-        let sampling = Sampling {
+        let sampling = BenchSampling {
             spectrum: 3.0,
-            ..Sampling::default()
+            ..BenchSampling::default()
         };
         let mut bench = Bench::new(&set, sampling);
         bench.follows = false;

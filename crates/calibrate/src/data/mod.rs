@@ -16,7 +16,8 @@ pub use nuisances::Nuisances;
 use crate::grouping::Grouping;
 use crate::optics::PixelGrid;
 
-use crate::set::{ElementIndex, LedIndex, MeasuredSet, PerLed, expected, saturated};
+use crate::set::{ElementIndex, LedIndex, MeasuredSet, PerLed};
+use metalith_sensor::frame::{expected, saturated};
 
 /// How a measurement was lit and where it was taken: measurements are grouped by this.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,5 +2,5 @@
 
 mod spectrum;
 
-pub use metalith_wave::camera::{Optic, PixelGrid, Reading};
+pub use metalith_sensor::{Optic, PixelGrid, Reading};
 pub use spectrum::Quadrature;

@@ -1,6 +1,6 @@
 //! Quadrature over the spectrum of an LED.
 
-use crate::set::Led;
+use crate::set::BenchLed;
 use metalith_optics::LightChange;
 
 /// Equidistant wavelengths over a Gaussian: for smooth integrands this sum converges faster than any power
@@ -9,7 +9,7 @@ use metalith_optics::LightChange;
 pub struct Quadrature {
     /// Wavelengths (nm).
     pub wavelengths_nm: Vec<f64>,
-    led: Led,
+    led: BenchLed,
 }
 
 /// Half range in standard deviations, with margin for an LED that is shifted or wider than stated.
@@ -24,7 +24,7 @@ const MOST_SIGMAS: f64 = 5.2;
 
 impl Quadrature {
     /// Wavelengths not more than `step_nm` apart, within `range_nm`.
-    pub fn new(led: Led, step_nm: f64, range_nm: (f64, f64)) -> Self {
+    pub fn new(led: BenchLed, step_nm: f64, range_nm: (f64, f64)) -> Self {
         let (sigmas, beyond_nm) = REACH_OF_NARROW;
         let sigma_nm = led.sigma_nm();
         let reach = (REACH_SIGMAS * sigma_nm)
@@ -63,7 +63,7 @@ mod tests {
     fn a_narrow_lamp_that_is_shifted_is_not_cut() {
         /// Error of the mean (nm): what a Gaussian has beyond 3 of its standard deviations on one side.
         const CUT_NM: f64 = 0.02;
-        let led = Led {
+        let led = BenchLed {
             centre_nm: 530.0,
             fwhm_nm: 6.0,
             channel: None,

@@ -1,6 +1,5 @@
 //! A measured set: what was written, what the bench recorded, and what the lab believes of both.
 
-mod frame;
 mod index;
 pub mod read;
 mod sem;
@@ -9,16 +8,12 @@ use std::path::PathBuf;
 
 use ndarray::Array2;
 
-pub use frame::{Bayer, Channel};
-pub(crate) use frame::{expected, saturated};
 pub use index::{ElementIndex, LedIndex, MeasurementIndex, PerElement, PerLed, PerMeasurement};
 pub use sem::{COLUMNS as SEM_COLUMNS, SemSite};
 
 use metalith_cell::CellStack;
 use metalith_pillars::PillarMap;
-
-/// A mean of frames this near to saturation contains clipped frames.
-pub const SATURATED: f64 = 0.97;
+use metalith_sensor::{Colour, RelayCamera};
 
 /// One bench session, read and checked.
 #[derive(Clone, Debug)]
@@ -33,7 +28,7 @@ pub struct MeasuredSet {
     /// Full angle of the uniform disc that the source is (rad).
     pub divergence_rad: f64,
     pub camera: RelayCamera,
-    pub leds: PerLed<Led>,
+    pub leds: PerLed<BenchLed>,
     pub elements: PerElement<MeasuredElement>,
     pub measurements: PerMeasurement<Measurement>,
     /// Where a boundary of write fields runs across x and across y, from the middle of every lens (um), if the lab says so.
@@ -55,9 +50,9 @@ impl MeasuredSet {
     pub fn seeing_pixels(&self, measurement: MeasurementIndex) -> usize {
         let (camera, channel) = (&self.camera, self.leds[self.measurements[measurement].led].channel);
         let all = camera.rows * camera.cols;
-        camera.bayer.zip(channel).map_or(all, |(bayer, channel)| {
+        camera.filter.pixels_of(channel).map_or(all, |of_colour| {
             let pixels = (0..camera.rows).flat_map(|y| (0..camera.cols).map(move |x| (y, x)));
-            pixels.filter(|at| bayer.has(*at, channel)).count()
+            pixels.filter(|at| of_colour.has(*at)).count()
         })
     }
 
@@ -99,56 +94,16 @@ impl Stack {
     }
 }
 
-/// The camera behind its relay, in units of the sensor plane.
-#[derive(Clone, Copy, Debug)]
-pub struct RelayCamera {
-    pub pixel_um: f64,
-    pub rows: usize,
-    pub cols: usize,
-    pub black_level_dn: f64,
-    pub gain_e_per_dn: f64,
-    pub read_noise_dn: f64,
-    pub saturation_dn: f64,
-    /// Standard deviation of where a window is, along each axis (pixels).
-    pub registration_sigma_px: f64,
-    /// Relative standard deviation of the DN scale of each LED.
-    pub flux_sigma: f64,
-    /// Standard deviation of the relay's own Gaussian blur (um).
-    pub relay_blur_um: f64,
-    /// Filters over the pixels; none for a sensor that sees all colours alike.
-    pub bayer: Option<Bayer>,
-}
-
-impl RelayCamera {
-    /// Mean of a pixel from which on it was clipped in some of its frames (DN).
-    pub fn full_dn(&self) -> f64 {
-        SATURATED * self.saturation_dn
-    }
-
-    /// Variance of a pixel as recorded (DN^2) in the mean of so many frames: shot noise of this signal above the black level (DN),
-    /// and read noise.
-    pub fn variance_dn2(&self, signal_dn: f64, frames: u32) -> f64 {
-        let shot = signal_dn.max(0.0) / self.gain_e_per_dn;
-        (shot + self.read_noise_dn.powi(2)) / f64::from(frames)
-    }
-
-    /// Electrons that the mean of so many frames rests on where it shows this signal above black (DN): those of the light, and as
-    /// many as would scatter like the read noise.
-    pub fn electrons(&self, signal_dn: f64, frames: u32) -> f64 {
-        self.gain_e_per_dn.powi(2) * f64::from(frames).powi(2) * self.variance_dn2(signal_dn, frames)
-    }
-}
-
-/// A Gaussian spectrum.
+/// A light-emitting diode of the bench, with a Gaussian spectrum.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Led {
+pub struct BenchLed {
     pub centre_nm: f64,
     pub fwhm_nm: f64,
     /// Filter whose pixels record it, where the sensor has filters.
-    pub channel: Option<Channel>,
+    pub channel: Option<Colour>,
 }
 
-impl Led {
+impl BenchLed {
     /// Standard deviation (nm).
     pub fn sigma_nm(&self) -> f64 {
         self.fwhm_nm / (8.0 * 2f64.ln()).sqrt()

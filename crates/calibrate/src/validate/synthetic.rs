@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::bench::{Bench, Lit, Sampling};
+use crate::bench::{Bench, BenchSampling, Lit};
 use crate::cells::{CellSource, RigorousCells};
 use crate::effects;
 use crate::optics::PixelGrid;
@@ -68,7 +68,7 @@ impl<'a> Synthesizer<'a> {
     /// As [`Synthesizer::new`].
     pub fn with_orders(like: &'a MeasuredSet, settings: &Settings, orders: usize) -> Result<Self> {
         let s = settings.sampling;
-        let sampling = Sampling {
+        let sampling = BenchSampling {
             spectrum: 0.85 * s.spectrum,
             step_nm: 0.85 * s.step_nm,
             step_um: 0.9 * s.step_um,

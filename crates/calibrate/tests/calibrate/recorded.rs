@@ -3,9 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use metalith_calibrate::{Bayer, Diagnosis, MeasuredSet, Session, SetVerdict, Synthesizer};
+use metalith_calibrate::{Diagnosis, MeasuredSet, Session, SetVerdict, Synthesizer};
 use metalith_core::Silent;
 use metalith_gds::extract::GdsPillars;
+use metalith_sensor::ColourFilter;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
@@ -90,14 +91,14 @@ fn a_bias_is_found_in_a_mosaic() {
         .replace("centre_nm = 500", "centre_nm = 500\nchannel = \"green\"")
         .replace("centre_nm = 560", "centre_nm = 560\nchannel = \"red\"");
     fs::write(&path, text).unwrap();
-    let bayer = Bayer::CHOICES.iter().find(|c| c.0 == "grbg").unwrap().1;
+    let filter = ColourFilter::Grbg;
     let mut camera = SensorModel::new(1);
     let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
     for ((name, light), measurement) in light().iter().zip(&set.measurements) {
-        let channel = set.leds[measurement.led].channel.unwrap();
+        let pixels = filter.pixels_of(set.leds[measurement.led].channel).unwrap();
         let frame = Array2::from_shape_fn(light.dim(), |at| {
             // Through another filter comes a tenth.
-            let share = if bayer.has(at, channel) { 1.0 } else { 0.1 };
+            let share = if pixels.has(at) { 1.0 } else { 0.1 };
             camera.recorded(share * light[at], measurement.frames)
         });
         write_npy(&folder.path().join(format!("{name}.npy")), &frame);

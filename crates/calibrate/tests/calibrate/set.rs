@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use metalith_calibrate::{Diagnosis, MeasuredSet, Sampling, Session, Settings, Simulations, Synthesizer};
+use metalith_calibrate::{BenchSampling, Diagnosis, MeasuredSet, Session, Settings, Simulations, Synthesizer};
 use metalith_core::Silent;
 use metalith_gds::extract::GdsPillars;
 use metalith_testing::session::small_set;
@@ -39,9 +39,9 @@ pub fn settings() -> Settings {
 
 pub fn with_effects(names: &[&str]) -> Settings {
     Settings {
-        sampling: Sampling {
+        sampling: BenchSampling {
             spectrum: 0.34,
-            ..Sampling::default()
+            ..BenchSampling::default()
         },
         cache: Some(FOLDERS[1].clone()),
         only: names.iter().map(|n| (*n).into()).collect(),

@@ -9,7 +9,7 @@ mod bands;
 mod natural;
 mod power;
 
-use metalith_wave::camera::Noise;
+use metalith_sensor::Noise;
 use ndarray::Array3;
 
 use bands::ZONES;

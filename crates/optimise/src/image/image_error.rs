@@ -1,6 +1,6 @@
 //! The error to be expected of an image after Wiener filtering, in closed form.
 
-use metalith_wave::camera::Noise;
+use metalith_sensor::Noise;
 use num_complex::{Complex32, Complex64};
 
 use super::scene::Scene;

@@ -4,7 +4,7 @@ use crate::PixelWindow;
 use crate::image::pupil::USED;
 use crate::image::scene::Scene;
 use crate::merit::focus::Lens;
-use metalith_wave::camera::Noise;
+use metalith_sensor::Noise;
 
 /// Views that the merit is taken over.
 #[derive(Clone, Debug, PartialEq)]

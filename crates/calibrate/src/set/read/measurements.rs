@@ -6,17 +6,16 @@ use std::sync::Arc;
 use ndarray::Array2;
 
 use super::{DISTANCE_UM, WINDOW_CENTRE_UM, holds_its_pages, sensor_frame, whole};
-use crate::set::frame::{DarkPixels, Exposure, SensorFrames};
-use crate::set::{
-    ElementIndex, Led, LedIndex, MeasuredElement, Measurement, PerElement, PerLed, RelayCamera, SemSite, frame, sem,
-};
+use crate::set::{BenchLed, ElementIndex, LedIndex, MeasuredElement, Measurement, PerElement, PerLed, SemSite, sem};
 use metalith_core::document::{Limits, Section};
+use metalith_sensor::RelayCamera;
+use metalith_sensor::frame::{self, DarkPixels, ExposedFrame, SensorFrames};
 
 pub(super) fn measurements(
     root: &Section<'_, '_>,
     camera: &RelayCamera,
     frames: &SensorFrames,
-    leds: &PerLed<Led>,
+    leds: &PerLed<BenchLed>,
     elements: &PerElement<MeasuredElement>,
 ) -> Vec<Measurement> {
     let sensor = frames.pixels(camera);
@@ -46,7 +45,7 @@ pub(super) fn measurements(
         let aoi_deg: [f64; 2] = s.array("aoi_deg", Limits::new(-80.0..=80.0, "degrees"));
         let distance_um = s.float("distance_um", DISTANCE_UM);
         let window_centre_um = s.array("window_centre_um", WINDOW_CENTRE_UM);
-        let filter = camera.bayer.zip(leds.get(led).and_then(|l| l.channel));
+        let filter = camera.filter.pixels_of(leds.get(led).and_then(|l| l.channel));
         let (path, exposures) = exposures(&s, led, &mut darks);
         s.finish();
         let joined = frame::joined(exposures, sensor.as_ref(), camera, filter);
@@ -134,7 +133,7 @@ impl<'a> DarkFrames<'a> {
 
 /// The exposures of a measurement, at least one, and the file of the first: those of its `[[capture.exposure]]`, or its own. A dark frame
 /// of the measurement is that of its exposures which name none.
-fn exposures(s: &Section<'_, '_>, led: LedIndex, darks: &mut DarkFrames<'_>) -> (PathBuf, Vec<Exposure>) {
+fn exposures(s: &Section<'_, '_>, led: LedIndex, darks: &mut DarkFrames<'_>) -> (PathBuf, Vec<ExposedFrame>) {
     let (of_measurement, is_named) = (darks.of(s), s.has("dark_frame"));
     if !s.has("exposure") {
         let (path, only) = exposure(s, led, (of_measurement, is_named), darks);
@@ -161,8 +160,8 @@ fn exposures(s: &Section<'_, '_>, led: LedIndex, darks: &mut DarkFrames<'_>) -> 
 }
 
 /// Placeholder for an exposure that is missing.
-fn nothing(camera: &RelayCamera) -> Exposure {
-    Exposure {
+fn nothing(camera: &RelayCamera) -> ExposedFrame {
+    ExposedFrame {
         dn: Array2::zeros((camera.rows, camera.cols)),
         scale_dn: 1.0,
         frames: 1,
@@ -177,7 +176,7 @@ fn exposure(
     led: LedIndex,
     (dark, is_named): (Option<Arc<DarkPixels>>, bool),
     darks: &mut DarkFrames<'_>,
-) -> (PathBuf, Exposure) {
+) -> (PathBuf, ExposedFrame) {
     let camera = darks.camera;
     let path = s.file("file");
     let scale_dn = s.float("scale_dn", Limits::new(f64::MIN_POSITIVE..=1e12, "DN"));
@@ -195,7 +194,7 @@ fn exposure(
     if !is_named {
         darks.check_one_time(s, led, scale_dn);
     }
-    let mut exposure = Exposure {
+    let mut exposure = ExposedFrame {
         scale_dn,
         frames,
         dark,

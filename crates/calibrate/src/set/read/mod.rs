@@ -5,8 +5,7 @@ mod measurements;
 
 use std::path::Path;
 
-use super::frame::{self, Bayer, Channel, Recorded, SensorFrame, SensorFrames};
-use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
+use super::{BenchLed, MeasuredSet, PerElement, PerLed, Stack};
 use elements::elements;
 use measurements::{measurements, widths};
 use metalith_cell::{CellStack, Material, UniformLayer};
@@ -14,6 +13,8 @@ use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{LayerNumber, Progress, Result};
 use metalith_pillars::{ElementSite, LatticeKind, PillarReader, PillarShape};
 use metalith_rcwa::CellLattice;
+use metalith_sensor::frame::{self, Recorded, SensorFrame, SensorFrames};
+use metalith_sensor::{Colour, ColourFilter, RelayCamera};
 use ndarray::Array2;
 
 /// Version of the format that is read.
@@ -68,7 +69,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
     let (stack, is_known) = stack(&root.section("stack"), path.parent().unwrap_or(Path::new("")));
     let divergence_rad = source(&root.section("source"));
     let (camera, frames) = camera(&root.section("camera"));
-    let leds: PerLed<_> = leds(root, camera.bayer, is_known.then_some(&stack.cell)).into();
+    let leds: PerLed<_> = leds(root, camera.filter, is_known.then_some(&stack.cell)).into();
     let layout = root.file("layout");
     let elements: PerElement<_> = {
         let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, stack.cell.shape, sites, progress);
@@ -293,7 +294,7 @@ pub fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
         relay_blur_um: s
             .optional_float("relay_blur_um", Limits::new(0.0..=100.0, "um"))
             .unwrap_or(0.0),
-        bayer: s.has("bayer").then(|| s.choice("bayer", &Bayer::CHOICES, None)),
+        filter: s.choice("bayer", &ColourFilter::BAYER, Some(ColourFilter::None)),
     };
     let frames = SensorFrames {
         dark: sensor_frame(s, &camera, "dark_frame", "dark_frames"),
@@ -306,7 +307,7 @@ pub fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
 }
 
 /// What is wrong with a lamp whose spectrum reaches beyond what is known of the materials of a cell, and what to do.
-pub fn beyond_tables(led: &Led, cell: &CellStack) -> Option<(String, &'static str)> {
+pub fn beyond_tables(led: &BenchLed, cell: &CellStack) -> Option<(String, &'static str)> {
     let (film, all) = (cell.film.range_um(), cell.range_um());
     let half = SPECTRUM_SIGMAS * led.sigma_nm();
     let (from, to) = (led.centre_nm - half, led.centre_nm + half);
@@ -329,13 +330,13 @@ pub fn beyond_tables(led: &Led, cell: &CellStack) -> Option<(String, &'static st
     })
 }
 
-pub fn leds(root: &Section<'_, '_>, bayer: Option<Bayer>, cell: Option<&CellStack>) -> Vec<Led> {
-    let mut leds: Vec<Led> = Vec::new();
+pub fn leds(root: &Section<'_, '_>, filter: ColourFilter, cell: Option<&CellStack>) -> Vec<BenchLed> {
+    let mut leds: Vec<BenchLed> = Vec::new();
     for s in root.sections("led") {
-        let led = Led {
+        let led = BenchLed {
             centre_nm: s.float("centre_nm", Limits::new(200.0..=20_000.0, "nm")),
             fwhm_nm: s.float("fwhm_nm", Limits::new(0.5..=200.0, "nm")),
-            channel: bayer.map(|_| s.choice("channel", &Channel::CHOICES, None)),
+            channel: (filter != ColourFilter::None).then(|| s.choice("channel", &Colour::CHOICES, None)),
         };
         s.finish();
         if leds.iter().any(|l| l.name() == led.name()) {

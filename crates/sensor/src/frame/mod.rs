@@ -1,15 +1,13 @@
 //! Camera frames from NPY, PNG and TIFF files, what the sensor itself adds to them, and several exposures as one.
 
-mod bayer;
 mod expected;
 mod join;
 mod png;
 mod sensor;
 mod tiff;
 
-pub use bayer::{Bayer, Channel};
 pub use expected::expected;
-pub use join::{Exposure, joined};
+pub use join::{ExposedFrame, joined};
 pub use sensor::{DarkPixels, SensorFrame, SensorFrames, SensorPixels};
 
 use std::path::Path;
@@ -17,7 +15,7 @@ use std::path::Path;
 use metalith_core::npy;
 use ndarray::Array2;
 
-use super::SATURATED;
+use crate::relay::SATURATED;
 
 /// Most pixels of a stack of frames (1 GB in single precision).
 const MOST_PIXELS: u64 = 1 << 28;

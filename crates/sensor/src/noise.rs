@@ -4,7 +4,8 @@ use ndarray::Array2;
 use rand::Rng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
-/// Noise of a sensor, for images between zero and one: photons counted in units of `photon`, and what reading adds.
+/// Noise of a sensor: photons counted in units of `photon`, and what reading adds. Signals are of full scale, or in another
+/// unit that both fields share.
 ///
 /// The model and numbers of Tseng et al., Nature Communications 12, 6493 (2021).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +26,22 @@ impl Default for Noise {
 }
 
 impl Noise {
+    /// Noise of a data sheet, for images of which one is this number of electrons. `read_e`: standard deviation of reading (electrons).
+    pub fn of_electrons(full_scale_e: f64, read_e: f64) -> Self {
+        Self {
+            photon: 1.0 / full_scale_e,
+            read: read_e / full_scale_e,
+        }
+    }
+
+    /// Noise of frames in DN above the black level. `read_dn`: standard deviation of reading (DN).
+    pub fn of_dn(gain_e_per_dn: f64, read_dn: f64) -> Self {
+        Self {
+            photon: 1.0 / gain_e_per_dn,
+            read: read_dn,
+        }
+    }
+
     /// Variance at a signal of this size.
     pub fn variance(&self, signal: f64) -> f64 {
         self.photon * signal.max(0.0) + self.read.powi(2)

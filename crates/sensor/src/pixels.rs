@@ -8,8 +8,8 @@ use ndarray::Array2;
 use num_complex::Complex32;
 use rustfft::FftPlanner;
 
-use super::Optic;
-use crate::kernels::{cis, fade};
+use crate::Optic;
+use metalith_wave::kernels::{cis, fade};
 
 /// The intensity around one window, as a spectrum.
 #[derive(Clone, Debug)]

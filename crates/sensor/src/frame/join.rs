@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 
-use super::bayer::{Bayer, Channel};
 use super::{DarkPixels, SensorPixels, expected, saturated};
-use crate::set::RelayCamera;
+use crate::{ColourPixels, RelayCamera};
 
 /// A mean frame of one exposure.
-pub struct Exposure {
+pub struct ExposedFrame {
     /// Values as recorded, black level included (DN).
     pub dn: Array2<f32>,
     /// DN for |E|^2 / |E_inc|^2 = 1.
@@ -43,10 +42,10 @@ pub struct Joined {
 /// # Panics
 /// If there is no exposure.
 pub fn joined(
-    mut exposures: Vec<Exposure>,
+    mut exposures: Vec<ExposedFrame>,
     sensor: Option<&SensorPixels>,
     camera: &RelayCamera,
-    filter: Option<(Bayer, Channel)>,
+    filter: Option<ColourPixels>,
 ) -> Joined {
     let longest = exposures.iter().max_by(|a, b| a.scale_dn.total_cmp(&b.scale_dn));
     let (scale_dn, frames) = longest.map(|e| (e.scale_dn, e.frames)).expect("at least one exposure");
@@ -82,7 +81,7 @@ pub fn joined(
         let told = exposures.iter().zip(&masks).filter(move |(_, full)| !full[at]);
         told.map(|(e, _)| e)
     };
-    let signal = |e: &Exposure, at| f64::from(e.dn[at]) - black;
+    let signal = |e: &ExposedFrame, at| f64::from(e.dn[at]) - black;
     // Light of each pixel by all exposures, and the electrons that it rests on.
     let mut electrons = Array2::zeros(dn.dim());
     let first = Array2::from_shape_fn(dn.dim(), |at| {
@@ -93,7 +92,7 @@ pub fn joined(
         if weight == 0.0 {
             return f32::INFINITY;
         }
-        if filter.is_none_or(|(bayer, channel)| bayer.has(at, channel)) {
+        if filter.is_none_or(|pixels| pixels.has(at)) {
             let own = usable(at).map(|e| camera.electrons(signal(e, at), e.frames));
             electrons[at] = own.sum::<f64>() as f32;
         }
@@ -138,10 +137,10 @@ pub fn joined(
         let of_sensor: f64 = shared.iter().map(|error| (error / certainty).powi(2)).sum();
         noise[at] = (scale_dn * scale_dn * (1.0 / certainty + of_sensor)) as f32;
     }
-    if let Some((bayer, channel)) = filter {
-        dn = bayer.filled(&dn, channel);
+    if let Some(pixels) = filter {
+        dn = pixels.filled(&dn);
         for (at, v) in noise.indexed_iter_mut() {
-            if !bayer.has(at, channel) {
+            if !pixels.has(at) {
                 *v = f32::INFINITY;
             }
         }
@@ -159,9 +158,10 @@ mod tests {
     use super::super::SensorFrame;
     use super::super::sensor::tests::camera;
     use super::*;
+    use crate::{Colour, ColourFilter};
 
-    fn exposure(scale_dn: f64, frames: u32, values: [f32; 6]) -> Exposure {
-        Exposure {
+    fn exposure(scale_dn: f64, frames: u32, values: [f32; 6]) -> ExposedFrame {
+        ExposedFrame {
             dn: Array2::from_shape_vec((2, 3), values.to_vec()).unwrap(),
             scale_dn,
             frames,
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn pixels_under_other_filters_are_masked() {
-        let filter = Some((Bayer::CHOICES[0].1, Channel::Green));
+        let filter = ColourFilter::Rggb.pixels_of(Some(Colour::Green));
         let frame = exposure(1.0, 1, [900.0, 50.0, 900.0, 60.0, 900.0, 70.0]);
         let joined = joined(vec![frame], None, &camera(), filter);
         let noise = joined.noise.unwrap();

@@ -1,6 +1,6 @@
 //! Effect of source, blur and pixel area on intensity.
 
-use crate::kernels::{jinc, sinc};
+use metalith_wave::kernels::{jinc, sinc};
 
 /// Filters that intensity passes on its way to the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Optic {
 
 impl Optic {
     /// Factor of the intensity's spectrum at a frequency (cycles / um).
-    pub(super) fn transfer(&self, fx: f64, fy: f64) -> f64 {
+    pub(crate) fn transfer(&self, fx: f64, fy: f64) -> f64 {
         let [u, v] = self.disc_um;
         let disc = jinc(std::f64::consts::TAU * (fx * u[0] + fy * u[1]).hypot(fx * v[0] + fy * v[1]));
         let blur = (-2.0 * (std::f64::consts::PI * self.blur_um).powi(2) * (fx * fx + fy * fy)).exp();

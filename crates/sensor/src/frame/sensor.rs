@@ -2,8 +2,8 @@
 
 use ndarray::{Array2, Zip};
 
-use super::{Bayer, Channel, saturated};
-use crate::set::RelayCamera;
+use super::saturated;
+use crate::{Colour, ColourPixels, RelayCamera};
 
 /// A mean frame of the sensor by itself.
 pub struct SensorFrame {
@@ -87,11 +87,8 @@ impl SensorFrames {
 /// Mean of the even light at the pixels that have the filter of a pixel, at each pixel: colours of a light are unlike, and
 /// `scale_dn` is that of the pixels of one filter.
 fn levels(lit: &Array2<f32>, camera: &RelayCamera) -> Array2<f32> {
-    let group = |(y, x): (usize, usize)| {
-        let bayer = camera.bayer?;
-        Channel::CHOICES.iter().position(|(_, c)| bayer.has((y, x), *c))
-    };
-    let mut sums = [(0.0f64, 0usize); Channel::CHOICES.len()];
+    let group = |(y, x): (usize, usize)| camera.filter.colour_at(y, x).map(|colour| colour as usize);
+    let mut sums = [(0.0f64, 0usize); Colour::CHOICES.len()];
     for (at, v) in lit.indexed_iter() {
         let sum = &mut sums[group(at).unwrap_or(0)];
         *sum = (sum.0 + f64::from(*v), sum.1 + 1);
@@ -137,12 +134,12 @@ impl SensorPixels {
     pub fn take_out(
         &self,
         dn: &mut Array2<f32>,
-        filter: Option<(Bayer, Channel)>,
+        filter: Option<ColourPixels>,
         own: Option<&DarkPixels>,
     ) -> Array2<bool> {
         let dark = self.dark_of(own);
         let (black, full) = (self.camera.black_level_dn as f32, self.camera.saturation_dn);
-        let counts = |at| filter.is_none_or(|(bayer, channel)| bayer.has(at, channel));
+        let counts = |at| filter.is_none_or(|pixels| pixels.has(at));
         for (at, v) in dn.indexed_iter_mut() {
             let response = self.response(at);
             // Without light there is no response to speak of.
@@ -209,7 +206,7 @@ const LEAST_RESPONSE: f32 = 0.1;
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::set::Bayer;
+    use crate::ColourFilter;
 
     pub fn camera() -> RelayCamera {
         RelayCamera {
@@ -223,7 +220,7 @@ pub(super) mod tests {
             registration_sigma_px: 0.5,
             flux_sigma: 0.01,
             relay_blur_um: 0.0,
-            bayer: None,
+            filter: ColourFilter::None,
         }
     }
 
@@ -285,15 +282,15 @@ pub(super) mod tests {
     /// A flat frame that was too bright somewhere tells nothing there, and dead pixels of other filters no matter.
     #[test]
     fn pixels_that_a_flat_frame_does_not_tell_of_are_dead() {
-        let green = (Bayer::CHOICES[0].1, Channel::Green);
+        let green = ColourFilter::Rggb.pixels_of(Some(Colour::Green)).unwrap();
         let camera = RelayCamera {
-            bayer: Some(green.0),
+            filter: ColourFilter::Rggb,
             ..camera()
         };
         let shape = (8, 8);
         // Light of green alone; one green pixel is full.
-        let mut flat = Array2::from_shape_fn(shape, |at| if green.0.has(at, green.1) { 240.0 } else { 40.0 });
-        let full = (0..8).map(|x| (0, x)).find(|at| green.0.has(*at, green.1)).unwrap();
+        let mut flat = Array2::from_shape_fn(shape, |at| if green.has(at) { 240.0 } else { 40.0 });
+        let full = (0..8).map(|x| (0, x)).find(|at| green.has(*at)).unwrap();
         flat[full] = 1000.0;
         let pixels = frames(Array2::from_elem(shape, 40.0), flat, 1).pixels(&camera).unwrap();
         let masked = pixels.take_out(&mut Array2::from_elem(shape, 140.0), Some(green), None);
@@ -307,7 +304,7 @@ pub(super) mod tests {
     #[test]
     fn responses_are_relative_to_the_pixels_of_one_filter() {
         let camera = RelayCamera {
-            bayer: Some(Bayer::CHOICES[0].1),
+            filter: ColourFilter::Rggb,
             ..camera()
         };
         // Red 100, green 300 but for one of 200, blue 50.
