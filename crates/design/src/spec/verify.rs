@@ -65,6 +65,8 @@ pub struct LimitSpec {
     pub wrong_widths_max: u64,
     /// Shapes on the pillar layer that are not a pillar on the lattice.
     pub foreign_shapes_max: u64,
+    /// Root mean square phase error of the mapping, against the phase of pillars in lattices of equals (rad).
+    pub mapping_phase_rms_max_rad: f64,
     /// Root mean square phase error of rounding widths to the step (rad).
     pub rounding_phase_rms_max_rad: f64,
     /// Strehl of the layout over that of the unrounded design phase.
@@ -223,6 +225,7 @@ impl LimitSpec {
         let mut limits = Self {
             wrong_widths_max: 0,
             foreign_shapes_max: 0,
+            mapping_phase_rms_max_rad: 0.3,
             rounding_phase_rms_max_rad: 0.05,
             strehl_ratio_min: 0.0,
             centroid_shift_max_um: f64::MAX,
@@ -240,6 +243,7 @@ impl LimitSpec {
         };
         limits.wrong_widths_max = count("wrong_widths_max", limits.wrong_widths_max);
         limits.foreign_shapes_max = count("foreign_shapes_max", limits.foreign_shapes_max);
+        limits.mapping_phase_rms_max_rad = real("mapping_phase_rms_max_rad", "rad", limits.mapping_phase_rms_max_rad);
         limits.rounding_phase_rms_max_rad =
             real("rounding_phase_rms_max_rad", "rad", limits.rounding_phase_rms_max_rad);
         limits.strehl_ratio_min = real("strehl_ratio_min", "", limits.strehl_ratio_min);
