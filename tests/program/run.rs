@@ -143,7 +143,7 @@ fn what_is_too_large_to_be_simulated_is_compared_all_the_same() {
     );
     // A pillar that is off its site is found; limits that only a simulation could judge fail in any case.
     let right = |found: &Value| found["checks"][0]["reached"].as_f64() == Some(0.0);
-    assert!(right(&found) && found["checks"][2]["key"] == "rounding_phase_rms_max_rad");
+    assert!(right(&found) && found["checks"][3]["key"] == "rounding_phase_rms_max_rad");
     let gds = metalith(&["layout", "--hierarchy", "flat", "--out"], &[folder.path(), &mini]);
     assert!(gds.status.success());
     let path = folder.path().join("mini_3x3_pillars.gds");
