@@ -135,7 +135,13 @@ impl LayoutSpec {
         let layers = Layers::read(&root.section("layers"));
         let apertures = ApertureSpec::read(&root.section("apertures"), lens, array);
         let chip = ChipSpec::read(&root.section("chip"), lens, array, &apertures);
-        let marks = root.sections("mark").iter().map(|s| MarkSpec::read(s, &chip)).collect();
+        let marks = root.sections("mark");
+        let marks = marks.iter().map(|s| {
+            let mark = MarkSpec::read(s, &chip);
+            mark.check_elements(s, lens, array, &apertures);
+            mark
+        });
+        let marks = marks.collect();
         Self {
             hierarchy,
             timestamp,
@@ -324,6 +330,56 @@ impl ChipSpec {
 }
 
 impl MarkSpec {
+    /// A cross over an opening would be written over its pillars.
+    fn check_elements(&self, s: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec, apertures: &ApertureSpec) {
+        let half = [self.length_nm / 2, self.width_nm / 2];
+        let meets = |element: &Element, at: (i64, i64)| {
+            let reach = apertures.reach_nm(array, lens, element);
+            let is_round = array.lens_of(lens, element.index).outline.is_none();
+            [half, [half[1], half[0]]].into_iter().any(|[x, y]| {
+                // From the middle of the element to the nearest place of the arm.
+                let beside = |middle: i64, arm: i64, half: i64| {
+                    (middle.saturating_sub(arm).saturating_abs() - half).max(0) as f64
+                };
+                let off = [
+                    beside(element.centre_nm.0, at.0, x),
+                    beside(element.centre_nm.1, at.1, y),
+                ];
+                match is_round {
+                    true => off[0].hypot(off[1]) < reach[0] as f64,
+                    false => off[0] < reach[0] as f64 && off[1] < reach[1] as f64,
+                }
+            })
+        };
+        let elements = array.elements();
+        let met = self
+            .centres_nm
+            .iter()
+            .find_map(|&at| Some((at, elements.iter().find(|e| meets(e, at))?)));
+        if let Some(((x, y), element)) = met {
+            s.fault_given(
+                &[
+                    "lens.diameter_um",
+                    "array.elements",
+                    "array.spacing_um",
+                    "apertures.margin_um",
+                    "mark.y_um",
+                    "mark.length_um",
+                    "mark.width_um",
+                ],
+                "x_um",
+                format!(
+                    "the cross at ({}, {}) um of the set \"{}\" is over the opening of element {}",
+                    x as f64 * 1e-3,
+                    y as f64 * 1e-3,
+                    self.name,
+                    element.label()
+                ),
+                "move it away from the elements",
+            );
+        }
+    }
+
     fn read(s: &Section<'_, '_>, chip: &ChipSpec) -> Self {
         let xs = s.floats("x_um", PLACE);
         let ys = s.floats("y_um", PLACE);

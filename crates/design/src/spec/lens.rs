@@ -183,18 +183,7 @@ impl LensSpec {
 
     /// Files of its phases over the radius to which whole waves were added.
     pub(crate) fn unwrapped(&self) -> impl Iterator<Item = &Path> {
-        let along_y = self.along_y.iter().map(|y| (&y.phase, &y.terms));
-        std::iter::once((&self.phase, &self.terms))
-            .chain(along_y)
-            .flat_map(|(phase, terms)| {
-                let of_terms = terms.iter().filter_map(|term| match &term.form {
-                    TermForm::Radial(radial) => Some(radial),
-                    _ => None,
-                });
-                std::iter::once(phase)
-                    .chain(of_terms)
-                    .filter_map(RadialPhase::unwrapped)
-            })
+        self.radial_phases().filter_map(RadialPhase::unwrapped)
     }
 
     /// Least and greatest place of the aperture from the middle, along x and along y (um), as the phase has it: before the element
@@ -217,6 +206,20 @@ impl LensSpec {
             .find_map(|radial| match radial {
                 RadialPhase::Hyperbola { wavelength_um, .. } => Some(*wavelength_um),
                 _ => None,
+            })
+    }
+
+    /// Its phases over the radius, in the middle of the lens or elsewhere, of light along x and along y.
+    pub(crate) fn radial_phases(&self) -> impl Iterator<Item = &RadialPhase> {
+        let along_y = self.along_y.iter().map(|y| (&y.phase, &y.terms));
+        std::iter::once((&self.phase, &self.terms))
+            .chain(along_y)
+            .flat_map(|(phase, terms)| {
+                let of_terms = terms.iter().filter_map(|term| match &term.form {
+                    TermForm::Radial(radial) => Some(radial),
+                    _ => None,
+                });
+                std::iter::once(phase).chain(of_terms)
             })
     }
 

@@ -57,6 +57,13 @@ impl MapTable {
         &self.file
     }
 
+    /// Distance from its middle to its ends along x and y (um).
+    pub(crate) fn extent_um(&self) -> [f64; 2] {
+        let (columns, values) = &*self.values;
+        let rows = values.len().checked_div(*columns).unwrap_or(0);
+        [*columns, rows].map(|n| n as f64 * self.pitch_um / 2.0)
+    }
+
     /// True if its phases are known up to whole turns.
     pub fn is_wrapped(&self) -> bool {
         self.wrapped
