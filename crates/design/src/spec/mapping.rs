@@ -228,10 +228,11 @@ impl MappingSpec {
     /// Read the table or the library, if there is one. A library that is to be made may be of other sizes: it is left out.
     pub(crate) fn load(&mut self, cell: &CellSpec, library: LibraryFile) -> Result<()> {
         let own = cell.mapped(self.wavelength_um);
-        if let Some(file) = self.table_file.as_ref().or(self.pillar_library_file.as_ref())
-            && (file.exists() || library == LibraryFile::Needed)
-        {
-            self.identity.load(file, &own, library)?;
+        match self.table_file.as_ref().or(self.pillar_library_file.as_ref()) {
+            // A library that is to be made is for this cell.
+            Some(file) if library == LibraryFile::ToBeMade && !file.exists() => self.identity.is_stated = true,
+            Some(file) => self.identity.load(file, &own, library)?,
+            None => {}
         }
         if let Some(file) = &self.table_file {
             let allowed: Vec<u16> = cell.widths_nm().collect();
