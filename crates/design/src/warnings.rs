@@ -152,7 +152,7 @@ impl Design {
 
     /// Maps of which the lens has a small part.
     fn wide_maps(&self) -> Option<Warning> {
-        let maps = self.lenses().into_iter().flat_map(|lens| {
+        let mut maps = self.lenses().into_iter().flat_map(|lens| {
             let terms = lens.terms.iter();
             terms.filter_map(move |term| match &term.form {
                 TermForm::Map(map) => Some((
@@ -162,7 +162,7 @@ impl Design {
                 _ => None,
             })
         });
-        let (extent_um, radius_um) = maps.filter(|(extent, radius)| *extent > WIDE_MAP * radius).last()?;
+        let (extent_um, radius_um) = maps.find(|(extent, radius)| *extent > WIDE_MAP * radius)?;
         Some(Warning::new(
             "phase/wide-map",
             format!("a map of phases reaches to {extent_um:.1} um from its middle, and the lens to {radius_um:.1} um"),
@@ -172,16 +172,14 @@ impl Design {
 
     /// Zernike polynomials of a disc that is not the lens.
     fn other_discs(&self) -> Option<Warning> {
-        let discs = self.lenses().into_iter().flat_map(|lens| {
+        let mut discs = self.lenses().into_iter().flat_map(|lens| {
             let terms = lens.terms.iter();
             terms.filter_map(move |term| match &term.form {
                 TermForm::Zernike { radius_um, .. } => Some((*radius_um, lens.radius_um())),
                 _ => None,
             })
         });
-        let (disc_um, lens_um) = discs
-            .filter(|(disc, lens)| !(0.5..=2.0).contains(&(disc / lens)))
-            .last()?;
+        let (disc_um, lens_um) = discs.find(|(disc, lens)| !(0.5..=2.0).contains(&(disc / lens)))?;
         Some(Warning::new(
             "phase/zernike-disc",
             format!("Zernike polynomials are of a disc with a radius of {disc_um} um, and the lens has {lens_um} um"),
