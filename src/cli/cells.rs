@@ -55,6 +55,7 @@ pub struct CellsArgs {
 pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let design = standard_input::design_without_library(&args.design)?;
+    terminal.warnings(&design.mapping_warnings());
     let folder = args
         .out
         .clone()
@@ -167,7 +168,7 @@ fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Termin
         line(&counted(fit.mapping.sines.len(), "term"), fit.error);
     }
     if let Some(fit) = study.fits.get(1) {
-        print_line!("{}", rotation_keys(fit));
+        print_line!("{}", rotation_keys(fit, &study.mapped_cell));
     }
     print_line!("report: {}", folder.join("cells.html").display());
     Ok(Outcome::Fine)

@@ -170,6 +170,8 @@ impl Target {
 
 pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design)?;
+    let warnings = design.warnings()?;
+    terminal.warnings(&warnings);
     terminal.stop_on_interrupt();
     let mut array = PillarArray::build(&design, terminal)?;
     let mut compensation = None;
@@ -192,6 +194,7 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         let json = serde_json::json!({
             "design": design.name,
             "digest": design.digest(),
+            "warnings": warnings,
             "hierarchy": args.target.hierarchy(&design),
             "pillars": array.pillars(),
             "distinct_elements": array.classes.len(),
@@ -200,7 +203,7 @@ pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
             "compensation": compensation.as_ref().map(|c| &c.2.summary),
         });
         print_line!("{json:#}");
-    } else {
+    } else if !terminal.is_quiet() {
         for file in [&written.pillars, &written.apertures] {
             print_line!("{}  {:.3} MB", file.path.display(), file.bytes as f64 * 1e-6);
             for beside in &file.beside {

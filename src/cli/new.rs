@@ -146,6 +146,14 @@ impl NewArgs {
             // Notes of the two materials below one another.
             ("{after_film}", " ".repeat(32 - cell.film.len())),
             ("{film_word}", cell.film_word.to_owned()),
+            (
+                "{mapping_limit}",
+                match cell.shape {
+                    "" => "mapping_phase_rms_max_rad = 0.6   # the published polynomial errs by 0.57 rad rms against RCWA at 452 nm\n",
+                    _ => "",
+                }
+                .to_owned(),
+            ),
             ("{mapping_nm}", cell.mapping_nm.to_string()),
             ("{coefficients}", cell.coefficients.to_owned()),
             ("{verify_nm}", cell.verify_nm),

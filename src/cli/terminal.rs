@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use metalith::{FolderLock, Progress};
+use metalith::{FolderLock, Progress, Warning};
 
 use super::output;
 
@@ -134,6 +134,16 @@ impl Terminal {
             Some(bar) => bar.suspend(tell),
             None => tell(),
         }
+    }
+
+    /// Print warnings about an input, unless `--quiet`.
+    pub fn warnings(&self, warnings: &[Warning]) {
+        warnings.iter().for_each(|warning| self.say(&warning.to_string()));
+    }
+
+    /// True if nothing but errors and requested output is printed.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet
     }
 
     fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {

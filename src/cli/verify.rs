@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::cell::{cache_folder, oblique_refused};
-use metalith::design::{CellIncidence, LatticeOrders};
+use metalith::design::CellIncidence;
 use metalith::imaging::thumbnail;
 use metalith::report::{Figure, sig};
 use metalith::sensor::Camera;
 use metalith::{
     Accuracy, AsBuiltChip, CalibratedModel, Design, Error, Fidelity, PillarArray, PillarRows, Result, SimulationCases,
     Verification, cell_models, verify,
-    verify::{Simulation, verify_in_parts, verify_pillars},
+    verify::{Check, Simulation, verify_in_parts, verify_pillars},
     write_report,
 };
 
@@ -254,6 +254,12 @@ impl Judging {
         terminal.clear();
         if self.json {
             print_json(found);
+        } else if terminal.is_quiet() {
+            found
+                .checks
+                .iter()
+                .filter(|check| !check.passed())
+                .for_each(print_check);
         } else {
             summary(found, folder);
         }
@@ -277,27 +283,27 @@ fn summary(found: &Verification, folder: &Path) {
             );
         }
     }
-    for sentence in LatticeOrders::summary(&found.lattice_orders) {
-        print_line!("note: {sentence}");
-    }
     for quantity in found.model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");
     }
-    for check in &found.checks {
-        let verdict = if check.passed() { "holds" } else { "FAILS" };
-        print_line!(
-            "{verdict}: {}: {} (limit {}, `{}`)",
-            check.what,
-            sig(check.reached, 4),
-            sig(check.limit, 4),
-            check.key
-        );
-    }
+    found.checks.iter().for_each(print_check);
     print_line!("report: {}", folder.join("report.html").display());
+}
+
+fn print_check(check: &Check) {
+    let verdict = if check.passed() { "holds" } else { "FAILS" };
+    print_line!(
+        "{verdict}: {}: {} (limit {}, `{}`)",
+        check.what,
+        sig(check.reached, 4),
+        sig(check.limit, 4),
+        check.key
+    );
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design)?;
+    terminal.warnings(&design.warnings()?);
     let layout = InputFile::of(&args.layout)?;
     judged_as_made(
         "--compensated",

@@ -168,9 +168,11 @@ fn a_chip_as_made_loses_as_much_as_on_a_square_lattice() {
         ("diameter_um = 160", "diameter_um = 80"),
         ("focal_length_um = 240", "focal_length_um = 120"),
     ];
+    // In [cell] and in [mapping.cell].
     let square = [
         smaller[0],
         smaller[1],
+        ("lattice = \"hexagonal\"", "lattice = \"square\""),
         ("lattice = \"hexagonal\"", "lattice = \"square\""),
     ];
     let effects = [

@@ -143,7 +143,7 @@ fn what_is_too_large_to_be_simulated_is_compared_all_the_same() {
     );
     // A pillar that is off its site is found; limits that only a simulation could judge fail in any case.
     let right = |found: &Value| found["checks"][0]["reached"].as_f64() == Some(0.0);
-    assert!(right(&found) && found["checks"][2]["key"] == "rounding_phase_rms_max_rad");
+    assert!(right(&found) && found["checks"][3]["key"] == "rounding_phase_rms_max_rad");
     let gds = metalith(&["layout", "--hierarchy", "flat", "--out"], &[folder.path(), &mini]);
     assert!(gds.status.success());
     let path = folder.path().join("mini_3x3_pillars.gds");
@@ -404,4 +404,43 @@ fn what_cannot_be_read_is_bad_input() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("byte 0"));
     let output = metalith(&["run"], &[&folder.path().join("nowhere.toml")]);
     assert_eq!(output.status.code(), Some(2));
+}
+
+/// A mapping that errs is outside of the limits, which is all that a quiet run prints; warnings come first otherwise.
+#[test]
+fn an_error_of_the_mapping_is_a_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(design("tio2_532")).unwrap();
+    let table = design("tio2_532").with_file_name("mappings/tio2_532.csv");
+    let text = text
+        .replacen(
+            "\"mappings/tio2_532.csv\"",
+            &format!("{:?}", table.display().to_string()),
+            1,
+        )
+        .replacen("diameter_um = 80", "diameter_um = 20", 1)
+        .replacen("wavelength_nm = 532", "wavelength_nm = 540", 1)
+        .replacen(
+            "[verify.limits]",
+            "[verify.limits]\nmapping_phase_rms_max_rad = 0.01",
+            1,
+        );
+    let path = folder.path().join("lens.toml");
+    fs::write(&path, text).unwrap();
+    let run = |quiet: &str| metalith(&["run", "--fast", quiet, "--out"], &[folder.path(), &path]);
+    let output = run("--quiet");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!((output.status.code(), said.lines().count()), (Some(1), 1), "{said}");
+    assert!(said.starts_with("FAILS: rms phase error of the mapping"), "{said}");
+    assert!(output.stderr.is_empty());
+    let found = report(folder.path());
+    assert_eq!(found["checks"][0]["key"], "mapping_phase_rms_max_rad");
+    assert_eq!(found["warnings"][0]["id"], "design/wavelengths-differ");
+    let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("phase 540 nm; mapping 532 nm"));
+    let said = String::from_utf8(run("--threads=2").stderr).unwrap();
+    assert!(
+        said.starts_with("warning: parts of the design are for different wavelengths"),
+        "{said}"
+    );
 }

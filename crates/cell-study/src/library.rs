@@ -6,7 +6,7 @@ use std::path::Path;
 use ndarray::Array2;
 use serde::Serialize;
 
-use metalith_cell::{LibraryErrors, PillarLibrary, PolarisationAxis, UPRIGHT_ORDERS, UprightCell};
+use metalith_cell::{LibraryErrors, MappedCell, PillarLibrary, PolarisationAxis, UPRIGHT_ORDERS, UprightCell};
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::Design;
 use metalith_pillars::UprightRectangles;
@@ -17,6 +17,8 @@ use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, fixed, si
 pub struct LibraryStudy {
     pub name: String,
     pub wavelength_um: f64,
+    /// The cell that the mapping is for.
+    pub mapped_cell: MappedCell,
     /// The lengths that edges may have.
     pub pillars: UprightRectangles,
     /// Phase of light along x (turns) and share of its power that passes, by number less one; light along y has those of the
@@ -55,6 +57,7 @@ impl LibraryStudy {
         Ok(Self {
             name: design.name.clone(),
             wavelength_um,
+            mapped_cell: design.cell.mapped(wavelength_um),
             pillars,
             turns_x: (1..=pillars.count())
                 .map(|n| of_x(n).arg() / std::f64::consts::TAU)
@@ -74,7 +77,7 @@ impl LibraryStudy {
 pub fn write_library_report(study: &LibraryStudy, folder: &Path) -> Result<()> {
     page(study).write(&folder.join("cells.html"))?;
     write_json(&folder.join("cells.json"), "cells", study)?;
-    let csv = study.nearest.to_csv(study.pillars);
+    let csv = study.mapped_cell.to_comments() + &study.nearest.to_csv(study.pillars);
     AtomicFile::write(&folder.join("library.csv"), csv.as_bytes())
 }
 

@@ -30,7 +30,7 @@ pub fn write_cell_report(study: &CellStudy, folder: &Path) -> Result<()> {
             .collect();
         AtomicFile::write(
             &folder.join(format!("mapping_{name}.csv")),
-            mapping.table.to_csv().as_bytes(),
+            (study.mapped_cell.to_comments() + &mapping.table.to_csv()).as_bytes(),
         )?;
     }
     if !study.steered.is_empty() {
@@ -248,6 +248,8 @@ fn mappings(page: &mut Page, study: &CellStudy) {
             page.code(format!("coefficients = [{}]", list.join(", ")));
         }
     }
+    page.paragraph("Cell that the mappings made here are for, as a design states it after the keys of `[mapping]`:");
+    page.code(study.mapped_cell.to_toml());
 }
 
 fn named<'a>(study: &'a CellStudy, name: &str) -> Option<&'a MappingStudy> {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use metalith_cell::{MappingError, RotatedCell, RotationCurve, RotationFit, RotationMapping};
+use metalith_cell::{MappedCell, MappingError, RotatedCell, RotationCurve, RotationFit, RotationMapping};
 use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_report::{Axis, Cell, Chart, Column, Page, Table, counted, fixed, sig, write_json};
@@ -31,6 +31,8 @@ pub struct RotationPoint {
 pub struct RotationStudy {
     pub name: String,
     pub wavelength_um: f64,
+    /// The cell that the mapping is for.
+    pub mapped_cell: MappedCell,
     /// All rotations that the design may write.
     pub points: Vec<RotationPoint>,
     /// Error of the mapping of the design, and of half of the phase.
@@ -73,6 +75,7 @@ impl RotationStudy {
         Ok(Self {
             name: design.name.clone(),
             wavelength_um,
+            mapped_cell: design.cell.mapped(wavelength_um),
             points: (1..=pillars.steps).map(point).collect(),
             design: curve.error(&design.mapping.rotation),
             half: curve.error(&RotationMapping::default()),
@@ -88,15 +91,16 @@ impl RotationStudy {
 }
 
 /// The keys of `[mapping]` for a fit.
-pub fn rotation_keys(fit: &RotationFit) -> String {
+pub fn rotation_keys(fit: &RotationFit, cell: &MappedCell) -> String {
     let list = |terms: &[f64]| {
         let each: Vec<String> = terms.iter().map(|c| format!("{:.4}", c.to_degrees())).collect();
         format!("[{}]", each.join(", "))
     };
     format!(
-        "rotation_sines_deg = {}\nrotation_cosines_deg = {}",
+        "rotation_sines_deg = {}\nrotation_cosines_deg = {}\n\n{}",
         list(&fit.mapping.sines),
-        list(&fit.mapping.cosines)
+        list(&fit.mapping.cosines),
+        cell.to_toml()
     )
 }
 
@@ -160,7 +164,7 @@ pub fn write_rotation_report(study: &RotationStudy, folder: &Path) -> Result<()>
         page.details(
             format!("{}, as a design takes them", counted(fit.mapping.sines.len(), "term")),
             |inner| {
-                inner.code(rotation_keys(fit));
+                inner.code(rotation_keys(fit, &study.mapped_cell));
             },
         );
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use metalith_cell::{
-    BadCell, Basis, CellModel, ForwardFit, ForwardPolynomial, InverseFit, InversePolynomial, MappingError,
+    BadCell, Basis, CellModel, ForwardFit, ForwardPolynomial, InverseFit, InversePolynomial, MappedCell, MappingError,
     MappingTable, PhaseCurve, RampOrders, RigorousCell, bad_cells, curves_over, fit_forward, fit_inverse,
     forward_errors, round_trip,
 };
@@ -102,6 +102,8 @@ pub struct CellStudy {
     pub points: usize,
     /// Wavelength of the mapping (um).
     pub mapping_um: f64,
+    /// The cell that the mappings are for.
+    pub mapped_cell: MappedCell,
     /// Wavelengths that mappings are compared at, and the band of the best (um).
     pub compared_um: Vec<f64>,
     pub best_band_um: (f64, f64),
@@ -167,6 +169,7 @@ impl CellStudy {
             tolerance: spec.tolerance,
             points: cell.table().points(),
             mapping_um,
+            mapped_cell: design.cell.mapped(mapping_um),
             compared_um: design.compared_um().to_vec(),
             best_band_um: design.mapping_band_um()?,
             span_waves: fine.turns[fine.turns.len() - 1] - fine.turns[0],

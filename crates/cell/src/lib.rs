@@ -8,6 +8,7 @@ mod fit;
 mod illumination;
 pub mod kept;
 mod library;
+mod mapped_cell;
 mod model;
 mod neighbours;
 mod pointwise;
@@ -32,6 +33,7 @@ pub use fit::{
 };
 pub use illumination::{Illumination, Incidence, Spectral};
 pub use library::{LibraryErrors, LibraryPillar, PillarLibrary};
+pub use mapped_cell::{MappedCell, MappedDifference, MappedValue};
 pub use metalith_rcwa::Material;
 pub use model::{CellModel, Fidelity};
 pub use neighbours::{

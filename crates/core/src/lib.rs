@@ -13,6 +13,7 @@ mod plane;
 mod progress;
 pub mod srgb;
 pub mod text;
+mod warning;
 mod wedge;
 mod zernike;
 
@@ -25,5 +26,6 @@ pub use lagrange::lagrange_weight;
 pub use layer::LayerNumber;
 pub use plane::part;
 pub use progress::{Progress, Silent};
+pub use warning::Warning;
 pub use wedge::{Wedge, turned_sine};
 pub use zernike::Zernike;

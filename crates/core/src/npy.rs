@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read};
 use std::path::Path;
 
+use npyz::num_complex::{Complex32, Complex64};
+
 /// An array as the file has it, in C order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Array {
@@ -30,6 +32,8 @@ pub enum NpyError {
     Shape { shape: Vec<u64>, columns_first: bool },
     #[error("its entries are neither float32, float64, uint8 nor uint16")]
     Type,
+    #[error("its entries are neither float32, float64, complex64 nor complex128")]
+    NoPhase,
     #[error("it ends early: {0}")]
     Short(io::Error),
 }
@@ -50,6 +54,76 @@ pub fn read(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, Np
         return Err(NpyError::NotAFile);
     }
     read_from(BufReader::new(File::open(path)?), takes)
+}
+
+/// Variant of [`read`] for phases (rad), as other programs write them: in C or Fortran order, or as complex fields of which
+/// the phase is the angle.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_phases(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(NpyError::NotAFile);
+    }
+    phases_from(BufReader::new(File::open(path)?), takes)
+}
+
+fn phases_from(mut from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
+    let header = plain_header(&mut from)?;
+    let npy = npyz::NpyFile::new(Cursor::new(header).chain(from)).map_err(|e| NpyError::Format(e.to_string()))?;
+    let shape = npy.shape().to_vec();
+    let columns_first = npy.order() != npyz::Order::C;
+    if !takes(&shape) {
+        return Err(NpyError::Shape { shape, columns_first });
+    }
+    let npy = match npy.try_data::<Complex64>() {
+        Ok(data) => return angles(shape, columns_first, data),
+        Err(npy) => npy,
+    };
+    let npy = match npy.try_data::<Complex32>() {
+        Ok(data) => {
+            let wide = |v: Complex32| Complex64::new(v.re.into(), v.im.into());
+            return angles(shape, columns_first, data.map(|v| v.map(wide)));
+        }
+        Err(npy) => npy,
+    };
+    let values: io::Result<Vec<f64>> = match npy.try_data::<f64>() {
+        Ok(data) => data.collect(),
+        Err(npy) => {
+            let data = npy.try_data::<f32>().map_err(|_| NpyError::NoPhase)?;
+            data.map(|v| v.map(f64::from)).collect()
+        }
+    };
+    Ok(rows_first(shape, columns_first, values.map_err(NpyError::Short)?))
+}
+
+/// The angles of complex numbers (rad).
+fn angles(
+    shape: Vec<u64>,
+    columns_first: bool,
+    fields: impl Iterator<Item = io::Result<Complex64>>,
+) -> Result<Array, NpyError> {
+    let values = fields.map(|v| v.map(|v| if v.is_finite() { v.arg() } else { f64::NAN }));
+    let values = values.collect::<io::Result<_>>().map_err(NpyError::Short)?;
+    Ok(rows_first(shape, columns_first, values))
+}
+
+/// An array in C order; one of more than two axes stays as it is.
+fn rows_first(shape: Vec<u64>, columns_first: bool, values: Vec<f64>) -> Array {
+    let values = match shape[..] {
+        [rows, columns] if columns_first => {
+            let (rows, columns) = (rows as usize, columns as usize);
+            (0..rows * columns)
+                .map(|k| values[k % columns * rows + k / columns])
+                .collect()
+        }
+        _ => values,
+    };
+    Array {
+        shape,
+        values,
+        whole: false,
+    }
 }
 
 /// Variant of [`read`] for anything that can be read.
@@ -170,6 +244,27 @@ mod tests {
         assert_eq!(outcome(&file(&double, &data)).unwrap().values, numbers.map(f64::from));
         assert!(!read.whole && outcome(&file(&PLAIN.replace("<f4", "|u1"), &[7; 4])).unwrap().whole);
         assert!(matches!(outcome(&file(PLAIN, &[0; 15])), Err(NpyError::Short(_))));
+    }
+
+    #[test]
+    fn phases_are_read_as_other_programs_write_them() {
+        let phases = |header: &str, numbers: &[f64]| {
+            let data: Vec<u8> = numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
+            phases_from(&file(header, &data)[..], |shape| shape == [2, 3])
+                .unwrap()
+                .values
+        };
+        let header = PLAIN.replace("<f4", "<f8").replace("(2, 2)", "(2, 3)");
+        let in_rows = phases(&header, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        let in_columns = phases(&header.replace("False", "True"), &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0]);
+        assert_eq!(in_rows, in_columns);
+        let fields = [1.0, 0.0, 0.0, 2.0, -1.0, 0.0, 0.0, -3.0, 1.0, 1.0, f64::NAN, 0.0];
+        let angles = phases(&header.replace("<f8", "<c16"), &fields);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        assert_eq!(angles[..5], [0.0, quarter, 2.0 * quarter, -quarter, 0.5 * quarter]);
+        assert!(angles[5].is_nan());
+        let whole = phases_from(&file(&header.replace("<f8", "<i8"), &[0; 48])[..], |_| true);
+        assert!(matches!(whole, Err(NpyError::NoPhase)));
     }
 
     #[test]

@@ -138,7 +138,8 @@ impl Design {
         self.optimise.within(band_um);
         self.check_bands(&stack)?;
         stack.check_substrate(band_um)?;
-        for um in self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]) {
+        let named = [&self.verify.wavelengths_um, &self.mapping.comparison.wavelengths_um];
+        for um in named.into_iter().flatten().chain([&self.mapping.wavelength_um]) {
             stack.full_transmission(*um)?;
             for material in stack.materials() {
                 material.index(*um)?;

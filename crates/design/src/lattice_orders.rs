@@ -222,7 +222,9 @@ mod tests {
     #[test]
     fn a_pitch_beyond_the_wavelength_diffracts_into_both_media() {
         let wide = ("width_max_nm = 350", "width_max_nm = 700");
-        let design = changed("asi_940", &[("pitch_nm = 450", "pitch_nm = 1000"), wide]);
+        // In [cell] and in [mapping.cell].
+        let pitch = ("pitch_nm = 450", "pitch_nm = 1000");
+        let design = changed("asi_940", &[pitch, pitch, wide]);
         let middle = design.lattice_orders(AskedLight::Middle).unwrap();
         let media: Vec<_> = middle.iter().map(|o| o.medium).collect();
         assert_eq!(media, Medium::BOTH);

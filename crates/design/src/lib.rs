@@ -7,6 +7,7 @@ mod design;
 mod lattice_orders;
 pub mod phase;
 mod spec;
+mod warnings;
 
 pub use array::{PillarArray, PillarRule};
 pub use cell_file::CellFile;

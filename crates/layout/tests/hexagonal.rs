@@ -19,7 +19,8 @@ const ROW_NM: i64 = 303;
 
 fn text(elements: &str) -> String {
     let text = std::fs::read_to_string(design("mini_3x3")).unwrap();
-    text.replacen("[cell]\n", "[cell]\nshape = \"circle\"\nlattice = \"hexagonal\"\n", 1)
+    metalith_testing::accepting(&text)
+        .replacen("[cell]\n", "[cell]\nshape = \"circle\"\nlattice = \"hexagonal\"\n", 1)
         .replacen("elements = [3, 3]", elements, 1)
 }
 

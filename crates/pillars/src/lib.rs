@@ -8,6 +8,7 @@ mod pillar_check;
 mod rectangle;
 mod rows;
 mod shape;
+mod steepness;
 
 pub use circle::{CHORD_ERROR, circle_corners};
 pub use eighth::EighthMap;
@@ -17,3 +18,4 @@ pub use pillar_check::PillarCheck;
 pub use rectangle::{Rectangles, RotatedRectangles, UprightRectangles};
 pub use rows::PillarRows;
 pub use shape::PillarShape;
+pub use steepness::Steepness;

@@ -194,6 +194,13 @@ fn layouts(tolerance: &Tolerance, folder: &Path, known: bool, progress: &dyn Pro
         let path = folder.join(&name);
         if !known {
             let design = tolerance.design(number)?;
+            // Others differ by the values of a grid.
+            if number == 0 {
+                design
+                    .warnings()?
+                    .iter()
+                    .for_each(|warning| progress.warn(&warning.to_string()));
+            }
             let array = PillarArray::build(&design, progress)?;
             write_pillars(&design, &array, design.layout.hierarchy, &path, progress)?;
         }

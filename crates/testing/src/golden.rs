@@ -17,6 +17,11 @@ pub fn design(name: &str) -> PathBuf {
     root().join("designs").join(format!("{name}.toml"))
 }
 
+/// The text of a shipped design that takes its mapping whatever its cell is.
+pub fn accepting(text: &str) -> String {
+    text.replacen("[mapping]", "[mapping]\naccept = \"a test of another cell\"", 1)
+}
+
 /// Compare with `golden/NAME`, kept compressed if the name ends in `.gz`. With `METALITH_GOLDEN=renew` in
 /// the environment the file is written instead, and what changed is printed.
 pub fn golden(name: &str, found: &[u8]) {

@@ -9,4 +9,4 @@ pub mod rectangles;
 #[cfg(feature = "session")]
 pub mod session;
 
-pub use golden::{design, golden, root};
+pub use golden::{accepting, design, golden, root};

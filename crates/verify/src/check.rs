@@ -47,7 +47,21 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
         sense: Sense::AtMost,
     };
     let wrong: u64 = found.elements.iter().map(|e| e.widths.faults()).sum();
-    let mut checks = vec![
+    let mut checks = Vec::new();
+    // Pillars as fabricated, or moved on purpose, are not those of the mapping.
+    let mapping = found
+        .distinct
+        .iter()
+        .map(|d| (d.element.label(), d.phase.mapping.rms_rad));
+    if let Some((place, reached)) = worst(mapping).filter(|_| !found.compensated && found.model.is_none()) {
+        checks.push(at_most(
+            format!("rms phase error of the mapping, element {place} [rad]"),
+            "mapping_phase_rms_max_rad",
+            reached,
+            limits.mapping_phase_rms_max_rad,
+        ));
+    }
+    checks.extend([
         at_most(
             "pillars that are wrong, missing or extra".into(),
             "wrong_widths_max",
@@ -60,7 +74,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             found.foreign.total() as f64,
             limits.foreign_shapes_max as f64,
         ),
-    ];
+    ]);
     let rounding = worst(
         found
             .distinct
@@ -172,6 +186,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
 /// The limits on phase and light that a design sets, none of which holds of a layout that is not simulated.
 fn not_simulated(limits: &LimitSpec, why: &str) -> Vec<Check> {
     let most = [
+        ("mapping_phase_rms_max_rad", limits.mapping_phase_rms_max_rad),
         ("rounding_phase_rms_max_rad", limits.rounding_phase_rms_max_rad),
         ("centroid_shift_max_um", limits.centroid_shift_max_um),
         ("mtf_difference_max", limits.mtf_difference_max),

@@ -83,6 +83,7 @@ pub fn verify_pillars(
     let mut verification = Verification {
         design: design.name.clone(),
         design_digest: design.digest(),
+        warnings: design.warnings()?,
         fidelity,
         model: None,
         compensated: array.compensated,

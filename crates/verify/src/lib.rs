@@ -29,7 +29,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, Warning};
 use metalith_design::array::{PillarArray, PillarRule, PlacedElement, Symmetry};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{AskedLight, Design, Element, FieldAngle, LatticeOrders};
@@ -110,6 +110,9 @@ pub struct DistinctElement {
 pub struct Verification {
     pub design: String,
     pub design_digest: String,
+    /// What of the design is allowed and easily a mistake.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<Warning>,
     /// The cell that the layout is judged by.
     pub fidelity: Fidelity,
     /// The calibrated model that the layout is judged by, if it is judged as made.
@@ -337,6 +340,7 @@ fn judge(
     let mut verification = Verification {
         design: design.name.clone(),
         design_digest: design.digest(),
+        warnings: design.warnings()?,
         fidelity: cases.judge.fidelity(),
         model: cases.judge.statement(),
         compensated: array.compensated,

@@ -10,5 +10,5 @@ mod term;
 pub(crate) use element::Rotation;
 pub use element::{ElementPhase, LensPhase};
 pub use open::OpenAreas;
-pub use radial::{Interpolation, RadialPhase};
+pub use radial::{Interpolation, RadialPhase, TableReading};
 pub use term::{MapTable, PhaseTerm, TermForm, ZernikeOrder};

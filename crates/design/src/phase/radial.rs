@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::table;
-use metalith_core::document::Section;
+use metalith_core::document::{Limits, Section};
 use metalith_core::{Error, Result};
 
 /// Interpolation of a table between its radii.
@@ -39,7 +39,33 @@ pub enum RadialPhase {
         interpolation: Interpolation,
         radius_um: Vec<f64>,
         phase_rad: Vec<f64>,
+        /// Reading of the file, which the phases are the result of.
+        #[serde(skip)]
+        reading: TableReading,
     },
+}
+
+/// How the file of a table is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TableReading {
+    /// True if its phases are known up to whole waves, false if they are not; found if nothing says so.
+    wrapped: Option<bool>,
+    /// Distance of its places from the middle on (um), if the file has phases alone.
+    pitch_um: Option<f64>,
+    /// True if whole waves were added.
+    is_unwrapped: bool,
+}
+
+impl TableReading {
+    pub(crate) fn read(s: &Section<'_, '_>) -> Self {
+        Self {
+            wrapped: s
+                .has("wrapped")
+                .then(|| s.choice("wrapped", &[("no", false), ("yes", true)], None)),
+            pitch_um: s.optional_float("pitch_um", Limits::new(1e-3..=1e5, "um")),
+            is_unwrapped: false,
+        }
+    }
 }
 
 impl Interpolation {
@@ -60,6 +86,24 @@ impl RadialPhase {
             interpolation,
             radius_um: Vec::new(),
             phase_rad: Vec::new(),
+            reading: TableReading::default(),
+        }
+    }
+
+    /// The same, with a file that is read in another way if it is a table.
+    #[must_use]
+    pub(crate) fn read_as(mut self, other: TableReading) -> Self {
+        if let Self::Table { reading, .. } = &mut self {
+            *reading = other;
+        }
+        self
+    }
+
+    /// The file of the table, if whole waves were added to its phases because they jump.
+    pub(crate) fn unwrapped(&self) -> Option<&Path> {
+        match self {
+            Self::Table { file, reading, .. } if reading.is_unwrapped => Some(file),
+            _ => None,
         }
     }
 
@@ -83,13 +127,31 @@ impl RadialPhase {
             interpolation,
             radius_um,
             phase_rad,
+            reading,
         } = self
         else {
             return Ok(());
         };
-        (*radius_um, *phase_rad) = table::read(file)?;
-        if *interpolation == Interpolation::Nearest {
+        let rows = table::read(file, reading.pitch_um)?;
+        (*radius_um, *phase_rad) = (rows.radius_um, rows.phase_rad);
+        reading.is_unwrapped = false;
+        if *interpolation == Interpolation::Nearest || reading.wrapped == Some(true) {
             table::unwrap(phase_rad);
+        } else if reading.wrapped.is_none() {
+            reading.is_unwrapped = table::unwrap_if_wrapped(phase_rad).map_err(|row| Error::Table {
+                path: file.clone(),
+                line: rows.lines.get(row).copied(),
+                what: format!(
+                    "the phase jumps from {} to {} rad between radii of {} and {} um, and both a wave and a step may be meant",
+                    phase_rad[row - 1],
+                    phase_rad[row],
+                    radius_um[row - 1],
+                    radius_um[row]
+                ),
+                hint: "say `wrapped = \"yes\"` for phases that are known up to whole waves, or `wrapped = \"no\"`; more rows make a \
+                       wrapped table clear"
+                    .into(),
+            })?;
         }
         let (first, last) = (radius_um[0], radius_um[radius_um.len() - 1]);
         // A ring-by-ring table ends in the middle of the last ring.

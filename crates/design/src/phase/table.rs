@@ -1,6 +1,6 @@
 //! Tables of phase over radius, from CSV or NPY.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use super::Interpolation;
@@ -10,16 +10,26 @@ use metalith_core::{Error, Result, document, npy};
 /// Most rows of a table: a ring for each site of the largest lens that can be designed.
 const MOST_ROWS: usize = 1 << 20;
 
-/// Radii (um), strictly ascending from zero or more, and phases (rad).
+/// Rows of a table.
+#[derive(Debug)]
+pub(super) struct Rows {
+    /// Strictly ascending from zero or more.
+    pub radius_um: Vec<f64>,
+    pub phase_rad: Vec<f64>,
+    /// Line of each row; none of a binary file.
+    pub lines: Vec<usize>,
+}
+
+/// A table, of phases alone at radii this far apart (um) if that is given.
 ///
 /// # Errors
 /// If the file cannot be read, is neither CSV with the columns `r_um, phase_rad` nor an NPY array of
-/// shape `[rows, 2]`, or holds something that is not a finite number.
-pub(super) fn read(path: &Path) -> Result<(Vec<f64>, Vec<f64>)> {
+/// shape `[rows, 2]`, of phases alone neither one of both, or holds something that is not a finite number.
+pub(super) fn read(path: &Path, pitch_um: Option<f64>) -> Result<Rows> {
     let (rows, lines) = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
-        (read_npy(path)?, Vec::new())
+        (read_npy(path, pitch_um)?, Vec::new())
     } else {
-        read_csv(path)?.into_iter().unzip()
+        read_csv(path, pitch_um)?.into_iter().unzip()
     };
     let fault = |row: usize, what: String| Error::Table {
         path: path.to_owned(),
@@ -38,24 +48,46 @@ pub(super) fn read(path: &Path) -> Result<(Vec<f64>, Vec<f64>)> {
             return Err(fault(k, format!("radius {r} um follows {} um", rows[k - 1].0)));
         }
     }
-    Ok(rows.into_iter().unzip())
+    let (radius_um, phase_rad) = rows.into_iter().unzip();
+    Ok(Rows {
+        radius_um,
+        phase_rad,
+        lines,
+    })
 }
 
 /// Each row, and the line that it is in.
-fn read_csv(path: &Path) -> Result<Vec<((f64, f64), usize)>> {
+fn read_csv(path: &Path, pitch_um: Option<f64>) -> Result<Vec<((f64, f64), usize)>> {
     let text = document::load(path)?;
     let fault = |line: usize, what: String| Error::Table {
         path: path.to_owned(),
         line: Some(line),
         what,
-        hint: "the columns are `r_um,phase_rad`; lines that begin with # are comments".into(),
+        hint: match pitch_um {
+            None => {
+                "the columns are `r_um,phase_rad`; lines that begin with # are comments; phases alone need `pitch_um`"
+            }
+            Some(_) => "with `pitch_um` the one column is `phase_rad`; lines that begin with # are comments",
+        }
+        .into(),
     };
-    let mut lines = table_rows(&text);
-    let (at, head) = lines.next().ok_or_else(|| fault(1, "the file is empty".into()))?;
+    let mut lines = table_rows(&text).peekable();
+    let &(at, head) = lines.peek().ok_or_else(|| fault(1, "the file is empty".into()))?;
+    if let Some(pitch_um) = pitch_um {
+        if head == "phase_rad" {
+            lines.next();
+        }
+        let row = |(k, (at, line)): (usize, (usize, &str))| match line.parse::<f64>() {
+            Ok(phase) => Ok(((k as f64 * pitch_um, phase), at)),
+            Err(_) => Err(fault(at, format!("`{}` is not a number", quoted(line)))),
+        };
+        return lines.take(MOST_ROWS + 1).enumerate().map(row).collect();
+    }
     if head.split(',').map(str::trim).ne(["r_um", "phase_rad"]) {
         return Err(fault(at, format!("the columns are `{}`", quoted(head))));
     }
     lines
+        .skip(1)
         .take(MOST_ROWS + 1)
         .map(|(at, line)| {
             let mut fields = line.split(',').map(|f| f.trim().parse::<f64>());
@@ -67,22 +99,87 @@ fn read_csv(path: &Path) -> Result<Vec<((f64, f64), usize)>> {
         .collect()
 }
 
-fn read_npy(path: &Path) -> Result<Vec<(f64, f64)>> {
-    let fault = |what: String| Error::Table {
+fn read_npy(path: &Path, pitch_um: Option<f64>) -> Result<Vec<(f64, f64)>> {
+    let fault = |what: String| {
+        Error::Table {
         path: path.to_owned(),
         line: None,
         what,
-        hint: "save an array of shape [rows, 2], columns r_um and phase_rad, as float64 or float32 in C order".into(),
+        hint: match pitch_um {
+            None => "save an array of shape [rows, 2], columns r_um and phase_rad, as float64 or float32; one of phases alone needs \
+                     `pitch_um`",
+            Some(_) => "with `pitch_um`, save phases in rad or complex fields as an array of one axis",
+        }
+        .into(),
+    }
     };
-    let array = npy::read(path, |shape| {
-        shape.len() == 2 && shape[1] == 2 && shape[0] <= MOST_ROWS as u64
+    let array = npy::read_phases(path, |shape| match (pitch_um, shape) {
+        (None, [rows, 2]) | (Some(_), [rows]) => *rows <= MOST_ROWS as u64,
+        _ => false,
     });
     let values = match array {
         Ok(array) => array.values,
         Err(npy::NpyError::Io(error)) => return Err(Error::io("read", path)(error)),
         Err(error) => return Err(fault(error.to_string())),
     };
-    Ok(values.chunks_exact(2).map(|row| (row[0], row[1])).collect())
+    Ok(match pitch_um {
+        None => values.chunks_exact(2).map(|row| (row[0], row[1])).collect(),
+        Some(pitch_um) => values
+            .iter()
+            .zip(0..)
+            .map(|(v, k)| (f64::from(k) * pitch_um, *v))
+            .collect(),
+    })
+}
+
+/// Largest step from row to row, in parts of pi, of a table that is surely wrapped: with larger ones it may fall as well as rise.
+const SURE: f64 = 0.75;
+
+/// Rounding of the phases of a table that ends a little above two pi (rad).
+const ROUNDED_RAD: f64 = 0.01;
+
+/// Add whole waves to phases that jump because they are wrapped: all are within one wave, and with the waves the jumps are steps
+/// such as those beside them. True if waves were added.
+///
+/// # Errors
+/// The row of a jump that may be one of a wave or a step.
+pub(super) fn unwrap_if_wrapped(phase_rad: &mut [f64]) -> std::result::Result<bool, usize> {
+    let (least, most) = phase_rad
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
+    let jumps: Vec<usize> = (1..phase_rad.len())
+        .filter(|&k| (phase_rad[k] - phase_rad[k - 1]).abs() > PI)
+        .collect();
+    if jumps.is_empty() || most - least > TAU + ROUNDED_RAD {
+        return Ok(false);
+    }
+    let mut joined = phase_rad.to_vec();
+    unwrap(&mut joined);
+    // Difference of a step from the mean of those beside it; no number if there is none.
+    let step = |phases: &[f64], k: usize| (1..phases.len()).contains(&k).then(|| phases[k] - phases[k - 1]);
+    let apart = |phases: &[f64], k: usize| {
+        let beside: Vec<f64> = [step(phases, k - 1), step(phases, k + 1)]
+            .into_iter()
+            .flatten()
+            .collect();
+        let mean = beside.iter().sum::<f64>() / beside.len() as f64;
+        step(phases, k).map_or(f64::NAN, |own| (own - mean).abs())
+    };
+    // Rows far apart of a weak lens: the steps beside a jump are more like it as it stands.
+    if jumps.iter().all(|&k| apart(phase_rad, k) < apart(&joined, k)) {
+        return Ok(false);
+    }
+    let step = |k: usize| step(&joined, k);
+    let is_clear = |k: usize| step(k).is_some_and(|own| own.abs() <= SURE * PI) && apart(&joined, k) < 0.5 * PI;
+    if let Some(row) = jumps.into_iter().find(|&k| !is_clear(k)) {
+        return Err(row);
+    }
+    // Steps of nearly half a wave elsewhere may be jumps of the other sign.
+    if let Some(row) = (1..joined.len()).find(|&k| step(k).is_some_and(|step| step.abs() > SURE * PI)) {
+        return Err(row);
+    }
+    phase_rad.copy_from_slice(&joined);
+    Ok(true)
 }
 
 /// Whole turns are added so that no step from row to row is more than half a turn: phases given ring by
@@ -138,6 +235,51 @@ mod tests {
         assert!(phases.windows(2).all(|p| (p[1] - p[0]).abs() <= TAU / 2.0));
     }
 
+    #[test]
+    fn wrapped_tables_are_joined_and_others_stay() {
+        // A lens of 20 waves, some rows for each.
+        let lens = |rows: i32| -> Vec<f64> {
+            let r = |k| f64::from(k) / f64::from(rows);
+            (0..=rows).map(|k| -20.0 * TAU * r(k).powi(2)).collect()
+        };
+        const ROUNDING: f64 = 1e-9;
+        let wrap = |phases: &[f64]| phases.iter().map(|v| v.rem_euclid(TAU)).collect::<Vec<_>>();
+        let fine = lens(400);
+        let mut joined = wrap(&fine);
+        assert_eq!(unwrap_if_wrapped(&mut joined), Ok(true));
+        assert!(joined.iter().zip(&fine).all(|(a, b)| (a - b).abs() < ROUNDING));
+        // Steps of more than half a wave at the rim: where it is cannot be told.
+        assert!(unwrap_if_wrapped(&mut wrap(&lens(60))).is_err());
+        // Unwrapped, however steep, and what never jumps.
+        for mut stays in [
+            lens(20),
+            vec![0.0, 3.0, 6.0],
+            vec![0.0, -3.0, -6.0],
+            vec![0.0, -1.25, -5.0],
+        ] {
+            let was = stays.clone();
+            assert_eq!(unwrap_if_wrapped(&mut stays), Ok(false));
+            assert_eq!(stays, was);
+        }
+        // One step of most of a wave is either.
+        assert_eq!(unwrap_if_wrapped(&mut [0.0, -5.0]), Err(1));
+    }
+
+    #[test]
+    fn phases_alone_have_a_pitch() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("phase.csv");
+        for head in ["", "phase_rad\n"] {
+            std::fs::write(&path, format!("{head}1\n2\n4\n")).unwrap();
+            let rows = read(&path, Some(0.5)).unwrap();
+            assert_eq!(
+                (rows.radius_um, rows.phase_rad),
+                (vec![0.0, 0.5, 1.0], vec![1.0, 2.0, 4.0])
+            );
+        }
+        assert!(read(&path, None).is_err());
+    }
+
     /// Table as spreadsheets save it.
     #[test]
     fn a_mark_of_the_byte_order_is_no_part_of_a_table() {
@@ -145,7 +287,8 @@ mod tests {
         let path = folder.path().join("phase.csv");
         for comment in ["", "# rings\r\n"] {
             std::fs::write(&path, format!("\u{feff}{comment}r_um,phase_rad\r\n0,1\r\n2,3\r\n")).unwrap();
-            assert_eq!(read(&path).unwrap(), (vec![0.0, 2.0], vec![1.0, 3.0]));
+            let rows = read(&path, None).unwrap();
+            assert_eq!((rows.radius_um, rows.phase_rad), (vec![0.0, 2.0], vec![1.0, 3.0]));
         }
     }
 
@@ -155,7 +298,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("phase.csv");
         std::fs::write(&path, "# rings\n\nr_um,phase_rad\n0,0\n# again\n0,1\n").unwrap();
-        match read(&path).unwrap_err() {
+        match read(&path, None).unwrap_err() {
             Error::Table { line, .. } => assert_eq!(line, Some(6)),
             other => panic!("{other}"),
         }

@@ -134,8 +134,14 @@ impl LayoutSpec {
         }
         let layers = Layers::read(&root.section("layers"));
         let apertures = ApertureSpec::read(&root.section("apertures"), lens, array);
-        let chip = ChipSpec::read(&root.section("chip"), lens, array);
-        let marks = root.sections("mark").iter().map(|s| MarkSpec::read(s, &chip)).collect();
+        let chip = ChipSpec::read(&root.section("chip"), lens, array, &apertures);
+        let marks = root.sections("mark");
+        let marks = marks.iter().map(|s| {
+            let mark = MarkSpec::read(s, &chip);
+            mark.check_elements(s, lens, array, &apertures);
+            mark
+        });
+        let marks = marks.collect();
         Self {
             hierarchy,
             timestamp,
@@ -260,6 +266,23 @@ impl ApertureSpec {
         ((std::f64::consts::PI / half_angle / 8.0).ceil() as usize).max(2) * 8
     }
 
+    /// Farthest place of the opening about an element from its middle, along x and along y (nm).
+    fn reach_nm(&self, array: &ArraySpec, shared: &LensSpec, element: &Element) -> [i64; 2] {
+        let lens = array.lens_of(shared, element.index);
+        match &lens.outline {
+            Some(outline) => {
+                let corners = outline.rotated(array.rotation_deg(element.index)).grown(self.margin_nm);
+                corners.iter().fold([0, 0], |[x, y], corner| {
+                    [x.max(corner.0.saturating_abs()), y.max(corner.1.saturating_abs())]
+                })
+            }
+            None => {
+                // The polygon about the circle touches it at both axes.
+                [i64::from(lens.diameter_nm.div_ceil(2)) + self.margin_nm; 2]
+            }
+        }
+    }
+
     /// Chord error that the most vertices allowed reach (nm).
     fn error_nm(&self, radius_nm: f64) -> f64 {
         let corners = ((self.max_vertices - 1) / 8 * 8).max(8) as f64;
@@ -268,21 +291,37 @@ impl ApertureSpec {
 }
 
 impl ChipSpec {
-    fn read(s: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec) -> Self {
+    fn read(s: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec, apertures: &ApertureSpec) -> Self {
         let size_um = s.array::<2>("size_um", Limits::new(10.0..=300_000.0, "um"));
         let size_nm = (whole_nm(s, "size_um", size_um[0]), whole_nm(s, "size_um", size_um[1]));
-        let elements = array.elements();
-        let needed = |centre: fn(&Element) -> i64| {
-            let reach = |e: &Element| 2 * centre(e).abs() + i64::from(array.lens_of(lens, e.index).diameter_nm);
-            elements.iter().map(reach).max().unwrap_or(0)
-        };
-        let (x, y) = (needed(|e| e.centre_nm.0), needed(|e| e.centre_nm.1));
+        let (mut x, mut y) = (0, 0);
+        for element in array.elements() {
+            let [reach_x, reach_y] = apertures.reach_nm(array, lens, &element);
+            // An outline with a fault may reach anywhere.
+            let twice = |centre: i64, reach: i64| centre.saturating_abs().saturating_add(reach).saturating_mul(2);
+            x = x.max(twice(element.centre_nm.0, reach_x));
+            y = y.max(twice(element.centre_nm.1, reach_y));
+        }
         if s.has("size_um") && (size_nm.0 < x || size_nm.1 < y) {
+            let um = |nm: i64| nm as f64 * 1e-3;
             s.fault_given(
-                &["lens.diameter_um", "array.elements", "array.spacing_um"],
+                &[
+                    "lens.diameter_um",
+                    "array.elements",
+                    "array.spacing_um",
+                    "apertures.margin_um",
+                    "apertures.chord_error_nm",
+                    "apertures.max_vertices",
+                ],
                 "size_um",
-                "the elements reach beyond the chip",
-                format!("use at least {} by {} um", x as f64 * 1e-3, y as f64 * 1e-3),
+                format!(
+                    "the apertures reach over {} by {} um, the chip over {} by {} um",
+                    um(x),
+                    um(y),
+                    um(size_nm.0),
+                    um(size_nm.1)
+                ),
+                format!("use at least {} by {} um", um(x), um(y)),
             );
         }
         s.finish();
@@ -291,6 +330,56 @@ impl ChipSpec {
 }
 
 impl MarkSpec {
+    /// A cross over an opening would be written over its pillars.
+    fn check_elements(&self, s: &Section<'_, '_>, lens: &LensSpec, array: &ArraySpec, apertures: &ApertureSpec) {
+        let half = [self.length_nm / 2, self.width_nm / 2];
+        let meets = |element: &Element, at: (i64, i64)| {
+            let reach = apertures.reach_nm(array, lens, element);
+            let is_round = array.lens_of(lens, element.index).outline.is_none();
+            [half, [half[1], half[0]]].into_iter().any(|[x, y]| {
+                // From the middle of the element to the nearest place of the arm.
+                let beside = |middle: i64, arm: i64, half: i64| {
+                    (middle.saturating_sub(arm).saturating_abs() - half).max(0) as f64
+                };
+                let off = [
+                    beside(element.centre_nm.0, at.0, x),
+                    beside(element.centre_nm.1, at.1, y),
+                ];
+                match is_round {
+                    true => off[0].hypot(off[1]) < reach[0] as f64,
+                    false => off[0] < reach[0] as f64 && off[1] < reach[1] as f64,
+                }
+            })
+        };
+        let elements = array.elements();
+        let met = self
+            .centres_nm
+            .iter()
+            .find_map(|&at| Some((at, elements.iter().find(|e| meets(e, at))?)));
+        if let Some(((x, y), element)) = met {
+            s.fault_given(
+                &[
+                    "lens.diameter_um",
+                    "array.elements",
+                    "array.spacing_um",
+                    "apertures.margin_um",
+                    "mark.y_um",
+                    "mark.length_um",
+                    "mark.width_um",
+                ],
+                "x_um",
+                format!(
+                    "the cross at ({}, {}) um of the set \"{}\" is over the opening of element {}",
+                    x as f64 * 1e-3,
+                    y as f64 * 1e-3,
+                    self.name,
+                    element.label()
+                ),
+                "move it away from the elements",
+            );
+        }
+    }
+
     fn read(s: &Section<'_, '_>, chip: &ChipSpec) -> Self {
         let xs = s.floats("x_um", PLACE);
         let ys = s.floats("y_um", PLACE);

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::array::whole_nm;
 use super::outline::{self, DIAMETER, LensOutline};
 use super::{CellSpec, term};
-use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TermForm};
+use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TableReading, TermForm};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
 use metalith_pillars::Lattice;
@@ -92,8 +92,9 @@ impl LensSpec {
             let focal_length_um = own.focal_length_um;
             let renew = |phase: &mut RadialPhase, terms: &mut Vec<PhaseTerm>, said: &Section<'_, '_>| {
                 *phase = read_radial(said, focal_length_um, shared.radius_um());
-                for (term, said) in terms.iter_mut().zip(said.sections("term")) {
-                    term::default_focal_length(term, &said, focal_length_um);
+                let sections = said.sections("term");
+                for (term, said) in terms.iter_mut().zip(term::sections(said, &sections)) {
+                    term::default_focal_length(term, said, focal_length_um);
                 }
                 terms.retain(|term| term.is_of(index));
             };
@@ -109,10 +110,11 @@ impl LensSpec {
     fn read_phase(&mut self, s: &Section<'_, '_>, cell: &CellSpec) {
         let (focal_length_um, radius_um) = (self.focal_length_um, self.radius_um());
         let read = |s: &Section<'_, '_>| {
+            let radial = read_radial(s, focal_length_um, radius_um);
             let terms = s.sections("term");
+            let of_phase = term::is_plane(s).then(|| term::read_keys(s, focal_length_um, radius_um));
             let terms = terms.iter().map(|term| term::read(term, focal_length_um, radius_um));
-            let terms = terms.collect();
-            (read_radial(s, focal_length_um, radius_um), terms)
+            (radial, of_phase.into_iter().chain(terms).collect())
         };
         (self.phase, self.terms) = read(s);
         self.along_y = s.optional_section("y").map(|y| {
@@ -179,6 +181,11 @@ impl LensSpec {
             })
     }
 
+    /// Files of its phases over the radius to which whole waves were added.
+    pub(crate) fn unwrapped(&self) -> impl Iterator<Item = &Path> {
+        self.radial_phases().filter_map(RadialPhase::unwrapped)
+    }
+
     /// Least and greatest place of the aperture from the middle, along x and along y (um), as the phase has it: before the element
     /// is rotated.
     fn ends_um(&self) -> [[f64; 2]; 2] {
@@ -199,6 +206,20 @@ impl LensSpec {
             .find_map(|radial| match radial {
                 RadialPhase::Hyperbola { wavelength_um, .. } => Some(*wavelength_um),
                 _ => None,
+            })
+    }
+
+    /// Its phases over the radius, in the middle of the lens or elsewhere, of light along x and along y.
+    pub(crate) fn radial_phases(&self) -> impl Iterator<Item = &RadialPhase> {
+        let along_y = self.along_y.iter().map(|y| (&y.phase, &y.terms));
+        std::iter::once((&self.phase, &self.terms))
+            .chain(along_y)
+            .flat_map(|(phase, terms)| {
+                let of_terms = terms.iter().filter_map(|term| match &term.form {
+                    TermForm::Radial(radial) => Some(radial),
+                    _ => None,
+                });
+                std::iter::once(phase).chain(of_terms)
             })
     }
 
@@ -249,6 +270,11 @@ pub(super) fn read_radial(s: &Section<'_, '_>, focal_length_um: f64, radius_um: 
         ("even_powers", PhaseSource::EvenPowers),
         ("table", PhaseSource::Table),
         ("flat", PhaseSource::Flat),
+        // Phases over the plane, which are read as terms.
+        ("map", PhaseSource::Flat),
+        ("zernike", PhaseSource::Flat),
+        ("polynomial", PhaseSource::Flat),
+        ("optic_studio", PhaseSource::Flat),
     ];
     match s.choice("source", &sources, None) {
         PhaseSource::Hyperbola => RadialPhase::Hyperbola {
@@ -271,7 +297,7 @@ pub(super) fn read_radial(s: &Section<'_, '_>, focal_length_um: f64, radius_um: 
                 normalisation_um: read_normalisation(s, radius_um),
             }
         }
-        PhaseSource::Table => RadialPhase::table(s.file("file"), Interpolation::read(s)),
+        PhaseSource::Table => RadialPhase::table(s.file("file"), Interpolation::read(s)).read_as(TableReading::read(s)),
         PhaseSource::Flat => RadialPhase::Flat,
     }
 }

@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::cell::read_band;
 use super::lens::WAVELENGTH;
-use super::{ArraySpec, CellSpec, SteeredMapping, SteeringSteps};
+use super::{ArraySpec, CellSpec, MappingIdentity, SteeredMapping, SteeringSteps};
 use metalith_cell::{Basis, InversePolynomial, MappingTable, PillarLibrary, RotationMapping};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
@@ -57,6 +57,9 @@ pub struct MappingSpec {
     /// Settings over which mappings are compared. Decides nothing of the layout.
     #[serde(skip)]
     pub comparison: MappingComparison,
+    /// The cell that the mapping is for.
+    #[serde(skip)]
+    pub identity: MappingIdentity,
 }
 
 /// Wavelengths that a study compares mappings at, where the design says them.
@@ -200,9 +203,11 @@ impl MappingSpec {
                 Vec::new()
             },
         };
+        let identity = MappingIdentity::read(s, cell, &polynomial, library);
         s.finish();
         Self {
             wavelength_um,
+            identity,
             polynomial,
             table_file,
             table: None,
@@ -222,6 +227,13 @@ impl MappingSpec {
 
     /// Read the table or the library, if there is one. A library that is to be made may be of other sizes: it is left out.
     pub(crate) fn load(&mut self, cell: &CellSpec, library: LibraryFile) -> Result<()> {
+        let own = cell.mapped(self.wavelength_um);
+        match self.table_file.as_ref().or(self.pillar_library_file.as_ref()) {
+            // A library that is to be made is for this cell.
+            Some(file) if library == LibraryFile::ToBeMade && !file.exists() => self.identity.is_stated = true,
+            Some(file) => self.identity.load(file, &own, library)?,
+            None => {}
+        }
         if let Some(file) = &self.table_file {
             let allowed: Vec<u16> = cell.widths_nm().collect();
             self.table = Some(MappingTable::read_csv(file, &allowed)?);

@@ -6,6 +6,7 @@ mod footprint;
 mod layout;
 mod lens;
 mod mapping;
+mod mapping_cell;
 mod optimise;
 mod outline;
 mod steered;
@@ -19,6 +20,7 @@ pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layers, LayoutLayer, LayoutS
 pub use lens::{LensSpec, PhaseAlongY};
 pub(crate) use mapping::LibraryFile;
 pub use mapping::{MappingComparison, MappingSpec};
+pub use mapping_cell::MappingIdentity;
 pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
 pub use outline::LensOutline;
 pub(crate) use outline::OutlineRows;

@@ -23,7 +23,30 @@ enum TermSource {
     OpticStudio,
 }
 
+/// Sources that a phase over the radius does not have.
+const PLANE: [&str; 4] = ["map", "zernike", "polynomial", "optic_studio"];
+
+/// True if a section of a phase is itself a phase over the plane.
+pub(super) fn is_plane(s: &Section<'_, '_>) -> bool {
+    s.is_one_of("source", &PLANE)
+}
+
+/// Sections of the terms of a phase, whose own sections of terms are these: the phase itself is the first if it is over the plane.
+pub(super) fn sections<'s, 'd, 't>(
+    phase: &'s Section<'d, 't>,
+    own: &'s [Section<'d, 't>],
+) -> impl Iterator<Item = &'s Section<'d, 't>> {
+    is_plane(phase).then_some(phase).into_iter().chain(own)
+}
+
 pub(super) fn read(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> PhaseTerm {
+    let term = read_keys(s, focal_length_um, radius_um);
+    s.finish();
+    term
+}
+
+/// A term whose section has other keys too.
+pub(super) fn read_keys(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> PhaseTerm {
     let sources = [
         ("hyperbola", TermSource::Radial),
         ("even_powers", TermSource::Radial),
@@ -85,7 +108,6 @@ pub(super) fn read(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) ->
             "multiply them by a whole number, or say `wrapped = \"no\"` of a table that never jumps by a turn",
         );
     }
-    s.finish();
     term
 }
 
@@ -102,14 +124,11 @@ pub(super) fn default_focal_length(term: &mut PhaseTerm, s: &Section<'_, '_>, of
 /// that all elements share, `placed` those of elements that are placed one by one.
 pub(super) fn check_elements(array: &ArraySpec, lens: &LensSpec, phase: &Section<'_, '_>, placed: &[Section<'_, '_>]) {
     let check = |phase: &Section<'_, '_>, lens: &LensSpec, there: &BTreeSet<(i32, i32)>, hint: &str| {
-        let along_y = lens.along_y.iter().zip(phase.optional_section("y"));
-        let along_y = along_y.flat_map(|(y, s)| y.terms.iter().zip(s.sections("term")));
-        let all = lens
-            .terms
-            .iter()
-            .zip(phase.sections("term"))
-            .chain(along_y.collect::<Vec<_>>());
-        for (term, s) in all {
+        let (own, y) = (phase.sections("term"), phase.optional_section("y"));
+        let own_y = y.as_ref().map_or_else(Vec::new, |y| y.sections("term"));
+        let along_y = lens.along_y.iter().zip(&y);
+        let along_y = along_y.flat_map(|(along, s)| along.terms.iter().zip(sections(s, &own_y)));
+        for (term, s) in lens.terms.iter().zip(sections(phase, &own)).chain(along_y) {
             if let Some((m, n)) = term.elements.iter().find(|index| !there.contains(index)) {
                 let what = format!("no element of this phase is ({m}, {n})");
                 s.fault_given(&["array.elements"], "elements_m", what, hint);

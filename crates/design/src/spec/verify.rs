@@ -65,6 +65,8 @@ pub struct LimitSpec {
     pub wrong_widths_max: u64,
     /// Shapes on the pillar layer that are not a pillar on the lattice.
     pub foreign_shapes_max: u64,
+    /// Root mean square phase error of the mapping, against the phase of pillars in lattices of equals (rad).
+    pub mapping_phase_rms_max_rad: f64,
     /// Root mean square phase error of rounding widths to the step (rad).
     pub rounding_phase_rms_max_rad: f64,
     /// Strehl of the layout over that of the unrounded design phase.
@@ -218,11 +220,15 @@ fn read_fidelity(s: &Section<'_, '_>, cell: &CellSpec) -> Fidelity {
     fidelity
 }
 
+/// Phase errors have this rms if they are random (rad): no limit beyond it fails.
+const RANDOM_RMS_RAD: f64 = 1.8;
+
 impl LimitSpec {
     fn read(section: Option<&Section<'_, '_>>) -> Self {
         let mut limits = Self {
             wrong_widths_max: 0,
             foreign_shapes_max: 0,
+            mapping_phase_rms_max_rad: 0.3,
             rounding_phase_rms_max_rad: 0.05,
             strehl_ratio_min: 0.0,
             centroid_shift_max_um: f64::MAX,
@@ -243,11 +249,22 @@ impl LimitSpec {
         };
         limits.wrong_widths_max = count("wrong_widths_max", limits.wrong_widths_max);
         limits.foreign_shapes_max = count("foreign_shapes_max", limits.foreign_shapes_max);
-        limits.rounding_phase_rms_max_rad =
-            real("rounding_phase_rms_max_rad", "rad", limits.rounding_phase_rms_max_rad);
-        limits.strehl_ratio_min = real("strehl_ratio_min", "", limits.strehl_ratio_min);
+        let within = |key, most, unit, default| s.optional_float(key, Limits::new(0.0..=most, unit)).unwrap_or(default);
+        limits.mapping_phase_rms_max_rad = within(
+            "mapping_phase_rms_max_rad",
+            RANDOM_RMS_RAD,
+            "rad",
+            limits.mapping_phase_rms_max_rad,
+        );
+        limits.rounding_phase_rms_max_rad = within(
+            "rounding_phase_rms_max_rad",
+            RANDOM_RMS_RAD,
+            "rad",
+            limits.rounding_phase_rms_max_rad,
+        );
+        limits.strehl_ratio_min = within("strehl_ratio_min", 2.0, "", limits.strehl_ratio_min);
         limits.centroid_shift_max_um = real("centroid_shift_max_um", "um", limits.centroid_shift_max_um);
-        limits.mtf_difference_max = real("mtf_difference_max", "", limits.mtf_difference_max);
+        limits.mtf_difference_max = within("mtf_difference_max", 1.0, "", limits.mtf_difference_max);
         limits.psf_difference_max = real("psf_difference_max", "", limits.psf_difference_max);
         let share = |key| s.optional_float(key, Limits::new(0.0..=1.0, "")).unwrap_or(0.0);
         limits.polychromatic_mtf_min = share("polychromatic_mtf_min");

@@ -168,7 +168,7 @@ fn by_its_own_rules(name: &str, changes: &[(&str, &str)]) -> DrcReport {
         assert!(text.contains(from), "{from}");
         text = text.replacen(from, to, 1);
     }
-    let design = Design::parse(&path, &text).unwrap();
+    let design = Design::parse(&path, &metalith_testing::accepting(&text)).unwrap();
     as_written(&design, &Deck::for_design(Some(&design)))
 }
 

@@ -106,7 +106,7 @@ fn fill_is_that_of_the_lattice() {
 fn design() -> Design {
     let path = metalith_testing::design("mini_3x3");
     let text = std::fs::read_to_string(&path).unwrap();
-    let text = text
+    let text = metalith_testing::accepting(&text)
         .replacen("[cell]\n", "[cell]\nshape = \"circle\"\nlattice = \"hexagonal\"\n", 1)
         .replacen("elements = [3, 3]", "elements = [2, 1]", 1);
     Design::parse(&path, &text).unwrap()

@@ -143,6 +143,7 @@ pub mod tests {
             rotation: Default::default(),
             steered: Vec::new(),
             comparison: MappingComparison::default(),
+            identity: Default::default(),
         };
         PillarRule::new(&cell, &mapping)
     }

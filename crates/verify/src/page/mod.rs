@@ -48,6 +48,9 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
         _ => format!("{failed} of {} limits do not hold.", found.checks.len()),
     };
     page.verdict(Verdict::of(failed == 0), words);
+    for warning in &found.warnings {
+        page.note(format!("Warning: {}. {}. `{}`", warning.what, warning.hint, warning.id));
+    }
     let half = exact(PixelFrequencies::of(design.verify.pixel_um).half_nyquist_lp_mm);
     let contrast_at = format!("MTF at {half} lp/mm, one wavelength");
     let mut facts = vec![

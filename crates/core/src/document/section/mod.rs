@@ -141,6 +141,12 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
+    /// True if the key is one of these texts. Says nothing of whether it may be, and does not count as asking for it.
+    pub fn is_one_of(&self, key: &str, words: &[&str]) -> bool {
+        let value = self.table.get(key).map(Spanned::get_ref);
+        matches!(value, Some(DeValue::String(word)) if words.contains(&word.as_ref()))
+    }
+
     /// True if the key holds a list.
     pub fn is_list(&self, key: &str) -> bool {
         matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Array(_)))

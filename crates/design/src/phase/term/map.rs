@@ -8,7 +8,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::super::Interpolation;
-use metalith_core::text::hex;
+use metalith_core::text::{hex, quoted, table_rows};
 use metalith_core::{Error, Result, npy};
 
 /// Entries of a table along an axis at most: sites of the largest lens that is held.
@@ -55,6 +55,13 @@ impl MapTable {
     /// The file that it is read from.
     pub fn file(&self) -> &Path {
         &self.file
+    }
+
+    /// Distance from its middle to its ends along x and y (um).
+    pub(crate) fn extent_um(&self) -> [f64; 2] {
+        let (columns, values) = &*self.values;
+        let rows = values.len().checked_div(*columns).unwrap_or(0);
+        [*columns, rows].map(|n| n as f64 * self.pitch_um / 2.0)
     }
 
     /// True if its phases are known up to whole turns.
@@ -136,20 +143,73 @@ impl MapTable {
     }
 }
 
-/// An array of two axes.
+/// Longest text of numbers that is read (bytes).
+const LONGEST_TEXT: u64 = 1 << 28;
+
+/// An array of two axes: an NPY file, or rows of numbers in a text.
 fn read(path: &Path) -> Result<npy::Array> {
-    let array = npy::read(path, |shape| {
-        shape.len() == 2 && shape.iter().all(|n| (2..=MOST).contains(n))
-    });
-    array.map_err(|error| match error {
+    let takes = |shape: &[u64]| shape.len() == 2 && shape.iter().all(|n| (2..=MOST).contains(n));
+    let is_text = ["csv", "txt", "tsv", "dat"]
+        .iter()
+        .any(|text| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(text)));
+    if is_text {
+        return read_text(path, takes);
+    }
+    npy::read_phases(path, takes).map_err(|error| match error {
         npy::NpyError::Io(error) => Error::io("read", path)(error),
         other => Error::Table {
             path: path.to_owned(),
             line: None,
+            hint: match &other {
+                npy::NpyError::Shape { shape, .. } if shape.len() == 1 => {
+                    "phases over the radius are `source = \"table\"` with `pitch_um`".into()
+                }
+                _ => format!("save phases in rad, or complex fields, as an array [ny, nx] of 2 to {MOST} each"),
+            },
             what: other.to_string(),
-            hint: format!("save phases in rad as an array [ny, nx] of 2 to {MOST} each, float64 or float32 in C order"),
         },
     })
+}
+
+/// Rows of numbers, equally many in each, between commas, semicolons, tabs or spaces.
+fn read_text(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<npy::Array> {
+    let fault = |line: Option<usize>, what: String| Error::Table {
+        path: path.to_owned(),
+        line,
+        what,
+        hint: format!("give phases in rad, 2 to {MOST} rows of as many numbers each, the lowest row first"),
+    };
+    let bytes = metalith_core::file::read_at_most(path, LONGEST_TEXT, "a table of phases")?;
+    let text = String::from_utf8(bytes).map_err(|_| fault(None, "this is not text".into()))?;
+    let (mut values, mut rows, mut columns) = (Vec::new(), 0, 0);
+    for (line, row) in table_rows(&text) {
+        let fields = row
+            .split([',', ';', '\t', ' '])
+            .map(str::trim)
+            .filter(|f| !f.is_empty());
+        let before = values.len();
+        for field in fields {
+            let number = field.parse::<f64>();
+            values.push(number.map_err(|_| fault(Some(line), format!("`{}` is not a number", quoted(field))))?);
+        }
+        let own = values.len() - before;
+        if rows > 0 && own != columns {
+            return Err(fault(
+                Some(line),
+                format!("{own} numbers, and {columns} in the rows before"),
+            ));
+        }
+        (rows, columns) = (rows + 1, own);
+    }
+    let shape = vec![rows as u64, columns as u64];
+    match takes(&shape) {
+        true => Ok(npy::Array {
+            shape,
+            values,
+            whole: false,
+        }),
+        false => Err(fault(None, format!("a table of {rows} rows and {columns} columns"))),
+    }
 }
 
 #[cfg(test)]
@@ -178,6 +238,29 @@ mod tests {
             assert!((linear.turns(x, y) - want).abs() < ROUNDING, "{x} {y}");
         }
         assert!((nearest.turns(0.9, -0.9) - 0.1).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn texts_are_rows_of_numbers() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("phase.csv");
+        let read_it = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            read(&path)
+        };
+        for text in ["1,2,3\n4,5,6\n", "# rows\n1 2  3\n4\t5\t6"] {
+            let array = read_it(text).unwrap();
+            assert_eq!(
+                (array.shape, array.values),
+                (vec![2, 3], vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+            );
+        }
+        for (text, at) in [("1,2\n3\n", Some(2)), ("1,x\n", Some(1)), ("1,2\n", None), ("", None)] {
+            match read_it(text).unwrap_err() {
+                Error::Table { line, .. } => assert_eq!(line, at, "{text}"),
+                other => panic!("{other}"),
+            }
+        }
     }
 
     #[test]

@@ -1,0 +1,31 @@
+//! Something of an input that is allowed, and that is easily a mistake.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// A warning: it stands first on the terminal, in the report and in its JSON file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Warning {
+    /// The identity of the warning, `subject/cause`: the text may change, the identity stays.
+    pub id: &'static str,
+    pub what: String,
+    pub hint: String,
+}
+
+impl Warning {
+    /// A warning by its identity (`subject/cause`), with the remedy.
+    pub fn new(id: &'static str, what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self {
+            id,
+            what: what.into(),
+            hint: hint.into(),
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "warning: {} [{}]\n  help: {}", self.what, self.id, self.hint)
+    }
+}

@@ -1,0 +1,350 @@
+//! What a design may be and easily is by mistake.
+
+use metalith_core::{Result, Warning};
+use metalith_pillars::{PillarShape, Steepness};
+
+use crate::phase::{ElementPhase, LensPhase, RadialPhase, TermForm};
+use crate::{AskedLight, Design, LatticeOrders, LensSpec};
+
+/// Sites of a design whose phase is compared with the phase of their neighbours: of larger elements some rows are.
+const MOST_SITES: usize = 1 << 22;
+
+/// Rows of an element that are compared at least.
+const FEWEST_ROWS: usize = 16;
+
+/// Share of the radius that rays of a lens may miss the middle of the sensor by: lenses for a long depth of focus or many wavelengths
+/// miss it by a part of this, a phase that is ten times too flat by 0.6.
+const MOST_MISSED: f64 = 0.4;
+
+/// Ratio of the size of a map to that of the lens beyond which its pitch may be wrong.
+const WIDE_MAP: f64 = 4.0;
+
+/// Area of the opening beside the lens, in parts of the lens.
+const WIDE_MARGIN: f64 = 0.6;
+
+/// Wavelengths that differ by less are one (um): the rounding of a file.
+const ROUNDING_UM: f64 = 1e-7;
+
+impl Design {
+    /// All warnings about the design, those about its mapping first.
+    ///
+    /// # Errors
+    /// If a material is not known at a wavelength.
+    pub fn warnings(&self) -> Result<Vec<Warning>> {
+        let mut found = self.mapping_warnings();
+        found.extend(self.wavelengths_differ());
+        found.extend(self.unwrapped_tables());
+        found.extend(self.out_of_focus());
+        found.extend(self.wide_maps());
+        found.extend(self.other_discs());
+        found.extend(self.wide_margins());
+        found.extend(self.coarse_circles());
+        found.extend(self.steep_phase());
+        found.extend(lattice_warning(
+            &self.lattice_orders(AskedLight::All)?,
+            self.cell.pitch_nm,
+        ));
+        Ok(found)
+    }
+
+    /// Warnings about the cell that the mapping is for.
+    pub fn mapping_warnings(&self) -> Vec<Warning> {
+        let own = self.cell.mapped(self.mapping.wavelength_um);
+        self.mapping.identity.warnings(&own).collect()
+    }
+
+    /// Wavelengths of phase, mapping and wedges that are not one.
+    fn wavelengths_differ(&self) -> Option<Warning> {
+        let elements = self.elements();
+        let lenses = elements.iter().map(|e| self.lens_of(e));
+        let phases = lenses
+            .flat_map(LensSpec::radial_phases)
+            .filter_map(|radial| match radial {
+                RadialPhase::Hyperbola { wavelength_um, .. } => Some(*wavelength_um),
+                _ => None,
+            });
+        let wedges = elements.iter().map(|e| e.wedge);
+        let wedges = wedges.filter(|wedge| (wedge.sin_x, wedge.sin_y) != (0.0, 0.0));
+        let phases: Vec<f64> = distinct(phases);
+        let wedges: Vec<f64> = distinct(wedges.map(|wedge| wedge.wavelength_um));
+        let mapping = vec![self.mapping.wavelength_um];
+        let all = distinct([&phases, &mapping, &wedges].into_iter().flatten().copied());
+        if all.len() < 2 {
+            return None;
+        }
+        let named = [("phase", phases), ("mapping", mapping), ("wedges", wedges)];
+        let named: Vec<String> = named
+            .into_iter()
+            .filter(|(_, um)| !um.is_empty())
+            .map(|(name, um)| {
+                let nm: Vec<String> = um.iter().map(|um| format!("{}", (um * 1e6).round() / 1e3)).collect();
+                format!("{name} {} nm", nm.join(", "))
+            })
+            .collect();
+        Some(Warning::new(
+            "design/wavelengths-differ",
+            format!(
+                "parts of the design are for different wavelengths: {}",
+                named.join("; ")
+            ),
+            "use one wavelength in [phase], [mapping] and [array], unless this is meant",
+        ))
+    }
+
+    /// Tables of phases that jump by whole waves.
+    fn unwrapped_tables(&self) -> Option<Warning> {
+        let own = self.array.placed.iter().filter_map(|p| p.lens.as_ref());
+        let files = std::iter::once(&self.lens).chain(own).flat_map(|lens| lens.unwrapped());
+        let mut names: Vec<String> = files.map(|file| file.display().to_string()).collect();
+        names.dedup();
+        (!names.is_empty()).then(|| {
+            Warning::new(
+                "phase/unwrapped",
+                format!(
+                    "phases of {} are wrapped: whole waves are added where they jump",
+                    names.join(", ")
+                ),
+                "give unwrapped phases, or `wrapped = \"no\"` if the jumps are meant",
+            )
+        })
+    }
+
+    /// The lens that all elements share, if one has it, and those that elements have of their own.
+    fn lenses(&self) -> Vec<&LensSpec> {
+        let mut lenses: Vec<&LensSpec> = Vec::new();
+        for element in self.elements() {
+            let lens = self.lens_of(&element);
+            if !lenses.iter().any(|known| std::ptr::eq(*known, lens)) {
+                lenses.push(lens);
+            }
+        }
+        lenses
+    }
+
+    /// A phase over the radius that sends its light elsewhere than to the middle of the sensor, at each wavelength.
+    fn out_of_focus(&self) -> Option<Warning> {
+        let focuses = |lens: &LensSpec| {
+            let own = lens.focused_um();
+            let at = self.verify.wavelengths_um.iter().copied().chain(own);
+            at.map(|um| missed(lens, um)).fold(f64::INFINITY, f64::min)
+        };
+        let lenses = self
+            .lenses()
+            .into_iter()
+            .filter(|lens| lens.terms.is_empty() && lens.phase != RadialPhase::Flat);
+        let worst = lenses
+            .map(|lens| (focuses(lens), lens))
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (missed, lens) = worst;
+        (missed > MOST_MISSED).then(|| {
+            Warning::new(
+                "phase/out-of-focus",
+                format!(
+                    "rays of the phase miss the middle of the sensor, {} um away, by {:.0} % of the radius of the lens on average, at \
+                     each wavelength of [verify]",
+                    lens.focal_length_um,
+                    missed * 100.0
+                ),
+                "check the units and the radius of the phase, and `focal_length_um` of [lens]",
+            )
+        })
+    }
+
+    /// Maps of which the lens has a small part.
+    fn wide_maps(&self) -> Option<Warning> {
+        let mut maps = self.lenses().into_iter().flat_map(|lens| {
+            let terms = lens.terms.iter();
+            terms.filter_map(move |term| match &term.form {
+                TermForm::Map(map) => Some((
+                    map.extent_um().into_iter().fold(f64::INFINITY, f64::min),
+                    lens.radius_um(),
+                )),
+                _ => None,
+            })
+        });
+        let (extent_um, radius_um) = maps.find(|(extent, radius)| *extent > WIDE_MAP * radius)?;
+        Some(Warning::new(
+            "phase/wide-map",
+            format!("a map of phases reaches to {extent_um:.1} um from its middle, and the lens to {radius_um:.1} um"),
+            "check `pitch_um`, the distance of the places of the map",
+        ))
+    }
+
+    /// Zernike polynomials of a disc that is not the lens.
+    fn other_discs(&self) -> Option<Warning> {
+        let mut discs = self.lenses().into_iter().flat_map(|lens| {
+            let terms = lens.terms.iter();
+            terms.filter_map(move |term| match &term.form {
+                TermForm::Zernike { radius_um, .. } => Some((*radius_um, lens.radius_um())),
+                _ => None,
+            })
+        });
+        let (disc_um, lens_um) = discs.find(|(disc, lens)| !(0.5..=2.0).contains(&(disc / lens)))?;
+        Some(Warning::new(
+            "phase/zernike-disc",
+            format!("Zernike polynomials are of a disc with a radius of {disc_um} um, and the lens has {lens_um} um"),
+            "check `normalisation_radius_um`; left out, it is the radius of the lens",
+        ))
+    }
+
+    /// Openings that pass much light beside the lens.
+    fn wide_margins(&self) -> Option<Warning> {
+        let margin_um = self.layout.apertures.margin_nm as f64 * 1e-3;
+        let beside = |lens: &LensSpec| (1.0 + margin_um / lens.radius_um()).powi(2) - 1.0;
+        let most = self.lenses().into_iter().map(beside).fold(0.0, f64::max);
+        (most > WIDE_MARGIN).then(|| {
+            Warning::new(
+                "apertures/wide-margin",
+                format!(
+                    "beside a lens its opening passes light through {:.0} % of the area of the lens, which no pillar focuses",
+                    most * 100.0
+                ),
+                "use a smaller `margin_um`",
+            )
+        })
+    }
+
+    /// Circles whose polygons are off by more than the step of widths.
+    fn coarse_circles(&self) -> Option<Warning> {
+        let (error_nm, step_nm) = (self.layout.circle_chord_error_nm?, self.cell.width_step_nm);
+        let is_coarse = self.cell.shape == PillarShape::Circle && error_nm > f64::from(step_nm);
+        is_coarse.then(|| {
+            Warning::new(
+                "layout/coarse-circles",
+                format!(
+                    "polygons of round pillars are off by up to {error_nm} nm, and diameters have steps of {step_nm} nm"
+                ),
+                "use a smaller `circle_chord_error_nm`",
+            )
+        })
+    }
+
+    /// Pillars between which the phase steps by more than half a wave.
+    fn steep_phase(&self) -> Option<Warning> {
+        let (lens, elements) = (LensPhase::of(self), self.elements());
+        let lattice = lens.lattice();
+        let rows = (MOST_SITES / elements.len().max(1) / lattice.sites()).max(FEWEST_ROWS);
+        let one_in = lattice.sites().div_ceil(rows);
+        let mut all = Steepness::default();
+        for element in &elements {
+            let phase = ElementPhase::of(&lens, element);
+            // Maps that are known up to whole waves jump where nothing does.
+            let known = |ix, iy| phase.parts(ix, iy).map(|[known, _]| known);
+            let found = Steepness::of_rows(&lattice, one_in, known);
+            all.sites += found.sites;
+            all.steep_sites += found.steep_sites;
+            all.largest_step_rad = all.largest_step_rad.max(found.largest_step_rad);
+        }
+        (all.steep_sites > 0).then(|| {
+            let percent = 100.0 * all.steep_sites as f64 / all.sites as f64;
+            Warning::new(
+                "phase/steep",
+                format!(
+                    "the phase steps by more than pi from one pillar to the next at {percent:.1} % of the pillars, by up to {:.2} rad: \
+                     there the lattice cannot follow it",
+                    all.largest_step_rad
+                ),
+                "use a smaller pitch, a longer focal length, a smaller diameter, or less steering",
+            )
+        })
+    }
+}
+
+/// Distance from the middle of the sensor at which rays of a lens land at a wavelength (um), mean over its area, in parts of its
+/// radius; a ray that does not leave counts as one radius.
+fn missed(lens: &LensSpec, wavelength_um: f64) -> f64 {
+    const RINGS: u32 = 64;
+    let radius_um = lens.radius_um();
+    let width_um = radius_um / f64::from(RINGS);
+    let (mut sum, mut area) = (0.0, 0.0);
+    for ring in 0..RINGS {
+        let inner_um = f64::from(ring) * width_um;
+        let turns = |r: f64| lens.phase.turns(r * r);
+        let (r, slope) = (
+            inner_um + 0.5 * width_um,
+            (turns(inner_um + width_um) - turns(inner_um)) / width_um,
+        );
+        let sine = wavelength_um * slope;
+        let lands_um = match sine.abs() < 1.0 {
+            true => (r + lens.focal_length_um * sine / (1.0 - sine * sine).sqrt()).abs(),
+            false => radius_um,
+        };
+        sum += r * lands_um.min(radius_um);
+        area += r;
+    }
+    sum / area / radius_um
+}
+
+/// Light that the lattice diffracts, and the pitch (nm) that would not.
+fn lattice_warning(orders: &[LatticeOrders], pitch_nm: u32) -> Option<Warning> {
+    let pitches = orders.iter().map(|o| o.wavelength_um / o.edge_um * f64::from(pitch_nm));
+    let pitch = pitches.fold(f64::INFINITY, f64::min).floor();
+    (!orders.is_empty()).then(|| {
+        Warning::new(
+            "lattice/diffracts",
+            LatticeOrders::summary(orders).join("; "),
+            format!(
+                "a pitch of up to {pitch} nm, instead of {pitch_nm} nm, has no such orders; or use longer wavelengths"
+            ),
+        )
+    })
+}
+
+/// Wavelengths in rising order, each once.
+fn distinct(um: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut um: Vec<f64> = um.collect();
+    um.sort_by(f64::total_cmp);
+    um.dedup_by(|a, b| (*a - *b).abs() < ROUNDING_UM);
+    um
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn warned(name: &str, changes: &[(&str, &str)]) -> Vec<Warning> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"));
+        let mut text = std::fs::read_to_string(&path).unwrap();
+        for (from, to) in changes {
+            assert!(text.contains(from), "{from}");
+            text = text.replacen(from, to, 1);
+        }
+        Design::parse(&path, &text).unwrap().warnings().unwrap()
+    }
+
+    fn ids(warnings: &[Warning]) -> Vec<&'static str> {
+        warnings.iter().map(|w| w.id).collect()
+    }
+
+    #[test]
+    fn a_sound_design_has_no_warnings() {
+        for name in ["asi_940", "silicon_10600"] {
+            assert_eq!(warned(name, &[]), [], "{name}");
+        }
+    }
+
+    #[test]
+    fn wavelengths_that_differ_are_named() {
+        let found = warned("tio2_532", &[("wavelength_nm = 532", "wavelength_nm = 633")]);
+        let found = found.iter().find(|w| w.id == "design/wavelengths-differ").unwrap();
+        assert!(found.what.ends_with("phase 633 nm; mapping 532 nm"), "{found}");
+    }
+
+    #[test]
+    fn a_steep_phase_is_named_with_its_share() {
+        // At the rim, sin(theta) = 0.89: 0.32 um * 0.89 / 0.532 um = 0.54 waves along a row.
+        let found = warned("tio2_532", &[("focal_length_um = 80", "focal_length_um = 20")]);
+        let found = found.iter().find(|w| w.id == "phase/steep").unwrap();
+        assert!(found.what.contains(" % of the pillars, by up to 3.3"), "{found}");
+        assert!(!ids(&warned("tio2_532", &[])).contains(&"phase/steep"));
+    }
+
+    #[test]
+    fn a_lattice_that_diffracts_is_named_with_a_pitch_that_does_not() {
+        let found = warned("mini_3x3", &[]);
+        assert_eq!(ids(&found), ["design/wavelengths-differ", "lattice/diffracts"]);
+        assert!(found[1].what.contains("into the substrate"), "{}", found[1]);
+    }
+}
