@@ -25,7 +25,7 @@ mod upright;
 
 pub use cache::cache_folder;
 pub use curve::{BadCell, PhaseCurve, bad_cells};
-pub use exact::{MappingTable, RampOrders, simplex};
+pub use exact::{AVOIDED_BELOW, MappingTable, RampOrders, SolvedMapping, simplex};
 pub use fit::{
     FittedCell, ForwardFit, InverseFit, MappingError, RotationCurve, RotationFit, curves_over, fit_forward,
     fit_inverse, forward_errors, round_trip,
