@@ -297,7 +297,7 @@ fn summary(found: &Verification, folder: &Path) {
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
-    let mut design = standard_input::design(&args.design)?;
+    let mut design = standard_input::design(&args.design, terminal)?;
     let layout = InputFile::of(&args.layout)?;
     judged_as_made(
         "--compensated",

@@ -25,6 +25,9 @@ const LEAST_NM: f64 = 50.0;
 /// Light in the first order that is given up for an aspect ratio (height over narrowest width) less by one.
 const PER_ASPECT: f64 = 0.005;
 
+/// Light in the first order that is given up for phases without a gap of a wave.
+const PER_GAP: f64 = 0.3;
+
 /// Largest distance (waves) from one phase that pillars give to the next: beyond it a lens has no full wave of phase.
 pub const WIDEST_GAP_WAVES: f64 = 0.2;
 
@@ -178,7 +181,7 @@ impl CellRequest {
     }
 
     /// Choose the cell: of the pitches and heights that are not given those whose mapping sends most light to the first order,
-    /// less a little for high pillars.
+    /// less a little for high pillars and for phases that none gives.
     ///
     /// # Errors
     /// If the pitch diffracts or is too coarse for the aperture, the height gives no full wave of phase, the film absorbs, or the user
@@ -341,7 +344,7 @@ impl CellRequest {
                 trials.push(Trial {
                     pitch_nm,
                     height_nm,
-                    score: mapping.light.first - PER_ASPECT * aspect,
+                    score: mapping.light.first - PER_ASPECT * aspect - PER_GAP * mapping.gap_waves,
                     mapping,
                 });
             }
@@ -405,7 +408,7 @@ mod tests {
         assert_eq!((low, high, step), (100, 340, 2));
         let ((low, high), step) = request().widths(2700).unwrap();
         assert!(step == 10 && low % step == 0 && high % step == 0);
-        assert!(request().widths(120).is_err());
+        assert!(request().widths(110).is_err());
         let heights = request().heights().unwrap();
         assert!(heights.is_sorted() && heights.iter().all(|h| h % 10.0 == 0.0) && heights.contains(&600.0));
     }

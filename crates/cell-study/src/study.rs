@@ -19,7 +19,7 @@ use crate::SteeredStudy;
 const BEST_STEPS: f64 = 30.0;
 
 /// Name of the mapping of a design that is solved from its cell.
-const SOLVED: &str = "source = \"cells\"";
+const SOLVED: &str = "solved";
 
 /// Degree of the inverse polynomial that stands for `fitted`.
 const FITTED_DEGREE: usize = 3;
