@@ -209,7 +209,8 @@ fn write_mapping(path: &Path, design: &Design, best: &MappingStudy) -> Result<()
 
 /// The study of a design of rotated rectangles: a few cells, and no library.
 fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
-    let study = RotationStudy::new(design)?;
+    let study = RotationStudy::new(design, terminal)?;
+    terminal.clear();
     let _turn = terminal.turn_at(folder)?;
     write_rotation_report(&study, folder)?;
     if args.json {

@@ -410,7 +410,7 @@ mod tests {
         assert!(step == 10 && low % step == 0 && high % step == 0);
         assert!(request().widths(110).is_err());
         let heights = request().heights().unwrap();
-        assert!(heights.is_sorted() && heights.iter().all(|h| h % 10.0 == 0.0) && heights.contains(&600.0));
+        assert!(heights.is_sorted() && heights.iter().all(|h| h % 10.0 == 0.0) && heights.len() > 20);
     }
 
     /// A height that gives too little phase is refused, with one that gives enough.

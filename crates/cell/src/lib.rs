@@ -40,7 +40,7 @@ pub use neighbours::{
     Orientation, RealRow, SiteGrid, SiteResponse, SolvedRow, neighbours, sites_by,
 };
 pub use pointwise::PointwiseCell;
-pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
+pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS};
 pub use polarisation::{
     Analyser, AxisTables, FocusedLight, HandTables, LitStack, PassedTable, Polarisation, PolarisationAxis,
     PolarisedLight, PolarisedTables,

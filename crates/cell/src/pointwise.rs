@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::kept::{CacheEntry, bytes_of, complex_of, solver_of};
-use super::{CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, ObliqueTables};
-use metalith_core::{Error, Progress, Result};
+use super::{CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, ObliqueTables, Spectral};
+use metalith_core::{Error, Progress, Result, Silent};
 use metalith_rcwa::Orders;
 
 /// Median phase error over the cell's whole range 0.002 rad: finer than the table, and for a few
@@ -96,17 +96,8 @@ impl PointwiseCell {
         if let Some(solved) = table.read(decode, progress) {
             return Ok(solved);
         }
-        let what = format!("pillars at {:.4} um", wavelength_um);
-        progress.begin(&what, self.widths_nm.len() as u64);
-        let one = |&width_nm: &u16| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
-            let t = (self.stack).transmission(f64::from(width_nm), wavelength_um, orders);
-            progress.advance(1);
-            t
-        };
-        let solved = self.widths_nm.par_iter().map(one).collect::<Result<Vec<_>>>()?;
+        let one = |w| self.stack.transmission(f64::from(w), wavelength_um, orders);
+        let solved = solve_widths(&self.widths_nm, one, wavelength_um, progress)?;
         table.write(&bytes_of(solved.iter().copied()), progress);
         Ok(solved)
     }
@@ -127,13 +118,24 @@ impl PointwiseCell {
         Ok(spread(&self.widths_nm, &solved, max_width_nm))
     }
 
-    fn tilted(&self, orders: usize, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<ObliqueTables> {
+    fn tilted(
+        &self,
+        orders: usize,
+        wavelength_um: f64,
+        sines: [f64; 2],
+        max_width_nm: u16,
+        progress: &dyn Progress,
+    ) -> Result<ObliqueTables> {
         let orders = self.at_most(orders)?;
         let solve = |w| {
             let [[ss, sp], [ps, pp]] = self.stack.oblique(f64::from(w), wavelength_um, sines, orders)?;
             Ok([ss, pp, sp, ps])
         };
-        let [ss, pp, sp, ps] = tabulate(&self.widths_nm, max_width_nm, solve)?;
+        let solved = solve_widths(&self.widths_nm, solve, wavelength_um, progress)?;
+        let [ss, pp, sp, ps] = std::array::from_fn(|k| {
+            let own: Vec<Complex64> = solved.iter().map(|t: &[Complex64; 4]| t[k]).collect();
+            spread(&self.widths_nm, &own, max_width_nm)
+        });
         Ok(ObliqueTables {
             kept: [ss, pp],
             turned: [sp, ps],
@@ -148,12 +150,18 @@ impl CellModel for PointwiseCell {
 
     fn response(&self, light: &Illumination<'_>, widest_nm: u16, progress: &dyn Progress) -> Result<CellResponse> {
         let (um, sines) = (light.wavelength_um, light.cell_sines());
+        // Of a band whoever asks says how far it is.
+        let progress = if light.spectral == Spectral::InBand {
+            &Silent
+        } else {
+            progress
+        };
         if sines == [0.0; 2] {
             let orders = light.spectral.choose(self.orders.along_axis(), BAND_ORDERS);
             return self.normal(orders, um, widest_nm, progress).map(CellResponse::Scalar);
         }
         let orders = light.spectral.choose(OBLIQUE_ORDERS, OBLIQUE_BAND_ORDERS);
-        let tables = self.tilted(orders, um, sines, widest_nm)?;
+        let tables = self.tilted(orders, um, sines, widest_nm, progress)?;
         Ok(CellResponse::Jones(JonesTables::Oblique(tables)))
     }
 
@@ -162,20 +170,26 @@ impl CellModel for PointwiseCell {
     }
 }
 
-/// Tables over all widths (nm) of what is solved for some of them, in rising order, each with `N` values.
-///
-/// # Errors
-/// That of the first width that cannot be solved.
-pub fn tabulate<const N: usize>(
+/// What is solved for each width (nm) at a wavelength (um), with progress.
+fn solve_widths<T: Send>(
     widths_nm: &[u16],
-    max_width_nm: u16,
-    solve: impl Fn(u16) -> Result<[Complex64; N]> + Sync,
-) -> Result<[Vec<Complex64>; N]> {
-    let solved = widths_nm.par_iter().map(|&w| solve(w)).collect::<Result<Vec<_>>>()?;
-    Ok(std::array::from_fn(|k| {
-        let own = solved.iter().map(|t| t[k]).collect::<Vec<_>>();
-        spread(widths_nm, &own, max_width_nm)
-    }))
+    solve: impl Fn(u16) -> Result<T> + Sync,
+    wavelength_um: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<T>> {
+    progress.begin(
+        &format!("pillars at {:.1} nm", wavelength_um * 1e3),
+        widths_nm.len() as u64,
+    );
+    let one = |&width_nm: &u16| {
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        let solved = solve(width_nm);
+        progress.advance(1);
+        solved
+    };
+    widths_nm.par_iter().map(one).collect()
 }
 
 /// A table over all widths (nm): straight lines between those that were solved, the nearest beyond, nothing at
@@ -203,7 +217,6 @@ fn spread(widths_nm: &[u16], solved: &[Complex64], max_width_nm: u16) -> Vec<Com
 mod tests {
     use super::*;
     use crate::Material;
-    use metalith_core::Silent;
 
     /// Mean power of a band by few orders equals the result by many orders.
     #[test]
