@@ -3,6 +3,7 @@
 use std::fs;
 
 use assert_cmd::Command;
+use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 
 fn metalith() -> Command {
@@ -106,6 +107,33 @@ fn a_new_design_is_for_its_wavelength_and_material() {
     new(&["none.toml", "--material", "TiO3"])
         .code(2)
         .stderr(contains("use one of tio2"));
+    // A shipped design is rescaled to another wavelength and another size, and what it has no other of is refused.
+    let like = [
+        "like.toml",
+        "--like",
+        "asi_940",
+        "--wavelength-nm",
+        "1550",
+        "--diameter-um",
+        "50",
+        "--array",
+        "2x1",
+    ];
+    new(&like).success();
+    let text = fs::read_to_string(folder.path().join("like.toml")).unwrap();
+    for said in [
+        "wavelength_nm = 1550",
+        "focal_length_um = 75",
+        "elements = [2, 1]",
+        "source = \"cells\"",
+        "wavelengths_nm = [1550]",
+    ] {
+        assert!(text.contains(said), "{said} in {text}");
+    }
+    let rectangles = ["none.toml", "--like", "birefringent_532", "--wavelength-nm", "633"];
+    new(&rectangles)
+        .code(2)
+        .stderr(contains("birefringent_532").or(contains("none")));
     assert!(!folder.path().join("none.toml").exists());
 }
 

@@ -66,6 +66,11 @@ impl Materials {
         })
     }
 
+    /// Names of film and substrate as a design has them.
+    pub fn names(&self) -> [&str; 2] {
+        [&self.names[0], &self.names[1]]
+    }
+
     /// Word for the film in sentences.
     fn film_word(&self) -> String {
         let name = &self.names[0];

@@ -1,6 +1,7 @@
 //! `metalith new`: a commented design to start from.
 
 mod chosen;
+mod like;
 
 use std::path::{Path, PathBuf};
 
@@ -53,9 +54,9 @@ pub struct NewArgs {
     #[arg(long, value_name = "N", hide = true)]
     elements: Option<u32>,
 
-    /// Diameter of a lens (um).
-    #[arg(long, value_name = "UM", default_value_t = 60.0)]
-    diameter_um: f64,
+    /// Diameter of a lens (um); 60 if left out.
+    #[arg(long, value_name = "UM")]
+    diameter_um: Option<f64>,
 
     /// Focal length (um); 2.4 times the diameter if left out.
     #[arg(long, value_name = "UM")]
@@ -94,11 +95,18 @@ pub struct NewArgs {
     #[arg(long, value_name = "NM", value_parser = clap::value_parser!(u32).range(20..=20_000))]
     pitch_nm: Option<u32>,
 
-    /// Begin with a shipped design and the files that it reads instead: other pillars, lattices, materials,
-    /// wavelengths, phases and arrays.
-    #[arg(long, value_name = "DESIGN", value_parser = ShippedDesign::names(), conflicts_with_all = ["array", "elements", "diameter_um",
-        "focal_length_um", "wavelength_nm", "steering_deg", "material", "substrate", "shape", "lattice", "pillar_height_nm", "pitch_nm"])]
+    /// Begin with a shipped design and the files that it reads instead: other pillars, lattices, materials, wavelengths, phases and
+    /// arrays. With other options it is rescaled: chip and marks follow the lenses, pillars and mapping are chosen anew.
+    #[arg(long, value_name = "DESIGN", value_parser = ShippedDesign::names())]
     like: Option<String>,
+}
+
+/// Distance of the polygon of an opening from its circle (nm).
+fn chord_nm(diameter_um: f64, margin_um: f64) -> f64 {
+    // A polygon of n sides is off its circle by R (pi / n)^2 / 2; a few sides fewer than are allowed.
+    let side_angle = std::f64::consts::PI / f64::from(MOST_SIDES);
+    let opening_nm = (0.5 * diameter_um + margin_um) * 1e3;
+    (0.5 * opening_nm * side_angle.powi(2)).ceil().max(FINEST_CHORD_NM)
 }
 
 /// Numbers of elements along x and y.
@@ -112,17 +120,26 @@ fn array(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl NewArgs {
-    /// True if nothing is said of pillars or light: the design is for colour, with the pillars of the paper.
-    fn is_for_colour(&self) -> bool {
+    /// True if anything is said of pillars or light.
+    fn changes_pillars(&self) -> bool {
         let said = [&self.material, &self.substrate, &self.shape, &self.lattice];
-        said.iter().all(|option| option.is_none())
-            && self.wavelength_nm.is_none()
-            && self.pillar_height_nm.is_none()
-            && self.pitch_nm.is_none()
+        said.iter().any(|option| option.is_some())
+            || self.wavelength_nm.is_some()
+            || self.pillar_height_nm.is_some()
+            || self.pitch_nm.is_some()
+    }
+
+    /// True if the design is for colour, with the pillars of the paper.
+    fn is_for_colour(&self) -> bool {
+        !self.changes_pillars()
+    }
+
+    fn diameter_um(&self) -> f64 {
+        self.diameter_um.unwrap_or(60.0)
     }
 
     fn focal_length_um(&self) -> f64 {
-        self.focal_length_um.unwrap_or(2.4 * self.diameter_um)
+        self.focal_length_um.unwrap_or(2.4 * self.diameter_um())
     }
 
     fn wavelength_nm(&self) -> f64 {
@@ -150,13 +167,13 @@ impl NewArgs {
             return Ok(StartCell::of_the_paper());
         }
         let (nm, focal_length_um) = (self.wavelength_nm(), self.focal_length_um());
-        let numbers = [nm, self.diameter_um, focal_length_um];
+        let numbers = [nm, self.diameter_um(), focal_length_um];
         if !(numbers.iter().all(|n| n.is_finite() && *n > 0.0) && self.steering_deg().abs() < 90.0) {
             return Err(Error::refused(
                 "new/numbers",
                 format!(
                     "a lens of {} um, f = {focal_length_um} um, for {nm} nm",
-                    self.diameter_um
+                    self.diameter_um()
                 ),
                 "give positive numbers, and steering of less than 90 degrees",
             ));
@@ -171,7 +188,7 @@ impl NewArgs {
         )?;
         let (x, y) = self.elements();
         let steps = 0.5 * f64::from(x.max(y).saturating_sub(1));
-        let radius_um = 0.5 * self.diameter_um;
+        let radius_um = 0.5 * self.diameter_um();
         let request = CellRequest {
             film: materials.film.clone(),
             substrate: materials.substrate.clone(),
@@ -198,17 +215,14 @@ impl NewArgs {
     /// The text of the design.
     fn text(&self, name: &str, cell: &StartCell) -> String {
         // Lenses as far apart as in `designs/prototype_3x3.toml`: 2.42 times their diameter, on whole nanometres.
-        let spacing_um = (2.42 * self.diameter_um * 1e3).round() * 1e-3;
+        let spacing_um = (2.42 * self.diameter_um() * 1e3).round() * 1e-3;
         let (x, y) = self.elements();
         let outside = |elements: u32| {
-            let outermost_um = 0.5 * f64::from(elements.saturating_sub(1)) * spacing_um + 0.5 * self.diameter_um;
+            let outermost_um = 0.5 * f64::from(elements.saturating_sub(1)) * spacing_um + 0.5 * self.diameter_um();
             OUTSIDE_UM.map(|d| (outermost_um + d).ceil())
         };
         let ([local_x, global_x, edge_x], [local_y, global_y, edge_y]) = (outside(x), outside(y));
-        // A polygon of n sides is off its circle by R (pi / n)^2 / 2; a few sides fewer than are allowed.
-        let side_angle = std::f64::consts::PI / f64::from(MOST_SIDES);
-        let opening_nm = (0.5 * self.diameter_um + MARGIN_UM) * 1e3;
-        let chord_nm = (0.5 * opening_nm * side_angle.powi(2)).ceil().max(FINEST_CHORD_NM);
+        let chord_nm = chord_nm(self.diameter_um(), MARGIN_UM);
         let nm = self.wavelength_nm();
         let title = match (x, y) {
             (1, 1) => format!("{} lens for {nm} nm", cell.film_word),
@@ -225,7 +239,7 @@ impl NewArgs {
             ("{name}", name.to_owned()),
             ("{elements_x}", x.to_string()),
             ("{elements_y}", y.to_string()),
-            ("{diameter_um}", self.diameter_um.to_string()),
+            ("{diameter_um}", self.diameter_um().to_string()),
             ("{focal_length_um}", self.focal_length_um().to_string()),
             ("{wavelength_nm}", nm.to_string()),
             ("{chord_nm}", chord_nm.to_string()),
@@ -255,7 +269,8 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let name = args.design.file_stem().unwrap_or_default().to_string_lossy();
     if let Some(like) = &args.like {
-        for file in ShippedDesign::of(like).write(&args.design, &name)? {
+        let rescaled = |text| args.rescaled(text, &args.design, terminal);
+        for file in ShippedDesign::of(like).write(&args.design, &name, rescaled)? {
             print_line!("{}", file.display());
         }
         print_line!("next: metalith run {}", args.design.display());
