@@ -25,8 +25,10 @@ const LEAST_NM: f64 = 50.0;
 /// Light in the first order that is given up for an aspect ratio (height over narrowest width) less by one.
 const PER_ASPECT: f64 = 0.005;
 
-/// Light in the first order that is given up for phases without a gap of a wave.
+/// Light in the first order that is given up for phases without a gap of a wave beyond a small one, which the few widths that are
+/// tried have too.
 const PER_GAP: f64 = 0.3;
+const SMALL_GAP_WAVES: f64 = 0.06;
 
 /// Largest distance (waves) from one phase that pillars give to the next: beyond it a lens has no full wave of phase.
 pub const WIDEST_GAP_WAVES: f64 = 0.2;
@@ -78,10 +80,15 @@ struct Trial {
     score: f64,
 }
 
-impl Trial {
-    fn works(&self) -> bool {
-        self.mapping.gap_waves <= WIDEST_GAP_WAVES && self.mapping.light.first >= LEAST_LIGHT
-    }
+/// True if a mapping makes a lens.
+fn works(mapping: &SolvedMapping) -> bool {
+    mapping.gap_waves <= WIDEST_GAP_WAVES && mapping.light.first >= LEAST_LIGHT
+}
+
+/// Light in the first order, less what is given up for low pillars and for phases that have no gap.
+fn score(mapping: &SolvedMapping, height_nm: f64, narrowest_nm: u16) -> f64 {
+    let aspect = height_nm / f64::from(narrowest_nm);
+    mapping.light.first - PER_ASPECT * aspect - PER_GAP * (mapping.gap_waves - SMALL_GAP_WAVES).max(0.0)
 }
 
 impl CellRequest {
@@ -192,17 +199,22 @@ impl CellRequest {
         let tried = trials.len();
         trials.sort_by(|a, b| b.score.total_cmp(&a.score));
         let asked = |trial: &&Trial| self.height_nm.is_none_or(|height| height == trial.height_nm);
-        let working: Vec<&Trial> = trials.iter().filter(|t| t.works()).collect();
+        let working: Vec<&Trial> = trials.iter().filter(|t| works(&t.mapping)).collect();
         // What few widths and orders say may not hold for all.
         const SOLVED: usize = 3;
-        let mut refused: Option<SolvedMapping> = None;
+        let (mut refused, mut best): (Option<SolvedMapping>, Option<(f64, ChosenCell)>) = (None, None);
         for trial in working.iter().copied().filter(asked).take(SOLVED) {
             let (widths_nm, step_nm) = self.widths(trial.pitch_nm)?;
             let all: Vec<u16> = (widths_nm.0..=widths_nm.1).step_by(usize::from(step_nm)).collect();
             let stack = self.stack(trial.pitch_nm, trial.height_nm)?;
             let mapping = SolvedMapping::solve(&stack, self.wavelength_um, &all, cache, progress)?;
-            if mapping.gap_waves <= WIDEST_GAP_WAVES && mapping.light.first >= LEAST_LIGHT {
-                return Ok(ChosenCell {
+            if !works(&mapping) {
+                refused.get_or_insert(mapping);
+                continue;
+            }
+            let score = score(&mapping, trial.height_nm, widths_nm.0);
+            if best.as_ref().is_none_or(|(most, _)| score > *most) {
+                let cell = ChosenCell {
                     pitch_nm: trial.pitch_nm,
                     height_nm: trial.height_nm,
                     widths_nm,
@@ -211,9 +223,12 @@ impl CellRequest {
                     nyquist_nm,
                     tried,
                     mapping,
-                });
+                };
+                best = Some((score, cell));
             }
-            refused.get_or_insert(mapping);
+        }
+        if let Some((_, cell)) = best {
+            return Ok(cell);
         }
         Err(self.refusal(&trials, &working, refused))
     }
@@ -340,11 +355,10 @@ impl CellRequest {
                 let Ok(mapping) = SolvedMapping::of_curve(&curve, ORDERS) else {
                     continue;
                 };
-                let aspect = height_nm / f64::from(widths_nm[0]);
                 trials.push(Trial {
                     pitch_nm,
                     height_nm,
-                    score: mapping.light.first - PER_ASPECT * aspect - PER_GAP * mapping.gap_waves,
+                    score: score(&mapping, height_nm, widths_nm[0]),
                     mapping,
                 });
             }

@@ -66,6 +66,14 @@ impl Materials {
         })
     }
 
+    /// Band about a wavelength (nm), as a list of TOML, where the film is known: that of `metalith cells`.
+    pub fn band_nm(&self, nm: f64) -> Option<String> {
+        let (low_um, high_um) = self.film.range_um();
+        let low = (nm * (1.0 - BAND)).floor().max((low_um * 1e3).ceil());
+        let high = (nm * (1.0 + BAND)).ceil().min((high_um * 1e3).floor());
+        (low < high).then(|| format!("[{low}, {high}]"))
+    }
+
     /// Names of film and substrate as a design has them.
     pub fn names(&self) -> [&str; 2] {
         [&self.names[0], &self.names[1]]
@@ -176,11 +184,6 @@ impl StartCell {
             LatticeKind::Hexagonal => "hexagonal",
         };
         let mapping = &cell.mapping;
-        let (low_um, high_um) = materials.film.range_um();
-        let band = [
-            (nm * (1.0 - BAND)).floor().max((low_um * 1e3).ceil()),
-            (nm * (1.0 + BAND)).ceil().min((high_um * 1e3).floor()),
-        ];
         let source = |material: &Material, said: bool| {
             given(
                 said,
@@ -239,10 +242,10 @@ impl StartCell {
             ),
             line("ambient_index", "1.0", ""),
         ];
-        if band[0] < band[1] {
+        if let Some(band) = materials.band_nm(nm) {
             keys.push(line(
                 "band_nm",
-                format!("[{}, {}]", band[0], band[1]),
+                band,
                 "that `metalith cells` tabulates; decides nothing of the layout",
             ));
         }

@@ -12,10 +12,10 @@ use super::{NewArgs, chord_nm};
 use crate::cli::Terminal;
 use crate::cli::section_text::with_keys;
 
-fn refused(like: &Design, what: &str) -> Error {
+fn refused(like: &str, what: &str) -> Error {
     Error::refused(
         "new/not-rescaled",
-        format!("{} with other values: {what}", like.name),
+        format!("{like} with other values: {what}"),
         "begin with another design, or without options, and change the file",
     )
 }
@@ -42,8 +42,9 @@ impl NewArgs {
             return Ok(text);
         }
         let like = Design::parse_without_library(path, &text)?;
+        let name = self.like.as_deref().unwrap_or(&like.name);
         if !like.array.placed.is_empty() || like.lens.outline.is_some() {
-            return Err(refused(&like, "its elements are placed or shaped one by one"));
+            return Err(refused(name, "its elements are placed or shaped one by one"));
         }
         let old_um = f64::from(like.lens.diameter_nm) * 1e-3;
         let diameter_um = self.diameter_um.unwrap_or(old_um);
@@ -54,7 +55,7 @@ impl NewArgs {
         let is_lens_new = diameter_um != old_um || focal_length_um != like.lens.focal_length_um;
         if !is_hyperbola && (is_lens_new || self.wavelength_nm.is_some()) {
             return Err(refused(
-                &like,
+                name,
                 "its phase is no hyperbola, which alone is known for another lens",
             ));
         }
@@ -147,10 +148,10 @@ impl NewArgs {
         set: &mut impl FnMut(&str, usize, &[(&str, Option<String>)]),
         terminal: &Terminal,
     ) -> Result<()> {
-        let cell = &like.cell;
+        let (cell, name) = (&like.cell, self.like.as_deref().unwrap_or(&like.name));
         if cell.shape.rectangles().is_some() || !cell.under.is_empty() || !like.mapping.steered.is_empty() {
             return Err(refused(
-                like,
+                name,
                 "only squares and circles on their substrate are chosen anew",
             ));
         }
@@ -206,7 +207,7 @@ impl NewArgs {
                 ("width_step_nm", some(&chosen.step_nm)),
                 ("pillar_material", quoted(materials.names()[0])),
                 ("substrate_material", quoted(materials.names()[1])),
-                ("band_nm", None),
+                ("band_nm", materials.band_nm(wavelength_um * 1e3)),
             ],
         );
         let nm = some(&((wavelength_um * 1e6).round() / 1e3));
