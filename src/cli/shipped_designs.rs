@@ -84,15 +84,24 @@ impl ShippedDesign {
             let [own, new] = [&self.name, name].map(|name| format!("name = \"{name}\""));
             let text = change(self.text.replacen(&own, &new, 1))?;
             Design::parse(design, &text)?;
-            AtomicFile::write(design, text.as_bytes())
+            AtomicFile::write(design, text.as_bytes())?;
+            Ok::<_, Error>(text)
         })();
-        if let Err(error) = written {
-            for (path, _) in &missing {
-                let _ = std::fs::remove_file(path);
-            }
-            return Err(error);
+        let text = written.as_deref().unwrap_or_default();
+        let (files, unnamed): (Vec<_>, Vec<_>) = missing.into_iter().map(|(path, _)| path).partition(|path| {
+            let from_design = path
+                .strip_prefix(folder)
+                .unwrap_or(path)
+                .to_string_lossy()
+                .replace('\\', "/");
+            text.contains(&format!("\"{from_design}\""))
+        });
+        for path in unnamed {
+            let _ = std::fs::remove_file(&path);
+            // A folder that holds other files stays.
+            let _ = path.parent().map(std::fs::remove_dir);
         }
-        let files = missing.into_iter().map(|(path, _)| path);
+        written?;
         Ok(std::iter::once(design.to_owned()).chain(files).collect())
     }
 }

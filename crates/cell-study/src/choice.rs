@@ -17,6 +17,10 @@ const PITCHES: [f64; 4] = [0.96, 0.88, 0.80, 0.72];
 /// Heights that are tried, in steps of a tenth of wavelength over index contrast, which is a wave of phase against air.
 const HEIGHTS: std::ops::RangeInclusive<u32> = 7..=32;
 
+/// Least phase (waves) that light gains in the film against air: phases of lower pillars come from resonances alone, which unlike
+/// neighbours shift.
+const LEAST_GAIN_WAVES: f64 = 0.7;
+
 /// Narrowest pillar and narrowest gap over the nearest distance of two pillars, and both at least (nm).
 const NARROWEST: f64 = 0.25;
 const GAP: f64 = 0.15;
@@ -198,8 +202,13 @@ impl CellRequest {
         let mut trials = self.trials(diffracts_nm, progress)?;
         let tried = trials.len();
         trials.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let index = self.index(&self.film)?;
+        let gain_waves = |height_nm: f64| height_nm * 1e-3 * (index - 1.0) / self.wavelength_um + 1e-9;
         let asked = |trial: &&Trial| self.height_nm.is_none_or(|height| height == trial.height_nm);
-        let working: Vec<&Trial> = trials.iter().filter(|t| works(&t.mapping)).collect();
+        let working: Vec<&Trial> = trials
+            .iter()
+            .filter(|t| works(&t.mapping) && gain_waves(t.height_nm) >= LEAST_GAIN_WAVES)
+            .collect();
         // What few widths and orders say may not hold for all.
         const SOLVED: usize = 3;
         let (mut refused, mut best): (Option<SolvedMapping>, Option<(f64, ChosenCell)>) = (None, None);
@@ -230,17 +239,21 @@ impl CellRequest {
         if let Some((_, cell)) = best {
             return Ok(cell);
         }
-        Err(self.refusal(&trials, &working, refused))
+        let low = self.height_nm.map(gain_waves).filter(|gain| *gain < LEAST_GAIN_WAVES);
+        Err(self.refusal(&trials, &working, refused, low))
     }
 
     /// Reason why no cell that was asked for works, and the nearest that does.
-    fn refusal(&self, trials: &[Trial], working: &[&Trial], solved: Option<SolvedMapping>) -> Error {
+    fn refusal(&self, trials: &[Trial], working: &[&Trial], solved: Option<SolvedMapping>, low: Option<f64>) -> Error {
         let nm = self.wavelength_um * 1e3;
         let of_asked = trials
             .iter()
             .find(|t| self.height_nm.is_none_or(|height| height == t.height_nm));
         let found = solved.or_else(|| of_asked.map(|t| t.mapping.clone()));
-        let numbers = found.map_or_else(
+        let few = low.map(|gain| {
+            format!("a phase of {gain:.2} waves more than air, at least {LEAST_GAIN_WAVES} for a full wave without resonances")
+        });
+        let of_mapping = found.map_or_else(
             || format!("every width passes less than {AVOIDED_BELOW} of the light"),
             |m| {
                 format!(
@@ -250,6 +263,7 @@ impl CellRequest {
                 )
             },
         );
+        let numbers = few.unwrap_or(of_mapping);
         let k = self.film.index(self.wavelength_um).map_or(0.0, |index| index.im);
         let what = match self.height_nm {
             Some(height) => format!("pillars of {} {height} nm high at {nm:.1} nm have {numbers}", self.film),
@@ -436,7 +450,10 @@ mod tests {
             ..request()
         };
         let error = low.choose(None, &Silent).unwrap_err().to_string();
-        assert!(error.contains("200 nm high"), "{error}");
+        assert!(
+            error.contains("200 nm high") && error.contains("--pillar-height-nm "),
+            "{error}"
+        );
         assert!(request().choose(None, &Silent).unwrap().mapping.light.first > 0.7);
     }
 }

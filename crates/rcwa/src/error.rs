@@ -227,10 +227,10 @@ impl Error {
             Self::MaterialIndex { .. } => "use n > 0 and k >= 0".into(),
             Self::OutOfRange { .. } => "choose wavelengths in that range, or another material".into(),
             Self::Io { .. } => "check the path; relative paths count from the file that names them".into(),
-            Self::Table {
-                cause: TableError::NotOfDatabase { .. },
-                ..
-            } => "give a file as refractiveindex.info has it: `DATA` with tabulated nk, n or k, or formulas 1 to 9".into(),
+            Self::Table { path, .. } if crate::material::is_yaml(path) => {
+                "give a file as refractiveindex.info has it: `DATA` with tabulated nk, n or k of rising wavelengths, or formulas 1 to 9"
+                    .into()
+            }
             Self::Table { .. } => {
                 "give columns wavelength_nm (or wavelength_um), n and, if it absorbs, k, and no others, with rising \
                                    wavelengths"

@@ -33,8 +33,10 @@ const LONGEST_TABLE: u64 = 8 << 20;
 /// Rounding (um) where tables in nm and bands in um meet at their ends.
 const ROUNDING: f64 = 1e-9;
 
-fn is_yaml(name: &str) -> bool {
-    name.ends_with(".yml") || name.ends_with(".yaml")
+/// True if a file is read as YAML of refractiveindex.info.
+pub(crate) fn is_yaml(path: &Path) -> bool {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    ending.is_some_and(|ending| ending == "yml" || ending == "yaml")
 }
 
 fn of_csv(text: &str) -> Result<Dispersion, (Option<usize>, TableError)> {
@@ -83,8 +85,7 @@ impl Material {
 
     /// True if a text in a file that names a material means a file: a CSV table, or YAML of refractiveindex.info.
     pub fn is_table(text: &str) -> bool {
-        let text = text.to_ascii_lowercase();
-        text.ends_with(".csv") || is_yaml(&text)
+        text.to_ascii_lowercase().ends_with(".csv") || is_yaml(Path::new(text))
     }
 
     /// A material of a file: YAML as refractiveindex.info gives it, by the ending of its name, else [`Material::read_csv`].
@@ -92,8 +93,7 @@ impl Material {
     /// # Errors
     /// If the file cannot be read, is too large, or does not say an index.
     pub fn read_file(path: &Path) -> Result<Self> {
-        let name = path.to_string_lossy().to_ascii_lowercase();
-        Self::read_as(path, if is_yaml(&name) { yaml::parse } else { of_csv })
+        Self::read_as(path, if is_yaml(path) { yaml::parse } else { of_csv })
     }
 
     /// Wavelengths (um) of the samples about one between which the index is a guess: they are far apart, and n or k changes much
