@@ -17,6 +17,7 @@ use serde::Serialize;
 use crate::{Error, Result, TableError};
 use form::Dispersion;
 use known::KNOWN;
+use table::TableFault;
 
 /// An optical material: complex index n + i k over the wavelength.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -39,7 +40,7 @@ pub(crate) fn is_yaml(path: &Path) -> bool {
     ending.is_some_and(|ending| ending == "yml" || ending == "yaml")
 }
 
-fn of_csv(text: &str) -> Result<Dispersion, (Option<usize>, TableError)> {
+fn of_csv(text: &str) -> Result<Dispersion, TableFault> {
     Ok(Dispersion::Table {
         samples: table::parse(text)?,
     })
@@ -139,7 +140,7 @@ impl Material {
         Self::read_as(path, of_csv)
     }
 
-    fn read_as(path: &Path, parse: fn(&str) -> Result<Dispersion, (Option<usize>, TableError)>) -> Result<Self> {
+    fn read_as(path: &Path, parse: fn(&str) -> Result<Dispersion, TableFault>) -> Result<Self> {
         let fault = |line: Option<usize>, cause: TableError| Error::Table {
             path: path.to_owned(),
             line,

@@ -1,11 +1,9 @@
 //! Files of the refractiveindex.info database, as they are: YAML with tables and dispersion formulas 1 to 9.
 
 use super::form::{Dispersion, IndexOver};
+use super::table::TableFault;
 use crate::TableError;
 use metalith_core::text::quoted;
-
-/// Line, counted from one, and what is wrong there.
-type YamlFault = (Option<usize>, TableError);
 
 /// One entry of the list `DATA`.
 #[derive(Default)]
@@ -21,12 +19,12 @@ struct Entry<'t> {
 /// Least number of coefficients of each formula.
 const LEAST: [usize; 9] = [1, 1, 1, 9, 1, 1, 6, 4, 6];
 
-fn fault(line: usize, what: impl Into<String>) -> YamlFault {
+fn fault(line: usize, what: impl Into<String>) -> TableFault {
     (Some(line), TableError::NotOfDatabase { what: what.into() })
 }
 
 /// The index that the text of a file gives.
-pub(super) fn parse(text: &str) -> Result<Dispersion, YamlFault> {
+pub(super) fn parse(text: &str) -> Result<Dispersion, TableFault> {
     let entries = entries(text);
     let (mut n, mut k, mut both) = (None, None, None);
     for entry in &entries {
@@ -125,7 +123,7 @@ fn entries(text: &str) -> Vec<Entry<'_>> {
 }
 
 /// Numbers of a line, between blanks or commas.
-fn numbers((line, text): (usize, &str)) -> Result<Vec<f64>, YamlFault> {
+fn numbers((line, text): (usize, &str)) -> Result<Vec<f64>, TableFault> {
     let words = text
         .split(|c: char| c.is_whitespace() || c == ',')
         .filter(|w| !w.is_empty());
@@ -137,7 +135,7 @@ fn numbers((line, text): (usize, &str)) -> Result<Vec<f64>, YamlFault> {
         .collect()
 }
 
-fn table<const N: usize>(entry: &Entry<'_>) -> Result<Vec<[f64; N]>, YamlFault> {
+fn table<const N: usize>(entry: &Entry<'_>) -> Result<Vec<[f64; N]>, TableFault> {
     let mut rows: Vec<[f64; N]> = Vec::new();
     for &row in &entry.rows {
         let values = numbers(row)?;
@@ -162,7 +160,7 @@ fn table<const N: usize>(entry: &Entry<'_>) -> Result<Vec<[f64; N]>, YamlFault> 
     }
 }
 
-fn formula(entry: &Entry<'_>, kind: &str) -> Result<IndexOver, YamlFault> {
+fn formula(entry: &Entry<'_>, kind: &str) -> Result<IndexOver, TableFault> {
     let number = kind.strip_prefix("formula").and_then(|n| n.trim().parse::<u8>().ok());
     let Some(number) = number.filter(|n| (1..=9).contains(n)) else {
         return Err(fault(
