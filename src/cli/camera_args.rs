@@ -61,7 +61,7 @@ impl CameraArgs {
         for quantity in model.iter().flat_map(|m| m.perturbation.not_applied()) {
             terminal.say(&quantity.to_string());
         }
-        let design = standard_input::design(&self.design)?;
+        let design = standard_input::design(&self.design, terminal)?;
         model
             .iter()
             .try_for_each(|model| model.check_shape(design.cell.shape))?;

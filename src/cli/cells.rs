@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::cell::{CellTable, MappingError, Origin, PolarisationAxis, RigorousCell, cache_folder};
 use metalith::cell_study::{
-    CellStudy, LibraryStudy, RotationStudy, StudyOptions, rotation_keys, study_steered, write_cell_report,
-    write_library_report, write_rotation_report,
+    CellStudy, LibraryStudy, MappingStudy, RotationStudy, StudyOptions, rotation_keys, study_steered,
+    write_cell_report, write_library_report, write_rotation_report,
 };
 use metalith::report::{counted, fixed, sig};
-use metalith::{Design, Error, Progress, Rectangles, Result};
+use metalith::{AtomicFile, Design, Error, Progress, Rectangles, Result};
 
+use super::section_text::with_keys;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Tabulate the unit cell of a design by RCWA, fit it, and report the errors of its mapping.
@@ -46,6 +47,11 @@ pub struct CellsArgs {
     #[arg(long)]
     steered: bool,
 
+    /// Put the best mapping into the design file: its coefficients, or the name of a table that is written beside it. All else of the
+    /// file stays as it is.
+    #[arg(long)]
+    write: bool,
+
     /// Print `cells.json` to standard output, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
@@ -54,7 +60,14 @@ pub struct CellsArgs {
 /// Do it.
 pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let design = standard_input::design_without_library(&args.design)?;
+    if args.write && args.design.as_os_str() == "-" {
+        return Err(Error::refused(
+            "cells/write-to-standard-input",
+            "a mapping to be written into a design of standard input",
+            "name the design file, or leave --write out",
+        ));
+    }
+    let mut design = standard_input::design_without_library(&args.design)?;
     terminal.warnings(&design.mapping_warnings());
     let folder = args
         .out
@@ -74,6 +87,8 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let options = StudyOptions { threshold: args.avoid };
     options.check()?;
+    design.solve_mapping(terminal)?;
+    let design = design;
     let mut spec = design.table_spec()?;
     spec.orders = args.orders;
     spec.tolerance = args.tolerance;
@@ -97,9 +112,13 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         Origin::Computed(None) => print_line!("library: {} cells solved, not kept", study.points),
     }
     print_line!(
-        "at {} nm the widths span {} waves; the mapping of the design errs by {} rad rms",
+        "at {} nm the widths span {} waves; {} errs by {} rad rms",
         sig(study.mapping_um * 1e3, 4),
         fixed(study.span_waves, 2),
+        match design.mapping.from_cells {
+            true => "the mapping that is solved from the cell",
+            false => "the mapping of the design",
+        },
         fixed(study.design_round_trip.rms_rad, 3)
     );
     let wavelengths = study
@@ -119,6 +138,21 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
             led.join(" "),
             fixed(mapping.mean(|o| o.first), 3)
         );
+    }
+    if let Some(best) = study.best() {
+        print_line!(
+            "best, by the light in the first order: {} with {} ({} straight on, {} rad rms)",
+            best.name,
+            fixed(best.compared(), 3),
+            fixed(
+                best.led.iter().map(|o| o.zero).sum::<f64>() / best.led.len().max(1) as f64,
+                3
+            ),
+            fixed(best.phase.rms_rad, 3)
+        );
+        if args.write {
+            write_mapping(&args.design, &design, best)?;
+        }
     }
     for study in &study.steered {
         let light = study
@@ -142,9 +176,50 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     Ok(Outcome::Fine)
 }
 
+/// Put a mapping into a design file, and the table that it may need beside that.
+fn write_mapping(path: &Path, design: &Design, best: &MappingStudy) -> Result<()> {
+    if best.name == "design" {
+        print_line!("design: {} has the best of these mappings", path.display());
+        return Ok(());
+    }
+    let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let wavelength = ((design.mapping.wavelength_um * 1e6).round() / 1e3).to_string();
+    let table = format!("{}_mapping.csv", design.name);
+    let quoted = format!("\"{table}\"");
+    let coefficients = best.coefficients.as_ref().map(|list| format!("{list:?}"));
+    let is_table = coefficients.is_none();
+    let keys = [
+        ("source", None),
+        ("table", is_table.then_some(quoted.as_str())),
+        ("basis", (!is_table).then_some("\"all_powers\"")),
+        ("coefficients", coefficients.as_deref()),
+        ("wavelength_nm", Some(wavelength.as_str())),
+    ];
+    let cell = design.cell.mapped(design.mapping.wavelength_um);
+    let stated = cell.to_toml();
+    let stated: Vec<(&str, Option<&str>)> = stated
+        .lines()
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(key, value)| (key, Some(value)))
+        .collect();
+    let changed = with_keys(&text, "[mapping]", 0, &keys);
+    let changed = with_keys(&changed, "[mapping.cell]", 0, &stated);
+    if is_table {
+        let file = path.with_file_name(&table);
+        AtomicFile::write(&file, (cell.to_comments() + &best.table.to_csv()).as_bytes())?;
+        print_line!("mapping: {}", file.display());
+    }
+    // What cannot be read does not replace what can.
+    Design::parse(path, &changed)?;
+    AtomicFile::write(path, changed.as_bytes())?;
+    print_line!("design: {} has this mapping now", path.display());
+    Ok(())
+}
+
 /// The study of a design of rotated rectangles: a few cells, and no library.
 fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
-    let study = RotationStudy::new(design)?;
+    let study = RotationStudy::new(design, terminal)?;
+    terminal.clear();
     let _turn = terminal.turn_at(folder)?;
     write_rotation_report(&study, folder)?;
     if args.json {

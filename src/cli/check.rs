@@ -100,7 +100,10 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     args.paths_are_apart()?;
     let named = args.rules.as_deref().map(Deck::read).transpose()?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;
-    let mut design = args.design.as_deref().map(standard_input::design).transpose()?;
+    let mut design = {
+        let read = |path| standard_input::design(path, terminal);
+        args.design.as_deref().map(read).transpose()?
+    };
     let unnamed = named.is_none() && design.is_none();
     let deck = named.unwrap_or_else(|| Deck::for_design(design.as_ref()));
     terminal.stop_on_interrupt();

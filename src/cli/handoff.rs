@@ -79,7 +79,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
     let out = match &args.out {
         Some(out) => out.clone(),
         None => {
-            let design = Design::read(design)?.name;
+            let design = Design::read_with(design, terminal)?.name;
             let name = if args.compensate.is_some() {
                 compensated_name(&design)
             } else {

@@ -169,7 +169,7 @@ impl Target {
 }
 
 pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
-    let mut design = standard_input::design(&args.design)?;
+    let mut design = standard_input::design(&args.design, terminal)?;
     let warnings = design.warnings()?;
     terminal.warnings(&warnings);
     terminal.stop_on_interrupt();

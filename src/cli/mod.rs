@@ -25,6 +25,7 @@ mod psf;
 mod renamed;
 mod restore;
 mod run;
+mod section_text;
 mod shipped_designs;
 mod standard_input;
 mod study;

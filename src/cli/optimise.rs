@@ -62,7 +62,7 @@ pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.plan.is_some() {
         standard_input::named([args.design.as_path()])?;
     }
-    let design = standard_input::design(&args.design)?;
+    let design = standard_input::design(&args.design, terminal)?;
     terminal.stop_on_interrupt();
     let folder = args
         .out

@@ -41,7 +41,7 @@ pub struct PlanArgs {
 
 pub fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let design = standard_input::design(&args.design)?;
+    let design = standard_input::design(&args.design, terminal)?;
     let bench = BenchFile::read(&args.bench)?;
     let folder = match &args.out {
         Some(out) => out.clone(),

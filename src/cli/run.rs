@@ -26,7 +26,7 @@ pub struct RunArgs {
 }
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
-    let design = standard_input::design(&args.design)?;
+    let design = standard_input::design(&args.design, terminal)?;
     terminal.warnings(&design.warnings()?);
     // What could not be read back is not written; `metalith layout` writes it.
     let simulation = args.judging.simulation(&design, &args.target.folder(&design))?;

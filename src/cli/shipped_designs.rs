@@ -44,12 +44,17 @@ impl ShippedDesign {
         }
     }
 
-    /// Write it under another name, with its files beside it, and give the paths of all.
+    /// Write it under another name and as `change` makes it, with its files beside it, and give the paths of all.
     ///
     /// # Errors
-    /// If a file is there that says something else, the name is none of a design, or a file cannot be written: then none of them is
-    /// left.
-    pub fn write(&self, design: &Path, name: &str) -> Result<Vec<PathBuf>> {
+    /// If a file is there that says something else, the name is none of a design, or a file cannot be written, and those of `change`:
+    /// then none of them is left.
+    pub fn write(
+        &self,
+        design: &Path,
+        name: &str,
+        change: impl FnOnce(String) -> Result<String>,
+    ) -> Result<Vec<PathBuf>> {
         let folder = design.parent().unwrap_or(Path::new(""));
         let beside: Vec<(PathBuf, &[u8])> = self
             .files
@@ -77,17 +82,26 @@ impl ShippedDesign {
                 AtomicFile::write(path, bytes)?;
             }
             let [own, new] = [&self.name, name].map(|name| format!("name = \"{name}\""));
-            let text = self.text.replacen(&own, &new, 1);
+            let text = change(self.text.replacen(&own, &new, 1))?;
             Design::parse(design, &text)?;
-            AtomicFile::write(design, text.as_bytes())
+            AtomicFile::write(design, text.as_bytes())?;
+            Ok::<_, Error>(text)
         })();
-        if let Err(error) = written {
-            for (path, _) in &missing {
-                let _ = std::fs::remove_file(path);
-            }
-            return Err(error);
+        let text = written.as_deref().unwrap_or_default();
+        let (files, unnamed): (Vec<_>, Vec<_>) = missing.into_iter().map(|(path, _)| path).partition(|path| {
+            let from_design = path
+                .strip_prefix(folder)
+                .unwrap_or(path)
+                .to_string_lossy()
+                .replace('\\', "/");
+            text.contains(&format!("\"{from_design}\""))
+        });
+        for path in unnamed {
+            let _ = std::fs::remove_file(&path);
+            // A folder that holds other files stays.
+            let _ = path.parent().map(std::fs::remove_dir);
         }
-        let files = missing.into_iter().map(|(path, _)| path);
+        written?;
         Ok(std::iter::once(design.to_owned()).chain(files).collect())
     }
 }

@@ -9,6 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use metalith::{Design, Error, Result};
 use tempfile::TempDir;
 
+use super::Terminal;
+
 /// Name of standard input in messages.
 const NAME: &str = "standard input";
 
@@ -90,12 +92,14 @@ impl Deref for InputFile {
 ///
 /// # Errors
 /// As [`Design::read`]; also if standard input is no text, or too long.
-pub fn design(path: &Path) -> Result<Design> {
-    if is_standard_input(path) {
-        Design::parse(Path::new(NAME), &design_text()?)
+pub fn design(path: &Path, terminal: &Terminal) -> Result<Design> {
+    let design = if is_standard_input(path) {
+        Design::parse_with(Path::new(NAME), &design_text()?, terminal)
     } else {
-        Design::read(path)
-    }
+        Design::read_with(path, terminal)
+    };
+    terminal.clear();
+    design
 }
 
 /// Variant of [`design`] for a caller that makes the library of its pillars, which need not be there yet.

@@ -302,7 +302,7 @@ fn print_check(check: &Check) {
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
-    let mut design = standard_input::design(&args.design)?;
+    let mut design = standard_input::design(&args.design, terminal)?;
     terminal.warnings(&design.warnings()?);
     let layout = InputFile::of(&args.layout)?;
     judged_as_made(

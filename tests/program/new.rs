@@ -12,10 +12,7 @@ fn metalith() -> Command {
 /// What `new` writes passes its own run and the design rules, at more than one size.
 #[test]
 fn a_new_design_can_be_run_and_checked() {
-    for options in [
-        &[][..],
-        &["--elements", "1", "--diameter-um", "80.3", "--wavelength-nm", "532"],
-    ] {
+    for options in [&[][..], &["--elements", "1", "--diameter-um", "80.3"]] {
         let folder = tempfile::tempdir().unwrap();
         let run = |arguments: &[&str]| metalith().current_dir(folder.path()).args(arguments).assert().success();
         run(&[&["new", "mine.toml"], options].concat());
@@ -62,26 +59,82 @@ fn a_new_design_replaces_nothing_and_says_what_cannot_be() {
     assert!(!folder.path().join("none.toml").exists() && !folder.path().join("nan.toml").exists());
 }
 
-/// The cell of a new design is one for the visible or for the near infrared, and whoever asks for other waves is told so.
+/// One line gives the design of a lens for a wavelength, whose mapping is solved from its cell; what cannot be is refused with what can.
 #[test]
-fn a_new_design_for_long_waves_says_what_its_cell_is_for() {
+fn a_new_design_is_for_its_wavelength_and_material() {
     let folder = tempfile::tempdir().unwrap();
-    let new = |nm: &str| {
-        let name = format!("mine_{nm}.toml");
-        metalith()
+    let new = |arguments: &[&str]| {
+        let mut program = metalith();
+        program
             .current_dir(folder.path())
-            .args(["new", &name, "--wavelength-nm", nm])
-            .assert()
-            .success()
+            .env("METALITH_CACHE", folder.path().join("cache"));
+        program.arg("new").args(arguments).assert()
     };
-    for nm in ["850", "940", "1550"] {
-        new(nm).stderr(contains("those of designs/asi_940.toml, as much larger as the wave"));
+    let lens = [
+        "--material",
+        "TiO2",
+        "--wavelength-nm",
+        "633",
+        "--diameter-um",
+        "20",
+        "--focal-length-um",
+        "40",
+    ];
+    new(&[&["lens.toml"][..], &lens].concat()).success();
+    let text = fs::read_to_string(folder.path().join("lens.toml")).unwrap();
+    for said in [
+        "source = \"cells\"",
+        "pillar_material = \"tio2_siefke_2016\"",
+        "wavelengths_nm = [633]",
+        "shape = \"circle\"",
+    ] {
+        assert!(text.contains(said), "{said} in {text}");
     }
-    new("800").stderr(contains("begin with `--like asi_940`"));
-    new("1700").stderr(contains("`--like hexagonal_1550`"));
-    new("380").stderr(contains("not for 380 nm: change them"));
-    let quiet = new("633");
-    assert!(quiet.get_output().stderr.is_empty());
+    let run = ["run", "lens.toml", "--fast", "--quiet"];
+    let mut program = metalith();
+    program
+        .current_dir(folder.path())
+        .env("METALITH_CACHE", folder.path().join("cache"));
+    program.args(run).assert().success();
+    let report = fs::read_to_string(folder.path().join("out/lens/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["mapping"]["digest"].as_str().unwrap().len(), 32);
+    assert!(report["mapping"]["light"]["first"].as_f64().unwrap() > 0.7);
+    let refused = |options: &[&str]| new(&[&["none.toml"][..], &lens, options].concat()).code(2);
+    refused(&["--pitch-nm", "500"]).stderr(contains("take --pitch-nm 434"));
+    refused(&["--pillar-height-nm", "150"]).stderr(contains("take --pillar-height-nm"));
+    new(&["none.toml", "--material", "TiO3"])
+        .code(2)
+        .stderr(contains("use one of tio2"));
+    // A shipped design is rescaled to another wavelength and another size, and what it has no other of is refused.
+    let like = [
+        "like.toml",
+        "--like",
+        "asi_940",
+        "--wavelength-nm",
+        "1550",
+        "--diameter-um",
+        "50",
+        "--array",
+        "2x1",
+    ];
+    new(&like).success();
+    let text = fs::read_to_string(folder.path().join("like.toml")).unwrap();
+    for said in [
+        "wavelength_nm = 1550",
+        "focal_length_um = 75",
+        "elements = [2, 1]",
+        "source = \"cells\"",
+        "wavelengths_nm = [1550]",
+    ] {
+        assert!(text.contains(said), "{said} in {text}");
+    }
+    assert!(!folder.path().join("mappings").exists());
+    let rectangles = ["none.toml", "--like", "birefringent_532", "--wavelength-nm", "633"];
+    new(&rectangles)
+        .code(2)
+        .stderr(contains("birefringent_532 with other values"));
+    assert!(!folder.path().join("none.toml").exists());
 }
 
 /// Every design of the repository can be begun with from the program alone, and is the same but for its name.
@@ -145,7 +198,6 @@ fn a_new_design_like_another_replaces_no_file() {
     assert_eq!(fs::read_to_string(&mapping).unwrap(), "mine");
     assert!(!folder.path().join("mine.toml").exists());
     new(&["mine.toml", "--like", "tio2"]).stderr(contains("tio2_532"));
-    new(&["mine.toml", "--like", "tio2_532", "--diameter-um", "50"]).stderr(contains("cannot be used with"));
 }
 
 /// A design that is piped in makes the layout of the same design in a file.

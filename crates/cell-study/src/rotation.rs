@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use metalith_cell::{MappedCell, MappingError, RotatedCell, RotationCurve, RotationFit, RotationMapping};
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_report::{Axis, Cell, Chart, Column, Page, Table, counted, fixed, sig, write_json};
 
@@ -46,8 +46,8 @@ impl RotationStudy {
     /// Solve the cell of a design.
     ///
     /// # Errors
-    /// If the pillars are no rectangles, or the cell cannot be solved.
-    pub fn new(design: &Design) -> Result<Self> {
+    /// If the pillars are no rectangles, the cell cannot be solved, or the user stopped it.
+    pub fn new(design: &Design, progress: &dyn Progress) -> Result<Self> {
         let pillars = design.cell.shape.rotated().ok_or_else(|| {
             Error::refused(
                 "cells/kind-of-pillar",
@@ -59,7 +59,7 @@ impl RotationStudy {
         let wavelength_um = design.mapping.wavelength_um;
         let stack = design.cell_stack()?;
         let full = stack.full_transmission(wavelength_um)?.powi(2);
-        let response = RotatedCell::new(stack, pillars, arriving).at(wavelength_um)?;
+        let response = RotatedCell::new(stack, pillars, arriving).at_with(wavelength_um, progress)?;
         let curve = RotationCurve::new(response.clone());
         let point = |number: u16| {
             let rotation = pillars.drawn_rotation(number);

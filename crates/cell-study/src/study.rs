@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use metalith_cell::{
-    BadCell, Basis, CellModel, ForwardFit, ForwardPolynomial, InverseFit, InversePolynomial, MappedCell, MappingError,
-    MappingTable, PhaseCurve, RampOrders, RigorousCell, bad_cells, curves_over, fit_forward, fit_inverse,
+    AVOIDED_BELOW, BadCell, Basis, CellModel, ForwardFit, ForwardPolynomial, InverseFit, InversePolynomial, MappedCell,
+    MappingError, MappingTable, PhaseCurve, RampOrders, RigorousCell, bad_cells, curves_over, fit_forward, fit_inverse,
     forward_errors, round_trip,
 };
 use metalith_core::{Error, Result};
@@ -17,6 +17,9 @@ use crate::SteeredStudy;
 
 /// Steps of the band that the best mapping sends light to the first order in.
 const BEST_STEPS: f64 = 30.0;
+
+/// Name of the mapping of a design that is solved from its cell.
+const SOLVED: &str = "solved";
 
 /// Degree of the inverse polynomial that stands for `fitted`.
 const FITTED_DEGREE: usize = 3;
@@ -37,7 +40,9 @@ pub struct StudyOptions {
 
 impl Default for StudyOptions {
     fn default() -> Self {
-        Self { threshold: 0.3 }
+        Self {
+            threshold: AVOIDED_BELOW,
+        }
     }
 }
 
@@ -74,7 +79,15 @@ pub struct MappingStudy {
     pub table: MappingTable,
 }
 
+/// Shares of light that count as equal: no lens shows the difference.
+const EQUAL: f64 = 5e-4;
+
 impl MappingStudy {
+    /// Mean power of the first order at the wavelengths that mappings are compared at.
+    pub fn compared(&self) -> f64 {
+        self.led.iter().map(|o| o.first).sum::<f64>() / self.led.len().max(1) as f64
+    }
+
     /// Mean power of an order over the band.
     pub fn mean(&self, of: impl Fn(&RampOrders) -> f64) -> f64 {
         self.band.iter().map(of).sum::<f64>() / self.band.len() as f64
@@ -129,6 +142,15 @@ pub struct CellStudy {
 }
 
 impl CellStudy {
+    /// The mapping with the most light in the first order, as the mean over [`CellStudy::compared_um`]; of equals the first, which is
+    /// the design's own.
+    pub fn best(&self) -> Option<&MappingStudy> {
+        let light = MappingStudy::compared;
+        self.mappings
+            .iter()
+            .reduce(|a, b| if light(b) > light(a) + EQUAL { b } else { a })
+    }
+
     /// Study the cell of a design.
     ///
     /// # Errors
@@ -259,7 +281,8 @@ fn mappings(
         polynomial("best polynomial", best);
     }
     if let Some(table) = &design.mapping.table {
-        found.insert(0, ("design", table.clone(), None));
+        let name = if design.mapping.from_cells { SOLVED } else { "design" };
+        found.insert(0, (name, table.clone(), None));
     }
     let exact = MappingTable::nearest(&curve, &[])?;
     let led_bad = bad_cells(cell, design.compared_um(), writable, options.threshold)?;

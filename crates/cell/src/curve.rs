@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::CellModel;
-use metalith_core::{Error, Result};
+use super::{CellModel, Illumination};
+use metalith_core::{Error, Progress, Result};
 
 /// The cell at one wavelength, width by width.
 #[derive(Clone, Debug)]
@@ -40,6 +40,19 @@ impl PhaseCurve {
     /// # Errors
     /// As [`CellModel::transmissions`]; also if there are fewer than two widths.
     pub fn new(cell: &dyn CellModel, wavelength_um: f64, widths_nm: &[u16]) -> Result<Self> {
+        Self::solved(cell, wavelength_um, widths_nm, None)
+    }
+
+    /// [`PhaseCurve::new`] of a cell that solves what it is asked, with its progress where it is not coupled.
+    ///
+    /// # Errors
+    /// As [`PhaseCurve::new`]; also if the user stopped it.
+    pub fn solved(
+        cell: &dyn CellModel,
+        wavelength_um: f64,
+        widths_nm: &[u16],
+        progress: Option<&dyn Progress>,
+    ) -> Result<Self> {
         let (Some(&widest), true) = (widths_nm.last(), widths_nm.len() > 1) else {
             return Err(Error::refused(
                 "cell/curve-too-short",
@@ -47,10 +60,18 @@ impl PhaseCurve {
                 "widen the range of widths of the cell",
             ));
         };
-        let all = cell.transmissions(wavelength_um, widest)?;
+        let all = match progress {
+            Some(progress) => (cell.response(&Illumination::normal(wavelength_um), widest, progress)?).focused()?,
+            None => cell.transmissions(wavelength_um, widest)?,
+        };
         let full = cell.full_transmission(wavelength_um)?;
-        let t: Vec<Complex64> = widths_nm.iter().map(|&w| all[usize::from(w)] / full).collect();
-        let mut turns = Vec::with_capacity(t.len());
+        let t = widths_nm.iter().map(|&w| all[usize::from(w)] / full).collect();
+        Ok(Self::of_transmissions(wavelength_um, widths_nm.to_vec(), t))
+    }
+
+    /// The curve of widths (nm), which rise in small steps, by their transmissions over that of a cell that passes all power.
+    pub fn of_transmissions(wavelength_um: f64, widths_nm: Vec<u16>, t: Vec<Complex64>) -> Self {
+        let mut turns: Vec<f64> = Vec::with_capacity(t.len());
         for value in &t {
             let wrapped = value.arg() / TAU;
             turns.push(
@@ -59,12 +80,12 @@ impl PhaseCurve {
                     .map_or(wrapped, |last| wrapped + f64::round(last - wrapped)),
             );
         }
-        Ok(Self {
+        Self {
             wavelength_um,
-            widths_nm: widths_nm.to_vec(),
+            widths_nm,
             t,
             turns,
-        })
+        }
     }
 
     /// Power of the zero order over the incident, by width.

@@ -26,7 +26,7 @@ mod upright;
 
 pub use cache::cache_folder;
 pub use curve::{BadCell, PhaseCurve, bad_cells};
-pub use exact::{MappingTable, RampOrders, simplex};
+pub use exact::{AVOIDED_BELOW, MappingTable, RampOrders, SolvedMapping, simplex};
 pub use fit::{
     FittedCell, ForwardFit, InverseFit, MappingError, RotationCurve, RotationFit, curves_over, fit_forward,
     fit_inverse, forward_errors, round_trip,
@@ -42,7 +42,7 @@ pub use neighbours::{
     Orientation, RealRow, SiteGrid, SiteResponse, SolvedRow, neighbours, sites_by,
 };
 pub use pointwise::PointwiseCell;
-pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
+pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS};
 pub use polarisation::{
     Analyser, AxisTables, FocusedLight, HandTables, LitStack, PassedTable, Polarisation, PolarisationAxis,
     PolarisedLight, PolarisedTables,

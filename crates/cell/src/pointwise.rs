@@ -1,10 +1,14 @@
 //! The rigorous cell at a few wavelengths, without a table.
 
+use std::path::{Path, PathBuf};
+
 use num_complex::Complex64;
 use rayon::prelude::*;
+use serde::Serialize;
 
-use super::{CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, ObliqueTables};
-use metalith_core::{Progress, Result};
+use super::kept::{CacheEntry, bytes_of, complex_of, solver_of};
+use super::{CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, ObliqueTables, Spectral};
+use metalith_core::{Error, Progress, Result, Silent};
 use metalith_rcwa::Orders;
 
 /// Median phase error over the cell's whole range 0.002 rad: finer than the table, and for a few
@@ -30,7 +34,11 @@ pub struct PointwiseCell {
     stack: CellStack,
     widths_nm: Vec<u16>,
     orders: Orders,
+    /// Folder of the cache of what is solved along the normal.
+    folder: Option<PathBuf>,
 }
+
+const MAGIC: [u8; 8] = *b"MLLINE\0\x01";
 
 impl PointwiseCell {
     /// The cell for these widths (nm). Widths between them are interpolated, those beyond them get the
@@ -49,7 +57,49 @@ impl PointwiseCell {
             stack,
             widths_nm,
             orders,
+            folder: None,
         }
+    }
+
+    /// Same cell, whose answers along the normal are cached in a folder from one run to the next.
+    #[must_use]
+    pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
+        self.folder = folder.map(Path::to_owned);
+        self
+    }
+
+    /// Table of its widths along the normal in the cache.
+    fn entry(&self, wavelength_um: f64, orders: Orders) -> CacheEntry {
+        #[derive(Serialize)]
+        struct Inputs<'a> {
+            solver: u32,
+            stack: &'a CellStack,
+            widths_nm: &'a [u16],
+            wavelength_um: f64,
+            orders: usize,
+        }
+        let inputs = Inputs {
+            solver: solver_of(self.stack.shape),
+            stack: &self.stack,
+            widths_nm: &self.widths_nm,
+            wavelength_um,
+            orders: orders.along_axis(),
+        };
+        let inputs = serde_json::to_vec(&inputs).expect("plain data serialises");
+        CacheEntry::new(self.folder.as_deref(), "line", MAGIC, inputs, "pillars at a wavelength")
+    }
+
+    /// Transmissions of its widths along the normal.
+    fn solved(&self, orders: Orders, wavelength_um: f64, progress: &dyn Progress) -> Result<Vec<Complex64>> {
+        let table = self.entry(wavelength_um, orders);
+        let decode = |content: &[u8]| complex_of(content).filter(|t| t.len() == self.widths_nm.len());
+        if let Some(solved) = table.read(decode, progress) {
+            return Ok(solved);
+        }
+        let one = |w| self.stack.transmission(f64::from(w), wavelength_um, orders);
+        let solved = solve_widths(&self.widths_nm, one, wavelength_um, progress)?;
+        table.write(&bytes_of(solved.iter().copied()), progress);
+        Ok(solved)
     }
 
     /// Orders, at most as many as the cell was made with.
@@ -57,20 +107,35 @@ impl PointwiseCell {
         Ok(Orders::new(orders.min(self.orders.along_axis()))?)
     }
 
-    fn normal(&self, orders: usize, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let orders = self.at_most(orders)?;
-        let solve = |w| Ok([self.stack.transmission(f64::from(w), wavelength_um, orders)?]);
-        let [table] = tabulate(&self.widths_nm, max_width_nm, solve)?;
-        Ok(table)
+    fn normal(
+        &self,
+        orders: usize,
+        wavelength_um: f64,
+        max_width_nm: u16,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Complex64>> {
+        let solved = self.solved(self.at_most(orders)?, wavelength_um, progress)?;
+        Ok(spread(&self.widths_nm, &solved, max_width_nm))
     }
 
-    fn tilted(&self, orders: usize, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<ObliqueTables> {
+    fn tilted(
+        &self,
+        orders: usize,
+        wavelength_um: f64,
+        sines: [f64; 2],
+        max_width_nm: u16,
+        progress: &dyn Progress,
+    ) -> Result<ObliqueTables> {
         let orders = self.at_most(orders)?;
         let solve = |w| {
             let [[ss, sp], [ps, pp]] = self.stack.oblique(f64::from(w), wavelength_um, sines, orders)?;
             Ok([ss, pp, sp, ps])
         };
-        let [ss, pp, sp, ps] = tabulate(&self.widths_nm, max_width_nm, solve)?;
+        let solved = solve_widths(&self.widths_nm, solve, wavelength_um, progress)?;
+        let [ss, pp, sp, ps] = std::array::from_fn(|k| {
+            let own: Vec<Complex64> = solved.iter().map(|t: &[Complex64; 4]| t[k]).collect();
+            spread(&self.widths_nm, &own, max_width_nm)
+        });
         Ok(ObliqueTables {
             kept: [ss, pp],
             turned: [sp, ps],
@@ -83,14 +148,20 @@ impl CellModel for PointwiseCell {
         Fidelity::Rigorous
     }
 
-    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, progress: &dyn Progress) -> Result<CellResponse> {
         let (um, sines) = (light.wavelength_um, light.cell_sines());
+        // Of a band whoever asks says how far it is.
+        let progress = if light.spectral == Spectral::InBand {
+            &Silent
+        } else {
+            progress
+        };
         if sines == [0.0; 2] {
             let orders = light.spectral.choose(self.orders.along_axis(), BAND_ORDERS);
-            return self.normal(orders, um, widest_nm).map(CellResponse::Scalar);
+            return self.normal(orders, um, widest_nm, progress).map(CellResponse::Scalar);
         }
         let orders = light.spectral.choose(OBLIQUE_ORDERS, OBLIQUE_BAND_ORDERS);
-        let tables = self.tilted(orders, um, sines, widest_nm)?;
+        let tables = self.tilted(orders, um, sines, widest_nm, progress)?;
         Ok(CellResponse::Jones(JonesTables::Oblique(tables)))
     }
 
@@ -99,20 +170,26 @@ impl CellModel for PointwiseCell {
     }
 }
 
-/// Tables over all widths (nm) of what is solved for some of them, in rising order, each with `N` values.
-///
-/// # Errors
-/// That of the first width that cannot be solved.
-pub fn tabulate<const N: usize>(
+/// What is solved for each width (nm) at a wavelength (um), with progress.
+fn solve_widths<T: Send>(
     widths_nm: &[u16],
-    max_width_nm: u16,
-    solve: impl Fn(u16) -> Result<[Complex64; N]> + Sync,
-) -> Result<[Vec<Complex64>; N]> {
-    let solved = widths_nm.par_iter().map(|&w| solve(w)).collect::<Result<Vec<_>>>()?;
-    Ok(std::array::from_fn(|k| {
-        let own = solved.iter().map(|t| t[k]).collect::<Vec<_>>();
-        spread(widths_nm, &own, max_width_nm)
-    }))
+    solve: impl Fn(u16) -> Result<T> + Sync,
+    wavelength_um: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<T>> {
+    progress.begin(
+        &format!("pillars at {:.1} nm", wavelength_um * 1e3),
+        widths_nm.len() as u64,
+    );
+    let one = |&width_nm: &u16| {
+        if progress.stopped() {
+            return Err(Error::Interrupted);
+        }
+        let solved = solve(width_nm);
+        progress.advance(1);
+        solved
+    };
+    widths_nm.par_iter().map(one).collect()
 }
 
 /// A table over all widths (nm): straight lines between those that were solved, the nearest beyond, nothing at
@@ -140,7 +217,6 @@ fn spread(widths_nm: &[u16], solved: &[Complex64], max_width_nm: u16) -> Vec<Com
 mod tests {
     use super::*;
     use crate::Material;
-    use metalith_core::Silent;
 
     /// Mean power of a band by few orders equals the result by many orders.
     #[test]
@@ -188,6 +264,18 @@ mod tests {
         }
         println!("{coarse} {fine}");
         assert!((coarse / fine - 1.0).abs() < POWER, "{coarse} {fine}");
+    }
+
+    /// What was solved once is the same to the last bit when it is read again.
+    #[test]
+    fn a_cached_table_is_the_solved_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let cell = PointwiseCell::with_orders(crate::stack::tests::paper(), [120, 160], Orders::new(3).unwrap());
+        let solved = cell.transmissions(0.6, 160).unwrap();
+        let cached = cell.kept_in(Some(folder.path()));
+        assert_eq!(cached.transmissions(0.6, 160).unwrap(), solved);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert_eq!(cached.transmissions(0.6, 160).unwrap(), solved);
     }
 
     #[test]

@@ -7,7 +7,9 @@ use serde::Serialize;
 
 use metalith_core::{Error, Result};
 use metalith_pillars::PillarShape;
-use metalith_rcwa::{CellLattice, Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, transmit};
+use metalith_rcwa::{
+    CellLattice, Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, solve_each, transmit,
+};
 
 /// A pillar on its substrate, as etched: everything that decides its transmission but its width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -174,6 +176,34 @@ impl CellStack {
             Side::Below,
             orders,
         )?)
+    }
+
+    /// [`CellStack::transmission`] of a pillar at several heights (nm): most of the work is done once. The mean of both
+    /// polarisations.
+    ///
+    /// # Errors
+    /// As [`CellStack::transmission`].
+    pub fn at_heights(
+        &self,
+        width_nm: f64,
+        wavelength_um: f64,
+        heights_nm: &[f64],
+        orders: Orders,
+    ) -> Result<Vec<Complex64>> {
+        Self::check_width(width_nm)?;
+        let of = |&height_nm: &f64| {
+            let stack = Self {
+                height_nm,
+                ..self.clone()
+            };
+            stack.layers(width_nm, wavelength_um)
+        };
+        let stacks = heights_nm.iter().map(of).collect::<Result<Vec<_>>>()?;
+        let solved = solve_each(&stacks, &Incidence::normal(wavelength_um, Side::Below), orders)?;
+        let mean = solved
+            .iter()
+            .map(|answer| 0.5 * (answer.jones[0][0] + answer.jones[1][1]));
+        Ok(mean.collect())
     }
 
     /// Zero-order transmission of light whose direction has these sines in air, along x and y: of light

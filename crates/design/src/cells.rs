@@ -174,7 +174,8 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 Fidelity::Published => Ok(Box::new(PublishedCell::of_stack(&design.cell_stack()?)?)),
                 Fidelity::Rigorous => {
                     let stack = design.cell_stack()?;
-                    Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
+                    let cell = PointwiseCell::new(stack, design.cell.widths_nm());
+                    Ok(Box::new(cell.kept_in(cache_folder().as_deref())))
                 }
                 Fidelity::Neighbours => Ok(Box::new(neighbour_cell(design, cache_folder())?)),
                 Fidelity::Calibrated => Err(Error::refused(

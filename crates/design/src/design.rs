@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use metalith_cell::{Analyser, CellStack, FocusedLight, PolarisationAxis};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::text::{hex, quoted};
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Progress, Result, Silent};
 use metalith_pillars::{ElementSite, Lattice};
 
 use crate::spec::{
@@ -46,16 +46,45 @@ impl Design {
     /// [`metalith_core::Error::Text`] with every mistake of the file, each with line, column and remedy;
     /// [`metalith_core::Error::Table`] for a phase table that cannot be used.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::parse(path, &load(path)?)
+        Self::read_with(path, &Silent)
     }
 
-    /// The design of a text, as if it stood in the file at `path`; the files that it names are read.
+    /// [`Design::read`], with progress of the mapping where that is solved from the cell: seconds, once for each cell.
+    ///
+    /// # Errors
+    /// As [`Design::read`]; also if the user stopped it.
+    pub fn read_with(path: &Path, progress: &dyn Progress) -> Result<Self> {
+        Self::parse_with(path, &load(path)?, progress)
+    }
+
+    /// The design of a text, as if it stood in the file at `path`; the files that it names are read, and a mapping that it
+    /// asks of the cell is solved, or read from the cache.
     ///
     /// # Errors
     /// As [`Design::read`], but for reading the file itself.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        Document::read(path, text, |root| Self::sections(path, root, LibraryFile::Needed))?
-            .with_files(LibraryFile::Needed)
+        Self::parse_with(path, text, &Silent)
+    }
+
+    /// [`Design::parse`], with progress as [`Design::read_with`].
+    ///
+    /// # Errors
+    /// As [`Design::parse`]; also if the user stopped it.
+    pub fn parse_with(path: &Path, text: &str, progress: &dyn Progress) -> Result<Self> {
+        let mut design = Document::read(path, text, |root| Self::sections(path, root, LibraryFile::Needed))?
+            .with_files(LibraryFile::Needed)?;
+        design.solve_mapping(progress)?;
+        Ok(design)
+    }
+
+    /// Solve the mapping from the cell, or read it from the cache, if the design has no other: for designs of
+    /// [`Design::parse_without_library`].
+    ///
+    /// # Errors
+    /// If the cell cannot be solved, all widths transmit little, or the user stopped it.
+    pub fn solve_mapping(&mut self, progress: &dyn Progress) -> Result<()> {
+        let stack = self.cell_stack()?;
+        self.mapping.solve(&self.cell, &stack, progress)
     }
 
     /// Reads a design as [`Design::read`] and [`Design::parse_without_library`] do.
@@ -66,8 +95,8 @@ impl Design {
         Self::parse_without_library(path, &load(path)?)
     }
 
-    /// Variant of [`Design::parse`] for a caller that makes the library of its pillars: the file of the library may not
-    /// be there yet. Until it is, the design has no pillars.
+    /// Variant of [`Design::parse`] for a caller that makes the library of its pillars or needs no pillars: the file of the
+    /// library may not be there yet, and no mapping is solved. Until it is, the design has no pillars.
     ///
     /// # Errors
     /// As [`Design::parse`].
@@ -91,8 +120,13 @@ impl Design {
         let cell = CellSpec::read(&root.section("cell"));
         let phase = root.section("phase");
         let lens = LensSpec::read(&root.section("lens"), &phase, &cell);
-        let (array_section, mapping_section) = (root.section("array"), root.section("mapping"));
-        let mapping_um = MappingSpec::read_wavelength(&mapping_section, &cell);
+        let array_section = root.section("array");
+        let mapping_section = match library {
+            LibraryFile::Needed => root.section("mapping"),
+            LibraryFile::ToBeMade => root.section_or_none("mapping"),
+        };
+        let from_cells = MappingSpec::is_from_cells(&mapping_section, &cell, library);
+        let mapping_um = MappingSpec::read_wavelength(&mapping_section, &cell, &lens, from_cells);
         let array = ArraySpec::read(
             &array_section,
             &lens,
@@ -101,7 +135,7 @@ impl Design {
             mapping_um,
             &root.sections("element"),
         );
-        let mapping = MappingSpec::read(&mapping_section, mapping_um, &cell, &array, library);
+        let mapping = MappingSpec::read(&mapping_section, mapping_um, &cell, &array, library, from_cells);
         let layout = LayoutSpec::read(root, &lens, &array);
         let verify = VerifySpec::read(&root.section("verify"), &cell);
         check_directions(&array_section, &array, &verify);

@@ -27,3 +27,26 @@ fn a_design_takes_its_mapping_from_a_table() {
             .all(|u| rule.width_nm(u) == exact.width_nm(u))
     );
 }
+
+/// A mapping that is solved from the cell needs no wavelength beside that of the lens, and stands beside no other.
+#[test]
+fn a_mapping_of_the_cell_stands_alone() {
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/tio2_532.toml"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let (before, rest) = text.split_once("[mapping]").unwrap();
+    let after = &rest[rest.find("[layout]").unwrap()..];
+    let with = |keys: &str| Design::parse_without_library(path, &format!("{before}[mapping]\n{keys}\n{after}"));
+    let design = with("source = \"cells\"").unwrap();
+    assert!(design.mapping.from_cells && design.mapping.table.is_none());
+    assert_eq!(design.mapping.wavelength_um, 0.532);
+    // Whoever makes the mapping needs none.
+    let none = Design::parse_without_library(path, &format!("{before}{after}")).unwrap();
+    assert!(none.mapping.from_cells && none.mapping.wavelength_um == 0.532);
+    for keys in [
+        "source = \"cells\"\ncoefficients = [0.3, 0.4]",
+        "source = \"cells\"\ntable = \"mappings/tio2_532.csv\"",
+        "source = \"table\"",
+    ] {
+        assert!(with(keys).is_err(), "{keys}");
+    }
+}

@@ -132,6 +132,8 @@ pub enum TableError {
     NotRising,
     #[error("fewer than two rows")]
     TooFewRows,
+    #[error("{what}")]
+    NotOfDatabase { what: String },
 }
 
 impl Error {
@@ -217,13 +219,18 @@ impl Error {
                 .into(),
             Self::UnknownMaterial { known, .. } => {
                 format!(
-                    "use one of {}, or the path of a .csv table of n and k",
+                    "use one of {}, a formula such as TiO2, SiO2 or a-Si, or the path of a .csv table of n and k or of a .yml file \
+                     of refractiveindex.info",
                     known.join(", ")
                 )
             }
             Self::MaterialIndex { .. } => "use n > 0 and k >= 0".into(),
             Self::OutOfRange { .. } => "choose wavelengths in that range, or another material".into(),
             Self::Io { .. } => "check the path; relative paths count from the file that names them".into(),
+            Self::Table { path, .. } if crate::material::is_yaml(path) => {
+                "give a file as refractiveindex.info has it: `DATA` with tabulated nk, n or k of rising wavelengths, or formulas 1 to 9"
+                    .into()
+            }
             Self::Table { .. } => {
                 "give columns wavelength_nm (or wavelength_um), n and, if it absorbs, k, and no others, with rising \
                                    wavelengths"

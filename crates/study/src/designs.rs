@@ -116,7 +116,7 @@ pub(crate) fn check(
     let (Ok(text), true) = (load(design), root.sound(&["design"])) else {
         return;
     };
-    if grids.iter().any(|g| g.values.is_empty()) || Design::parse(design, &text).is_err() {
+    if grids.iter().any(|g| g.values.is_empty()) || Design::parse_without_library(design, &text).is_err() {
         return;
     }
     let designs = count(grids);
@@ -133,7 +133,7 @@ pub(crate) fn check(
         for value in &grid.values {
             let fault = match with_values(&text, &[(&grid.key, value)]) {
                 Err(NoPlace { what, hint, .. }) => Some(("key", what, hint)),
-                Ok(text) => told(Design::parse(design, &text)).map(|(what, hint)| {
+                Ok(text) => told(Design::parse_without_library(design, &text)).map(|(what, hint)| {
                     let key = &grid.key;
                     (
                         "values",
@@ -162,7 +162,7 @@ pub(crate) fn check(
         let setting = setting(grids, number);
         let fault = match with_values(&text, &setting) {
             Err(NoPlace { change, what, hint }) => Some((change, what, hint)),
-            Ok(text) => told(Design::parse(design, &text)).map(|(what, hint)| {
+            Ok(text) => told(Design::parse_without_library(design, &text)).map(|(what, hint)| {
                 let words: Vec<String> = setting.iter().map(|(k, v)| format!("`{k} = {v}`")).collect();
                 (
                     grids.len() - 1,

@@ -93,6 +93,7 @@ pub fn verify_pillars(
         elements,
         foreign: extraction.oddities,
         distinct: Vec::new(),
+        mapping: design.mapping.solved.clone(),
         rotations: None,
         lattice_orders: design.lattice_orders(AskedLight::All)?,
         not_simulated: Some(why),

@@ -28,7 +28,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use metalith_cell::Fidelity;
+use metalith_cell::{Fidelity, SolvedMapping};
 use metalith_core::{Progress, Result, Warning};
 use metalith_design::array::{PillarArray, PillarRule, PlacedElement, Symmetry};
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -130,6 +130,9 @@ pub struct Verification {
     pub elements: Vec<ElementCheck>,
     pub foreign: UnrecognisedShapes,
     pub distinct: Vec<DistinctElement>,
+    /// Mapping of the design, where it was solved from the cell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mapping: Option<SolvedMapping>,
     /// Error of the lattice of a design of rotated rectangles against the phase that is asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotations: Option<EqualRotations>,
@@ -353,6 +356,7 @@ fn judge(
         elements,
         foreign: found.foreign,
         distinct: simulated,
+        mapping: design.mapping.solved.clone(),
         rotations: EqualRotations::of(design, simulator.judge(), progress)?,
         lattice_orders: design.lattice_orders(AskedLight::All)?,
         not_simulated: None,

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use metalith_cell::Fidelity;
+use metalith_cell::{Fidelity, Material};
 use metalith_design::{Design, LatticeOrders};
 use metalith_report::{fixed, sig};
 
@@ -30,6 +30,20 @@ pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, fo
             "indices, pitch and direction of all light of [verify], and at the shortest wavelength of the band; {known}"
         ),
     );
+    if let Some(solved) = &design.mapping.solved {
+        row(
+            "The mapping was solved from the cell of the design",
+            solved.words(),
+            "the width with the nearest phase among equal neighbours, without widths that pass less than 0.3 of the light or where a wider pillar has less phase",
+        );
+    }
+    if let Some(gaps) = gaps(design) {
+        row(
+            "Between samples of an index that are far apart it is a guess",
+            gaps,
+            "a monotonic cubic between the two samples, which stays between their values: measure the film nearer to the wavelength",
+        );
+    }
     if let Some(loss) = loss(design) {
         row(
             "Light arrives through a substrate without loss",
@@ -37,6 +51,38 @@ pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, fo
             "its index is taken for real, which changes what a face passes by less than a millionth; what is lost on the way is in no figure",
         );
     }
+}
+
+/// Samples of the materials that are far apart about a wavelength of `[verify]`.
+fn gaps(design: &Design) -> Option<String> {
+    let stack = design.cell_stack().ok()?;
+    let nm = |um: f64| fixed(um * 1e3, 1);
+    let of = |material: &Material, um: f64| {
+        let (low, high) = material.wide_gap_um(um)?;
+        let index = |um| {
+            material
+                .index(um)
+                .map_or_else(|_| String::new(), |n| format!("{} + {} i", sig(n.re, 4), sig(n.im, 2)))
+        };
+        let (low_nm, high_nm) = (nm(low), nm(high));
+        Some(format!(
+            "{material} at {} nm is taken for {}, between {} at {low_nm} nm and {} at {high_nm} nm",
+            nm(um),
+            index(um),
+            index(low),
+            index(high)
+        ))
+    };
+    let mut found: Vec<String> = Vec::new();
+    for um in &design.verify.wavelengths_um {
+        let new = stack.materials().filter_map(|material| of(material, *um));
+        for words in new.collect::<Vec<_>>() {
+            if !found.contains(&words) {
+                found.push(words);
+            }
+        }
+    }
+    (!found.is_empty()).then(|| found.join("; "))
 }
 
 /// Loss in a substrate that absorbs a little, at the wavelength of the band at which it absorbs most.

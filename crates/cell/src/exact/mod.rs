@@ -2,6 +2,7 @@
 
 mod csv;
 mod simplex;
+mod solved;
 
 use num_complex::Complex64;
 use serde::Serialize;
@@ -9,6 +10,7 @@ use serde::Serialize;
 use crate::{CellModel, InversePolynomial, MappingError, PhaseCurve};
 use metalith_core::{Error, Result};
 pub use simplex::simplex;
+pub use solved::{AVOIDED_BELOW, SolvedMapping};
 
 /// Width for each of equal parts of a turn.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -181,29 +183,33 @@ impl MappingTable {
         let widest = self.widths_nm.iter().copied().max().unwrap_or(0);
         let t = cell.transmissions(wavelength_um, widest)?;
         let full = cell.full_transmission(wavelength_um)?;
+        Ok(self.ramp(wavelength_um, full, |width| t[usize::from(width)]))
+    }
+
+    /// [`MappingTable::orders`] at the wavelength of a curve that has all widths of the mapping.
+    pub fn orders_of(&self, curve: &PhaseCurve) -> RampOrders {
+        let last = curve.widths_nm.len() - 1;
+        let at = |width| curve.widths_nm.partition_point(|&v| v < width).min(last);
+        self.ramp(curve.wavelength_um, 1.0, |width| curve.t[at(width)])
+    }
+
+    fn ramp(&self, wavelength_um: f64, full: f64, t: impl Fn(u16) -> Complex64) -> RampOrders {
         let n = self.widths_nm.len() as f64;
         let power = |order: i32| -> f64 {
             let parts = self.widths_nm.iter().enumerate();
             let sum: Complex64 = parts
-                .map(|(i, &w)| {
-                    t[usize::from(w)] * Complex64::cis(-f64::from(order) * std::f64::consts::TAU * (i as f64 + 0.5) / n)
-                })
+                .map(|(i, &w)| t(w) * Complex64::cis(-f64::from(order) * std::f64::consts::TAU * (i as f64 + 0.5) / n))
                 .sum();
             (sum / (n * full)).norm_sqr()
         };
-        let passed = self
-            .widths_nm
-            .iter()
-            .map(|&w| (t[usize::from(w)] / full).norm_sqr())
-            .sum::<f64>()
-            / n;
-        Ok(RampOrders {
+        let passed = self.widths_nm.iter().map(|&w| (t(w) / full).norm_sqr()).sum::<f64>() / n;
+        RampOrders {
             wavelength_um,
             first: power(1),
             zero: power(0),
             second: power(2),
             passed,
-        })
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use num_complex::Complex64;
 use serde::Serialize;
 
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, Silent};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
 
@@ -117,7 +117,15 @@ impl RotatedCell {
     /// # Errors
     /// As [`CellStack::jones`].
     pub fn at(&self, wavelength_um: f64) -> Result<RotationResponse> {
-        Ok(self.response_of(self.solved(wavelength_um, false)?))
+        self.at_with(wavelength_um, &Silent)
+    }
+
+    /// [`RotatedCell::at`] with progress of the rotations that are solved.
+    ///
+    /// # Errors
+    /// As [`RotatedCell::at`]; also if the user stopped it.
+    pub fn at_with(&self, wavelength_um: f64, progress: &dyn Progress) -> Result<RotationResponse> {
+        Ok(self.response_of(self.solved(wavelength_um, false, progress)?))
     }
 
     fn response_of(&self, solved: Arc<Solved>) -> RotationResponse {
@@ -128,41 +136,55 @@ impl RotatedCell {
         }
     }
 
-    fn solved(&self, wavelength_um: f64, of_band: bool) -> Result<Arc<Solved>> {
+    fn solved(&self, wavelength_um: f64, of_band: bool, progress: &dyn Progress) -> Result<Arc<Solved>> {
         let key = (wavelength_um.to_bits(), of_band);
         let known = || self.solved.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(solved) = known().get(&key) {
             return Ok(Arc::clone(solved));
         }
         let solved = Arc::new(match of_band {
-            true => self.solve_in_band(wavelength_um)?,
-            false => self.solve(wavelength_um, CHOICE)?,
+            true => self.solve_in_band(wavelength_um, progress)?,
+            false => self.solve(wavelength_um, CHOICE, progress)?,
         });
         known().insert(key, Arc::clone(&solved));
         Ok(solved)
     }
 
-    fn solve_in_band(&self, wavelength_um: f64) -> Result<Solved> {
+    fn solve_in_band(&self, wavelength_um: f64, progress: &dyn Progress) -> Result<Solved> {
         Ok(Solved {
-            series: Series::of(&self.samples(INTERVALS, wavelength_um, BAND_ORDERS)?),
+            series: Series::of(&self.samples(INTERVALS, wavelength_um, BAND_ORDERS, progress)?),
             finer: None,
             truncation: None,
         })
     }
 
     /// Solves with as many orders as this cell needs.
-    fn solve(&self, wavelength_um: f64, choice: OrderChoice) -> Result<Solved> {
+    fn solve(&self, wavelength_um: f64, choice: OrderChoice, progress: &dyn Progress) -> Result<Solved> {
         Solved::converged(choice, |intervals, orders| {
-            self.samples(intervals, wavelength_um, orders)
+            self.samples(intervals, wavelength_um, orders, progress)
         })
     }
 
     /// Over a quarter turn.
-    fn samples(&self, intervals: usize, wavelength_um: f64, orders: usize) -> Result<Vec<Channels>> {
+    fn samples(
+        &self,
+        intervals: usize,
+        wavelength_um: f64,
+        orders: usize,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Channels>> {
         let (orders, edges) = (Orders::new(orders)?, [self.pillars.width_nm, self.pillars.length_nm]);
         let edges = edges.map(f64::from);
-        RotationSamples::over(intervals, &self.stack, edges, wavelength_um, orders, self.arriving)
-            .map(RotationSamples::channels)
+        RotationSamples::over(
+            intervals,
+            &self.stack,
+            edges,
+            wavelength_um,
+            orders,
+            self.arriving,
+            progress,
+        )
+        .map(RotationSamples::channels)
     }
 
     /// Table of converted (0) or unconverted (1) light.
@@ -179,8 +201,14 @@ impl RotatedCell {
         std::iter::once(Complex64::ZERO).chain((1..=most).map(of)).collect()
     }
 
-    fn both_hands(&self, wavelength_um: f64, of_band: bool, most: u16) -> Result<PolarisedTables> {
-        let solved = self.solved(wavelength_um, of_band)?;
+    fn both_hands(
+        &self,
+        wavelength_um: f64,
+        of_band: bool,
+        most: u16,
+        progress: &dyn Progress,
+    ) -> Result<PolarisedTables> {
+        let solved = self.solved(wavelength_um, of_band, progress)?;
         let of = |channel: usize| [Hand::Focused, Hand::Other].map(|hand| self.table(&solved, most, hand, channel));
         Ok(PolarisedTables::Hands(HandTables {
             focused: self.arriving,
@@ -288,11 +316,14 @@ impl CellModel for RotatedCell {
         Fidelity::Rigorous
     }
 
-    fn response(&self, light: &Illumination<'_>, last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+    fn response(&self, light: &Illumination<'_>, last: u16, progress: &dyn Progress) -> Result<CellResponse> {
         if light.cell_sines() != [0.0; 2] {
             return Err(super::rectangle::oblique_refused());
         }
-        let tables = self.both_hands(light.wavelength_um, light.spectral == Spectral::InBand, last)?;
+        let in_band = light.spectral == Spectral::InBand;
+        // Of a band whoever asks says how far it is.
+        let progress = if in_band { &Silent } else { progress };
+        let tables = self.both_hands(light.wavelength_um, in_band, last, progress)?;
         Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
     }
 
@@ -308,7 +339,6 @@ mod tests {
     use super::super::rectangle::tests::{PILLARS, titania};
     use super::super::{Polarisation, PolarisedLight, RotatedRectangle};
     use super::*;
-    use metalith_core::Silent;
     use metalith_rcwa::circular;
 
     /// Between the solved rotations, of |t| near 1.1: what the series leaves out; ten times more with five rotations.
@@ -343,7 +373,7 @@ mod tests {
     }
 
     fn in_band(cell: &RotatedCell, most: u16) -> HandTables {
-        match cell.both_hands(0.532, true, most).unwrap() {
+        match cell.both_hands(0.532, true, most, &Silent).unwrap() {
             PolarisedTables::Hands(hands) => hands,
             other => panic!("{other:?}"),
         }
@@ -353,7 +383,7 @@ mod tests {
     fn the_series_meets_the_solver_between_its_samples() {
         for arriving in [Handedness::Left, Handedness::Right] {
             let cell = RotatedCell::new(titania(), PILLARS, arriving);
-            let off = from_the_solver(&cell, &cell.solved(0.532, true).unwrap(), BAND_ORDERS);
+            let off = from_the_solver(&cell, &cell.solved(0.532, true, &Silent).unwrap(), BAND_ORDERS);
             assert!(off < BETWEEN, "{arriving:?}: {off}");
         }
     }
@@ -361,7 +391,7 @@ mod tests {
     #[test]
     fn tables_have_the_series_at_drawn_rotations() {
         let cell = RotatedCell::new(titania(), PILLARS, Handedness::Left);
-        let solved = cell.solved(0.532, true).unwrap();
+        let solved = cell.solved(0.532, true, &Silent).unwrap();
         let light = Illumination::normal(0.532).in_band();
         let converted = cell
             .response(&light, 180, &Silent)
@@ -424,9 +454,9 @@ mod tests {
             close,
             more: 13,
         };
-        let few = cell.solve(0.532, choice(1.0)).unwrap();
+        let few = cell.solve(0.532, choice(1.0), &Silent).unwrap();
         assert!(from_the_solver(&cell, &few, 9) < BETWEEN);
-        let many = cell.solve(0.532, choice(0.001)).unwrap();
+        let many = cell.solve(0.532, choice(0.001), &Silent).unwrap();
         let off = from_the_solver(&cell, &many, 13);
         let [few, many] = [few, many].map(|s| s.truncation.unwrap());
         assert_eq!([few.orders, few.fewer, many.orders, many.fewer], [9, 7, 13, 9]);

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use metalith_core::Result;
+use metalith_core::{Error, Progress, Result, Silent};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::{Orders, circular};
 
@@ -40,6 +40,7 @@ impl RotationSamples {
             wavelength_um,
             orders,
             Handedness::Left,
+            &Silent,
         )
     }
 
@@ -50,7 +51,16 @@ impl RotationSamples {
     pub fn converged(stack: &CellStack, edges_nm: [f64; 2], wavelength_um: f64) -> Result<Self> {
         let solved = Solved::converged(CHOICE, |intervals, orders| {
             let orders = Orders::new(orders)?;
-            Self::over(intervals, stack, edges_nm, wavelength_um, orders, Handedness::Left).map(Self::channels)
+            Self::over(
+                intervals,
+                stack,
+                edges_nm,
+                wavelength_um,
+                orders,
+                Handedness::Left,
+                &Silent,
+            )
+            .map(Self::channels)
         })?;
         let samples = Self::NUMBERS / 2;
         let rotation = |k: usize| FRAC_PI_2 * k as f64 / samples as f64;
@@ -65,15 +75,23 @@ impl RotationSamples {
         wavelength_um: f64,
         orders: Orders,
         arriving: Handedness,
+        progress: &dyn Progress,
     ) -> Result<Self> {
         let rotations: Vec<f64> = solved_rotations(intervals).collect();
+        let what = format!("rectangles, {} orders an axis", orders.along_axis());
+        progress.begin(&what, rotations.len() as u64);
         let jones = rotations.into_par_iter().map(|rotation| {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
             let pillar = RotatedRectangle {
                 width_nm,
                 length_nm,
                 rotation,
             };
-            Ok(circular(stack.jones(&pillar, wavelength_um, [0.0; 2], orders)?))
+            let jones = circular(stack.jones(&pillar, wavelength_um, [0.0; 2], orders)?);
+            progress.advance(1);
+            Ok(jones)
         });
         Ok(Self(samples(&jones.collect::<Result<Vec<_>>>()?, arriving)))
     }
@@ -146,7 +164,7 @@ mod tests {
         let numbers: Vec<u16> = (0..=PILLARS.steps).collect();
         for focused in [Handedness::Left, Handedness::Right] {
             let cell = RotatedCell::new(titania(), PILLARS, focused);
-            let PolarisedTables::Hands(wanted) = cell.both_hands(0.532, true, PILLARS.steps).unwrap() else {
+            let PolarisedTables::Hands(wanted) = cell.both_hands(0.532, true, PILLARS.steps, &Silent).unwrap() else {
                 panic!("it knows both hands")
             };
             let found = kept.hands(PILLARS, &numbers, focused);

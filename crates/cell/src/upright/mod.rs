@@ -160,7 +160,7 @@ impl UprightCell {
         Ok(along)
     }
 
-    fn solved(&self, wavelength_um: f64, of_band: bool) -> Result<Arc<Along>> {
+    fn solved(&self, wavelength_um: f64, of_band: bool, progress: &dyn Progress) -> Result<Arc<Along>> {
         let key = (wavelength_um.to_bits(), of_band);
         let known = || self.solved.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(solved) = known().get(&key) {
@@ -168,7 +168,7 @@ impl UprightCell {
         }
         let solved = Arc::new(match of_band {
             true => self.solve(wavelength_um, Orders::new(BAND_ORDERS)?, &Silent)?,
-            false => self.along(wavelength_um, &Silent)?,
+            false => self.along(wavelength_um, progress)?,
         });
         known().insert(key, Arc::clone(&solved));
         Ok(solved)
@@ -193,8 +193,8 @@ impl UprightCell {
         (0..=last).map(at).collect()
     }
 
-    fn tables(&self, wavelength_um: f64, of_band: bool, last: u16) -> Result<PolarisedTables> {
-        let solved = self.solved(wavelength_um, of_band)?;
+    fn tables(&self, wavelength_um: f64, of_band: bool, last: u16, progress: &dyn Progress) -> Result<PolarisedTables> {
+        let solved = self.solved(wavelength_um, of_band, progress)?;
         Ok(PolarisedTables::Axes(AxisTables {
             focused: self.focused,
             along: PolarisationAxis::ALL.map(|axis| self.table(&solved, axis, last)),
@@ -207,11 +207,11 @@ impl CellModel for UprightCell {
         Fidelity::Rigorous
     }
 
-    fn response(&self, light: &Illumination<'_>, last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+    fn response(&self, light: &Illumination<'_>, last: u16, progress: &dyn Progress) -> Result<CellResponse> {
         if light.cell_sines() != [0.0; 2] {
             return Err(crate::rectangle::oblique_refused());
         }
-        let tables = self.tables(light.wavelength_um, light.spectral == Spectral::InBand, last)?;
+        let tables = self.tables(light.wavelength_um, light.spectral == Spectral::InBand, last, progress)?;
         Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
     }
 

@@ -342,12 +342,16 @@ fn read_rectangles(s: &Section<'_, '_>, widest: u32) -> RotatedRectangles {
 /// The material at a key, if it is there. Those that have a name are known here; tables are read with the files of the design.
 fn read_material(s: &Section<'_, '_>, key: &str) -> Option<String> {
     let text = s.optional_text(key)?;
-    if !Material::is_table(&text)
-        && let Err(error) = Material::named(&text)
-    {
-        s.fault(key, error.to_string(), error.remedy());
+    if Material::is_table(&text) {
+        return Some(text);
     }
-    Some(text)
+    match Material::named(&text) {
+        Ok(material) => Some(material.name().to_owned()),
+        Err(error) => {
+            s.fault(key, error.to_string(), error.remedy());
+            Some(text)
+        }
+    }
 }
 
 /// A spacer on the substrate, then what the etch left of the film.

@@ -7,18 +7,20 @@ use serde::{Serialize, Serializer};
 
 use super::cell::read_band;
 use super::lens::WAVELENGTH;
-use super::{ArraySpec, CellSpec, MappingIdentity, SteeredMapping, SteeringSteps};
-use metalith_cell::{Basis, InversePolynomial, MappingTable, PillarLibrary, RotationMapping};
-use metalith_core::Result;
+use super::{ArraySpec, CellSpec, LensSpec, MappingIdentity, SteeredMapping, SteeringSteps};
+use metalith_cell::{
+    Basis, CellStack, InversePolynomial, MappingTable, PillarLibrary, RotationMapping, SolvedMapping, cache_folder,
+};
 use metalith_core::document::{Limits, Section};
+use metalith_core::{Progress, Result};
 
 pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
 
-/// State of the library of upright rectangles that a reader requires.
+/// State of the library of upright rectangles, or of the mapping that is solved from the cell, that a reader requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LibraryFile {
     Needed,
-    /// Library that the caller makes; until then a design has no pillars.
+    /// Library or mapping that the caller makes; until then a design has no pillars.
     ToBeMade,
 }
 
@@ -32,9 +34,15 @@ pub struct MappingSpec {
     /// File of a table that stands in its place, such as `metalith cells` writes.
     #[serde(skip)]
     pub table_file: Option<PathBuf>,
-    /// Contents of that file.
+    /// Contents of that file, or the mapping that was solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<MappingTable>,
+    /// True if the mapping is solved from the cell of the design.
+    #[serde(skip)]
+    pub from_cells: bool,
+    /// Mapping that was solved from the cell; the layout depends on its table alone.
+    #[serde(skip)]
+    pub solved: Option<SolvedMapping>,
     /// File of the library of upright rectangles, such as `metalith cells` writes.
     #[serde(skip)]
     pub pillar_library_file: Option<PathBuf>,
@@ -75,8 +83,23 @@ pub struct MappingComparison {
 const PUBLISHED_CELL: &str = "only square pillars of `sin_luke_2015`, 700 nm high, 350 nm apart, on fused silica in air have a published mapping";
 
 impl MappingSpec {
+    /// True if the mapping is solved from the cell: a section says so, or says none to whoever makes it.
+    pub(crate) fn is_from_cells(s: &Section<'_, '_>, cell: &CellSpec, library: LibraryFile) -> bool {
+        let says_none = !s.has("coefficients") && !s.has("table") && !cell.is_of_the_paper();
+        let asked = s.has("source") || (library == LibraryFile::ToBeMade && says_none);
+        asked && cell.shape.rectangles().is_none()
+    }
+
     /// The wavelength that the mapping is made for (um), which other sections go by.
-    pub(crate) fn read_wavelength(s: &Section<'_, '_>, cell: &CellSpec) -> f64 {
+    ///
+    /// A mapping that is solved from the cell is one for the light that the lens focuses, if the section does not say another.
+    pub(crate) fn read_wavelength(s: &Section<'_, '_>, cell: &CellSpec, lens: &LensSpec, from_cells: bool) -> f64 {
+        if from_cells
+            && !s.has("wavelength_nm")
+            && let Some(um) = lens.focused_um()
+        {
+            return um;
+        }
         if cell.is_known_to_be_another(s) {
             let expected = format!("the wavelength in nm that the mapping is made for; {PUBLISHED_CELL}");
             s.must_have("wavelength_nm", &expected);
@@ -92,16 +115,21 @@ impl MappingSpec {
         cell: &CellSpec,
         array: &ArraySpec,
         library: LibraryFile,
+        from_cells: bool,
     ) -> Self {
         let published = InversePolynomial::published();
         let rotated = cell.shape.rotated().is_some();
         let upright = cell.shape.upright().is_some();
-        if !rotated && !upright && !s.has("table") && cell.is_known_to_be_another(s) {
+        if s.has("source") {
+            s.choice("source", &[("cells", ())], None);
+        }
+        if !rotated && !upright && !from_cells && !s.has("table") && cell.is_known_to_be_another(s) {
             let [least, greatest] = [cell.width_range_nm.0, cell.width_range_nm.1].map(f64::from);
             let pitch = f64::from(cell.pitch_nm);
             let expected = format!(
-                "those of this cell, or a `table`, as `metalith cells` finds them ({PUBLISHED_CELL}); it can begin with \
-                 `coefficients = [{:.5}, {:.5}]`, a straight line over the widths",
+                "those of this cell, or a `table`, as `metalith cells` finds them ({PUBLISHED_CELL}), or `source = \"cells\"` in their \
+                 place: the mapping is then solved from [cell]; it can begin with `coefficients = [{:.5}, {:.5}]`, a straight line over \
+                 the widths",
                 least / pitch,
                 (greatest - least) / pitch
             );
@@ -133,7 +161,7 @@ impl MappingSpec {
             coefficients,
         };
         let refuse_all = |why: &str, instead: &str| {
-            for key in ["coefficients", "table", "basis", "steered"]
+            for key in ["coefficients", "table", "basis", "steered", "source"]
                 .into_iter()
                 .filter(|key| s.has(key))
             {
@@ -171,7 +199,7 @@ impl MappingSpec {
         });
         let rotation = read_rotation(s, rotated);
         // A table is held to the widths of the cell when it is read.
-        if !s.has("table") && !rotated && !upright {
+        if !s.has("table") && !from_cells && !rotated && !upright {
             check_widths(s, cell, &polynomial);
         }
         let table_file = s.has("table").then(|| s.file("table"));
@@ -181,6 +209,18 @@ impl MappingSpec {
                 "a mapping that is a table has no coefficients",
                 "keep one of `table` and `coefficients`",
             );
+        }
+        if from_cells {
+            for key in ["coefficients", "basis", "table", "cell", "accept"]
+                .into_iter()
+                .filter(|key| s.has(key))
+            {
+                s.fault(
+                    key,
+                    "a mapping beside `source = \"cells\"`, by which it is solved from [cell]",
+                    format!("keep one of `source` and `{key}`"),
+                );
+            }
         }
         let steered = s.sections("steered");
         let steered: Vec<_> = steered
@@ -203,7 +243,10 @@ impl MappingSpec {
                 Vec::new()
             },
         };
-        let identity = MappingIdentity::read(s, cell, &polynomial, library);
+        let identity = match from_cells {
+            true => MappingIdentity::of_this_cell(),
+            false => MappingIdentity::read(s, cell, &polynomial, library),
+        };
         s.finish();
         Self {
             wavelength_um,
@@ -211,6 +254,8 @@ impl MappingSpec {
             polynomial,
             table_file,
             table: None,
+            from_cells,
+            solved: None,
             pillar_library_file,
             pillar_library: None,
             pillar_library_refused: None,
@@ -248,6 +293,18 @@ impl MappingSpec {
                 }
                 (Err(_), LibraryFile::ToBeMade) => {}
             }
+        }
+        Ok(())
+    }
+
+    /// Solve the mapping from the cell, if that is its source.
+    pub(crate) fn solve(&mut self, cell: &CellSpec, stack: &CellStack, progress: &dyn Progress) -> Result<()> {
+        if self.from_cells {
+            let widths_nm: Vec<u16> = cell.widths_nm().collect();
+            let cache = cache_folder();
+            let solved = SolvedMapping::solve(stack, self.wavelength_um, &widths_nm, cache.as_deref(), progress)?;
+            self.table = Some(solved.table.clone());
+            self.solved = Some(solved);
         }
         Ok(())
     }

@@ -145,6 +145,15 @@ impl MappingIdentity {
         }
     }
 
+    /// Identity of a mapping that is solved from the cell of its design.
+    pub(super) fn of_this_cell() -> Self {
+        Self {
+            is_stated: true,
+            accept: None,
+            differences: Vec::new(),
+        }
+    }
+
     /// Compare the head of a table or library with the cell of the design, which is `own`.
     ///
     /// # Errors

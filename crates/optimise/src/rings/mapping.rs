@@ -137,6 +137,8 @@ pub mod tests {
             polynomial,
             table_file: None,
             table: None,
+            from_cells: false,
+            solved: None,
             pillar_library_file: None,
             pillar_library: None,
             pillar_library_refused: None,

@@ -132,3 +132,67 @@ fn samples(known: &[[f64; 3]]) -> Dispersion {
         samples: known.to_vec(),
     }
 }
+
+/// Formulas and words of the field, in small letters and without signs, each with the material that is meant.
+const WORDS: [(&str, &str); 22] = [
+    ("sin", "sin_luke_2015"),
+    ("si3n4", "sin_luke_2015"),
+    ("siliconnitride", "sin_luke_2015"),
+    ("tio2", "tio2_siefke_2016"),
+    ("titania", "tio2_siefke_2016"),
+    ("titaniumdioxide", "tio2_siefke_2016"),
+    ("rutile", "tio2_rutile_devore_1951"),
+    ("asi", "a_si_pierce_1972"),
+    ("amorphoussilicon", "a_si_pierce_1972"),
+    ("si", "c_si_salzberg_1957"),
+    ("csi", "c_si_salzberg_1957"),
+    ("silicon", "c_si_salzberg_1957"),
+    ("gan", "gan_barker_1973"),
+    ("galliumnitride", "gan_barker_1973"),
+    ("nb2o5", "nb2o5_lemarchand_2013"),
+    ("sio2", "fused_silica_malitson_1965"),
+    ("fusedsilica", "fused_silica_malitson_1965"),
+    ("quartz", "fused_silica_malitson_1965"),
+    ("al2o3", "alumina_zhukovsky_2015"),
+    ("alumina", "alumina_zhukovsky_2015"),
+    ("sapphire", "alumina_malitson_dodge_1972"),
+    ("vacuum", "air"),
+];
+
+fn plain(name: &str) -> String {
+    let letters = name.chars().filter(char::is_ascii_alphanumeric);
+    letters.map(|c| c.to_ascii_lowercase()).collect()
+}
+
+/// See [`super::Material::own_name`].
+pub(super) fn own_name(name: &str) -> Option<&'static str> {
+    let word = plain(name);
+    let own = KNOWN.iter().map(|known| known.name).find(|own| plain(own) == word);
+    own.or_else(|| WORDS.iter().find(|(known, _)| *known == word).map(|(_, own)| *own))
+}
+
+/// All names, those first that share most pairs of letters with a name.
+pub(super) fn nearest_first(name: &str) -> Vec<&'static str> {
+    let pairs = |text: &str| {
+        plain(text)
+            .as_bytes()
+            .windows(2)
+            .map(<[u8]>::to_vec)
+            .collect::<Vec<_>>()
+    };
+    let asked = pairs(name);
+    let shared = |text: &str| {
+        let own = pairs(text);
+        asked.iter().filter(|pair| own.contains(pair)).count()
+    };
+    let words = |own: &str| {
+        WORDS
+            .iter()
+            .filter(|(_, of)| *of == own)
+            .map(|(word, _)| shared(word))
+            .max()
+    };
+    let mut names: Vec<_> = KNOWN.iter().map(|known| known.name).collect();
+    names.sort_by_key(|own| std::cmp::Reverse(shared(own).max(words(own).unwrap_or(0))));
+    names
+}

@@ -4,6 +4,7 @@ mod films;
 mod form;
 mod known;
 mod table;
+mod yaml;
 
 use std::fmt;
 use std::fs::File;
@@ -16,6 +17,7 @@ use serde::Serialize;
 use crate::{Error, Result, TableError};
 use form::Dispersion;
 use known::KNOWN;
+use table::TableFault;
 
 /// An optical material: complex index n + i k over the wavelength.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -32,42 +34,82 @@ const LONGEST_TABLE: u64 = 8 << 20;
 /// Rounding (um) where tables in nm and bands in um meet at their ends.
 const ROUNDING: f64 = 1e-9;
 
+/// True if a file is read as YAML of refractiveindex.info.
+pub(crate) fn is_yaml(path: &Path) -> bool {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    ending.is_some_and(|ending| ending == "yml" || ending == "yaml")
+}
+
+fn of_csv(text: &str) -> Result<Dispersion, TableFault> {
+    Ok(Dispersion::Table {
+        samples: table::parse(text)?,
+    })
+}
+
 impl Material {
     /// A material that can be named in a design.
     ///
     /// # Errors
     /// If there is none of that name; the error lists those there are.
     pub fn named(name: &str) -> Result<Self> {
+        let own = Self::own_name(name);
         let known = KNOWN
             .iter()
-            .find(|k| k.name == name)
+            .find(|k| own == Some(k.name))
             .ok_or_else(|| Error::UnknownMaterial {
                 name: name.to_owned(),
-                known: KNOWN.iter().map(|k| k.name).collect(),
+                known: known::nearest_first(name),
             })?;
         Ok(Self {
-            name: name.to_owned(),
+            name: known.name.to_owned(),
             form: (known.form)(),
             offset: 0.0,
         })
     }
 
-    /// The material that a text file names: one of [`Material::named`], or a CSV table whose path counts
-    /// from `folder`.
+    /// The name here of a material that is called by it or by a formula or word of the field, such as TiO2 or a-Si.
+    pub fn own_name(name: &str) -> Option<&'static str> {
+        known::own_name(name)
+    }
+
+    /// The material that a text file names: one of [`Material::named`], or a table whose path counts from `folder`.
     ///
     /// # Errors
-    /// As [`Material::named`] and [`Material::read_csv`].
+    /// As [`Material::named`] and [`Material::read_file`].
     pub fn resolve(text: &str, folder: &Path) -> Result<Self> {
         if Self::is_table(text) {
-            Self::read_csv(&folder.join(text))
+            Self::read_file(&folder.join(text))
         } else {
             Self::named(text)
         }
     }
 
-    /// True if a text in a file that names a material means a CSV table.
+    /// True if a text in a file that names a material means a file: a CSV table, or YAML of refractiveindex.info.
     pub fn is_table(text: &str) -> bool {
-        text.to_ascii_lowercase().ends_with(".csv")
+        text.to_ascii_lowercase().ends_with(".csv") || is_yaml(Path::new(text))
+    }
+
+    /// A material of a file: YAML as refractiveindex.info gives it, by the ending of its name, else [`Material::read_csv`].
+    ///
+    /// # Errors
+    /// If the file cannot be read, is too large, or does not say an index.
+    pub fn read_file(path: &Path) -> Result<Self> {
+        Self::read_as(path, if is_yaml(path) { yaml::parse } else { of_csv })
+    }
+
+    /// Wavelengths (um) of the samples about one between which the index is a guess: they are far apart, and n or k changes much
+    /// between them.
+    pub fn wide_gap_um(&self, wavelength_um: f64) -> Option<(f64, f64)> {
+        /// Gap over the wavelength, and change of n and of k across it.
+        const FAR: [f64; 3] = [0.04, 0.05, 0.01];
+        let all: Vec<f64> = self.form.samples_um().collect();
+        let after = all.partition_point(|um| *um < wavelength_um);
+        let (low, high) = (*all.get(after.checked_sub(1)?)?, *all.get(after)?);
+        let change = self.form.index(high) - self.form.index(low);
+        let is_far = high > wavelength_um
+            && high - low > FAR[0] * wavelength_um
+            && (change.re.abs() > FAR[1] || change.im.abs() > FAR[2]);
+        is_far.then_some((low, high))
     }
 
     /// Material of one index at all wavelengths.
@@ -95,6 +137,10 @@ impl Material {
     /// # Errors
     /// If the file cannot be read, is too large, or a row is not what the header says.
     pub fn read_csv(path: &Path) -> Result<Self> {
+        Self::read_as(path, of_csv)
+    }
+
+    fn read_as(path: &Path, parse: fn(&str) -> Result<Dispersion, TableFault>) -> Result<Self> {
         let fault = |line: Option<usize>, cause: TableError| Error::Table {
             path: path.to_owned(),
             line,
@@ -112,13 +158,13 @@ impl Material {
         File::open(path)
             .and_then(|file| file.take(LONGEST_TABLE).read_to_end(&mut text))
             .map_err(Error::io(path))?;
-        let samples = table::parse(&String::from_utf8_lossy(&text)).map_err(|(line, cause)| fault(line, cause))?;
+        let form = parse(&String::from_utf8_lossy(&text)).map_err(|(line, cause)| fault(line, cause))?;
         let name = path
             .file_name()
             .map_or_else(String::new, |n| n.to_string_lossy().into());
         Ok(Self {
             name,
-            form: Dispersion::Table { samples },
+            form,
             offset: 0.0,
         })
     }
@@ -294,6 +340,33 @@ mod tests {
             Material::constant(1.5, 0.2).unwrap().most_absorbing((0.5, 0.6)),
             (0.5, 0.2)
         );
+    }
+
+    /// Formulas and words of the field are names, and what is no name is answered with the nearest first.
+    #[test]
+    fn names_of_the_field_are_understood() {
+        for (name, own) in [
+            ("TiO2", "tio2_siefke_2016"),
+            ("SiO2", "fused_silica_malitson_1965"),
+            ("a-Si", "a_si_pierce_1972"),
+            ("Si3N4", "sin_luke_2015"),
+            ("GaN", "gan_barker_1973"),
+            ("sin_rich_vogt_2015", "sin_rich_vogt_2015"),
+        ] {
+            assert_eq!(Material::named(name).unwrap().name(), own, "{name}");
+        }
+        let remedy = Material::named("TiO2 film").unwrap_err().remedy();
+        assert!(remedy.starts_with("use one of tio2"), "{remedy}");
+        assert!(Material::is_table("Film.YML") && Material::is_table("a.csv") && !Material::is_table("tio2"));
+    }
+
+    /// k of amorphous silicon ends between two samples that are far apart.
+    #[test]
+    fn wide_gaps_are_found() {
+        let film = Material::named("a-si").unwrap();
+        assert_eq!(film.wide_gap_um(0.94), Some((0.8856, 0.9538)));
+        assert_eq!(film.wide_gap_um(1.55), None);
+        assert_eq!(Material::named("sio2").unwrap().wide_gap_um(0.94), None);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::TableError;
 use metalith_core::text::{quoted, table_rows};
 
 /// Line, counted from one, and what is wrong there.
-type TableFault = (Option<usize>, TableError);
+pub(super) type TableFault = (Option<usize>, TableError);
 
 /// Samples (L (um), n, k) of the text of a table, wavelengths rising.
 pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {

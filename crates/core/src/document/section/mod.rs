@@ -160,6 +160,11 @@ impl<'d, 't> Section<'d, 't> {
         })
     }
 
+    /// A table that may be left out, where it then has no keys and no faults.
+    pub fn section_or_none(&self, key: &str) -> Section<'d, 't> {
+        self.optional_section(key).unwrap_or_else(|| self.vacant(key))
+    }
+
     /// A table that may be left out.
     pub fn optional_section(&self, key: &str) -> Option<Section<'d, 't>> {
         let value = self.get(key)?;

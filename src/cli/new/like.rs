@@ -1,0 +1,236 @@
+//! A shipped design for another lens, wavelength or material: its text with the values that follow from these.
+
+use std::path::Path;
+
+use metalith::cell::cache_folder;
+use metalith::cell_study::CellRequest;
+use metalith::phase::RadialPhase;
+use metalith::{Design, Error, LatticeKind, PillarShape, Result};
+
+use super::chosen::Materials;
+use super::{NewArgs, chord_nm};
+use crate::cli::Terminal;
+use crate::cli::section_text::with_keys;
+
+fn refused(like: &str, what: &str) -> Error {
+    Error::refused(
+        "new/not-rescaled",
+        format!("{like} with other values: {what}"),
+        "begin with another design, or without options, and change the file",
+    )
+}
+
+/// Half of the extent of the elements along an axis (um).
+fn extent_um(elements: u32, spacing_um: f64, diameter_um: f64) -> f64 {
+    0.5 * (f64::from(elements.saturating_sub(1)) * spacing_um + diameter_um)
+}
+
+impl NewArgs {
+    /// True if anything is asked of a design that is begun with.
+    fn changes(&self) -> bool {
+        self.changes_pillars()
+            || self.diameter_um.is_some()
+            || self.focal_length_um.is_some()
+            || self.array.is_some()
+            || self.elements.is_some()
+            || self.steering_deg.is_some()
+    }
+
+    /// The text of a shipped design, whose files are at `path`, with what is asked for.
+    pub(super) fn rescaled(&self, text: String, path: &Path, terminal: &Terminal) -> Result<String> {
+        if !self.changes() {
+            return Ok(text);
+        }
+        let like = Design::parse_without_library(path, &text)?;
+        let name = self.like.as_deref().unwrap_or(&like.name);
+        if !like.array.placed.is_empty() || like.lens.outline.is_some() {
+            return Err(refused(name, "its elements are placed or shaped one by one"));
+        }
+        let old_um = f64::from(like.lens.diameter_nm) * 1e-3;
+        let diameter_um = self.diameter_um.unwrap_or(old_um);
+        // A lens of another size has the same aperture.
+        let scale = diameter_um / old_um;
+        let focal_length_um = self.focal_length_um.unwrap_or(like.lens.focal_length_um * scale);
+        let is_hyperbola = matches!(like.lens.phase, RadialPhase::Hyperbola { .. }) && like.lens.terms.is_empty();
+        let is_lens_new = diameter_um != old_um || focal_length_um != like.lens.focal_length_um;
+        if !is_hyperbola && (is_lens_new || self.wavelength_nm.is_some()) {
+            return Err(refused(
+                name,
+                "its phase is no hyperbola, which alone is known for another lens",
+            ));
+        }
+        let mut text = text;
+        let mut set = |head: &str, nth: usize, keys: &[(&str, Option<String>)]| {
+            let keys: Vec<_> = keys.iter().map(|(key, value)| (*key, value.as_deref())).collect();
+            text = with_keys(&text, head, nth, &keys);
+        };
+        let (x, y) = self.array.or(self.elements.map(|n| (n, n))).unwrap_or(like.array.count);
+        let steering_deg = self.steering_deg.unwrap_or(like.array.steering_deg);
+        let spacing_um = [
+            like.array.spacing_nm,
+            like.array.spacing_y_nm.unwrap_or(like.array.spacing_nm),
+        ]
+        .map(|nm| (nm as f64 * scale).round() * 1e-3);
+        if is_lens_new {
+            let um = |um: f64| Some(um.to_string());
+            set(
+                "[lens]",
+                0,
+                &[
+                    ("diameter_um", um(diameter_um)),
+                    ("focal_length_um", um(focal_length_um)),
+                ],
+            );
+            let margin_um = like.layout.apertures.margin_nm as f64 * 1e-3;
+            set(
+                "[apertures]",
+                0,
+                &[("chord_error_nm", um(chord_nm(diameter_um, margin_um)))],
+            );
+        }
+        set(
+            "[array]",
+            0,
+            &[
+                ("elements", Some(format!("[{x}, {y}]"))),
+                (
+                    "spacing_um",
+                    Some(format!("[{:.3}, {:.3}]", spacing_um[0], spacing_um[1])),
+                ),
+                ("steering_deg", Some(steering_deg.to_string())),
+            ],
+        );
+        // Chip and marks keep their distance from the outermost lenses.
+        let old_spacing = [
+            like.array.spacing_nm,
+            like.array.spacing_y_nm.unwrap_or(like.array.spacing_nm),
+        ];
+        let further = |axis: usize| {
+            let [count, old] = [[x, y][axis], [like.array.count.0, like.array.count.1][axis]];
+            let old = extent_um(old, old_spacing[axis] as f64 * 1e-3, old_um);
+            (extent_um(count, spacing_um[axis], diameter_um) - old).ceil()
+        };
+        let by_um = [further(0), further(1)];
+        let size = like.layout.chip.size_nm;
+        let sides = [size.0, size.1].map(|nm| nm as f64 * 1e-3);
+        let side = |axis: usize| sides[axis] + 2.0 * by_um[axis];
+        set("[chip]", 0, &[("size_um", Some(format!("[{}, {}]", side(0), side(1))))]);
+        for (nth, mark) in like.layout.marks.iter().enumerate() {
+            let list = |axis: usize| {
+                let place = |&(x, y): &(i64, i64)| {
+                    let um = [x, y][axis] as f64 * 1e-3;
+                    if um == 0.0 { um } else { um + by_um[axis] * um.signum() }
+                };
+                Some(format!("{:?}", mark.centres_nm.iter().map(place).collect::<Vec<f64>>()))
+            };
+            set("[[mark]]", nth, &[("x_um", list(0)), ("y_um", list(1))]);
+        }
+        if self.changes_pillars() {
+            self.set_pillars(
+                &like,
+                [diameter_um, focal_length_um],
+                steering_deg,
+                (x, y),
+                &mut set,
+                terminal,
+            )?;
+        }
+        Ok(text)
+    }
+
+    /// Other pillars, and what follows from another wavelength.
+    fn set_pillars(
+        &self,
+        like: &Design,
+        [diameter_um, focal_length_um]: [f64; 2],
+        steering_deg: f64,
+        elements: (u32, u32),
+        set: &mut impl FnMut(&str, usize, &[(&str, Option<String>)]),
+        terminal: &Terminal,
+    ) -> Result<()> {
+        let (cell, name) = (&like.cell, self.like.as_deref().unwrap_or(&like.name));
+        if cell.shape.rectangles().is_some() || !cell.under.is_empty() || !like.mapping.steered.is_empty() {
+            return Err(refused(
+                name,
+                "only squares and circles on their substrate are chosen anew",
+            ));
+        }
+        let focused_um = like.lens.focused_um().unwrap_or(like.mapping.wavelength_um);
+        let wavelength_um = self.wavelength_nm.map_or(focused_um, |nm| nm * 1e-3);
+        let is_same = wavelength_um == focused_um;
+        let material = |said: &Option<String>, own: &str| said.clone().or_else(|| is_same.then(|| own.to_owned()));
+        let film = self.material.clone().unwrap_or_else(|| cell.pillar_material.clone());
+        let substrate = material(&self.substrate, &cell.substrate_material);
+        let materials = Materials::new(Some(&film), substrate.as_deref(), wavelength_um, like.folder())?;
+        let shape = match self.shape.as_deref() {
+            Some("square") => PillarShape::Square,
+            Some(_) => PillarShape::Circle,
+            None => cell.shape,
+        };
+        let lattice = match self.lattice.as_deref() {
+            Some("hexagonal") => LatticeKind::Hexagonal,
+            Some(_) => LatticeKind::Square,
+            None => cell.lattice,
+        };
+        let radius_um = 0.5 * diameter_um;
+        let steps = 0.5 * f64::from(elements.0.max(elements.1).saturating_sub(1));
+        let request = CellRequest {
+            film: materials.film.clone(),
+            substrate: materials.substrate.clone(),
+            wavelength_um,
+            shape,
+            lattice,
+            numerical_aperture: radius_um / radius_um.hypot(focal_length_um),
+            steering_sine: (steps * steering_deg).to_radians().sin().abs(),
+            pitch_nm: self.pitch_nm,
+            height_nm: self.pillar_height_nm,
+        };
+        let chosen = request.choose(cache_folder().as_deref(), terminal)?;
+        terminal.clear();
+        terminal.say(&chosen.mapping.words());
+        let some = |value: &dyn std::fmt::Display| Some(value.to_string());
+        let quoted = |text: &str| Some(format!("\"{}\"", text.replace('\\', "/")));
+        let is_square = shape.is_square();
+        set(
+            "[cell]",
+            0,
+            &[
+                ("shape", quoted(if is_square { "square" } else { "circle" })),
+                (
+                    "lattice",
+                    quoted(if lattice.is_square() { "square" } else { "hexagonal" }),
+                ),
+                ("pitch_nm", some(&chosen.pitch_nm)),
+                ("pillar_height_nm", some(&chosen.height_nm)),
+                ("width_min_nm", some(&chosen.widths_nm.0)),
+                ("width_max_nm", some(&chosen.widths_nm.1)),
+                ("width_step_nm", some(&chosen.step_nm)),
+                ("pillar_material", quoted(materials.names()[0])),
+                ("substrate_material", quoted(materials.names()[1])),
+                ("band_nm", materials.band_nm(wavelength_um * 1e3)),
+            ],
+        );
+        let nm = some(&((wavelength_um * 1e6).round() / 1e3));
+        set(
+            "[mapping]",
+            0,
+            &[
+                ("source", quoted("cells")),
+                ("wavelength_nm", nm.clone()),
+                ("table", None),
+                ("basis", None),
+                ("coefficients", None),
+                ("band_nm", None),
+                ("compared_nm", None),
+            ],
+        );
+        set("[verify]", 0, &[("fidelity", quoted("rigorous"))]);
+        if !is_same {
+            set("[phase]", 0, &[("wavelength_nm", nm.clone())]);
+            set("[array]", 0, &[("wedge_wavelength_nm", nm.clone())]);
+            let list = nm.map(|nm| format!("[{nm}]"));
+            set("[verify]", 0, &[("wavelengths_nm", list), ("camera", None)]);
+        }
+        Ok(())
+    }
+}
