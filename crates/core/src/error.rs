@@ -94,6 +94,15 @@ impl Error {
         }
     }
 
+    /// The identities of all that went wrong: of a text one for each mistake, [`Fault::id`](crate::Fault::id), else [`Error::id`].
+    pub fn ids(&self) -> Vec<String> {
+        match self {
+            #[cfg(feature = "documents")]
+            Self::Text(faults) => faults.faults().iter().map(crate::Fault::id).collect(),
+            other => vec![other.id().to_owned()],
+        }
+    }
+
     /// Whether it is a text with a mistake of this kind at the key with this path, as `lens.diameter_um`.
     #[cfg(feature = "documents")]
     pub fn has_fault(&self, kind: crate::FaultKind, key: &str) -> bool {
