@@ -406,7 +406,7 @@ fn what_cannot_be_read_is_bad_input() {
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let place = format!("{}{}, byte 0: ", super::refusal("layout/format"), junk.display());
-    assert!(said.starts_with(&place), "{said}");
+    assert!(said.contains(&place), "{said}");
     let output = metalith(&["run"], &[&folder.path().join("nowhere.toml")]);
     assert_eq!(output.status.code(), Some(2));
 }
