@@ -328,7 +328,7 @@ mod tests {
         for (of, id) in [
             (&["star", "--wavelengths-nm", "400,500"][..], "option/not-of-scene"),
             (&["scene.png", "--pixels", "64"], "option/not-of-scene"),
-            (&[&small], "table/format"),
+            (&[&small], "score/too-small"),
             (&[&tiny], "table/format"),
         ] {
             let error = scene(of).unwrap_err();
