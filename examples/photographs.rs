@@ -10,9 +10,9 @@
 
 use std::path::PathBuf;
 
-use metalith::imaging::restore::RestorationMethod;
 use metalith::imaging::scene::{images_in, read_far_scene};
-use metalith::imaging::{ImagingSystem, Rehearsal, ScenePower, Zone, ZoneScore, scores};
+use metalith::imaging::{ForecastScene, ImagingSystem, ScenePower, Zone, ZoneScore, scores};
+use metalith::restoration::RestorationMethod;
 use metalith::sensor::Camera;
 use metalith::{Design, Error, Result, Silent};
 
@@ -37,7 +37,7 @@ fn main() -> Result<()> {
     let camera = Camera::read(camera.as_ref())?;
     let photographs = images_in(folder.as_ref())?;
     let read = |path: &PathBuf| read_far_scene(path, field_deg);
-    let studio = ImagingSystem::open(
+    let system = ImagingSystem::open(
         &design,
         layout.as_ref(),
         &camera,
@@ -45,9 +45,9 @@ fn main() -> Result<()> {
         &read(&photographs[0])?,
         &Silent,
     )?;
-    let (simulation, operator) = (studio.simulation(), studio.restoration());
-    let rehearsal = Rehearsal::new(&studio, &operator);
-    let forecast = rehearsal.forecast(&studio, &operator, &Silent)?;
+    let (simulation, operator) = (system.simulation(), system.restoration());
+    let forecast_scene = ForecastScene::new(&system, &operator);
+    let forecast = forecast_scene.forecast(&system, &operator, &Silent)?;
     let mut rows: Vec<Row> = Vec::new();
     let mut powers = Vec::new();
     let mut keep = |way: String, found: Vec<ZoneScore>| match rows.iter_mut().find(|r| r.way == way) {
@@ -59,15 +59,15 @@ fn main() -> Result<()> {
     };
     for path in &photographs {
         let scene = read(path)?;
-        let frame = studio.record(&simulation, &scene, 1)?;
-        let truth = studio.truth(&scene);
+        let frame = system.record(&simulation, &scene, 1)?;
+        let truth = system.truth(&scene);
         powers.push(ScenePower::of(&truth));
-        keep("frame".into(), scores(&studio.unrestored(&operator, &frame), &truth)?);
+        keep("frame".into(), scores(&system.unrestored(&operator, &frame), &truth)?);
         for method in &methods {
             for joint in [true, false] {
                 if joint || separate {
-                    let error = &rehearsal.operator_error;
-                    let picture = studio.restore(&operator, error, &frame, *method, joint, &Silent)?;
+                    let error = &forecast_scene.operator_error;
+                    let picture = system.restore(&operator, error, &frame, *method, joint, &Silent)?;
                     let found = scores(&picture, &truth)?;
                     let words = if joint { "joint" } else { "each alone" };
                     eprintln!("{}: {}, {words}: {:.2} dB", scene.name, method.name(), found[0].psnr_db);

@@ -1,4 +1,4 @@
-//! From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
+//! Metalens design, from the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
 //! image it makes.
 //!
 //! Data runs one way. The first line makes a file; the second begins at the bytes of that file, so that
@@ -19,7 +19,7 @@
 //! | [`CellModel`] | [`cell`] | a pillar's width and a wavelength: published, fitted or rigorous |
 //! | [`Propagator`](wave::Propagator) | [`wave`] | transmissions on a lattice: folded, direct, by rings |
 //! | [`Psf`](wave::Psf) | [`wave::psf`] | a field |
-//! | [`ImagingSystem`](imaging::ImagingSystem) | [`imaging`] | a layout, a camera and a scene: a frame, and the picture restored from it |
+//! | [`ImagingSystem`](imaging::ImagingSystem) | [`imaging`], [`restoration`] | a layout, a camera and a scene: a frame, and the picture restored from it |
 //! | [`verify()`] | [`mod@verify`] | a design, its array and the bytes of a layout |
 //! | [`report`] | [`report`] | anything found: one HTML page and one JSON file |
 //!
@@ -84,6 +84,8 @@ extern crate self as metalith;
 pub mod cli;
 mod session;
 
+pub use metalith_attribution as attribution;
+#[cfg(feature = "baselines")]
 pub use metalith_baselines as baselines;
 pub use metalith_calibrate as calibrate;
 pub use metalith_cell as cell;
@@ -102,8 +104,11 @@ pub use metalith_optimise as optimise;
 pub use metalith_prior as prior;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
+pub use metalith_restoration as restoration;
 pub use metalith_sensor as sensor;
 pub use metalith_study as study;
+#[cfg(feature = "training")]
+pub use metalith_training as training;
 pub use metalith_verify as verify;
 pub use metalith_verify::compensate;
 pub use metalith_wave as wave;

@@ -64,7 +64,7 @@ impl Design {
         self.design.cell.pitch_nm
     }
 
-    /// How the pillars stand.
+    /// Lattice of the pillars.
     #[getter]
     fn lattice(&self) -> String {
         self.design.cell.lattice.to_string()
@@ -113,7 +113,7 @@ impl Design {
 #[pyclass(frozen, module = "metalith._native")]
 pub struct Array {
     pub array: PillarArray,
-    /// None for pillars that were given as arrays.
+    /// Design of the pillars; `None` for pillars that were given as arrays.
     pub design: Option<metalith::Design>,
 }
 
@@ -130,7 +130,7 @@ impl Array {
         self.array.lattice.pitch_nm()
     }
 
-    /// How the pillars stand.
+    /// Lattice of the pillars.
     #[getter]
     fn lattice(&self) -> String {
         self.array.lattice.kind().to_string()
@@ -142,7 +142,7 @@ impl Array {
         self.array.lattice.sites()
     }
 
-    /// What the pillars are.
+    /// Shape of the pillars.
     #[getter]
     fn shape(&self) -> ToldShape {
         told(self.array.shape)
@@ -305,8 +305,8 @@ pub fn width_map(
     })
 }
 
-/// What a layout holds: names, centres (nm) and widths (nm) of its elements, pitch (nm) and kind of their lattices, number of
-/// pillars, number of other shapes on the layer, top cell, shape of the pillars.
+/// Contents of a layout: names, centres (nm) and widths (nm) of its elements, pitch (nm) and kind of their lattices,
+/// number of pillars, number of other shapes on the layer, top cell, shape of the pillars.
 type ReadLayout<'py> = (
     Vec<String>,
     Vec<[i64; 2]>,
@@ -363,7 +363,7 @@ pub fn read_layout<'py>(
     ))
 }
 
-/// Where the elements of an array are.
+/// Places of the elements of an array.
 fn sites(array: &Array) -> Vec<ElementSite> {
     if let Some(design) = &array.design {
         return design.sites();

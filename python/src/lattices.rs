@@ -33,7 +33,7 @@ pub fn lattice_of(kind: LatticeKind, pitch_nm: u32, (rows, columns): (usize, usi
     Lattice::of_kind(kind, pitch_nm, rows)
 }
 
-/// Nothing, if pillars of such a shape can stand on a lattice of the kind.
+/// Succeeds if pillars of such a shape can stand on a lattice of the kind.
 pub fn check_shape(kind: LatticeKind, shape: PillarShape) -> Result<()> {
     match kind.refusal(shape) {
         Some(what) => Err(Error::refused(
@@ -45,13 +45,13 @@ pub fn check_shape(kind: LatticeKind, shape: PillarShape) -> Result<()> {
     }
 }
 
-/// Whether a place of the grid is a site that light passes and a pillar can stand on.
+/// True if a place of the grid is a site that light passes and a pillar can stand on.
 fn is_site(lattice: Lattice, ix: usize, iy: usize) -> bool {
     let [columns, rows] = lattice.reach();
     columns.contains(&ix) && rows.contains(&iy) && lattice.has(ix, iy)
 }
 
-/// Nothing, if all places that something stands at are sites.
+/// Succeeds if all places that something stands at are sites.
 pub fn check_places<T>(lattice: Lattice, of: &Array2<T>, stands: impl Fn(&T) -> bool) -> Result<()> {
     let wrong = of
         .indexed_iter()

@@ -16,7 +16,7 @@ use crate::lattices::{check_places, kind_of, lattice_of, stack_on};
 use crate::shapes::{ToldShape, shape_of};
 use crate::work::{error, work};
 
-/// What pillars are made of, where no design says.
+/// Stack of the pillars, where no design gives it.
 pub(crate) fn stack(pitch_nm: f64, height_nm: f64, pillar: &str, substrate: &str) -> Result<CellStack> {
     let here = Path::new("");
     Ok(CellStack {

@@ -30,7 +30,7 @@ const PIXELS_UM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 /// Diameters of openings that are taken (um), as by the program.
 const APERTURES_UM: std::ops::RangeInclusive<f64> = 0.1..=1e5;
 
-/// Nothing, if a length that is given lies within a range (um).
+/// Succeeds if a length that is given lies within a range (um).
 fn within(what: &str, um: Option<f64>, range: &std::ops::RangeInclusive<f64>) -> Result<()> {
     match um.filter(|um| !range.contains(um)) {
         Some(um) => Err(Error::refused(
@@ -56,19 +56,19 @@ struct Lit {
     shape: PillarShape,
     widths: PillarMap,
     wedge: Wedge,
-    /// From the pillars to the plane that is looked at (um).
+    /// Distance from the pillars to the plane that is viewed (um).
     distance_um: f64,
 }
 
 impl Lit {
-    /// What elements have alike that are simulated together; `by_place` where what is made of one depends on where it stands.
+    /// Properties that elements simulated together share; `by_place` where the result for one depends on its place.
     fn like(&self, by_place: bool) -> (Wedge, f64, Option<f64>, Option<[i64; 2]>) {
         let place = by_place.then_some(self.centre_nm);
         (self.wedge, self.distance_um, self.aperture_radius_um, place)
     }
 }
 
-/// In what light elements are looked at.
+/// Light in which elements are viewed.
 struct Looked {
     wavelengths_nm: Vec<f64>,
     fields_deg: Vec<(f64, f64)>,
@@ -96,10 +96,7 @@ fn simulate(
     light: &Looked,
     progress: &dyn Progress,
 ) -> Result<Vec<Found>> {
-    let by_place = match case {
-        SimulationCase::Cell(_) => false,
-        SimulationCase::Made(chip) => chip.perturbation().depends_on_place(),
-    };
+    let by_place = case.perturbation().depends_on_place();
     let mut found: Vec<(usize, Vec<Found>)> = Vec::new();
     let mut waiting: Vec<(usize, Lit)> = elements.into_iter().enumerate().collect();
     while let Some((_, first)) = waiting.first() {
@@ -188,7 +185,7 @@ fn simulate_together(
 /// PSFs for Python: a dictionary for each. With the statement of the model that they rest on, if any, as JSON.
 type ToldPsfs<'py> = (Vec<Bound<'py, PyDict>>, Option<String>);
 
-/// What is simulated as made, if anything, with the PSFs.
+/// PSFs with what is simulated as fabricated, if anything.
 fn told<'py>(py: Python<'py>, (found, made): (Vec<Found>, Option<AsBuiltChip>)) -> PyResult<ToldPsfs<'py>> {
     let one = |f: Found| {
         let dict = PyDict::new(py);
@@ -289,8 +286,8 @@ pub fn psf_of_array<'py>(
             fast,
         };
         let case = match &made {
-            Some(chip) => SimulationCase::Made(chip),
-            None => SimulationCase::Cell(cells[0].as_ref()),
+            Some(chip) => SimulationCase::from(chip),
+            None => SimulationCase::from(cells[0].as_ref()),
         };
         Ok((simulate(lit.collect(), case, &light, p)?, made))
     })?;
@@ -349,7 +346,6 @@ pub fn psf_of_widths<'py>(
             Wanted::Model(model) => {
                 let stated = LitStack {
                     focused: shape.rectangles().map(|_| focused(light, shape)),
-                    polarised: light,
                     stack,
                 };
                 let chip = AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());
@@ -376,8 +372,8 @@ pub fn psf_of_widths<'py>(
             fast,
         };
         let case = match (&made, &cell) {
-            (Some(chip), _) => SimulationCase::Made(chip),
-            (None, cell) => SimulationCase::Cell(cell.as_deref().expect("a cell where there is no model")),
+            (Some(chip), _) => SimulationCase::from(chip),
+            (None, cell) => SimulationCase::from(cell.as_deref().expect("a cell where there is no model")),
         };
         Ok((simulate(lit.collect(), case, &light, p)?, made))
     })?;

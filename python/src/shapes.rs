@@ -1,4 +1,4 @@
-//! What pillars are, between Python and the library.
+//! Shapes of pillars, between Python and the library.
 
 use metalith::{Error, PillarShape, Rectangles, Result, RotatedRectangles, UprightRectangles};
 use numpy::{PyArray1, PyReadonlyArray1};
@@ -45,7 +45,7 @@ pub fn shape_of((word, width_nm, length_nm, steps): ToldShape) -> Result<PillarS
     })
 }
 
-/// Whether an edge so long has its ends on the grid of 1 nm about its middle.
+/// True if an edge so long has its ends on the grid of 1 nm about its middle.
 fn even(nm: u16) -> bool {
     nm > 0 && nm.is_multiple_of(2)
 }

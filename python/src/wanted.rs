@@ -1,4 +1,4 @@
-//! What pillars are simulated as, and in what light, by the words of a caller.
+//! Simulation of pillars and its light, by the words of a caller.
 
 use std::path::Path;
 
@@ -9,16 +9,16 @@ use metalith::cell::{
 use metalith::design::band_about;
 use metalith::{CalibratedModel, CellModel, Error, Fidelity, LatticeKind, PillarMap, PillarShape, Rectangles, Result};
 
-/// What pillars are simulated as.
+/// Simulation that the caller asks for.
 pub enum Wanted {
-    /// As drawn, by such a cell.
+    /// Pillars as drawn, by such a cell.
     Cell(Fidelity),
-    /// As made on a measured line and bench.
+    /// Pillars as fabricated on a measured line and bench.
     Model(Box<CalibratedModel>),
 }
 
 impl Wanted {
-    /// What a word and a file name; a model has its own cells.
+    /// Simulation that a word and a file name; a model has its own cells.
     pub fn of(fidelity: Option<&str>, model: Option<&Path>) -> Result<Self> {
         match (fidelity, model) {
             (Some(word), Some(_)) => Err(Error::refused(

@@ -26,7 +26,7 @@ impl ShippedDesign {
         names
     }
 
-    /// One of [`ShippedDesign::names`].
+    /// Design of one of [`ShippedDesign::names`].
     ///
     /// # Panics
     /// If it is none of them.

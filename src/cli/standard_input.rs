@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use metalith::{Design, Error, Result};
 use tempfile::TempDir;
 
-/// What standard input is called in messages.
+/// Name of standard input in messages.
 const NAME: &str = "standard input";
 
 /// Most bytes of a design that is piped in: thousands of times what a person writes.
@@ -98,7 +98,7 @@ pub fn design(path: &Path) -> Result<Design> {
     }
 }
 
-/// The same for who makes the library of its pillars, which need not be there yet.
+/// Variant of [`design`] for a caller that makes the library of its pillars, which need not be there yet.
 ///
 /// # Errors
 /// As [`design`].

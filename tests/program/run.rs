@@ -332,8 +332,8 @@ fn a_layout_from_anywhere_is_found_and_simulated() {
     assert!(printed.contains("against the sites that hold a pillar"), "{printed}");
 }
 
-/// White light on the axis, by unlike neighbours: as `run` has it with the design, which knows by its mapping how often each width
-/// stands beside which others, where `psf` counts the widths of the layout.
+/// White light on the axis, by dissimilar neighbours: as `run` has it with the design, which knows by its mapping how
+/// often each width stands beside which others, where `psf` counts the widths of the layout.
 #[test]
 fn white_light_without_a_design_is_that_of_a_run() {
     /// Of shares and contrasts between 0.4 and 0.9. Tables by the two counts differ by 0.003; equal neighbours are 0.024 off.

@@ -1,4 +1,4 @@
-//! What cameras without a lens have in common: a sensor, light of a flat scene on its pixels, exposure, colours.
+//! Parts that cameras without a lens share: a sensor, light of a flat scene on its pixels, exposure, colours.
 
 use metalith_core::{Error, Progress, Result};
 use metalith_imaging::scene::SceneImage;
@@ -18,7 +18,7 @@ pub struct LenslessBench {
     pub view: SceneView,
     pub sampling: Sampling,
     colours: ChannelColours,
-    /// What light at sines far from the normal brings less, at each pixel of the scene.
+    /// Fall-off of light at sines far from the normal, at each pixel of the scene.
     falloff: Array2<f32>,
     gain: Vec<f64>,
 }
@@ -40,7 +40,7 @@ pub trait Lensless {
     /// If the user stopped it.
     fn sent(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Array2<f32>>>;
 
-    /// Which learnt last stage can follow.
+    /// Kind of the learnt last stage that can follow.
     fn stage_kind(&self) -> StageKind;
 
     /// The one that does.
@@ -54,7 +54,7 @@ pub trait Lensless {
 }
 
 impl<T: Lensless> BaselineCamera for T {
-    fn ways(&self) -> Vec<Method> {
+    fn methods(&self) -> Vec<Method> {
         let learnt = self.stage().map(|stage| stage.kind.words());
         let way = |method: &str| Method {
             method: method.into(),
@@ -121,11 +121,12 @@ pub fn of_one_wavelength(camera: &Camera) -> Result<Camera> {
 const WIDEST_DEG: f64 = 150.0;
 
 impl LenslessBench {
-    /// For scenes of this size and field, at wavelengths at most `step_nm` apart. It still has to be given its exposure.
+    /// Bench for scenes of this size and field, at wavelengths at most `step_nm` apart. It still has to be given its
+    /// exposure.
     ///
     /// # Errors
-    /// If a channel counts no visible light, the camera tells no three colours apart, the sensor is one line of pixels, or the scene
-    /// is near.
+    /// If a channel counts no visible light, the camera distinguishes no three colours, the sensor is one line of
+    /// pixels, or the scene is near.
     pub fn new(camera: &Camera, view: SceneView, step_nm: f64) -> Result<Self> {
         if !(view.field_deg > 0.0 && view.field_deg < WIDEST_DEG) {
             return Err(Error::refused(
@@ -172,7 +173,7 @@ impl LenslessBench {
         })
     }
 
-    /// With the exposure that suits the light of a white scene.
+    /// Same bench with the exposure that suits the light of a white scene.
     ///
     /// # Errors
     /// If none of it reaches the sensor.
@@ -214,7 +215,7 @@ impl LenslessBench {
         weights
     }
 
-    /// The same for a grey surface.
+    /// Weights for a grey surface.
     pub fn grey_weights(&self, channel: usize) -> Vec<f64> {
         let own: Vec<Vec<f64>> = rgb_basis().iter().map(|b| self.weights(channel, b)).collect();
         (0..own[0].len()).map(|i| own.iter().map(|w| w[i]).sum()).collect()
@@ -237,7 +238,7 @@ impl LenslessBench {
         sent.iter().map(one).collect()
     }
 
-    /// What a perfect camera with these channels would give.
+    /// Image by a perfect camera with these channels.
     pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
         self.colours.rgb(&self.ideal(scene))
     }
@@ -257,6 +258,11 @@ impl LenslessBench {
         self.sampling.channels.len()
     }
 
+    /// Rows and columns of the scene.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.view.rows, self.view.columns)
+    }
+
     /// Rows and columns of the sensor.
     pub fn frame(&self) -> [usize; 2] {
         [self.camera.sensor.rows as usize, self.camera.sensor.columns as usize]
@@ -267,7 +273,7 @@ impl LenslessBench {
         expose(&self.camera, &self.gain, light, seed)
     }
 
-    /// That a scene is one of those that this is for.
+    /// Checks that a scene is one of those that this bench is for.
     ///
     /// # Errors
     /// If it has another size or field.
@@ -302,7 +308,7 @@ pub fn falloff([tx, ty]: [f64; 2]) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use metalith_imaging::restore::SceneStatistics;
+    use metalith_restoration::SceneStatistics;
     use metalith_sensor::ColourFilter;
 
     /// A small camera, a scene of the statistics of photographs.
@@ -320,7 +326,7 @@ pub(crate) mod tests {
             distance_um: f64::INFINITY,
         };
         let bench = LenslessBench::new(&camera, view, 50.0).unwrap();
-        let planes = SceneStatistics::colours().random_scene(&view, 7);
+        let planes = SceneStatistics::colours().random_scene((view.rows, view.columns), 7);
         let scene = bench.scene_of(planes.iter().map(|p| p.mapv(|v| v.clamp(0.0, 1.0))).collect());
         (camera, scene)
     }

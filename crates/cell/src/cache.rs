@@ -60,7 +60,7 @@ pub(super) fn read(
     columns.map(Some).ok_or_else(|| "it holds other columns".into())
 }
 
-/// What is left to read.
+/// Bytes that have not been read yet.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {

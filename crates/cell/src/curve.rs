@@ -30,7 +30,7 @@ pub struct BadCell {
     pub wavelength_um: f64,
     /// Power of the zero order over the incident.
     pub zero_order: f64,
-    /// Whether a wider pillar here has less phase.
+    /// True if a wider pillar here has less phase.
     pub backwards: bool,
 }
 
@@ -72,7 +72,7 @@ impl PhaseCurve {
         self.t.iter().map(Complex64::norm_sqr)
     }
 
-    /// Whether the phase falls from the width before to the width after.
+    /// True if the phase falls from the width before to the width after.
     pub fn backwards(&self, index: usize) -> bool {
         let last = self.turns.len() - 1;
         self.turns[(index + 1).min(last)] < self.turns[index.saturating_sub(1)]

@@ -5,6 +5,7 @@ mod column;
 mod curve;
 mod exact;
 mod fit;
+mod illumination;
 pub mod kept;
 mod library;
 mod model;
@@ -14,6 +15,7 @@ mod polarisation;
 mod polynomial;
 mod published;
 mod rectangle;
+mod response;
 mod rigorous;
 mod rotated;
 mod rotation;
@@ -28,9 +30,10 @@ pub use fit::{
     FittedCell, ForwardFit, InverseFit, MappingError, RotationCurve, RotationFit, curves_over, fit_forward,
     fit_inverse, forward_errors, round_trip,
 };
+pub use illumination::{Illumination, Incidence, Spectral};
 pub use library::{LibraryErrors, LibraryPillar, PillarLibrary};
 pub use metalith_rcwa::Material;
-pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
+pub use model::{CellModel, Fidelity};
 pub use neighbours::{
     BandNode, BandResponse, Blaze, CoarseCell, ElementRow, FittedNeighbours, Mapping, NEIGHBOUR_DEGREE,
     NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourCell, NeighbourResponse, NeighbourTable, NeighbourTableSpec,
@@ -45,8 +48,9 @@ pub use polarisation::{
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rectangle::{Handedness, OBLIQUE_RECTANGLES, RotatedRectangle, oblique_refused};
+pub use response::{CellResponse, JonesTables, NeighbourTables, ObliqueTables, POLARISATION_SHARE, dark};
 pub use rigorous::RigorousCell;
-pub use rotated::{RotatedCell, RotationSamples, Truncation};
+pub use rotated::{RotatedCell, RotationResponse, RotationSamples, Truncation};
 pub use rotation::RotationMapping;
 pub use stack::{CellStack, MOST_SUBSTRATE_K, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};

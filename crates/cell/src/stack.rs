@@ -14,7 +14,7 @@ use metalith_rcwa::{CellLattice, Incidence, Layer, LayerStack, Material, Orders,
 pub struct CellStack {
     /// Pitch of the lattice (nm).
     pub pitch_nm: f64,
-    /// How the pillars stand.
+    /// Lattice of the pillars.
     #[serde(skip_serializing_if = "is_square")]
     pub lattice: CellLattice,
     /// Height of the pillar (nm).
@@ -22,7 +22,7 @@ pub struct CellStack {
     /// Cross-section of the pillar; its width is the edge of a square, the diameter of a circle.
     #[serde(skip_serializing_if = "PillarShape::is_square")]
     pub shape: PillarShape,
-    /// What the pillar is etched from.
+    /// Material that the pillar is etched from.
     pub film: Material,
     pub substrate: Material,
     /// Unstructured layers between substrate and pillar, from the substrate upwards: a spacer, what the etch left of the film.
@@ -36,7 +36,7 @@ pub struct CellStack {
     pub corner_radius_nm: f64,
     /// Thickness of the mask left on top (nm); 0 for none.
     pub mask_height_nm: f64,
-    /// What the mask is of.
+    /// Material of the mask.
     pub mask: Material,
 }
 
@@ -78,8 +78,8 @@ impl CellStack {
         })
     }
 
-    /// Whether it is the cell of the paper, whose polynomials are published: squares of any silicon nitride, 700 nm high on a pitch of
-    /// 350 nm, on fused silica, in air.
+    /// True if it is the cell of the paper, whose polynomials are published: squares of any silicon nitride, 700 nm
+    /// high on a pitch of 350 nm, on fused silica, in air.
     pub fn is_of_the_paper(&self) -> bool {
         /// Refractive indices of silicon nitrides at 550 nm, from rich in nitrogen to rich in silicon.
         const NITRIDES: std::ops::Range<f64> = 1.8..2.4;
@@ -98,8 +98,8 @@ impl CellStack {
     /// zero leaves the bare substrate.
     ///
     /// # Errors
-    /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are rectangles,
-    /// which no width tells apart: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
+    /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are
+    /// rectangles, which no width distinguishes: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
         if self.shape.rectangles().is_some() {
             return Err(Error::refused(
@@ -111,7 +111,7 @@ impl CellStack {
         self.layers_of(wavelength_um, |wider_nm| self.outline((width_nm + wider_nm).max(0.0)))
     }
 
-    /// How many cross-sections stand for the walls of a pillar: one where they are upright.
+    /// Number of cross-sections that stand for the walls of a pillar: one where they are upright.
     pub fn slices(&self) -> usize {
         if self.taper == 0.0 { 1 } else { TAPER_SLICES }
     }

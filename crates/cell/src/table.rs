@@ -110,7 +110,7 @@ pub struct CellTable {
     columns: Vec<WidthSpectrum>,
 }
 
-/// Where a table came from.
+/// Origin of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// Read from this file, whose inputs are the same and whose checksum holds.
@@ -184,7 +184,7 @@ impl CellTable {
         Ok((table, Origin::Computed(kept)))
     }
 
-    /// What it was made for.
+    /// Specification that it was made for.
     pub fn spec(&self) -> &TableSpec {
         &self.spec
     }

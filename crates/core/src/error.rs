@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-/// What an error came from, for [`std::error::Error::source`].
+/// Cause of an error, for [`std::error::Error::source`].
 pub type Cause = Box<dyn std::error::Error + Send + Sync>;
 
 /// Result of every fallible operation of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What went wrong. The text of each variant names the place and the remedy.
+/// Error of the library. The text of each variant names the place and the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -94,7 +94,7 @@ impl Error {
         }
     }
 
-    /// The identities of all that went wrong: of a text one for each mistake, [`Fault::id`](crate::Fault::id), else [`Error::id`].
+    /// Identities of all mistakes: [`Fault::id`](crate::Fault::id) of each mistake of a text, else [`Error::id`] alone.
     pub fn ids(&self) -> Vec<String> {
         match self {
             #[cfg(feature = "documents")]
@@ -103,7 +103,7 @@ impl Error {
         }
     }
 
-    /// Whether it is a text with a mistake of this kind at the key with this path, as `lens.diameter_um`.
+    /// True if the error is a text with a mistake of this kind at the key with this path, such as `lens.diameter_um`.
     #[cfg(feature = "documents")]
     pub fn has_fault(&self, kind: crate::FaultKind, key: &str) -> bool {
         matches!(self, Self::Text(faults) if faults.has(kind, key))

@@ -1,4 +1,4 @@
-//! How far equal neighbours, and the neighbours that there are, are from rows of real pillars of
+//! Errors of the local periodic approximation and of the coupled model on rows of real pillars of
 //! `designs/prototype_3x3.toml`, whose optimised phase jumps from ring to ring.
 //!
 //! Rows of 20 consecutive pillars along x and of 12 along y or the diagonal, at four radii, without the three at either end; of the centre element in light

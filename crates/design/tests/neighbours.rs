@@ -7,7 +7,10 @@ mod truth_rows;
 
 use std::collections::BTreeMap;
 
-use metalith_cell::{Blaze, CoarseCell, Fidelity, NeighbourTable, NeighbourTableSpec, sites_by};
+use metalith_cell::{
+    Blaze, CellResponse, CoarseCell, Fidelity, Illumination, NeighbourTable, NeighbourTableSpec, NeighbourTables,
+    sites_by,
+};
 use metalith_core::Silent;
 use metalith_design::cell_models;
 use metalith_rcwa::SiteLattice;
@@ -20,18 +23,18 @@ use truth_rows::blazed_orders::BlazeOrders;
 /// Measured: 0.009 to 0.014.
 const MISFIT: f64 = 0.02;
 
-/// The same of supercells that the sum was not fitted to, whose pillars jump more.
+/// Limit for supercells that the sum was not fitted to, whose pillars jump more.
 const LEFT_OUT: f64 = 0.035;
 
 /// Share of the light in the first order of all rows together, against their supercells. Measured: 0.008 at most.
 const FIRST_OF_ROWS: f64 = 0.015;
 
-/// At 530 nm, where resonances of equal pillars are strongest, it is at most this share of that of equal neighbours.
-/// Measured: 0.12 along the normal; 0.30 and 0.27 of that of steered elements, solved as they are lit.
+/// Largest error at 530 nm, where resonances of equal pillars are strongest, as a share of the error of the local
+/// periodic approximation. Measured: 0.12 along the normal; 0.30 and 0.27 for steered elements, solved at oblique
+/// incidence.
 const OF_EQUAL: f64 = 0.5;
 
-/// No row along the normal is met worse than by equal neighbours, but for this: a third of
-/// what is left over.
+/// No row along the normal is met worse than by equal neighbours, but for this: a third of the residual.
 const WORSE: f64 = 0.005;
 
 /// Share of the first order of blazed rows of the truth, mean over where their phase starts and over s and p, rms over
@@ -40,8 +43,9 @@ const WORSE: f64 = 0.005;
 const FIRST: [f64; 2] = [0.02, 0.045];
 const GAIN: f64 = 6.0;
 
-/// Of single rows: the share of the first order, that of the zero order, and the phase (rad) less its mean. Resonances of
-/// a row that repeats exactly are not in a sum over pairs. Measured: 0.039 along the normal and 0.058, 0.015, 0.049.
+/// Limits for single rows: the share of the first order, the share of the zeroth order, and the phase (rad) less its
+/// mean. Resonances of a row that repeats exactly are not in a sum over pairs. Measured: 0.039 along the normal and
+/// 0.058, 0.015, 0.049.
 const FIRST_OF_A_ROW: f64 = 0.065;
 const ZERO: f64 = 0.02;
 const PHASE: f64 = 0.055;
@@ -231,8 +235,18 @@ fn between_the_tables_blazed_rows_are_met_as_well() {
         for um in [0.41, 0.43, 0.48, 0.505, 0.545, 0.56, 0.59, 0.62, 0.675, 0.69] {
             let coarse = CoarseCell::new(&stack, um, prototype.mapping.range_nm()).unwrap();
             let full = coarse.full_transmission().unwrap();
-            let band = cells[0].among_neighbours_in_band(um, &looks, &Silent).unwrap().unwrap();
-            let equal = cells[1].transmissions_in_band(um, pitch_nm as u16).unwrap();
+            let light = Illumination {
+                viewing: Some(&looks),
+                ..Illumination::from_direction(um, looks(um)).in_band()
+            };
+            let CellResponse::Neighbours(NeighbourTables::Band(band)) = cells[0].response(&light, 0, &Silent).unwrap()
+            else {
+                panic!("it knows its neighbours")
+            };
+            let equal = cells[1]
+                .response(&light, pitch_nm as u16, &Silent)
+                .and_then(CellResponse::focused);
+            let equal = equal.unwrap();
             for (cells, turns) in &rows {
                 let lattice = SiteLattice::row(*cells).unwrap();
                 let mut sums = [0.0; 3];
@@ -274,7 +288,7 @@ fn between_the_tables_blazed_rows_are_met_as_well() {
     }
 }
 
-/// Where the phase of a row starts, so many times.
+/// Number of places where the phase of a row starts.
 const STARTS: usize = 4;
 
 /// Mathematical libraries of machines differ in their last digits, which a fit over thousands of sites adds up.

@@ -10,7 +10,7 @@ use truth_rows::{compare, read, total};
 const FIRST: f64 = 0.012;
 const FIRST_OF_A_GRATING: f64 = 0.027;
 
-/// The same for the share of the zero order. Measured: 0.0034.
+/// Limit for the share of the zeroth order. Measured: 0.0034.
 const ZERO: f64 = 0.005;
 
 /// Phase of the first order (rad), less its mean over the rows of one grating and wavelength. Measured: 0.0104.

@@ -109,8 +109,8 @@ fn fill(
     Ok(contents.checks)
 }
 
-/// The cell of the pillars as drawn that judges, or that stands beside a chip as made: a compensated layout is right when it is
-/// made, not as it is drawn.
+/// The cell of the pillars as drawn that judges, or that stands beside a chip as fabricated: a compensated layout is
+/// right when it is made, not as it is drawn.
 fn judging(options: &HandoffOptions, sources: &Sources) -> Fidelity {
     match &sources.model {
         Some(_) => Fidelity::Rigorous,

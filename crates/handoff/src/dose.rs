@@ -72,10 +72,10 @@ pub struct WriteTime {
     pub job_s: f64,
 }
 
-/// How the time of a job is computed, for the page.
+/// Formula of the time of a job, for the page.
 pub(super) const FORMULA: &str =
     "time = dose x area / current  +  shapes x overhead a shape  +  fields x overhead a field  +  overhead of the job";
-/// How step and clock follow from the dose, for the page.
+/// Formulas of step and clock from the dose, for the page.
 pub(super) const DOSE_FORMULA: &str = "dose [uC/cm2] = current [pA] x 100 / (clock [MHz] x step^2 [nm2])";
 
 impl WriteTime {

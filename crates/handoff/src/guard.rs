@@ -11,7 +11,7 @@ use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_pillars::PillarShape;
 
-/// Whether the process can make the design at all.
+/// Checks that the process can make the design at all.
 pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     if !process.exposes_pillars() {
         return Err(Error::refused(
@@ -73,8 +73,8 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     Ok(())
 }
 
-/// Whether a hand-off may be put at this place: nothing is there, or an empty folder, or nothing but an older hand-off
-/// with its archive.
+/// Checks that a hand-off may be put at this place: nothing is there, or an empty folder, or nothing but an older
+/// hand-off with its archive.
 ///
 /// # Errors
 /// If something else is there, with the name of the first such file.

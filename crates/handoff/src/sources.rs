@@ -26,7 +26,7 @@ pub(super) struct Sources {
     /// The decks of the process, in its order.
     decks: Vec<(PathBuf, Deck)>,
     pub waivers: Option<Waivers>,
-    /// What the layout is compensated for.
+    /// Model that the layout is compensated for.
     pub model: Option<CalibratedModel>,
     kept: Vec<InputCopy>,
 }

@@ -1,43 +1,40 @@
-//! What others assume of such cameras, so that it can be said what each assumption is worth.
+//! Approximations that others make of such cameras, so that the worth of each can be stated.
 //!
 //! The array of Chakravarthula et al. (ACM Trans. Graph. 42, 257 (2023)) was trained on frames with one kernel for each
 //! element and colour, whatever the place in its field, brightness that falls as a Butterworth filter of the angle, one
 //! wavelength for each colour, no light beside the image, and nine patches of 420 x 420 pixels, each for itself.
 
-use metalith_core::{Progress, Result};
-use metalith_design::Design;
-use metalith_sensor::{Camera, Channel, ChannelSampling, Illuminant, Response};
 use serde::Serialize;
 
-use crate::forecast_scene::Rehearsal;
-use crate::imaging_system::ImagingSystem;
-use crate::kept::KernelCache;
-use crate::kernel_plan::Wanted;
-use crate::restore::RestorationMethod;
-use crate::scene::SceneImage;
-use crate::score::{ZoneScore, scores};
-use crate::stray_light::StrayLight;
-
-/// What is assumed of the way from a scene to the frame, instead of what is known.
+/// Assumptions on the way from a scene to the frame, in place of what is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ApproximationSet {
     /// The kernel on the axis of an element holds over its whole field.
     pub fixed_kernels: bool,
     /// Light falls with the angle as `butterworth` says, and not by what elements pass and flat surfaces send.
     pub butterworth: bool,
-    /// Nothing lands outside of the kernels.
-    pub no_veil: bool,
+    /// True if nothing lands outside of the kernels.
+    pub no_stray_light: bool,
     /// Each element has a square of so many pixels to itself, and no light lands beside it.
     pub patch_pixels: Option<u32>,
 }
 
 impl ApproximationSet {
+    /// The text of these approximations in the digest of a camera, which stands in files of sets for learning: names of fields
+    /// do not decide it, so that sets are the same and go on after a change of names.
+    pub(crate) fn digest_text(&self) -> String {
+        format!(
+            "Assumed {{ fixed_kernels: {}, butterworth: {}, no_veil: {}, patch_pixels: {:?} }}",
+            self.fixed_kernels, self.butterworth, self.no_stray_light, self.patch_pixels
+        )
+    }
+
     /// All of it: the setting of the paper.
     pub fn paper() -> Self {
         Self {
             fixed_kernels: true,
             butterworth: true,
-            no_veil: true,
+            no_stray_light: true,
             patch_pixels: Some(PATCH),
         }
     }
@@ -47,140 +44,13 @@ impl ApproximationSet {
 const CUTOFF_DEG: f64 = 22.5;
 const ORDER: i32 = 4;
 /// Pixels an axis of a patch.
-const PATCH: u32 = 420;
+pub(crate) const PATCH: u32 = 420;
 
 /// Light under an angle from the axis of an element, whose tangent is given, over that on the axis.
 pub fn butterworth(tangent: f64) -> f64 {
     (1.0 + (tangent.atan().to_degrees() / CUTOFF_DEG).powi(2 * ORDER))
         .sqrt()
         .recip()
-}
-
-/// A camera of the same kind whose channels count one wavelength each, their mean (um), and as much of it as they counted of
-/// all light.
-pub fn without_dispersion(camera: &Camera, channels: &[ChannelSampling]) -> Camera {
-    let channel_um: Vec<f64> = channels.iter().map(ChannelSampling::mean_um).collect();
-    // In light of equal energy a channel counts so many photons for each nm.
-    let counted: Vec<f64> = channels
-        .iter()
-        .zip(&channel_um)
-        .map(|(c, um)| c.parts.iter().map(|p| p.weight).sum::<f64>() / um)
-        .collect();
-    let most = counted.iter().copied().fold(0.0, f64::max);
-    let line = |(channel, (um, counted)): (&Channel, (&f64, &f64))| {
-        let nm = um * 1e3;
-        Channel {
-            name: channel.name.clone(),
-            response: Response::Band {
-                band_nm: [nm - 0.5, nm + 0.5],
-                efficiency: counted / most,
-            },
-        }
-    };
-    let lines = camera.channels.iter().zip(channel_um.iter().zip(&counted));
-    Camera {
-        channels: lines.map(line).collect(),
-        // A mean may lie between two lamps.
-        illuminant: Illuminant::EqualEnergy,
-        ..camera.clone()
-    }
-}
-
-/// A picture as it would be if something that is assumed were so.
-#[derive(Clone, Debug, Serialize)]
-pub struct AssumedScore {
-    /// In words.
-    pub assumption: &'static str,
-    pub scores: Vec<ZoneScore>,
-    /// What the operator of the restoration errs by, by channel.
-    pub operator_error: Vec<f64>,
-}
-
-/// Scores of a scene under the paper's assumptions: none of them, each alone, and all; joint and by Tikhonov. `narrow` is
-/// the same studio with one wavelength a channel.
-///
-/// # Errors
-/// If no light reaches the sensor, or the user stopped it.
-pub fn worth_of_assumptions(
-    studio: &ImagingSystem,
-    narrow: &ImagingSystem,
-    scene: &SceneImage,
-    seed: u64,
-    progress: &dyn Progress,
-) -> Result<Vec<AssumedScore>> {
-    let none = ApproximationSet::default();
-    let fixed = ApproximationSet {
-        fixed_kernels: true,
-        ..none
-    };
-    let fading = ApproximationSet {
-        butterworth: true,
-        ..none
-    };
-    let clear = ApproximationSet { no_veil: true, ..none };
-    let patches = ApproximationSet {
-        patch_pixels: Some(PATCH),
-        ..none
-    };
-    let all = ApproximationSet::paper();
-    let cases = [
-        ("none: all of the physics", studio, none),
-        ("one kernel for each element and colour", studio, fixed),
-        ("brightness by a Butterworth filter", studio, fading),
-        ("one wavelength for each colour", narrow, none),
-        ("no veil", studio, clear),
-        ("patches of 420 x 420 pixels", studio, patches),
-        ("all of them: the setting of the paper", narrow, all),
-    ];
-    cases
-        .into_iter()
-        .map(|(assumption, studio, assumed)| {
-            let studio = studio.assuming(assumed)?;
-            let frame = studio.record(&studio.simulation_of(scene), scene, seed)?;
-            let operator = studio.restoration();
-            let error = Rehearsal::new(&studio, &operator).operator_error;
-            let picture = studio.restore(&operator, &error, &frame, RestorationMethod::Tikhonov, true, progress)?;
-            Ok(AssumedScore {
-                assumption,
-                scores: scores(&picture, &studio.truth(scene))?,
-                operator_error: error.overall,
-            })
-        })
-        .collect()
-}
-
-impl ImagingSystem {
-    /// The same with other assumptions, and the exposure that suits them.
-    ///
-    /// # Errors
-    /// If no light reaches the sensor.
-    pub fn assuming(&self, assumed: ApproximationSet) -> Result<Self> {
-        let veil = match assumed.no_veil {
-            true => StrayLight::none(&self.camera.sensor, self.channels.len(), self.bank.bases),
-            false => self.veil.clone(),
-        };
-        let mut other = self.clone();
-        (other.assumed, other.veil) = (assumed, veil);
-        other.exposed()
-    }
-
-    /// The studio of the same chip and scene with a camera that has no dispersion.
-    ///
-    /// # Errors
-    /// As [`ImagingSystem::open`].
-    pub fn open_without_dispersion(
-        &self,
-        design: &Design,
-        layout: &std::path::Path,
-        model: Option<&metalith_optics::CalibratedModel>,
-        scene: &SceneImage,
-        kept: &KernelCache,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let camera = without_dispersion(&self.camera, &self.channels);
-        let wanted = Wanted::new(design, &camera, scene)?.for_wide_bands();
-        Self::open_wanted(wanted, design, layout, model, kept, progress)
-    }
 }
 
 #[cfg(test)]
@@ -196,20 +66,10 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_without_dispersion_counts_one_wavelength_a_channel() {
-        let camera = Camera::three_bands(5.86);
-        let all = camera.sampling([400.0, 700.0], 12.5).unwrap();
-        let narrow = without_dispersion(&camera, &all.channels);
-        let sampling = narrow.sampling([400.0, 700.0], 12.5).unwrap();
-        let counted = |c: &ChannelSampling| c.parts.iter().map(|p| p.weight).sum::<f64>();
-        for (k, middle) in [450.0, 550.0, 650.0].into_iter().enumerate() {
-            // Photons of equal energy are as many as the wavelength is long: the mean of a band of 100 nm is beyond its middle.
-            let nm = middle + 100f64.powi(2) / (12.0 * middle);
-            let parts = &sampling.channels[k].parts;
-            assert!(parts.iter().all(|p| p.nm.iter().all(|v| (v - nm).abs() < 0.51)));
-            // The balance of the channels stays: sums over parts 1 nm wide.
-            let ratio = |of: &[ChannelSampling]| counted(&of[k]) / counted(&of[0]);
-            assert!((ratio(&sampling.channels) / ratio(&all.channels) - 1.0).abs() < 1e-6);
-        }
+    fn the_text_of_a_digest_is_that_of_sets_on_the_disk() {
+        let none = "Assumed { fixed_kernels: false, butterworth: false, no_veil: false, patch_pixels: None }";
+        assert_eq!(ApproximationSet::default().digest_text(), none);
+        let all = "Assumed { fixed_kernels: true, butterworth: true, no_veil: true, patch_pixels: Some(420) }";
+        assert_eq!(ApproximationSet::paper().digest_text(), all);
     }
 }

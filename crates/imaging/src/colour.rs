@@ -7,8 +7,8 @@ use ndarray::{Array2, Array3};
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 
-/// What an ideal camera with the channels of this one sees of a scene: light of each channel at each place, that of a
-/// white surface being one.
+/// Image of a scene by an ideal camera with the channels of this one: light of each channel at each place, the light of
+/// a white surface being one.
 #[derive(Clone, Debug)]
 pub struct ChannelColours {
     /// Linear sRGB (rows) from the light of each channel (columns), where the camera has colours.
@@ -23,11 +23,11 @@ pub fn share(channel: &ChannelSampling, spectrum: &SceneSpectrum) -> f64 {
     sums.0 / sums.1
 }
 
-/// Channels whose colours are closer than this to one another cannot be told apart.
+/// Channels whose colours are closer than this to one another cannot be distinguished.
 const COLOURS: f64 = 1e-3;
 
 impl ChannelColours {
-    /// Of the channels of a camera in its light.
+    /// Colours of the channels of a camera in its light.
     pub fn of(channels: &[ChannelSampling]) -> Self {
         let from_rgb = DMatrix::from_fn(channels.len(), 3, |c, b| share(&channels[c], &rgb_basis()[b]));
         let singular = from_rgb.clone().svd(false, false).singular_values;
@@ -36,7 +36,7 @@ impl ChannelColours {
         Self { to_rgb }
     }
 
-    /// Whether pictures have colours; else they are grey, the mean of all channels.
+    /// True if pictures have colours; else they are grey, the mean of all channels.
     pub fn has_colours(&self) -> bool {
         self.to_rgb.is_some()
     }

@@ -24,19 +24,19 @@ use crate::scene::SceneImage;
 
 /// Images of one shard: a folder named by the range of their numbers.
 const SHARD: usize = 1000;
-/// What files of a set hold, in a word that changes with it: those of before are made anew.
+/// Format of the files of a set, in words that change with it: files of an older format are made anew.
 const FORMAT: &str = "frames above a black level";
 /// Black level over the deviation of what reading adds: one dark pixel of a thousand million is cut at zero.
 const DEVIATIONS: f64 = 6.0;
 /// Least and largest black level (numbers of the file).
 const BLACK: [f64; 2] = [64.0, 32_768.0];
 
-/// What stands in `manifest.json`.
+/// Contents of `manifest.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetManifest {
     pub design: String,
     pub camera: String,
-    /// What the frames were made with; nothing in sets that have no black level.
+    /// Origin of the frames; empty in sets that have no black level.
     #[serde(default)]
     pub made_from: DatasetOrigin,
     pub seed: u64,
@@ -55,18 +55,18 @@ pub struct DatasetManifest {
 /// Digests of what frames were made with, each a SHA-256 in hexadecimal.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DatasetOrigin {
-    /// Of what the design says of layout, materials and cell ([`Design::simulation_digest`]).
+    /// Digest of layout, materials and cell of the design ([`Design::simulation_digest`]).
     pub design_sha256: String,
-    /// Of the file.
+    /// Digest of the layout file.
     pub layout_sha256: String,
-    /// Of what the camera file and its curves say.
+    /// Digest of the camera file and its curves.
     pub camera_sha256: String,
-    /// Of the file, if the chip is taken as made.
+    /// Digest of the model file, if the chip is taken as fabricated.
     pub model_sha256: Option<String>,
 }
 
 impl DatasetOrigin {
-    /// Of a design, the file of its layout, a camera and the file of a model, if there is one.
+    /// Origin from a design, the file of its layout, a camera and the file of a model, if there is one.
     ///
     /// # Errors
     /// If a material is not known, or a file cannot be read.
@@ -114,17 +114,17 @@ pub(crate) fn black_level(camera: &Camera) -> u16 {
 }
 
 impl DatasetManifest {
-    /// Of a set that has no pairs yet.
-    pub fn of(studio: &ImagingSystem, made_from: DatasetOrigin, seed: u64) -> Self {
+    /// Manifest of a set that has no pairs yet.
+    pub fn of(system: &ImagingSystem, made_from: DatasetOrigin, seed: u64) -> Self {
         Self {
-            design: studio.design.name.clone(),
-            camera: studio.camera.name.clone(),
+            design: system.design.name.clone(),
+            camera: system.camera.name.clone(),
             made_from,
             seed,
-            field_deg: studio.view.field_deg,
-            black_level: black_level(&studio.camera),
+            field_deg: system.view.field_deg,
+            black_level: black_level(&system.camera),
             white: png16::WHITE,
-            gain: studio.gain.clone(),
+            gain: system.gain.clone(),
             pairs: Vec::new(),
         }
     }
@@ -134,10 +134,10 @@ impl DatasetManifest {
 /// scene of an image. Ask [`check_images`](crate::check_images) first: here an image that cannot be used stops the work.
 ///
 /// # Errors
-/// If an image cannot be read or is not of the size that the studio was opened for, a file cannot be written, or the user
+/// If an image cannot be read or is not of the size that the imaging system was opened for, a file cannot be written, or the user
 /// stopped it; what is complete is kept.
 pub fn write_dataset(
-    studio: &ImagingSystem,
+    system: &ImagingSystem,
     operator: &FrameOperator<'_>,
     images: &[PathBuf],
     read: &dyn Fn(&Path) -> Result<SceneImage>,
@@ -146,7 +146,7 @@ pub fn write_dataset(
     progress: &dyn Progress,
 ) -> Result<DatasetManifest> {
     progress.begin("recording frames", images.len() as u64);
-    let writer = PairWriter::new(studio, operator, manifest.seed, folder);
+    let writer = PairWriter::new(system, operator, manifest.seed, folder);
     for (i, image) in images.iter().enumerate() {
         if progress.stopped() {
             return Err(Error::Interrupted);
@@ -166,34 +166,34 @@ pub fn write_dataset_manifest(folder: &Path, manifest: &DatasetManifest) -> Resu
     metalith_report::write_json(&folder.join("manifest.json"), "dataset", manifest)
 }
 
-/// What writes the pairs of a set.
+/// Writer of the pairs of a set.
 pub struct PairWriter<'a> {
-    studio: &'a ImagingSystem,
+    system: &'a ImagingSystem,
     operator: &'a FrameOperator<'a>,
     seed: u64,
     folder: &'a Path,
-    /// Of chip and camera.
-    studio_digest: [u8; 32],
+    /// Digest of chip and camera.
+    system_digest: [u8; 32],
     black: u16,
 }
 
 impl<'a> PairWriter<'a> {
-    /// For the simulation of a studio, noise of a seed, and a folder.
-    pub fn new(studio: &'a ImagingSystem, operator: &'a FrameOperator<'a>, seed: u64, folder: &'a Path) -> Self {
+    /// Writer for the simulation of an imaging system, noise of a seed, and a folder.
+    pub fn new(system: &'a ImagingSystem, operator: &'a FrameOperator<'a>, seed: u64, folder: &'a Path) -> Self {
         Self {
-            studio,
+            system,
             operator,
             seed,
             folder,
-            studio_digest: studio.digest(),
-            black: black_level(&studio.camera),
+            system_digest: system.digest(),
+            black: black_level(&system.camera),
         }
     }
 
     /// Write the frame and the scene of image number `i`, if they are not there undamaged. `read` gives the scene of an image.
     ///
     /// # Errors
-    /// If the image cannot be read or is not of the size that the studio was opened for, or a file cannot be written.
+    /// If the image cannot be read or is not of the size that the imaging system was opened for, or a file cannot be written.
     pub fn write(&self, image: &Path, i: usize, read: &dyn Fn(&Path) -> Result<SceneImage>) -> Result<DatasetPair> {
         let bytes = read_at_most(image, png16::LONGEST, "an image")?;
         let mut hasher = Sha256::new();
@@ -202,7 +202,7 @@ impl<'a> PairWriter<'a> {
         hasher.update(self.seed.to_le_bytes());
         let own = hasher.clone().finalize();
         let own_seed = u64::from_le_bytes(own[..8].try_into().expect("eight bytes"));
-        hasher.update(self.studio_digest);
+        hasher.update(self.system_digest);
         hasher.update(FORMAT);
         let source = hex(&hasher.finalize());
         let [of_frame, of_truth] = ["frame", "truth"].map(|kind| format!("{source} {kind}"));
@@ -217,9 +217,9 @@ impl<'a> PairWriter<'a> {
             (Some(frame), Some(truth)) => [frame, truth],
             _ => {
                 let scene = read(image)?;
-                let scene = self.studio.simulated(&scene);
-                let recorded = self.studio.record(self.operator, &scene, own_seed)?;
-                let ideal = self.studio.truth(&scene).mapv(srgb::encoded);
+                let scene = self.system.simulated(&scene);
+                let recorded = self.system.record(self.operator, &scene, own_seed)?;
+                let ideal = self.system.truth(&scene).mapv(srgb::encoded);
                 let frame = png16::grey(&recorded.planes, self.black, &of_frame);
                 let truth = png16::colour(&ideal, Some(&of_truth));
                 AtomicFile::write(&frame_file, &frame)?;

@@ -1,9 +1,10 @@
-//! From light in the pixels to the numbers that a camera gives out.
+//! Exposure: from light in the pixels to the numbers that a camera records.
 
 use metalith_core::{Error, Result};
 use metalith_report::sig;
 use metalith_sensor::{Camera, ColourFilter};
 use metalith_wave::camera::Noise;
+use metalith_wave::kernels::box_sums;
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +14,8 @@ use crate::operator_error::OperatorError;
 /// A frame as it was recorded.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Of full scale, quantised; one plane for a sensor with a colour filter array, else one for each channel.
+    /// Signals as shares of full scale, quantised; one plane for a sensor with a colour filter array, else one for each
+    /// channel.
     pub planes: Vec<Array2<f32>>,
     pub filter: ColourFilter,
     /// Signal, of full scale, of a unit of light in each channel.
@@ -25,7 +27,7 @@ pub struct Frame {
     pub saturated: usize,
 }
 
-/// What each channel counts of the light of the scene, against the one that counts most.
+/// Sensitivity of each channel to the light of the scene, relative to the channel that counts most.
 pub fn sensitivity(camera: &Camera, channels: &[metalith_sensor::ChannelSampling]) -> Vec<f64> {
     let counted: Vec<f64> = channels
         .iter()
@@ -36,7 +38,7 @@ pub fn sensitivity(camera: &Camera, channels: &[metalith_sensor::ChannelSampling
     counted.iter().map(|c| c / most).collect()
 }
 
-/// Which channel a pixel counts; none for a sensor whose pixels count all.
+/// Channel that a pixel counts; `None` for a sensor whose pixels count all.
 pub fn channel_at(filter: ColourFilter, names: &[String], row: usize, column: usize) -> Option<usize> {
     let pattern = match filter {
         ColourFilter::None => return None,
@@ -49,7 +51,7 @@ pub fn channel_at(filter: ColourFilter, names: &[String], row: usize, column: us
     names.iter().position(|n| n == wanted)
 }
 
-/// Whether a pixel counts a channel; pixels of a sensor without a filter count all.
+/// True if a pixel counts a channel; pixels of a sensor without a filter count all.
 pub fn counts_channel(filter: ColourFilter, names: &[String], [row, column]: [usize; 2], channel: usize) -> bool {
     channel_at(filter, names, row, column).is_none_or(|c| c == channel)
 }
@@ -108,7 +110,7 @@ pub(crate) fn recorded(camera: &Camera, signal: f64) -> f32 {
     ((signal.min(camera.sensor.largest_signal()) / step).round() * step) as f32
 }
 
-/// How many planes the frames of a camera have: one behind a colour filter array, else one for each channel.
+/// Number of planes of the frames of a camera: one behind a colour filter array, else one for each channel.
 pub(crate) fn planes_of(camera: &Camera) -> usize {
     match camera.sensor.filter {
         ColourFilter::None => camera.channels.len(),
@@ -117,7 +119,8 @@ pub(crate) fn planes_of(camera: &Camera) -> usize {
 }
 
 impl Frame {
-    /// Of signals that were recorded, of full scale, in the planes that the sensor of a camera has; `gain` as [`gains`] has it.
+    /// Frame of signals that were recorded, as shares of full scale, in the planes that the sensor of a camera has;
+    /// `gain` as [`gains`] has it.
     pub fn of_signals(camera: &Camera, gain: &[f64], planes: Vec<Array2<f32>>) -> Self {
         let full = recorded(camera, f64::INFINITY);
         Self {
@@ -130,7 +133,7 @@ impl Frame {
         }
     }
 
-    /// Whether it can be of a sensor of so many rows and columns behind so many channels.
+    /// Checks that the frame can be of a sensor of so many rows and columns behind so many channels.
     ///
     /// # Errors
     /// If it is of another camera.
@@ -155,12 +158,12 @@ impl Frame {
         self.saturated as f64 / self.pixels() as f64
     }
 
-    /// Whether most pixels are at full scale: what is restored then says nothing of the camera.
+    /// True if most pixels are at full scale: what is restored then says nothing of the camera.
     pub fn is_lost(&self) -> bool {
         self.saturated_share() > 0.5
     }
 
-    /// What is to be known of pixels at full scale, if there are more than a few; `truth` is the scene in linear sRGB.
+    /// Note on pixels at full scale, if there are more than a few; `truth` is the scene in linear sRGB.
     pub fn saturation_note(&self, truth: &Array3<f64>) -> Option<String> {
         /// Share that is told.
         const TOLD: f64 = 0.01;
@@ -209,12 +212,12 @@ impl Frame {
         self.gain.iter().enumerate().map(of).collect()
     }
 
-    /// What was recorded of a channel.
+    /// Plane that a channel was recorded in.
     fn plane(&self, channel: usize) -> &Array2<f32> {
         &self.planes[if self.filter == ColourFilter::None { channel } else { 0 }]
     }
 
-    /// Whether a pixel counts a channel.
+    /// True if a pixel counts a channel.
     fn counts(&self, channel: usize, names: &[String], row: usize, column: usize) -> bool {
         counts_channel(self.filter, names, [row, column], channel)
     }
@@ -226,7 +229,7 @@ impl Frame {
     /// made dark would be trusted more than its neighbours.
     pub fn light(&self, camera: &Camera, error: &OperatorError) -> (Vec<Array2<f32>>, Vec<Array2<f32>>) {
         let names = camera.channel_names();
-        let (mut light, mut trust) = (Vec::new(), Vec::new());
+        let (mut light, mut inverse_variance) = (Vec::new(), Vec::new());
         for (channel, gain) in self.gain.iter().enumerate() {
             let plane = self.plane(channel);
             let known = |y: usize, x: usize| self.counts(channel, &names, y, x) && plane[[y, x]] < self.full;
@@ -235,38 +238,18 @@ impl Frame {
             let (sums, numbers) = (box_sums(&signal, NEAR), box_sums(&known, NEAR));
             let overall = signal.sum() / known.sum().max(1.0);
             light.push(signal.mapv(|v| (v / gain) as f32));
-            trust.push(Array2::from_shape_fn(plane.dim(), |at| {
+            inverse_variance.push(Array2::from_shape_fn(plane.dim(), |at| {
                 let mean = (sums[at] / numbers[at].max(1.0)).max(0.0);
                 let variance = self.noise.variance(mean) + (error.about(channel, at) * mean.max(overall)).powi(2);
                 (known[at] * gain * gain / variance.max(f64::MIN_POSITIVE)) as f32
             }));
         }
-        (light, trust)
+        (light, inverse_variance)
     }
 }
 
 /// Pixels on both sides over which a mean signal is taken: about what the window of a kernel holds.
 const NEAR: usize = 16;
-
-/// Sums over squares about each pixel, as far as they are in the plane.
-pub(crate) fn box_sums(plane: &Array2<f64>, near: usize) -> Array2<f64> {
-    let along = |line: ndarray::ArrayView1<'_, f64>| -> Vec<f64> {
-        let mut running = vec![0.0];
-        line.iter().for_each(|v| running.push(running[running.len() - 1] + v));
-        let n = line.len();
-        (0..n)
-            .map(|i| running[(i + near + 1).min(n)] - running[i.saturating_sub(near)])
-            .collect()
-    };
-    let mut out = plane.clone();
-    for axis in [1, 0] {
-        for mut lane in out.lanes_mut(ndarray::Axis(axis)) {
-            let sums = along(lane.view());
-            lane.iter_mut().zip(sums).for_each(|(to, sum)| *to = sum);
-        }
-    }
-    out
-}
 
 #[cfg(test)]
 mod tests {
@@ -294,13 +277,19 @@ mod tests {
             for words in ["66.7 %", "light up to 2", "the frame is lost"] {
                 assert!(note.contains(words), "{note}");
             }
-            let (light, trust) = frame.light(&camera, &OperatorError::none(3));
+            let (light, inverse_variance) = frame.light(&camera, &OperatorError::none(3));
             // Unknown light is none; as it was recorded it is that of full scale.
             let recorded = frame.recorded_light(&camera);
             assert!(light[0].iter().all(|v| *v == 0.0) && recorded[1].iter().all(|v| *v == frame.full));
             assert!(light[2] == recorded[2]);
-            assert!(trust[0].iter().chain(&trust[1]).all(|t| *t == 0.0), "{gain_e}");
-            assert!(trust[2].iter().all(|t| *t > 0.0), "{gain_e}");
+            assert!(
+                inverse_variance[0]
+                    .iter()
+                    .chain(&inverse_variance[1])
+                    .all(|t| *t == 0.0),
+                "{gain_e}"
+            );
+            assert!(inverse_variance[2].iter().all(|t| *t > 0.0), "{gain_e}");
         }
     }
 
@@ -342,12 +331,17 @@ mod tests {
         // A quarter, of a scene whose white is one.
         let note = frame.saturation_note(&Array3::from_elem((1, 1, 3), 1.0)).unwrap();
         assert!(note.starts_with("25.0 %") && note.ends_with("fell on them"), "{note}");
-        let (light, trust) = frame.light(&camera, &OperatorError::none(3));
+        let (light, inverse_variance) = frame.light(&camera, &OperatorError::none(3));
         assert!(frame.is_of([40, 40], 3).is_ok());
         for (size, channels) in [([40, 41], 3), ([40, 40], 1)] {
             let error = frame.is_of(size, channels).unwrap_err().to_string();
             assert!(error.contains("another camera"), "{error}");
         }
-        assert!(light[0][[1, 1]] > 0.1 && trust[0][[1, 1]] > 0.0 && trust[0][[0, 0]] == 0.0 && trust[2][[0, 0]] == 0.0);
+        assert!(
+            light[0][[1, 1]] > 0.1
+                && inverse_variance[0][[1, 1]] > 0.0
+                && inverse_variance[0][[0, 0]] == 0.0
+                && inverse_variance[2][[0, 0]] == 0.0
+        );
     }
 }

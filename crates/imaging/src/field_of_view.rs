@@ -1,13 +1,14 @@
-//! What a camera, an array and its kernels can see: asked before and after work is spent on it.
+//! Field of view of a camera, an array and its kernels, checked before and after work is spent on it.
 
 use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_sensor::{Camera, ChannelSampling};
 
+use crate::chip::element_views;
+use crate::geometry::{ElementView, SceneView};
 use crate::kernels::BankSpec;
 use crate::scene::SceneImage;
 use crate::stray_light::{LightShares, StrayLight};
-use crate::{ElementView, SceneView, element_views};
 
 /// Least share of the light that travels to the sensor in the windows of the kernels: with less there is no image.
 /// `prototype_3x3` has 40 %.
@@ -18,10 +19,15 @@ const LEAST_IN_WINDOWS: f64 = 0.02;
 const LEAST_COVERED: f64 = 0.95;
 
 /// Kernels must hold a part of the light that can be called an image.
-pub fn check_windows(veil: &StrayLight, bases: usize, channels: &[ChannelSampling], spec: &BankSpec) -> Result<()> {
-    for (channel, shares) in channels.iter().zip(veil.budget.chunks(bases)) {
+pub fn check_windows(
+    stray_light: &StrayLight,
+    bases: usize,
+    channels: &[ChannelSampling],
+    spec: &BankSpec,
+) -> Result<()> {
+    for (channel, shares) in channels.iter().zip(stray_light.budget.chunks(bases)) {
         let all = LightShares::sum(shares);
-        let travelling = all.in_kernels + all.veil + all.beyond;
+        let travelling = all.in_kernels + all.stray_light + all.beyond;
         if all.in_kernels < LEAST_IN_WINDOWS * travelling {
             return Err(Error::refused(
                 "imaging/window-too-small",
@@ -167,16 +173,16 @@ mod tests {
             accurate: false,
         };
         let with = |in_kernels: f64| {
-            let mut veil = StrayLight::none(&camera.sensor, channels.len(), 2);
-            for shares in &mut veil.budget {
+            let mut stray_light = StrayLight::none(&camera.sensor, channels.len(), 2);
+            for shares in &mut stray_light.budget {
                 *shares = LightShares {
                     arrives: 1.0,
                     in_kernels,
-                    veil: 0.5,
+                    stray_light: 0.5,
                     ..LightShares::default()
                 };
             }
-            check_windows(&veil, 2, &channels, &spec)
+            check_windows(&stray_light, 2, &channels, &spec)
         };
         assert!(with(0.3).is_ok());
         let error = with(0.005).unwrap_err().to_string();

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use metalith_core::{AtomicFile, Result, srgb};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array3;
 use serde::Serialize;
@@ -10,7 +11,6 @@ use serde::Serialize;
 use crate::dataset::black_level;
 use crate::exposure::Frame;
 use crate::png16;
-use crate::restore::RestorationMethod;
 
 /// A frame as a PNG of 16 bits.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -29,7 +29,7 @@ impl FrameFile {
     /// Name of the file.
     pub const NAME: &'static str = "frame.png";
 
-    /// Of a frame of a camera.
+    /// File of a frame of a camera.
     pub fn of(camera: &Camera, frame: &Frame) -> Self {
         Self {
             file: Self::NAME.into(),

@@ -1,4 +1,5 @@
-//! Where a point of the scene is seen, and where each element puts it on the sensor.
+//! Geometry of scenes: the direction in which a point is seen, and the place on the sensor at which each element images
+//! it.
 //!
 //! The scene is a plane before the chip, in perspective: a place on it is the pair of tangents under which the middle of
 //! the chip sees its light arrive. Columns of a picture of the scene run along +x and rows along +y, so that the
@@ -64,7 +65,7 @@ impl SceneSpace {
         }
     }
 
-    /// With the distance of each pixel (um, positive).
+    /// Space of a scene with the distance of each pixel (um, positive).
     pub fn with_depth(view: &SceneView, um: &Array2<f32>) -> Self {
         let ends = um.iter().fold([f32::MAX, 0.0f32], |[a, b], v| [a.min(*v), b.max(*v)]);
         Self {
@@ -111,7 +112,7 @@ pub struct ElementView {
     pub wedge: Wedge,
     /// Area of the element that is open, over that of the lens that the elements of a design share.
     pub area: f64,
-    /// From the pillar tops to the sensor below the middle of the chip (um).
+    /// Distance from the pillar tops to the sensor below the middle of the chip (um).
     pub sensor_um: f64,
     /// Slope of the sensor's plane against the chip, along x and y.
     pub slope: [f64; 2],
@@ -132,7 +133,8 @@ impl ElementView {
         (cosine2 > 0.0).then(|| [0, 1].map(|a| sines[a] / cosine2.sqrt() - self.centre_um[a] / scene_distance_um))
     }
 
-    /// Where the chief ray of light from these sines meets the sensor, from the element's axis (um); none if it does not.
+    /// Place where the chief ray of light from these sines meets the sensor, from the element's axis (um); `None` if it
+    /// does not.
     pub fn landing_um(&self, sines: [f64; 2], wavelength_um: f64) -> Option<[f64; 2]> {
         let wave = PlaneWave {
             wavelength_um,
@@ -158,7 +160,7 @@ impl ElementView {
         [place_um[0] / length + x, place_um[1] / length + y]
     }
 
-    /// From the pillar tops to the sensor at a place from the element's axis (um).
+    /// Distance from the pillar tops to the sensor at a place from the element's axis (um).
     pub fn distance_um(&self, place_um: [f64; 2]) -> f64 {
         self.axis_distance_um() + self.slope[0] * place_um[0] + self.slope[1] * place_um[1]
     }

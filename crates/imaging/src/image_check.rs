@@ -1,4 +1,4 @@
-//! Whether frames can be recorded of all images of a set: asked before any work.
+//! Check that frames can be recorded of all images of a set, made before any work.
 
 use std::path::{Path, PathBuf};
 
@@ -73,7 +73,7 @@ fn most_frequent<'a>(sizes: impl Iterator<Item = &'a [usize; 2]>) -> Option<[usi
     counts.into_iter().rev().max_by_key(|(_, count)| *count).map(|c| c.0)
 }
 
-/// What is wrong with an image, without its path and the remedy.
+/// Reason why an image cannot be used, without its path and the remedy.
 fn reason(error: Error) -> String {
     match error {
         Error::Table { what, .. } | Error::Invalid { what, .. } => what,

@@ -4,58 +4,60 @@ use std::borrow::Cow;
 
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
+use metalith_restoration::{
+    FrameModel, LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples,
+    restore_separate,
+};
 use metalith_sensor::{Camera, ChannelSampling};
 use ndarray::{Array2, Array3};
 use sha2::{Digest, Sha256};
 
 use crate::approximation_set::ApproximationSet;
+use crate::colour::ChannelColours;
 use crate::exposure::{Frame, expose, gains, sensitivity};
+use crate::geometry::{ElementView, SceneSpace, SceneView};
 use crate::kernels::KernelBank;
 use crate::layout::PillarCount;
 use crate::operator::{BetweenNodes, Detail, FrameOperator, SceneInputs, ScenePoints};
 use crate::operator_error::OperatorError;
-use crate::restore::{
-    LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples, restore_separate,
-};
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::stray_light::StrayLight;
-use crate::{ChannelColours, ElementView, SceneSpace, SceneView};
 
-/// What pictures are taken with.
+/// Imaging system that takes pictures: a chip, its kernels and a camera.
 #[derive(Clone)]
 pub struct ImagingSystem {
     pub design: Design,
     pub camera: Camera,
     pub bank: KernelBank,
-    /// Which kernels of the bank are in force between its nodes, as scenes are simulated.
+    /// Rule for the kernels between the nodes of the bank, as scenes are simulated.
     pub between: BetweenNodes,
     /// Every how many-th of these nodes a restoration knows.
     pub(crate) restored_step: usize,
-    pub veil: StrayLight,
+    pub stray_light: StrayLight,
     pub elements: Vec<ElementView>,
     pub channels: Vec<ChannelSampling>,
     /// Spectra of the bank: those of the scenes, and the primaries of the restoration among or after them.
     pub basis: Vec<SceneSpectrum>,
-    /// How many of them are the scenes'.
+    /// Number of them that are the scenes'.
     pub(crate) scene_spectra: usize,
-    /// Where the primaries begin.
+    /// Index where the primaries begin.
     pub(crate) primaries: usize,
-    /// Of scenes as they are simulated, and of the pictures that are restored.
+    /// View of scenes as they are simulated, and of the pictures that are restored.
     pub view: SceneView,
-    /// Of scenes as they are given: another one if their pixels are finer than the points that the sensor's pixels look at. Then their
-    /// means over larger ones are simulated, and are the truth that pictures are held to.
+    /// View of scenes as they are given: another one if their pixels are finer than the points that the sensor's pixels
+    /// look at. Then their means over larger ones are simulated, and are the truth that pictures are held to.
     pub given: SceneView,
-    /// What the layout has of the pillars of its design, if it was counted.
+    /// Count of the pillars of its design that the layout has, if it was counted.
     pub pillars: Option<PillarCount>,
     /// Signal of a unit of light in each channel.
     pub gain: Vec<f64>,
     pub colours: ChannelColours,
-    /// Whether kernels and veil were found on the disk.
+    /// True if kernels and stray light were found on the disk.
     pub from_cache: [bool; 2],
-    /// What is assumed instead of what is known; nothing, unless asked for.
+    /// Assumptions in place of what is known; none, unless asked for.
     pub assumed: ApproximationSet,
-    /// What is known of pictures from photographs; as it comes with the program, unless another is put here.
+    /// Learned denoiser, trained on photographs: the shipped one, unless another is put here.
     pub prior: LearnedDenoiser,
 }
 
@@ -66,11 +68,10 @@ pub struct ImagingSystem {
 const TOGETHER: f64 = 2.0;
 
 impl ImagingSystem {
-    /// With the gain of each channel that the exposure of the camera asks for.
+    /// Same system with the gain of each channel that the exposure of the camera asks for.
     pub(crate) fn exposed(mut self) -> Result<Self> {
         let operator = self.restoration();
-        let ones = vec![Array2::<f32>::ones((self.view.rows, self.view.columns)); operator.inputs()];
-        let white = operator.apply(&ones);
+        let white = operator.apply(&operator.white());
         drop(operator);
         self.gain = gains(&self.camera, &sensitivity(&self.camera, &self.channels), &white)?;
         Ok(self)
@@ -86,10 +87,17 @@ impl ImagingSystem {
             assumed: self.assumed,
             ..detail
         };
-        FrameOperator::new(&self.bank, &self.veil, &self.elements, &self.camera, space, detail)
+        FrameOperator::new(
+            &self.bank,
+            &self.stray_light,
+            &self.elements,
+            &self.camera,
+            space,
+            detail,
+        )
     }
 
-    /// Of scenes as finely as they are known.
+    /// Detail of scenes as finely as they are known.
     pub(crate) fn finest(&self) -> Detail {
         Detail {
             between: self.between,
@@ -102,7 +110,7 @@ impl ImagingSystem {
         self.operator(self.finest())
     }
 
-    /// The same for one scene, with the distances of its pixels if it has them.
+    /// Operator for one scene, with the distances of its pixels if it has them.
     pub fn simulation_of(&self, scene: &SceneImage) -> FrameOperator<'_> {
         let scene = self.simulated(scene);
         let space = match &scene.depth_um {
@@ -112,8 +120,8 @@ impl ImagingSystem {
         self.operator_in(&space, self.finest())
     }
 
-    /// What a restoration knows of the same way: to it, colours of a scene are sums of three primaries. A camera that
-    /// tells no colours apart sees grey.
+    /// Operator of a restoration, which takes colours of a scene for sums of three primaries. A camera that
+    /// distinguishes no colours sees grey.
     pub fn restoration(&self) -> FrameOperator<'_> {
         let primaries = self.primaries();
         let inputs = match self.colours.has_colours() {
@@ -127,7 +135,7 @@ impl ImagingSystem {
         })
     }
 
-    /// Which spectra of the bank are the primaries of a restoration: red, green and blue.
+    /// Range of the spectra of the bank that are the primaries of a restoration: red, green and blue.
     pub fn primaries(&self) -> std::ops::Range<usize> {
         self.primaries..self.primaries + rgb_basis().len()
     }
@@ -160,18 +168,22 @@ impl ImagingSystem {
         Ok(expose(&self.camera, &self.gain, &light, seed))
     }
 
-    /// SHA-256 of all that decides the frame of a scene but its noise: kernels and veil, elements, camera, field, exposure.
+    /// SHA-256 of all that decides the frame of a scene but its noise: kernels and stray light, elements, camera, field, exposure.
     pub fn digest(&self) -> [u8; 32] {
         let mut hasher = Sha256::new();
         let distinct = self.bank.distinct.iter().map(|d| &d.values);
-        for number in distinct.chain([&self.veil.values]).flatten() {
+        for number in distinct.chain([&self.stray_light.values]).flatten() {
             hasher.update(number.to_le_bytes());
         }
         let camera = serde_json::to_vec(&self.camera).expect("plain data serialises");
         hasher.update(camera);
         hasher.update(format!(
-            "{:?} {:?} {:?} {:?} {:?}",
-            self.bank.elements, self.elements, self.view, self.gain, self.assumed
+            "{:?} {:?} {:?} {:?} {}",
+            self.bank.elements,
+            self.elements,
+            self.view,
+            self.gain,
+            self.assumed.digest_text()
         ));
         if self.between != BetweenNodes::Linear {
             hasher.update(format!("{:?}", self.between));
@@ -192,11 +204,11 @@ impl ImagingSystem {
         joint: bool,
         progress: &dyn Progress,
     ) -> Result<Array3<f64>> {
-        let [light, trust] = match (method, joint) {
+        let [light, inverse_variance] = match (method, joint) {
             (RestorationMethod::Tikhonov, true) => self.known(operator, &error.times(TOGETHER), frame)?,
             _ => self.known(operator, error, frame)?,
         };
-        let recorded = self.recorded(operator, &light, &trust);
+        let recorded = self.recorded(operator, &light, &inverse_variance);
         let planes = match joint {
             true => restore_joint(&recorded, method, progress)?,
             false => restore_separate(&recorded, method, progress)?,
@@ -217,9 +229,9 @@ impl ImagingSystem {
         light: &[Array2<f32>],
         progress: &dyn Progress,
     ) -> Result<[Array3<f64>; 2]> {
-        let [recorded, trust] = self.known(operator, &error.times(TOGETHER), frame)?;
+        let [recorded, inverse_variance] = self.known(operator, &error.times(TOGETHER), frame)?;
         let restored = |light: &[Array2<f32>]| -> Result<Array3<f64>> {
-            let recorded = self.recorded(operator, light, &trust);
+            let recorded = self.recorded(operator, light, &inverse_variance);
             let planes = restore_joint(&recorded, RestorationMethod::Tikhonov, progress)?;
             Ok(self.picture(operator, &planes))
         };
@@ -238,8 +250,8 @@ impl ImagingSystem {
         seeds: std::ops::Range<u64>,
         progress: &dyn Progress,
     ) -> Result<Vec<Array3<f64>>> {
-        let [light, trust] = self.known(operator, error, frame)?;
-        let recorded = self.recorded(operator, &light, &trust);
+        let [light, inverse_variance] = self.known(operator, error, frame)?;
+        let recorded = self.recorded(operator, &light, &inverse_variance);
         let drawn = restore_samples(&recorded, seeds, progress)?;
         Ok(drawn.iter().map(|planes| self.picture(operator, planes)).collect())
     }
@@ -248,17 +260,17 @@ impl ImagingSystem {
         &'a self,
         operator: &'a FrameOperator<'a>,
         light: &'a [Array2<f32>],
-        trust: &'a [Array2<f32>],
+        inverse_variance: &'a [Array2<f32>],
     ) -> Recorded<'a> {
         Recorded {
             operator,
             light,
-            trust,
+            inverse_variance,
             prior: &self.prior,
         }
     }
 
-    /// What a frame says: its light, and how far each pixel is to be trusted.
+    /// Light of a frame, and the weight of each pixel.
     fn known(
         &self,
         operator: &FrameOperator<'_>,
@@ -266,9 +278,9 @@ impl ImagingSystem {
         frame: &Frame,
     ) -> Result<[Vec<Array2<f32>>; 2]> {
         frame.is_of(operator.frame(), self.gain.len())?;
-        let (light, trust) = frame.light(&self.camera, error);
-        match trust.iter().flatten().any(|t| *t > 0.0) {
-            true => Ok([light, trust]),
+        let (light, inverse_variance) = frame.light(&self.camera, error);
+        match inverse_variance.iter().flatten().any(|t| *t > 0.0) {
+            true => Ok([light, inverse_variance]),
             false => Err(Error::refused(
                 "restore/all-saturated",
                 "nothing is known of the scene: every pixel that counts light is at full scale",
@@ -290,11 +302,11 @@ impl ImagingSystem {
     /// A frame as a picture without any restoration, linear sRGB `[row, column, colour]`: pixels where they look, over those
     /// of a white scene.
     pub fn unrestored(&self, operator: &FrameOperator<'_>, frame: &Frame) -> Array3<f64> {
-        let (light, trust) = frame.light(&self.camera, &OperatorError::none(self.gain.len()));
-        self.colours.rgb(&operator.unrestored(&light, &trust))
+        let (light, inverse_variance) = frame.light(&self.camera, &OperatorError::none(self.gain.len()));
+        self.colours.rgb(&operator.unrestored(&light, &inverse_variance))
     }
 
-    /// What a perfect camera with these channels would give of a scene: the truth that pictures are held to.
+    /// Image of a scene by a perfect camera with these channels: the truth that pictures are compared with.
     pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
         self.colours
             .rgb(&ChannelColours::ideal(&self.channels, &self.simulated(scene)))

@@ -1,4 +1,4 @@
-//! What scenes in a camera ask of the kernels and the veil of a chip.
+//! Plan of the kernels and the stray light of a chip that scenes in a camera need.
 
 use std::borrow::Cow;
 
@@ -7,40 +7,40 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_gds::extract::Extraction;
 use metalith_optics::{CalibratedModel, SimulationCase};
+use metalith_restoration::LearnedDenoiser;
 use metalith_sensor::{Blend, Camera, ChannelSampling, Sampling};
 use serde::Serialize;
 
 use crate::approximation_set::ApproximationSet;
+use crate::chip::{ChipInLight, element_views, sampling_of, sensor_um};
+use crate::colour::ChannelColours;
 use crate::field_of_view::{check_coverage, check_view, check_windows};
+use crate::geometry::{ElementView, SceneView};
 use crate::imaging_system::ImagingSystem;
-use crate::kernels::{BankSpec, KernelBank};
+use crate::kernels::{BankSpec, KernelBank, SMALL_UM};
 use crate::operator::BetweenNodes;
-use crate::restore::LearnedDenoiser;
 use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::stray_light::StrayLight;
-use crate::{ChannelColours, ChipInLight, ElementView, SceneView, element_views, sampling_of, sensor_um};
 
 /// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
-/// steeply is the veil's. A lens of the paper sees 60 degrees.
+/// steeply is the stray light's. A lens of the paper sees 60 degrees.
 const FIELD_DEG: f64 = 30.0;
 /// Nodes an axis of this field.
 const NODES: usize = 17;
-/// The same in light of narrow bands, where nothing but the sensor's pixels smooths the images, if so many can be held: two steps for
-/// one. A restoration knows no more of them than of the others.
+/// Number of nodes in light of narrow bands, where nothing but the sensor's pixels smooths the images, if so many can
+/// be held: two steps for one. A restoration knows no more of them than of the others.
 const NODES_OF_NARROW: usize = 2 * (NODES - 1) + 1;
-/// The same where six of them are to hold the rings of an image out of focus (455 nm behind a lens of 140 um) to a thousandth of its peak.
+/// Number of nodes where six of them are to hold the rings of an image out of focus (455 nm behind a lens of 140 um) to
+/// a thousandth of its peak.
 const NODES_OF_SIXFOLD: usize = 5 * (NODES - 1) / 2 + 1;
 /// Steps an axis between the nodes that a restoration knows.
 const RESTORED_STEPS: usize = (NODES - 1) / 2;
-/// Radius of lenses whose fast fields err by more than accurate ones, which cost as much there: what is seen of them is mostly the
-/// window of a kernel (um).
-pub(crate) const SMALL_UM: f64 = 150.0;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
 
 impl BankSpec {
-    /// For the elements of a design before a camera, in light of wide bands.
+    /// Specification for the elements of a design before a camera, in light of wide bands.
     pub fn standard(design: &Design, camera: &Camera) -> Self {
         Self {
             pixel_um: camera.sensor.pixel_um,
@@ -51,8 +51,8 @@ impl BankSpec {
         }
     }
 
-    /// With the nodes that light of a camera asks for, by how images follow from those at its wavelengths
-    /// ([`Sampling::blend`](metalith_sensor::Sampling)).
+    /// Same specification with the nodes that light of a camera asks for, by how images follow from those at its
+    /// wavelengths ([`Sampling::blend`](metalith_sensor::Sampling)).
     pub fn in_light(self, blend: Blend) -> Self {
         match blend {
             Blend::Linear => self,
@@ -66,8 +66,9 @@ impl BankSpec {
         }
     }
 
-    /// Which kernels are in force between its nodes in such light. What fields that are not accurate err by from node to node is no
-    /// polynomial: of kernels of `prototype_3x3` (530 nm, between 33 nodes) six err by 0.3 to 1.3 % of the peak, two by 0.8 to 1.1 %.
+    /// Rule for the kernels between its nodes in such light. The error of fields that are not accurate is no polynomial
+    /// from node to node: of kernels of `prototype_3x3` (530 nm, between 33 nodes) six err by 0.3 to 1.3 % of the peak,
+    /// two by 0.8 to 1.1 %.
     pub fn between_nodes(&self, blend: Blend) -> BetweenNodes {
         match blend {
             Blend::Cubic if self.accurate => BetweenNodes::Sixfold,
@@ -76,13 +77,13 @@ impl BankSpec {
     }
 }
 
-/// What scenes in a camera ask of kernels.
-pub(crate) struct Wanted<'a> {
+/// Plan of the kernels that scenes in a camera need.
+pub(crate) struct KernelPlan<'a> {
     design: &'a Design,
     camera: &'a Camera,
-    /// In the pixels that it is simulated in.
+    /// Scene in the pixels that it is simulated in.
     pub(crate) scene: Cow<'a, SceneImage>,
-    /// As it was given.
+    /// View of the scene as it was given.
     given: SceneView,
     elements: Vec<ElementView>,
     channels: Vec<ChannelSampling>,
@@ -93,7 +94,7 @@ pub(crate) struct Wanted<'a> {
     fewer_nodes: Option<usize>,
     /// Spectra of the scenes, and the primaries of the restoration among or after them.
     basis: Vec<SceneSpectrum>,
-    /// Where the primaries begin.
+    /// Index where the primaries begin.
     primaries: usize,
     pub(crate) spec: BankSpec,
 }
@@ -104,7 +105,7 @@ pub fn simulated_view(design: &Design, camera: &Camera, view: &SceneView) -> Sce
     view.no_finer(0.5 * camera.sensor.pixel_um / sensor_um(design, camera))
 }
 
-/// What decides a bank, as text.
+/// Inputs that decide a bank, as text.
 #[derive(Serialize)]
 struct Inputs<'a> {
     solver: u32,
@@ -114,21 +115,21 @@ struct Inputs<'a> {
     elements: &'a [ElementView],
     camera: &'a Camera,
     model: &'a str,
-    /// The cell that pillars are simulated by, and the wavelengths that it has tables of unlike neighbours for.
+    /// The cell that pillars are simulated by, and the wavelengths that it has tables of dissimilar neighbours for.
     fidelity: Fidelity,
     tabulated_um: &'a [f64],
-    /// Of pillars that change polarisation, the light of the scene and what of it reaches the sensor.
+    /// Light of the scene, and the part of it that reaches the sensor, for pillars that change polarisation.
     #[serde(skip_serializing_if = "Option::is_none")]
     polarised: Option<PolarisedLight>,
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
     scene_distance_um: f64,
-    /// Where light of narrow bands asks for wavelengths of its own, these (nm).
+    /// Wavelengths of light of narrow bands (nm), where it asks for its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     cubic_nm: Option<&'a [f64]>,
 }
 
-impl<'a> Wanted<'a> {
+impl<'a> KernelPlan<'a> {
     pub(crate) fn new(design: &'a Design, camera: &'a Camera, scene: &'a SceneImage) -> Result<Self> {
         let elements = element_views(design, camera);
         let given = scene.view;
@@ -169,12 +170,12 @@ impl<'a> Wanted<'a> {
         })
     }
 
-    /// What is to be known of the pixels of the scene, if they are not those that were given.
+    /// Note on the pixels of the scene, if they are not those that were given.
     pub(crate) fn averaging(&self) -> Option<String> {
         averaging(&self.given, &self.scene.view)
     }
 
-    /// What decides the kernels of a layout.
+    /// Inputs that decide the kernels of a layout.
     pub(crate) fn inputs(&self, layout: &str, model: Option<&CalibratedModel>) -> Result<Vec<u8>> {
         let lens = &self.design.lens;
         let model_text = model.map_or_else(String::new, |m| format!("{:?}", m.perturbation));
@@ -212,13 +213,13 @@ impl<'a> Wanted<'a> {
         ChipInLight::new(self.design, extraction, case, self.camera, distance_um, progress)
     }
 
-    /// With so many nodes whatever the light, and linear between them.
+    /// Same plan with so many nodes whatever the light, and linear between them.
     pub(crate) fn with_nodes(mut self, nodes: usize) -> Self {
         (self.spec.nodes, self.between, self.fewer_nodes) = (nodes, BetweenNodes::Linear, None);
         self
     }
 
-    /// As in light of wide bands: where one wavelength only stands for such a band.
+    /// Same plan as in light of wide bands, for one wavelength that stands for such a band.
     pub(crate) fn for_wide_bands(self) -> Self {
         self.with_nodes(NODES)
     }
@@ -242,7 +243,7 @@ impl<'a> Wanted<'a> {
         KernelBank::build(chip, &self.basis, spec, progress)
     }
 
-    pub(crate) fn veil(
+    pub(crate) fn stray_light(
         &self,
         chip: &ChipInLight<'_>,
         bank: &KernelBank,
@@ -251,16 +252,16 @@ impl<'a> Wanted<'a> {
         StrayLight::build(chip, bank, &self.basis, &self.camera.sensor, &self.scene.view, progress)
     }
 
-    pub(crate) fn studio(self, bank: KernelBank, veil: StrayLight) -> Result<ImagingSystem> {
-        check_windows(&veil, bank.bases, &self.channels, &bank.spec)?;
+    pub(crate) fn system(self, bank: KernelBank, stray_light: StrayLight) -> Result<ImagingSystem> {
+        check_windows(&stray_light, bank.bases, &self.channels, &bank.spec)?;
         let restored_step = self.restored_step(&bank.spec);
-        let studio = ImagingSystem {
+        let system = ImagingSystem {
             design: self.design.clone(),
             camera: self.camera.clone(),
             bank,
             between: self.between,
             restored_step,
-            veil,
+            stray_light,
             elements: self.elements,
             colours: ChannelColours::of(&self.channels),
             channels: self.channels,
@@ -275,11 +276,11 @@ impl<'a> Wanted<'a> {
             assumed: ApproximationSet::default(),
             prior: LearnedDenoiser::shipped()?,
         };
-        studio.exposed()
+        system.exposed()
     }
 }
 
-/// In words, that scenes of a view are averaged to the larger pixels of another; none if both are the same.
+/// Words for scenes of a view that are averaged to the larger pixels of another; `None` if both views are equal.
 pub(crate) fn averaging(given: &SceneView, view: &SceneView) -> Option<String> {
     let size = |v: &SceneView| format!("{} x {}", v.columns, v.rows);
     (given != view).then(|| {
@@ -303,20 +304,20 @@ mod tests {
         let scene = SceneImage::of_rgb("dark", &Array3::zeros((64, 64, 3)), 80.0, f64::INFINITY);
         for (camera, narrow) in [("gt1930", false), ("gt1930_mono", false), ("gt1930_narrow", true)] {
             let camera = Camera::read(format!("../../cameras/{camera}.toml").as_ref()).unwrap();
-            let wanted = Wanted::new(&design, &camera, &scene).unwrap();
+            let plan = KernelPlan::new(&design, &camera, &scene).unwrap();
             let (nodes, step) = if narrow { (NODES_OF_NARROW, 4) } else { (NODES, 2) };
-            assert_eq!(wanted.spec.nodes, nodes);
-            assert_eq!(wanted.fewer_nodes.is_some(), narrow);
+            assert_eq!(plan.spec.nodes, nodes);
+            assert_eq!(plan.fewer_nodes.is_some(), narrow);
             // A restoration knows as many of both, and of those behind small lenses.
-            assert_eq!(wanted.restored_step(&wanted.spec), step);
+            assert_eq!(plan.restored_step(&plan.spec), step);
             let small = BankSpec {
                 accurate: true,
-                ..wanted.spec
+                ..plan.spec
             };
             let small = small.in_light(if narrow { Blend::Cubic } else { Blend::Linear });
-            assert_eq!(wanted.restored_step(&small), if narrow { 5 } else { 2 });
-            let inputs = wanted.inputs("layout", None).unwrap();
-            let wide = wanted.for_wide_bands();
+            assert_eq!(plan.restored_step(&small), if narrow { 5 } else { 2 });
+            let inputs = plan.inputs("layout", None).unwrap();
+            let wide = plan.for_wide_bands();
             assert_eq!((wide.spec.nodes, wide.between), (NODES, BetweenNodes::Linear));
             assert_eq!(wide.inputs("layout", None).unwrap() == inputs, !narrow);
         }
@@ -344,13 +345,13 @@ mod tests {
         );
         let rgb = Array3::from_shape_fn((100, 2748, 3), |(y, x, _)| f64::from(u8::from((x + y) % 2 == 0)));
         let scene = SceneImage::of_rgb("fine", &rgb, 80.0, f64::INFINITY);
-        let wanted = Wanted::new(&design, &camera, &scene).unwrap();
+        let plan = KernelPlan::new(&design, &camera, &scene).unwrap();
         // Each pixel is the mean of four.
-        let SceneView { rows, columns, .. } = wanted.scene.view;
-        assert_eq!((wanted.given, rows, columns), (scene.view, 50, 1374));
-        assert!(wanted.scene.planes[0].iter().all(|v| *v == 0.5) && wanted.averaging().is_some());
+        let SceneView { rows, columns, .. } = plan.scene.view;
+        assert_eq!((plan.given, rows, columns), (scene.view, 50, 1374));
+        assert!(plan.scene.planes[0].iter().all(|v| *v == 0.5) && plan.averaging().is_some());
         let coarse = SceneImage::of_rgb("coarse", &Array3::zeros((64, 64, 3)), 80.0, f64::INFINITY);
-        let wanted = Wanted::new(&design, &camera, &coarse).unwrap();
-        assert!(matches!(wanted.scene, Cow::Borrowed(_)) && wanted.averaging().is_none());
+        let plan = KernelPlan::new(&design, &camera, &coarse).unwrap();
+        assert!(matches!(plan.scene, Cow::Borrowed(_)) && plan.averaging().is_none());
     }
 }

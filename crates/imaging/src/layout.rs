@@ -1,4 +1,4 @@
-//! Whether a layout is that of its design: asked before anything is simulated.
+//! Check that a layout is of its design, made before anything is simulated.
 
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
@@ -8,7 +8,7 @@ use metalith_pillars::PillarCheck;
 use metalith_report::count;
 use serde::{Deserialize, Serialize};
 
-/// What a layout has of the pillars of a design.
+/// Count of the pillars of a design that a layout has.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PillarCount {
     /// Pillars on the sites of elements.
@@ -25,7 +25,7 @@ pub struct PillarCount {
     pub why: String,
 }
 
-/// That each element of a design has pillars.
+/// Checks that each element of a design has pillars.
 ///
 /// # Errors
 /// If one has none: the layout is of another design.
@@ -63,7 +63,7 @@ pub fn check_elements(design: &Design, extraction: &Extraction) -> Result<()> {
     ))
 }
 
-/// Why shapes are no pillars of a design, in words; none where there are none.
+/// Reason why shapes are no pillars of a design, in words; `None` where there are none.
 fn why(foreign: &UnrecognisedShapes) -> String {
     let each = Why::ALL.into_iter().zip(foreign.by_why).filter(|(_, n)| *n > 0);
     let words: Vec<String> = each.map(|(why, n)| format!("{} {}", count(n), why.words())).collect();
@@ -71,7 +71,7 @@ fn why(foreign: &UnrecognisedShapes) -> String {
 }
 
 impl PillarCount {
-    /// Of what was read of a layout.
+    /// Count of the pillars read from a layout.
     ///
     /// # Errors
     /// If the user stopped it.
@@ -111,7 +111,7 @@ impl PillarCount {
         some.map(|(_, words)| words).collect()
     }
 
-    /// In words.
+    /// Words for the count.
     pub fn words(&self) -> String {
         let mut all = vec![format!("{} pillars on the sites of the design", count(self.pillars))];
         all.extend(self.differences());
@@ -121,7 +121,7 @@ impl PillarCount {
         all.join("; ")
     }
 
-    /// What is to be known before pictures are taken for those of the design; none of a layout that has its pillars.
+    /// Note to read before pictures are taken for pictures of the design; `None` for a layout that has its pillars.
     pub fn note(&self) -> Option<String> {
         let mut all = self.differences();
         if 2 * self.others > self.pillars {
@@ -151,7 +151,7 @@ mod tests {
         Design::parse(path, &text).unwrap()
     }
 
-    /// What is read, for the small array, of the layout of an array of a design.
+    /// Extraction of the layout of an array of a design, for the small array.
     fn read(written: &Design, change: impl FnOnce(&mut PillarArray)) -> Extraction {
         let mut array = PillarArray::build(written, &Silent).unwrap();
         change(&mut array);

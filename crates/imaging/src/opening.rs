@@ -1,4 +1,4 @@
-//! How a studio is opened: kernels and veil of a chip made, or taken from the disk.
+//! Opening of an imaging system: kernels and stray light of a chip made, or taken from the disk.
 
 use std::path::Path;
 
@@ -12,21 +12,22 @@ use metalith_layout::read_pillars;
 use metalith_optics::{AsBuiltChip, CalibratedModel, SimulationCase};
 use metalith_sensor::Camera;
 
+use crate::cache_file;
+use crate::geometry::SceneView;
 use crate::imaging_system::ImagingSystem;
-use crate::kept::KernelCache;
-use crate::kernel_plan::Wanted;
+use crate::kernel_cache::KernelCache;
+use crate::kernel_plan::KernelPlan;
 use crate::layout::{PillarCount, check_elements};
 use crate::scene::SceneImage;
-use crate::{SceneView, cache};
 
 impl ImagingSystem {
-    /// For a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes of a field. Kernels
-    /// and veil are kept on the disk.
+    /// Opens a system for a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes
+    /// of a field. Kernels and stray light are kept on the disk.
     ///
     /// # Errors
     /// If the layout cannot be read or has no pillars in one of the elements, the camera does not
     /// see the chip, a scene is wider than the array sees, a spectral cube has not the wavelengths that the camera counts, kernels or
-    /// veil are too large, or the user stopped it. That they cannot be kept is a warning to `progress`, and so are pillars that are
+    /// stray light are too large, or the user stopped it. That they cannot be kept is a warning to `progress`, and so are pillars that are
     /// not those of the design, and scenes with finer pixels than are simulated ([`simulated_view`](crate::simulated_view)).
     pub fn open(
         design: &Design,
@@ -36,57 +37,57 @@ impl ImagingSystem {
         scene: &SceneImage,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::open_kept(design, layout, camera, model, scene, &KernelCache::of_user(), progress)
+        Self::open_cached(design, layout, camera, model, scene, &KernelCache::of_user(), progress)
     }
 
-    /// The same with kernels and veil that are kept elsewhere.
+    /// Variant of [`ImagingSystem::open`] with kernels and stray light that are cached elsewhere.
     ///
     /// # Errors
     /// As [`ImagingSystem::open`]; if nothing may be made and something is not there, or what was made cannot be kept in a folder that
     /// was asked for.
-    pub fn open_kept(
+    pub fn open_cached(
         design: &Design,
         layout: &Path,
         camera: &Camera,
         model: Option<&CalibratedModel>,
         scene: &SceneImage,
-        kept: &KernelCache,
+        cache: &KernelCache,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::open_wanted(
-            Wanted::new(design, camera, scene)?,
+        Self::open_planned(
+            KernelPlan::new(design, camera, scene)?,
             design,
             layout,
             model,
-            kept,
+            cache,
             progress,
         )
     }
 
-    /// For what was said to be wanted of a design.
-    pub(crate) fn open_wanted(
-        wanted: Wanted<'_>,
+    /// Opens a system by the plan of a design.
+    pub(crate) fn open_planned(
+        plan: KernelPlan<'_>,
         design: &Design,
         layout: &Path,
         model: Option<&CalibratedModel>,
-        kept: &KernelCache,
+        cache: &KernelCache,
         progress: &dyn Progress,
     ) -> Result<Self> {
         progress.begin("reading the layout", 1);
         let digest = hex(&file_digest(layout)?);
-        let inputs = wanted.inputs(&digest, model)?;
+        let inputs = plan.inputs(&digest, model)?;
         let SceneView {
             rows,
             columns,
             field_deg,
             ..
-        } = wanted.scene.view;
+        } = plan.scene.view;
         let field = format!("{rows}x{columns} {field_deg}");
-        let veil_inputs = [&inputs[..], field.as_bytes()].concat();
-        let folder = kept.folder.as_deref();
-        let bank = folder.and_then(|f| cache::kept_bank(f, &inputs));
-        let veil = folder.and_then(|f| cache::kept_veil(f, &veil_inputs));
-        let from_cache = [bank.is_some(), veil.is_some()];
+        let stray_light_inputs = [&inputs[..], field.as_bytes()].concat();
+        let folder = cache.folder.as_deref();
+        let bank = folder.and_then(|f| cache_file::cached_bank(f, &inputs));
+        let stray_light = folder.and_then(|f| cache_file::cached_stray_light(f, &stray_light_inputs));
+        let from_cache = [bank.is_some(), stray_light.is_some()];
         if let (
             KernelCache {
                 folder: Some(folder),
@@ -94,7 +95,7 @@ impl ImagingSystem {
                 ..
             },
             [false, _] | [_, false],
-        ) = (kept, from_cache)
+        ) = (cache, from_cache)
         {
             return Err(Error::refused(
                 "imaging/kernels-missing",
@@ -108,20 +109,20 @@ impl ImagingSystem {
         };
         let mut extraction = None;
         let count_inputs = format!("{digest} {}", design.digest()).into_bytes();
-        let mut pillars = folder.and_then(|f| cache::kept_pillars(f, &count_inputs));
-        if pillars.is_none() && kept.make {
+        let mut pillars = folder.and_then(|f| cache_file::cached_pillars(f, &count_inputs));
+        if pillars.is_none() && cache.make {
             let count = PillarCount::of(design, extraction.insert(read()?), progress)?;
-            let write = |folder: &Path| cache::keep_pillars(folder, &count_inputs, &count);
-            kept.keep("the count of the pillars is", write, progress)?;
+            let write = |folder: &Path| cache_file::cache_pillars(folder, &count_inputs, &count);
+            cache.keep("the count of the pillars is", write, progress)?;
             pillars = Some(count);
         }
         let notes = pillars.as_ref().and_then(PillarCount::note);
         notes
             .into_iter()
-            .chain(wanted.averaging())
+            .chain(plan.averaging())
             .for_each(|note| progress.warn(&note));
-        let (bank, veil) = match (bank, veil) {
-            (Some(bank), Some(veil)) => (bank, veil),
+        let (bank, stray_light) = match (bank, stray_light) {
+            (Some(bank), Some(stray_light)) => (bank, stray_light),
             (bank, _) => {
                 let extraction = match extraction {
                     Some(extraction) => extraction,
@@ -132,39 +133,39 @@ impl ImagingSystem {
                 let case = match model {
                     Some(model) => {
                         made = AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
-                        SimulationCase::Made(&made)
+                        SimulationCase::from(&made)
                     }
                     None => {
                         models = cell_models(design, &[design.verify.fidelity])?;
-                        SimulationCase::Cell(models[0].as_ref())
+                        models[0].as_ref().into()
                     }
                 };
-                let chip = wanted.chip(&extraction, case, progress)?;
+                let chip = plan.chip(&extraction, case, progress)?;
                 let bank = match bank {
                     Some(bank) => bank,
                     None => {
-                        let bank = wanted.bank(&chip, progress)?;
-                        let write = |folder: &Path| cache::keep_bank(folder, &inputs, &bank);
-                        kept.keep("the kernels are", write, progress)?;
+                        let bank = plan.bank(&chip, progress)?;
+                        let write = |folder: &Path| cache_file::cache_bank(folder, &inputs, &bank);
+                        cache.keep("the kernels are", write, progress)?;
                         bank
                     }
                 };
-                let veil = wanted.veil(&chip, &bank, progress)?;
-                let write = |folder: &Path| cache::keep_veil(folder, &veil_inputs, &veil);
-                kept.keep("the veil is", write, progress)?;
-                (bank, veil)
+                let stray_light = plan.stray_light(&chip, &bank, progress)?;
+                let write = |folder: &Path| cache_file::cache_stray_light(folder, &stray_light_inputs, &stray_light);
+                cache.keep("the stray light is", write, progress)?;
+                (bank, stray_light)
             }
         };
         Ok(Self {
             from_cache,
             pillars,
-            ..wanted.studio(bank, veil)?
+            ..plan.system(bank, stray_light)?
         })
     }
 
-    /// For pillars that were read and a case that is at hand, such as one of many draws of a chip: nothing is kept on the
-    /// disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as for [`ImagingSystem::open`]
-    /// if left out.
+    /// Opens a system for pillars that were read and a case in memory, such as one of many draws of a chip: nothing is
+    /// stored on the disk. `nodes`: places an axis of the field of each element at which kernels are formed, as many as
+    /// for [`ImagingSystem::open`] if left out.
     ///
     /// # Errors
     /// As [`ImagingSystem::open`].
@@ -177,14 +178,14 @@ impl ImagingSystem {
         nodes: Option<usize>,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let mut wanted = Wanted::new(design, camera, scene)?;
+        let mut plan = KernelPlan::new(design, camera, scene)?;
         check_elements(design, extraction)?;
         if let Some(nodes) = nodes {
-            wanted = wanted.with_nodes(nodes);
+            plan = plan.with_nodes(nodes);
         }
-        let chip = wanted.chip(extraction, case, progress)?;
-        let bank = wanted.bank(&chip, progress)?;
-        let veil = wanted.veil(&chip, &bank, progress)?;
-        wanted.studio(bank, veil)
+        let chip = plan.chip(extraction, case, progress)?;
+        let bank = plan.bank(&chip, progress)?;
+        let stray_light = plan.stray_light(&chip, &bank, progress)?;
+        plan.system(bank, stray_light)
     }
 }

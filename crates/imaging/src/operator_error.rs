@@ -1,13 +1,13 @@
-//! What the operator of a restoration errs by against the simulation, pixel by pixel.
+//! Error of the operator of a restoration against the simulation, pixel by pixel.
 
 use ndarray::Array2;
 
-use crate::exposure::box_sums;
+use metalith_wave::kernels::box_sums;
 
 /// Errors of an operator as shares of the light, root mean square.
 #[derive(Clone, Debug, Default)]
 pub struct OperatorError {
-    /// Of each channel's frame.
+    /// Error of each channel's frame.
     pub overall: Vec<f64>,
     /// About each pixel, by channel; none where it is the same everywhere.
     local: Vec<Array2<f32>>,
@@ -23,18 +23,18 @@ const TOLD: f64 = 0.03;
 const ABOUT: usize = 24;
 
 impl OperatorError {
-    /// Of an operator without error.
+    /// Error of an operator that has none.
     pub fn none(channels: usize) -> Self {
         Self::uniform(vec![0.0; channels])
     }
 
-    /// The same share everywhere in a channel.
+    /// Error that is the same share everywhere in a channel.
     pub fn uniform(overall: Vec<f64>) -> Self {
         let local = Vec::new();
         Self { overall, local }
     }
 
-    /// Of frames that are known as others, by channel, in the pixels that count one.
+    /// Error between frames and reference frames, by channel, in the pixels that count one.
     pub fn between(
         light: &[Array2<f32>],
         known: &[Array2<f32>],
@@ -62,7 +62,7 @@ impl OperatorError {
         error
     }
 
-    /// The same errors, so many times as large.
+    /// Same errors, so many times as large.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         Self {
@@ -71,7 +71,8 @@ impl OperatorError {
         }
     }
 
-    /// What to say of a restoration that this limits, with the worst of its channels of these names; nothing where it does not.
+    /// Note on a restoration that this error limits, with the worst of its channels of these names; `None` where it
+    /// does not.
     pub fn note(&self, channels: &[String]) -> Option<String> {
         let worst = self.overall.iter().zip(channels).max_by(|a, b| a.0.total_cmp(b.0));
         let (error, channel) = worst.filter(|(error, _)| **error > TOLD)?;

@@ -7,14 +7,14 @@ use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table,
 use metalith_sensor::{Camera, ColourFilter};
 use ndarray::{Array2, Array3};
 
-use crate::approximation_set::AssumedScore;
+use crate::approximation_scores::AssumedScore;
 use crate::exposure::Frame;
 use crate::files::write_restored;
 use crate::point_image;
 use crate::report::{Assumption, PictureReport};
 use crate::resolution::ContrastCurve;
 use crate::score::Zone;
-use crate::uncertainty::{DoubtReport, Uncertainty, root_mean_square};
+use crate::uncertainty::{Uncertainty, UncertaintyReport, root_mean_square};
 
 /// Pictures beside the numbers.
 pub struct PicturePages<'a> {
@@ -22,11 +22,11 @@ pub struct PicturePages<'a> {
     /// Linear sRGB.
     pub scene: &'a Array3<f64>,
     pub frame: &'a Frame,
-    /// By each way of restoring, linear sRGB, in the order of the report; the page shows the first.
+    /// Restored pictures by each method, linear sRGB, in the order of the report; the page shows the first.
     pub restored: &'a [Array3<f64>],
     pub camera: &'a Camera,
-    /// What samples say, if any were drawn.
-    pub doubt: Option<&'a Uncertainty>,
+    /// Uncertainty from samples, if any were drawn.
+    pub uncertainty: Option<&'a Uncertainty>,
 }
 
 /// Edge of a zoom (pixels of the scene).
@@ -106,7 +106,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
     let names = pages.camera.channel_names();
     let head = pictures_side_by_side(pages.scene, pages.frame, &pages.restored[0], &names);
     page.figure(head.caption(
-        "The frame is what the sensor records, neighbours' light and veil included; its mosaic is shown as colours. The picture is restored from this frame alone.",
+        "The frame is what the sensor records, neighbours' light and stray light included; its mosaic is shown as colours. The picture is restored from this frame alone.",
     ));
     let first = &report.restorations[0];
     let whole = &first.scores[0];
@@ -141,8 +141,8 @@ fn page(pages: &PicturePages<'_>) -> Page {
     ]);
     zooms(&mut page, pages);
     errors(&mut page, pages);
-    if let (Some(found), Some(numbers)) = (pages.doubt, &report.doubt) {
-        doubt(&mut page, found, numbers);
+    if let (Some(found), Some(numbers)) = (pages.uncertainty, &report.uncertainty) {
+        uncertainty(&mut page, found, numbers);
     }
     contrast(&mut page, &report.contrast);
     scores(&mut page, report);
@@ -190,19 +190,19 @@ fn map(title: &str, values: &Array2<f64>, what: &str) -> HeatMap {
     HeatMap::new(title, upwards, axis("column", columns), axis("row from below", rows)).values(what, "")
 }
 
-/// What samples say: where they differ, detail is invented.
-fn doubt(page: &mut Page, doubt: &Uncertainty, report: &DoubtReport) {
+/// Section of the samples: where they differ, detail is invented.
+fn uncertainty(page: &mut Page, uncertainty: &Uncertainty, report: &UncertaintyReport) {
     page.section("How sure the picture is");
     let mut row = PhotoRow::new("Mean of samples", 250.0);
-    row.photo("mean", &doubt.mean.mapv(srgb::encoded));
+    row.photo("mean", &uncertainty.mean.mapv(srgb::encoded));
     page.figure(row.caption(format!(
         "{} pictures that the frame may be of were drawn by the learnt prior; their mean has {} dB.",
-        doubt.samples,
+        uncertainty.samples,
         fixed(report.scores[0].psnr_db, 2)
     )));
-    let map = map("Uncertainty", &doubt.spread, "deviation");
+    let map = map("Uncertainty", &uncertainty.spread, "deviation");
     page.figure(map.caption(format!(
-        "Deviation of the samples from their mean, of sRGB values: where it is large, detail is invented. The order of the pixels by doubt and that by true error have a rank correlation of {}. It says where, not how much: samples deviate by {} on average, their mean errs by {}.",
+        "Deviation of the samples from their mean, of sRGB values: where it is large, detail is invented. The order of the pixels by uncertainty and that by true error have a rank correlation of {}. It says where, not how much: samples deviate by {} on average, their mean errs by {}.",
         fixed(report.rank_correlation, 2),
         fixed(report.spread, 3),
         fixed(report.error, 3)
@@ -270,11 +270,11 @@ fn budget(page: &mut Page, report: &PictureReport) {
     for channel in &report.budget {
         let s = &channel.shares;
         let share = |v: f64| 100.0 * v / s.arrives;
-        let sum = s.in_kernels + s.veil + s.beyond + s.evanescent + s.not_passed;
+        let sum = s.in_kernels + s.stray_light + s.beyond + s.evanescent + s.not_passed;
         table.row([
             Cell::from(channel.channel.as_str()),
             Cell::fixed(share(s.in_kernels), 2),
-            Cell::fixed(share(s.veil), 2),
+            Cell::fixed(share(s.stray_light), 2),
             Cell::fixed(share(s.beyond), 2),
             Cell::fixed(share(s.not_passed), 2),
             Cell::fixed(share(s.evanescent), 2),
@@ -283,7 +283,7 @@ fn budget(page: &mut Page, report: &PictureReport) {
         ]);
     }
     page.table(table.caption(
-        "Of the light that arrives at the openings of all elements from a white scene. Images are what lands within the kernels' windows; undiffracted light is a part of veil and of what lands beside the sensor. What is not passed is reflected, absorbed, left in the glass, or leaves more steeply than half a wavelength over the pitch.",
+        "Of the light that arrives at the openings of all elements from a white scene. Images are what lands within the kernels' windows; undiffracted light is a part of stray light and of what lands beside the sensor. What is not passed is reflected, absorbed, left in the glass, or leaves more steeply than half a wavelength over the pitch.",
     ));
 }
 
@@ -320,7 +320,7 @@ pub(crate) fn list_assumptions(page: &mut Page, all: &[Assumption]) {
 fn worth(page: &mut Page, cases: &[AssumedScore]) {
     let Some(physics) = cases.first() else { return };
     page.section("What the assumptions of others are worth");
-    let mut columns = vec![Column::text("ApproximationSet")];
+    let mut columns = vec![Column::text("Approximation")];
     for zone in Zone::ALL {
         columns.push(Column::number(format!("PSNR, {}", zone.name()), "dB"));
     }

@@ -14,7 +14,7 @@ const SOURCE: &str = "metalith source";
 pub(crate) const WHITE: u16 = u16::MAX;
 /// Longest file (bytes), and most bytes of its numbers.
 pub(crate) const LONGEST: u64 = 1 << 30;
-/// What a whole file ends with.
+/// Bytes that a whole file ends with.
 const END: &[u8] = b"\0\0\0\0IEND\xaeB`\x82";
 
 /// Planes below one another, full scale being one, and what they were made from. Nothing has the number `black`, full scale
@@ -47,8 +47,8 @@ pub fn write_picture(path: &Path, values: &Array3<f64>) -> Result<()> {
     AtomicFile::write(path, &colour(values, None))
 }
 
-/// What the picture of a file was made from; none if the file is damaged or does not say so, or its numbers are not those that were
-/// written with it.
+/// Source that the picture of a file was made from; `None` if the file is damaged or does not say so, or its numbers
+/// are not those that were written with it.
 pub(crate) fn source_of(bytes: &[u8]) -> Option<String> {
     if !bytes.ends_with(END) {
         return None;

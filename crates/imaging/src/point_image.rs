@@ -97,7 +97,7 @@ pub fn section(page: &mut Page, images: &[PointImage], pixel_um: f64) {
         grid.image(format!("{}, {}", image.element, image.channel), image.values.clone());
     }
     page.figure(grid.caption(
-        "A point in the middle of the field of each distinct element, white in the camera's light, by what each channel counts of it: wavelengths that a wedge sends elsewhere land there. Energy in a pixel of the sensor, as a share of the light of the channel that arrives at the element. The window of the kernels, four decades; what lands outside is in the veil.",
+        "A point in the middle of the field of each distinct element, white in the camera's light, by what each channel counts of it: wavelengths that a wedge sends elsewhere land there. Energy in a pixel of the sensor, as a share of the light of the channel that arrives at the element. The window of the kernels, four decades; what lands outside is in the stray light.",
     ));
     let mut table = Table::new([
         Column::text("Element"),

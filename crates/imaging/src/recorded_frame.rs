@@ -13,7 +13,7 @@ use crate::exposure::{Frame, planes_of, recorded};
 use crate::imaging_system::ImagingSystem;
 use crate::png16;
 
-/// What the numbers of a frame's file stand for.
+/// Meaning of the numbers of a frame's file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameNumbers {
     /// Number where there is no signal; 0 if left out.
@@ -26,7 +26,7 @@ pub struct FrameNumbers {
 struct Grey {
     numbers: Vec<u16>,
     is_deep: bool,
-    /// Whether this program wrote it, with levels that are known.
+    /// True if this program wrote it, with levels that are known.
     is_own: bool,
 }
 

@@ -1,15 +1,15 @@
-//! What is found of a picture.
-
-use nalgebra::DMatrix;
-use ndarray::Array3;
-use serde::Serialize;
+//! Report of a picture.
 
 use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
 use metalith_design::Design;
 use metalith_optics::{CalibratedModel, ModelStatement};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
+use nalgebra::DMatrix;
+use ndarray::Array3;
+use serde::Serialize;
 
-use crate::approximation_set::AssumedScore;
+use crate::approximation_scores::AssumedScore;
 use crate::chip::sensor_um;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
@@ -19,14 +19,13 @@ use crate::layout::PillarCount;
 use crate::operator::BetweenNodes;
 use crate::point_image::PointImage;
 use crate::resolution::ContrastCurve;
-use crate::restore::RestorationMethod;
 use crate::scene::SceneImage;
 use crate::score::ZoneScore;
 use crate::spectra::rgb_basis;
 use crate::stray_light::LightShares;
-use crate::uncertainty::DoubtReport;
+use crate::uncertainty::UncertaintyReport;
 
-/// What is said of a frame, simulated or recorded, whatever is made of it.
+/// Statement of a frame, simulated or recorded, whatever is made of it.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameStatement {
     pub design: String,
@@ -36,15 +35,15 @@ pub struct FrameStatement {
     /// Distance of the scene (mm); none for one that is far.
     pub distance_mm: Option<f64>,
     pub saturated: usize,
-    /// The same as a share of all pixels.
+    /// Share of all pixels that are saturated.
     pub saturated_share: f64,
     /// The calibrated model that the chip is made by, if one was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelStatement>,
-    /// What is to be known before anything else: pixels that were lost, scenes and layouts that are not what they seem.
+    /// Notes to read before anything else: pixels that were lost, scenes and layouts that are not what they seem.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// What the operator of the restoration errs by, by channel; see [`crate::Rehearsal::operator_error`].
+    /// Error of the operator of the restoration, by channel; see [`crate::ForecastScene::operator_error`].
     pub operator_error: Vec<f64>,
     pub assumptions: Vec<Assumption>,
 }
@@ -59,7 +58,7 @@ impl FrameStatement {
         )
     }
 
-    /// What the operator of the restoration errs by, channel by channel.
+    /// Words for the error of the operator of the restoration, channel by channel.
     pub(crate) fn error_words(&self) -> String {
         let each = self.operator_error.iter();
         let words: Vec<String> = each
@@ -68,10 +67,10 @@ impl FrameStatement {
         words.join(", ")
     }
 
-    /// Of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. Notes and what the
-    /// operator errs by are added.
+    /// Statement of a frame behind a layout whose file has this name; its chip is made by a model, if one is given. The
+    /// caller adds notes and the error of the operator.
     pub fn new(
-        studio: &ImagingSystem,
+        system: &ImagingSystem,
         layout: String,
         scene: &SceneImage,
         frame: &Frame,
@@ -79,16 +78,16 @@ impl FrameStatement {
     ) -> Self {
         let fidelity = match model {
             Some(_) => Fidelity::Calibrated,
-            None => studio.design.verify.fidelity,
+            None => system.design.verify.fidelity,
         };
         let model = model.map(ModelStatement::of);
-        let mut assumptions = studio.assumptions(scene, fidelity);
+        let mut assumptions = system.assumptions(scene, fidelity);
         assumptions.extend(model.iter().flat_map(Assumption::of_model));
         let distance_mm = scene.view.distance_um * 1e-3;
         Self {
-            design: studio.design.name.clone(),
+            design: system.design.name.clone(),
             layout,
-            camera: studio.camera.name.clone(),
+            camera: system.camera.name.clone(),
             field_deg: scene.view.field_deg,
             distance_mm: distance_mm.is_finite().then_some(distance_mm),
             saturated: frame.saturated,
@@ -117,10 +116,10 @@ pub struct PictureReport {
     /// Contrast of fine detail, for scenes that say it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub contrast: Vec<ContrastCurve>,
-    /// What samples say, if any were drawn.
+    /// Uncertainty from samples, if any were drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub doubt: Option<DoubtReport>,
-    /// What the assumptions of others are worth, if asked for.
+    pub uncertainty: Option<UncertaintyReport>,
+    /// Worth of the assumptions of others, if asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub worth: Vec<AssumedScore>,
 }
@@ -129,25 +128,25 @@ pub struct PictureReport {
 #[derive(Clone, Debug, Serialize)]
 pub struct RestorationReport {
     pub method: String,
-    /// By all elements at once, or each alone.
+    /// True if by all elements at once; false for each alone.
     pub joint: bool,
     /// Name of the file of the picture, 16 bits in sRGB.
     pub picture: String,
     pub scores: Vec<ZoneScore>,
     /// Expected PSNR of linear light in each zone (dB), of natural scenes, where there is a forecast.
     pub forecast_db: Vec<f64>,
-    /// The same of scenes with the spectrum of this one.
+    /// Forecast for scenes with the spectrum of this one (dB).
     pub forecast_of_scene_db: Vec<f64>,
 }
 
-/// Where the light of one channel goes.
+/// Budget of the light of one channel.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChannelBudget {
     pub channel: String,
     pub shares: LightShares,
 }
 
-/// How far chief rays are from the best homography.
+/// Distance of chief rays from the best homography.
 #[derive(Clone, Debug, Serialize)]
 pub struct HomographyResidual {
     pub element: String,
@@ -164,7 +163,7 @@ pub struct Assumption {
 }
 
 impl Assumption {
-    /// What a calibrated model says: where it comes from, what it changes, and what of it is not applied.
+    /// Assumptions of a calibrated model: where it comes from, what it changes, and what of it is not applied.
     pub fn of_model(model: &ModelStatement) -> Vec<Self> {
         let of = |quantity: &str, value: String| Self {
             what: format!("`{quantity}` of the model"),
@@ -184,7 +183,7 @@ impl Assumption {
 }
 
 impl RestorationReport {
-    /// Of a method.
+    /// Report of a method.
     pub fn new(method: RestorationMethod, joint: bool, scores: Vec<ZoneScore>) -> Self {
         Self {
             method: method.name().to_owned(),
@@ -198,7 +197,7 @@ impl RestorationReport {
 }
 
 impl ImagingSystem {
-    /// What is to be known of a frame before its picture is looked at; `truth` is the scene in linear sRGB.
+    /// Notes on a frame, to read before its picture is viewed; `truth` is the scene in linear sRGB.
     pub fn notes(&self, frame: &Frame, truth: &Array3<f64>) -> Vec<String> {
         let layout = self.pillars.as_ref().and_then(PillarCount::note);
         let all = [frame.saturation_note(truth), layout, averaging(&self.given, &self.view)];
@@ -207,7 +206,10 @@ impl ImagingSystem {
 
     /// Light budget of each channel for a white scene.
     pub fn budget(&self) -> Vec<ChannelBudget> {
-        let channels = self.channels.iter().zip(self.veil.budget.chunks(self.bank.bases));
+        let channels = self
+            .channels
+            .iter()
+            .zip(self.stray_light.budget.chunks(self.bank.bases));
         channels
             .map(|(channel, shares)| ChannelBudget {
                 channel: channel.name.clone(),
@@ -216,7 +218,7 @@ impl ImagingSystem {
             .collect()
     }
 
-    /// What the best homography between scene and sub-image misses, for each element and channel.
+    /// Residual of the best homography between scene and sub-image, for each element and channel.
     pub fn homographies(&self) -> Vec<HomographyResidual> {
         let mut all = Vec::new();
         for (k, element) in self.design.elements().iter().enumerate() {
@@ -258,7 +260,7 @@ impl ImagingSystem {
         points
     }
 
-    /// What was assumed of a scene and of everything else, in words.
+    /// Assumptions on a scene and on everything else, in words.
     pub fn assumptions(&self, scene: &SceneImage, fidelity: Fidelity) -> Vec<Assumption> {
         let cell = match fidelity {
             Fidelity::Neighbours => {
@@ -306,7 +308,7 @@ impl ImagingSystem {
             assumption(
                 "window of a kernel",
                 format!(
-                    "{} pixels; what lands outside is the veil, in squares of {} pixels",
+                    "{} pixels; what lands outside is the stray light, in squares of {} pixels",
                     spec.window,
                     crate::stray_light::CELL_PIXELS
                 ),
@@ -315,7 +317,7 @@ impl ImagingSystem {
                 "wavelengths",
                 format!(
                     "at most {} nm apart, nearer in the light of narrow lamps; between them the PSF is blended and moves with the chief ray",
-                    crate::chip::STEP_NM
+                    metalith_sensor::WavelengthSteps::USUAL_NM
                 ),
             ),
             assumption("sensor", place_of_sensor(&self.design, &self.camera)),
@@ -355,7 +357,7 @@ impl ImagingSystem {
     }
 }
 
-/// Where the sensor is, against the focal lengths of lenses.
+/// Place of the sensor, relative to the focal lengths of lenses.
 fn place_of_sensor(design: &Design, camera: &Camera) -> String {
     let distance_um = sensor_um(design, camera);
     let source = match camera.sensor.distance_um {
@@ -382,7 +384,7 @@ fn place_of_sensor(design: &Design, camera: &Camera) -> String {
     format!("{distance_um} um behind the pillar tops in the middle of the chip, {source}{others}")
 }
 
-/// What is assumed of the polarisation of the scene, at pillars that give this light the phase of the design.
+/// Assumption on the polarisation of the scene, at pillars that give this light the phase of the design.
 fn polarised(focused: FocusedLight, light: PolarisedLight) -> String {
     let arriving = light.arriving_at(focused);
     let own = focused.polarisation();
@@ -390,10 +392,10 @@ fn polarised(focused: FocusedLight, light: PolarisedLight) -> String {
         true => format!("all light arrives {arriving}, as behind a filter"),
         false => format!("all light arrives {arriving}, and pillars focus what arrives {own}"),
     };
-    format!("{source}; {}, in image and veil", light.detector(focused))
+    format!("{source}; {}, in image and stray light", light.detector(focused))
 }
 
-/// Where the spectra of a scene come from.
+/// Source of the spectra of a scene.
 fn spectra_of(scene: &SceneImage) -> String {
     if scene.basis == rgb_basis() {
         return "smooth reflectances of sRGB after Mallett and Yuksel (2019)".into();

@@ -1,4 +1,4 @@
-//! How much contrast of fine detail a frame and a picture keep, from scenes whose truth is a formula.
+//! Resolution: the contrast of fine detail that a frame and a picture keep, from scenes whose truth is a formula.
 //!
 //! A slanted edge gives the whole curve: places near it are sorted by their distance from it into quarters of a pixel, the
 //! step is differentiated, and its spectrum is that of a line (ISO 12233). A Siemens star gives one frequency for each
@@ -46,7 +46,7 @@ const STAR_MOST: f64 = 0.2;
 /// Curves of the frame behind the element that looks ahead, channel by channel, and of the picture; none for a scene from
 /// which they cannot be read.
 pub fn contrast_curves(
-    studio: &ImagingSystem,
+    system: &ImagingSystem,
     kind: BuiltIn,
     truth: &Array3<f64>,
     frame: &Frame,
@@ -54,17 +54,17 @@ pub fn contrast_curves(
 ) -> Vec<ContrastCurve> {
     let grey = |a: &Array3<f64>| a.mean_axis(ndarray::Axis(2)).expect("three colours");
     let (truth, picture) = (grey(truth), grey(picture));
-    let mut all: Vec<(String, Vec<Sample>)> = (0..studio.channels.len())
+    let mut all: Vec<(String, Vec<Sample>)> = (0..system.channels.len())
         .map(|c| {
             (
-                format!("frame, {}", studio.channels[c].name),
-                of_frame(studio, c, frame, &truth),
+                format!("frame, {}", system.channels[c].name),
+                of_frame(system, c, frame, &truth),
             )
         })
         .collect();
     all.push(("picture".into(), of_picture(&picture, &truth)));
     // Cycles a pixel to cycles a degree.
-    let per_degree = 1.0 / studio.view.pixel().atan().to_degrees();
+    let per_degree = 1.0 / system.view.pixel().atan().to_degrees();
     let points = |samples: &[Sample]| match kind {
         BuiltIn::Edge => edge(samples),
         BuiltIn::Star => star(samples, STAR * truth.ncols() as f64),
@@ -91,17 +91,17 @@ fn of_picture(picture: &Array2<f64>, truth: &Array2<f64>) -> Vec<Sample> {
 }
 
 /// The pixels that count a channel behind the element whose wedge is the least.
-fn of_frame(studio: &ImagingSystem, channel: usize, frame: &Frame, truth: &Array2<f64>) -> Vec<Sample> {
+fn of_frame(system: &ImagingSystem, channel: usize, frame: &Frame, truth: &Array2<f64>) -> Vec<Sample> {
     let wedge = |k: &usize| {
-        let w = studio.elements[*k].wedge;
+        let w = system.elements[*k].wedge;
         w.sin_x.hypot(w.sin_y)
     };
-    let ahead = (0..studio.elements.len()).min_by(|a, b| wedge(a).total_cmp(&wedge(b)));
-    let Some(element) = ahead.map(|k| studio.elements[k]) else {
+    let ahead = (0..system.elements.len()).min_by(|a, b| wedge(a).total_cmp(&wedge(b)));
+    let Some(element) = ahead.map(|k| system.elements[k]) else {
         return Vec::new();
     };
-    let (sensor, view) = (&studio.camera.sensor, &studio.view);
-    let names = studio.camera.channel_names();
+    let (sensor, view) = (&system.camera.sensor, &system.view);
+    let names = system.camera.channel_names();
     let plane = &frame.planes[channel.min(frame.planes.len() - 1)];
     let mut samples = Vec::new();
     for ((row, column), value) in plane.indexed_iter() {
@@ -110,13 +110,13 @@ fn of_frame(studio: &ImagingSystem, channel: usize, frame: &Frame, truth: &Array
         }
         let on_chip = sensor.place_um([row, column]);
         let place = [0, 1].map(|axis| on_chip[axis] - element.centre_um[axis]);
-        let sines = element.sines_of_landing(place, studio.bank.channel_um[channel]);
+        let sines = element.sines_of_landing(place, system.bank.channel_um[channel]);
         let Some(tangents) = element.tangents(sines, view.distance_um) else {
             continue;
         };
         let [y, x] = view.place(tangents);
         let inside = |v: f64, n: usize| v >= 0.0 && v + 1.0 < n as f64;
-        if place.iter().all(|v| v.abs() < studio.bank.spec.reach_um) && inside(y, view.rows) && inside(x, view.columns)
+        if place.iter().all(|v| v.abs() < system.bank.spec.reach_um) && inside(y, view.rows) && inside(x, view.columns)
         {
             samples.push(Sample {
                 x: x - 0.5 * (view.columns as f64 - 1.0),
@@ -136,7 +136,7 @@ fn between(plane: &Array2<f64>, y: f64, x: f64) -> f64 {
         + (plane[[i + 1, j]] * (1.0 - v) + plane[[i + 1, j + 1]] * v) * u
 }
 
-/// From the middle of a slanted edge: cycles a pixel, and contrast.
+/// Contrast from the middle of a slanted edge: cycles a pixel, and contrast.
 fn edge(samples: &[Sample]) -> Vec<(f64, f64)> {
     let lean = LEAN_DEG.to_radians();
     let bins = (2.0 * NEAR * BINS) as usize;
@@ -171,7 +171,8 @@ fn edge(samples: &[Sample]) -> Vec<(f64, f64)> {
     (1..=(0.5 / STEP) as usize).filter_map(contrast).collect()
 }
 
-/// From a star of a radius (pixels): cycles a pixel, and contrast. Rings of which a part is not seen say nothing.
+/// Contrast from a star of a radius (pixels): cycles a pixel, and contrast. Rings of which a part is not seen say
+/// nothing.
 fn star(samples: &[Sample], reach: f64) -> Vec<(f64, f64)> {
     let contrast = |k: usize| {
         let cycles = k as f64 * STEP;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use metalith_core::{Result, srgb};
 use metalith_report::{Page, PhotoRow, fixed, write_json};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array3;
 use serde::Serialize;
@@ -12,9 +13,8 @@ use crate::exposure::Frame;
 use crate::files::{picture_file, write_restored};
 use crate::page::{list_assumptions, shown};
 use crate::report::FrameStatement;
-use crate::restore::RestorationMethod;
 
-/// What the page of a restored frame says, in numbers.
+/// Numbers of the page of a restored frame.
 #[derive(Clone, Debug, Serialize)]
 pub struct RestoredReport {
     /// Name of the file of the frame.
@@ -28,14 +28,14 @@ pub struct RestoredReport {
 #[derive(Clone, Debug, Serialize)]
 pub struct RestoredPicture {
     pub method: String,
-    /// By all elements at once, or each alone.
+    /// True if by all elements at once; false for each alone.
     pub joint: bool,
     /// Name of the file of the picture, 16 bits in sRGB.
     pub picture: String,
 }
 
 impl RestoredPicture {
-    /// Of a method.
+    /// Picture of a method.
     pub fn new(method: RestorationMethod, joint: bool) -> Self {
         Self {
             method: method.name().to_owned(),

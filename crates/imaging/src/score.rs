@@ -1,29 +1,13 @@
-//! How near a restored picture comes to its scene.
-
-use std::ops::RangeInclusive;
+//! Score of a restored picture: its similarity to its scene.
 
 use metalith_core::srgb::encoded;
 use metalith_core::{Error, Result, part};
-use metalith_wave::restore::{psnr_db, ssim_colour};
+use metalith_restoration::{psnr_db, ssim_colour};
 use ndarray::Array3;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::SceneView;
-use crate::scene::SIDES;
-
-/// Least and longest side of a scene whose pictures are scored (pixels): a third of the least holds the window of the similarity,
-/// 11 pixels wide.
-pub const SCORED_SIDES: RangeInclusive<usize> = 33..=4096;
-
-/// How many pixels scenes have, for messages.
-pub(crate) fn sides_words() -> String {
-    format!(
-        "{} to {} pixels a side; where pictures are not scored (`dataset`, `train`, `denoise`) {} are enough",
-        SCORED_SIDES.start(),
-        SCORED_SIDES.end(),
-        SIDES.start()
-    )
-}
+use crate::geometry::SceneView;
+use crate::scene::{SCORED_SIDES, sides_words};
 
 /// PSNR of pictures that are equal (dB). It stands for infinity, which JSON does not know; rounding in single precision leaves 140.
 pub const MOST_DB: f64 = 200.0;
@@ -76,7 +60,7 @@ pub struct ZoneScore {
     /// Peak signal to noise ratio of sRGB values (dB), at most [`MOST_DB`].
     #[serde(deserialize_with = "decibels")]
     pub psnr_db: f64,
-    /// The same of linear light (dB).
+    /// Peak signal-to-noise ratio of linear light (dB).
     #[serde(deserialize_with = "decibels")]
     pub psnr_linear_db: f64,
     /// Structural similarity of sRGB values, mean over the colours.
@@ -108,7 +92,7 @@ pub fn psnr_words(db: f64) -> String {
     }
 }
 
-/// Whether pictures of a scene can be scored: asked before they are taken.
+/// Checks that pictures of a scene can be scored, before they are taken.
 ///
 /// # Errors
 /// If it is too small for the zones of the field.

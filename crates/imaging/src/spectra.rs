@@ -73,7 +73,7 @@ fn colour_rows() -> DMatrix<f64> {
     rows
 }
 
-/// From tristimulus values to linear sRGB whose white is that of a flat reflectance.
+/// Matrix from tristimulus values to linear sRGB whose white is the white of a flat reflectance.
 fn from_xyz(rows: &DMatrix<f64>) -> Matrix3<f64> {
     let primaries = Matrix3::from_fn(|c, p| {
         let [x, y] = PRIMARIES[p];
@@ -191,7 +191,7 @@ fn kkt(smooth: &DMatrix<f64>, equal: &DMatrix<f64>, penalty: f64) -> DMatrix<f64
 mod tests {
     use super::*;
 
-    /// Of sums over 41 samples, solved through singular values.
+    /// Tolerance of sums over 41 samples, solved through singular values.
     const ROUNDING: f64 = 1e-6;
 
     #[test]

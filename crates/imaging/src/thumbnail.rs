@@ -6,13 +6,13 @@ use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_optics::CalibratedModel;
 use metalith_report::{Figure, fixed};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 
 use crate::field_of_view::widest_field_deg;
-use crate::forecast_scene::Rehearsal;
+use crate::forecast_scene::ForecastScene;
 use crate::imaging_system::ImagingSystem;
 use crate::page::pictures_side_by_side;
-use crate::restore::RestorationMethod;
 use crate::scene::{BuiltIn, chart};
 use crate::score::scores;
 
@@ -20,7 +20,7 @@ use crate::score::scores;
 const PIXELS: usize = 512;
 /// Angle from its left to its right edge (degrees), or less where the array does not see as much.
 const MOST_DEG: u32 = 80;
-/// Of the noise.
+/// Seed of the noise.
 const SEED: u64 = 1;
 
 /// Scene, frame and picture of a Siemens star in the camera of a layout, by Tikhonov and all elements. The star fills 80 degrees,
@@ -37,12 +37,12 @@ pub fn thumbnail(
 ) -> Result<Figure> {
     let field_deg = widest_field_deg(design, camera, PIXELS, MOST_DEG)?;
     let scene = chart(BuiltIn::Star, PIXELS, field_deg, f64::INFINITY);
-    let studio = ImagingSystem::open(design, layout, camera, model, &scene, progress)?;
-    let frame = studio.record(&studio.simulation(), &scene, SEED)?;
-    let operator = studio.restoration();
-    let error = Rehearsal::new(&studio, &operator).operator_error;
-    let picture = studio.restore(&operator, &error, &frame, RestorationMethod::Tikhonov, true, progress)?;
-    let truth = studio.truth(&scene);
+    let system = ImagingSystem::open(design, layout, camera, model, &scene, progress)?;
+    let frame = system.record(&system.simulation(), &scene, SEED)?;
+    let operator = system.restoration();
+    let error = ForecastScene::new(&system, &operator).operator_error;
+    let picture = system.restore(&operator, &error, &frame, RestorationMethod::Tikhonov, true, progress)?;
+    let truth = system.truth(&scene);
     let names = camera.channel_names();
     let whole = scores(&picture, &truth)?[0];
     Ok(pictures_side_by_side(&truth, &frame, &picture, &names).caption(format!(

@@ -1,4 +1,4 @@
-//! How sure a restored picture is: samples of the pictures that the frame may be of.
+//! Uncertainty of a restored picture: samples of the pictures that the frame may be of.
 
 use ndarray::{Array2, Array3, Axis};
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::score::{ZoneScore, scores};
 use metalith_core::{Result, srgb};
 
-/// What samples say together.
+/// Statistics of samples.
 #[derive(Clone, Debug)]
 pub struct Uncertainty {
     /// Their mean, linear sRGB `[row, column, colour]`.
@@ -18,20 +18,20 @@ pub struct Uncertainty {
 
 /// Uncertainty beside the truth.
 #[derive(Clone, Debug, Serialize)]
-pub struct DoubtReport {
+pub struct UncertaintyReport {
     pub samples: usize,
-    /// Of the mean of the samples.
+    /// Scores of the mean of the samples.
     pub scores: Vec<ZoneScore>,
     /// Mean deviation of the samples (sRGB values).
     pub spread: f64,
     /// Mean error of their mean, in the same unit: more than the spread, as samples know nothing of what all of them miss.
     pub error: f64,
-    /// How well the order of the pixels by their doubt is that by their error (Spearman's rank correlation).
+    /// Rank correlation (Spearman's) of the order of the pixels by their uncertainty with the order by their error.
     pub rank_correlation: f64,
 }
 
 impl Uncertainty {
-    /// Of pictures in linear sRGB; at least two.
+    /// Uncertainty from pictures in linear sRGB; at least two.
     pub fn of(pictures: &[Array3<f64>]) -> Self {
         let n = pictures.len() as f64;
         let mut mean = Array3::zeros(pictures[0].dim());
@@ -55,9 +55,9 @@ impl Uncertainty {
     ///
     /// # Errors
     /// If the picture is too small to be scored.
-    pub fn report(&self, truth: &Array3<f64>) -> Result<DoubtReport> {
+    pub fn report(&self, truth: &Array3<f64>) -> Result<UncertaintyReport> {
         let error = root_mean_square(&self.mean.mapv(srgb::encoded), &truth.mapv(srgb::encoded));
-        Ok(DoubtReport {
+        Ok(UncertaintyReport {
             samples: self.samples,
             scores: scores(&self.mean, truth)?,
             spread: self.spread.mean().unwrap_or(0.0),
@@ -118,15 +118,15 @@ mod tests {
     }
 
     #[test]
-    fn samples_that_differ_in_one_place_doubt_it() {
+    fn samples_that_differ_in_one_place_are_uncertain_there() {
         let one = Array3::from_elem((20, 20, 3), 0.5);
         let mut other = one.clone();
         other[[3, 4, 1]] = 0.7;
-        let doubt = Uncertainty::of(&[one.clone(), other]);
-        assert!((doubt.mean[[3, 4, 1]] - 0.6).abs() < 1e-12);
+        let uncertainty = Uncertainty::of(&[one.clone(), other]);
+        assert!((uncertainty.mean[[3, 4, 1]] - 0.6).abs() < 1e-12);
         let step = srgb::encoded(0.7) - srgb::encoded(0.5);
         // Two samples of one colour in three: half of the step squared, twice, over one, over three.
-        assert!((doubt.spread[[3, 4]] - step * (0.5f64 / 3.0).sqrt()).abs() < 1e-12);
-        assert_eq!(doubt.spread[[0, 0]], 0.0);
+        assert!((uncertainty.spread[[3, 4]] - step * (0.5f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!(uncertainty.spread[[0, 0]], 0.0);
     }
 }

@@ -1,6 +1,6 @@
 //! Pictures of lenses that are no squares on a square lattice: where their light goes, against what their cells pass.
 
-use metalith_cell::{Analyser, CellModel, PolarisedTables};
+use metalith_cell::{Analyser, CellModel, CellResponse, Illumination, PolarisedTables};
 use metalith_core::Silent;
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
@@ -57,13 +57,13 @@ fn camera(nm: f64) -> Camera {
 struct Taken<'a> {
     chip: ChipInLight<'a>,
     bank: KernelBank,
-    veil: StrayLight,
+    stray_light: StrayLight,
 }
 
 fn taken<'a>(design: &Design, extraction: &'a Extraction, cell: &'a dyn CellModel, nm: f64) -> Taken<'a> {
     let camera = camera(nm);
     let scene = SceneImage::of_rgb("white", &Array3::from_elem((20, 20, 3), 1.0), FIELD_DEG, f64::INFINITY);
-    let case = SimulationCase::Cell(cell);
+    let case = SimulationCase::from(cell);
     let chip = ChipInLight::new(design, extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
     let spec = BankSpec {
         pixel_um: camera.sensor.pixel_um,
@@ -73,8 +73,12 @@ fn taken<'a>(design: &Design, extraction: &'a Extraction, cell: &'a dyn CellMode
         accurate: true,
     };
     let bank = KernelBank::build(&chip, &scene.basis, spec, &Silent).unwrap();
-    let veil = StrayLight::build(&chip, &bank, &scene.basis, &camera.sensor, &scene.view, &Silent).unwrap();
-    Taken { chip, bank, veil }
+    let stray_light = StrayLight::build(&chip, &bank, &scene.basis, &camera.sensor, &scene.view, &Silent).unwrap();
+    Taken {
+        chip,
+        bank,
+        stray_light,
+    }
 }
 
 /// Share of the light that arrives at the pillars of the only element and leaves it as the tables of a cell say, mean over
@@ -96,12 +100,18 @@ fn passed(
     nm.iter().map(of).sum::<f64>() / nm.len() as f64
 }
 
+/// Answer of a cell for one wavelength (um) of a band.
+fn in_band(cell: &dyn CellModel, um: f64, last: u16) -> CellResponse {
+    cell.response(&Illumination::normal(um).in_band(), last, &Silent)
+        .unwrap()
+}
+
 /// Image, veil and what is lost are all the light, and what is not passed is what the cells do not pass.
 fn assert_all_light(taken: &Taken<'_>, wanted: f64) {
     /// Directions with next to no power are left out of blocks, tables are in single precision.
     const LIGHT: f64 = 2e-3;
-    for shares in &taken.veil.budget {
-        let travels = shares.in_kernels + shares.veil + shares.beyond + shares.evanescent;
+    for shares in &taken.stray_light.budget {
+        let travels = shares.in_kernels + shares.stray_light + shares.beyond + shares.evanescent;
         let all = travels + shares.not_passed;
         assert!((all / shares.arrives - 1.0).abs() < LIGHT, "{shares:?}");
         let found = 1.0 - shares.not_passed / shares.arrives;
@@ -125,9 +135,9 @@ fn a_hexagonal_lens_takes_pictures() {
     assert!(!design.cell.lattice.is_square());
     let cell = cell_models(&design, &[design.verify.fidelity]).unwrap().remove(0);
     let um = nm * 1e-3;
-    let table = cell.transmissions_in_band(um, design.cell.most()).unwrap();
+    let table = in_band(cell.as_ref(), um, design.cell.most()).focused().unwrap();
     let taken = taken(&design, &extraction, cell.as_ref(), nm);
-    let of = |um| cell.transmissions_in_band(um, design.cell.most()).unwrap();
+    let of = |um| in_band(cell.as_ref(), um, design.cell.most()).focused().unwrap();
     let wanted = passed(&extraction, &taken.chip.sampling.wavelengths_nm, cell.as_ref(), of);
     assert_all_light(&taken, wanted);
 
@@ -169,9 +179,9 @@ fn a_hexagonal_lens_takes_pictures() {
     }
 }
 
-/// What rotated rectangles do not convert is in the picture, and behind an analyser it is not.
+/// Light that rotated rectangles do not convert is in the picture, and behind an analyser it is not.
 #[test]
-fn light_that_is_not_converted_is_in_the_veil() {
+fn light_that_is_not_converted_is_in_the_stray_light() {
     let nm = 532.0;
     let small = [
         ("diameter_um = 80", "diameter_um = 20"),
@@ -187,10 +197,10 @@ fn light_that_is_not_converted_is_in_the_veil() {
         let taken = taken(&design, &extraction, cell.as_ref(), nm);
         let (most, nm) = (design.cell.most(), &taken.chip.sampling.wavelengths_nm);
         let converted = passed(&extraction, nm, cell.as_ref(), |um| {
-            cell.transmissions_in_band(um, most).unwrap()
+            in_band(cell.as_ref(), um, most).focused().unwrap()
         });
         let other = passed(&extraction, nm, cell.as_ref(), |um| {
-            match cell.polarised_in_band(um, most).unwrap() {
+            match in_band(cell.as_ref(), um, most).polarised() {
                 Some(PolarisedTables::Hands(hands)) => hands.unconverted[0].clone(),
                 other => panic!("{other:?}"),
             }
@@ -201,16 +211,16 @@ fn light_that_is_not_converted_is_in_the_veil() {
         } else {
             converted + other
         };
-        println!("{converted} {other} {:?}", taken.veil.budget);
+        println!("{converted} {other} {:?}", taken.stray_light.budget);
         assert_all_light(&taken, wanted);
-        shares.push(taken.veil.budget[0].zero_order / taken.veil.budget[0].arrives);
+        shares.push(taken.stray_light.budget[0].zero_order / taken.stray_light.budget[0].arrives);
     }
     // What is not converted leaves as one wave, for all pillars do alike what they do not convert.
     assert!(shares[0] > 0.1 && shares[1] < 0.02, "{shares:?}");
 }
 
-/// Where light goes, of a small lens of pillars that are no half-wave plates, as shares of what arrives: in kernels, in veil and
-/// beyond, as one wave, not passed.
+/// Budget of the light of a small lens of pillars that are no half-wave plates, as shares of what arrives: in kernels,
+/// in stray light and beyond, as one wave, not passed.
 fn budget(light: &str) -> ([f64; 4], Vec<f32>) {
     let line = format!("[verify]\n{light}\n");
     let small = [
@@ -222,8 +232,8 @@ fn budget(light: &str) -> ([f64; 4], Vec<f32>) {
     let (design, extraction) = lens("geometric_phase_532", &small);
     let cell = cell_models(&design, &[design.verify.fidelity]).unwrap().remove(0);
     let taken = taken(&design, &extraction, cell.as_ref(), 532.0);
-    let shares = taken.veil.budget[0];
-    let rest = shares.veil + shares.beyond;
+    let shares = taken.stray_light.budget[0];
+    let rest = shares.stray_light + shares.beyond;
     let parts = [shares.in_kernels, rest, shares.zero_order, shares.not_passed].map(|v| v / shares.arrives);
     (parts, taken.bank.distinct[0].in_window.clone())
 }
@@ -231,7 +241,7 @@ fn budget(light: &str) -> ([f64; 4], Vec<f32>) {
 /// Behind two linear analysers that are crossed is all of the light, in kernels and beyond them.
 #[test]
 fn crossed_analysers_have_all_of_the_light() {
-    /// Kernels are kept in single precision, and blocks of the veil leave out directions with next to no power.
+    /// Kernels are kept in single precision, and blocks of the stray light leave out directions with next to no power.
     const SUM: f64 = 1e-3;
     let [all, along, across] = ["", "analyser = 30", "analyser = -60"].map(|light| budget(light).0);
     println!("{all:.4?} {along:.4?} {across:.4?}");
@@ -253,7 +263,7 @@ fn crossed_analysers_have_all_of_the_light() {
 /// and all the rest. (Where the rest lands is scaled by how much it is, and no mean.)
 #[test]
 fn unpolarised_scenes_are_the_mean_of_both_hands() {
-    /// Kernels are kept in single precision, and blocks of the veil leave out directions with next to no power.
+    /// Kernels are kept in single precision, and blocks of the stray light leave out directions with next to no power.
     const MEAN: f64 = 5e-4;
     let of = |light: &str| budget(&format!("polarisation = \"{light}\""));
     let [left, right, mean] = ["left", "right", "unpolarised"].map(of);

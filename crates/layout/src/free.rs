@@ -12,14 +12,14 @@ use metalith_design::array::PillarArray;
 use metalith_design::{Hierarchy, LayoutLayer};
 use metalith_pillars::PillarShape;
 
-/// What a layout needs beside its pillars.
+/// Contents of a layout other than its pillars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FreeLayout<'a> {
     /// Name of the top cell: letters, digits and `_`.
     pub top: &'a str,
-    /// Of the pillars.
+    /// Layer of the pillars.
     pub layer: LayerNumber,
-    /// What the pillars are.
+    /// Shape of the pillars.
     pub shape: PillarShape,
 }
 

@@ -13,16 +13,16 @@ use metalith_core::{AtomicFile, Error, Result};
 /// Version of the format that is written. The first called its perturbation `departure`; it is still read.
 const SCHEMA: u32 = 2;
 
-/// What a session has taught, in a file that later designs are simulated and compensated with.
+/// Model that a session has calibrated, in a file that later designs are simulated and compensated with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibratedModel {
     schema: u32,
     /// The session that it comes from.
     pub set: String,
-    /// In words: what was found.
+    /// Finding of the calibration, in words.
     pub finding: String,
-    /// How chips and bench differ from what is stated.
+    /// Differences of chips and bench from what is stated.
     #[serde(alias = "departure")]
     pub perturbation: Perturbation,
 }
@@ -38,7 +38,8 @@ impl CalibratedModel {
         }
     }
 
-    /// Nothing, if pillars of a stack can be as the model says that are drawn so often, by width or number, on each of some elements.
+    /// Succeeds if pillars of a stack that are drawn so often, by width or number, on each of some elements can be as
+    /// the model says.
     ///
     /// # Errors
     /// If the bias of all widths leaves nothing of the narrowest that is drawn, or joins the widest.
@@ -53,7 +54,8 @@ impl CalibratedModel {
         }
     }
 
-    /// The same of pillars whose edges are drawn from the one to the other of these (nm), `nearest_nm` from middle to middle.
+    /// Check of pillars whose edges are drawn from the one to the other of these (nm), `nearest_nm` from middle to
+    /// middle.
     fn check_bias(&self, edges_nm: [f64; 2], nearest_nm: f64) -> Result<()> {
         let bias_nm = self.perturbation.geometry.cd_bias_nm;
         let [narrowest, widest] = edges_nm.map(|nm| nm + bias_nm);
@@ -199,6 +201,7 @@ mod tests {
             .replace("missing_pillars = 0.0", "missing_pillars = nan");
         std::fs::write(&path, &wrong).unwrap();
         let error = CalibratedModel::read(&path).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
         let Error::Text(faults) = error else { panic!("{error}") };
         for key in ["stray_light", "missing_pillars"] {
             let line = wrong.lines().position(|line| line.starts_with(key)).unwrap();
@@ -206,6 +209,5 @@ mod tests {
             let place = faults.line_column(fault.span.start);
             assert_eq!(place, (line + 1, key.len() + 4), "{faults}");
         }
-        assert_eq!(error.exit_code(), 2);
     }
 }

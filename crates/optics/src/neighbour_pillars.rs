@@ -22,14 +22,15 @@ pub struct NeighbourPillars<'a> {
     /// Column of each drawn width (nm); that after the last stands for no pillar.
     columns: Vec<u16>,
     count: usize,
-    /// By own column.
+    /// Terms by own column.
     own: Vec<Complex32>,
-    /// By offset, own column and neighbour's.
+    /// Terms by offset, own column and neighbour's.
     pairs: Vec<Complex32>,
 }
 
 impl<'a> NeighbourPillars<'a> {
-    /// In light of one polarisation, 0 for s and 1 for p: as [`NeighbourPillars::new`], with responses for s and p.
+    /// Pillars in light of one polarisation, 0 for s and 1 for p: as [`NeighbourPillars::new`], with responses for s
+    /// and p.
     ///
     /// # Errors
     /// As [`NeighbourPillars::new`].

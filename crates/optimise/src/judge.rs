@@ -1,4 +1,4 @@
-//! What was gained: Strehl ratios off the grid that was optimised on, three ways.
+//! Gain of an optimisation: Strehl ratios off the grid that was optimised on, three ways.
 
 use std::path::Path;
 
@@ -64,7 +64,7 @@ impl OptimiseTask {
         judging_wavelengths(self.spec.band_um.0 * 1e3, self.spec.band_um.1 * 1e3)
     }
 
-    /// From the widths that phases (turns) make, with one cell.
+    /// Strehl ratios from the widths that phases (waves) give, with one cell.
     ///
     /// # Errors
     /// If the cell does not cover the band.
@@ -74,7 +74,7 @@ impl OptimiseTask {
         Ok(Judged::new("rings", cell.fidelity(), strehl, largest_step(turns)))
     }
 
-    /// From the pillars of a layout of the lens alone, summed over every pillar.
+    /// Strehl ratios from the pillars of a layout of the lens alone, summed over every pillar.
     ///
     /// # Errors
     /// If a width is none that a phase is mapped to, or the cell does not cover the band.
@@ -88,7 +88,7 @@ impl OptimiseTask {
     /// draw. `cells` as in [`OptimiseTask::solve`].
     ///
     /// # Errors
-    /// If a cell does not cover the band, or knows unlike neighbours.
+    /// If a cell does not cover the band, or is coupled.
     pub fn judge_errors(
         &self,
         turns: &[f64],

@@ -32,6 +32,7 @@ mod solvers;
 pub use cells::TaskCells;
 pub use image::deconvolution::Deconvolution;
 pub use image::pupil::Pupil;
+pub use image::scene::Scene;
 pub use image::views::Views;
 pub use image::window::PixelWindow;
 pub use judge::{Judged, lens_alone};

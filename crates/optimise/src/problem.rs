@@ -1,9 +1,14 @@
 //! The merit that a design asks for.
 
+use metalith_cell::{CellModel, Fidelity};
+use metalith_core::{Progress, Result};
+use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
+use metalith_wave::camera::Noise;
 use rayon::prelude::*;
 
 use crate::PixelWindow;
 use crate::image::deconvolution::Deconvolution;
+use crate::image::scene::Scene;
 use crate::image::views::Views;
 use crate::merit::field::{FieldProblem, MeritKind};
 use crate::merit::field_point::FieldPoint;
@@ -11,11 +16,6 @@ use crate::merit::focus::{FabricationError, Lens, wavelengths};
 use crate::merit::robust;
 use crate::rings::kernel::RingField;
 use crate::rings::mapping::Mapping;
-use metalith_cell::{CellModel, Fidelity};
-use metalith_core::{Progress, Result};
-use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
-use metalith_wave::camera::Noise;
-use metalith_wave::restore::Scene;
 
 /// Radii at which side lobes are sampled, out to four times the radius where they begin.
 const SIDE_LOBE_POINTS: usize = 48;

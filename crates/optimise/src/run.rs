@@ -1,4 +1,4 @@
-//! From a design to its optimised phase.
+//! Run from a design to its optimised phase.
 
 use crate::cells::check_shape;
 use crate::merit::field::FieldProblem;
@@ -15,7 +15,7 @@ use metalith_design::array::PillarRule;
 use metalith_design::phase::RadialPhase;
 use metalith_design::{Design, MeritSpec, OptimiseSpec, StartSpec};
 
-/// What an optimisation found.
+/// Result of an optimisation.
 #[derive(Clone, Debug)]
 pub struct Optimised {
     /// Phase of each ring (turns), in [0, 1).
@@ -28,7 +28,7 @@ pub struct Optimised {
     pub start: &'static str,
     /// Merit at every fiftieth part of the way.
     pub history: Vec<(u32, f64)>,
-    /// Where to go on if it was interrupted.
+    /// Checkpoint to go on from if it was interrupted.
     pub interrupted: Option<Checkpoint>,
 }
 
@@ -37,13 +37,13 @@ pub struct Optimised {
 pub struct OptimiseTask {
     /// The rings and the distance to the sensor.
     pub lens: Lens,
-    /// From phase to width.
+    /// Mapping from phase to width.
     pub mapping: Mapping,
-    /// How it is to be optimised.
+    /// Settings of the optimisation.
     pub spec: OptimiseSpec,
     /// The design's own phase (turns).
     pub own_turns: Vec<f64>,
-    /// What gains are counted from: the design's own phase, or where that is a table, which may well be an
+    /// Reference phase (waves) of gains: the design's own phase, or where that is a table, which may well be an
     /// optimised one, a hyperbolic lens for the middle of the band.
     pub reference_turns: Vec<f64>,
     pub(crate) limit: StepLimit,
@@ -87,7 +87,7 @@ impl OptimiseTask {
         self.limit
     }
 
-    /// The same task without errors of fabrication in mind.
+    /// Same task without errors of fabrication.
     pub fn regardless_of_errors(&self) -> Self {
         let mut plain = self.clone();
         plain.spec.robust = None;

@@ -25,7 +25,7 @@ impl PillarShape {
     /// Name and value of each that differs by its width alone, as design files and options have them.
     pub const CHOICES: [(&'static str, Self); 2] = [("square", Self::Square), ("circle", Self::Circle)];
 
-    /// Whether it is the square: what designs had before there were others, and what is then left out of keys and digests.
+    /// True if it is the square, which is left out of keys and digests: the default of designs.
     pub fn is_square(&self) -> bool {
         *self == Self::Square
     }
@@ -99,7 +99,7 @@ impl PillarShape {
         }
     }
 
-    /// How far a pillar reaches from its middle along x and y (nm), if its width is even.
+    /// Reach of a pillar from its middle along x and y (nm), if its width is even.
     pub fn reach(self, number: u16) -> (i64, i64) {
         match self {
             Self::Square | Self::Circle => (i64::from(number) / 2, i64::from(number) / 2),
@@ -115,7 +115,7 @@ impl PillarShape {
         }
     }
 
-    /// What is said of a pillar with this number.
+    /// Words for a pillar with this number.
     pub fn words(self, number: u16) -> String {
         match self {
             Self::Square | Self::Circle => format!("{number} nm wide"),
@@ -147,7 +147,7 @@ impl PillarShape {
         }
     }
 
-    /// What several of it are called.
+    /// Plural of the name of the shape.
     pub fn plural(self) -> &'static str {
         match self {
             Self::Square => "squares",

@@ -1,4 +1,4 @@
-//! What can go wrong in solving a cell: causes with numbers, and for each a remedy.
+//! Errors of solving a cell: causes with numbers, and for each a remedy.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use super::{Orders, SiteLattice};
 /// Result of solving a cell.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why a cell was not solved, or a material is not known.
+/// Reason why a cell was not solved, or a material is not known.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -104,7 +104,7 @@ pub enum Error {
     },
 }
 
-/// What is wrong with a table of indices.
+/// Fault in a table of indices.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
@@ -172,7 +172,7 @@ impl Error {
         }
     }
 
-    /// What to do about it.
+    /// Remedy for the error.
     pub fn remedy(&self) -> String {
         match self {
             Self::Wavelength { .. } => "use a positive number of micrometres".into(),

@@ -1,4 +1,4 @@
-//! What draws are judged with: the designs, their layouts as read back, and tables of cells.
+//! Bench that judges draws: the designs, their layouts as read back, and tables of cells.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -46,7 +46,7 @@ pub(crate) struct Bench {
     current: Mutex<Option<Arc<Subject>>>,
 }
 
-/// Where the layout and the tables of each design are, by its number.
+/// Paths of the layout and the tables of each design, by its number.
 pub(crate) struct Files {
     pub layouts: Vec<std::path::PathBuf>,
     pub cells: Vec<std::path::PathBuf>,
@@ -59,7 +59,7 @@ pub(crate) struct Subject {
     array: PillarArray,
     layout: ReadLayout,
     bank: Arc<CellBank>,
-    /// What restorations know, if it is not the chip of the draw.
+    /// Chip that restorations know, if it is not the chip of the draw.
     known: Option<KnownChip>,
 }
 
@@ -70,14 +70,14 @@ pub struct JudgedDraw {
     pub picture: Option<TakenPicture>,
 }
 
-/// What all draws make of a pillar, at the least and at the most.
+/// Range of what all draws make of a pillar, from the least to the most.
 struct MadeRange {
     bias_nm: [f64; 2],
     changes: [CellChange; 2],
 }
 
 impl Bench {
-    /// For a tolerance that was read. `key`: of the random numbers.
+    /// Bench for a tolerance that was read. `key`: of the random numbers.
     pub fn new(tolerance: Tolerance, key: [u8; 32], files: Files) -> Result<Self> {
         let base = match &tolerance.model {
             Some(path) => CalibratedModel::read(path)?.perturbation,
@@ -167,7 +167,7 @@ impl Bench {
             return Err(Error::refused(
                 "study/oblique",
                 "a study takes the cells along the normal, and the design asks for them as they are lit",
-                "leave out `incidence = \"as_lit\"` in [verify] of the design of the study",
+                "leave out `incidence = \"oblique\"` in [verify] of the design of the study",
             ));
         }
         check_rectangles(&design, &self.made, self.picture.is_some())?;
@@ -278,7 +278,6 @@ fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Re
     let stated = LitStack {
         stack: bank.stated().clone(),
         focused: design.focused(),
-        polarised: design.verify.light(),
     };
     Ok(AsBuiltChip::in_light(&stated, model)?.from_bank(bank))
 }
@@ -332,8 +331,8 @@ impl MadeRange {
         }
     }
 
-    /// What the tables of a design must hold for all draws. Those of other designs count too: designs whose pillars are
-    /// alike then have the same tables.
+    /// Range that the tables of a design must hold for all draws. Ranges of other designs count too: designs whose
+    /// pillars are alike then have the same tables.
     fn range(&self, design: &Design, layout: &ReadLayout) -> Result<BankRange> {
         let histograms = layout.extraction().elements.iter().map(|e| e.widths.histogram());
         let mut drawn: BTreeSet<u16> = BTreeSet::new();

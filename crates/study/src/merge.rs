@@ -28,9 +28,9 @@ pub struct StudyResult {
     pub grid: Vec<GridPoint>,
     /// Draws at each combination of values of several grids, where these are few enough to be read.
     pub combinations: Vec<GridPoint>,
-    /// Of the limits that depend on the draw.
+    /// Responses of the limits that depend on the draw.
     pub responses: Vec<Response>,
-    /// What it takes for a yield of 90 %.
+    /// Tightening of tolerances for a yield of 90 %.
     pub tightenings: Vec<Tightening>,
     /// All draws, in the order of their numbers.
     #[serde(skip)]
@@ -172,7 +172,7 @@ pub enum TableFormat {
 }
 
 impl TableFormat {
-    /// By the ending of the name of a file.
+    /// Format by the ending of the name of a file.
     ///
     /// # Errors
     /// If the ending is another, or the program was built without Parquet.

@@ -19,7 +19,7 @@ const SHARD_SECONDS: f64 = 600.0;
 pub struct Sharding {
     /// SHA-256 of all that decides the answers, in hexadecimal.
     pub key: String,
-    /// What a part is called.
+    /// Name of a part.
     pub part: &'static str,
     pub parts: u64,
     pub per_shard: u64,
@@ -46,7 +46,7 @@ struct Header {
     end: u64,
 }
 
-/// How far the work is.
+/// Progress of the work.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Status {
     pub shards: u64,
@@ -91,7 +91,7 @@ impl Sharding {
         })
     }
 
-    /// Where a shard is, or will be.
+    /// Path where a shard is, or will be.
     pub fn path(&self, number: u64) -> PathBuf {
         self.folder.join(FOLDER).join(format!("{number:06}.jsonl"))
     }
@@ -134,7 +134,7 @@ impl Sharding {
         file.commit()
     }
 
-    /// Whether a shard is there; no more than its first line is read.
+    /// True if a shard is there; no more than its first line is read.
     ///
     /// # Errors
     /// If what is there belongs to another plan, or is no shard.
@@ -165,7 +165,7 @@ impl Sharding {
         }
     }
 
-    /// Why a file with this first line is not that shard, with the identity of the refusal.
+    /// Identity and text of the refusal of a file with this first line as that shard.
     fn refusal(&self, shard: Shard, first_line: &str) -> Option<(&'static str, String)> {
         match self.own_header(first_line) {
             Err((id, why)) => Some((id, why.into())),
@@ -183,7 +183,7 @@ impl Sharding {
         }
     }
 
-    /// How far the work is.
+    /// Progress of the work.
     ///
     /// # Errors
     /// If its folder cannot be read.

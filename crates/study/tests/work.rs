@@ -114,13 +114,13 @@ fn pairs_of_shards_are_those_of_one_run() {
     let camera = metalith_sensor::Camera::read(&at("camera.toml")).unwrap();
     let kept = metalith_imaging::KernelCache::made(&at("alone"));
     let first = scene(&images[0]).unwrap();
-    let studio = ImagingSystem::open_kept(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
+    let system = ImagingSystem::open_cached(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
     let origin = DatasetOrigin::of(&design, &layout, &camera, None).unwrap();
     let write = |seed| {
-        let head = DatasetManifest::of(&studio, origin.clone(), seed);
+        let head = DatasetManifest::of(&system, origin.clone(), seed);
         write_dataset(
-            &studio,
-            &studio.simulation(),
+            &system,
+            &system.simulation(),
             &images,
             &scene,
             head,
@@ -209,7 +209,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     let camera = SMALL_CAMERA.replace(mono, &three.collect::<String>());
     fs::write(at("camera.toml"), camera).unwrap();
     let design = Design::read(&at("design.toml")).unwrap();
-    let lineup = Comparison {
+    let comparison = Comparison {
         camera: at("camera.toml"),
         designs: vec![ListedDesign {
             name: Some("small".into()),
@@ -229,7 +229,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         learnt: Vec::new(),
         lpips: None,
     };
-    let planned = plan_comparison(&lineup, &at("parts"), &Silent).unwrap();
+    let planned = plan_comparison(&comparison, &at("parts"), &Silent).unwrap();
     assert_eq!(planned.cut().shards(), 4);
     let work = Work::open(&at("parts")).unwrap();
     work.run(&[1, 2, 3], &Silent).unwrap();
@@ -241,7 +241,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     ");
     work.run(&[0], &Silent).unwrap();
     let merged = planned.merge(&Silent).unwrap();
-    let open = lineup.open().unwrap();
+    let open = comparison.open().unwrap();
     let kept = metalith_imaging::KernelCache::only(&at("parts"));
     let cameras = (0..4).map(|k| open.take(k, &kept, &Silent).unwrap()).collect();
     let direct = open.comparison(cameras);
@@ -268,6 +268,6 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         assert!(page.contains(part), "{part}");
     }
     fs::remove_file(planned.cut().path(1)).unwrap();
-    fs::copy(&lineup.photographs[0], &lineup.photographs[1]).unwrap();
+    fs::copy(&comparison.photographs[0], &comparison.photographs[1]).unwrap();
     assert_eq!(work.run(&[1], &Silent).unwrap_err().id(), "study/another-plan");
 }

@@ -1,4 +1,4 @@
-//! What can go wrong on the way of light, as causes that a caller can match on.
+//! Errors of simulating light, as causes that a caller can match on.
 
 use metalith_pillars::Lattice;
 
@@ -8,7 +8,7 @@ use crate::{PlaneWave, Window};
 /// Result of every fallible operation of this crate.
 pub type Result<T, E = WaveError> = std::result::Result<T, E>;
 
-/// What went wrong. The text says what and where; [`WaveError::hint`] says what to do.
+/// Error of a simulation. The text says what and where; [`WaveError::hint`] says what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WaveError {
@@ -92,15 +92,6 @@ pub enum WaveError {
     /// A map of the sensor's plane without a size, or too large for memory.
     #[error("a map of {0} x {0} squares of {1} um at {2} um", grid.cells, grid.cell_um, grid.distance_um)]
     Map { grid: LandingGrid, most: usize },
-
-    /// An image smaller than what is to be measured of it.
-    #[error("an image of {rows} x {columns} pixels")]
-    SmallImage {
-        rows: usize,
-        columns: usize,
-        /// Pixels an axis that it must have.
-        least: usize,
-    },
 }
 
 /// An angle as people gave it: without what the way to radians and back left in its last digits, zero without a sign.
@@ -126,11 +117,10 @@ impl WaveError {
             Self::Pixels { .. } => "wave/pixels",
             Self::Samples => "wave/samples",
             Self::Map { .. } => "wave/map",
-            Self::SmallImage { .. } => "wave/small-image",
         }
     }
 
-    /// What to do about it.
+    /// Remedy for the error.
     pub fn hint(&self) -> String {
         match self {
             Self::Window { .. } => {
@@ -155,7 +145,6 @@ impl WaveError {
             Self::Pixels { .. } => "use fewer pixels, or form the PSF on a larger window".into(),
             Self::Samples => "form both on the same number of samples and with the same step".into(),
             Self::Map { most, .. } => format!("use positive lengths and at most {most} squares"),
-            Self::SmallImage { least, .. } => format!("give an image of at least {least} x {least} pixels"),
         }
     }
 }

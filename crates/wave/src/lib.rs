@@ -5,7 +5,6 @@ mod error;
 pub mod kernels;
 pub mod propagation;
 pub mod psf;
-pub mod restore;
 
 pub use error::{Result, WaveError};
 pub use propagation::{

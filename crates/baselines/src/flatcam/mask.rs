@@ -10,12 +10,12 @@ use rustfft::FftPlanner;
 pub struct MaskSpec {
     /// Width of one member of a sequence (um).
     pub feature_um: f64,
-    /// From the mask to the sensor (um).
+    /// Distance from the mask to the sensor (um).
     pub distance_um: f64,
 }
 
 impl MaskSpec {
-    /// As published: openings of 30 um, half a millimetre before the sensor.
+    /// Mask as published: openings of 30 um, half a millimetre before the sensor.
     pub fn standard() -> Self {
         Self {
             feature_um: 30.0,
@@ -23,7 +23,7 @@ impl MaskSpec {
         }
     }
 
-    /// With openings of this width, at this distance (um).
+    /// Mask with openings of this width, at this distance (um).
     ///
     /// # Errors
     /// If one of them is not from 1 to 100 000 um.

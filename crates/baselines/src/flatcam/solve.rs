@@ -18,7 +18,7 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Of every second pixel from the first on: those that count one channel.
+    /// Factor of every second pixel from the first on: those that count one channel.
     ///
     /// # Errors
     /// If the decomposition fails.
@@ -52,7 +52,7 @@ fn correlated(n: usize) -> Mat<f64> {
     })
 }
 
-/// Both axes.
+/// Factors of both axes.
 pub struct TwoFactors {
     down: Factor,
     across: Factor,

@@ -1,4 +1,4 @@
-//! What a person has put into the folder of a planned session, and a new plan would take away.
+//! Files that a person has put into the folder of a planned session, and a new plan would take away.
 
 use std::collections::BTreeMap;
 use std::path::Path;

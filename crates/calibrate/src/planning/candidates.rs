@@ -212,8 +212,8 @@ fn captures(design: &Design, bench: &BenchFile, set: &MeasuredSet, chosen: &[Ele
     (out, unseen)
 }
 
-/// Where light of a wavelength (um) lands from the element's axis, in the focal plane, to a hundredth of a micrometre; none
-/// if it leaves too steeply.
+/// Place where light of a wavelength (um) lands from the element's axis, in the focal plane, to a hundredth of a
+/// micrometre; `None` if it leaves too steeply.
 fn landing_um(wedge: Wedge, aoi_deg: [f64; 2], wavelength_um: f64, f_um: f64) -> Option<[f64; 2]> {
     let turn = [wedge.sin_x, wedge.sin_y];
     let sines = [0, 1].map(|k| aoi_deg[k].to_radians().sin() + turn[k] * wavelength_um / wedge.wavelength_um);

@@ -1,4 +1,5 @@
-//! Whether a session of a design can be planned: what a measured set may say is checked before any work is spent.
+//! Check that a session of a design can be planned: it compares the design with what a measured set may say, before any
+//! work is spent.
 
 use metalith_core::document::Limits;
 use metalith_core::{Error, Result};
@@ -8,8 +9,8 @@ use super::bench_file::BenchFile;
 use super::candidates::{chosen_elements, distances_um, lens_diameter_um};
 use crate::set::read;
 
-/// Nothing, if a set of the design can be planned and read: pillars that are squares or circles, elements that are round, and all
-/// within what a set may say.
+/// Succeeds if a set of the design can be planned and read: pillars that are squares or circles, elements that are
+/// round, and all within what a set may say.
 ///
 /// # Errors
 /// What stands against it, with the limit and what to do.

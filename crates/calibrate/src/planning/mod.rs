@@ -45,9 +45,9 @@ pub use limits::check_plannable;
 use crate::bench::{Bench, Sampling};
 use crate::effects::{self, Effect};
 use crate::session::check_effects;
-use crate::set::{LedIndex, MeasuredSet, PerCapture};
+use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
-use crate::surrogate::{Surrogate, check_calibration_fits};
+use crate::statistics::{Surrogate, check_calibration_fits};
 use candidates::{Candidates, sem_sites};
 use choice::{Choice, Picked, Place, Requirement};
 use information::{Information, cells_of, exposed};
@@ -164,9 +164,8 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
 
     let simulator = Simulator::new(Bench::new(&set, SAMPLING), cells, known);
     check_calibration_fits(&simulator)?;
-    let led = set.captures.iter().map(|c| c.led).collect::<PerCapture<LedIndex>>();
     let nothing = vec![0.0; simulator.slots.len()];
-    let surrogate = Surrogate::beside(&simulator, &nothing, Some((&led, set.leds.len())), progress)?;
+    let surrogate = Surrogate::beside(&simulator, &nothing, true, progress)?;
     let shown = exposed(&set, &surrogate, bench.peak);
     let margins = choice.margins(&picked);
     let detections: Vec<(Requirement, f64, bool)> = choice

@@ -1,4 +1,4 @@
-//! What is asked of a session: each effect at a size, and told from every other.
+//! Wanted result of a session: each effect at a size, and distinguished from every other.
 
 use metalith_core::{Error, Result};
 use metalith_report::{exact, sig};
@@ -17,7 +17,7 @@ fn asked(effect: &dyn Effect) -> impl Iterator<Item = (usize, Parameter)> + use<
     all.filter(move |(k, _)| *k == 0 || !is_dormant)
 }
 
-/// Nothing, if all wanted sizes are of effects of a set and within what physics allows.
+/// Succeeds if all wanted sizes are of effects of a set and within what physics allows.
 ///
 /// # Errors
 /// If a name is not known; if a size is beyond, with what sizes are counted from.

@@ -6,7 +6,7 @@ use metalith_cell::{CellStack, CoarseCell, ElementRow, RealRow, SiteGrid};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
 
-/// Where rows begin, over the radius of the lens.
+/// Radii where rows begin, over the radius of the lens.
 const RADII: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.88];
 
 /// Share of the light in the first order, mean of s and p, of all rows together: those that do not fit into the lens are

@@ -1,4 +1,4 @@
-//! Mappings for steered elements, chosen by what their pillars do among unlike neighbours.
+//! Mappings for steered elements, chosen by what their pillars do among dissimilar neighbours.
 //!
 //! Where the phase is steep, neighbours differ from one to the next, and the mapping that brings most light into the first
 //! order of equal neighbours is not the best one. Here the pillars of a sample of sites, drawn by a polynomial, transmit by
@@ -29,9 +29,9 @@ use sample::SiteSample;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SteeredLight {
     pub wavelength_um: f64,
-    /// By the sum over pairs, mean of s and p, over a sample of the element's sites.
+    /// Light by the sum over pairs, mean of s and p, over a sample of the element's sites.
     pub pairs: [f64; 2],
-    /// By supercells of rows of the element's pillars, all rows together.
+    /// Light by supercells of rows of the element's pillars, all rows together.
     pub supercells: [f64; 2],
 }
 
@@ -41,7 +41,7 @@ pub struct SteeredStudy {
     /// Steps from the middle of the array along the two axes, the larger first.
     pub steps: SteeringSteps,
     pub coefficients: Vec<f64>,
-    /// At each of the wavelengths that the design compares mappings at.
+    /// Light at each of the wavelengths that the design compares mappings at.
     pub light: Vec<SteeredLight>,
 }
 
@@ -52,8 +52,8 @@ impl SteeredStudy {
         sum(1) / sum(0)
     }
 
-    /// Whether supercells find more light with the element's own mapping. The sum over pairs that it was chosen by errs by a few hundredths,
-    /// and may promise what is not there.
+    /// True if supercells find more light with the element's own mapping. The sum over pairs that it was chosen by errs
+    /// by a few hundredths, and may promise what is not there.
     pub fn is_better(&self) -> bool {
         self.gain() > 1.0
     }

@@ -28,7 +28,7 @@ const MOST_ROUNDS: usize = 200;
 pub struct RampOrders {
     /// Wavelength (um).
     pub wavelength_um: f64,
-    /// Where the design sends it.
+    /// Power in the order into which the design sends it.
     pub first: f64,
     /// Straight on, unfocused.
     pub zero: f64,

@@ -148,7 +148,7 @@ fn settled(
     Ok(coefficients)
 }
 
-/// Wavelength (nm) and duty cycle brought to about -1..1, where powers are told apart.
+/// Wavelength (nm) and duty cycle brought to about -1..1, where powers are distinguished.
 struct FitScale {
     centre: (f64, f64),
     half: (f64, f64),

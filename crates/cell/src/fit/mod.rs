@@ -28,8 +28,7 @@ pub struct MappingError {
 }
 
 impl MappingError {
-    /// Of phase errors in turns: what is left when their mean on the circle, which no image shows, is
-    /// taken off.
+    /// Error from phase errors in waves, less their mean on the circle, which no image shows.
     pub fn of_turns(errors: impl Iterator<Item = f64> + Clone) -> Self {
         let tau = std::f64::consts::TAU;
         let mean: Complex64 = errors.clone().map(|e| Complex64::cis(tau * e)).sum();

@@ -1,4 +1,4 @@
-//! What a pillar transmits among unlike neighbours at a wavelength between those that have tables.
+//! Transmission of a pillar by the coupled model at a wavelength between the wavelengths that have tables.
 //!
 //! Tables of neighbours cost minutes, and a band has dozens of wavelengths. Between two that have a table the phase of a pillar
 //! runs on as k P(w), where the path P changes slowly with the wavelength, and what is left changes slowly too:
@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use crate::{CellStack, NEIGHBOUR_DEGREE, NEIGHBOURS, NeighbourResponse, SiteResponse};
-use metalith_core::Result;
+use metalith_core::{Result, lagrange_weight};
 
 /// A wavelength that has a table, s and p as one.
 #[derive(Clone, Debug)]
@@ -27,8 +27,8 @@ pub struct BandNode {
 }
 
 impl BandNode {
-    /// Of responses for s and p of pillars on this stack; `around` are the widths (nm) that typically stand around a pillar of a
-    /// width (nm), in the order of [`NEIGHBOURS`](crate::NEIGHBOURS).
+    /// Node from responses for s and p of pillars on this stack; `around` are the widths (nm) that typically stand
+    /// around a pillar of a width (nm), in the order of [`NEIGHBOURS`](crate::NEIGHBOURS).
     ///
     /// # Errors
     /// If the wavelength is outside the range of a material.
@@ -67,21 +67,21 @@ impl BandNode {
 /// The response of a band at one wavelength.
 #[derive(Clone, Debug)]
 pub struct BandResponse {
-    /// At least one; all have the same terms, since the tables of a cell are for the same widths.
+    /// Parts, at least one; all have the same terms, since the tables of a cell are for the same widths.
     parts: Vec<BandPart>,
 }
 
-/// What the table of a wavelength contributes.
+/// Contribution of the table of a wavelength.
 #[derive(Clone, Debug)]
 struct BandPart {
     response: NeighbourResponse,
-    /// By own width in whole nm.
+    /// Weights by own width in whole nm.
     weight: Vec<Complex64>,
 }
 
 impl BandResponse {
-    /// At a wavelength (um), from the nodes of the band in rising order; none if there are none. The amplitudes of tables are
-    /// multiplied by `scale`.
+    /// Response at a wavelength (um), from the nodes of the band in rising order; `None` if there are none. The
+    /// amplitudes of tables are multiplied by `scale`.
     pub fn at(nodes: &[BandNode], wavelength_um: f64, scale: f64) -> Option<Self> {
         let after = nodes.partition_point(|n| n.wavelength_um <= wavelength_um);
         let low = after.clamp(1, nodes.len().saturating_sub(1).max(1)) - 1;
@@ -127,10 +127,8 @@ impl BandResponse {
 fn lagrange(nodes: &[BandNode], wavelength_um: f64) -> Vec<f64> {
     let of = |i: usize| {
         let others = nodes.iter().enumerate().filter(|(j, _)| *j != i);
-        let own = nodes[i].wavelength_um;
-        others
-            .map(|(_, other)| (wavelength_um - other.wavelength_um) / (own - other.wavelength_um))
-            .product()
+        let others = others.map(|(_, other)| other.wavelength_um);
+        lagrange_weight(wavelength_um, nodes[i].wavelength_um, others)
     };
     (0..nodes.len()).map(of).collect()
 }

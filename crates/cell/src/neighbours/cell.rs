@@ -4,15 +4,13 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use num_complex::Complex64;
-
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, Silent};
 
 use super::{BandNode, BandResponse, FittedNeighbours, Mapping, NEIGHBOURS, NeighbourTable, NeighbourTableSpec};
-use crate::{CellModel, CellStack, Fidelity, ObliqueTables, PointwiseCell};
+use crate::{CellModel, CellResponse, CellStack, Fidelity, Illumination, NeighbourTables, PointwiseCell, Spectral};
 
-/// Pillars among unlike neighbours, by [`NeighbourTable`]. Where it is asked for the transmission of a width alone, it
-/// answers as [`PointwiseCell`]: that of a lattice of equal pillars.
+/// Pillars among dissimilar neighbours, by [`NeighbourTable`]. [`PointwiseCell`] answers where the width of a pillar
+/// alone is known, as in a lattice of equal pillars.
 #[derive(Debug)]
 pub struct NeighbourCell {
     equal: PointwiseCell,
@@ -43,7 +41,7 @@ impl NeighbourCell {
         }
     }
 
-    /// The same, knowing bands by the tables of these wavelengths (um).
+    /// Same cell, which knows bands by the tables of these wavelengths (um).
     #[must_use]
     pub fn tabulated_at(mut self, wavelengths_um: &[f64]) -> Self {
         self.tabulated_um = wavelengths_um.to_vec();
@@ -60,7 +58,8 @@ impl NeighbourCell {
         }
         let widths = || self.mappings.iter().flat_map(Mapping::samples_nm);
         let widest = widths().copied().max().unwrap_or(0);
-        let t = self.equal.transmissions_in_band(wavelength_um, widest)?;
+        let light = Illumination::normal(wavelength_um).in_band();
+        let t = self.equal.response(&light, widest, &Silent)?.focused()?;
         let full = self.equal.full_transmission(wavelength_um)?;
         let sum: f64 = widths().map(|w| (t[usize::from(*w)] / full).norm_sqr()).sum();
         let found = sum / widths().count().max(1) as f64;
@@ -97,59 +96,21 @@ impl NeighbourCell {
         known().insert(key, Arc::clone(&found));
         Ok(found)
     }
-}
 
-impl CellModel for NeighbourCell {
-    fn fidelity(&self) -> Fidelity {
-        Fidelity::Neighbours
-    }
-
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        self.equal.transmissions(wavelength_um, max_width_nm)
-    }
-
-    fn transmissions_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        self.equal.transmissions_in_band(wavelength_um, max_width_nm)
-    }
-
-    fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        self.equal.oblique(wavelength_um, sines, max_width_nm)
-    }
-
-    fn oblique_in_band(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        self.equal.oblique_in_band(wavelength_um, sines, max_width_nm)
-    }
-
-    fn among_neighbours(
-        &self,
-        wavelength_um: f64,
-        sines: [f64; 2],
-        progress: &dyn Progress,
-    ) -> Result<Option<FittedNeighbours>> {
-        let table = self.table(wavelength_um, sines, progress)?;
-        Ok(Some(FittedNeighbours {
-            responses: table.responses(self.full_transmission(wavelength_um)?),
-            left_out: table.left_out(),
-        }))
-    }
-
-    fn among_neighbours_in_band(
-        &self,
-        wavelength_um: f64,
-        looks: &dyn Fn(f64) -> [f64; 2],
-        progress: &dyn Progress,
-    ) -> Result<Option<BandResponse>> {
-        // What turns this light to the normal (turns a pitch).
-        let step = wavelength_um * 1e3 / self.stack.pitch_nm;
-        let straight = looks(wavelength_um).map(|sine| -sine / step);
-        let node = |um: &f64| {
-            let table = self.table(*um, looks(*um), progress)?;
-            BandNode::new(*um, &table.responses(1.0), &self.stack, |w| self.around(w, straight))
-        };
-        let nodes = self.tabulated_um.iter().map(node).collect::<Result<Vec<_>>>()?;
+    /// Between the wavelengths that have tables; none without any.
+    fn in_band(&self, light: &Illumination<'_>, progress: &dyn Progress) -> Result<Option<BandResponse>> {
         let [Some(first), Some(last)] = [self.tabulated_um.first(), self.tabulated_um.last()] else {
             return Ok(None);
         };
+        let wavelength_um = light.wavelength_um;
+        // What turns this light to the normal (turns a pitch).
+        let step = wavelength_um * 1e3 / self.stack.pitch_nm;
+        let straight = light.coupled_sines(wavelength_um).map(|sine| -sine / step);
+        let node = |um: &f64| {
+            let table = self.table(*um, light.coupled_sines(*um), progress)?;
+            BandNode::new(*um, &table.responses(1.0), &self.stack, |w| self.around(w, straight))
+        };
+        let nodes = self.tabulated_um.iter().map(node).collect::<Result<Vec<_>>>()?;
         let mut scale = self.full_transmission(wavelength_um)?;
         let end = wavelength_um.clamp(*first, *last);
         if end != wavelength_um {
@@ -157,8 +118,33 @@ impl CellModel for NeighbourCell {
         }
         Ok(BandResponse::at(&nodes, wavelength_um, scale))
     }
+}
+
+impl CellModel for NeighbourCell {
+    fn fidelity(&self) -> Fidelity {
+        Fidelity::Neighbours
+    }
+
+    fn response(&self, light: &Illumination<'_>, largest_number: u16, progress: &dyn Progress) -> Result<CellResponse> {
+        if light.spectral == Spectral::Exact {
+            let um = light.wavelength_um;
+            let table = self.table(um, light.coupled_sines(um), progress)?;
+            return Ok(CellResponse::Neighbours(NeighbourTables::Fitted(FittedNeighbours {
+                responses: table.responses(self.full_transmission(um)?),
+                left_out: table.left_out(),
+            })));
+        }
+        match self.in_band(light, progress)? {
+            Some(response) => Ok(CellResponse::Neighbours(NeighbourTables::Band(response))),
+            None => self.equal.response(light, largest_number, progress),
+        }
+    }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
         self.equal.full_transmission(wavelength_um)
+    }
+
+    fn uncoupled(&self) -> Option<&dyn CellModel> {
+        Some(&self.equal)
     }
 }

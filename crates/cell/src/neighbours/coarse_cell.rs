@@ -15,8 +15,9 @@ use crate::CellStack;
 /// 0.008, at (7/5)^6, about eight times the cost.
 const COARSE: usize = 2;
 
-/// The same on a hexagonal lattice, whose pillars are of silicon for the most part: with 2 the first order of blazed rows of these
-/// differs by up to 0.17 in share from that with 5, with 3 by 0.02 (`hexagonal_supercells` in the tests of the solver).
+/// Number of coarse orders on a hexagonal lattice, whose pillars are of silicon for the most part: with 2 the first
+/// order of blazed rows of these differs by up to 0.17 in share from the result with 5, with 3 by 0.02
+/// (`hexagonal_supercells` in the tests of the solver).
 const COARSE_OF_HEXAGONAL: usize = 3;
 
 /// Highest order of a single cell that supercells keep along each axis on such a lattice.
@@ -69,9 +70,8 @@ impl<'a> CoarseCell<'a> {
         })
     }
 
-    /// By how much wider a pillar is solved than it is (nm), so that few orders transmit as many do, in
-    /// the mean square over the widths, along the normal. Too few orders act mostly like a pillar that is a little too
-    /// thin.
+    /// Widening of a pillar for the solver (nm), so that few orders transmit as many do, in the mean square over the
+    /// widths, along the normal. Too few orders act mostly like a pillar that is a little too thin.
     pub fn shift_nm(&self) -> f64 {
         self.shift_nm
     }
@@ -81,12 +81,12 @@ impl<'a> CoarseCell<'a> {
         self.wavelength_um * 1e3 / self.stack.pitch_nm
     }
 
-    /// How its pillars stand.
+    /// Grid of the sites of its pillars.
     pub(crate) fn grid(&self) -> SiteGrid {
         SiteGrid::of(self.stack)
     }
 
-    /// What every site of a solved supercell transmits: see [`transmissions_on`].
+    /// Transmission of every site of a solved supercell: see [`transmissions_on`].
     pub(crate) fn transmissions(
         &self,
         lattice: &SiteLattice,

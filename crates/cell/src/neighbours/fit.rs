@@ -9,10 +9,10 @@ use metalith_rcwa::SiteLattice;
 use super::training::TrainingCell;
 use super::{NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteGrid, linear};
 
-/// Added to the mean square of each term, as a part of it: sites are a few for each weight, and widths of neighbours are
-/// often nearly those of a grating. Terms of high degree are held back more, by the fourth power of their degree in parts
-/// of [`PLAIN_DEGREE`]: that takes a twentieth off what is left of rows of real pillars. Without the power, 1e-4 and 1e-3
-/// cannot be told apart.
+/// Added to the mean square of each term, as a part of it: sites are a few for each weight, and widths of neighbours
+/// are often nearly those of a grating. Terms of high degree are held back more, by the fourth power of their degree in
+/// parts of [`PLAIN_DEGREE`]: that takes a twentieth off what is left of rows of real pillars. Without the power, 1e-4
+/// and 1e-3 cannot be distinguished.
 const RIDGE: f64 = 1e-4;
 const RIDGE_OF_DEGREE: f64 = 1e-2;
 const PLAIN_DEGREE: f64 = 4.0;
@@ -25,12 +25,12 @@ const PARTS: usize = 6;
 pub(crate) struct SiteSample {
     /// Number of its supercell.
     pub supercell: usize,
-    /// As so many sites does it count.
+    /// Weight, as so many sites.
     pub weight: f64,
     pub own_nm: f64,
-    /// In the order of [`SiteGrid::neighbours`].
+    /// Widths in the order of [`SiteGrid::neighbours`].
     pub neighbours_nm: [f64; NEIGHBOURS.len()],
-    /// For s and p.
+    /// Transmission for s and p.
     pub transmitted: [Complex64; 2],
 }
 
@@ -171,9 +171,9 @@ pub(crate) fn fit(grid: SiteGrid, basis: NeighbourBasis, sines: [f64; 2], sample
 
 /// A mirror of the lattice that leaves the direction of the light.
 struct Symmetry {
-    /// Where the neighbour of each number goes.
+    /// Number to which the neighbour of each number goes.
     to: [usize; NEIGHBOURS.len()],
-    /// Whether s and p change places.
+    /// True if s and p change places.
     swapped: bool,
 }
 

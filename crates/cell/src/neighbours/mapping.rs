@@ -39,8 +39,9 @@ impl Mapping {
         }
     }
 
-    /// Of pillars whose phase is not known: each stands for the share of the pillars that are narrower. `counts` are
-    /// numbers of pillars with the width (nm) as index, of one element each; the first entry counts sites without one.
+    /// Mapping of pillars whose phase is not known: each stands for the share of the pillars that are narrower.
+    /// `counts` are numbers of pillars with the width (nm) as index, of one element each; the first entry counts sites
+    /// without one.
     ///
     /// # Errors
     /// If there are no pillars.

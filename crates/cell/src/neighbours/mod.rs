@@ -1,4 +1,4 @@
-//! Pillars among unlike neighbours, from supercells.
+//! Pillars among dissimilar neighbours, from supercells.
 //!
 //! The other models of this crate take each pillar for one of a lattice of equal pillars. That holds for a lens where the
 //! widths change slowly. Where the phase is steep the width changes from site to site, the orders leave at large

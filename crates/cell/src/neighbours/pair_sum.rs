@@ -1,4 +1,4 @@
-//! What a pillar transmits among unlike neighbours.
+//! Coupled model: transmission of a pillar among dissimilar neighbours.
 //!
 //! A lattice of equal pillars is one place in the space of all neighbourhoods, and a special one: its guided modes
 //! resonate. Here the transmission of a site is a sum over pairs,
@@ -28,8 +28,8 @@ pub const NEIGHBOURS: [[i32; 2]; 12] = [
     [0, -2],
 ];
 
-/// The same on a hexagonal lattice, in places of its grid: half pitches along x, rows along y. The six nearest, then the six behind
-/// their gaps.
+/// Offsets of neighbours on a hexagonal lattice, in places of its grid: half pitches along x, rows along y. The six
+/// nearest, then the six behind their gaps.
 const NEIGHBOURS_OF_HEXAGONAL: [[i32; 2]; NEIGHBOURS.len()] = [
     [2, 0],
     [-2, 0],
@@ -57,7 +57,7 @@ pub fn neighbours(kind: LatticeKind) -> &'static [[i32; 2]; NEIGHBOURS.len()] {
 const OWN_DEGREE: usize = 12;
 const PAIR_DEGREE: usize = 6;
 
-/// The same in the neighbour's width: what a pair adds is a sum of so many products of a function of each.
+/// Degree in the neighbour's width: what a pair adds is a sum of so many products of a function of each.
 pub const NEIGHBOUR_DEGREE: usize = 4;
 
 /// Number of terms of a(w), and of each b_d.
@@ -76,7 +76,8 @@ pub struct NeighbourBasis {
 }
 
 impl NeighbourBasis {
-    /// For pillars of these widths (nm), each as often as it is drawn. Those beyond their range count as its end.
+    /// Basis for pillars of these widths (nm), each as often as it is drawn. Widths beyond their range count as its
+    /// end.
     pub fn new(widths_nm: impl Iterator<Item = f64> + Clone) -> Self {
         let range_nm = widths_nm
             .clone()
@@ -134,7 +135,7 @@ impl NeighbourBasis {
         std::array::from_fn(|i| own[i / NEIGHBOUR_DEGREE] * other[i % NEIGHBOUR_DEGREE])
     }
 
-    /// What the width of a neighbour counts as.
+    /// Functions of the width of a neighbour.
     fn neighbour(&self, width_nm: f64) -> [f64; NEIGHBOUR_DEGREE] {
         let all: [f64; NEIGHBOUR_DEGREE + 1] = self.chebyshev(width_nm);
         std::array::from_fn(|b| all[b + 1] - self.means[b])
@@ -164,14 +165,14 @@ impl NeighbourBasis {
 pub struct NeighbourResponse {
     pub basis: NeighbourBasis,
     /// Weight of each term, in the order of [`NeighbourBasis::terms`]. The sum has the scale of
-    /// [`CellModel::transmissions`](crate::CellModel::transmissions).
+    /// [`CellResponse`](crate::CellResponse).
     pub weights: Vec<Complex64>,
 }
 
 /// The sums over pairs in one light, fitted to supercells, and how far they are from others.
 #[derive(Clone, Debug)]
 pub struct FittedNeighbours {
-    /// For s and p.
+    /// Responses for s and p.
     pub responses: [NeighbourResponse; 2],
     /// Share of the arriving light that the sums put elsewhere than supercells do that were left out of the fit: mean over their
     /// sites, s and p.
@@ -180,20 +181,20 @@ pub struct FittedNeighbours {
 
 /// A sum over pairs in one light.
 pub trait SiteResponse: Sync {
-    /// What a pillar (nm) transmits on the mean over its neighbours.
+    /// Mean transmission of a pillar (nm) over its neighbours.
     fn own(&self, width_nm: f64) -> Complex64;
 
-    /// What the neighbour at the offset of this number in [`NEIGHBOURS`] adds; widths in nm.
+    /// Term that the neighbour at the offset of this number in [`NEIGHBOURS`] adds; widths in nm.
     fn pair(&self, number: usize, own_nm: f64, neighbour_nm: f64) -> Complex64;
 
-    /// What a pair adds, apart by width: [`SiteResponse::pair`] is the sum of the products of these, of the own width, with
-    /// [`SiteResponse::neighbour_factors`].
+    /// Factors of the term of a pair that depend on the own width: [`SiteResponse::pair`] is the sum of the products of
+    /// these, of the own width, with [`SiteResponse::neighbour_factors`].
     fn pair_factors(&self, number: usize, own_nm: f64) -> [Complex64; NEIGHBOUR_DEGREE];
 
     /// The factors of a neighbour's width (nm); the same at all wavelengths of one cell.
     fn neighbour_factors(&self, neighbour_nm: f64) -> [f64; NEIGHBOUR_DEGREE];
 
-    /// What a pillar transmits among neighbours of these widths (nm), in the order of [`NEIGHBOURS`].
+    /// Transmission of a pillar among neighbours of these widths (nm), in the order of [`NEIGHBOURS`].
     fn among(&self, own_nm: f64, neighbours_nm: &[f64; NEIGHBOURS.len()]) -> Complex64 {
         let pairs = neighbours_nm.iter().enumerate();
         let pairs: Complex64 = pairs.map(|(k, other)| self.pair(k, own_nm, *other)).sum();

@@ -1,4 +1,4 @@
-//! How far a model of single sites is from rows of real pillars.
+//! Errors of a model of single sites on rows of real pillars.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -15,14 +15,14 @@ use super::{CoarseCell, Orientation, SiteGrid};
 const PILLARS: usize = 20;
 const PILLARS_ACROSS: usize = 12;
 
-/// The same of a row along x of a hexagonal lattice, whose pillars are half a pitch from one to the next.
+/// Number of pillars of a row along x of a hexagonal lattice, whose pillars are half a pitch from one to the next.
 const PILLARS_OF_HALVES: usize = 14;
 
 /// Pillars at either end that do not count where a row is closed to a ring only to be solved: they stand beside a jump that the
 /// element does not have. The neighbours that matter most are within two pitches.
 const ENDS: usize = 3;
 
-/// The same of a row whose pillars are half a pitch from one to the next.
+/// Number of pillars at either end of a row whose pillars are half a pitch from one to the next.
 const ENDS_OF_HALVES: usize = 4;
 
 /// The axes and diagonals.
@@ -41,8 +41,8 @@ pub struct RealRow {
     pub direction: [i32; 2],
     /// Width of each pillar (nm); a diagonal row has a site at every step of x + y.
     pub widths_nm: Vec<f64>,
-    /// Whether its first pillar does follow the last, as in a blazed grating. If not, the three pillars at either end are solved
-    /// with the others but count in no sum.
+    /// True if its first pillar follows the last, as in a blazed grating. If not, the three pillars at either end are
+    /// solved with the others but count in no sum.
     pub repeats: bool,
 }
 
@@ -55,7 +55,7 @@ pub struct SolvedRow {
     pub widths_nm: Vec<f64>,
     /// Number of the pillar of the row that each site is.
     pub pillars: Vec<usize>,
-    /// What each site transmits, `[polarisation][site]`.
+    /// Transmission of each site, `[polarisation][site]`.
     transmitted: [Vec<Complex64>; 2],
     full: f64,
     /// Numbers of the pillars that count.
@@ -65,7 +65,7 @@ pub struct SolvedRow {
 /// A row of an element, with the phase that is asked of each of its pillars.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ElementRow {
-    /// Where it begins, from the middle of the element (um).
+    /// Place where it begins, from the middle of the element (um).
     pub radius_um: f64,
     /// Phase of each pillar (turns).
     pub turns: Vec<f64>,
@@ -116,7 +116,7 @@ impl ElementRow {
 }
 
 impl SolvedRow {
-    /// What each site transmits, `[polarisation][site]`, scaled as a single cell.
+    /// Transmission of each site, `[polarisation][site]`, scaled as a single cell.
     pub fn transmitted(&self) -> &[Vec<Complex64>; 2] {
         &self.transmitted
     }

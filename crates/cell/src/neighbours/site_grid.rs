@@ -1,4 +1,4 @@
-//! How the sites of supercells lie in the plane, and on the grid of an element.
+//! Places of the sites of supercells in the plane, and on the grid of an element.
 
 use metalith_pillars::LatticeKind;
 use metalith_rcwa::CellLattice;
@@ -26,7 +26,7 @@ impl SiteGrid {
         Self { row }
     }
 
-    /// Whether it is square.
+    /// True if it is square.
     pub fn is_square(self) -> bool {
         self.row.is_none()
     }
@@ -63,7 +63,8 @@ impl SiteGrid {
         }
     }
 
-    /// Whether samples on the sites tell a wave of this vector (turns a pitch along x and y) from all shorter ones.
+    /// True if samples on the sites distinguish a wave of this vector (waves a pitch along x and y) from all shorter
+    /// ones.
     pub(crate) fn tells(self, vector: [f64; 2]) -> bool {
         let within = |share: f64| (-0.5..0.5).contains(&share);
         let Some(row) = self.row else {
@@ -161,7 +162,7 @@ mod tests {
         }
     }
 
-    /// Of a wave and those that are the same at all sites one is told.
+    /// Waves that are equal at all sites form a class, and one of each class is distinguished.
     #[test]
     fn one_wave_of_a_class_is_told() {
         let grid = hexagonal();

@@ -1,4 +1,4 @@
-//! From the orders of a supercell to what each of its sites transmits.
+//! Transmission of each site of a supercell, from its orders.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,8 @@ use metalith_rcwa::{SiteLattice, SupercellOrder, SupercellResponse};
 use super::SiteGrid;
 
 /// Transmission of every site of a supercell, for s and p incident, `[polarisation][site]`: the samples on the lattice
-/// of sites whose diffraction orders are those of the supercell. A lattice of samples tells apart only directions with
+/// of sites whose diffraction orders are those of the supercell. A lattice of samples distinguishes only directions
+/// with
 /// |sine| below half the wavelength over the pitch; orders beyond are left out.
 ///
 /// |t|^2, averaged over the sites, is the power of these orders times `full`^2. With `full` the root of the index of

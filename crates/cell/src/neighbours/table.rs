@@ -1,4 +1,4 @@
-//! Responses of pillars among unlike neighbours for one light: fitted to supercells, and kept.
+//! Responses of pillars among dissimilar neighbours for one light: fitted to supercells, and kept.
 
 use std::path::Path;
 
@@ -29,10 +29,10 @@ pub struct NeighbourTableSpec {
     pub sines: [f64; 2],
 }
 
-/// What pillars transmit among unlike neighbours in one light.
+/// Transmission of pillars by the coupled model in one light.
 #[derive(Clone, Debug)]
 pub struct NeighbourTable {
-    /// For s and p; |t| of a site that passes all its light is 1.
+    /// Responses for s and p; |t| of a site that passes all its light is 1.
     responses: [NeighbourResponse; 2],
     left_out: f64,
 }
@@ -60,7 +60,7 @@ impl NeighbourTable {
         Ok(table)
     }
 
-    /// The same, solved now whatever is kept.
+    /// Table that is solved now, whatever is cached.
     ///
     /// # Errors
     /// As [`NeighbourTable::obtain`].
@@ -75,7 +75,7 @@ impl NeighbourTable {
         Ok(Self { responses, left_out })
     }
 
-    /// Whether the table of a light comes with the program, as it does for the designs that do.
+    /// True if the table of a light is shipped with the program, as it is for the designs that are.
     pub fn is_shipped(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping]) -> bool {
         kept(spec, stack, mappings, None).is_shipped()
     }
@@ -88,8 +88,8 @@ impl NeighbourTable {
         })
     }
 
-    /// What the sites of a supercell on a square lattice transmit by the sum over pairs, `[polarisation][site]`, where |t| of a site that
-    /// passes all its light is `full`; one width (nm) for each site.
+    /// Transmission of the sites of a supercell on a square lattice by the sum over pairs, `[polarisation][site]`,
+    /// where |t| of a site that passes all its light is `full`; one width (nm) for each site.
     pub fn sites(&self, lattice: &SiteLattice, widths_nm: &[f64], full: f64) -> [Vec<Complex64>; 2] {
         self.responses(full).map(|r| sites_by(&r, lattice, widths_nm))
     }
@@ -101,7 +101,7 @@ impl NeighbourTable {
     }
 }
 
-/// What the sites of a supercell on a square lattice transmit by a sum over pairs; one width (nm) for each site.
+/// Transmission of the sites of a supercell on a square lattice by a sum over pairs; one width (nm) for each site.
 pub fn sites_by(response: &impl SiteResponse, lattice: &SiteLattice, widths_nm: &[f64]) -> Vec<Complex64> {
     let site = |i: usize| response.among(widths_nm[i], &neighbours_nm(SiteGrid::SQUARE, lattice, widths_nm, i));
     (0..lattice.len()).map(site).collect()
@@ -186,7 +186,7 @@ fn inputs(spec: &NeighbourTableSpec, stack: &CellStack, mappings: &[Mapping]) ->
     .expect("plain data serialises")
 }
 
-/// What was left out, then Re and Im of each weight, s then p (f64, little-endian).
+/// Bytes of a table: what was left out, then Re and Im of each weight, s then p (f64, little-endian).
 fn encode(table: &NeighbourTable) -> Vec<u8> {
     let weights = table.responses.iter().flat_map(|r| &r.weights);
     let numbers = std::iter::once(table.left_out).chain(weights.flat_map(|w| [w.re, w.im]));

@@ -1,4 +1,4 @@
-//! What sites of a supercell transmit.
+//! Tests of the transmission of the sites of a supercell.
 
 use metalith_rcwa::SiteLattice;
 use num_complex::Complex64;

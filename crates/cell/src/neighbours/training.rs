@@ -10,7 +10,7 @@ use metalith_rcwa::SiteLattice;
 use super::{Blaze, Mapping, SiteGrid};
 
 /// Supercells drawn by chance along the normal, where each of their sites counts for eight by symmetry, and for other
-/// directions. With half as many, what is left over grows by a tenth.
+/// directions. With half as many, the residual grows by a tenth.
 const RANDOM: [usize; 2] = [120, 280];
 
 /// Sites of oblique supercells, and of rows along x where those have a mirror plane, which halves the unknowns. The time
@@ -45,8 +45,8 @@ const NORMAL_SITES: std::ops::RangeInclusive<usize> = 3..=12;
 const STARTS: usize = 12;
 const STEEPEST: f64 = 0.45;
 
-/// As so many sites does one of a blazed grating count. What they are for: without them, steered elements have too little
-/// light in the first order, rows of the truth at 530 nm by 0.045 rms instead of 0.020; and no row of real pillars gets worse.
+/// Weight of a site of a blazed grating, as so many sites. Without them, steered elements have too little light in the
+/// first order, rows of the truth at 530 nm by 0.045 rms instead of 0.020; and no row of real pillars gets worse.
 const BLAZED_WEIGHT: f64 = 3.0;
 
 /// Different pillars side by side.
@@ -55,7 +55,7 @@ pub(crate) struct TrainingCell {
     pub lattice: SiteLattice,
     /// Width of each site (nm), in the order of the lattice.
     pub widths_nm: Vec<f64>,
-    /// As so many sites does each count.
+    /// Weight of each, as so many sites.
     pub weight: f64,
 }
 

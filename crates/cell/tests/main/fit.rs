@@ -4,10 +4,11 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use metalith_cell::{
-    Basis, CellModel, CellStack, Fidelity, FittedCell, ForwardPolynomial, InversePolynomial, MappingTable, PhaseCurve,
-    PublishedCell, bad_cells, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
+    Basis, CellModel, CellResponse, CellStack, Fidelity, FittedCell, ForwardPolynomial, Illumination,
+    InversePolynomial, MappingTable, PhaseCurve, PublishedCell, bad_cells, curves_over, fit_forward, fit_inverse,
+    forward_errors, round_trip,
 };
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 use num_complex::Complex64;
 
@@ -50,7 +51,8 @@ impl CellModel for Solved {
         Fidelity::Rigorous
     }
 
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let wavelength_um = light.wavelength_um;
         // Even widths from 100 to 300 nm; what is narrower or odd is not looked at below.
         let mut known = self.1.lock().unwrap();
         let t = match known.get(&wavelength_um.to_bits()) {
@@ -65,7 +67,7 @@ impl CellModel for Solved {
                 known.entry(wavelength_um.to_bits()).or_insert(t)
             }
         };
-        Ok(t[..=usize::from(max_width_nm)].to_vec())
+        Ok(CellResponse::Scalar(t[..=usize::from(widest_nm)].to_vec()))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {

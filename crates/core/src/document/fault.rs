@@ -25,6 +25,8 @@ pub enum FaultKind {
     OutOfRange,
     /// A word that is not among the choices of its key.
     UnknownChoice,
+    /// A key or a word of an earlier version, which has another name now.
+    Renamed,
     /// A list of another length than the key has.
     WrongLength,
     /// A text with characters that no line may hold.
@@ -45,6 +47,7 @@ impl FaultKind {
             Self::WrongType => "wrong-type",
             Self::OutOfRange => "out-of-range",
             Self::UnknownChoice => "unknown-choice",
+            Self::Renamed => "renamed",
             Self::WrongLength => "wrong-length",
             Self::Unprintable => "unprintable",
             Self::NoFile => "no-file",
@@ -143,7 +146,7 @@ impl Faults {
         Self::new(path, text, placed, total)
     }
 
-    /// How many mistakes there are, listed or not.
+    /// Number of mistakes, listed or not.
     pub fn count(&self) -> usize {
         self.total
     }
@@ -158,7 +161,7 @@ impl Faults {
         &self.faults
     }
 
-    /// Whether there is a mistake of this kind at the key with this path from the top of the file.
+    /// True if there is a mistake of this kind at the key with this path from the top of the file.
     pub fn has(&self, kind: FaultKind, key: &str) -> bool {
         self.faults.iter().any(|fault| fault.kind == kind && fault.key == key)
     }

@@ -25,7 +25,7 @@ use crate::error::{Error, Result};
 pub struct Document<'t> {
     path: PathBuf,
     text: &'t str,
-    /// None where a fault turned out to be part of another.
+    /// Faults in order; `None` where a fault turned out to be part of another.
     faults: RefCell<Vec<Option<Fault>>>,
     /// Faults found after the list was full.
     more: Cell<usize>,
@@ -138,7 +138,7 @@ impl<'t> Document<'t> {
         self.path.parent().map_or_else(PathBuf::new, Path::to_owned)
     }
 
-    /// Whether further faults are counted only.
+    /// True if further faults are only counted.
     fn is_full(&self) -> bool {
         self.faults.borrow().len() >= MOST_HELD
     }
@@ -167,7 +167,7 @@ impl<'t> Document<'t> {
         self.replaced.borrow().contains(path)
     }
 
-    /// Whether neither the value at a path, nor a section that it is in, has a fault.
+    /// True if neither the value at a path nor any section that contains it has a fault.
     fn is_sound(&self, path: &str) -> bool {
         let doubted = self.doubted.borrow();
         let sections = path.match_indices('.').map(|(end, _)| &path[..end]);

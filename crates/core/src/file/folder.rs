@@ -29,7 +29,7 @@ pub struct AtomicFolder {
     lock: Option<File>,
 }
 
-/// Where everything lies.
+/// Paths of everything that an unfinished folder consists of.
 struct Places {
     folder: PathBuf,
     archive: PathBuf,
@@ -97,12 +97,12 @@ impl AtomicFolder {
         Ok(this)
     }
 
-    /// Where the folder is to be written: it is there, and empty.
+    /// Path at which the folder is to be written: it is there, and empty.
     pub fn folder(&self) -> PathBuf {
         self.part.join(FOLDER)
     }
 
-    /// Where the archive is to be written.
+    /// Path at which the archive is to be written.
     pub fn archive(&self) -> PathBuf {
         self.part.join(ARCHIVE)
     }
@@ -132,7 +132,7 @@ impl Drop for AtomicFolder {
     }
 }
 
-/// Whether something is there; links are not followed.
+/// True if something is at the path; links are not followed.
 fn is_there(path: &Path) -> Result<bool> {
     match fs::symlink_metadata(path) {
         Ok(_) => Ok(true),

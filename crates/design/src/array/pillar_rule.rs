@@ -22,9 +22,9 @@ pub struct PillarRule {
     range_nm: (f64, f64),
     /// Published phase over width of the paper's cell, and the wavelength of the mapping (um).
     forward: Option<(ForwardPolynomial, f64)>,
-    /// Of rotated rectangles: everything else does not count.
+    /// Rule of rotated rectangles; with it, no other field counts.
     rotation: Option<RotationRule>,
-    /// Of upright rectangles: everything else does not count.
+    /// Rule of upright rectangles; with it, no other field counts.
     pair: Option<PairRule>,
 }
 
@@ -44,10 +44,10 @@ const OTHER_PHASE: f64 = 0.618_033_988_749_894_9;
 #[derive(Clone, Debug, PartialEq)]
 struct RotationRule {
     pillars: RotatedRectangles,
-    /// Of the light that arrives.
+    /// Handedness of the light that arrives.
     arriving: Handedness,
     mapping: RotationMapping,
-    /// What the grid adds to the rotation of each number, in steps; the first stands for no pillar.
+    /// Change of the rotation of each number by the grid, in steps; the first stands for no pillar.
     turned: Vec<f64>,
     /// The number over each of [`PARTS`] of a turn of phase, zero where it is not the same all over: sums of waves for millions of
     /// sites take longer than to write them.
@@ -110,7 +110,7 @@ impl RotationRule {
         }
     }
 
-    /// The same from the sums themselves.
+    /// Nearest number, from the sums themselves.
     fn nearest(&self, u: f64) -> u16 {
         let wanted = self.unrounded(u);
         let nearest = wanted.round();
@@ -194,7 +194,7 @@ impl PillarRule {
         }
     }
 
-    /// The same rule, asked about the phase of light along an axis; of upright rectangles alone there is a difference.
+    /// Same rule for the phase of light along an axis; only upright rectangles have a difference.
     #[must_use]
     pub fn along(mut self, axis: PolarisationAxis) -> Self {
         if let Some(pair) = &mut self.pair {
@@ -203,7 +203,7 @@ impl PillarRule {
         self
     }
 
-    /// What the pillars are, as far as symmetry is asked: rectangles, or what a mirror leaves as it is.
+    /// Shape of the pillars, as far as symmetry is concerned: rectangles, or shapes that a mirror leaves unchanged.
     pub(super) fn shape(&self) -> PillarShape {
         match (&self.rotation, &self.pair) {
             (Some(rule), _) => PillarShape::Rectangle(rule.pillars.into()),
@@ -243,7 +243,8 @@ impl PillarRule {
         nm / span_nm.abs().max(self.step_nm)
     }
 
-    /// The same of a width that is written, or of the number of a rectangle as it is drawn; one that is not in the library has none.
+    /// Phase (waves) of a width that is written, or of the number of a rectangle as it is drawn; one that is not in the
+    /// library has none.
     pub fn turns_of_written(&self, width_nm: u16) -> f64 {
         if let Some(pair) = &self.pair {
             return pair.choice.turns(width_nm, pair.axis).unwrap_or(0.0);
@@ -337,7 +338,8 @@ mod tests {
         Design::parse(path, &text.replacen("[layout]", &format!("{steered}\n[layout]"), 1))
     }
 
-    /// Both hands, series that go forwards and back, and steps from a degree to a tenth of it: what is kept is what the sums give.
+    /// Test of both hands, series that go forwards and back, and steps from a degree to a tenth of it: what is kept is
+    /// what the sums give.
     #[test]
     fn numbers_that_are_kept_are_those_of_the_sums() {
         for (arriving, steps) in [

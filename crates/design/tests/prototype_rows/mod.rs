@@ -4,15 +4,15 @@
 use std::f64::consts::TAU;
 
 use metalith_cell::{
-    Blaze, CellModel, CoarseCell, ElementRow, Mapping, NeighbourTable, NeighbourTableSpec, PointwiseCell, RealRow,
-    SiteGrid,
+    Blaze, CellModel, CellResponse, CoarseCell, ElementRow, Illumination, JonesTables, Mapping, NeighbourTable,
+    NeighbourTableSpec, PointwiseCell, RealRow, SiteGrid,
 };
 use metalith_core::{Silent, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarRule};
 use num_complex::Complex64;
 
-/// Where rows begin, from the middle of the element (um).
+/// Places where rows begin, from the middle of the element (um).
 pub const RADII_UM: [f64; 4] = [60.0, 180.0, 300.0, 440.0];
 
 /// Share of the light that models put elsewhere than the supercell of a row, mean of s and p.
@@ -90,7 +90,11 @@ impl Prototype {
         let as_lit = if along_normal {
             [normal.clone(), normal.clone()]
         } else {
-            equal.oblique(um, sines, widest).unwrap().unwrap().kept
+            let light = Illumination::from_direction(um, sines).oblique();
+            match equal.response(&light, widest, &Silent).unwrap() {
+                CellResponse::Jones(JonesTables::Oblique(tables)) => tables.kept,
+                other => panic!("{other:?}"),
+            }
         };
         let normal = [normal.clone(), normal];
         let table = self.neighbours(um, sines);

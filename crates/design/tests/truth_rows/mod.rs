@@ -38,7 +38,8 @@ pub struct Summary {
     /// Mean share of the first order: by the truth, by single cells at normal incidence, by single cells at the angle
     /// of arrival, by [`BlazeOrders`].
     pub shares: [f64; 4],
-    /// Difference of that share from the truth: single cells at normal incidence, as lit, [`BlazeOrders`].
+    /// Difference of that share from the truth: single cells at normal incidence, at oblique incidence,
+    /// [`BlazeOrders`].
     pub first: [f64; 3],
     /// Difference of the share of the zero order, by [`BlazeOrders`].
     pub zero: f64,

@@ -26,7 +26,7 @@ pub(super) struct Outlines {
     pub rings: Vec<Ring>,
 }
 
-/// What is a pillar, and where.
+/// Pillars that are looked for: what is a pillar, and where.
 #[derive(Clone, Copy)]
 pub(super) struct WantedPillars<'a> {
     pub layer: LayerNumber,
@@ -36,7 +36,7 @@ pub(super) struct WantedPillars<'a> {
 
 /// One layout.
 pub(super) struct Content {
-    /// What is a pillar.
+    /// Shape of the pillars.
     pub shape: PillarShape,
     pub elements: Vec<ExtractedElement<StoredPillars>>,
     pub outlines: BTreeMap<LayerNumber, Outlines>,
@@ -51,7 +51,7 @@ pub(super) struct TextCopy {
     pub layer: LayerNumber,
     /// Its string, by its number in [`Strings`].
     pub string: u32,
-    /// In the common unit.
+    /// Place in the common unit.
     pub at: Point,
 }
 

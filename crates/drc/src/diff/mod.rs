@@ -98,7 +98,7 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     Ok(report)
 }
 
-/// What the pillars of two layouts are: those of the first, of upright rectangles with the lengths of both.
+/// Shape of the pillars of two layouts: the shape of the first, for upright rectangles with the lengths of both.
 fn both(first: PillarShape, second: PillarShape) -> Result<PillarShape> {
     let (Some(a), Some(b)) = (first.upright(), second.upright()) else {
         return Ok(first);
@@ -129,7 +129,7 @@ fn gcd(a: i64, b: i64) -> i64 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Whether two files are the same, byte by byte.
+/// True if two files are equal, byte by byte.
 fn same_bytes(a: &Layout, b: &Layout) -> Result<bool> {
     if a.bytes() != b.bytes() {
         return Ok(false);

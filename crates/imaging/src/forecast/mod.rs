@@ -2,20 +2,22 @@
 //!
 //! A restoration by Tikhonov's method is linear. Of each frequency of a scene, in each cell of the field and each plane of colour,
 //! it loses a share of the power; what it makes of noise comes to that, whatever power the scene has. Both are found on one random
-//! scene ([`crate::Rehearsal`]). The shares times the power that scenes have, and the noise of as much light as they have, are the
+//! scene ([`crate::ForecastScene`]). The shares times the power that scenes have, and the noise of as much light as they have, are the
 //! expected error.
 
+mod bands;
 mod natural;
 mod power;
 
 use metalith_wave::camera::Noise;
 use ndarray::Array3;
 
-use power::{CELLS, ZONES, means_by_cell, zone_means, zone_of};
+use bands::ZONES;
+use power::{CELLS, means_by_cell, zone_means, zone_of};
 
 pub use power::ScenePower;
 
-/// What a camera and a restoration lose of any scene, and what they make of noise.
+/// Forecast of what a camera and a restoration lose of any scene, and of what they make of noise.
 #[derive(Clone, Debug)]
 pub struct Forecast {
     /// Power of the error without noise over that of the scene.
@@ -30,7 +32,7 @@ pub struct Forecast {
     exposed: Exposed,
 }
 
-/// How much noise there is for how much light.
+/// Noise of an exposure, and its light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Exposed {
     noise: Noise,
@@ -39,7 +41,7 @@ pub(crate) struct Exposed {
 }
 
 impl Exposed {
-    /// Of the noise of a sensor, and the mean signal that a scene gave.
+    /// Exposure of the noise of a sensor, and the mean signal that a scene gave.
     pub fn of(noise: Noise, signal: f64) -> Self {
         Self { noise, signal }
     }
@@ -55,8 +57,8 @@ impl Exposed {
 }
 
 impl Forecast {
-    /// From a scene, the picture that was restored of it without noise, and what noise adds to that, all linear sRGB
-    /// `[row, column, colour]`.
+    /// Forecast from a scene, the picture that was restored of it without noise, and what noise adds to that, all
+    /// linear sRGB `[row, column, colour]`.
     pub(crate) fn between(truth: &Array3<f64>, picture: &Array3<f64>, noise: &Array3<f64>, exposed: Exposed) -> Self {
         let error = picture - truth;
         let mut lost = ScenePower::of(&error);
@@ -100,10 +102,10 @@ impl Forecast {
 
 #[cfg(test)]
 mod tests {
-    use super::power::BANDS;
+    use super::bands::BANDS;
     use super::*;
-    use crate::SceneView;
-    use crate::restore::SceneStatistics;
+    use crate::geometry::SceneView;
+    use metalith_restoration::SceneStatistics;
 
     fn random(seed: u64, rows: usize, columns: usize) -> Array3<f64> {
         let view = SceneView {
@@ -112,7 +114,7 @@ mod tests {
             field_deg: 60.0,
             distance_um: f64::INFINITY,
         };
-        let planes = SceneStatistics::colours().random_scene(&view, seed);
+        let planes = SceneStatistics::colours().random_scene((view.rows, view.columns), seed);
         Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| f64::from(planes[c][[y, x]]))
     }
 
@@ -143,14 +145,14 @@ mod tests {
             light: power.light.clone(),
             exposed: exposed(),
         };
-        let scores = crate::scores(&Array3::zeros(picture.dim()), &picture).unwrap();
+        let scores = crate::score::scores(&Array3::zeros(picture.dim()), &picture).unwrap();
         for ((got, want), tolerance) in all.psnr_linear_db(&power).iter().zip(scores).zip(TOLERANCE) {
             let ratio = 10f64.powf(0.1 * (want.psnr_linear_db - got));
             assert!((ratio - 1.0).abs() < tolerance, "{got} {want:?}");
         }
     }
 
-    /// What a blur loses is found on one scene, and holds for another of other power.
+    /// Losses by a blur are found on one scene, and hold for another of other power.
     #[test]
     fn what_is_lost_of_one_scene_is_lost_of_another() {
         /// Decibels, of one draw.
@@ -174,7 +176,7 @@ mod tests {
         // Twice as fine, and of another contrast.
         let fine = random(2, 320, 320);
         let other = Array3::from_shape_fn((160, 160, 3), |(y, x, c)| 0.5 * fine[[2 * y, 2 * x, c]]);
-        let scores = crate::scores(&blurred(&other), &other).unwrap();
+        let scores = crate::score::scores(&blurred(&other), &other).unwrap();
         for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&other)).iter().zip(scores) {
             assert!((got - want.psnr_linear_db).abs() < DRAW_DB, "{got} {want:?}");
         }
@@ -185,7 +187,7 @@ mod tests {
         });
         let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &noise, exposed());
         let smooth = Array3::from_shape_fn(rehearsed.dim(), |(y, x, _)| 0.3 + 1e-3 * (0.02 * (y + x) as f64).sin());
-        let scores = crate::scores(&(&blurred(&smooth) + &noise), &smooth).unwrap();
+        let scores = crate::score::scores(&(&blurred(&smooth) + &noise), &smooth).unwrap();
         for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&smooth)).iter().zip(scores) {
             assert!((got - want.psnr_linear_db).abs() < DRAW_DB, "{got} {want:?}");
         }

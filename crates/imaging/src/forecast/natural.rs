@@ -1,8 +1,8 @@
-//! What photographs have on the mean.
+//! Mean statistics of photographs.
 
-use super::power::{Bands, ZONES};
+use super::bands::{Bands, ZONES};
 
-/// Of a zone of the field.
+/// Statistics of a zone of the field.
 pub struct NaturalZone {
     /// Mean light, white being one.
     pub light: f64,

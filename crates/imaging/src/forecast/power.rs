@@ -2,24 +2,21 @@
 
 use std::ops::Range;
 
-use metalith_wave::kernels::{fft_size, mirrored};
+use metalith_restoration::SceneStatistics;
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size, mirrored};
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use rayon::prelude::*;
 
+use super::bands::{BANDS, Bands, ZONES};
 use super::natural::NATURAL;
-use crate::Zone;
-use crate::operator::{FftScratch, SquareFft};
-use crate::restore::SceneStatistics;
+use crate::score::Zone;
 
-/// Cells an axis of the field that power is told apart in, two for each third of it. Within a zone what is lost changes, and
-/// where a scene happens to be bright in it would decide: with whole zones the forecast of twelve photographs differs by up to
-/// 0.6 dB with the seed of the random scene, with these by up to 0.2 dB. Cells of half the size tell the bands of frequency
-/// apart no better.
+/// Cells an axis of the field that power is distinguished in, two for each third of it. Within a zone what is lost
+/// changes, and where a scene happens to be bright in it would decide: with whole zones the forecast of twelve
+/// photographs differs by up to 0.6 dB with the seed of the random scene, with these by up to 0.2 dB. Cells of half the
+/// size tell the bands of frequency apart no better.
 pub(super) const CELLS: usize = 6;
-
-/// Zones of which the field is made.
-pub(super) const ZONES: [Zone; 3] = [Zone::Centre, Zone::Edge, Zone::Corner];
 
 /// Index into [`ZONES`] of a cell, row by row.
 pub(super) fn zone_of(cell: usize) -> usize {
@@ -33,15 +30,6 @@ fn cells(rows: usize, columns: usize) -> impl Iterator<Item = [Range<usize>; 2]>
     (0..CELLS * CELLS).map(move |i| [part(rows, i / CELLS), part(columns, i % CELLS)])
 }
 
-/// Upper ends of bands of frequency (cycles a pixel): half of the power of a restoration is lost somewhere between the fifth and
-/// the tenth, by the place in the field. The last one holds all that is finer.
-pub(super) const BANDS: [f64; 14] = [
-    0.008, 0.016, 0.03, 0.045, 0.06, 0.08, 0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.4, 1.0,
-];
-
-/// Powers of a plane by band.
-pub type Bands = [f64; BANDS.len()];
-
 /// Power of a picture, mean square of its light: by cell of the field, plane of colour and band of frequency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenePower {
@@ -51,7 +39,7 @@ pub struct ScenePower {
 }
 
 impl ScenePower {
-    /// Of linear sRGB `[row, column, colour]`.
+    /// Power of linear sRGB `[row, column, colour]`.
     pub fn of(picture: &Array3<f64>) -> Self {
         let colours = picture.axis_iter(Axis(2));
         let planes: Vec<Array2<f32>> = colours.map(|plane| plane.mapv(|v| v as f32)).collect();
@@ -74,7 +62,7 @@ impl ScenePower {
         }
     }
 
-    /// For each zone of which the field is made the mean light, and powers by plane of colour and band of frequency.
+    /// Mean light of each zone of which the field is made, and powers by plane of colour and band of frequency.
     pub fn by_zone(&self) -> Vec<(Zone, f64, Vec<Bands>)> {
         let light = zone_means(&self.light);
         let of_zone = |(zone, name): (usize, &Zone)| {
@@ -188,11 +176,11 @@ fn bands(plane: &Array2<f32>) -> Vec<Bands> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SceneView;
+    use crate::geometry::SceneView;
 
     #[test]
     fn power_of_random_scenes_is_that_of_their_statistics() {
-        /// Of forty draws, whose brightest places have much of the power.
+        /// Tolerance for forty draws, whose brightest places have much of the power.
         const DRAWS: f64 = 0.15;
         let view = SceneView {
             rows: 256,
@@ -202,7 +190,7 @@ mod tests {
         };
         let statistics = SceneStatistics::colours();
         let power = |seed| {
-            let planes = statistics.random_scene(&view, seed);
+            let planes = statistics.random_scene((view.rows, view.columns), seed);
             ScenePower::of(&Array3::from_shape_fn((256, 256, 3), |(y, x, c)| {
                 f64::from(planes[c][[y, x]])
             }))

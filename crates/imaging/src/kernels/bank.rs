@@ -6,18 +6,24 @@ use metalith_core::{Error, Result};
 use metalith_design::array::Symmetry;
 use serde::{Deserialize, Serialize};
 
-use crate::cache::MOST_BYTES;
+/// Most bytes that the numbers of a bank or of its stray light may have: both are held in memory, and refused before they are
+/// made if they would be more.
+pub const MOST_BYTES: u64 = 4 << 30;
+/// Radius of lenses whose fast fields err by more than accurate ones, which cost as much there: what is seen of them is mostly the
+/// window of a kernel (um).
+pub(crate) const SMALL_UM: f64 = 150.0;
 
-/// What a bank is sampled with.
+/// Specification of the sampling of a bank.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BankSpec {
     /// Edge of a sensor pixel (um).
     pub pixel_um: f64,
-    /// Pixels an axis of a kernel, even. What lands outside is the veil's.
+    /// Pixels an axis of a kernel, even. What lands outside is the stray light's.
     pub window: usize,
     /// Places an axis of the field of each element, odd, at which kernels are formed.
     pub nodes: usize,
-    /// From the element's axis to the last of these places (um): light whose chief ray lands farther off is the veil's.
+    /// Distance from the element's axis to the last of these places (um): light whose chief ray lands farther off is
+    /// the stray light's.
     pub reach_um: f64,
     /// Fields of all elements to 1e-5 of the matched peak, those of small lenses always, instead of to 1e-3; see [`metalith_wave::Accuracy`].
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -25,7 +31,7 @@ pub struct BankSpec {
 }
 
 impl BankSpec {
-    /// Where node `i` of an axis is, from the element's axis (um).
+    /// Place of node `i` of an axis, from the element's axis (um).
     pub fn node_um(&self, i: usize) -> f64 {
         match self.nodes {
             1 => 0.0,
@@ -46,8 +52,8 @@ impl BankSpec {
         2 * self.window
     }
 
-    /// Whether the kernels of so many different places of elements can be held and kept, in so many channels and spectra,
-    /// made of so many wavelengths.
+    /// Checks that the kernels of so many different places of elements can be held and stored, in so many channels and
+    /// spectra, made of so many wavelengths.
     ///
     /// # Errors
     /// If they are too many.
@@ -91,7 +97,7 @@ pub struct KernelBank {
 /// The kernels of one distinct element.
 #[derive(Clone, Debug)]
 pub struct DistinctKernels {
-    /// For each node, row by row: which kernels, and what turns them into those of the node.
+    /// Kernels of each node, row by row, and the symmetry that turns them into the kernels of the node.
     pub nodes: Vec<(usize, Symmetry)>,
     /// Unique node, channel, spectrum, then rows of `side` values.
     pub values: Vec<f32>,

@@ -1,19 +1,18 @@
 //! Kernels from the field behind each element.
 
 use metalith_core::{Error, Progress, Result};
+use metalith_wave::kernels::FftScratch;
 use metalith_wave::{Accuracy, Scratch, Window};
 use rayon::prelude::*;
 
-use super::bank::{BankSpec, DistinctKernels, KernelBank};
-use super::spectrum::{KernelPlan, MovedPart, QUARTERS};
-use crate::ElementView;
+use super::bank::{BankSpec, DistinctKernels, KernelBank, SMALL_UM};
+use super::spectrum::{MovedPart, QUARTERS, SpectrumPlan};
 use crate::chip::{ChipInLight, ElementInLight};
-use crate::kernel_plan::SMALL_UM;
-use crate::operator::FftScratch;
+use crate::geometry::ElementView;
 use crate::spectra::SceneSpectrum;
 
 impl KernelBank {
-    /// Whether the kernels of a chip can be held, for so many spectra of a scene.
+    /// Checks that the kernels of a chip can be held, for so many spectra of a scene.
     ///
     /// # Errors
     /// As [`BankSpec::check_size`].
@@ -39,7 +38,7 @@ impl KernelBank {
         let wavelengths = chip.sampling.wavelengths_nm.len();
         spec.check_size(count, channel_um.len(), basis.len(), wavelengths)?;
         progress.begin("simulating kernels", (count * wavelengths) as u64);
-        let plan = KernelPlan::new(spec.window);
+        let plan = SpectrumPlan::new(spec.window);
         let all: Vec<usize> = (0..wavelengths).collect();
         let mut distinct = Vec::new();
         // One element after the other: what its sites transmit at all wavelengths is held while it is at work.
@@ -87,7 +86,7 @@ type Turned = (usize, metalith_design::array::Symmetry);
 /// Nodes that no symmetry turns into one another, and for each node which of them it is, and turned how.
 type Orbits = (Vec<[usize; 2]>, Vec<Turned>);
 
-/// Of each distinct element.
+/// Orbits of each distinct element.
 fn orbits_of(chip: &ChipInLight<'_>, spec: &BankSpec) -> Vec<Orbits> {
     let of_each = chip.distinct.iter();
     of_each.map(|d| orbits(spec.nodes, &d.symmetries)).collect()
@@ -128,7 +127,7 @@ struct Builder<'a> {
     view: ElementView,
     basis: &'a [SceneSpectrum],
     spec: &'a BankSpec,
-    plan: &'a KernelPlan,
+    plan: &'a SpectrumPlan,
     channel_um: &'a [f64],
 }
 
@@ -191,7 +190,7 @@ impl Builder<'_> {
         };
         let lit = self.light.lit(wavelength, sines);
         // The PSF has no structure finer than wavelength / (2 NA).
-        let aperture = (lit.element.radius_um() / view.sensor_um).atan().sin();
+        let aperture = (lit.radius_um() / view.sensor_um).atan().sin();
         let quarter = self.spec.pixel_um / QUARTERS as f64;
         let within = (quarter * 4.0 * aperture / um).ceil().max(1.0) as usize;
         let window = Window {
@@ -200,7 +199,7 @@ impl Builder<'_> {
             samples: side * within,
             distance_um: view.distance_um(landing),
         };
-        let accuracy = match self.spec.accurate || lit.element.radius_um() < SMALL_UM {
+        let accuracy = match self.spec.accurate || lit.radius_um() < SMALL_UM {
             true => Accuracy::Accurate,
             false => Accuracy::Fast,
         };

@@ -10,4 +10,5 @@ mod bank;
 mod build;
 mod spectrum;
 
-pub use bank::{BankSpec, DistinctKernels, KernelBank, TurnedKernel};
+pub(crate) use bank::SMALL_UM;
+pub use bank::{BankSpec, DistinctKernels, KernelBank, MOST_BYTES, TurnedKernel};

@@ -10,14 +10,14 @@ use std::ops::Range;
 use metalith_sensor::ChannelPart;
 use num_complex::Complex32;
 
-use crate::operator::{FftScratch, SquareFft};
 use crate::spectra::SceneSpectrum;
+use metalith_wave::kernels::{FftScratch, SquareFft};
 
 /// Squares an axis of a pixel.
 pub const QUARTERS: usize = 4;
 
-/// What kernels are made with: transforms of one window size.
-pub struct KernelPlan {
+/// Plan that kernels are made with: transforms of one window size.
+pub struct SpectrumPlan {
     /// Pixels an axis of a kernel, even.
     pub window: usize,
     fft: SquareFft,
@@ -35,12 +35,12 @@ pub struct MovedPart {
     pub nm: f64,
     /// Wavelengths whose PSFs it is a sum of, with their weights: [`metalith_sensor::Sampling::blended`].
     pub blended: Vec<(usize, f64)>,
-    /// From the chief ray of the channel to that of the part (pixels).
+    /// Offset from the chief ray of the channel to the chief ray of the part (pixels).
     pub offset: [f64; 2],
 }
 
 impl MovedPart {
-    /// Of a part whose chief ray lands there, made of these wavelengths.
+    /// Part whose chief ray lands there, made of these wavelengths.
     pub fn new(part: &ChannelPart, total: f64, blended: Vec<(usize, f64)>, offset: [f64; 2]) -> Self {
         Self {
             weight: part.weight / total,
@@ -50,14 +50,14 @@ impl MovedPart {
         }
     }
 
-    /// Whether its PSF is in a kernel of so many pixels: parts that land farther off belong to the veil.
+    /// True if its PSF is in a kernel of so many pixels: parts that land farther off belong to the stray light.
     pub fn inside(&self, window: usize) -> bool {
         self.offset.iter().all(|o| o.abs() <= 0.5 * window as f64)
     }
 }
 
-impl KernelPlan {
-    /// For kernels of `window` pixels an axis, an even number.
+impl SpectrumPlan {
+    /// Plan for kernels of `window` pixels an axis, an even number.
     pub fn new(window: usize) -> Self {
         // Half a window more than the kernel: what parts that have moved put beyond it comes back outside of it.
         Self {
@@ -66,7 +66,7 @@ impl KernelPlan {
         }
     }
 
-    /// Of the energies in quarters of the pixels of a window, row by row, its chief ray in the middle.
+    /// Spectrum of the energies in quarters of the pixels of a window, row by row, its chief ray in the middle.
     pub fn spectrum(&self, quarters: &[f32], scratch: &mut FftScratch) -> PsfSpectrum {
         let (inner, size) = (self.window * QUARTERS, self.fft.size());
         let from = (size - inner) / 2;
@@ -234,10 +234,10 @@ mod tests {
     /// A Gaussian that the light of two wavelengths moves: closed form on pixels by a fine sum.
     #[test]
     fn kernels_are_pixels_of_the_moved_psf() {
-        /// Of the peak: single precision, and a Gaussian of 3 quarters that is summed over them.
+        /// Tolerance as a share of the peak: single precision, and a Gaussian of 3 quarters that is summed over them.
         const SHARE: f32 = 2e-3;
         let window = 16;
-        let plan = KernelPlan::new(window);
+        let plan = SpectrumPlan::new(window);
         let mut scratch = FftScratch::default();
         let sigma = 0.8;
         let n = window * QUARTERS;

@@ -1,10 +1,10 @@
-//! Which kernels are in force between the places at which they were formed.
+//! Kernels between the places at which they were formed.
 
 use std::ops::Range;
 
 use metalith_sensor::lagrange;
 
-/// How the kernel at a place of an element's field follows from those of the nodes about it.
+/// Rule by which the kernel at a place of an element's field follows from the kernels of the nodes about it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BetweenNodes {
     /// Along each axis a mean of the two next to it.
@@ -117,7 +117,7 @@ mod tests {
         }
     }
 
-    /// What an element's mirrored twin has at the mirrored place.
+    /// Kernels of an element and its mirrored twin are equal at mirrored places.
     #[test]
     fn both_sides_are_alike() {
         let n = 9;

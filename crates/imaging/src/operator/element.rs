@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use metalith_sensor::Sensor;
-use metalith_wave::kernels::fft_size;
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use ndarray::Array2;
 use num_complex::Complex32;
 
@@ -12,9 +12,7 @@ use super::between::BetweenNodes;
 use super::mixed::MixedKernels;
 use super::source::KernelSource;
 use super::warp::{CellPoint, Warp};
-use super::{FftScratch, SquareFft};
-use crate::ElementView;
-use crate::geometry::SceneSpace;
+use crate::geometry::{ElementView, SceneSpace};
 
 /// One element of an operator.
 pub struct ElementOperator<'a> {
@@ -26,7 +24,7 @@ pub struct ElementOperator<'a> {
     pub(super) channels: Vec<ChannelPlan>,
 }
 
-/// What one channel of an element needs.
+/// Plan of one channel of an element.
 pub(super) struct ChannelPlan {
     /// One for each point within a pixel; none if they are made when needed.
     warps: Vec<Warp>,
@@ -39,7 +37,7 @@ pub(super) struct NodePlan {
     node: [usize; 2],
     pub first: [usize; 2],
     pub shape: [usize; 2],
-    /// By phase and light, see [`MixedKernels`].
+    /// Kernels by phase and light, see [`MixedKernels`].
     kernels: MixedKernels,
     /// Over its rectangle.
     weights: Vec<f32>,
@@ -161,7 +159,7 @@ impl<'a> ElementOperator<'a> {
         points.iter().map(warp).collect()
     }
 
-    /// What is cut out of the sampled light for a node: weights of its inputs, at one of their points.
+    /// Light that is cut out of the sampled light for a node: weights of its inputs, at one of their points.
     pub(super) fn lights(&self, node: &NodePlan, inputs: usize, points: usize) -> Vec<Light> {
         if !node.kernels.is_empty() {
             let all = node.kernels.mixtures().iter();
@@ -221,7 +219,7 @@ impl<'a> ElementOperator<'a> {
 
 /// Light that one kernel of a node acts on.
 pub(super) struct Light {
-    /// Of each input.
+    /// Weights of each input.
     pub weights: Vec<f32>,
     pub point: usize,
 }
@@ -245,7 +243,7 @@ impl NodePlan {
     }
 }
 
-/// Which of the kernels of a node.
+/// Index of a kernel of a node.
 #[derive(Clone, Copy)]
 struct KernelAt {
     input: usize,

@@ -49,13 +49,13 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
-    /// Where a row of it lies in the image.
+    /// Range of one of its rows in the image.
     fn row(&self, y: usize) -> std::ops::Range<usize> {
         let at = (self.first[0] + y) * self.columns + self.first[1];
         at..at + self.shape[1]
     }
 
-    /// Whether an image has any light in it.
+    /// True if an image has any light in it.
     pub fn is_lit(&self, image: &[f32]) -> bool {
         (0..self.shape[0]).any(|y| image[self.row(y)].iter().any(|v| *v != 0.0))
     }

@@ -6,7 +6,7 @@ use num_complex::Complex32;
 /// Kernels of a node as spectra, each for a mixture of the inputs.
 #[derive(Clone, Debug, Default)]
 pub struct MixedKernels {
-    /// By phase and mixture.
+    /// Spectra by phase and mixture.
     spectra: Vec<Complex32>,
     /// Weights of the inputs in each mixture.
     mixtures: Vec<Vec<f32>>,
@@ -18,9 +18,9 @@ pub struct MixedKernels {
 const LEFT_OUT: f64 = 2e-3;
 
 impl MixedKernels {
-    /// For spectra of `size` frequencies an axis, by phase and input. Inputs are taken to vary with the spectrum of scenes, and
-    /// by `statistics` with one another: planes of the picture (rows) from independent ones (columns); none for inputs
-    /// that are not mixed.
+    /// Mixtures of spectra of `size` frequencies an axis, by phase and input. Inputs are taken to vary with the
+    /// spectrum of scenes, and by `statistics` with one another: planes of the picture (rows) from independent ones
+    /// (columns); none for inputs that are not mixed.
     pub fn new(spectra: Vec<Complex32>, inputs: usize, size: usize, statistics: Option<&DMatrix<f64>>) -> Self {
         let entries = (size / 2 + 1) * size;
         let alone = |i: usize| (0..inputs).map(|k| f32::from(u8::from(i == k))).collect();
@@ -90,7 +90,7 @@ impl MixedKernels {
         }
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.spectra.is_empty()
     }

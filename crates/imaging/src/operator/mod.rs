@@ -1,13 +1,14 @@
-//! From a scene to the frame, and the adjoint: both matrix-free, for whole frames.
+//! Operator from a scene to the frame, and its adjoint: both matrix-free, for whole frames.
 //!
 //! Each element samples the scene on the pixels of its sub-image. Each node of its kernels takes its share of that, by
 //! weights over the field, and spreads it by its kernel, through transforms of small squares. Sub-images add up where they
-//! overlap; light that no kernel holds is laid over the frame by the veil.
+//! overlap; light that no kernel holds is laid over the frame by the stray light.
 //!
 //! | question | file |
 //! | --- | --- |
 //! | which place of the scene a pixel looks at | `warp` |
 //! | which kernels are in force between nodes | `between` |
+//! | how finely it samples the scene, and what it knows | `detail` |
 //! | kernels on the pixels of a grid | `source` |
 //! | an element: its warps, kernels of its nodes as spectra | `element` |
 //! | light through an element, and back | `pass` |
@@ -15,11 +16,10 @@
 //! | the innermost loops | `loops` |
 //! | fewer of them than inputs | `mixed` |
 //! | a scene without what its grid cannot hold | `smooth` |
-//! | transforms | `fft2` |
 
 mod between;
+mod detail;
 mod element;
-mod fft2;
 mod loops;
 mod mixed;
 mod pass;
@@ -30,101 +30,21 @@ mod warp;
 
 use std::borrow::Cow;
 
+use metalith_restoration::{FrameModel, Planes};
 use metalith_sensor::Camera;
-use nalgebra::DMatrix;
+use metalith_wave::kernels::{FftScratch, box_sums};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::approximation_set::ApproximationSet;
-use crate::exposure::box_sums;
+use crate::geometry::{ElementView, SceneSpace, SceneView};
 use crate::kernels::KernelBank;
 use crate::stray_light::{self, StrayLight};
-use crate::{ElementView, SceneSpace, SceneView};
 
 pub use between::BetweenNodes;
+pub use detail::{Detail, SceneInputs, ScenePoints};
 use element::ElementOperator;
-pub use fft2::{FftScratch, SquareFft};
 use smooth::Smoothing;
 use source::KernelSource;
-
-/// Which planes of the scene go into an operator, out of the spectra of its bank.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SceneInputs {
-    /// One plane for each of these spectra; every channel sees all of them.
-    Spectra(std::ops::Range<usize>),
-    /// One plane for each channel: the light that it counts, spread as that of a surface whose spectrum is the sum of
-    /// these.
-    Channels(std::ops::Range<usize>),
-}
-
-/// At how many points the scene is sampled for the pixels of the sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScenePoints {
-    FourAPixel,
-    OneAPixel,
-    /// One for a square of two by two pixels, of a scene without what is finer; with a colour filter array light is then
-    /// found for the pixels alone that count a channel.
-    OneASquare,
-}
-
-impl ScenePoints {
-    /// Pixels an axis of a cell: what shares its points.
-    pub fn cell(self) -> usize {
-        match self {
-            Self::FourAPixel | Self::OneAPixel => 1,
-            Self::OneASquare => 2,
-        }
-    }
-
-    /// Points of a cell from its middle along x and y (pixels).
-    pub fn offsets(self) -> &'static [[f64; 2]] {
-        match self {
-            Self::FourAPixel => &[[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]],
-            Self::OneAPixel | Self::OneASquare => &[[0.0; 2]],
-        }
-    }
-}
-
-/// How finely an operator samples the scene, and which kernels it knows.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Detail {
-    pub points: ScenePoints,
-    /// Every how many-th node of the bank along each axis is used; it divides the steps between the nodes.
-    pub node_step: usize,
-    /// Which kernels are in force between these nodes.
-    pub between: BetweenNodes,
-    pub inputs: SceneInputs,
-    pub assumed: ApproximationSet,
-    /// How the inputs vary with one another: planes (rows) from independent ones (columns). With it kept kernels are as few
-    /// mixtures as see the same to 0.2 % of the light.
-    pub statistics: Option<DMatrix<f64>>,
-}
-
-impl Detail {
-    /// Every node and the scene at four points a pixel: what is taken for the truth.
-    pub fn simulation(spectra: usize) -> Self {
-        Self {
-            points: ScenePoints::FourAPixel,
-            node_step: 1,
-            between: BetweenNodes::Linear,
-            inputs: SceneInputs::Spectra(0..spectra),
-            assumed: ApproximationSet::default(),
-            statistics: None,
-        }
-    }
-
-    /// What a restoration knows: kernels on a coarser grid over the field, and no more of the scene than they pass.
-    pub fn restoration(points: ScenePoints, inputs: SceneInputs) -> Self {
-        Self {
-            points,
-            node_step: 2,
-            between: BetweenNodes::Linear,
-            inputs,
-            assumed: ApproximationSet::default(),
-            statistics: None,
-        }
-    }
-}
 
 /// The way from planes of the scene to the frame of each channel.
 pub struct FrameOperator<'a> {
@@ -133,16 +53,16 @@ pub struct FrameOperator<'a> {
     channels: usize,
     inputs: SceneInputs,
     elements: Vec<ElementOperator<'a>>,
-    veil: Cow<'a, StrayLight>,
+    stray_light: Cow<'a, StrayLight>,
     smoothing: Smoothing,
 }
 
 impl<'a> FrameOperator<'a> {
-    /// For the elements of a bank before the sensor of a camera. With one point a cell spectra of kernels are kept in
-    /// memory.
+    /// Operator for the elements of a bank before the sensor of a camera. With one point a cell, spectra of kernels are
+    /// kept in memory.
     pub fn new(
         bank: &'a KernelBank,
-        veil: &'a StrayLight,
+        stray_light: &'a StrayLight,
         elements: &[ElementView],
         camera: &Camera,
         space: &SceneSpace,
@@ -168,32 +88,14 @@ impl<'a> FrameOperator<'a> {
             view: *view,
             frame: [sensor.rows as usize, sensor.columns as usize],
             channels: bank.channel_um.len(),
-            veil: match &detail.inputs {
-                SceneInputs::Spectra(_) => Cow::Borrowed(veil),
-                SceneInputs::Channels(spectra) => Cow::Owned(veil.grey(spectra.clone())),
+            stray_light: match &detail.inputs {
+                SceneInputs::Spectra(_) => Cow::Borrowed(stray_light),
+                SceneInputs::Channels(spectra) => Cow::Owned(stray_light.grey(spectra.clone())),
             },
             inputs: detail.inputs,
             elements,
             smoothing: Smoothing::new(step),
         }
-    }
-
-    /// Number of planes that go in.
-    pub fn inputs(&self) -> usize {
-        match &self.inputs {
-            SceneInputs::Spectra(spectra) => spectra.len(),
-            SceneInputs::Channels(_) => self.channels,
-        }
-    }
-
-    /// Whether the planes that go in are red, green and blue.
-    pub fn sees_colours(&self) -> bool {
-        matches!(&self.inputs, SceneInputs::Spectra(spectra) if spectra.len() == 3)
-    }
-
-    /// Number of channels that come out.
-    pub fn channels(&self) -> usize {
-        self.channels
     }
 
     /// The scene.
@@ -206,115 +108,39 @@ impl<'a> FrameOperator<'a> {
         self.frame
     }
 
-    /// Number of elements.
-    pub fn elements(&self) -> usize {
-        self.elements.len()
-    }
-
-    /// Light in each pixel, by channel: share of a channel's light that arrives at a lens from a unit of projected solid
-    /// angle of a white surface.
-    pub fn apply(&self, scene: &[Array2<f32>]) -> Vec<Array2<f32>> {
-        let all: Vec<usize> = (0..self.elements.len()).collect();
-        self.apply_elements(scene, &all, true)
-    }
-
-    /// The same of some of the elements, with or without the veil of all.
-    pub fn apply_elements(&self, scene: &[Array2<f32>], elements: &[usize], veil: bool) -> Vec<Array2<f32>> {
-        assert_eq!(scene.len(), self.inputs(), "one plane for each spectrum of the scene");
-        let smooth: Vec<_> = scene.par_iter().map(|p| self.smoothing.apply(p)).collect();
-        let images: Vec<_> = elements
-            .par_iter()
-            .map_init(FftScratch::default, |scratch, e| {
-                self.elements[*e].apply(&smooth, scratch)
-            })
-            .collect();
-        let mut frames = vec![Array2::zeros(self.frame); self.channels];
-        for image in images.into_iter().flatten() {
-            image.add_to(&mut frames);
-        }
-        if veil {
-            self.add_veil(scene, &mut frames);
-        }
-        frames
-    }
-
-    fn add_veil(&self, scene: &[Array2<f32>], frames: &mut [Array2<f32>]) {
+    fn add_stray_light(&self, scene: &[Array2<f32>], frames: &mut [Array2<f32>]) {
         let gathered: Vec<Vec<f64>> = scene
             .par_iter()
             .map(|p| stray_light::gather(&self.view, p.view()))
             .collect();
         frames.par_iter_mut().enumerate().for_each(|(channel, frame)| {
-            let mut cells = vec![0.0; self.veil.cells[0] * self.veil.cells[1]];
+            let mut cells = vec![0.0; self.stray_light.cells[0] * self.stray_light.cells[1]];
             for (input, light) in gathered.iter().enumerate() {
-                if let Some(basis) = self.veil_basis(channel, input) {
-                    let own = self.veil.apply(channel, basis, light);
+                if let Some(basis) = self.stray_light_basis(channel, input) {
+                    let own = self.stray_light.apply(channel, basis, light);
                     cells.iter_mut().zip(own).for_each(|(c, v)| *c += v);
                 }
             }
-            stray_light::lay(&cells, self.veil.cells, frame);
+            stray_light::lay(&cells, self.stray_light.cells, frame);
         });
     }
 
-    /// Which spectrum of the veil takes an input to a channel.
-    fn veil_basis(&self, channel: usize, input: usize) -> Option<usize> {
+    /// Spectrum of the stray light that takes an input to a channel.
+    fn stray_light_basis(&self, channel: usize, input: usize) -> Option<usize> {
         match &self.inputs {
             SceneInputs::Spectra(spectra) => Some(spectra.start + input),
             SceneInputs::Channels(_) => (channel == input).then_some(0),
         }
     }
 
-    /// The adjoint of [`FrameOperator::apply`]: from frames by channel to planes of the scene.
-    pub fn adjoint(&self, frames: &[Array2<f32>]) -> Vec<Array2<f32>> {
-        let all: Vec<usize> = (0..self.elements.len()).collect();
-        self.adjoint_elements(frames, &all, true)
-    }
-
-    /// The same of some of the elements, with or without the veil of all.
-    pub fn adjoint_elements(&self, frames: &[Array2<f32>], elements: &[usize], veil: bool) -> Vec<Array2<f32>> {
-        assert_eq!(frames.len(), self.channels, "one frame for each channel");
-        let shape = (self.view.rows, self.view.columns);
-        let mut planes = vec![Array2::zeros(shape); self.inputs()];
-        // Planes of a few elements are held at a time, and added in the order of elements: the sums do not depend on the threads.
-        // Twice as many as these, so that who is done with one has another.
-        for some in elements.chunks(2 * rayon::current_num_threads()) {
-            let found: Vec<Vec<Array2<f32>>> = some
-                .par_iter()
-                .map_init(FftScratch::default, |scratch, e| {
-                    self.elements[*e].adjoint(frames, shape, self.inputs(), scratch)
-                })
-                .collect();
-            for own in found {
-                planes.iter_mut().zip(&own).for_each(|(p, o)| *p += o);
-            }
-        }
-        planes.par_iter_mut().for_each(|p| *p = self.smoothing.adjoint(p));
-        if veil {
-            let lifted: Vec<Vec<f64>> = frames
-                .par_iter()
-                .map(|f| stray_light::lift(f, self.veil.cells))
-                .collect();
-            planes.par_iter_mut().enumerate().for_each(|(input, plane)| {
-                let mut cells = vec![0.0; stray_light::SCENE_CELLS * stray_light::SCENE_CELLS];
-                for (channel, light) in lifted.iter().enumerate() {
-                    if let Some(basis) = self.veil_basis(channel, input) {
-                        let own = self.veil.adjoint(channel, basis, light);
-                        cells.iter_mut().zip(own).for_each(|(c, v)| *c += v);
-                    }
-                }
-                stray_light::spread(&self.view, &cells, plane);
-            });
-        }
-        planes
-    }
-
-    /// What a frame is as a picture of its channels, unrestored: light of the pixels laid on the places that they look at,
-    /// over that of a white scene. `weight` is zero for pixels that are not known. Needs an operator with one point a cell.
+    /// Picture of the channels of a frame, unrestored: light of the pixels laid on the places that they look at, over
+    /// that of a white scene. `weight` is zero for pixels that are not known. Needs an operator with one point a cell.
     pub fn unrestored(&self, light: &[Array2<f32>], weight: &[Array2<f32>]) -> Vec<Array2<f32>> {
         /// Pixels of the scene that a pixel of the sensor is laid over, on each side, twice: where they are far apart, none is
         /// left out.
         const LAID: usize = 1;
         let shape = (self.view.rows, self.view.columns);
-        let white = self.apply(&vec![Array2::ones(shape); self.inputs()]);
+        let white = self.apply(&self.white());
         let laid = |frames: &[Array2<f32>]| {
             let known = frames.iter().zip(weight).map(|(frame, weight)| {
                 let own = ndarray::Zip::from(frame).and(weight);
@@ -336,5 +162,92 @@ impl<'a> FrameOperator<'a> {
                 .for_each(|s, w| *s = if *w > 0.0 { *s / w } else { 0.0 });
         }
         sums
+    }
+}
+
+/// Light in each pixel, by channel: share of a channel's light that arrives at a lens from a unit of projected solid
+/// angle of a white surface.
+impl FrameModel for FrameOperator<'_> {
+    fn inputs(&self) -> usize {
+        match &self.inputs {
+            SceneInputs::Spectra(spectra) => spectra.len(),
+            SceneInputs::Channels(_) => self.channels,
+        }
+    }
+
+    fn channels(&self) -> usize {
+        self.channels
+    }
+
+    fn elements(&self) -> usize {
+        self.elements.len()
+    }
+
+    fn picture_shape(&self) -> (usize, usize) {
+        (self.view.rows, self.view.columns)
+    }
+
+    fn frame_shape(&self) -> (usize, usize) {
+        self.frame.into()
+    }
+
+    fn sees_colours(&self) -> bool {
+        matches!(&self.inputs, SceneInputs::Spectra(spectra) if spectra.len() == 3)
+    }
+
+    fn apply_elements(&self, scene: &[Array2<f32>], elements: &[usize], stray_light: bool) -> Planes {
+        assert_eq!(scene.len(), self.inputs(), "one plane for each spectrum of the scene");
+        let smooth: Vec<_> = scene.par_iter().map(|p| self.smoothing.apply(p)).collect();
+        let images: Vec<_> = elements
+            .par_iter()
+            .map_init(FftScratch::default, |scratch, e| {
+                self.elements[*e].apply(&smooth, scratch)
+            })
+            .collect();
+        let mut frames = vec![Array2::zeros(self.frame); self.channels];
+        for image in images.into_iter().flatten() {
+            image.add_to(&mut frames);
+        }
+        if stray_light {
+            self.add_stray_light(scene, &mut frames);
+        }
+        frames
+    }
+
+    fn adjoint_elements(&self, frames: &[Array2<f32>], elements: &[usize], stray_light: bool) -> Planes {
+        assert_eq!(frames.len(), self.channels, "one frame for each channel");
+        let shape = (self.view.rows, self.view.columns);
+        let mut planes = vec![Array2::zeros(shape); self.inputs()];
+        // Planes of a few elements are held at a time, and added in the order of elements: the sums do not depend on the threads.
+        // Twice as many as these, so that who is done with one has another.
+        for some in elements.chunks(2 * rayon::current_num_threads()) {
+            let found: Vec<Vec<Array2<f32>>> = some
+                .par_iter()
+                .map_init(FftScratch::default, |scratch, e| {
+                    self.elements[*e].adjoint(frames, shape, self.inputs(), scratch)
+                })
+                .collect();
+            for own in found {
+                planes.iter_mut().zip(&own).for_each(|(p, o)| *p += o);
+            }
+        }
+        planes.par_iter_mut().for_each(|p| *p = self.smoothing.adjoint(p));
+        if stray_light {
+            let lifted: Vec<Vec<f64>> = frames
+                .par_iter()
+                .map(|f| stray_light::lift(f, self.stray_light.cells))
+                .collect();
+            planes.par_iter_mut().enumerate().for_each(|(input, plane)| {
+                let mut cells = vec![0.0; stray_light::SCENE_CELLS * stray_light::SCENE_CELLS];
+                for (channel, light) in lifted.iter().enumerate() {
+                    if let Some(basis) = self.stray_light_basis(channel, input) {
+                        let own = self.stray_light.adjoint(channel, basis, light);
+                        cells.iter_mut().zip(own).for_each(|(c, v)| *c += v);
+                    }
+                }
+                stray_light::spread(&self.view, &cells, plane);
+            });
+        }
+        planes
     }
 }

@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
+use metalith_wave::kernels::FftScratch;
 use ndarray::Array2;
 use num_complex::Complex32;
 
-use super::FftScratch;
 use super::element::{ElementOperator, NodePlan};
 use super::loops::{Rectangle, multiply_add, multiply_conj_add};
 use super::sub_image::SubImage;

@@ -12,8 +12,8 @@ pub struct Smoothing {
 }
 
 impl Smoothing {
-    /// For points that are `step` pixels of the scene apart: waves of two steps keep half of their height. A grid that is
-    /// finer than the scene needs none.
+    /// Smoothing for points that are `step` pixels of the scene apart: waves of two steps keep half of their height. A
+    /// grid that is finer than the scene needs none.
     pub fn new(step: f64) -> Self {
         let reach = if step > 0.5 {
             (LOBES as f64 * step).ceil() as usize

@@ -9,21 +9,22 @@ use std::ops::Range;
 use metalith_sensor::{ColourFilter, Sensor};
 use nalgebra::DMatrix;
 
-use super::{BetweenNodes, Detail, SceneInputs, ScenePoints};
+use super::between::BetweenNodes;
+use super::detail::{Detail, SceneInputs, ScenePoints};
 use crate::approximation_set::ApproximationSet;
 use crate::exposure::channel_at;
 use crate::kernels::{BankSpec, KernelBank, TurnedKernel};
 
-/// Where kernels come from.
+/// Source of kernels.
 #[derive(Clone)]
 pub struct KernelSource<'a> {
     pub bank: &'a KernelBank,
     pub points: ScenePoints,
     pub inputs: SceneInputs,
     pub assumed: ApproximationSet,
-    /// How inputs vary with one another, if kernels are to be mixed.
+    /// Variation of inputs with one another, if kernels are to be mixed.
     pub statistics: Option<DMatrix<f64>>,
-    /// That of the bank, with the nodes that are used.
+    /// Specification of the bank, with the nodes that are used.
     pub spec: BankSpec,
     pub between: BetweenNodes,
     node_step: usize,
@@ -92,7 +93,7 @@ impl<'a> KernelSource<'a> {
         }
     }
 
-    /// Which planes of the scene a channel sees, each with the spectra whose kernels act on it.
+    /// Planes of the scene that a channel sees, each with the spectra whose kernels act on it.
     pub fn inputs(&self, channel: usize) -> Vec<(usize, Range<usize>)> {
         match &self.inputs {
             SceneInputs::Spectra(all) => all.clone().enumerate().map(|(i, b)| (i, b..b + 1)).collect(),
@@ -165,8 +166,8 @@ impl<'a> KernelSource<'a> {
         (kernel, level)
     }
 
-    /// Which kept values of a kernel light at a point reaches a pixel of each cell by, along one axis: the first or the second
-    /// of two points, the first or the second of two pixels.
+    /// Values of a kernel by which light at a point reaches a pixel of each cell, along one axis: the first or the
+    /// second of two points, the first or the second of two pixels.
     fn taps(&self, point: usize, phase: usize) -> Taps {
         let window = self.spec.window as i64;
         // A kept value `i` stands at (i - window + 1/2) / 2 pixels from the light.
@@ -202,7 +203,7 @@ struct Taps {
 }
 
 impl Taps {
-    /// Which of so many values count for a cell, and by which weight.
+    /// Indices of the values, of so many, that count for a cell, and their weights.
     fn weights_of(&self, cell: usize, values: usize) -> impl Iterator<Item = (usize, f32)> {
         let first = self.first + (cell * self.stride) as i64;
         let from = (-first).max(0) as usize;

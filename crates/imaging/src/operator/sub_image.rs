@@ -5,7 +5,7 @@ use ndarray::Array2;
 /// The sub-image of an element: the pixels of one phase of its cells, in one channel.
 pub struct SubImage {
     pub channel: usize,
-    /// Which pixels of the sensor.
+    /// Pixels of the sensor.
     pub grid: PixelGrid,
     /// Row by row.
     pub light: Vec<f32>,

@@ -1,12 +1,12 @@
-//! Which place of the scene each pixel of a sub-image looks at.
+//! Place of the scene that each pixel of a sub-image views.
 
 use metalith_sensor::Sensor;
 use ndarray::Array2;
 
 use super::between::BetweenNodes;
 use super::sub_image::PixelGrid;
-use crate::ElementView;
 use crate::approximation_set::{ApproximationSet, butterworth};
+use crate::geometry::ElementView;
 use crate::geometry::SceneSpace;
 use crate::kernels::BankSpec;
 
@@ -18,43 +18,43 @@ pub struct Warp {
     pub origin: [i64; 2],
     /// Rows and columns of cells.
     pub shape: [usize; 2],
-    /// Where in the scene's picture the lit cells look.
+    /// Places in the scene's picture that the lit cells view.
     looks: Vec<Look>,
-    /// For each cell: place among the nodes of the kernels (row, column).
+    /// Place of each cell among the nodes of the kernels (row, column).
     pub nodes: Vec<[f32; 2]>,
-    /// For each cell: projected solid angle, zero where the scene or the field of the kernels ends.
+    /// Projected solid angle of each cell, zero where the scene or the field of the kernels ends.
     flux: Vec<f32>,
     /// Rows and columns of the scene.
     size: [usize; 2],
 }
 
-/// Where a cell looks in the scene's picture.
+/// Place in the scene's picture that a cell views.
 #[derive(Clone, Copy)]
 struct Look {
     cell: u32,
     /// The upper left of the four pixels about the place.
     pixel: u32,
-    /// From it to the next row and the next column.
+    /// Shares of the next row and the next column.
     share: [f32; 2],
 }
 
-/// Where in each cell the scene is sampled.
+/// Point of each cell at which the scene is sampled.
 #[derive(Clone, Copy)]
 pub struct CellPoint {
     /// Pixels an axis of a cell.
     pub cell: usize,
-    /// From the middle of the cell along x and y (pixels).
+    /// Shift from the middle of the cell along x and y (pixels).
     pub shift: [f64; 2],
     /// Cells beside the sensor that count: light farther off never reaches it.
     pub reach: usize,
     /// Pixels whose light the point stands for.
     pub area: f64,
-    /// What is assumed of the brightness over the field.
+    /// Assumptions on the brightness over the field.
     pub assumed: ApproximationSet,
 }
 
 impl Warp {
-    /// For light of a wavelength (um), one point of each cell.
+    /// Warp for light of a wavelength (um), one point of each cell.
     pub fn new(
         element: &ElementView,
         sensor: &Sensor,
@@ -192,8 +192,8 @@ impl Warp {
         }
     }
 
-    /// For each of `n` by `n` nodes, row by row, the rectangle of the sub-image in which its weights are not zero: first row and
-    /// column, rows and columns.
+    /// Supports of `n` by `n` nodes, row by row: the rectangle of the sub-image in which the weights of the node are
+    /// not zero, as first row and column, rows and columns.
     pub fn supports(&self, between: BetweenNodes, n: usize) -> Vec<Option<([usize; 2], [usize; 2])>> {
         let mut ends = vec![([usize::MAX; 2], [0; 2]); n * n];
         for (i, place) in self.nodes.iter().enumerate().filter(|(i, _)| self.flux[*i] > 0.0) {
@@ -217,8 +217,8 @@ impl Warp {
 }
 
 impl Look {
-    /// For a place (row, column) in a picture of so many rows and columns, at least two each; nothing is beyond the middles of its
-    /// outermost pixels.
+    /// Look at a place (row, column) in a picture of so many rows and columns, at least two each; nothing is beyond the
+    /// middles of its outermost pixels.
     fn new(cell: usize, place: [f64; 2], size: [usize; 2]) -> Self {
         let place = [0, 1].map(|a| place[a].clamp(0.0, (size[a] - 1) as f64));
         let low = [0, 1].map(|a| (place[a] as usize).min(size[a] - 2));
@@ -263,7 +263,7 @@ fn extent(element: &ElementView, spec: &BankSpec, channel_um: f64) -> ([f64; 2],
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SceneView;
+    use crate::geometry::SceneView;
     use metalith_core::Wedge;
     use metalith_sensor::Camera;
 

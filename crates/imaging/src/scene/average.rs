@@ -3,16 +3,16 @@
 use ndarray::{Array2, Axis};
 
 use super::SceneImage;
-use crate::SceneView;
-use crate::score::SCORED_SIDES;
+use super::sides::SCORED_SIDES;
+use crate::geometry::SceneView;
 
-/// Of a number of pixels that fit: a view is no finer than its own pixels.
+/// Tolerance of a number of pixels that fit: a view is no finer than its own pixels.
 const ROUNDING: f64 = 1e-9;
 
 impl SceneView {
-    /// The same view in as many pixels as are at least so wide (tangent); itself if its own are, or if its shorter side would have
-    /// fewer than the 33 that pictures of it must have to be scored. Rows that are no whole pixel are left out, half of them on each
-    /// side.
+    /// Same view in as many pixels as are at least so wide (tangent); itself if its own are, or if its shorter side
+    /// would have fewer than the 33 that pictures of it must have to be scored. Rows that are no whole pixel are left
+    /// out, half of them on each side.
     #[must_use]
     pub fn no_finer(&self, tangent: f64) -> Self {
         let shorter = self.rows.min(self.columns).max(1);
@@ -30,8 +30,8 @@ impl SceneView {
 }
 
 impl SceneImage {
-    /// The same scene in the larger pixels of a view that [`SceneView::no_finer`] made of its own: means of linear light, and of one
-    /// over the distance.
+    /// Same scene in the larger pixels of a view that [`SceneView::no_finer`] made of its own: means of linear light,
+    /// and of one over the distance.
     #[must_use]
     pub fn averaged(&self, view: &SceneView) -> Self {
         let nearness = |depth: &Array2<f32>| averaged(&depth.mapv(f32::recip), view).mapv(f32::recip);
@@ -54,8 +54,8 @@ pub fn averaged(plane: &Array2<f32>, view: &SceneView) -> Array2<f32> {
     along(&down, Axis(1), &boxes(columns, view.columns, side)).mapv(|v| v as f32)
 }
 
-/// Of so many boxes of one length next to one another, in the middle of `n` values: the first value of each, and what it and those
-/// behind it have of the box.
+/// Boxes of one length, so many next to one another, in the middle of `n` values: the first value of each, and the
+/// shares of the box of that value and of those after it.
 fn boxes(n: usize, count: usize, length: f64) -> Vec<(usize, Vec<f64>)> {
     let begin = 0.5 * (n as f64 - count as f64 * length);
     let one = |k: usize| {

@@ -77,7 +77,7 @@ pub fn chart(kind: BuiltIn, size: usize, field_deg: f64, distance_um: f64) -> Sc
     SceneImage::of_rgb(name, &rgb, field_deg, distance_um)
 }
 
-/// Whether a place from the middle (pixels) is bright on the chart: bars are dark.
+/// True if a place from the middle (pixels) is bright on the chart: bars are dark.
 fn bars(size: usize) -> impl Fn(f64, f64) -> bool {
     let mut groups: Vec<[f64; 3]> = Vec::new();
     let reach = 0.5 * size as f64;

@@ -1,4 +1,4 @@
-//! How far each pixel of a scene is.
+//! Distance of each pixel of a scene.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::SceneImage;
 use super::read::{LONGEST, array, png_values};
 
 impl SceneImage {
-    /// The same scene with the distances of its pixels (um).
+    /// Same scene with the distances of its pixels (um).
     ///
     /// # Errors
     /// If there is not one for each pixel.

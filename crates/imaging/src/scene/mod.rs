@@ -1,4 +1,4 @@
-//! What stands before the camera: a picture of it, in light, with spectra.
+//! Scene before the camera: a picture of it, in light, with spectra.
 //!
 //! | question | file |
 //! | --- | --- |
@@ -7,6 +7,7 @@
 //! | a spectral cube as a few planes | `cube` |
 //! | how far each pixel is | `depth` |
 //! | larger pixels | `average` |
+//! | how many pixels it may have | `sides` |
 
 mod average;
 mod chart;
@@ -14,10 +15,11 @@ mod cube;
 mod depth;
 mod folder;
 mod read;
+mod sides;
 
 use ndarray::{Array2, Array3};
 
-use crate::SceneView;
+use crate::geometry::SceneView;
 use crate::spectra::{SceneSpectrum, linear_rgb, rgb_basis};
 
 pub use average::averaged;
@@ -25,8 +27,9 @@ pub use chart::{BuiltIn, chart};
 pub(crate) use chart::{LEAN_DEG, SPOKES, STAR};
 pub use depth::read_depth;
 pub use folder::images_in;
-pub(crate) use read::SIDES;
 pub use read::{SceneFile, read_far_scene, read_picture, read_scene};
+pub use sides::SCORED_SIDES;
+pub(crate) use sides::sides_words;
 
 /// A scene: planes of light, each with the spectrum of its reflectance.
 ///
@@ -47,7 +50,7 @@ pub struct SceneImage {
 }
 
 impl SceneImage {
-    /// Of linear sRGB, `[row, column, colour]`, white being one.
+    /// Scene of linear sRGB, `[row, column, colour]`, white being one.
     pub fn of_rgb(name: &str, rgb: &Array3<f64>, field_deg: f64, distance_um: f64) -> Self {
         let (rows, columns, _) = rgb.dim();
         Self {
@@ -67,7 +70,7 @@ impl SceneImage {
         }
     }
 
-    /// The same scene, white everywhere.
+    /// Same scene, white everywhere.
     pub fn white(&self) -> Self {
         let shape = (self.view.rows, self.view.columns);
         let mut white = Self::of_rgb(

@@ -11,12 +11,10 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
+use super::sides::{SIDES, sides_words};
 use super::{SceneImage, cube};
-use crate::SceneView;
-use crate::score::{SCORED_SIDES, sides_words};
+use crate::geometry::SceneView;
 
-/// Shortest and longest side of a picture that is read (pixels): not all are scored.
-pub(crate) const SIDES: std::ops::RangeInclusive<usize> = 16..=*SCORED_SIDES.end();
 /// Longest file (bytes): a cube of 1024 x 1024 with 31 bands in double precision, and some more.
 pub(super) const LONGEST: u64 = 512 << 20;
 
@@ -237,7 +235,8 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     Ok(upright(stored, decoder.exif().map_or(1, |exif| orientation(exif))))
 }
 
-/// How a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if it does not say.
+/// Orientation in which a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if the file does not
+/// say.
 fn orientation(exif: &[u8]) -> u16 {
     const TAG: u16 = 274;
     /// Bytes of an entry, and those before its value.

@@ -1,8 +1,8 @@
-//! The veil: all light that lands outside of the kernels' windows, laid over the sensor coarsely.
+//! The stray light: all light that lands outside of the kernels' windows, laid over the sensor coarsely.
 //!
 //! Where light of a direction lands follows from the local spectra of the element, by rays
 //! ([`metalith_wave::propagation::LocalAngularSpectrum`]). What the kernel of that direction holds is taken out of it, so that image
-//! and veil together are all the light that travels to the sensor.
+//! and stray light together are all the light that travels to the sensor.
 //!
 //! | question | file |
 //! | --- | --- |
@@ -19,7 +19,7 @@ use metalith_sensor::Sensor;
 use metalith_wave::kernels::sum_of_products;
 use pulp::Arch;
 
-use crate::cache::MOST_BYTES;
+use crate::kernels::MOST_BYTES;
 
 pub use shares::LightShares;
 pub use squares::{gather, lay, lift, spread};
@@ -29,7 +29,7 @@ pub const SCENE_CELLS: usize = 20;
 /// Pixels an axis of a square of the sensor.
 pub const CELL_PIXELS: usize = 16;
 
-/// Where a channel's light of a scene's squares goes that no kernel holds.
+/// Stray light: where a channel's light of a scene's squares goes that no kernel holds.
 #[derive(Clone, Debug)]
 pub struct StrayLight {
     /// Rows and columns of squares of the sensor.
@@ -40,7 +40,7 @@ pub struct StrayLight {
     /// Channel, spectrum, square of the scene, square of the sensor: light on it, of what a lens receives from a white
     /// surface of that square.
     pub values: Vec<f32>,
-    /// By channel and spectrum: shares of the light that arrives.
+    /// Shares of the light that arrives, by channel and spectrum.
     pub budget: Vec<LightShares>,
 }
 
@@ -50,7 +50,7 @@ pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
 }
 
 impl StrayLight {
-    /// Whether the veil of a sensor can be held.
+    /// Checks that the stray light of a sensor can be held.
     ///
     /// # Errors
     /// If it has too many pixels.
@@ -74,7 +74,7 @@ impl StrayLight {
         ))
     }
 
-    /// No veil, for tests and for those who leave it out.
+    /// No stray light, for tests and for those who leave it out.
     pub fn none(sensor: &Sensor, channels: usize, bases: usize) -> Self {
         let cells = sensor_cells(sensor);
         Self {
@@ -86,7 +86,7 @@ impl StrayLight {
         }
     }
 
-    /// For each square of the scene the light on those of the sensor.
+    /// Light on the squares of the sensor, for each square of the scene.
     fn block(&self, channel: usize, basis: usize) -> impl Iterator<Item = &[f32]> {
         let (rows, columns) = (SCENE_CELLS * SCENE_CELLS, self.cells[0] * self.cells[1]);
         let from = (channel * self.bases + basis) * rows * columns;
@@ -111,7 +111,7 @@ impl StrayLight {
             .collect()
     }
 
-    /// The veil of a surface whose spectrum is the sum of some of the basis, in each channel.
+    /// The stray light of a surface whose spectrum is the sum of some of the basis, in each channel.
     pub fn grey(&self, spectra: std::ops::Range<usize>) -> Self {
         let size = SCENE_CELLS * SCENE_CELLS * self.cells[0] * self.cells[1];
         let mut values = vec![0.0f32; self.channels * size];
@@ -136,7 +136,7 @@ mod tests {
     use metalith_sensor::Camera;
 
     #[test]
-    fn a_sensor_whose_veil_cannot_be_held_is_refused() {
+    fn a_sensor_whose_stray_light_cannot_be_held_is_refused() {
         let mut sensor = Camera::three_bands(5.86).sensor;
         assert!(StrayLight::check_size(&sensor, 3, 6).is_ok());
         (sensor.rows, sensor.columns) = (100_000, 100_000);

@@ -1,21 +1,21 @@
-//! How much of the light goes where.
+//! Shares of the light by destination.
 
 use serde::{Deserialize, Serialize};
 
-/// Where the light goes that arrives at all elements from a white scene.
+/// Shares by destination of the light that arrives at all elements from a white scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LightShares {
     /// Light that arrives, of any scale.
     pub arrives: f64,
-    /// Of it, what kernels hold, on or off the sensor.
+    /// Share that kernels hold, on or off the sensor.
     pub in_kernels: f64,
-    /// On the sensor, outside of kernels.
-    pub veil: f64,
-    /// In the sensor's plane or beyond, but not on the sensor.
+    /// Share on the sensor, outside of kernels.
+    pub stray_light: f64,
+    /// Share in the sensor's plane or beyond, but not on the sensor.
     pub beyond: f64,
     /// Held in frequencies that do not travel.
     pub evanescent: f64,
-    /// Undiffracted: a part of the veil and of what lands beyond.
+    /// Undiffracted: a part of the stray light and of what lands beyond.
     pub zero_order: f64,
     /// Reflected or absorbed, or diffracted into the glass.
     pub not_passed: f64,
@@ -26,7 +26,7 @@ impl LightShares {
     pub fn add(&mut self, other: &Self, weight: f64) {
         self.arrives += weight * other.arrives;
         self.in_kernels += weight * other.in_kernels;
-        self.veil += weight * other.veil;
+        self.stray_light += weight * other.stray_light;
         self.beyond += weight * other.beyond;
         self.evanescent += weight * other.evanescent;
         self.zero_order += weight * other.zero_order;

@@ -1,9 +1,9 @@
-//! From the pixels of scene and sensor to squares, and back: straight lines between the middles of squares.
+//! Conversion from the pixels of scene and sensor to squares, and back: straight lines between the middles of squares.
 
 use ndarray::{Array2, ArrayView2};
 
 use super::{CELL_PIXELS, SCENE_CELLS};
-use crate::SceneView;
+use crate::geometry::SceneView;
 
 /// Gather the light of a plane of the scene into squares: hats about their middles, times projected solid angle.
 pub fn gather(view: &SceneView, plane: ArrayView2<'_, f32>) -> Vec<f64> {
@@ -27,7 +27,7 @@ pub fn spread(view: &SceneView, cells: &[f64], plane: &mut Array2<f32>) {
     }
 }
 
-/// From squares to the pixels of the sensor: straight lines between the middles of squares.
+/// Spreads squares over the pixels of the sensor: straight lines between the middles of squares.
 pub fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
     let [down, across] = sensor_hats(frame.dim().into(), shape);
     for (mut row, hat) in frame.rows_mut().into_iter().zip(&down) {
@@ -54,7 +54,7 @@ pub fn solid_angle(view: &SceneView, row: f64, column: f64) -> f64 {
     (view.pixel() / (1.0 + tx * tx + ty * ty)).powi(2)
 }
 
-/// The same of the pixels of a row.
+/// Solid angles of the pixels of a row.
 fn solid_angles(view: &SceneView, row: usize) -> impl Iterator<Item = f64> {
     let pixel = view.pixel();
     let [first, ty] = view.tangents(row as f64, 0.0);
@@ -64,7 +64,7 @@ fn solid_angles(view: &SceneView, row: usize) -> impl Iterator<Item = f64> {
     })
 }
 
-/// What a pixel has of the light of its square.
+/// Share of a pixel in the light of its square.
 const PIXEL_SHARE: f64 = 1.0 / (CELL_PIXELS * CELL_PIXELS) as f64;
 
 /// The two squares on both sides of a pixel along an axis, with its weights in them.
@@ -78,7 +78,7 @@ fn sensor_hats(frame: [usize; 2], shape: [usize; 2]) -> [Vec<Hat>; 2] {
     [0, 1].map(|a| hats(frame[a], CELL_PIXELS as f64, shape[a]))
 }
 
-/// For each of `n` pixels the squares on both sides, `pixels` wide, with their weights.
+/// Squares on both sides of each of `n` pixels, `pixels` wide, with their weights.
 fn hats(n: usize, pixels: f64, cells: usize) -> Vec<Hat> {
     let one = |i: usize| {
         let place = ((i as f64 + 0.5) / pixels - 0.5).clamp(0.0, (cells - 1) as f64);

@@ -1,4 +1,4 @@
-//! Where the light of each square of the scene lands, by rays.
+//! Ray trace of the light of each square of the scene.
 
 use metalith_core::{Error, Progress, Result};
 use metalith_sensor::{ChannelSampling, Sensor};
@@ -9,17 +9,17 @@ use rayon::prelude::*;
 use super::squares::solid_angle;
 use super::{CELL_PIXELS, LightShares, SCENE_CELLS, StrayLight, sensor_cells};
 use crate::chip::ChipInLight;
+use crate::geometry::{ElementView, SceneView};
 use crate::kernels::KernelBank;
 use crate::spectra::SceneSpectrum;
-use crate::{ElementView, SceneView};
 
 /// Blocks an axis of an element.
 const BLOCKS: usize = 20;
-/// Wavelengths of the veil are at most so far apart (nm): it moves with the chief ray by less than a square.
-const VEIL_STEP_NM: f64 = 38.0;
+/// Wavelengths of the stray light are at most so far apart (nm): it moves with the chief ray by less than a square.
+const STRAY_LIGHT_STEP_NM: f64 = 38.0;
 
 impl StrayLight {
-    /// Trace the veil of a scene's field.
+    /// Trace the stray light of a scene's field.
     ///
     /// # Errors
     /// If the user stopped it, or a map is too large.
@@ -31,11 +31,11 @@ impl StrayLight {
         view: &SceneView,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let stride = (VEIL_STEP_NM / crate::chip::STEP_NM) as usize;
+        let stride = (STRAY_LIGHT_STEP_NM / metalith_sensor::WavelengthSteps::USUAL_NM) as usize;
         let all = &chip.sampling.wavelengths_nm;
         let mut chosen: Vec<usize> = (0..all.len()).step_by(stride.max(1)).collect();
         chosen.extend((chosen.last() != Some(&(all.len() - 1))).then_some(all.len() - 1));
-        progress.begin("tracing the veil", (chosen.len() * chip.elements.len()) as u64);
+        progress.begin("tracing the stray light", (chosen.len() * chip.elements.len()) as u64);
         let weights = weights(chip, basis, &chosen);
         let cells = sensor_cells(sensor);
         let tracer = Tracer {
@@ -64,13 +64,13 @@ impl StrayLight {
                     // Where light arrives in two polarisations one stands for both: their tables differ in obliquely lit
                     // cells alone.
                     let departing = light.departing(*i);
-                    let parts = if lit.share < 1.0 {
+                    let parts = if lit.weight < 1.0 {
                         &departing[..1]
                     } else {
                         &departing[..]
                     };
                     let of = |(table, order): &(&_, i32)| {
-                        let aperture = lit.element.lit_aperture(table, &lit.light);
+                        let aperture = chip.distinct[distinct].made.lit_aperture(table, &lit.light);
                         (
                             *order,
                             LocalAngularSpectrum::of(&aperture, all[*i] * 1e-3, distance_um, BLOCKS),
@@ -85,7 +85,7 @@ impl StrayLight {
                 .collect();
             for element in (0..chip.elements.len()).filter(|e| chip.copies[*e].0 == distinct) {
                 let area = chip.elements[element].area;
-                // Row by row: the light of all squares is larger than the veil itself.
+                // Row by row: the light of all squares is larger than the stray light itself.
                 for row in 0..SCENE_CELLS {
                     let squares = row * SCENE_CELLS..(row + 1) * SCENE_CELLS;
                     let traced: Vec<Traced> = squares
@@ -151,15 +151,16 @@ struct Tracer<'a> {
 struct Departed {
     /// Each with how often it has the phase of the element.
     parts: Vec<(i32, LocalAngularSpectrum)>,
-    /// As [`ElementInLight::arriving_um2`](crate::chip::ElementInLight::arriving_um2).
+    /// Area of the light that arrives (um^2), as
+    /// [`ElementInLight::arriving_um2`](crate::chip::ElementInLight::arriving_um2).
     arriving_um2: f64,
-    /// As [`ElementInLight::zero_order`](crate::chip::ElementInLight::zero_order).
+    /// Zeroth order, as [`ElementInLight::zero_order`](crate::chip::ElementInLight::zero_order).
     zero_order: f64,
 }
 
-/// The veil of one square of the scene through one element, of what arrives there.
+/// The stray light of one square of the scene through one element, of what arrives there.
 struct Traced {
-    /// By channel and spectrum: light on each square of the sensor.
+    /// Light on each square of the sensor, by channel and spectrum.
     light: Vec<Vec<f64>>,
     shares: Vec<LightShares>,
 }
@@ -225,7 +226,7 @@ impl Tracer<'_> {
             traced.shares[pair] = LightShares {
                 arrives,
                 in_kernels: in_kernel,
-                veil: on_sensor,
+                stray_light: on_sensor,
                 beyond: scale * outside - on_sensor,
                 evanescent: sum(&|m| m.evanescent),
                 zero_order: sum(&|m| m.zero_order),
@@ -326,11 +327,11 @@ impl Tracer<'_> {
 /// lacks has left it by diffraction, and is near it.
 const MOST_SCALE: f64 = 50.0;
 
-/// Where the light of one wavelength, square of the scene and element lands, as shares of what arrives.
+/// Light of one wavelength, square of the scene and element where it lands, as shares of what arrives.
 #[derive(Default)]
 struct LandedLight {
     cells: Vec<(u32, f32)>,
-    /// Without the window of the kernel.
+    /// Light without the window of the kernel.
     cells_outside: Vec<(u32, f32)>,
     travelling: f64,
     outside: f64,

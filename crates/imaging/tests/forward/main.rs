@@ -4,12 +4,12 @@ mod parts;
 mod setup;
 
 use metalith_core::Silent;
-use metalith_imaging::restore::SceneStatistics;
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{
     ApproximationSet, BetweenNodes, Detail, ElementInLight, FrameOperator, KernelBank, SceneInputs, ScenePoints,
     SceneSpace, StrayLight, element_views,
 };
+use metalith_restoration::{FrameModel, SceneStatistics};
 use metalith_sensor::{Camera, Sensor};
 use metalith_wave::{Accuracy, Scratch, Window};
 use ndarray::Array2;
@@ -110,18 +110,18 @@ const SIZE: usize = 160;
 /// Places an axis, 4.3 um apart as in the program's own kernels for such light and lenses (41 over 166 um).
 const NODES: usize = 13;
 
-/// What the image behind an element is off the direct sum, of its range: root mean square and at any one pixel; `about`: where the
-/// scene is (degrees).
+/// Error of the image behind an element against the direct sum, relative to its range: root mean square and at any one
+/// pixel; `about`: where the scene is (degrees).
 fn off_direct_sum(setup: &Setup, bank: &KernelBank, element: usize, about: [f64; 2]) -> [f64; 2] {
     /// Pixels of the image of the scene: a disc of four degrees on both sides.
     const IMAGE: f64 = 100.0;
     let nm = setup.chip().sampling.wavelengths_nm.clone();
     assert_eq!(nm.len(), 2, "all wavelengths are simulated");
-    let veil = StrayLight::none(&setup.camera.sensor, 1, 3);
+    let stray_light = StrayLight::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     let scene = waves(SIZE, about);
     let space = SceneSpace::flat(&scene.view);
-    let operator = FrameOperator::new(bank, &veil, &views, &setup.camera, &space, sixfold());
+    let operator = FrameOperator::new(bank, &stray_light, &views, &setup.camera, &space, sixfold());
     let got = operator.apply_elements(&scene.planes, &[element], false).remove(0);
     // An even number: between points the scene is straight, so that their sum is the integral.
     let want = direct_sum(setup, &scene, &[element], 2, &nm);
@@ -154,7 +154,8 @@ fn a_frame_is_the_direct_sum_over_points_and_wavelengths() {
     }
 }
 
-/// The same behind a hexagon that is larger than the shared lens, steers and is out of focus, and behind a rotated cubic phase.
+/// Frame behind a hexagon that is larger than the shared lens, steers and is out of focus, and behind a rotated cubic
+/// phase.
 #[test]
 #[ignore = "second tier: some minutes of CPU time, in scripts/slow_tests.sh"]
 fn a_frame_of_lenses_of_their_own_is_the_direct_sum() {
@@ -178,7 +179,7 @@ fn copies_are_what_symmetry_makes_of_them() {
     let setup = setup(&[[520.0, 560.0]], 40);
     let chip = setup.chip();
     let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-    let veil = StrayLight::none(&setup.camera.sensor, 1, 3);
+    let stray_light = StrayLight::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     // The neighbour below looks up.
     let scene = waves(40, [0.0, 15.0]);
@@ -189,7 +190,7 @@ fn copies_are_what_symmetry_makes_of_them() {
             ..Detail::simulation(3)
         };
         let space = SceneSpace::flat(&scene.view);
-        let operator = FrameOperator::new(&bank, &veil, &views, &setup.camera, &space, detail);
+        let operator = FrameOperator::new(&bank, &stray_light, &views, &setup.camera, &space, detail);
         let below = operator.apply_elements(&scene.planes, &[BELOW], false).remove(0);
         let left = operator.apply_elements(&planes, &[LEFT], false).remove(0);
         let range = f64::from(below.iter().copied().fold(0.0, f32::max));
@@ -209,7 +210,7 @@ fn a_coarse_grid_of_points_sees_the_same() {
     let setup = setup(&[[550.0, 551.0]], 40);
     let chip = setup.chip();
     let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-    let veil = StrayLight::none(&setup.camera.sensor, 1, 3);
+    let stray_light = StrayLight::none(&setup.camera.sensor, 1, 3);
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
     let frame = |points: ScenePoints| {
@@ -217,7 +218,7 @@ fn a_coarse_grid_of_points_sees_the_same() {
             points,
             ..Detail::simulation(3)
         };
-        let operator = FrameOperator::new(&bank, &veil, &views, &setup.camera, &space, detail);
+        let operator = FrameOperator::new(&bank, &stray_light, &views, &setup.camera, &space, detail);
         operator
             .apply_elements(&setup.scene.planes, &[MIDDLE, BELOW], false)
             .remove(0)
@@ -256,7 +257,7 @@ fn one_kernel_for_a_field_is_the_same_kernel_at_every_node() {
         let middle = element.nodes[element.nodes.len() / 2];
         element.nodes.fill(middle);
     }
-    let veil = StrayLight::none(&setup.camera.sensor, 2, 3);
+    let stray_light = StrayLight::none(&setup.camera.sensor, 2, 3);
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
     for plain in [
@@ -275,7 +276,7 @@ fn one_kernel_for_a_field_is_the_same_kernel_at_every_node() {
             ..plain.clone()
         };
         let frames = [(&bank, fixed), (&same, plain)].map(|(bank, detail)| {
-            let operator = FrameOperator::new(bank, &veil, &views, &setup.camera, &space, detail);
+            let operator = FrameOperator::new(bank, &stray_light, &views, &setup.camera, &space, detail);
             operator.apply(&setup.scene.planes)
         });
         let range = frames[1].iter().flatten().copied().fold(0.0f32, f32::max);
@@ -297,7 +298,7 @@ fn the_adjoint_is_that_of_the_operator() {
     let chip = setup.chip();
     let [bank, finer] =
         [5, 9].map(|nodes| KernelBank::build(&chip, &setup.scene.basis, spec(24, nodes), &Silent).unwrap());
-    let veil = setup.veil(&chip, &bank);
+    let stray_light = setup.stray_light(&chip, &bank);
     let views = element_views(&setup.design, &setup.camera);
     for detail in [
         Detail::simulation(3),
@@ -319,7 +320,7 @@ fn the_adjoint_is_that_of_the_operator() {
             } else {
                 &bank
             },
-            &veil,
+            &stray_light,
             &views,
             &setup.camera,
             &SceneSpace::flat(&setup.scene.view),
@@ -350,7 +351,7 @@ fn the_adjoint_is_that_of_the_operator() {
     }
 }
 
-/// Kernels, veil and what is lost are all the light, and the veil's total is what kernels leave.
+/// Kernels, stray light and what is lost are all the light, and the stray light's total is what kernels leave.
 #[test]
 fn all_light_is_accounted_for() {
     /// The target, of the light that arrives.
@@ -359,13 +360,13 @@ fn all_light_is_accounted_for() {
     for setup in [setup(&bands, 20), mixed(&bands, 20)] {
         let chip = setup.chip();
         let bank = KernelBank::build(&chip, &setup.scene.basis, spec(24, 5), &Silent).unwrap();
-        let veil = setup.veil(&chip, &bank);
-        for shares in veil.budget.chunks(3) {
+        let stray_light = setup.stray_light(&chip, &bank);
+        for shares in stray_light.budget.chunks(3) {
             let all = metalith_imaging::LightShares::sum(shares);
-            let found = all.in_kernels + all.veil + all.beyond + all.evanescent + all.not_passed;
+            let found = all.in_kernels + all.stray_light + all.beyond + all.evanescent + all.not_passed;
             println!("{all:?}");
             assert!((found / all.arrives - 1.0).abs() < ACCOUNT);
-            assert!(all.in_kernels > 0.1 * all.arrives && all.veil > 0.0 && all.beyond > 0.0);
+            assert!(all.in_kernels > 0.1 * all.arrives && all.stray_light > 0.0 && all.beyond > 0.0);
         }
     }
 }

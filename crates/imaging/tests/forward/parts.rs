@@ -1,10 +1,10 @@
 //! The operator of a part of a sensor, and on any number of threads.
 
 use metalith_core::{Silent, part};
-use metalith_imaging::restore::SceneStatistics;
 use metalith_imaging::{
     Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, StrayLight, element_views,
 };
+use metalith_restoration::{FrameModel, SceneStatistics};
 use metalith_sensor::Camera;
 use ndarray::Array2;
 
@@ -46,7 +46,8 @@ fn bank(setup: &Setup) -> KernelBank {
     KernelBank::build(&setup.chip(), &setup.scene.basis, spec(24, 5), &Silent).unwrap()
 }
 
-/// What a sensor does not see is not computed, and what it sees is the same: its frame, and what goes back from it.
+/// Parts of a sensor: what it does not see is not computed, and what it sees is equal: its frame, and what goes back
+/// from it.
 #[test]
 fn a_part_of_a_sensor_sees_what_the_whole_sees_there() {
     /// Single precision of transforms of other sizes, of the range.
@@ -56,7 +57,7 @@ fn a_part_of_a_sensor_sees_what_the_whole_sees_there() {
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
     let cameras = [setup.camera.clone(), part_of(&setup.camera)];
-    let veils = [0, 1].map(|k| StrayLight::none(&cameras[k].sensor, 1, 3));
+    let stray_lights = [0, 1].map(|k| StrayLight::none(&cameras[k].sensor, 1, 3));
     let near = |a: &Array2<f32>, b: &Array2<f32>, what: &str| {
         let range = b.iter().fold(0.0f32, |range, v| range.max(v.abs()));
         let off = (a - b).iter().fold(0.0f32, |off, v| off.max(v.abs()));
@@ -74,7 +75,7 @@ fn a_part_of_a_sensor_sees_what_the_whole_sees_there() {
     for detail in details() {
         let what = format!("{:?}", detail.points);
         let [whole, own] =
-            [0, 1].map(|k| FrameOperator::new(&bank, &veils[k], &views, &cameras[k], &space, detail.clone()));
+            [0, 1].map(|k| FrameOperator::new(&bank, &stray_lights[k], &views, &cameras[k], &space, detail.clone()));
         let frame = inside(&whole.apply(&planes)[0]);
         near(&own.apply(&planes)[0], &frame, &what);
         let light = Array2::from_shape_fn((ROWS as usize, ROWS as usize), |(y, x)| {
@@ -105,10 +106,10 @@ fn the_operator_depends_on_no_number_of_threads() {
     let bank = bank(&setup);
     let views = element_views(&setup.design, &setup.camera);
     let space = SceneSpace::flat(&setup.scene.view);
-    let veil = StrayLight::none(&setup.camera.sensor, 1, 3);
+    let stray_light = StrayLight::none(&setup.camera.sensor, 1, 3);
     let planes = vec![Array2::ones((20, 20)); 3];
     for detail in details() {
-        let operator = FrameOperator::new(&bank, &veil, &views, &setup.camera, &space, detail);
+        let operator = FrameOperator::new(&bank, &stray_light, &views, &setup.camera, &space, detail);
         let both = || {
             let frames = operator.apply(&planes);
             let back = operator.adjoint(&frames);

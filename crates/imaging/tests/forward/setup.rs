@@ -17,7 +17,8 @@ pub const MIDDLE: usize = 4;
 pub const BELOW: usize = 1;
 pub const LEFT: usize = 3;
 
-/// Of lenses of their own: a hexagon of 80 um with a shorter focal length, which looks aside, and a cubic phase.
+/// Elements with individual lenses: a hexagon of 80 um with a shorter focal length, which looks aside, and a cubic
+/// phase.
 pub const HEXAGON: usize = 2;
 pub const CUBIC: usize = 3;
 
@@ -58,7 +59,7 @@ pub struct Setup {
 
 impl Setup {
     pub fn chip(&self) -> ChipInLight<'_> {
-        let case = SimulationCase::Cell(self.cells[0].as_ref());
+        let case = SimulationCase::from(self.cells[0].as_ref());
         ChipInLight::new(
             &self.design,
             &self.extraction,
@@ -70,7 +71,7 @@ impl Setup {
         .unwrap()
     }
 
-    pub fn veil(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> StrayLight {
+    pub fn stray_light(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> StrayLight {
         let (sensor, scene) = (&self.camera.sensor, &self.scene);
         StrayLight::build(chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
     }

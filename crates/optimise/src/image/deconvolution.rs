@@ -117,7 +117,7 @@ impl Deconvolution {
         })
     }
 
-    /// What the merit is taken over.
+    /// Views that the merit is taken over.
     pub fn views(&self) -> &Views {
         &self.views
     }

@@ -1,10 +1,11 @@
 //! The error to be expected of an image after Wiener filtering, in closed form.
 
+use metalith_wave::camera::Noise;
 use num_complex::{Complex32, Complex64};
 
+use super::scene::Scene;
+use super::wiener::Wiener;
 use crate::PixelWindow;
-use metalith_wave::camera::Noise;
-use metalith_wave::restore::{Scene, Wiener};
 
 /// Power of image and noise at every frequency of a window's quarter plane, and the number of modes that
 /// each stands for.
@@ -84,7 +85,7 @@ fn wide(c: Complex32) -> Complex64 {
 mod tests {
     use super::*;
 
-    /// Of sums over 49 modes in double precision, through a difference of the size of one.
+    /// Tolerance of sums over 49 modes in double precision, through a difference of the size of one.
     const ROUNDING: f64 = 1e-9;
 
     const WINDOW: PixelWindow = PixelWindow {

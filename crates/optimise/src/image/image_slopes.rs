@@ -86,7 +86,7 @@ struct Slope {
 /// the fields of.
 const VIEWS_AT_A_TIME: usize = 24;
 
-/// Whether a channel still belongs to the group of the one before.
+/// True if a channel still belongs to the group of the one before.
 fn in_one_group() -> impl FnMut(&Channel, &Channel) -> bool {
     let mut views = 0;
     move |one: &Channel, next: &Channel| {
@@ -184,8 +184,8 @@ mod tests {
         }
     }
 
-    /// What a choice gains to first order, against the merit with the next wider and the next narrower pillar:
-    /// half their difference is free of the second order.
+    /// Gain of a choice to first order, against the merit with the next wider and the next narrower pillar: half their
+    /// difference is free of the second order.
     #[test]
     fn first_order_gains_are_those_of_differences() {
         /// Third order over steps of 2 nm, and single precision of the transforms.

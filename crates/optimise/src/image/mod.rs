@@ -5,5 +5,7 @@ pub(crate) mod image_error;
 pub(crate) mod image_slopes;
 pub(crate) mod imaging;
 pub(crate) mod pupil;
+pub(crate) mod scene;
 pub(crate) mod views;
+pub(crate) mod wiener;
 pub(crate) mod window;

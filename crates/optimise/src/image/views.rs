@@ -1,12 +1,12 @@
-//! What expected image errors are taken over: wavelengths, field angles, the window, the scene.
+//! Views that expected image errors are taken over: wavelengths, field angles, the window, the scene.
 
 use crate::PixelWindow;
 use crate::image::pupil::USED;
+use crate::image::scene::Scene;
 use crate::merit::focus::Lens;
 use metalith_wave::camera::Noise;
-use metalith_wave::restore::Scene;
 
-/// What the merit is taken over.
+/// Views that the merit is taken over.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Views {
     /// Wavelengths (um), ascending.
@@ -22,7 +22,7 @@ pub struct Views {
     pub shared_filter: f64,
     /// Wavelengths of each channel that a step of the optimiser draws.
     pub drawn: usize,
-    /// What is looked at.
+    /// Scene that is viewed.
     pub scene: Scene,
     /// Noise of the sensor.
     pub noise: Noise,

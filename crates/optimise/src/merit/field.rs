@@ -19,7 +19,7 @@ pub const LANES: usize = 32;
 /// and is a thousandth of a hyperbolic lens at its worst wavelength.
 pub const FLOOR: f64 = 1e-9;
 
-/// How the intensities of a block make a merit.
+/// Merit that the intensities of a block make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeritKind {
     /// Mean of the logarithms.
@@ -46,12 +46,13 @@ pub struct FieldProblem {
     pub(crate) row_weight: Vec<f32>,
     /// `[ring][row]`.
     kernel: Planes,
-    /// Transmission, `[width_nm][row]`, made width taken from the designed one; among unlike neighbours its mean over them.
+    /// Transmission, `[width_nm][row]`, made width taken from the designed one; among dissimilar neighbours its mean
+    /// over them.
     pub(crate) table: Planes,
     pub(crate) mapping: Mapping,
-    /// Of each row that is no padding.
+    /// Condition of each row that is no padding.
     pub(crate) conditions: Vec<Option<Condition>>,
-    /// Where the neighbours of pillars are not taken for equals.
+    /// Terms of neighbours, where they are not taken for equals.
     pub(crate) surroundings: Option<NeighbourTerms>,
 }
 
@@ -130,11 +131,11 @@ impl FieldProblem {
         })
     }
 
-    /// The same merit with neighbours as they are: of rows that are all of the focus, without errors of fabrication.
+    /// Same merit with the coupled model: of rows that are all of the focus, without errors of fabrication.
     ///
     /// # Errors
-    /// If it takes more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with errors, or the cell does
-    /// not know unlike neighbours at a wavelength.
+    /// If it takes more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with
+    /// errors, or the cell is not coupled at a wavelength.
     pub fn among_neighbours(mut self, lens: &Lens, cell: &dyn CellModel, memory_bytes: u64) -> Result<Self> {
         let widths: Vec<u16> = self.mapping.choices().iter().map(|c| c.width_nm).collect();
         let most = self.mapping.max_width_nm();
@@ -171,7 +172,8 @@ impl FieldProblem {
         self.table.row(usize::from(width_nm), self.rows)
     }
 
-    /// What the width of a ring acts on beside its own transmission, while others have these widths (nm); nothing among equals.
+    /// Context of a ring: what its width acts on other than its own transmission, while other rings have these widths
+    /// (nm); `None` among equal neighbours.
     pub fn visit(&self, ring: usize, widths_nm: &[u16]) -> Option<RingContext> {
         self.surroundings.as_ref().map(|s| s.visit(ring, widths_nm))
     }

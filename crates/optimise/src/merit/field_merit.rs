@@ -26,7 +26,7 @@ impl FieldProblem {
     /// `gradient`.
     ///
     /// # Panics
-    /// Among unlike neighbours, whose widths are whole: designs with them and a solver that needs this are refused.
+    /// Among dissimilar neighbours, whose widths are whole: designs with them and a solver that needs this are refused.
     pub fn merit_of_phases(&self, turns: &[f64], gradient: Option<&mut [f64]>) -> f64 {
         assert!(self.surroundings.is_none(), "no slopes among unlike neighbours");
         let widths = turns.iter().map(|&t| self.mapping.width_nm(t)).collect::<Vec<_>>();
@@ -256,7 +256,7 @@ mod tests {
         assert!((left - right).abs() < TOLERANCE * scale, "{left} {right} of {scale}");
     }
 
-    /// What a single choice gains to first order, against the merit with a small part of it in place.
+    /// Gain of a single choice to first order, against the merit with a small part of it in place.
     #[test]
     fn first_order_gains_are_slopes_of_the_merit() {
         /// Single precision over a hundred rows.

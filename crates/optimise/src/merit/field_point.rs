@@ -2,12 +2,12 @@
 
 use num_complex::Complex32;
 
-/// What a cell is asked for at one row: a wavelength and an error of fabrication.
+/// Condition of a cell at one row: a wavelength and an error of fabrication.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     /// Vacuum wavelength (um).
     pub wavelength_um: f64,
-    /// Which of the cells given: they differ in height.
+    /// Index of the cell among the cells given: they differ in height.
     pub cell: usize,
     /// Made width less designed width (nm).
     pub width_bias_nm: f64,

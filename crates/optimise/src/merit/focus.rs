@@ -29,7 +29,7 @@ pub struct Lens {
 pub struct FabricationError {
     /// Made width less designed width (nm).
     pub width_bias_nm: f64,
-    /// Which of the cells given, by their film height.
+    /// Index of the cell among the cells given, by their film height.
     pub cell: usize,
     /// Distance to the sensor less the designed one (um).
     pub gap_error_um: f64,
@@ -123,7 +123,7 @@ impl Lens {
         Ok(Strehl::new(wavelengths_um, ratio))
     }
 
-    /// The same from an array of pillars, such as one read back from a layout: a sum over every site.
+    /// Strehl ratio from an array of pillars, such as one read back from a layout: a sum over every site.
     ///
     /// # Errors
     /// If the array is on another lattice, or the cell does not cover a wavelength or width.
@@ -183,7 +183,7 @@ impl Lens {
     }
 }
 
-/// What pillars of these widths transmit, each in a lattice of its equals.
+/// Transmission of pillars of these widths, each in a lattice of its equals.
 fn among_equals(widths_nm: &[u16], cell: &dyn CellModel, wavelength_um: f64) -> Result<Vec<Complex64>> {
     let widest = widths_nm.iter().copied().max().unwrap_or(0);
     let t = cell.transmissions(wavelength_um, widest)?;

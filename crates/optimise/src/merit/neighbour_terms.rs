@@ -17,17 +17,17 @@ use metalith_cell::{CellModel, NEIGHBOUR_DEGREE};
 use metalith_core::{Error, Result};
 use num_complex::Complex64;
 
-/// What neighbours add at each row.
+/// Terms that neighbours add at each row.
 pub struct NeighbourTerms {
     links: Links,
     rows: usize,
     /// Field of what a neighbour adds, `[link][row]`.
     kernel: Planes,
-    /// Of the own width, `[width_nm][product][row]`.
+    /// Factors of the own width, `[width_nm][product][row]`.
     factors: Planes,
-    /// Of neighbours in the same ring, whose width is the own one: `[width_nm][distance][row]`.
+    /// Terms of neighbours in the same ring, whose width is the own one: `[width_nm][distance][row]`.
     same: Planes,
-    /// Of a neighbour's width, by it.
+    /// Factors of a neighbour's width, by it.
     neighbour: Vec<[f32; NEIGHBOUR_DEGREE]>,
 }
 
@@ -44,7 +44,7 @@ pub struct RingContext {
 /// Terms of neighbours with what each pillar transmits on the mean over its neighbours.
 pub struct PairTerms {
     pub terms: NeighbourTerms,
-    /// Of each row, by width (nm) as far as it was asked for; none of padding.
+    /// Transmissions of each row, by width (nm) as far as it was asked for; `None` for padding.
     pub own: Vec<Option<Vec<Complex64>>>,
 }
 
@@ -53,8 +53,8 @@ impl NeighbourTerms {
     /// most `max_width_nm` wide.
     ///
     /// # Errors
-    /// If they take more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with errors, or the
-    /// cell does not know unlike neighbours at a wavelength.
+    /// If they take more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with
+    /// errors, or the cell is not coupled at a wavelength.
     pub fn of(
         conditions: &[Option<Condition>],
         widths: &[u16],
@@ -147,7 +147,7 @@ impl NeighbourTerms {
         }
     }
 
-    /// What the width of a ring is multiplied with, whatever it is, while others have these widths.
+    /// Context of a ring: what its width, whatever it is, is multiplied with, while others have these widths.
     pub fn visit(&self, ring: usize, widths_nm: &[u16]) -> RingContext {
         let mut visit = RingContext {
             around: Planes::zeros(PRODUCTS * self.rows),
@@ -225,7 +225,7 @@ fn add_scaled((re, im): (&mut [f32], &mut [f32]), by: f32, (a_re, a_im): (&[f32]
 
 #[cfg(test)]
 mod tests {
-    use metalith_cell::{CellModel, Fidelity, SiteResponse};
+    use metalith_cell::{CellModel, CellResponse, Fidelity, Illumination, NeighbourTables, SiteResponse};
     use metalith_core::Silent;
     use metalith_design::array::PillarRule;
     use metalith_design::{Design, cell_models};
@@ -282,10 +282,11 @@ mod tests {
 
         /// The field at the focus, site by site, each among the twelve pillars about it.
         fn of_sites(&self, widths: &PillarMap, wavelength_um: f64) -> Complex64 {
-            let response = self
-                .cell
-                .among_neighbours_in_band(wavelength_um, &|_| [0.0; 2], &Silent);
-            let response = response.unwrap().unwrap();
+            let light = Illumination::normal(wavelength_um).in_band();
+            let response = self.cell.response(&light, 0, &Silent).unwrap();
+            let CellResponse::Neighbours(NeighbourTables::Band(response)) = response else {
+                panic!("it knows its neighbours")
+            };
             let field = RingField::new(&self.lens.rings, wavelength_um, self.lens.gap_um);
             let n = widths.lattice.sites() as i32;
             let width = |x: i32, y: i32| {
@@ -406,7 +407,7 @@ mod tests {
         }
     }
 
-    /// At the end of a cold exchange no single ring has a better width: by the merit over all pairs.
+    /// Test that at the end of a cold exchange no single ring has a better width, by the merit over all pairs.
     #[test]
     fn an_exchange_ends_where_no_ring_gains() {
         let setup = Setup::new(30_000);

@@ -1,4 +1,4 @@
-//! What a gradient climbs.
+//! Objective that a gradient climbs.
 
 /// A merit of the phases of the rings; larger is better.
 pub trait Objective: Sync {

@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn draws_have_the_deviations_asked_for() {
-        /// Of four thousand draws: four standard errors of a standard deviation, and the cut and the grid of
+        /// Tolerance of four thousand draws: four standard errors of a standard deviation, and the cut and the grid of
         /// heights.
         const TOLERANCE: f64 = 0.06;
         let robust = RobustSpec {

@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn near_the_axis_it_is_the_average_around_it() {
-        /// Of the matched peak: where the series for the path ends.
+        /// Tolerance as a share of the matched peak: where the series for the path ends.
         const TOLERANCE: f64 = 2e-5;
         /// Angles within a half turn that the brute force is averaged over, which leaves either lattice alike.
         const ANGLES: u32 = 24;

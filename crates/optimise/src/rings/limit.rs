@@ -40,7 +40,7 @@ impl StepLimit {
         self.turns
     }
 
-    /// Whether a step keeps the limit.
+    /// True if a step keeps the limit.
     pub fn allows(self, from_turns: f64, to_turns: f64) -> bool {
         step(from_turns, to_turns).abs() <= self.turns + ROUNDING
     }
@@ -116,7 +116,7 @@ impl StepLimit {
         path
     }
 
-    /// For each choice, the choices that may stand next to it.
+    /// Choices that may stand next to each choice.
     pub fn neighbours(self, mapping: &Mapping) -> Vec<Vec<u16>> {
         let choices = mapping.choices();
         choices

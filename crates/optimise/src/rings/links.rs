@@ -1,4 +1,4 @@
-//! Which rings have pillars that stand next to one another.
+//! Links between rings whose pillars stand next to one another.
 
 use super::node::NODES;
 
@@ -14,7 +14,7 @@ pub struct Link {
     pub other: usize,
     /// One pitch (0), the diagonal (1) or two pitches (2).
     pub distance: usize,
-    /// For each radius of [`Rings::nodes`](crate::Rings::nodes), the number of neighbours of the sites that it stands for.
+    /// Number of neighbours of the sites that each radius of [`Rings::nodes`](crate::Rings::nodes) stands for.
     pub weights: [f64; NODES],
 }
 
@@ -29,9 +29,9 @@ impl Link {
 #[derive(Clone, Debug)]
 pub struct Links {
     all: Vec<Link>,
-    /// Where those of a ring begin; one more at the end.
+    /// Index where the links of a ring begin; one more at the end.
     first: Vec<usize>,
-    /// Those to a ring from other rings, by their places.
+    /// Links to a ring from other rings, by their places.
     reverse: Vec<Vec<usize>>,
 }
 

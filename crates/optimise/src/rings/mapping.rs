@@ -1,4 +1,4 @@
-//! From the phase of a ring to the width of its pillars, and the widths there are to choose from.
+//! Mapping from the phase of a ring to the width of its pillars, and the widths there are to choose from.
 
 use metalith_design::array::PillarRule;
 
@@ -71,11 +71,6 @@ impl Mapping {
                 distance(a).total_cmp(&distance(b))
             })
             .unwrap_or(0)
-    }
-
-    /// The choice that makes a width, if any does.
-    pub fn choice_of_width(&self, width_nm: u16) -> Option<usize> {
-        self.choices.iter().position(|c| c.width_nm == width_nm)
     }
 }
 
@@ -166,7 +161,6 @@ pub mod tests {
         for (i, choice) in mapping.choices().iter().enumerate() {
             assert_eq!(rule.width_nm(choice.turns), choice.width_nm);
             assert_eq!(mapping.nearest(choice.turns), i);
-            assert_eq!(mapping.choice_of_width(choice.width_nm), Some(i));
         }
     }
 

@@ -1,4 +1,4 @@
-//! What the rings of a lens transmit whose pillars have unlike neighbours, at one wavelength, in light along the axis.
+//! Transmission of the rings of a lens by the coupled model, at one wavelength, in light along the axis.
 //!
 //! The sum over pairs of [`SiteResponse`] is one of products of a function of the own width and one of the neighbour's. In a lens of
 //! rings the neighbours of a site are in its own ring and those about it.
@@ -10,7 +10,9 @@ use num_complex::Complex64;
 use crate::rings::kernel::RingField;
 use crate::rings::links::{DISTANCES, distance_of};
 use crate::rings::sites::Rings;
-use metalith_cell::{CellModel, NEIGHBOUR_DEGREE, NEIGHBOURS, SiteResponse};
+use metalith_cell::{
+    CellModel, CellResponse, Illumination, NEIGHBOUR_DEGREE, NEIGHBOURS, NeighbourTables, SiteResponse,
+};
 use metalith_core::{Result, Silent};
 
 /// Products that a pair at any distance is a sum of: for each distance those of [`SiteResponse::pair_factors`].
@@ -19,25 +21,29 @@ pub const PRODUCTS: usize = DISTANCES * NEIGHBOUR_DEGREE;
 /// The sum over pairs at one wavelength, by width (nm); of widths that were not asked for it knows nothing.
 #[derive(Clone, Debug)]
 pub struct PairResponse {
-    /// What a pillar transmits on the mean over its neighbours.
+    /// Mean transmission of a pillar over its neighbours.
     pub own: Vec<Complex64>,
-    /// Of the own width, mean over the neighbours at a distance: in a ring there are equally many on all sides.
+    /// Factors of the own width, mean over the neighbours at a distance: in a ring there are equally many on all sides.
     pub factors: Vec<[Complex64; PRODUCTS]>,
-    /// Of a neighbour's width, the same at all wavelengths.
+    /// Factors of a neighbour's width, equal at all wavelengths.
     pub neighbour: Vec<[f64; NEIGHBOUR_DEGREE]>,
 }
 
 impl PairResponse {
-    /// For pillars of these widths (nm); none if the cell takes neighbours for equals.
+    /// Response of pillars of these widths (nm); `None` if the cell takes neighbours for equals.
     ///
     /// # Errors
-    /// As [`CellModel::among_neighbours_in_band`].
+    /// As [`CellModel::response`].
     pub fn of(
         cell: &dyn CellModel,
         wavelength_um: f64,
         widths_nm: impl IntoIterator<Item = u16>,
     ) -> Result<Option<Self>> {
-        let Some(response) = cell.among_neighbours_in_band(wavelength_um, &|_| [0.0; 2], &Silent)? else {
+        if cell.uncoupled().is_none() {
+            return Ok(None);
+        }
+        let light = Illumination::normal(wavelength_um).in_band();
+        let CellResponse::Neighbours(NeighbourTables::Band(response)) = cell.response(&light, 0, &Silent)? else {
             return Ok(None);
         };
         let widths: BTreeSet<u16> = widths_nm.into_iter().filter(|w| *w > 0).collect();
@@ -61,7 +67,7 @@ impl PairResponse {
         Ok(Some(all))
     }
 
-    /// What a neighbour at a distance adds.
+    /// Term that a neighbour at a distance adds.
     pub fn pair(&self, distance: usize, own_nm: u16, neighbour_nm: u16) -> Complex64 {
         let factors = &self.factors[usize::from(own_nm)][distance * NEIGHBOUR_DEGREE..][..NEIGHBOUR_DEGREE];
         let neighbour = &self.neighbour[usize::from(neighbour_nm)];

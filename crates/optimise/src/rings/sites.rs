@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, lagrange_weight};
 use metalith_pillars::{Lattice, LatticeKind, PillarMap};
 
 use super::links::{Link, Links, distance_of, neighbour};
@@ -73,7 +73,7 @@ impl Rings {
         self.sites.len()
     }
 
-    /// Whether there are no rings; a lens has at least one.
+    /// True if there are no rings; a lens has at least one.
     pub fn is_empty(&self) -> bool {
         self.sites.is_empty()
     }
@@ -120,7 +120,7 @@ impl Rings {
         map
     }
 
-    /// Which rings have pillars that stand next to one another. The lattice must be square.
+    /// Links between rings whose pillars stand next to one another. The lattice must be square.
     pub fn links(&self) -> &Links {
         debug_assert!(
             self.lattice.is_square(),
@@ -167,21 +167,12 @@ impl Rings {
         &self.nodes[ring]
     }
 
-    /// Every distinct distance of a ring's sites (um) with its number of sites: the oracle of [`Node`].
-    #[cfg(test)]
-    pub fn distances(&self, ring: usize) -> impl Iterator<Item = (f64, u32)> {
-        let unit_um = self.lattice.unit_um();
-        self.of_ring(ring)
-            .iter()
-            .map(move |&(r2, n)| ((r2 as f64).sqrt() * unit_um, n))
-    }
-
     /// floor(r / pitch) from the square of a distance in units, exactly.
     fn ring_of(&self, units2: i64) -> usize {
         (units2 as u64).isqrt() as usize / units_of_pitch(self.lattice) as usize
     }
 
-    /// Those of `counts` that are of a ring.
+    /// Entries of `counts` for a ring.
     fn of_ring(&self, ring: usize) -> &[(i64, u32)] {
         let first = |k: usize| {
             let least = (units_of_pitch(self.lattice) * k as i64).pow(2);
@@ -200,7 +191,7 @@ impl Rings {
         })
     }
 
-    /// By how much each radius of [`Rings::nodes`] stands for a site of the ring.
+    /// Weight with which each radius of [`Rings::nodes`] stands for a site of the ring.
     pub fn shares_of(&self, ring: usize, units2: i64) -> [f64; NODES] {
         lagrange(&self.node_units2(ring), units2)
     }
@@ -227,7 +218,7 @@ fn lagrange(at: &[f64; NODES], units2: i64) -> [f64; NODES] {
     let s = units2 as f64;
     std::array::from_fn(|j| {
         let others = at.iter().enumerate().filter(|(i, _)| *i != j);
-        others.map(|(_, other)| (s - other) / (at[j] - other)).product()
+        lagrange_weight(s, at[j], others.map(|(_, other)| *other))
     })
 }
 
@@ -281,6 +272,16 @@ mod tests {
         Rings::new(Lattice::covering(1_000_000, 350).unwrap(), 1_000_000).unwrap()
     }
 
+    impl Rings {
+        /// Every distinct distance of a ring's sites (um) with its number of sites: the oracle of [`Node`].
+        fn distances(&self, ring: usize) -> impl Iterator<Item = (f64, u32)> {
+            let unit_um = self.lattice.unit_um();
+            self.of_ring(ring)
+                .iter()
+                .map(move |&(r2, n)| ((r2 as f64).sqrt() * unit_um, n))
+        }
+    }
+
     #[test]
     fn a_lens_of_1_mm_has_1429_rings_and_all_its_sites() {
         let rings = lens();
@@ -313,7 +314,7 @@ mod tests {
         }
     }
 
-    /// What is optimised is what is written: the table of a phase, one row a ring, gives every site its own ring, those on the
+    /// Layouts are what is optimised: the table of a phase, one row a ring, gives every site its own ring, those on the
     /// borders of rings as well, which are many on a hexagonal lattice.
     #[test]
     fn a_layout_gives_every_site_its_ring() {

@@ -45,7 +45,7 @@ impl Adam {
         self.step
     }
 
-    /// Whether all steps are done.
+    /// True if all steps are done.
     pub fn finished(&self) -> bool {
         self.step >= self.steps
     }

@@ -91,7 +91,7 @@ impl<'p> BlockExchange<'p> {
         &self.shares
     }
 
-    /// Whether all blocks are done or none promises any gain.
+    /// True if all blocks are done or none promises any gain.
     pub fn finished(&self) -> bool {
         self.settled || self.block >= self.blocks
     }

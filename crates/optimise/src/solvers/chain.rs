@@ -13,7 +13,7 @@ use metalith_core::Progress;
 /// Sweeps at temperature zero at most; an exchange ends where nothing is gained, commonly within thirty.
 pub(crate) const COLD_SWEEPS: u32 = 200;
 
-/// How the exchange of single rings goes, and how many blocks follow.
+/// Course of a chain: the exchange of single rings, and the number of blocks that follow.
 #[derive(Clone, Copy)]
 pub(crate) struct Course {
     pub chains: u32,
@@ -36,13 +36,13 @@ impl Course {
     }
 }
 
-/// What one chain found.
+/// Result of one chain.
 pub(crate) struct Found {
     pub turns: Vec<f64>,
     widths_nm: Vec<u16>,
     pub merit: f64,
     history: Vec<(u32, f64)>,
-    /// Where to go on.
+    /// Chain to go on from.
     pub chain: Chain,
     pub finished: bool,
 }

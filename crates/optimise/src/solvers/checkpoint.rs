@@ -1,4 +1,4 @@
-//! What is kept of an interrupted optimisation.
+//! Checkpoint of an interrupted optimisation.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarRule;
 
-/// Of the kept file.
+/// Magic number of the file.
 const MAGIC: [u8; 8] = *b"MLOPTI\0\x01";
 
 /// Raised whenever the optimiser goes another way from the same state.
@@ -25,13 +25,13 @@ const LONGEST: u64 = 1 << 30;
 /// The state of every chain, so that going on gives the same result as never having stopped.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// Of the design and its cell: a checkpoint of another is of no use.
+    /// Digest of the design and its cell: a checkpoint of another is of no use.
     pub digest: String,
     /// Chains of the exchange, if that was begun.
     pub chains: Vec<Chain>,
     /// Adam, if that was begun.
     pub adam: Option<AdamState>,
-    /// Of the cells: an input of the kept file.
+    /// Version of the solver of the cells: an input of the file.
     #[serde(skip)]
     pub solver: u32,
 }
@@ -134,7 +134,7 @@ impl Checkpoint {
             .unwrap_or(fresh))
     }
 
-    /// What it was made from.
+    /// Bytes of the inputs that it was made from.
     fn inputs(&self) -> Vec<u8> {
         let mut bytes = OPTIMISER.to_le_bytes().to_vec();
         bytes.extend(self.solver.to_le_bytes());
@@ -142,14 +142,14 @@ impl Checkpoint {
         bytes
     }
 
-    /// Whether every chain and Adam have a finite number for each of so many rings.
+    /// True if every chain and Adam have a finite number for each of so many rings.
     fn is_of(&self, rings: usize) -> bool {
         let fits = |numbers: &ExactNumbers| numbers.0.len() == rings && numbers.values().iter().all(|v| v.is_finite());
         let adam = self.adam.iter().flat_map(|a| [&a.turns, &a.mean, &a.square]);
         self.chains.iter().map(|chain| &chain.turns).chain(adam).all(fits)
     }
 
-    /// Whether anything was done.
+    /// True if anything was done.
     pub fn begun(&self) -> bool {
         self.adam.is_some() || !self.chains.is_empty()
     }
@@ -164,7 +164,7 @@ impl Checkpoint {
     }
 }
 
-/// Of all that decides an optimisation.
+/// Digest of all that decides an optimisation.
 fn digest(design: &Design) -> String {
     // What tables of materials say, as far as they can be read: the work itself says where not.
     let stack = design.cell_stack().ok();

@@ -9,7 +9,7 @@ use crate::rings::limit::StepLimit;
 use crate::rings::planes::Planes;
 use crate::solvers::score::Fields;
 
-/// How long to exchange, and how hot to begin.
+/// Schedule of an exchange: how long it lasts, and how hot it begins.
 ///
 /// While hot, a ring takes a candidate at random, with a probability that grows with its merit
 /// (exp(merit / temperature), Gibbs sampling), and so leaves optima that a greedy exchange is caught in.
@@ -80,7 +80,7 @@ impl<'p> Exchange<'p> {
         self.sweep
     }
 
-    /// Whether the schedule is done or no exchange gains any more.
+    /// True if the schedule is done or no exchange gains any more.
     pub fn finished(&self) -> bool {
         self.finished || self.sweep >= self.schedule.sweeps()
     }
@@ -250,7 +250,7 @@ mod tests {
         });
     }
 
-    /// At the end of a cold exchange no single ring has a better candidate: by brute force.
+    /// Test by brute force that at the end of a cold exchange no single ring has a better candidate.
     #[test]
     fn it_ends_where_no_ring_gains() {
         with_problem(|lens, problem| {

@@ -34,7 +34,7 @@ impl FieldProblem {
         });
     }
 
-    /// With a kernel times a transmission in place of what was left out.
+    /// Score with a kernel times a transmission in place of what was left out.
     #[inline(always)]
     fn score_of(
         &self,
@@ -63,7 +63,7 @@ impl FieldProblem {
 /// Fields that a ring is tried in.
 #[derive(Clone, Copy)]
 pub struct Fields<'a> {
-    /// Without what depends on the width of the ring.
+    /// Fields without what depends on the width of the ring.
     pub without: &'a Planes,
     /// Inverse intensities that logarithms count from.
     pub one_over_now: &'a [f32],

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::merit::focus::Lens;
 
-/// Where a solver begins.
+/// Start of a solver.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
     /// One focus for one wavelength: phi = -k (sqrt(r^2 + f^2) - f).
@@ -62,8 +62,8 @@ impl Start {
     }
 }
 
-/// At wavelength w the lens of phase slope -s (in turns a length) has rays sin = w s; the zone at r^2 =
-/// q R^2 is to focus w(q) at f, so s = r / (w(q) sqrt(r^2 + f^2)). Summed ring by ring.
+/// Logarithmic asphere. At wavelength w the lens of phase slope -s (in turns a length) has rays sin = w s; the zone at
+/// r^2 = q R^2 is to focus w(q) at f, so s = r / (w(q) sqrt(r^2 + f^2)). Summed ring by ring.
 fn log_asphere(lens: &Lens, band_um: (f64, f64)) -> Vec<f64> {
     let (edge, f) = (lens.rings.middle_um(lens.rings.len() - 1), lens.gap_um);
     let mut phase = 0.0;

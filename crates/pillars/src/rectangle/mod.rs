@@ -12,7 +12,7 @@ pub use upright::UprightRectangles;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(untagged)]
 pub enum Rectangles {
-    /// Of one size, by their rotation: geometric phase.
+    /// Rectangles of one size, by their rotation: geometric phase.
     Rotated(RotatedRectangles),
     /// Upright, by their edges along x and y: a phase of its own for light polarised along each.
     Upright(UprightRectangles),
@@ -47,7 +47,7 @@ impl Rectangles {
         }
     }
 
-    /// How far a pillar reaches from its middle along x and y (nm).
+    /// Reach of a pillar from its middle along x and y (nm).
     pub fn reach(self, number: u16) -> (i64, i64) {
         match self {
             Self::Rotated(pillars) => pillars.reach(number),
@@ -89,7 +89,7 @@ impl Rectangles {
         }
     }
 
-    /// What is said of a pillar with this number.
+    /// Words for a pillar with this number.
     pub fn words(self, number: u16) -> String {
         match self {
             Self::Rotated(pillars) => format!("rotated by {} degrees", short_deg(pillars.rotation(number))),

@@ -58,13 +58,14 @@ impl RotatedRectangles {
         2.0 * (squared.unwrap_or(0) as f64).sqrt()
     }
 
-    /// How far the corners of a pillar reach from its middle along x and y (nm).
+    /// Reach of the corners of a pillar from its middle along x and y (nm).
     pub fn reach(self, number: u16) -> (i64, i64) {
         let [a, b, ..] = self.corners(number);
         (a.0.abs().max(b.0.abs()), a.1.abs().max(b.1.abs()))
     }
 
-    /// By how much the rounding of its corners to the grid turns a pillar (rad): its axis as drawn less [`RotatedRectangles::rotation`].
+    /// Angle by which the rounding of its corners to the grid turns a pillar (rad): its axis as drawn less
+    /// [`RotatedRectangles::rotation`].
     pub fn turned_by_grid(self, number: u16) -> f64 {
         let [a, b, c, _] = self.corners(number).map(|(x, y)| (x as f64, y as f64));
         let (along, across) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));

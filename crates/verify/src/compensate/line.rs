@@ -1,8 +1,10 @@
-//! How a line makes pillars: transmission as stated and as made, and what density adds at each site.
+//! Pillars as a line fabricates them: transmission as stated and as fabricated, and what density adds at each site.
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder};
+use metalith_cell::{
+    CellModel, CellResponse, JonesTables, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder,
+};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_optics::{AsBuiltChip, CalibratedModel, Perturbation};
@@ -12,13 +14,14 @@ use metalith_pillars::{PillarMap, PillarShape, Rectangles};
 #[derive(Clone, Debug)]
 pub struct ColourTransmissions {
     pub wavelength_um: f64,
-    /// Of upright rectangles, which have a phase for each: the axis that the light is polarised along.
+    /// Axis that the light is polarised along, for upright rectangles, which have a phase for each.
     pub axis: Option<PolarisationAxis>,
     /// |t| of a stated cell that passes everything.
     pub full: f64,
-    /// Of intended pillars as stated, by width (nm) or number.
+    /// Transmission of intended pillars as stated, by width (nm) or number.
     pub stated: Vec<Complex64>,
-    /// Of made pillars, by the place of the drawn pillar in [`Line::drawn`] and then by step of density.
+    /// Transmission of fabricated pillars, by the place of the drawn pillar in [`Line::drawn`] and then by step of
+    /// density.
     made: Vec<Vec<Complex64>>,
 }
 
@@ -78,7 +81,7 @@ impl Line {
         Ok(line)
     }
 
-    /// What intended pillars transmit as stated at a wavelength (um).
+    /// Transmission of intended pillars as stated, at a wavelength (um).
     fn stated_colours(
         &self,
         lit: &LitStack,
@@ -93,9 +96,9 @@ impl Line {
             stated,
             made: Vec::new(),
         };
-        let found = self.stated.drawn_rectangles(&self.drawn, 0, wavelength_um, progress)?;
-        if let Some((PolarisedTables::Axes(tables), _)) = found {
-            let both = PolarisationAxis::ALL.into_iter().zip(tables.along);
+        if lit.focused.is_some() {
+            let along = along_axes(&self.stated, &self.drawn, 0, wavelength_um, progress)?;
+            let both = PolarisationAxis::ALL.into_iter().zip(along);
             return Ok(both.map(|(axis, table)| colour(Some(axis), table)).collect());
         }
         let wide = self.drawn.last().copied().unwrap_or(0);
@@ -103,7 +106,7 @@ impl Line {
         Ok(vec![colour(None, cell.transmissions(wavelength_um, wide)?)])
     }
 
-    /// Whether the width of a pillar depends on what is drawn around it.
+    /// True if the width of a pillar depends on what is drawn around it.
     pub fn varies_by_site(&self) -> bool {
         self.chip.perturbation().geometry.varies_by_site()
     }
@@ -116,7 +119,7 @@ impl Line {
         steps.unwrap_or_else(|| vec![0; drawn.number.len()])
     }
 
-    /// Solve all pillars that may be drawn as made, for these steps of density at the least and at the most.
+    /// Solve all pillars that may be drawn as fabricated, for these steps of density at the least and at the most.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
@@ -135,14 +138,14 @@ impl Line {
         Ok(())
     }
 
-    /// What a pillar transmits at one of the colours, drawn at a place of [`Line::drawn`], at a step of density
-    /// that was solved for.
+    /// Transmission of a pillar at one of the colours, drawn at a place of [`Line::drawn`], at a step of density that
+    /// was solved for.
     pub fn made(&self, colour: &ColourTransmissions, place: usize, step: i32) -> Complex64 {
         colour.made[place][(step - self.first_step) as usize]
     }
 }
 
-/// What pillars of a chip transmit at one of the colours where so many steps of density are added.
+/// Transmission of pillars of a chip at one of the colours where so many steps of density are added.
 fn made(
     chip: &AsBuiltChip,
     drawn: &[u16],
@@ -150,20 +153,30 @@ fn made(
     colour: &ColourTransmissions,
     progress: &dyn Progress,
 ) -> Result<Vec<Complex64>> {
-    let Some(axis) = colour.axis else {
-        return chip.drawn_widths(drawn, step, colour.wavelength_um, progress);
+    let um = colour.wavelength_um;
+    let table = match colour.axis {
+        None => chip.pillars(drawn, step, um, progress)?.focused()?,
+        // Those of both axes are solved together, and remembered.
+        Some(axis) => along_axes(chip, drawn, step, um, progress)?.swap_remove(axis.index()),
     };
-    // Those of both axes are solved together, and remembered.
-    match chip.drawn_rectangles(drawn, step, colour.wavelength_um, progress)? {
-        Some((PolarisedTables::Axes(tables), _)) => {
-            let table = &tables.along[axis.index()];
-            Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
-        }
-        _ => unreachable!("pillars that were told apart along this axis"),
+    Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
+}
+
+/// Transmission of upright rectangles of a chip for light along x and along y, by their number.
+fn along_axes(
+    chip: &AsBuiltChip,
+    drawn: &[u16],
+    step: i32,
+    wavelength_um: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<Complex64>>> {
+    match chip.pillars(drawn, step, wavelength_um, progress)? {
+        CellResponse::Jones(JonesTables::Polarised(PolarisedTables::Axes(tables))) => Ok(tables.along.into()),
+        other => unreachable!("pillars that were told apart along both axes: {other:?}"),
     }
 }
 
-/// Nothing, if another pillar of a design may come out as the intended one.
+/// Succeeds if another pillar of a design may come out as the intended one.
 fn check_shape(shape: PillarShape) -> Result<()> {
     match shape.rectangles() {
         Some(Rectangles::Rotated(_)) => Err(Error::refused(

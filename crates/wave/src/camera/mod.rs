@@ -1,4 +1,4 @@
-//! From light on the sensor's plane to what a camera gives out.
+//! Model of a camera: from light on the sensor's plane to the values that the camera records.
 //!
 //! | question | file |
 //! | --- | --- |

@@ -22,7 +22,7 @@ pub(crate) struct Fourier {
 }
 
 impl Fourier {
-    /// For images of this shape.
+    /// Transform for images of this shape.
     pub fn periodic(size: [usize; 2]) -> Self {
         let mut planner = FftPlanner::new();
         Self {

@@ -73,7 +73,7 @@ impl<'d, 't> Section<'d, 't> {
         self.fault_of(FaultKind::Inconsistent, key, what, hint);
     }
 
-    /// As [`Section::fault`], of another kind than a value that is inconsistent.
+    /// Variant of [`Section::fault`] for another kind than an inconsistent value.
     pub(super) fn fault_of(&self, kind: FaultKind, key: &str, what: impl Into<String>, hint: impl Into<String>) {
         let path = self.place_of(key);
         if !self.vacant && !self.document.is_replaced(&path) {
@@ -82,7 +82,7 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
-    /// As [`Section::fault`], at a byte within the text that stands at a key.
+    /// Variant of [`Section::fault`] for a byte within the text that stands at a key.
     pub fn fault_in_text(&self, key: &str, byte: usize, what: impl Into<String>, hint: impl Into<String>) {
         let path = self.place_of(key);
         if !self.vacant && !self.document.is_replaced(&path) {
@@ -95,17 +95,17 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
-    /// As [`Section::fault`], for a check that depends on other values too: their paths from the top of the file,
-    /// such as `"cell.pitch_nm"`; a path into sections of the name of this one means this one. Silent if one of
-    /// them has a fault.
+    /// Variant of [`Section::fault`] for a check that depends on other values too. `others` are their paths from the
+    /// top of the file, such as `"cell.pitch_nm"`; a path into sections of the name of this one means this one. Silent
+    /// if one of them has a fault.
     pub fn fault_given(&self, others: &[&str], key: &str, what: impl Into<String>, hint: impl Into<String>) {
         if self.sound(others) {
             self.fault(key, what, hint);
         }
     }
 
-    /// Whether none of these values, by their paths from the top of the file, has a fault so far: what was read
-    /// is what the file says, or a default.
+    /// True if none of these values, given by their paths from the top of the file, has a fault so far: each is then
+    /// what the file says, or a default.
     pub fn sound(&self, paths: &[&str]) -> bool {
         let in_here = |path: &str| {
             let key = path.strip_prefix(&self.name)?.strip_prefix('.')?;
@@ -117,7 +117,7 @@ impl<'d, 't> Section<'d, 't> {
         })
     }
 
-    /// Whether the key is there.
+    /// True if the key is there.
     pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
     }
@@ -138,7 +138,7 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
-    /// Whether the key holds a list.
+    /// True if the key holds a list.
     pub fn is_list(&self, key: &str) -> bool {
         matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Array(_)))
     }
@@ -229,6 +229,11 @@ impl<'d, 't> Section<'d, 't> {
             self.document
                 .fault(FaultKind::Unknown, self.place_of(name), key.span(), what, hint);
         }
+    }
+
+    /// Accept all keys that nobody asked for: they are for other readers of the file.
+    pub fn accept_others(&self) {
+        self.asked.borrow_mut().extend(self.keys());
     }
 
     fn get(&self, key: &str) -> Option<&'d Spanned<DeValue<'t>>> {

@@ -1,5 +1,5 @@
-//! From the cells of a pupil to the point spread function over a window and its transform on the
-//! pixels' frequencies, and the adjoint of both.
+//! Imaging from the cells of a pupil to the point spread function over a window and its transform on the pixels'
+//! frequencies, and the adjoint of both.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -147,17 +147,6 @@ impl<'p> Imaging<'p> {
             }
         }
         self.propagate_back(g_re, g_im);
-    }
-
-    /// Intensity at each sample, `[x][y]` with y from 0 to half the size, x from the middle of the window on
-    /// and around its end. Their sum over all y is the share of the incident power.
-    #[cfg(test)]
-    pub fn intensity(&mut self, t_re: &[f32], t_im: &[f32]) -> Vec<f32> {
-        self.propagate(t_re, t_im);
-        let (n, half) = (self.pupil.size, self.pupil.size / 2 + 1);
-        (0..n * half)
-            .map(|at| self.room.field[at].norm_sqr() * self.weight_x(at / half) * self.pupil.weight[at % half])
-            .collect()
     }
 
     fn weight_x(&self, x: usize) -> f32 {

@@ -1,4 +1,4 @@
-//! Where the light of each site comes from and goes to.
+//! Geometry of the light of each site: where it comes from and goes to.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,12 +7,12 @@ use num_complex::Complex64;
 use crate::PixelWindow;
 use crate::merit::focus::Lens;
 
-/// Where light comes from and goes to.
+/// Geometry of light: where it comes from and goes to.
 pub(super) struct Geometry<'l> {
     lens: &'l Lens,
     wavelength_um: f64,
     sine: f64,
-    /// Where the chief ray lands, and how far that is.
+    /// Place where the chief ray lands, and its distance.
     landing_um: f64,
     distance_um: f64,
     side_um: f64,

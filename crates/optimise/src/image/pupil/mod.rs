@@ -24,7 +24,7 @@ use geometry::Geometry;
 pub use spreading::USED;
 use spreading::{SPREAD, Spreading, first_cell, intensity_weights};
 
-/// What each ring of unit transmission puts into each cell of directions.
+/// Contribution of each ring of unit transmission to each cell of directions.
 ///
 /// The field is even in y, and so are the cells: only those at zero and above are kept.
 pub struct Pupil {

@@ -83,12 +83,12 @@ fn spreading(z: f64) -> f64 {
     }
 }
 
-/// By distance from the middle of the window in samples, 0 to size / 2: one over the squared transform of
-/// the spreading kernel, times a fade to zero at the end of the part that is used.
+/// Weights by distance from the middle of the window in samples, 0 to size / 2: one over the squared transform of the
+/// spreading kernel, times a fade to zero at the end of the part that is used.
 pub(super) fn intensity_weights(size: usize) -> Vec<f32> {
     /// Midpoint rule; the kernel is smooth but for steps of exp(-SHAPE) at its ends.
     const POINTS: u32 = 400;
-    /// Where the fade begins, as part of the window's half.
+    /// Place where the fade begins, as part of the window's half.
     const FADE: f64 = 0.9 * USED;
     (0..=size / 2)
         .map(|m| {
