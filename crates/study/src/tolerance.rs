@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_calibrate::{Effect, Stage, of_any_chip};
+use metalith_calibrate::{Effect, RENAMED_EFFECTS, Stage, of_any_chip};
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_verify::Sense;
@@ -174,6 +174,9 @@ impl Tolerance {
 fn effect<'e>(s: &Section<'_, '_>, known: &'e [Box<dyn Effect>]) -> &'e dyn Effect {
     let names: Vec<String> = known.iter().map(|e| e.name()).collect();
     let choices: Vec<(&str, usize)> = names.iter().enumerate().map(|(k, n)| (n.as_str(), k)).collect();
+    for (old, new) in RENAMED_EFFECTS {
+        s.renamed(old, new);
+    }
     known[s.choice("effect", &choices, None)].as_ref()
 }
 
@@ -291,7 +294,7 @@ distribution = "uniform"
 low = -2.0
 high = 2.0
 [[grid]]
-effect = "gap"
+effect = "defocus"
 values = [-5, 0, 5]
 [[limit]]
 figure = "strehl_530nm_0deg"
@@ -370,7 +373,7 @@ at_least = 0.6
             .concat();
         let text = GOOD.replace("draws = 10", "draws = 10000000") + &grids;
         let error = read(&text).unwrap_err();
-        // 200^4, and three values of the gap.
+        // 200^4, and three values of the defocus.
         insta::assert_snapshot!(fault(&error, "draws"), @"10000000 draws at each of 4800000000 points of the grid");
     }
 
