@@ -214,7 +214,8 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
     }
 }
 
-/// Errors in text files are shown with the text and its places marked, all others as one paragraph.
+/// Errors in text files are shown with the text and its places marked, all others as one paragraph. Each is shown with its identity,
+/// which stays when the words change.
 fn report(error: &Error) {
     if let Error::Text(faults) = error {
         let mut drawn = String::new();
@@ -228,7 +229,11 @@ fn report(error: &Error) {
         }
     }
     // Names from files may hold what moves a cursor.
-    output::tell(&format!("error: {}\n", printable_lines(&error.to_string())));
+    output::tell(&format!(
+        "error[{}]: {}\n",
+        error.id(),
+        printable_lines(&error.to_string())
+    ));
 }
 
 /// The faults of a file under one line that counts them; each is then drawn at its place.

@@ -6,15 +6,15 @@ use assert_cmd::Command;
 fn sets_whose_answers_would_be_in_one_folder_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let refused = |arguments: &[&str], why: &'static str| {
+    let refused = |arguments: &[&str], id: &str| {
         let mut command = Command::cargo_bin("metalith").unwrap();
         let told = command.arg("calibrate").args(arguments).assert().code(2);
-        told.stderr(predicates::str::contains(why));
+        told.stderr(predicates::str::contains(super::refusal(id)));
     };
     for set in ["monday/lens", "tuesday/lens", "tuesday/other"] {
         std::fs::create_dir_all(folder.path().join(set)).unwrap();
     }
     let [monday, tuesday, other] = ["monday/lens", "tuesday/lens", "tuesday/other"].map(path);
-    refused(&[&monday, &tuesday, "--out", &path("out")], "would be answered in");
-    refused(&["--validate", &monday, &other], "one at a time");
+    refused(&[&monday, &tuesday, "--out", &path("out")], "calibrate/same-answer");
+    refused(&["--validate", &monday, &other], "calibrate/several-sets");
 }

@@ -62,12 +62,15 @@ fn the_library_of_upright_rectangles_is_made_of_the_design() {
     let before = run(&["layout"]);
     let said = String::from_utf8_lossy(&before.stderr).into_owned();
     assert_eq!(before.status.code(), Some(2));
-    assert!(said.contains("metalith cells DESIGN"), "{said}");
+    assert!(said.contains("mapping.library/no-file"), "{said}");
     let out = folder.path().to_str().unwrap();
     let made = run(&["cells", "--out", out]);
     assert_eq!(made.status.code(), Some(0), "{}", String::from_utf8_lossy(&made.stderr));
-    let said = String::from_utf8_lossy(&made.stdout).into_owned();
-    assert!(said.contains("sizes are the nearest to some pair of phases"), "{said}");
+    let printed = String::from_utf8_lossy(&made.stdout).into_owned();
+    assert!(
+        printed.contains("sizes are the nearest to some pair of phases"),
+        "{printed}"
+    );
     let [library, shipped] = [
         folder.path().join("library.csv"),
         root.join("designs/phases/birefringent_532.csv"),

@@ -58,12 +58,9 @@ fn pillars_that_are_no_squares_are_told_with_their_rules() {
     let layout = out.join(format!("{}_pillars.gds", name.trim_end_matches('"')));
     assert!(layout.exists(), "{}", layout.display());
     let rules = Path::new(env!("CARGO_MANIFEST_DIR")).join("rules/rectangles.toml");
-    const TOLD: &str = "the pillars are rectangles, and the rules in force are those of squares";
+    const TOLD: &str = "--rules rules/rectangles.toml";
     let said = program(&["check".as_ref(), layout.as_ref()]);
-    assert!(
-        said.contains(TOLD) && said.contains("--rules rules/rectangles.toml"),
-        "{said}"
-    );
+    assert!(said.contains(TOLD), "{said}");
     for own in [
         ["--rules".as_ref(), rules.as_os_str()],
         ["--design".as_ref(), design.as_os_str()],

@@ -7,6 +7,8 @@ use assert_cmd::Command;
 use predicates::prelude::*;
 use predicates::str::contains;
 
+use super::refusal;
+
 fn compare(arguments: &[&str], out: &str) -> Command {
     let mut command = Command::cargo_bin("metalith").unwrap();
     command
@@ -37,27 +39,36 @@ fn what_cannot_be_compared_is_refused() {
     let camera = ["--camera", "cameras/gt1930.toml"];
     let flatcam = ["--rivals", "flatcam"];
     let cases: [(&[&str], &str); 9] = [
-        (&[&one], "no camera to compare"),
-        (&[&one, &other, flatcam[0], flatcam[1]], "of one size"),
-        (&[&one, "--rivals", "pinhole"], "possible values"),
-        (&[&one, "--design", "a=b:c:d:e:f"], "no field in degrees"),
-        (&[&one, "--design", "designs/tio2_532.toml"], "no layout of"),
+        (&[&one], "error[compare/no-camera]"),
+        (
+            &[&one, &other, flatcam[0], flatcam[1]],
+            "error[compare/photographs-differ-in-size]",
+        ),
+        (&[&one, "--rivals", "pinhole"], "'--rivals <"),
+        (&[&one, "--design", "a=b:c:d:e:f"], "'--design <"),
+        (&[&one, "--design", "designs/tio2_532.toml"], "error[compare/no-layout]"),
         (
             &[&one, "--design", "designs/mini_3x3.toml:none.gds", "--method", "magic"],
-            "no way to restore",
+            "'--method <",
         ),
-        (&[&one, flatcam[0], flatcam[1], "--mask-distance-um", "0"], "from 1 to"),
-        (&[&one, "--rivals", "diffusercam", "--diffuser-opening", "9"], "opening"),
+        (
+            &[&one, flatcam[0], flatcam[1], "--mask-distance-um", "0"],
+            "error[flatcam/geometry]",
+        ),
+        (
+            &[&one, "--rivals", "diffusercam", "--diffuser-opening", "9"],
+            "error[diffusercam/geometry]",
+        ),
         (
             &[&one, flatcam[0], flatcam[1], "--lpips", "cameras/gt1930.toml"],
-            "no file of safetensors",
+            "error[table/format]: cameras/gt1930.toml",
         ),
     ];
-    for (arguments, words) in cases {
+    for (arguments, id) in cases {
         compare(&[arguments, &camera].concat(), &out)
             .assert()
             .code(2)
-            .stderr(contains(words));
+            .stderr(contains(id));
         assert!(!Path::new(&out).exists(), "nothing is left of {arguments:?}");
     }
 }
@@ -160,8 +171,8 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     train("blending")
         .assert()
         .code(2)
-        .stderr(contains("name it by --design"));
-    train("magic").assert().code(2).stderr(contains("no learnt last stage"));
+        .stderr(contains(refusal("train/stage-camera")));
+    train("magic").assert().code(2).stderr(contains("'--stage <"));
     train("flatnet").assert().success().stdout(contains("weights"));
     let whole = fs::read(at("stage.safetensors")).unwrap();
     // Pictures that are there are taken again.
@@ -184,7 +195,7 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     compare(&[&[photographs.as_str()], &other[..], &learnt].concat(), &at("compare"))
         .assert()
         .code(2)
-        .stderr(contains("was taught for none of these cameras"));
+        .stderr(contains(refusal("compare/stage-without-camera")));
     fs::write(at("stage.safetensors"), &whole[..whole.len() - 1]).unwrap();
     compare(
         &[&[photographs.as_str()], &camera[..], &learnt].concat(),
@@ -192,5 +203,9 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     )
     .assert()
     .code(2)
-    .stderr(contains("no file of weights"));
+    .stderr(contains(format!(
+        "{}{}",
+        refusal("table/format"),
+        at("stage.safetensors")
+    )));
 }

@@ -7,6 +7,8 @@ use assert_cmd::Command;
 use predicates::prelude::*;
 use predicates::str::contains;
 
+use super::refusal;
+
 fn dataset(images: &Path, out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
     Command::cargo_bin("metalith")
         .unwrap()
@@ -32,9 +34,10 @@ fn bad_images_and_planned_folders_are_refused_before_any_work() {
     let ways: [&[&str]; 2] = [&[], &["--plan"]];
     for plan in ways {
         dataset(&images, &out, plan).code(2).stderr(
-            contains("2 of 4 images cannot be used")
-                .and(contains("c.png: it has 64 x 64 pixels, most have 64 x 48"))
-                .and(contains("d.png: it is neither")),
+            contains(refusal("imaging/unusable-images"))
+                .and(contains("c.png: "))
+                .and(contains("64 x 64"))
+                .and(contains("d.png: ")),
         );
         let kept = ["kernels", "plan.json", "manifest.json", "000000-000999"];
         assert!(kept.iter().all(|name| !out.join(name).exists()));
@@ -46,5 +49,5 @@ fn bad_images_and_planned_folders_are_refused_before_any_work() {
     fs::write(out.join("plan.json"), "{}").unwrap();
     dataset(&images, &out, &[])
         .code(2)
-        .stderr(contains("holds a plan").and(contains("metalith study run")));
+        .stderr(contains(refusal("dataset/folder-of-plan")));
 }

@@ -30,7 +30,8 @@ fn the_program_says_so_by_its_exit_code() {
     fs::write(received.join("tone.svg"), "<svg/>").unwrap();
     verify().code(1).stdout(predicates::str::contains("altered: tone.svg"));
     fs::remove_file(received.join("manifest.json")).unwrap();
-    verify().code(2).stderr(predicates::str::contains("manifest.json"));
+    let gone = format!("{}cannot read {}", super::refusal("file/system"), received.display());
+    verify().code(2).stderr(predicates::str::contains(gone));
 }
 
 /// Without a process file, from a folder that has none: the shipped one, and the shipped decks of rules.

@@ -19,3 +19,8 @@ mod predict;
 mod run;
 mod study;
 mod train;
+
+/// What the program prints before the words of a refusal with this identity.
+fn refusal(id: &str) -> String {
+    format!("error[{id}]: ")
+}

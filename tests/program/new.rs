@@ -5,6 +5,8 @@ use std::fs;
 use assert_cmd::Command;
 use predicates::str::contains;
 
+use super::refusal;
+
 fn metalith() -> Command {
     Command::cargo_bin("metalith").unwrap()
 }
@@ -52,9 +54,9 @@ fn a_new_design_replaces_nothing_and_says_what_cannot_be() {
             .code(2)
     };
     fs::write(folder.path().join("mine.toml"), "mine").unwrap();
-    new(&["mine.toml"]).stderr(contains("mine.toml exists"));
+    new(&["mine.toml"]).stderr(contains(refusal("new/exists")));
     assert_eq!(fs::read_to_string(folder.path().join("mine.toml")).unwrap(), "mine");
-    new(&["none.toml", "--elements", "0"]).stderr(contains("elements"));
+    new(&["none.toml", "--elements", "0"]).stderr(contains("array.elements/out-of-range"));
     new(&["nan.toml", "--diameter-um", "nan"]);
     assert!(!folder.path().join("none.toml").exists() && !folder.path().join("nan.toml").exists());
 }
@@ -189,12 +191,12 @@ fn a_new_design_like_another_replaces_no_file() {
         program.current_dir(folder.path()).arg("new").args(arguments);
         program.assert().code(2)
     };
-    new(&["two words.toml", "--like", "tio2_532"]).stderr(contains("cannot name files"));
+    new(&["two words.toml", "--like", "tio2_532"]).stderr(contains("name/inconsistent"));
     assert!(!folder.path().join("two words.toml").exists() && !folder.path().join("mappings/tio2_532.csv").exists());
     let mapping = folder.path().join("mappings/tio2_532.csv");
     fs::create_dir_all(mapping.parent().unwrap()).unwrap();
     fs::write(&mapping, "mine").unwrap();
-    new(&["mine.toml", "--like", "tio2_532"]).stderr(contains("exists and is another file"));
+    new(&["mine.toml", "--like", "tio2_532"]).stderr(contains(refusal("new/another-file")));
     assert_eq!(fs::read_to_string(&mapping).unwrap(), "mine");
     assert!(!folder.path().join("mine.toml").exists());
     new(&["mine.toml", "--like", "tio2"]).stderr(contains("tio2_532"));
@@ -222,5 +224,8 @@ fn a_design_may_come_by_standard_input() {
         .assert()
         .code(2);
     let said = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
-    assert!(said.contains("standard input"), "{said}");
+    assert!(
+        said.contains("[standard input:1:10]") && said.contains("schema/"),
+        "{said}"
+    );
 }

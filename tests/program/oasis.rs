@@ -89,8 +89,8 @@ fn commands_read_oasis_as_gdsii() {
     assert!(rules(&gds.1).len() > 40);
     assert_eq!(rules(&gds.1), rules(&oasis.1));
 
-    let (code, said) = run(&["diff", &layouts[0], &layouts[1]], folder.path());
-    assert!(code == Some(0) && said.contains("geometry same"), "{said}");
+    let (code, found) = json(&["diff", &layouts[0], &layouts[1], "--json"], folder.path());
+    assert!(code == Some(0) && found["same_geometry"] == true, "{found}");
 }
 
 /// A measured set whose layout is in the other format is the same set.

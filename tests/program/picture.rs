@@ -6,6 +6,8 @@ use std::path::Path;
 use assert_cmd::Command;
 use predicates::str::contains;
 
+use super::refusal;
+
 const DESIGN: &str = "designs/mini_3x3.toml";
 
 fn picture(arguments: &[&str]) -> Command {
@@ -40,21 +42,21 @@ fn what_cannot_be_pictured_is_refused() {
     );
     let gt = "cameras/gt1930.toml";
     let cases: [(&[&str], &str); 7] = [
-        (&["--camera", &beside], "does not see the chip"),
-        (&["--camera", &dark], "counts n"),
-        (&["--camera", gt, "--field-deg", "150"], "wider than the array"),
-        (&["--camera", gt, "--method", "magic"], "no way to restore"),
-        (&["--camera", gt, "--distance-mm", "0"], "positive"),
-        (&["--camera", gt, "--field-deg", "NaN"], "field"),
-        (&["--camera", "cameras/none.toml"], "cannot read"),
+        (&["--camera", &beside], "error[imaging/sensor-misplaced]"),
+        (&["--camera", &dark], "error[camera/no-light]"),
+        (&["--camera", gt, "--field-deg", "150"], "error[imaging/scene-too-wide]"),
+        (&["--camera", gt, "--method", "magic"], "'--method <"),
+        (&["--camera", gt, "--distance-mm", "0"], "error[option/scene-distance]"),
+        (&["--camera", gt, "--field-deg", "NaN"], "error[imaging/field-of-view]"),
+        (&["--camera", "cameras/none.toml"], "error[file/system]"),
     ];
-    for (arguments, words) in cases {
+    for (arguments, id) in cases {
         let out = folder.path().join("out").display().to_string();
         picture(arguments)
             .args(["--out", &out])
             .assert()
             .code(2)
-            .stderr(contains(words));
+            .stderr(contains(id));
         assert!(!Path::new(&out).exists(), "nothing is left of {arguments:?}");
     }
 }
@@ -81,8 +83,7 @@ fn files_that_are_not_what_they_seem_are_refused() {
     at("designs/array_2x4.toml", "star")
         .assert()
         .code(2)
-        .stderr(contains("has no pillar in this layout"))
-        .stderr(contains("metalith psf"));
+        .stderr(contains(refusal("imaging/element-not-in-layout")));
     let whole = folder.path().join("whole.npy");
     let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (40, 40), }\n";
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -93,7 +94,7 @@ fn files_that_are_not_what_they_seem_are_refused() {
     at(DESIGN, &whole.display().to_string())
         .assert()
         .code(2)
-        .stderr(contains("divide it by its white"));
+        .stderr(contains(format!("{}{}", refusal("table/format"), whole.display())));
     assert!(!Path::new(&out).exists());
 }
 
@@ -114,15 +115,12 @@ fn frames_that_cannot_be_restored_are_refused() {
     };
     let [small, whole] = [grey("small.png", 64, 64), grey("whole.png", 1936, 1216)];
     let out = folder.path().join("out").display().to_string();
-    for (frame, more, words) in [
-        (
-            &small,
-            &[][..],
-            "the frame is of another camera: it has 64 x 64 pixels, and the camera gives 1936 x 1216",
-        ),
-        (&whole, &[], "add --white"),
-        (&whole, &["--white", "20", "--black-level", "20"], "above --black-level"),
-        (&whole, &["--white", "4095", "--method", "magic"], "no way to restore"),
+    let mut said = Vec::new();
+    for (frame, more, id) in [
+        (&small, &[][..], "error[table/format]"),
+        (&whole, &[], "error[table/format]"),
+        (&whole, &["--white", "20", "--black-level", "20"], "error[table/format]"),
+        (&whole, &["--white", "4095", "--method", "magic"], "'--method <"),
     ] {
         let mut command = Command::cargo_bin("metalith").unwrap();
         command
@@ -130,7 +128,19 @@ fn frames_that_cannot_be_restored_are_refused() {
             .args(["restore", "golden/mini_3x3/folded.gds.gz", frame, "--design", DESIGN])
             .args(["--camera", "cameras/gt1930.toml", "--out", &out])
             .args(more);
-        command.assert().code(2).stderr(contains(words));
+        let refused = command.assert().code(2).stderr(contains(id));
+        let text = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        said.push(text[text.find("error").unwrap()..].to_owned());
         assert!(!Path::new(&out).exists());
     }
+    // Which of the three is wrong with a frame is in the words.
+    let folder = folder.path();
+    insta::assert_snapshot!(metalith_testing::without_folder(said[..3].concat().trim_end(), folder), @"
+    error[table/format]: small.png: the frame is of another camera: it has 64 x 64 pixels, and the camera gives 1936 x 1216
+      help: give the camera that it was recorded with, and the whole frame
+    error[table/format]: whole.png: a frame of 16 bits does not say which number is full scale
+      help: add --white, such as 4095 of 12 bits or 65520 where these are shifted up, and --black-level if no signal has another number than 0
+    error[table/format]: whole.png: full scale is 20, and no signal 20
+      help: give a --white above --black-level
+    ");
 }

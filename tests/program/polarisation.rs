@@ -6,6 +6,7 @@ use std::path::Path;
 use metalith_testing::design;
 use serde_json::Value;
 
+use super::refusal;
 use super::run::{metalith, report};
 
 /// What `psf` finds of a file with options: the numbers of its PSF, or what it says.
@@ -93,12 +94,9 @@ fn a_design_and_options_name_the_same_light() {
     assert_eq!(metalith(&words, &[&path, &layout]).status.code(), Some(0));
     assert_eq!(metalith(&words, &[&other, &layout]).status.code(), Some(2));
     let said = psf(&layout, &["--arriving", "45", "--analyser", "circular"]).unwrap_err();
-    assert!(
-        said.contains("linearly polarised at 45 degrees from x towards y") && said.contains("--focused"),
-        "{said}"
-    );
+    assert!(said.contains(&refusal("light/analyser")), "{said}");
     let said = psf(&layout, &["--arriving", "diagonal"]).unwrap_err();
-    assert!(said.contains("no light of polarisation `diagonal`"), "{said}");
+    assert!(said.contains("'--arriving <"), "{said}");
     assert!(psf(&layout, &["--focused", "left"]).is_err());
 
     // Half of what a linear analyser passes is focused, whatever hand that is.
@@ -110,5 +108,5 @@ fn a_design_and_options_name_the_same_light() {
         "{linear} {all}"
     );
     let said = psf(&layout, &["--analyser", "left"]).unwrap_err();
-    assert!(said.contains("there is no analyser `left`"), "{said}");
+    assert!(said.contains("'--analyser <"), "{said}");
 }

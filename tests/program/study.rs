@@ -4,6 +4,8 @@ use std::path::Path;
 
 use assert_cmd::Command;
 
+use super::refusal;
+
 fn metalith(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("metalith").unwrap();
     command.args(arguments);
@@ -36,7 +38,10 @@ fn shards_by_processes_are_those_of_one_process() {
     metalith(&["study", "merge", &by_two])
         .assert()
         .code(2)
-        .stderr(predicates::str::contains("6 of 6 draws are missing"));
+        .stderr(predicates::str::contains(format!(
+            "{}6 of 6 ",
+            refusal("study/draws-missing")
+        )));
     metalith(&["study", "run", &by_two, "--missing", "--jobs", "2"])
         .assert()
         .code(0);
@@ -44,7 +49,7 @@ fn shards_by_processes_are_those_of_one_process() {
     metalith(&["study", "run", &by_two, "--shard", "3"])
         .assert()
         .code(2)
-        .stderr(predicates::str::contains("shards 0 to 2"));
+        .stderr(predicates::str::contains(refusal("study/unknown-shard")));
     metalith(&["study", "run", &alone, "--missing", "--threads", "1"])
         .assert()
         .code(0);

@@ -7,6 +7,8 @@ use std::process::Command;
 use assert_cmd::assert::OutputAssertExt;
 use predicates::str::contains;
 
+use super::refusal;
+
 /// A folder with three small photographs.
 fn photographs(folder: &Path) -> PathBuf {
     let at = folder.join("photographs");
@@ -44,22 +46,22 @@ fn what_cannot_be_learnt_is_refused_before_any_work() {
     ];
     let odd = [&stage[..], &["--piece", "36"]].concat();
     let cases: [(&[&str], &str); 3] = [
-        (&odd, "multiple of 8"),
-        (&stage, "48 x 48 pixels"),
-        (&["--piece", "32", "--batch", "0"], "1 to 256 pieces"),
+        (&odd, "train/piece"),
+        (&stage, "train/too-few-photographs"),
+        (&["--piece", "32", "--batch", "0"], "train/nothing-to-learn"),
     ];
-    for (arguments, words) in cases {
+    for (arguments, id) in cases {
         train(&photographs, &out, arguments)
             .assert()
             .code(2)
-            .stderr(contains(words));
+            .stderr(contains(refusal(id)));
         // Nothing was taken by a camera.
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "{arguments:?}");
     }
     train(&photographs, folder.path(), &["--piece", "32"])
         .assert()
         .code(2)
-        .stderr(contains("is a folder"));
+        .stderr(contains(refusal("file/is-a-folder")));
 }
 
 /// A second signal that follows at once, as those of shells and of `timeout` do, is the same wish: the state is written.

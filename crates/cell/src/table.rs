@@ -297,13 +297,17 @@ mod tests {
     #[test]
     fn tables_reach_as_far_as_designs() {
         assert!(spec(6000.0, (8.0, 13.0)).check().is_ok());
-        let said = |spec: TableSpec| match spec.check() {
-            Err(Error::Invalid { what, hint, .. }) => format!("{what}: {hint}"),
-            other => panic!("{other:?}"),
-        };
-        let wide = said(spec(6000.0, (0.2, 20.3)));
-        assert!(wide.contains("at most 20 um apart"), "{wide}");
-        let large = said(spec(20_002.0, (8.0, 13.0)));
-        assert!(large.contains("a pitch from 1 to 20000 nm"), "{large}");
+        let wide = spec(6000.0, (0.2, 20.3)).check().unwrap_err();
+        assert_eq!(wide.id(), "cell/band");
+        insta::assert_snapshot!(wide, @"
+            a band from 0.2 to 20.3 um
+              help: give two rising, positive wavelengths at most 20 um apart
+            ");
+        let large = spec(20_002.0, (8.0, 13.0)).check().unwrap_err();
+        assert_eq!(large.id(), "cell/pitch");
+        insta::assert_snapshot!(large, @"
+            a table of a cell with a pitch of 20002 nm
+              help: use a pitch from 1 to 20000 nm
+            ");
     }
 }

@@ -94,6 +94,15 @@ impl Error {
         }
     }
 
+    /// Identities of all mistakes: [`Fault::id`](crate::Fault::id) of each mistake of a text, else [`Error::id`] alone.
+    pub fn ids(&self) -> Vec<String> {
+        match self {
+            #[cfg(feature = "documents")]
+            Self::Text(faults) => faults.faults().iter().map(crate::Fault::id).collect(),
+            other => vec![other.id().to_owned()],
+        }
+    }
+
     /// True if the error is a text with a mistake of this kind at the key with this path, such as `lens.diameter_um`.
     #[cfg(feature = "documents")]
     pub fn has_fault(&self, kind: crate::FaultKind, key: &str) -> bool {

@@ -500,7 +500,11 @@ mod tests {
         };
         // One of the elements looks nearly 8 degrees to this side.
         assert!(read("-80").is_ok());
-        let error = read("-86").unwrap_err().to_string();
-        assert!(error.contains("no light"), "{error}");
+        let error = read("-86").unwrap_err();
+        insta::assert_snapshot!(metalith_testing::without_folder(&error, path.parent().unwrap()), @"
+            mixed_lenses.toml:22:1: element (3, 0) has no light at 530 nm from the field angle (-86, 0) degrees
+              help: steer less, or take shorter wavelengths or smaller field angles in [verify]
+            ");
+        assert_eq!(error.ids(), ["array.steering_deg/inconsistent"]);
     }
 }

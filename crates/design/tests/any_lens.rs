@@ -17,6 +17,11 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(path(name)).unwrap()
 }
 
+/// The text of an error in a shipped design that was changed.
+fn words(error: &metalith_core::Error) -> String {
+    metalith_testing::without_folder(error, path("mini_3x3").parent().unwrap())
+}
+
 fn changed(name: &str, from: &str, to: &str) -> metalith_core::Result<Design> {
     let text = text(name);
     assert!(text.contains(from), "{from}");
@@ -78,19 +83,28 @@ fn the_band_is_that_of_the_design() {
 /// A band beyond what the materials are known for is refused before anything is written, with what they are known for.
 #[test]
 fn a_band_beyond_the_materials_is_refused() {
+    let refused = |from: &str, to: &str| {
+        let error = changed("asi_940", from, to).unwrap_err();
+        assert_eq!(error.id(), "design/band-beyond-materials");
+        words(&error)
+    };
+    let mut said = Vec::new();
     for section in ["[cell]", "[mapping]"] {
         let with = format!("{section}\nband_nm = [400, 1000]");
-        let error = changed("asi_940", section, &with).unwrap_err().to_string();
-        let wanted = format!("`band_nm` of {section} is 400 to 1000 nm");
-        assert!(
-            error.contains(&wanted) && error.contains("from 413.3 to 2066 nm"),
-            "{error}"
-        );
+        said.push(refused(section, &with));
     }
     assert!(changed("asi_940", "[cell]", "[cell]\nband_nm = [420, 1000]").is_ok());
     let own = "[optimise]\nband_nm = [400, 700]\n\n[verify]";
-    let error = changed("asi_940", "[verify]", own).unwrap_err().to_string();
-    assert!(error.contains("[optimise]"), "{error}");
+    said.push(refused("[verify]", own));
+    // The section is in the words.
+    insta::assert_snapshot!(said.join("\n"), @"
+        asi_940.toml: `band_nm` of [cell] is 400 to 1000 nm, and the materials of [cell] are known from 413.3 to 2066 nm
+          help: give a band in that range, or other materials
+        asi_940.toml: `band_nm` of [mapping] is 400 to 1000 nm, and the materials of [cell] are known from 413.3 to 2066 nm
+          help: give a band in that range, or other materials
+        asi_940.toml: `band_nm` of [optimise] is 400 to 700 nm, and the materials of [cell] are known from 413.3 to 2066 nm
+          help: give a band in that range, or other materials
+        ");
 }
 
 /// A table of a material that says something else is another chip in the light, and the same layout.
@@ -129,11 +143,19 @@ fn a_substrate_that_absorbs_is_refused_when_the_design_is_read() {
     };
     assert!(read(0.0005, "").is_ok());
     // It is verified at 530 nm, but white light has 400 nm too, unless the design says otherwise.
-    let said = read(0.02, "").unwrap_err().to_string();
-    assert!(said.contains("glass.csv has k = 0.02 at 400.0 nm"), "{said}");
+    let error = read(0.02, "").unwrap_err();
+    insta::assert_snapshot!(metalith_testing::without_folder(&error, folder.path()), @"
+        the substrate glass.csv has k = 0.02 at 400.0 nm, where light arrives through it
+          help: use a substrate with k of at most 0.001, or wavelengths and a band (`band_nm` in [cell]) at which it is clear: what absorbs on so thick a way passes no light
+        ");
+    assert_eq!(error.ids(), ["cell/absorbing-substrate"]);
     // The mapping is for 452 nm, where there is half of it.
-    let said = read(0.02, "band_nm = [500, 600]\n").unwrap_err().to_string();
-    assert!(said.contains("at 452.0 nm"), "{said}");
+    let error = read(0.02, "band_nm = [500, 600]\n").unwrap_err();
+    insta::assert_snapshot!(metalith_testing::without_folder(&error, folder.path()), @"
+        the substrate glass.csv has k = 0.007004159999999998 at 452.0 nm, where light arrives through it
+          help: use a substrate with k of at most 0.001, or wavelengths and a band (`band_nm` in [cell]) at which it is clear: what absorbs on so thick a way passes no light
+        ");
+    assert_eq!(error.ids(), ["cell/absorbing-substrate"]);
 }
 
 /// Sums over pairs were compared with real rows of the cell of the paper alone.
@@ -159,142 +181,152 @@ fn unlike_neighbours_judge_the_cell_of_the_paper_where_nothing_is_said() {
 
 #[test]
 fn mistakes_are_said() {
-    for (name, from, to, wanted) in [
-        ("asi_940", "shape = \"circle\"", "shape = \"hexagon\"", "shape"),
+    let cases = [
+        (
+            "asi_940",
+            "shape = \"circle\"",
+            "shape = \"hexagon\"",
+            "cell.shape/unknown-choice",
+        ),
         (
             "asi_940",
             "[cell]\n",
             "[cell]\nband_nm = [1000, 900]\n",
-            "a band from 1000 to 900",
+            "cell.band_nm/inconsistent",
         ),
         (
             "asi_940",
             "[cell]\n",
             "[cell]\nspacer_nm = 50\n",
-            "a spacer of no material",
+            "cell.spacer_nm/inconsistent",
         ),
         (
             "array_2x4",
             "spacing_um = [150, 120]",
             "spacing_um = [150, 50]",
-            "neighbouring lenses overlap",
+            "array.spacing_um/inconsistent",
         ),
         // 1000 um across, with 2858 sites of 350 nm.
         (
             "prototype_3x3",
             "spacing_um = 2420",
             "spacing_um = 1000",
-            "neighbouring lenses overlap, or the boxes about their pillars do",
+            "array.spacing_um/inconsistent",
         ),
         (
             "hologram",
             "wrapped = \"yes\"",
             "wrapped = \"yes\"\nscale = 0.5",
-            "phases that are known up to whole turns, times 0.5",
+            "phase.term#0.scale/inconsistent",
         ),
         (
             "hologram",
             "elements_m = [2] ",
             "elements_m = [3] ",
-            "no element of this phase is (3, 0)",
+            "phase.term#0.elements_m/inconsistent",
         ),
         (
             "hologram",
             "elements_m = [2]              # the second element alone\nelements_n = [0]",
             "elements_m = []\nelements_n = []",
-            "0 indices along x and 0 along y",
+            "phase.term#0.elements_m/inconsistent",
         ),
         (
             "array_2x4",
             "[array]",
             "[[phase.term]]\nsource = \"hyperbola\"\nwavelength_nm = 500\nelements_m = [0]\nelements_n = [1]\n\n[array]",
-            "no element of this phase is (0, 1)",
+            "phase.term#0.elements_m/inconsistent",
         ),
         (
             "mixed_lenses",
             "coefficients_rad = [12.0, 12.0]",
             "coefficients_rad = [12.0, 12.0]\nelements_m = [3]\nelements_n = [0]",
-            "no element of this phase is (3, 0)",
+            "element#3.phase.term#0.elements_m/inconsistent",
         ),
         (
             "array_2x4",
             "elements = [2, 4]",
             "elements = [2, 4.5]",
-            "2 by 4.5 elements",
+            "array.elements/inconsistent",
         ),
         (
             "geometric_phase_532",
             "pillar_length_nm = 250",
             "pillar_length_nm = 100",
-            "100 nm is not longer than the width of 100 nm",
+            "cell.pillar_length_nm/inconsistent",
         ),
         (
             "geometric_phase_532",
             "pillar_length_nm = 250",
             "pillar_length_nm = 350",
-            "a diagonal of 364 nm reaches beyond its cell",
+            "cell.pillar_length_nm/inconsistent",
         ),
         (
             "geometric_phase_532",
             "rotation_step_deg = 1",
             "rotation_step_deg = 7",
-            "no whole number of steps of 7 degrees",
+            "cell.rotation_step_deg/inconsistent",
         ),
         (
             "geometric_phase_532",
             "rotation_step_deg = 1",
             "rotation_step_deg = 0.5",
-            "do not tell rotations of 0.5 degrees",
+            "cell.rotation_step_deg/inconsistent",
         ),
         (
             "geometric_phase_532",
             "[mapping]  ",
             "[mapping]\ncoefficients = [0.3, 0.5]\n#",
-            "rectangles have no widths to map to",
+            "mapping.coefficients/inconsistent",
         ),
         (
             "geometric_phase_532",
             "pillar_height_nm = 600",
             "pillar_height_nm = 600\nwidth_min_nm = 100",
-            "width_min_nm",
+            "cell.width_min_nm/unknown",
         ),
         (
             "geometric_phase_532",
             "rotation_sines_deg = [",
             "rotation_sines_deg = [0, 0, 0, 0, 0, 0, ",
-            "8 terms, at most 6",
+            "mapping.rotation_sines_deg/inconsistent",
         ),
         (
             "tio2_532",
             "[mapping]  ",
             "[mapping]\nrotation_sines_deg = [0.1]\n#",
-            "the pillars are no rotated rectangles",
+            "mapping.rotation_sines_deg/inconsistent",
         ),
-        ("hologram", "x_um = 60", "x_um = -20", "overlaps that of element (1, 0)"),
+        ("hologram", "x_um = 60", "x_um = -20", "element#1.x_um/inconsistent"),
         (
             "hologram",
             "[array]\n",
             "[array]\nelements = [1, 1]\n",
-            "a grid beside elements",
+            "array.elements/inconsistent",
         ),
-        ("hologram", "pitch_um = 0.35", "pitch_um = 0.2", "the lens to 30"),
-        ("hologram", "source = \"map\"", "source = \"maps\"", "source"),
+        ("hologram", "pitch_um = 0.35", "pitch_um = 0.2", "table/format"),
+        (
+            "hologram",
+            "source = \"map\"",
+            "source = \"maps\"",
+            "phase.term#0.wavelength_nm/missing phase.term#0.source/unknown-choice phase.term#0.source/unknown-choice phase.term#0.file/unknown phase.term#0.pitch_um/unknown phase.term#0.interpolation/unknown phase.term#0.wrapped/unknown",
+        ),
         (
             "array_2x4",
             "[array]",
             "[[phase.term]]\nsource = \"polynomial\"\npowers_x = [1]\npowers_y = [0, 1]\ncoefficients_rad = [1.0]\n\n[array]",
-            "2 powers for 1 coefficients",
+            "phase.term#0.powers_y/inconsistent",
         ),
         (
             "array_2x4",
             "[array]",
             "[[phase.term]]\nsource = \"zernike\"\norder = \"noll\"\ncoefficients_waves = [1.0]\n\n[array]",
-            "order",
+            "phase.term#0.order/unknown-choice",
         ),
-    ] {
-        let error = changed(name, from, to).unwrap_err().to_string();
-        assert!(error.contains(wanted), "{to}: {error}");
-    }
+    ];
+    let errors = cases.map(|(name, from, to, _)| changed(name, from, to).unwrap_err());
+    insta::assert_snapshot!(errors.each_ref().map(words).join("\n"));
+    assert_eq!(errors.map(|error| error.ids().join(" ")), cases.map(|case| case.3));
 }
 
 fn zernike(order: &str, terms: usize) -> metalith_core::Result<Design> {
@@ -307,8 +339,8 @@ fn zernike(order: &str, terms: usize) -> metalith_core::Result<Design> {
 
 #[test]
 fn the_fringe_order_has_37_polynomials() {
-    let error = zernike("fringe", 38).unwrap_err().to_string();
-    assert!(error.contains("38 coefficients of the fringe order"), "{error}");
+    let error = zernike("fringe", 38).unwrap_err();
+    assert_eq!(error.ids(), ["phase.term#0.coefficients_waves/inconsistent"]);
     assert!(zernike("standard", 38).is_ok());
     // The last is one in the middle, and at the rim.
     let design = zernike("fringe", 37).unwrap();
@@ -343,8 +375,8 @@ fn the_least_spacing_of_a_grid_leaves_a_pitch() {
             };
             Design::parse(&path(name), &text(name).lines().map(changed).collect::<String>())
         };
-        let error = read(least_um - 0.001).unwrap_err().to_string();
-        assert!(error.contains("neighbouring lenses overlap"), "{name}: {error}");
+        let error = read(least_um - 0.001).unwrap_err();
+        assert_eq!(error.ids(), ["array.spacing_um/inconsistent"], "{name}: {error}");
         let design = read(least_um).unwrap();
         let lattice = design.lattice();
         let outermost_nm = lattice.place_nm(0, lattice.sites() - 1);

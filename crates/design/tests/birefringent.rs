@@ -167,44 +167,45 @@ fn light_says_which_phase_is_judged() {
 #[test]
 fn what_cannot_be_is_told_with_its_place() {
     let rigorous = "fidelity = \"rigorous\"";
-    for (from, to, wanted) in [
-        ("library = \"phases/birefringent_532.csv\"", "", "`library`"),
-        ("birefringent_532.csv", "nowhere.csv", "metalith cells DESIGN"),
+    let cases = [
+        (
+            "library = \"phases/birefringent_532.csv\"",
+            "",
+            "mapping.library/missing",
+        ),
+        ("birefringent_532.csv", "nowhere.csv", "mapping.library/no-file"),
         (
             "width_step_nm = 10",
             "width_step_nm = 2",
-            "edges of 96 lengths, at most 64",
+            "cell.width_step_nm/inconsistent",
         ),
+        ("width_max_nm = 280", "width_max_nm = 270", "table/format"),
         (
             "width_max_nm = 280",
-            "width_max_nm = 270",
-            "280 x 90 nm is no pillar of the design",
+            "width_max_nm = 400",
+            "cell.width_max_nm/out-of-range",
         ),
-        ("width_max_nm = 280", "width_max_nm = 400", "width_max_nm"),
         (
             "[mapping] ",
             "[mapping]\ncoefficients = [0.2, 0.5]\n#",
-            "leave `coefficients` out",
+            "mapping.coefficients/inconsistent",
         ),
-        (
-            rigorous,
-            "fidelity = \"published\"",
-            "rectangular pillars by the `published` cell",
-        ),
+        (rigorous, "fidelity = \"published\"", "verify.fidelity/inconsistent"),
         (
             rigorous,
             "fidelity = \"rigorous\"\nanalyser = \"circular\"",
-            "which focus no hand",
+            "verify.analyser/inconsistent",
         ),
         (
             "shape = \"upright_rectangle\"",
             "shape = \"square\"",
-            "use `shape = \"upright_rectangle\"`",
+            "phase.y/inconsistent mapping.coefficients/missing mapping.library/unknown mapping.library/inconsistent",
         ),
-    ] {
-        let error = changed(&[(from, to)]).unwrap_err().to_string();
-        assert!(error.contains(wanted), "{from}: {error}");
-    }
+    ];
+    let errors = cases.map(|(from, to, _)| changed(&[(from, to)]).unwrap_err());
+    let words = |error| metalith_testing::without_folder(error, path().parent().unwrap());
+    insta::assert_snapshot!(errors.each_ref().map(words).join("\n"));
+    assert_eq!(errors.map(|error| error.ids().join(" ")), cases.map(|case| case.2));
     // Whoever makes the library needs none, and takes none of other sizes.
     let missing = text().replace("birefringent_532.csv", "nowhere.csv");
     assert!(

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_core::Result;
+use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_pillars::Lattice;
@@ -25,6 +25,11 @@ fn npy(columns: usize, rows: usize, rad: impl Fn(usize, usize) -> f64) -> Vec<u8
         bytes.extend(rad(ix, iy).to_le_bytes());
     }
     bytes
+}
+
+/// The text of an error in a shipped design that was changed.
+fn words(error: &Error) -> String {
+    metalith_testing::without_folder(error, path("hologram").parent().unwrap())
 }
 
 /// Distance of the places of the map (um).
@@ -90,21 +95,22 @@ fn a_map_covers_the_box_about_its_aperture() {
 
 #[test]
 fn a_map_that_ends_within_its_aperture_is_refused() {
-    let said = |size, changes: &[(&str, &str)]| hologram(size, changes).unwrap_err().to_string();
+    // The words are the lengths that decide.
+    let said = |size, changes: &[(&str, &str)]| match hologram(size, changes).unwrap_err() {
+        Error::Table { what, .. } => what,
+        other => panic!("{other:?}"),
+    };
     let short = said([116, 54], &[RECTANGLE]);
-    assert!(
-        short.contains("reach to 29 and 13.5 um, the lens to 30 and 12 um"),
-        "{short}"
-    );
+    insta::assert_snapshot!(short, @"116 by 54 places of 0.5 um reach to 29 and 13.5 um, the lens to 30 and 12 um");
     let shifted = ("pitch_um = 0.5", "pitch_um = 0.5\ncentre_um = [0, -2]");
     let low = said([144, 54], &[RECTANGLE, shifted]);
-    assert!(low.contains("the lens to 30 and 14 um"), "{low}");
+    insta::assert_snapshot!(low, @"144 by 54 places of 0.5 um reach to 36 and 13.5 um, the lens to 30 and 14 um");
     assert!(hologram([144, 56], &[RECTANGLE, shifted]).is_ok());
     // A polygon beside its middle needs more to one side.
     let beside = "aperture = \"polygon\"\ncorners_x_um = [-5, 30, 30, -5]\ncorners_y_um = [-8, -8, 8, 8]";
     assert!(hologram([120, 32], &[("diameter_um = 60", beside)]).is_ok());
     let round = said([144, 54], &[]);
-    assert!(round.contains("the lens to 30 and 30 um"), "{round}");
+    insta::assert_snapshot!(round, @"144 by 54 places of 0.5 um reach to 36 and 13.5 um, the lens to 30 and 30 um");
 }
 
 /// A map of an element that has an aperture of its own need not cover the lens that the others share.
@@ -156,12 +162,12 @@ fn small_lenses_stand_near_one_another_beside_a_large_one() {
     assert_eq!(within, [None, small, small]);
     // 86 columns of each, and none between.
     assert!(three(30.1).is_ok());
-    let said = three(30.0).unwrap_err().to_string();
-    assert!(said.contains("this lens overlaps that of element (2, 0)"), "{said}");
-    assert!(
-        said.contains("at least 30.1 um apart along x, or 30.1 um along y"),
-        "{said}"
-    );
+    let error = three(30.0).unwrap_err();
+    insta::assert_snapshot!(words(&error), @"
+        hologram.toml:32:8: this lens overlaps that of element (2, 0), or the upright boxes about their pillars do
+          help: place them at least 30.1 um apart along x, or 30.1 um along y: the boxes and a pitch between them
+        ");
+    assert_eq!(error.ids(), ["element#2.x_um/inconsistent"]);
 }
 
 #[test]
@@ -171,16 +177,14 @@ fn strips_stand_side_by_side_whichever_way_they_are_turned() {
         placed(&(element(0.0, 0.0, &turned) + &element(0.0, y_um, &turned)))
     };
     assert!(two(30.0, 0).is_ok() && two(20.3, 0).is_ok());
-    let said = two(20.0, 0).unwrap_err().to_string();
-    assert!(
-        said.contains("at least 100.1 um apart along x, or 20.3 um along y"),
-        "{said}"
-    );
-    let turned = two(30.0, 90).unwrap_err().to_string();
-    assert!(
-        turned.contains("20.3 um apart along x, or 100.1 um along y"),
-        "{turned}"
-    );
+    insta::assert_snapshot!(words(&two(20.0, 0).unwrap_err()), @"
+        hologram.toml:30:8: this lens overlaps that of element (1, 0), or the upright boxes about their pillars do
+          help: place them at least 100.1 um apart along x, or 20.3 um along y: the boxes and a pitch between them
+        ");
+    insta::assert_snapshot!(words(&two(30.0, 90).unwrap_err()), @"
+        hologram.toml:30:8: this lens overlaps that of element (1, 0), or the upright boxes about their pillars do
+          help: place them at least 20.3 um apart along x, or 100.1 um along y: the boxes and a pitch between them
+        ");
     let design = two(30.0, 180).unwrap();
     assert_eq!(design.sites()[1].within_nm, Some([[-49_875, 49_875], [-9_975, 9_975]]));
     assert_eq!(design.sites_of(&design.elements()[1..]), design.sites()[1..]);
@@ -207,8 +211,12 @@ fn grids_of_strips_are_as_dense_as_the_strips() {
             .iter()
             .all(|site| site.within_nm == Some([[-49_875, 49_875], [-9_975, 9_975]]))
     );
-    let said = grid(20.0).unwrap_err().to_string();
-    assert!(said.contains("use at least [100.1, 20.3] um"), "{said}");
+    let error = grid(20.0).unwrap_err();
+    insta::assert_snapshot!(words(&error), @"
+        array_2x4.toml:24:14: neighbouring lenses overlap, or the boxes about their pillars do
+          help: use at least [100.1, 20.3] um: the lens with its lattice
+        ");
+    assert_eq!(error.ids(), ["array.spacing_um/inconsistent"]);
     let shipped = Design::read(&path("array_2x4")).unwrap();
     assert!(shipped.sites().iter().all(|site| site.within_nm.is_none()));
 }

@@ -294,17 +294,28 @@ mod tests {
         let text = "schema = 1\nname = \"x\"\npillar_height_nm = 700\n[layers]\npillars = \"1-0\"\n\
                     [[rule]]\nid = \"a\"\ncheck = \"gap_min\"\n[[rule]]\nid = \"a\"\ncheck = \"wings\"\n\
                     [[rule]]\nid = \"b\"\ncheck = \"on_lattice\"\nfrom = \"layout\"\n";
-        let error = Deck::parse(Path::new("deck.toml"), text.into())
-            .unwrap_err()
-            .to_string();
-        for expected in [
-            "deck.toml:5:",
-            "lacks `nm`",
-            "a second rule `a`",
-            "no check `wings`",
-            "`from` cannot be \"layout\"",
-        ] {
-            assert!(error.contains(expected), "{expected}: {error}");
-        }
+        let error = Deck::parse(Path::new("deck.toml"), text.into()).unwrap_err();
+        insta::assert_snapshot!(error, @r#"
+            deck.toml:5:11: "1-0" is not a layer
+              help: write layer and datatype as "1/0"
+            deck.toml:6:1: [rule] lacks `nm`
+              help: add `nm`: a number from 0 to 1000000 nm
+            deck.toml:10:6: a second rule `a`
+              help: give every rule an id of its own
+            deck.toml:11:9: there is no check `wings`
+              help: docs/guide/check.md lists all checks
+            deck.toml:15:8: `from` cannot be "layout"
+              help: use one of: design
+            "#);
+        assert_eq!(
+            error.ids(),
+            [
+                "layers.pillars/inconsistent",
+                "rule#0.nm/missing",
+                "rule#1.id/inconsistent",
+                "rule#1.check/inconsistent",
+                "rule#2.from/unknown-choice"
+            ]
+        );
     }
 }

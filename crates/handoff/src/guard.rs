@@ -80,12 +80,15 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
 /// If something else is there, with the name of the first such file.
 pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
     let hint = "choose another folder with --out, or move it away";
-    for (path, kind) in [(folder, "folder"), (archive, "file")] {
+    for (path, kind, id) in [
+        (folder, "folder", "handoff/no-folder"),
+        (archive, "file", "handoff/no-file"),
+    ] {
         match std::fs::symlink_metadata(path) {
             Ok(found) if (kind == "folder" && found.is_dir()) || (kind == "file" && found.is_file()) => {}
             Ok(_) => {
                 return Err(Error::refused(
-                    "handoff/in-the-way",
+                    id,
                     format!("{} is there and is no {kind}", path.display()),
                     hint,
                 ));
@@ -102,7 +105,7 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     if !handed_off && archive.exists() && !zip::is_packed_here(archive, &name)? {
         return Err(Error::refused(
-            "handoff/in-the-way",
+            "handoff/foreign-archive",
             format!("{} is there, and is not the archive of a hand-off", archive.display()),
             hint,
         ));

@@ -171,30 +171,68 @@ fn openings_are_the_apertures_with_their_margin() {
 #[test]
 fn apertures_that_cannot_be_are_refused() {
     let l = "corners_x_um = [-10, 25, 25, 10, 10, -10]";
-    for (from, to, said) in [
+    let cases = [
         (
             l,
             "corners_x_um = [-10, 25, 25, 10, 10]",
-            "5 places along x and 6 along y",
+            "element#3.x_um/inconsistent element#3.corners_x_um/inconsistent apertures.chord_error_nm/inconsistent chip.size_um/inconsistent",
         ),
         (
             l,
             "corners_x_um = [-10, 25, -10, 10, 10, 25]",
-            "crosses or touches itself",
+            "element#3.corners_x_um/inconsistent apertures.margin_um/inconsistent",
         ),
-        (l, "corners_x_um = [15, 50, 50, 35, 35, 15]", "outside the outline"),
+        (
+            l,
+            "corners_x_um = [15, 50, 50, 35, 35, 15]",
+            "element#3.corners_x_um/inconsistent",
+        ),
         (
             "aperture_um = [50, 20]",
             "aperture_um = [50, 20]\ndiameter_um = 60",
-            "says its own size",
+            "element#1.diameter_um/inconsistent",
         ),
-        ("aperture_sides = 6", "aperture_sides = 2", "aperture_sides"),
-        ("aperture = \"regular\"", "aperture = \"hexagon\"", "hexagon"),
-    ] {
+        (
+            "aperture_sides = 6",
+            "aperture_sides = 2",
+            "element#2.aperture_sides/out-of-range",
+        ),
+        (
+            "aperture = \"regular\"",
+            "aperture = \"hexagon\"",
+            "element#2.aperture/unknown-choice element#2.aperture_sides/unknown",
+        ),
+    ];
+    let errors = cases.map(|(from, to, _)| {
         assert!(ELEMENTS.contains(from));
-        let error = of(&ELEMENTS.replace(from, to)).unwrap_err().to_string();
-        assert!(error.contains(said), "{said} not in {error}");
-    }
+        of(&ELEMENTS.replace(from, to)).unwrap_err()
+    });
+    let words = |error| metalith_testing::without_folder(error, metalith_testing::design("hologram").parent().unwrap());
+    insta::assert_snapshot!(errors.each_ref().map(words).join("\n"), @r#"
+        hologram.toml:46:8: this lens overlaps that of element (1, 0), or the upright boxes about their pillars do
+          help: place them at least 530.25 um apart along x, or 530.25 um along y: the boxes and a pitch between them
+        hologram.toml:49:16: 5 places along x and 6 along y
+          help: give x and y of each corner, 3 to 1000 of them
+        hologram.toml:69:18: this takes 505 vertices, `max_vertices` is 200
+          help: allow at least 67.2 nm, or more vertices (readers of old take 200, the format 8191)
+        hologram.toml:72:11: the elements reach beyond the chip
+          help: use at least 1140 by 1140 um
+        hologram.toml:49:16: the outline crosses or touches itself
+          help: list its corners as one goes around it, each once
+        hologram.toml:68:13: the opening about an aperture meets itself: a notch of the aperture is narrower than two margins
+          help: use a smaller margin or a wider notch
+        hologram.toml:49:16: the middle of the element is outside the outline
+          help: count corners from the middle of the element
+        hologram.toml:35:15: a diameter beside an aperture that says its own size
+          help: leave it out: it is that of the circle about the aperture
+        hologram.toml:42:18: `aperture_sides` cannot be 2
+          help: it must be a number from 3 to 64 sides
+        hologram.toml:41:12: `aperture` cannot be "hexagon"
+          help: use one of: circle, rectangle, regular, polygon
+        hologram.toml:42:1: unknown key `aperture_sides` in [element]
+          help: known here: aperture, diameter_um, focal_length_um, phase, rotation_deg, steering_x_deg, steering_y_deg, x_um, y_um
+        "#);
+    assert_eq!(errors.map(|error| error.ids().join(" ")), cases.map(|case| case.2));
 }
 
 /// The aperture of all elements of a grid.

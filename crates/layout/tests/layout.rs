@@ -7,7 +7,7 @@ use std::path::Path;
 use metalith_core::{AtomicFile, Silent};
 use metalith_design::array::ClassPillars;
 use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_gds::{LayerNumber, Layout, Point, ReadLimits, Selection, Shape, Transform, Visitor};
+use metalith_gds::{LayerNumber, Layout, LayoutError, Limit, Point, ReadLimits, Selection, Shape, Transform, Visitor};
 use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_apertures, write_pillars, write_pillars_as};
 use metalith_oasis::{CellReference, NameTable, OasisItem, OasisLimits, OasisReader, OasisShape};
 use metalith_pillars::PillarRows;
@@ -376,8 +376,14 @@ fn an_array_of_a_billion_copies_on_one_place_is_not_converted() {
     let layout = Layout::from_bytes("array.gds", gds.end(), ReadLimits::default()).unwrap();
     let path = folder.path().join("array.oas");
     let format = LayoutFormat::Oasis(OasisEncoding::Plain);
-    let error = convert(&layout, format, &path, &Silent).unwrap_err().to_string();
-    assert!(error.contains("shapes"), "{error}");
+    let error = convert(&layout, format, &path, &Silent).unwrap_err();
+    let behind = std::error::Error::source(&error).and_then(|s| s.downcast_ref::<metalith_gds::Error>());
+    let cause = behind.and_then(metalith_gds::Error::in_layout).map(|(_, cause)| cause);
+    let limit = Limit::FlatShapesOfShortFile;
+    assert!(
+        matches!(cause, Some(LayoutError::Limit { limit: found, .. }) if *found == limit),
+        "{error:?}"
+    );
     assert!(!path.exists());
 }
 

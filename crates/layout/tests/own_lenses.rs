@@ -237,13 +237,11 @@ fn openings_are_as_large_as_their_lenses() {
 #[test]
 fn elements_whose_boxes_overlap_are_refused() {
     let near = text().replace("x_um = 0\ny_um = 105", "x_um = 50\ny_um = 55");
-    let said = Design::parse(&design("hologram"), &near).unwrap_err().to_string();
-    assert!(
-        said.contains("this lens overlaps that of element (3, 0)") && !said.contains("(2, 0)"),
-        "{said}"
-    );
-    assert!(
-        said.contains("at least 60.2 um apart along x, or 60.2 um along y"),
-        "{said}"
-    );
+    let path = design("hologram");
+    let error = Design::parse(&path, &near).unwrap_err();
+    insta::assert_snapshot!(metalith_testing::without_folder(&error, path.parent().unwrap()), @"
+        hologram.toml:61:8: this lens overlaps that of element (3, 0), or the upright boxes about their pillars do
+          help: place them at least 60.2 um apart along x, or 60.2 um along y: the boxes and a pitch between them
+        ");
+    assert_eq!(error.ids(), ["element#4.x_um/inconsistent"]);
 }

@@ -199,8 +199,13 @@ mod tests {
         model().write(&path).unwrap();
         assert_eq!(CalibratedModel::read(&path).unwrap(), model());
         std::fs::write(&path, "schema = 7").unwrap();
-        let error = CalibratedModel::read(&path).unwrap_err().to_string();
-        assert!(error.contains("model.toml:1:1: missing field"), "{error}");
+        let Error::Text(faults) = CalibratedModel::read(&path).unwrap_err() else {
+            panic!("a mistake of the text is one at a place");
+        };
+        // A schema that is not known would be a mistake at its key.
+        let fault = &faults.faults()[0];
+        assert_eq!(faults.line_column(fault.span.start), (1, 1));
+        assert_eq!((fault.kind, &*fault.key), (FaultKind::Inconsistent, ""));
     }
 
     #[test]
@@ -208,18 +213,21 @@ mod tests {
         let biased = |nm| {
             let mut model = model();
             model.perturbation.geometry.cd_bias_nm = nm;
-            model.check_bias([100.0, 280.0], 350.0).map_err(|e| e.to_string())
+            model.check_bias([100.0, 280.0], 350.0)
         };
         for nm in [-99.9, 0.0, 69.9] {
-            assert_eq!(biased(nm), Ok(()));
+            biased(nm).unwrap();
         }
-        for (nm, what) in [
-            (-100.0, "leaves nothing of pillars drawn 100 nm wide"),
-            (70.0, "makes pillars of 350 nm, 350 nm from one to the next"),
-        ] {
-            let error = biased(nm).unwrap_err();
-            assert!(error.contains(what) && error.contains("between -100 and 70"), "{error}");
-        }
+        let errors = [-100.0, 70.0].map(|nm| biased(nm).unwrap_err());
+        assert!(errors.iter().all(|error| error.id() == "model/bias-out-of-range"));
+        insta::assert_snapshot!(errors[0], @"
+        `cd_bias_nm` = -100 of the model leaves nothing of pillars drawn 100 nm wide
+          help: set it in [perturbation.geometry] between -100 and 70
+        ");
+        insta::assert_snapshot!(errors[1], @"
+        `cd_bias_nm` = 70 of the model makes pillars of 350 nm, 350 nm from one to the next
+          help: set it in [perturbation.geometry] between -100 and 70
+        ");
     }
 
     #[test]
@@ -239,13 +247,13 @@ mod tests {
             .replace("missing_pillars = 0.0", "missing_pillars = nan");
         std::fs::write(&path, &wrong).unwrap();
         let error = CalibratedModel::read(&path).unwrap_err();
-        let place = |key: &str| {
-            let line = wrong.lines().position(|line| line.starts_with(key)).unwrap();
-            format!("model.toml:{}:{}: `{key}` cannot be ", line + 1, key.len() + 4)
-        };
-        for key in ["stray_light", "missing_pillars"] {
-            assert!(error.to_string().contains(&place(key)), "{error}");
-        }
         assert_eq!(error.exit_code(), 2);
+        let Error::Text(faults) = error else { panic!("{error}") };
+        for key in ["stray_light", "missing_pillars"] {
+            let line = wrong.lines().position(|line| line.starts_with(key)).unwrap();
+            let fault = faults.faults().iter().find(|fault| fault.key.ends_with(key)).unwrap();
+            let place = faults.line_column(fault.span.start);
+            assert_eq!(place, (line + 1, key.len() + 4), "{faults}");
+        }
     }
 }

@@ -97,12 +97,15 @@ impl Camera {
         let dark = self.channels.iter().find(|c| !c.counts_any(&self.illuminant));
         match dark {
             None => Ok(self),
-            Some(channel) => Err(Error::Table {
-                path: path.to_owned(),
-                line: None,
-                what: format!("channel `{}` counts none of the light of the illuminant", channel.name),
-                hint: "let the efficiency of each channel and the illuminant overlap in wavelength".into(),
-            }),
+            Some(channel) => Err(Error::refused(
+                "camera/no-light",
+                format!(
+                    "{}: channel `{}` counts none of the light of the illuminant",
+                    path.display(),
+                    channel.name
+                ),
+                "let the efficiency of each channel and the illuminant overlap in wavelength",
+            )),
         }
     }
 }

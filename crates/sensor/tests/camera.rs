@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_core::Error;
+use metalith_core::{Error, Fault};
 use metalith_sensor::{Camera, ColourFilter, Illuminant, SensorNoise};
 
 fn shipped(name: &str) -> PathBuf {
@@ -62,6 +62,16 @@ fn read(text: &str) -> Result<Camera, Error> {
     Camera::read(&path)
 }
 
+/// The text of an error without the folder of the camera, which is another each time.
+fn words(error: &Error) -> String {
+    let text = error.to_string();
+    let lines = text.lines().map(|line| match line.find("camera.toml:") {
+        Some(begin) => &line[begin..],
+        None => line,
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
 #[test]
 fn all_mistakes_are_found_at_once() {
     read(PLAIN).unwrap();
@@ -74,23 +84,17 @@ fn all_mistakes_are_found_at_once() {
         .replace("equal_energy", "sun");
     match read(&wrong) {
         Err(Error::Text(faults)) => {
-            let words = faults.to_string();
-            assert_eq!(faults.count(), 6, "{words}");
-            for (line, what) in [
-                (4, "pixel_um"),
-                (7, "filter"),
-                (8, "bit"),
-                (13, "a band must end"),
-                (14, "time_ms"),
-                (17, "source"),
-            ] {
-                assert!(
-                    words
-                        .lines()
-                        .any(|l| l.contains(&format!("camera.toml:{line}:")) && l.contains(what)),
-                    "{line} {what}: {words}"
-                );
-            }
+            let place = |fault: &Fault| (faults.line_column(fault.span.start).0, fault.id());
+            let found: Vec<_> = faults.faults().iter().map(place).collect();
+            let wanted = [
+                (4, "sensor.pixel_um/out-of-range"),
+                (7, "sensor.filter/unknown-choice"),
+                (8, "sensor.bit/unknown"),
+                (13, "channel#0.band_nm/inconsistent"),
+                (14, "exposure.time_ms/missing"),
+                (17, "illuminant.source/unknown-choice"),
+            ];
+            assert_eq!(found, wanted.map(|(line, id)| (line, id.to_owned())), "{faults}");
         }
         other => panic!("{other:?}"),
     }
@@ -98,37 +102,61 @@ fn all_mistakes_are_found_at_once() {
 
 #[test]
 fn what_does_not_fit_together_is_said() {
-    for (from, to, what) in [
-        ("filter = \"none\"", "filter = \"rggb\"", "does not fit the channels"),
+    let cases = [
+        ("filter = \"none\"", "filter = \"rggb\"", "sensor.filter/inconsistent"),
         (
             "full_well_e = 10000",
             "full_well_e = 10000\nnoise_photon = 1e-4\nnoise_read = 0",
-            "noise is given twice",
+            "sensor.full_well_e/inconsistent sensor.read_noise_e/inconsistent",
         ),
-        ("band_nm = [450, 650]", "", "band_nm"),
+        ("band_nm = [450, 650]", "", "channel#0.band_nm/missing"),
         (
             "band_nm = [450, 650]",
             "quantum_efficiency = \"none.csv\"",
-            "there is no file",
+            "channel#0.quantum_efficiency/no-file",
         ),
-        ("source = \"equal_energy\"", "source = \"leds\"", "there is no diode"),
+        (
+            "source = \"equal_energy\"",
+            "source = \"leds\"",
+            "illuminant.source/inconsistent",
+        ),
         (
             "source = \"equal_energy\"",
             "source = \"d65\"\nfile = \"x.csv\"",
-            "of no use",
+            "illuminant.file/unknown illuminant.file/inconsistent",
         ),
         (
             "source = \"equal_energy\"",
             "source = \"leds\"\n[[illuminant.led]]\ncentre_nm = 900\nwidth_nm = 10",
-            "counts none of the light",
+            "camera/no-light",
         ),
         // 4095 steps of one electron are 0.41 of the well.
-        ("bits = 12", "bits = 12\ngain_e = 1", "camera.toml:9:"),
-    ] {
-        let error = read(&PLAIN.replace(from, to)).unwrap_err().to_string();
-        assert!(error.contains(what), "{what}: {error}");
-        assert!(error.contains("help: "), "{error}");
-    }
+        ("bits = 12", "bits = 12\ngain_e = 1", "sensor.gain_e/inconsistent"),
+    ];
+    let errors = cases.map(|(from, to, _)| read(&PLAIN.replace(from, to)).unwrap_err());
+    insta::assert_snapshot!(errors.each_ref().map(words).join("\n"), @r#"
+        camera.toml:7:10: this colour filter array does not fit the channels
+          help: name three channels red, green and blue, or use `filter = "none"`
+        camera.toml:9:15: noise is given twice: `full_well_e`, and in units of full scale
+          help: keep `noise_photon` and `noise_read`, or the numbers in electrons
+        camera.toml:12:16: noise is given twice: `read_noise_e`, and in units of full scale
+          help: keep `noise_photon` and `noise_read`, or the numbers in electrons
+        camera.toml:11:1: [channel] lacks `band_nm`
+          help: add `band_nm`: a list of 2 numbers
+        camera.toml:13:22: there is no file /tmp/.tmpjh9d3a/none.csv
+          help: relative paths count from the folder of this file
+        camera.toml:17:10: there is no diode
+          help: add one or more sections [[illuminant.led]]
+        camera.toml:18:1: unknown key `file` in [illuminant]
+          help: known here: led, source
+        camera.toml:18:8: `file` is of no use with this source
+          help: remove it, or change `source`
+        camera.toml: channel `mono` counts none of the light of the illuminant
+          help: let the efficiency of each channel and the illuminant overlap in wavelength
+        camera.toml:9:10: most of a picture would be at its limit: a white surface has 0.9 of full scale, 9000 electrons, and pixel values end at 4095
+          help: give a smaller `white`, or a `gain_e` of 2.1978 electrons a step and more
+        "#);
+    assert_eq!(errors.map(|error| error.ids().join(" ")), cases.map(|case| case.2));
 }
 
 #[test]
@@ -141,8 +169,12 @@ fn white_beyond_the_last_step_is_a_fault_where_it_stands() {
         )
     };
     // 4095 steps of one electron in a well of 10000.
-    let error = with("gain_e = 1", "white = 0.42").unwrap_err().to_string();
-    assert!(error.contains("camera.toml:17:") && error.contains("4095"), "{error}");
+    let error = with("gain_e = 1", "white = 0.42").unwrap_err();
+    insta::assert_snapshot!(words(&error), @"
+        camera.toml:17:9: most of a picture would be at its limit: a white surface has 0.42 of full scale, 4200 electrons, and pixel values end at 4095
+          help: give a smaller `white`, or a `gain_e` of 1.0256 electrons a step and more
+        ");
+    assert_eq!(error.ids(), ["exposure.white/inconsistent"]);
     with("gain_e = 1", "white = 0.4").unwrap();
     // Steps that are the whole of the well end one step below it.
     with("", "white = 1").unwrap();

@@ -161,7 +161,7 @@ pub(crate) fn check(
     for number in 0..designs {
         let setting = setting(grids, number);
         let fault = match with_values(&text, &setting) {
-            Err(NoPlace { change, what, hint }) => Some((change, what, hint)),
+            Err(NoPlace { change, what, hint, .. }) => Some((change, what, hint)),
             Ok(text) => told(Design::parse_without_library(design, &text)).map(|(what, hint)| {
                 let words: Vec<String> = setting.iter().map(|(k, v)| format!("`{k} = {v}`")).collect();
                 (

@@ -31,7 +31,14 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
     fn open_in(folder: &Path) -> Result<Self> {
         let mut found: Self = read(folder)?;
         if !found.is_known() {
-            return Err(fault(folder, "a manifest of another version of the program".into()));
+            return Err(Error::refused(
+                "study/another-version",
+                format!(
+                    "{} is a manifest of another version of the program",
+                    folder.join(MANIFEST).display()
+                ),
+                PLAN_AGAIN,
+            ));
         }
         found.place(folder);
         Ok(found)
@@ -64,6 +71,9 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
     }
 }
 
+const PLAN_AGAIN: &str =
+    "plan it again: `metalith study plan`, or `--plan` of `metalith dataset`, `compare`, `optimise`";
+
 /// True if a folder holds a plan, of whatever work.
 pub fn is_planned(folder: &Path) -> bool {
     folder.join(MANIFEST).is_file()
@@ -83,7 +93,7 @@ fn fault(folder: &Path, what: String) -> Error {
         path: folder.join(MANIFEST),
         line: None,
         what,
-        hint: "plan it again: `metalith study plan`, or `--plan` of `metalith dataset`, `compare`, `optimise`".into(),
+        hint: PLAN_AGAIN.into(),
     }
 }
 

@@ -152,29 +152,32 @@ impl Sharding {
             .map_err(Error::io("read", &path))?;
         match self.refusal(shard, &first) {
             None => Ok(true),
-            Some(why) => Err(refused(&path, &why)),
+            Some((id, why)) => Err(refused(id, &path, &why)),
         }
     }
 
-    /// The header in the first line of a shard of this plan, or why it is none.
-    fn own_header(&self, first_line: &str) -> std::result::Result<Header, &'static str> {
+    /// The header in the first line of a shard of this plan, or why it is none, with the identity of the refusal.
+    fn own_header(&self, first_line: &str) -> std::result::Result<Header, (&'static str, &'static str)> {
         match serde_json::from_str::<Header>(first_line) {
-            Err(_) => Err("is no shard of a plan"),
-            Ok(header) if header.plan != self.key => Err("is a part of another plan"),
+            Err(_) => Err(("study/not-a-shard", "is no shard of a plan")),
+            Ok(header) if header.plan != self.key => Err(("study/shard-of-another-plan", "is a part of another plan")),
             Ok(header) => Ok(header),
         }
     }
 
-    /// Reason why a file with this first line is not that shard.
-    fn refusal(&self, shard: Shard, first_line: &str) -> Option<String> {
+    /// Identity and text of the refusal of a file with this first line as that shard.
+    fn refusal(&self, shard: Shard, first_line: &str) -> Option<(&'static str, String)> {
         match self.own_header(first_line) {
-            Err(why) => Some(why.into()),
-            Ok(header) if header != self.header(shard) => Some(format!(
-                "holds {}s {} to {} as shard {}, of a plan that was cut otherwise",
-                self.part,
-                header.first,
-                header.end.saturating_sub(1),
-                header.shard
+            Err((id, why)) => Some((id, why.into())),
+            Ok(header) if header != self.header(shard) => Some((
+                "study/shard-cut-otherwise",
+                format!(
+                    "holds {}s {} to {} as shard {}, of a plan that was cut otherwise",
+                    self.part,
+                    header.first,
+                    header.end.saturating_sub(1),
+                    header.shard
+                ),
             )),
             Ok(_) => None,
         }
@@ -271,7 +274,9 @@ impl Sharding {
         let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
         let mut lines = text.lines();
         let first_line = lines.next().unwrap_or_default();
-        let header = self.own_header(first_line).map_err(|why| refused(path, why))?;
+        let header = self
+            .own_header(first_line)
+            .map_err(|(id, why)| refused(id, path, why))?;
         let mut parts = Vec::new();
         for (k, line) in lines.enumerate() {
             let part: T = serde_json::from_str(line).map_err(|e| Error::Table {
@@ -285,6 +290,7 @@ impl Sharding {
         let told = parts.iter().all(|(k, part)| number(part).is_none_or(|own| own == *k));
         if !told || parts.len() as u64 != header.end.saturating_sub(header.first) {
             return Err(refused(
+                "study/shard-incomplete",
                 path,
                 &format!("does not hold the {}s that its first line names", self.part),
             ));
@@ -299,9 +305,9 @@ fn line(value: &impl Serialize) -> String {
     text
 }
 
-fn refused(path: &Path, why: &str) -> Error {
+fn refused(id: &'static str, path: &Path, why: &str) -> Error {
     Error::refused(
-        "study/shard-refused",
+        id,
         format!("{} {why}", path.display()),
         "remove the file if it came here by mistake; its shard is then made again",
     )

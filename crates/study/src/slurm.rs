@@ -158,7 +158,7 @@ mod tests {
         let list = std::fs::read_to_string(all[1].script.with_extension("txt")).unwrap();
         assert_eq!(list.lines().next(), Some("2003"));
         std::fs::write(&file, "cpus_per_task = 0\npartitio = \"cpu\"\n").unwrap();
-        let error = Slurm::read(&file).unwrap_err().to_string();
-        assert!(error.contains("cpus_per_task") && error.contains("partitio"), "{error}");
+        let ids = Slurm::read(&file).unwrap_err().ids();
+        assert_eq!(ids, ["cpus_per_task/out-of-range", "partitio/unknown"]);
     }
 }

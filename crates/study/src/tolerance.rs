@@ -278,6 +278,7 @@ fn limit(s: &Section<'_, '_>) -> FigureLimit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metalith_core::{Error, FaultKind};
 
     const GOOD: &str = r#"
 schema = 1
@@ -308,6 +309,21 @@ at_least = 0.6
         Tolerance::read(&path)
     }
 
+    /// What does not fit at a key.
+    fn fault(error: &Error, key: &str) -> String {
+        let Error::Text(faults) = error else {
+            panic!("{error}");
+        };
+        let at = |f: &&metalith_core::Fault| f.kind == FaultKind::Inconsistent && f.key == key;
+        faults
+            .faults()
+            .iter()
+            .find(at)
+            .unwrap_or_else(|| panic!("{faults}"))
+            .what
+            .clone()
+    }
+
     #[test]
     fn a_file_is_read() {
         let read = read(GOOD).unwrap();
@@ -323,14 +339,14 @@ at_least = 0.6
             .replace("high = 2.0", "high = -3.0")
             .replace("[-5, 0, 5]", "[-500]")
             .replace("at_least", "at_leas");
-        let error = read(&bad).unwrap_err().to_string();
-        for part in [
-            "did you mean",
-            "not above the lowest",
-            "`defocus` cannot be -500 um",
-            "one side",
+        let error = read(&bad).unwrap_err();
+        for (kind, key) in [
+            (FaultKind::UnknownChoice, "vary#0.effect"),
+            (FaultKind::Inconsistent, "vary#1.high"),
+            (FaultKind::Inconsistent, "grid#0.values"),
+            (FaultKind::Inconsistent, "limit#0.figure"),
         ] {
-            assert!(error.contains(part), "{part} is not in {error}");
+            assert!(error.has_fault(kind, key), "{kind:?} {key}: {error}");
         }
     }
 
@@ -358,9 +374,9 @@ at_least = 0.6
             })
             .concat();
         let text = GOOD.replace("draws = 10", "draws = 10000000") + &grids;
-        let error = read(&text).unwrap_err().to_string();
+        let error = read(&text).unwrap_err();
         // 200^4, and three values of the defocus.
-        assert!(error.contains("10000000 draws at each of 4800000000 points"), "{error}");
+        insta::assert_snapshot!(fault(&error, "draws"), @"10000000 draws at each of 4800000000 points of the grid");
     }
 
     #[test]
@@ -384,63 +400,61 @@ at_least = 0.6
     fn a_grid_over_what_the_design_cannot_have_is_told_with_its_place() {
         // Its lines follow those of the file before.
         let line = GOOD.lines().count() + 2;
-        for (key, values, column, parts) in [
-            (
-                "cell.pillar_heigth_nm",
-                "[650]",
-                7,
-                "in d.toml, there is no `pillar_heigth_nm` in `cell`",
-            ),
-            ("cell", "[650]", 7, "is a table"),
-            (
-                "verify.pixel_um",
-                "[5]",
-                7,
-                "`verify.pixel_um` does not vary: all draws",
-            ),
-            (
-                "cell.pillar_height_nm",
-                "[650, -1]",
-                10,
-                "with `cell.pillar_height_nm = -1` the design has a mistake",
-            ),
-            ("layout.hierarchy", "[\"deep\"]", 10, "use one of: "),
-            ("cell.pillar_height_nm", "[]", 10, "a grid without values"),
-            (
-                "cell.pillar_height_nm",
-                "[[1]]",
-                11,
-                "a list of numbers, texts in quotes",
-            ),
+        let mut said = Vec::new();
+        for (key, values, column, kind) in [
+            ("cell.pillar_heigth_nm", "[650]", 7, FaultKind::Inconsistent),
+            ("cell", "[650]", 7, FaultKind::Inconsistent),
+            ("verify.pixel_um", "[5]", 7, FaultKind::Inconsistent),
+            ("cell.pillar_height_nm", "[650, -1]", 10, FaultKind::Inconsistent),
+            ("layout.hierarchy", "[\"deep\"]", 10, FaultKind::Inconsistent),
+            ("cell.pillar_height_nm", "[]", 10, FaultKind::Inconsistent),
+            ("cell.pillar_height_nm", "[[1]]", 11, FaultKind::WrongType),
         ] {
             let error = of_a_design(&format!("[[grid]]\nkey = \"{key}\"\nvalues = {values}\n")).unwrap_err();
-            let text = error.to_string();
+            let Error::Text(faults) = error else {
+                panic!("{error:?}");
+            };
             // A fault of the values is one line below the key.
-            let line = if column == 7 { line } else { line + 1 };
-            assert!(text.contains(&format!("tolerance.toml:{line}:{column}: ")), "{text}");
-            assert!(text.contains(parts), "{parts}: {text}");
+            let (line, name) = match column {
+                7 => (line, "grid#1.key"),
+                _ => (line + 1, "grid#1.values"),
+            };
+            let at = |f: &&metalith_core::Fault| {
+                f.kind == kind && f.key == name && faults.line_column(f.span.start) == (line, column)
+            };
+            let fault = faults.faults().iter().find(at);
+            said.push(fault.unwrap_or_else(|| panic!("{faults}")).what.clone());
         }
+        // The limits of a design are in its own words.
+        insta::assert_snapshot!(said.join("\n"), @r#"
+        in d.toml, there is no `pillar_heigth_nm` in `cell`
+        in d.toml, `cell` is a table
+        `verify.pixel_um` does not vary: all draws of a study are judged alike; limits stand in [[limit]]
+        with `cell.pillar_height_nm = -1` the design has a mistake: `pillar_height_nm` cannot be -1
+        with `layout.hierarchy = deep` the design has a mistake: `hierarchy` cannot be "deep"
+        a grid without values
+        `values` is an array
+        "#);
         // Each value is possible, and not both.
         let both = of_a_design(
             "[[grid]]\nkey = \"cell.width_max_nm\"\nvalues = [300, 290]\n\
              [[grid]]\nkey = \"mapping.coefficients.0\"\nvalues = [0.2923, 0.3]\n",
         );
-        let text = both.unwrap_err().to_string();
-        assert!(
-            text.contains("with `cell.width_max_nm = 290` and `mapping.coefficients.0 = 0.3` the design has a mistake"),
-            "{text}"
-        );
+        let both = fault(&both.unwrap_err(), "grid#2.values");
+        let setting = both.split(" the design has a mistake: ").next().unwrap();
+        insta::assert_snapshot!(setting, @"with `cell.width_max_nm = 290` and `mapping.coefficients.0 = 0.3`");
         let twice = of_a_design(
             "[[grid]]\nkey = \"cell.pitch_nm\"\nvalues = [350]\n[[grid]]\nkey = \"cell.pitch_nm\"\nvalues = [350]\n",
         );
-        assert!(twice.unwrap_err().to_string().contains("`cell.pitch_nm` varies twice"));
+        insta::assert_snapshot!(fault(&twice.unwrap_err(), "grid#2.key"), @"`cell.pitch_nm` varies twice");
         let many: Vec<String> = (0..40).map(|k| (650 + k).to_string()).collect();
         let many = many.join(", ");
         let many = of_a_design(&format!(
             "[[grid]]\nkey = \"cell.pillar_height_nm\"\nvalues = [{many}]\n\
              [[grid]]\nkey = \"lens.focal_length_um\"\nvalues = [{many}]\n"
         ));
-        assert!(many.unwrap_err().to_string().contains("1600 designs"));
+        let many = fault(&many.unwrap_err(), "grid#1.values");
+        insta::assert_snapshot!(many, @"1600 designs: each combination of these values is one");
     }
 
     #[test]

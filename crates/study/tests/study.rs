@@ -6,8 +6,8 @@ use std::fs;
 use std::path::Path;
 
 use common::{SMALL_CAMERA, tolerance};
-use metalith_core::Silent;
 use metalith_core::document::Scalar;
+use metalith_core::{Error, FaultKind, Result, Silent};
 use metalith_imaging::scene::{BuiltIn, chart};
 use metalith_imaging::{ForecastScene, ImagingSystem, scores};
 use metalith_optics::{CalibratedModel, Perturbation};
@@ -59,7 +59,7 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
         // The four bytes that such a file begins with.
         assert!(fs::read(&table).unwrap().starts_with(b"PAR1"));
     } else {
-        assert!(written.unwrap_err().to_string().contains("--features parquet"));
+        assert_eq!(written.unwrap_err().id(), "study/no-parquet");
         assert!(!table.exists());
     }
 }
@@ -79,10 +79,10 @@ fn a_bias_that_pillars_cannot_have_is_refused_before_any_draw() {
         .replacen("draws = 1\n", "draws = 1\nmodel = \"model.toml\"\n", 1);
     fs::write(&path, other).unwrap();
     let error = plan(&path, &folder.path().join("study"), PlanSettings::default(), &Silent).unwrap_err();
-    let error = error.to_string();
+    assert_eq!(error.id(), "model/bias-out-of-range");
+    // The draw is named.
     assert!(
-        error.contains("draw 0 of the study: `cd_bias_nm` = -150")
-            && error.contains("vary `cd_bias` over less, or set it in"),
+        matches!(&error, Error::Invalid { what, .. } if what.starts_with("draw 0 ")),
         "{error}"
     );
 }
@@ -192,52 +192,60 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
         made,
         "a study that is planned keeps its cut"
     );
-    let missing = merge(&made, 0, &Silent).err().unwrap().to_string();
-    assert!(
-        missing.contains("4 of 4 draws are missing") && missing.contains("0-3"),
-        "{missing}"
-    );
+    let refusal = |result: Result<_>| result.err().unwrap();
+    let missing = refusal(merge(&made, 0, &Silent).map(|_| ()));
+    assert_eq!(missing.id(), "study/draws-missing");
+    insta::assert_snapshot!(metalith_testing::without_folder(missing, folder.path()), @r"
+    4 of 4 draws are missing in study/shards: 0-3
+      help: make them with `metalith study run FOLDER --missing`
+    ");
     run_shard(&made, 0).unwrap();
     // A shard that is there is left as it is, without reading anything else.
     let bank = study.join("cells.bank");
     let kept = fs::read(&bank).unwrap();
     fs::remove_file(&bank).unwrap();
     run_shard(&made, 0).unwrap();
-    let refused = run_shard(&made, 1).err().unwrap().to_string();
-    assert!(refused.contains("cells.bank"), "a shard makes no tables: {refused}");
+    let refused = refusal(run_shard(&made, 1));
+    assert!(
+        matches!(&refused, Error::Io { path, .. } if *path == bank),
+        "a shard makes no tables: {refused:?}"
+    );
     fs::write(&bank, &kept[..kept.len() - 1]).unwrap();
-    let refused = run_shard(&made, 1).err().unwrap().to_string();
-    assert!(refused.contains("no tables of its own"), "{refused}");
+    assert_eq!(refusal(run_shard(&made, 1)).id(), "study/tables-unreadable");
     fs::write(&bank, &kept).unwrap();
     run_shard(&made, 1).unwrap();
     assert_eq!(made.cut().status().unwrap().finished, 2);
     // The same draws twice.
     let twice = made.cut().path(7);
     fs::copy(made.cut().path(0), &twice).unwrap();
-    let double = merge(&made, 0, &Silent).err().unwrap().to_string();
-    assert!(double.contains("twice") && double.contains("000007.jsonl"), "{double}");
+    let double = refusal(merge(&made, 0, &Silent).map(|_| ()));
+    assert_eq!(double.id(), "study/draws-twice");
+    insta::assert_snapshot!(metalith_testing::without_folder(double, folder.path()), @r"
+    2 draws are there twice, the first is 0: in study/shards/000000.jsonl and in study/shards/000007.jsonl
+      help: remove one of the two files
+    ");
     fs::remove_file(&twice).unwrap();
     // A part of another plan.
     let own = fs::read_to_string(made.cut().path(1)).unwrap();
     fs::write(made.cut().path(1), own.replace(&made.key, &"0".repeat(64))).unwrap();
-    let foreign = run_shard(&made, 1).err().unwrap().to_string();
-    assert!(foreign.contains("another plan"), "{foreign}");
+    let foreign = refusal(run_shard(&made, 1));
+    assert_eq!(foreign.id(), "study/shard-of-another-plan");
     assert!(merge(&made, 0, &Silent).is_err());
     assert_eq!(made.cut().status().unwrap().unusable.len(), 1);
     // A draw that lost its figures.
     let (before, after) = own.split_once("\"reached\":[").unwrap();
     let cut = format!("{before}\"reached\":[{}", &after[after.find(']').unwrap()..]);
     fs::write(made.cut().path(1), cut).unwrap();
-    let short = merge(&made, 0, &Silent).err().unwrap().to_string();
-    assert!(short.contains("0 limits"), "{short}");
+    let short = refusal(merge(&made, 0, &Silent).map(|_| ()));
+    assert_eq!(short.id(), "study/damaged-draw");
     fs::write(made.cut().path(1), own).unwrap();
     merge(&made, 0, &Silent).unwrap();
     // A design that has changed since.
     let design = folder.path().join("design.toml");
     let text = fs::read_to_string(&design).unwrap();
     fs::write(&design, text.replace("window_samples = 32", "window_samples = 34")).unwrap();
-    let changed = Run::open(&made).err().unwrap().to_string();
-    assert!(changed.contains("has changed"), "{changed}");
+    let changed = refusal(Run::open(&made).map(|_| ()));
+    assert_eq!(changed.id(), "study/another-plan");
     assert!(plan(&path, &study, PlanSettings::default(), &Silent).is_err());
 }
 
@@ -250,14 +258,12 @@ fn a_limit_on_no_figure_is_told() {
         .unwrap()
         .replace("strehl_660nm_0deg", "strehl_670nm_0deg");
     fs::write(&path, text).unwrap();
-    let error = plan(&path, &folder.path().join("s"), PlanSettings::default(), &Silent)
-        .err()
-        .unwrap()
-        .to_string();
-    assert!(
-        error.contains("strehl_670nm_0deg") && error.contains("strehl_660nm_0deg"),
-        "{error}"
-    );
+    let error = plan(&path, &folder.path().join("s"), PlanSettings::default(), &Silent).unwrap_err();
+    assert_eq!(error.id(), "study/unknown-figure");
+    // What there is is named.
+    let text = error.to_string();
+    let [unknown, known] = ["strehl_670nm_0deg", "strehl_660nm_0deg"].map(|figure| text.contains(figure));
+    assert!(unknown && known, "{text}");
 }
 
 /// Tables of draws are interpolated: what this does to a picture that `metalith picture` restores (dB).
@@ -333,12 +339,12 @@ fn mistakes_of_a_picture_are_told_with_their_place() {
     let text = fs::read_to_string(&path).unwrap();
     let bad = "[picture]\ncamera = \"no.toml\"\nscene = \"none.png\"\npixels = 64\nnodes = 4\nmethod = \"magic\"\n";
     fs::write(&path, format!("{text}{bad}")).unwrap();
-    let error = metalith_study::Tolerance::read(&path).unwrap_err().to_string();
-    for part in [
-        "an image has its own number of pixels",
-        "an even number of places",
-        "use one of: tikhonov",
+    let error = metalith_study::Tolerance::read(&path).unwrap_err();
+    for (kind, key) in [
+        (FaultKind::Inconsistent, "picture.pixels"),
+        (FaultKind::Inconsistent, "picture.nodes"),
+        (FaultKind::UnknownChoice, "picture.method"),
     ] {
-        assert!(error.contains(part), "{part} is not in {error}");
+        assert!(error.has_fault(kind, key), "{kind:?} {key}: {error}");
     }
 }

@@ -59,17 +59,21 @@ fn pairs_of_shards_are_those_of_one_run() {
     let run = |shards: &[u64]| Work::Pairs(work.clone()).run(shards, &Silent);
     run(&[2, 0]).unwrap();
     assert_eq!(work.cut().status().unwrap().missing, [1]);
-    let missing = work.merge(&Silent).unwrap_err().to_string();
-    assert!(missing.contains("2 of 5 pairs are missing"), "{missing}");
+    let missing = work.merge(&Silent).unwrap_err();
+    assert_eq!(missing.id(), "study/draws-missing");
+    insta::assert_snapshot!(metalith_testing::without_folder(missing, folder.path()), @r"
+    2 of 5 pairs are missing in parts/shards: 2-3
+      help: make them with `metalith study run FOLDER --missing`
+    ");
     // Shards make no kernels of their own.
     fs::rename(at("parts/kernels"), at("aside")).unwrap();
-    let refused = run(&[1]).unwrap_err().to_string();
-    assert!(refused.contains("makes no kernels"), "{refused}");
+    assert_eq!(run(&[1]).unwrap_err().id(), "imaging/kernels-missing");
     fs::rename(at("aside"), at("parts/kernels")).unwrap();
     let kept = fs::read(&images[3]).unwrap();
     fs::copy(&images[0], &images[3]).unwrap();
-    let changed = run(&[1]).unwrap_err().to_string();
-    assert!(changed.contains("image_4.png has changed"), "{changed}");
+    let changed = run(&[1]).unwrap_err();
+    assert_eq!(changed.id(), "study/input-changed");
+    assert!(changed.to_string().contains(&*images[3].to_string_lossy()), "{changed}");
     fs::write(&images[3], kept).unwrap();
     run(&[1]).unwrap();
     // A file that is not what its shard wrote is noticed, and made again with its shard.
@@ -81,25 +85,29 @@ fn pairs_of_shards_are_those_of_one_run() {
         .unwrap()
         .set_len(cut)
         .unwrap();
-    let refused = work.merge(&Silent).unwrap_err().to_string();
-    assert!(
-        refused.contains("1 of 5 pairs") && refused.contains("000001.jsonl"),
-        "{refused}"
-    );
+    let refused = work.merge(&Silent).unwrap_err();
+    assert_eq!(refused.id(), "study/damaged-pairs");
+    insta::assert_snapshot!(metalith_testing::without_folder(refused, folder.path()), @r"
+    files of 1 of 5 pairs are damaged or not there: 2
+      help: remove the files of their shards (1; the first is parts/shards/000001.jsonl), then make them again by `metalith study run parts --missing`
+    ");
     fs::remove_file(work.cut().path(1)).unwrap();
     run(&[1]).unwrap();
     assert_eq!(work.merge(&Silent).unwrap(), right);
     let old = fs::read_to_string(at("parts/plan.json")).unwrap();
     fs::create_dir(at("old")).unwrap();
     fs::write(at("old/plan.json"), old.replacen("\"schema\": 2", "\"schema\": 1", 1)).unwrap();
-    let refused = Work::open(&at("old")).err().unwrap().to_string();
-    assert!(refused.contains("another version"), "{refused}");
+    assert_eq!(Work::open(&at("old")).err().unwrap().id(), "study/another-version");
     let bad = PairsRequest {
         images: [&images[..], &[at("camera.toml")]].concat(),
         ..request.clone()
     };
-    let refused = plan_pairs(&bad, &at("bad"), None, &Silent).unwrap_err().to_string();
-    assert!(refused.contains("camera.toml: it is neither PNG"), "{refused}");
+    let refused = plan_pairs(&bad, &at("bad"), None, &Silent).unwrap_err();
+    assert_eq!(refused.id(), "imaging/unusable-images");
+    assert!(
+        refused.to_string().contains(&*at("camera.toml").to_string_lossy()),
+        "{refused}"
+    );
     assert!(!at("bad/kernels").exists());
 
     let scene = |path: &Path| read_far_scene(path, 50.0);
@@ -178,8 +186,7 @@ fn starts_of_the_optimiser_are_runs_with_their_seeds() {
     fs::write(&path, text).unwrap();
     assert!(work.run(&[0], &Silent).is_ok(), "what is there needs no design");
     fs::remove_file(planned.cut().path(0)).unwrap();
-    let changed = work.run(&[0], &Silent).unwrap_err().to_string();
-    assert!(changed.contains("a file of it has changed"), "{changed}");
+    assert_eq!(work.run(&[0], &Silent).unwrap_err().id(), "study/another-plan");
 }
 
 /// Cameras of shards have the scores of one run, and the page its pictures.
@@ -226,8 +233,12 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     assert_eq!(planned.cut().shards(), 4);
     let work = Work::open(&at("parts")).unwrap();
     work.run(&[1, 2, 3], &Silent).unwrap();
-    let missing = planned.merge(&Silent).err().unwrap().to_string();
-    assert!(missing.contains("1 of 4 cameras are missing"), "{missing}");
+    let missing = planned.merge(&Silent).err().unwrap();
+    assert_eq!(missing.id(), "study/draws-missing");
+    insta::assert_snapshot!(metalith_testing::without_folder(missing, folder.path()), @r"
+    1 of 4 cameras are missing in parts/shards: 0
+      help: make them with `metalith study run FOLDER --missing`
+    ");
     work.run(&[0], &Silent).unwrap();
     let merged = planned.merge(&Silent).unwrap();
     let open = comparison.open().unwrap();
@@ -258,6 +269,5 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     }
     fs::remove_file(planned.cut().path(1)).unwrap();
     fs::copy(&comparison.photographs[0], &comparison.photographs[1]).unwrap();
-    let changed = work.run(&[1], &Silent).unwrap_err().to_string();
-    assert!(changed.contains("a file of it has changed"), "{changed}");
+    assert_eq!(work.run(&[1], &Silent).unwrap_err().id(), "study/another-plan");
 }

@@ -9,4 +9,12 @@ pub mod rectangles;
 #[cfg(feature = "session")]
 pub mod session;
 
+use std::fmt::Display;
+use std::path::Path;
+
 pub use golden::{accepting, design, golden, root};
+
+/// The text of an error without the folder that its files are in, which differs from machine to machine.
+pub fn without_folder(error: impl Display, folder: &Path) -> String {
+    error.to_string().replace(&format!("{}/", folder.display()), "")
+}

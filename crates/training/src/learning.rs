@@ -89,15 +89,20 @@ impl TrainingSpec {
     /// # Errors
     /// If there is nothing to learn, or pieces are too small, too large or no multiple of eight.
     pub fn check(&self) -> Result<()> {
-        let fault = |what: &str, hint: &str| Err(Error::refused("train/settings", what, hint));
+        let fault = |id, what: &str, hint: &str| Err(Error::refused(id, what, hint));
         if !self.piece.is_multiple_of(8) || !(32..=512).contains(&self.piece) {
             return fault(
+                "train/piece",
                 "pieces of this size cannot be learnt from",
                 "give a multiple of 8 from 32 to 512",
             );
         }
         if self.steps == 0 || !(1..=256).contains(&self.batch) {
-            return fault("nothing to learn", "give at least one step, and 1 to 256 pieces a step");
+            return fault(
+                "train/nothing-to-learn",
+                "nothing to learn",
+                "give at least one step, and 1 to 256 pieces a step",
+            );
         }
         Ok(())
     }

@@ -165,21 +165,20 @@ mod tests {
             width_nm: 300,
             last_nm: 288,
         };
-        let text = metalith_core::Error::from(error).to_string();
-        assert!(
-            text.contains("300 nm wide") && text.contains("ends at 288 nm") && text.contains("help: make the table")
-        );
+        let at_border = metalith_core::Error::from(error);
+        assert_eq!(at_border.id(), "wave/width");
+        insta::assert_snapshot!(at_border, @"
+            a pillar is 300 nm wide, the table of the cell ends at 288 nm
+              help: make the table up to the widest pillar of the layout
+            ");
     }
+
     #[test]
     fn angles_are_told_in_the_degrees_that_were_given() {
         let error = WaveError::Incidence {
             field_rad: [95.3_f64, -0.0].map(f64::to_radians),
             looks_at: [-0.0, 0.25],
         };
-        let text = error.to_string();
-        assert!(
-            text.contains("(95.3, 0) degrees") && text.contains("sines 0, 0.25"),
-            "{text}"
-        );
+        insta::assert_snapshot!(error, @"no light arrives at (95.3, 0) degrees from where an element looks, sines 0, 0.25");
     }
 }

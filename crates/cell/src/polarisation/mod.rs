@@ -111,8 +111,13 @@ impl FromStr for Polarisation {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        named_or_linear(text, &Self::CHOICES, Self::Linear)
-            .ok_or_else(|| refusal(format!("there is no light of polarisation `{text}`"), &Self::CHOICES))
+        named_or_linear(text, &Self::CHOICES, Self::Linear).ok_or_else(|| {
+            refusal(
+                "light/unknown-polarisation",
+                format!("there is no light of polarisation `{text}`"),
+                &Self::CHOICES,
+            )
+        })
     }
 }
 
@@ -151,8 +156,13 @@ impl FromStr for Analyser {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        named_or_linear(text, &Self::CHOICES, Self::Linear)
-            .ok_or_else(|| refusal(format!("there is no analyser `{text}`"), &Self::CHOICES))
+        named_or_linear(text, &Self::CHOICES, Self::Linear).ok_or_else(|| {
+            refusal(
+                "light/unknown-analyser",
+                format!("there is no analyser `{text}`"),
+                &Self::CHOICES,
+            )
+        })
     }
 }
 
@@ -167,10 +177,10 @@ fn named_or_linear<T: Copy>(text: &str, choices: &[(&str, T)], linear: fn(f64) -
     known.map(|(_, known)| *known).or_else(|| angle().map(linear))
 }
 
-fn refusal<T>(what: String, choices: &[(&str, T)]) -> Error {
+fn refusal<T>(id: &'static str, what: String, choices: &[(&str, T)]) -> Error {
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
     Error::refused(
-        "light/unknown-polarisation",
+        id,
         what,
         format!(
             "use {}, or the angle of linear polarisation from x towards y, from -{most} to {most} degrees",

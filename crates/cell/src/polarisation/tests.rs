@@ -182,14 +182,23 @@ fn names_and_angles_are_read() {
     }
     assert_eq!("-30.5".parse::<Polarisation>().unwrap(), Polarisation::Linear(-30.5));
     for wrong in ["z", "", "NaN", "inf", "181"] {
-        let error = wrong.parse::<Polarisation>().unwrap_err().to_string();
-        assert!(
-            error.contains("use left, right, x, y, unpolarised, or the angle"),
-            "{error}"
+        let errors = [
+            wrong.parse::<Polarisation>().unwrap_err(),
+            wrong.parse::<Analyser>().unwrap_err(),
+        ];
+        assert_eq!(
+            errors.map(|error| error.id()),
+            ["light/unknown-polarisation", "light/unknown-analyser"]
         );
-        let error = wrong.parse::<Analyser>().unwrap_err().to_string();
-        assert!(error.contains("use circular, x, y, or the angle"), "{error}");
     }
+    insta::assert_snapshot!("z".parse::<Polarisation>().unwrap_err(), @"
+        there is no light of polarisation `z`
+          help: use left, right, x, y, unpolarised, or the angle of linear polarisation from x towards y, from -180 to 180 degrees
+        ");
+    insta::assert_snapshot!("z".parse::<Analyser>().unwrap_err(), @"
+        there is no analyser `z`
+          help: use circular, x, y, or the angle of linear polarisation from x towards y, from -180 to 180 degrees
+        ");
     for (name, wanted) in Analyser::CHOICES {
         assert_eq!(name.parse::<Analyser>().unwrap(), wanted);
     }

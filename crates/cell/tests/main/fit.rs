@@ -8,7 +8,7 @@ use metalith_cell::{
     InversePolynomial, MappingTable, PhaseCurve, PublishedCell, bad_cells, curves_over, fit_forward, fit_inverse,
     forward_errors, round_trip,
 };
-use metalith_core::{Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 use num_complex::Complex64;
 
@@ -201,16 +201,30 @@ fn mappings_go_through_files_and_bad_ones_name_the_line() {
     let exact = MappingTable::nearest(&curve, &[]).unwrap();
     std::fs::write(&file, exact.to_csv()).unwrap();
     assert_eq!(MappingTable::read_csv(&file, &widths).unwrap(), exact);
-    for (text, word) in [
-        ("", "header"),
-        ("turns,width_nm\n", "fewer than two"),
-        ("turns,width_nm\n0.25,100\n0.5,102\n", "line 3"),
-        ("turns,width_nm\n0.25,100\n0.75,101\n", "101 nm"),
-        ("turns,width_nm\n0.25,100\n0.75\n", "line 3"),
-        ("turns,width_nm\n0.25,100\nNaN,102\n", "line 3"),
+    let mut said = Vec::new();
+    for (text, at) in [
+        ("", Some(1)),
+        ("turns,width_nm\n", None),
+        ("turns,width_nm\n0.25,100\n0.5,102\n", Some(3)),
+        ("turns,width_nm\n0.25,100\n0.75,101\n", Some(3)),
+        ("turns,width_nm\n0.25,100\n0.75\n", Some(3)),
+        ("turns,width_nm\n0.25,100\nNaN,102\n", Some(3)),
     ] {
         std::fs::write(&file, text).unwrap();
-        let error = MappingTable::read_csv(&file, &widths).unwrap_err().to_string();
-        assert!(error.contains(word), "{error}");
+        match MappingTable::read_csv(&file, &widths).unwrap_err() {
+            Error::Table { line, what, .. } => {
+                said.push(what);
+                assert_eq!(line, at, "{said:?}");
+            }
+            other => panic!("{other:?}"),
+        }
     }
+    insta::assert_snapshot!(said.join("\n"), @r#"
+    the header is not `turns,width_nm`
+    fewer than two parts of a turn
+    0.5 turns stand where 0.750000 should
+    a width of 101 nm may not be written
+    "0.75" is not a phase and a width
+    NaN turns stand where 0.750000 should
+    "#);
 }

@@ -37,6 +37,25 @@ pub enum FaultKind {
     Inconsistent,
 }
 
+impl FaultKind {
+    /// The word for it in identities of mistakes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Syntax => "syntax",
+            Self::Missing => "missing",
+            Self::Unknown => "unknown",
+            Self::WrongType => "wrong-type",
+            Self::OutOfRange => "out-of-range",
+            Self::UnknownChoice => "unknown-choice",
+            Self::Renamed => "renamed",
+            Self::WrongLength => "wrong-length",
+            Self::Unprintable => "unprintable",
+            Self::NoFile => "no-file",
+            Self::Inconsistent => "inconsistent",
+        }
+    }
+}
+
 /// One mistake: its cause and key, where in the text (bytes), and what to do.
 #[derive(Clone, Debug)]
 pub struct Fault {
@@ -46,6 +65,17 @@ pub struct Fault {
     pub span: Range<usize>,
     pub what: String,
     pub hint: String,
+}
+
+impl Fault {
+    /// Identity of the mistake, `key/cause`, as `lens.diameter_um/out-of-range`; `file/cause` where the file as a whole is at fault.
+    pub fn id(&self) -> String {
+        let key = match self.key.as_str() {
+            "" => "file".into(),
+            key => printable(key),
+        };
+        format!("{key}/{}", self.kind.name())
+    }
 }
 
 /// Mistakes that are listed; the rest is counted.
@@ -65,6 +95,7 @@ pub struct Faults {
 /// One fault as a diagnostic of its own, shown with the text around it.
 #[derive(Debug)]
 struct Mark {
+    id: String,
     span: Range<usize>,
     what: String,
     hint: String,
@@ -83,6 +114,7 @@ impl Faults {
         let single = faults
             .iter()
             .map(|f| Mark {
+                id: f.id(),
                 span: f.span.clone(),
                 what: f.what.clone(),
                 hint: f.hint.clone(),
@@ -201,6 +233,10 @@ impl fmt::Display for Mark {
 impl std::error::Error for Mark {}
 
 impl Diagnostic for Mark {
+    fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        Some(Box::new(&self.id))
+    }
+
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
         Some(Box::new(&self.hint))
     }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::FaultKind;
 use super::section::float_of;
 
 /// A number, a text or a switch, as it stands in a file.
@@ -69,6 +70,8 @@ impl fmt::Display for Scalar {
 pub struct NoPlace {
     /// Number of the change, in the order in which they were given.
     pub change: usize,
+    /// The cause: no such key, a list or table where a single value is needed, two values for one key, no TOML.
+    pub kind: FaultKind,
     pub what: String,
     pub hint: String,
 }
@@ -79,17 +82,23 @@ pub struct NoPlace {
 /// # Errors
 /// If the text is not TOML, a key is not in it, is there twice among the changes, or holds a list or a table.
 pub fn with_values(text: &str, changes: &[(&str, &Scalar)]) -> Result<String, NoPlace> {
-    let fault = |change, what: String, hint: String| NoPlace { change, what, hint };
+    let fault = |change, kind, what: String, hint: String| NoPlace {
+        change,
+        kind,
+        what,
+        hint,
+    };
     let table = DeTable::parse(text).map_err(|e| {
         fault(
             0,
+            FaultKind::Syntax,
             format!("the file is not TOML: {}", e.message().trim()),
             "mend its syntax".into(),
         )
     })?;
     let mut places = Vec::with_capacity(changes.len());
     for (change, (key, value)) in changes.iter().enumerate() {
-        let place = find(table.get_ref(), key).map_err(|(what, hint)| fault(change, what, hint))?;
+        let place = find(table.get_ref(), key).map_err(|(kind, what, hint)| fault(change, kind, what, hint))?;
         places.push((place.span(), change, value.toml()));
     }
     places.sort_by_key(|p| p.0.start);
@@ -97,6 +106,7 @@ pub fn with_values(text: &str, changes: &[(&str, &Scalar)]) -> Result<String, No
         let key = changes[pair[1].1].0;
         return Err(fault(
             pair[1].1,
+            FaultKind::Inconsistent,
             format!("`{key}` has two values"),
             "keep one of the two".into(),
         ));
@@ -109,7 +119,7 @@ pub fn with_values(text: &str, changes: &[(&str, &Scalar)]) -> Result<String, No
 }
 
 /// The single value at a key; what is wrong and what to do.
-fn find<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Result<&'v Spanned<DeValue<'t>>, (String, String)> {
+fn find<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Result<&'v Spanned<DeValue<'t>>, (FaultKind, String, String)> {
     let mut at: Option<&Spanned<DeValue<'_>>> = None;
     let mut above = String::new();
     for part in key.split('.') {
@@ -121,6 +131,7 @@ fn find<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Result<&'v Spanned<DeValue
         let absent = |known: String| {
             let what = format!("there is no `{part}` {place}");
             (
+                FaultKind::Unknown,
                 what,
                 format!("known there: {known}; write a key that is left out into the file"),
             )
@@ -144,7 +155,11 @@ fn find<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Result<&'v Spanned<DeValue
                 .and_then(|k: usize| items.get(k))
                 .ok_or_else(|| absent(format!("places from 0 to {}", items.len().saturating_sub(1))))?,
             Some(_) => {
-                return Err((format!("`{above}` is a single value"), "end the key there".into()));
+                return Err((
+                    FaultKind::WrongType,
+                    format!("`{above}` is a single value"),
+                    "end the key there".into(),
+                ));
             }
         });
         if !above.is_empty() {
@@ -155,10 +170,12 @@ fn find<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Result<&'v Spanned<DeValue
     let value = at.expect("a split text has a part");
     match value.get_ref() {
         DeValue::Table(_) => Err((
+            FaultKind::WrongType,
             format!("`{key}` is a table"),
             "name one of its keys, such as `cell.pitch_nm`".into(),
         )),
         DeValue::Array(_) => Err((
+            FaultKind::WrongType,
             format!("`{key}` is a list"),
             format!("name one of its places, from zero: `{key}.0`"),
         )),
@@ -215,21 +232,29 @@ mod tests {
 
     #[test]
     fn a_key_without_a_place_is_told_with_those_there_are() {
-        let told = |key: &str| {
-            let fault = with_values(TEXT, &[(key, &Scalar::Whole(1))]).unwrap_err();
-            format!("{}; {}", fault.what, fault.hint)
-        };
-        for (key, part) in [
-            ("cell.pitch", "no `pitch` in `cell`; known there: pitch_nm, sizes, on"),
-            ("lens.f", "no `lens` at the top; known there: name, cell, mark"),
-            ("cell", "is a table"),
-            ("cell.sizes", "`cell.sizes.0`"),
-            ("cell.sizes.2", "places from 0 to 1"),
-            ("cell.pitch_nm.x", "`cell.pitch_nm` is a single value"),
-            ("", "no `` at the top"),
+        let mut told = Vec::new();
+        for (key, kind) in [
+            ("cell.pitch", FaultKind::Unknown),
+            ("lens.f", FaultKind::Unknown),
+            ("cell", FaultKind::WrongType),
+            ("cell.sizes", FaultKind::WrongType),
+            ("cell.sizes.2", FaultKind::Unknown),
+            ("cell.pitch_nm.x", FaultKind::WrongType),
+            ("", FaultKind::Unknown),
         ] {
-            assert!(told(key).contains(part), "{key}: {}", told(key));
+            let fault = with_values(TEXT, &[(key, &Scalar::Whole(1))]).unwrap_err();
+            assert_eq!(fault.kind, kind, "{key}");
+            told.push(format!("{}; {}", fault.what, fault.hint));
         }
+        insta::assert_snapshot!(told.join("\n"), @"
+            there is no `pitch` in `cell`; known there: pitch_nm, sizes, on; write a key that is left out into the file
+            there is no `lens` at the top; known there: name, cell, mark; write a key that is left out into the file
+            `cell` is a table; name one of its keys, such as `cell.pitch_nm`
+            `cell.sizes` is a list; name one of its places, from zero: `cell.sizes.0`
+            there is no `2` in `cell.sizes`; known there: places from 0 to 1; write a key that is left out into the file
+            `cell.pitch_nm` is a single value; end the key there
+            there is no `` at the top; known there: name, cell, mark; write a key that is left out into the file
+            ");
         let twice = with_values(TEXT, &[("name", &Scalar::Whole(1)), ("name", &Scalar::Whole(2))]);
         assert_eq!(twice.unwrap_err().change, 1);
     }

@@ -1,7 +1,8 @@
 use std::path::Path;
 use std::time::Instant;
 
-use super::{Document, Faults, Limits, Section};
+use super::FaultKind::{Inconsistent, Missing, OutOfRange, Unknown, Unprintable};
+use super::{Document, FaultKind, Faults, Limits, Section};
 use crate::Error;
 
 fn faults_of(text: &str, read: impl FnOnce(&Section<'_, '_>)) -> Faults {
@@ -11,8 +12,8 @@ fn faults_of(text: &str, read: impl FnOnce(&Section<'_, '_>)) -> Faults {
     }
 }
 
-fn words(faults: &Faults) -> Vec<&str> {
-    faults.faults().iter().map(|f| f.what.as_str()).collect()
+fn found(faults: &Faults) -> Vec<(FaultKind, &str)> {
+    faults.faults().iter().map(|f| (f.kind, f.key.as_str())).collect()
 }
 
 /// A cell whose widest pillar is bounded by its pitch.
@@ -33,28 +34,36 @@ fn cell(root: &Section<'_, '_>) {
 
 #[test]
 fn what_depends_on_a_wrong_value_is_not_judged() {
-    assert_eq!(
-        words(&faults_of("[cell]\npitch_nm = 35\nwidth_nm = 300", cell)),
-        ["`pitch_nm` cannot be 35"]
-    );
-    assert_eq!(
-        words(&faults_of("[cell]\nwidth_nm = 300", cell)),
-        ["[cell] lacks `pitch_nm`"]
-    );
-    assert_eq!(words(&faults_of("", cell)), ["the file lacks `cell`"]);
+    let wrong = faults_of("[cell]\npitch_nm = 35\nwidth_nm = 300", cell);
+    assert_eq!(found(&wrong), [(OutOfRange, "cell.pitch_nm")]);
+    insta::assert_snapshot!(wrong, @"
+        test.toml:2:12: `pitch_nm` cannot be 35
+          help: it must be a number from 100 to 2000 nm
+        ");
+    let missing = faults_of("[cell]\nwidth_nm = 300", cell);
+    assert_eq!(found(&missing), [(Missing, "cell.pitch_nm")]);
+    insta::assert_snapshot!(missing, @"
+        test.toml:1:1: [cell] lacks `pitch_nm`
+          help: add `pitch_nm`: a number from 100 to 2000 nm
+        ");
+    let empty = faults_of("", cell);
+    assert_eq!(found(&empty), [(Missing, "cell")]);
+    insta::assert_snapshot!(empty, @"
+        test.toml:1:1: the file lacks `cell`
+          help: add `cell`: a section [cell]
+        ");
     let right = faults_of("[cell]\npitch_nm = 200\nwidth_nm = 300", cell);
-    assert_eq!(words(&right), ["the pillar is wider than the pitch"]);
+    assert_eq!(found(&right), [(Inconsistent, "cell.width_nm")]);
 }
 
 #[test]
 fn a_misspelt_key_is_one_mistake() {
     let faults = faults_of("[cell]\npitch_nn = 350\nwidth_nm = 300", cell);
-    assert_eq!(words(&faults), ["unknown key `pitch_nn` in [cell]"]);
-    assert!(
-        faults.faults()[0]
-            .hint
-            .ends_with("did you mean `pitch_nm`, which is missing?")
-    );
+    assert_eq!(found(&faults), [(Unknown, "cell.pitch_nn")]);
+    insta::assert_snapshot!(faults, @"
+        test.toml:2:1: unknown key `pitch_nn` in [cell]
+          help: known here: pitch_nm, width_nm; did you mean `pitch_nm`, which is missing?
+        ");
 }
 
 /// An old name, of a key or of a word, is one mistake, and the new one is named.
@@ -98,7 +107,7 @@ fn many_mistakes_are_counted_in_linear_time() {
     (0..100_000).for_each(|k| text += &format!("key_{k} = 1\n"));
     let faults = faults_of(&text, cell);
     assert_eq!((faults.count(), faults.faults().len()), (100_000, 50));
-    assert!(faults.to_string().ends_with("99950 more mistakes"));
+    insta::assert_snapshot!(faults.to_string().lines().last().unwrap(), @"test.toml: 99950 more mistakes");
     let broken = faults_of(&"= ]\n".repeat(1 << 18), cell);
     assert_eq!(broken.count(), 1);
     assert!(start.elapsed().as_secs() < MOST_SECONDS);
@@ -114,10 +123,15 @@ fn texts_are_one_printable_line() {
         let faults = faults_of(&format!("title = {text}"), |root| {
             root.text("title");
         });
-        assert_eq!(words(&faults), [format!("`title` contains the character {character}")]);
+        assert_eq!(found(&faults), [(Unprintable, "title")]);
+        assert!(faults.faults()[0].what.ends_with(character), "{faults}");
     }
     let faults = faults_of("\"a\\u001b\" = 1\n", |_| {});
-    assert_eq!(words(&faults), ["unknown key `a\\u{1b}` at the top"]);
+    assert_eq!(faults.faults()[0].kind, Unknown);
+    insta::assert_snapshot!(faults, @r"
+        test.toml:1:1: unknown key `a\u{1b}` at the top
+          help: known here:
+        ");
 }
 
 /// The text is drawn with its places, whatever is in it.
@@ -143,7 +157,7 @@ fn sections_of_one_name_are_judged_each() {
             s.finish();
         }
     });
-    assert_eq!(words(&faults), ["`a` cannot be 50", "a and b differ"]);
+    assert_eq!(found(&faults), [(OutOfRange, "pair#0.a"), (Inconsistent, "pair#1.b")]);
     assert_eq!(faults.line_column(faults.faults()[1].span.start), (6, 5));
 }
 
@@ -154,14 +168,27 @@ fn a_file_of_another_kind_is_said_to_be_one() {
     // A header of GDSII before what no text is long enough for.
     let mut layout = vec![0x00, 0x06, 0x00, 0x02, 0x02, 0x58];
     layout.resize(super::LONGEST as usize + 1, 0xff);
-    for (bytes, kind) in [
-        (&layout[..], "a layout in GDSII"),
-        (b"%SEMI-OASIS\r\n\x01\xff", "a layout in OASIS"),
-        (b"\x89PNG\r\n\x1a\n", "a picture (PNG)"),
-        (b"\xff\xfe", "not UTF-8"),
+    let mut said = Vec::new();
+    for (bytes, id) in [
+        (&layout[..], "file/not-text"),
+        (b"%SEMI-OASIS\r\n\x01\xff", "file/not-text"),
+        (b"\x89PNG\r\n\x1a\n", "file/not-text"),
+        (b"\xff\xfe", "table/format"),
     ] {
         std::fs::write(&path, bytes).unwrap();
-        let error = super::load(&path).unwrap_err().to_string();
-        assert!(error.contains("lens.gds") && error.contains(kind), "{error}");
+        let error = super::load(&path).unwrap_err();
+        assert_eq!(error.id(), id);
+        said.push(error.to_string().replace(&*path.to_string_lossy(), "lens.gds"));
     }
+    // The kind of file is in the words.
+    insta::assert_snapshot!(said.join("\n"), @"
+        lens.gds is a layout in GDSII, and a text is asked for here
+          help: check which file is given where: `--help` says the order
+        lens.gds is a layout in OASIS, and a text is asked for here
+          help: check which file is given where: `--help` says the order
+        lens.gds is a picture (PNG), and a text is asked for here
+          help: check which file is given where: `--help` says the order
+        lens.gds, line 1: this is not UTF-8 text
+          help: save the file as UTF-8
+        ");
 }

@@ -25,19 +25,15 @@ use crate::error::{Error, Result};
 /// If it cannot be read, is a device or a pipe, or is longer.
 pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
     let found = fs::metadata(path).map_err(Error::io("read", path))?;
-    let refused = |why: String| {
+    let refused = |id, why: String| {
         let hint = format!("{what} of up to {most} bytes is read; is this the right file?");
-        Err(Error::refused(
-            "file/too-large",
-            format!("{} {why}", path.display()),
-            hint,
-        ))
+        Err(Error::refused(id, format!("{} {why}", path.display()), hint))
     };
     if !found.is_file() {
-        return refused("is not an ordinary file".into());
+        return refused("file/not-ordinary", "is not an ordinary file".into());
     }
     if found.len() > most {
-        return refused(format!("is {} bytes long", found.len()));
+        return refused("file/too-large", format!("is {} bytes long", found.len()));
     }
     let mut bytes = Vec::with_capacity(found.len() as usize);
     let file = fs::File::open(path).map_err(Error::io("read", path))?;
@@ -46,7 +42,7 @@ pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
         .read_to_end(&mut bytes)
         .map_err(Error::io("read", path))?;
     if bytes.len() as u64 > most {
-        return refused("grows while it is read".into());
+        return refused("file/too-large", "grows while it is read".into());
     }
     Ok(bytes)
 }

@@ -433,20 +433,41 @@ mod tests {
 
     #[test]
     fn steps_that_no_element_has_and_steps_given_twice_are_faults() {
-        for (steps, wanted) in [
-            ("[0, 0]", "no steered elements"),
-            ("[2, 0]", "no steered elements"),
-            ("[0, 1]", "no steered elements"),
-            ("[1, 0.5]", "no steered elements"),
-        ] {
+        let designs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs");
+        let words = |error: &metalith_core::Error| metalith_testing::without_folder(error, &designs);
+        let mut absent = Vec::new();
+        for steps in ["[0, 0]", "[2, 0]", "[0, 1]", "[1, 0.5]"] {
             let text = format!("[[mapping.steered]]\nsteps = {steps}\ncoefficients = [0.3, 0.5]\n");
-            let error = mini(&text).unwrap_err().to_string();
-            assert!(error.contains(wanted), "{steps}: {error}");
+            let error = mini(&text).unwrap_err();
+            assert_eq!(
+                error.ids(),
+                ["mapping.steered#0.steps/inconsistent"],
+                "{steps}: {error}"
+            );
+            absent.push(words(&error));
         }
+        insta::assert_snapshot!(absent.join("\n"), @"
+            mini_3x3.toml:39:9: no steered elements are 0 and 0 steps from the middle of the array
+              help: give steps of elements that there are, the larger first, such as [1, 0]; along an axis with an even number of elements they are 0.5, 1.5, ...
+            mini_3x3.toml:39:9: no steered elements are 2 and 0 steps from the middle of the array
+              help: give steps of elements that there are, the larger first, such as [1, 0]; along an axis with an even number of elements they are 0.5, 1.5, ...
+            mini_3x3.toml:39:9: no steered elements are 0 and 1 steps from the middle of the array
+              help: give steps of elements that there are, the larger first, such as [1, 0]; along an axis with an even number of elements they are 0.5, 1.5, ...
+            mini_3x3.toml:39:9: no steered elements are 1 and 0.5 steps from the middle of the array
+              help: give steps of elements that there are, the larger first, such as [1, 0]; along an axis with an even number of elements they are 0.5, 1.5, ...
+            ");
         let one = "[[mapping.steered]]\nsteps = [1, 1]\ncoefficients = [0.3, 0.5]\n";
-        let error = mini(&format!("{one}{one}")).unwrap_err().to_string();
-        assert!(error.contains("have a mapping already"), "{error}");
-        let error = mini(&one.replace("0.5", "0.9")).unwrap_err().to_string();
-        assert!(error.contains("asks for widths from 105.0 to 420.0 nm"), "{error}");
+        let twice = mini(&format!("{one}{one}")).unwrap_err();
+        insta::assert_snapshot!(words(&twice), @"
+            mini_3x3.toml:42:9: these elements have a mapping already
+              help: give one `[[mapping.steered]]` for each pair of steps
+            ");
+        assert_eq!(twice.ids(), ["mapping.steered#1.steps/inconsistent"]);
+        let wide = mini(&one.replace("0.5", "0.9")).unwrap_err();
+        insta::assert_snapshot!(words(&wide), @"
+            mini_3x3.toml:40:16: this mapping asks for widths from 105.0 to 420.0 nm
+              help: the cell allows 100 to 300 nm: change the coefficients or [cell] width_min_nm, width_max_nm
+            ");
+        assert_eq!(wide.ids(), ["mapping.steered#0.coefficients/inconsistent"]);
     }
 }

@@ -123,8 +123,12 @@ mod tests {
             ("elements = [2, 2]", "[1, 1]"),
             ("elements = [3, 3]", "[1, 0.5]"),
         ] {
-            let error = design(array, steps).unwrap_err().to_string();
-            assert!(error.contains("no steered elements are"), "{array} {steps}: {error}");
+            let error = design(array, steps).unwrap_err();
+            assert_eq!(
+                error.ids(),
+                ["mapping.steered#0.steps/inconsistent"],
+                "{array} {steps}: {error}"
+            );
         }
     }
 
@@ -144,6 +148,10 @@ mod tests {
         let text = std::fs::read_to_string(path).unwrap();
         let steered = "[[mapping.steered]]\nsteps = [1, 0]\ncoefficients = [0.3, 0.5]\n\n[layout]";
         let error = Design::parse(path, &text.replacen("[layout]", steered, 1)).unwrap_err();
-        assert!(error.to_string().contains("placed one by one are no steps"), "{error}");
+        assert_eq!(error.ids(), ["mapping.steered#0.steps/inconsistent"], "{error}");
+        insta::assert_snapshot!(metalith_testing::without_folder(error, path.parent().unwrap()), @"
+            hologram.toml:47:9: elements that are placed one by one are no steps from the middle of a grid
+              help: leave `[[mapping.steered]]` out, or use `elements` and `spacing_um` of [array] in place of [[element]]
+            ");
     }
 }

@@ -136,6 +136,10 @@ fn a_lens_too_large_to_be_held_is_held_folded() {
     assert_eq!(found.elements[0].widths.number(sites / 2 + 1, sites - 1), 130);
     let alone = file(&[(octant, &ALL), (&[(7, 9, 100)], &ALL[..1])], true);
     let error = metalith_core::Error::from(extract_folded(&alone, &plan, &Silent).unwrap_err());
-    assert!(format!("{error:?}").contains("an eighth"), "{error:?}");
+    assert_eq!(error.id(), "extract/sites");
+    insta::assert_snapshot!(error, @"
+        test.gds: 1 elements with 2195672164 lattice sites together
+          help: up to 2147483648 sites are held at a time, an eighth of an element that is folded by all eight symmetries: a smaller lens, or fewer elements in one layout
+        ");
     assert!(extract(&alone, &plan, &Silent).is_err());
 }

@@ -20,9 +20,9 @@ fn layout(bytes: Vec<u8>) -> Layout {
     Layout::from_bytes("test.gds", bytes, ReadLimits::default()).unwrap()
 }
 
-fn fault_of(bytes: Vec<u8>) -> (u64, String) {
+fn fault_of(bytes: Vec<u8>) -> (u64, LayoutError) {
     match Layout::from_bytes("test.gds", bytes, ReadLimits::default()).map(|_| ()) {
-        Err(Error::Layout { offset, cause, .. }) => (offset, cause.to_string()),
+        Err(Error::Layout { offset, cause, .. }) => (offset, cause),
         other => panic!("expected a fault of the layout, not {other:?}"),
     }
 }
@@ -96,7 +96,7 @@ fn absolute_widths_and_magnified_cells_do_not_go_together() {
     };
     assert_eq!(boxes(&layout(drawn(-200, 1.0))), [[-100, 0, 100, 1000]]);
     assert_eq!(boxes(&layout(drawn(200, 2.0))), [[-200, 0, 200, 2000]]);
-    assert!(fault_of(drawn(-200, 2.0)).1.contains("absolute"));
+    assert_eq!(fault_of(drawn(-200, 2.0)).1, LayoutError::AbsoluteWidth);
 }
 
 /// Optional records, unusual order, several XY records, padding: all legal, all read.
@@ -119,44 +119,51 @@ fn faults_name_the_byte() {
     let whole = gds::everything();
     // Cut anywhere, a file is a fault near its end, and never a shorter layout.
     for cut in (0..whole.len() - 4).step_by(7) {
-        let (offset, what) = fault_of(whole[..cut].to_vec());
-        assert!(offset <= cut as u64, "{what}");
+        let (offset, cause) = fault_of(whole[..cut].to_vec());
+        assert!(offset <= cut as u64, "{cause}");
     }
     let head = Gds::library().0.len() as u64;
     let mut odd = Gds::library();
     odd.cell("A").record(0x08, 0, &[0]).end_cell();
-    let (offset, what) = fault_of(odd.end());
-    assert_eq!(offset, head + 28 + 6);
-    assert!(what.contains("length 5"), "{what}");
+    let odd_length = LayoutError::RecordLength {
+        length: 5,
+        first: false,
+    };
+    assert_eq!(fault_of(odd.end()), (head + 28 + 6, odd_length));
     let mut unknown = Gds::library();
     unknown.record(0x77, 0, &[]);
     assert_eq!(fault_of(unknown.end()).0, head);
     let mut unended = Gds::library();
     unended.cell("A").empty(0x08).int2(0x0D, &[1]).end_cell();
-    assert!(fault_of(unended.end()).1.contains("ENDEL is missing"));
+    let cause = fault_of(unended.end()).1;
+    assert!(matches!(cause, LayoutError::ElementNotEnded { .. }), "{cause:?}");
     let mut bare = Gds::library();
     bare.cell("A")
         .empty(0x08)
         .int4(0x10, &[0, 0, 1, 0, 1, 1, 0, 0])
         .empty(0x11);
-    assert!(fault_of(bare.end_cell().end()).1.contains("without LAYER"));
-    assert!(fault_of(b"%PDF-1.4 not a layout".to_vec()).1.contains("HEADER"));
+    let no_layer = LayoutError::Lacks {
+        element: "BOUNDARY",
+        lacks: "LAYER",
+    };
+    assert_eq!(fault_of(bare.end_cell().end()).1, no_layer);
+    assert_eq!(fault_of(b"%PDF-1.4 not a layout".to_vec()).1, LayoutError::NoHeader);
 }
 
 #[test]
 fn faults_of_the_tree_are_found_before_anything_is_expanded() {
-    let visit = |bytes: Vec<u8>| {
-        let error = layout(bytes).visit(&Selection::default(), &mut Flat(Vec::new()), &Silent);
-        error.unwrap_err().to_string()
-    };
+    let visit = |bytes: Vec<u8>| visited(&layout(bytes)).unwrap_err();
+    let text = str::to_owned;
     let mut dangling = Gds::library();
     dangling.cell("A").sref("NOWHERE", 0, 0).end_cell();
-    assert!(visit(dangling.end()).contains("NOWHERE, which is not in the file"));
+    let (cell, name) = (text("A"), text("NOWHERE"));
+    assert_eq!(visit(dangling.end()), LayoutError::Dangling { cell, name });
     let mut circle = Gds::library();
     circle.cell("A").sref("B", 0, 0).end_cell();
     circle.cell("B").sref("C", 0, 0).end_cell();
     circle.cell("C").sref("B", 0, 0).square(1, 0, 0, 10).end_cell();
-    assert!(visit(circle.end()).contains("which contains it"));
+    let (cell, name) = (text("C"), text("B"));
+    assert_eq!(visit(circle.end()), LayoutError::Circle { cell, name });
     // Forty levels of two references each: 10^12 squares from a few kilobytes.
     let mut bomb = Gds::library();
     bomb.cell("L0").square(1, 0, 0, 10).end_cell();
@@ -169,12 +176,15 @@ fn faults_of_the_tree_are_found_before_anything_is_expanded() {
     }
     let layout = layout(bomb.end());
     assert_eq!(layout.flat_shapes(), 1 << 40);
-    let error = layout.visit(&Selection::default(), &mut Flat(Vec::new()), &Silent);
-    assert!(
-        error
-            .unwrap_err()
-            .to_string()
-            .contains("shapes with all references followed")
+    let cause = visited(&layout).unwrap_err();
+    let (limit, most) = (Limit::FlatShapes, ReadLimits::default().flat_shapes);
+    assert_eq!(
+        cause,
+        LayoutError::Limit {
+            limit,
+            found: 1 << 40,
+            most
+        }
     );
 }
 
@@ -242,10 +252,7 @@ fn names_are_printable() {
     assert_eq!(layout.cell_index("A\\u{1b}[2J\\u{fffe}"), Some(0));
     assert_eq!(layout.cell_index("A\u{1b}[2J\u{fffe}"), Some(0));
     let error = visited(&layout).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "cell TOP refers to B\\u{a}, which is not in the file"
-    );
+    insta::assert_snapshot!(error, @r"cell TOP refers to B\u{a}, which is not in the file");
 }
 
 /// The program's error says the same as ours, and keeps it as its source.

@@ -2,7 +2,7 @@
 
 use metalith_core::Silent;
 use metalith_gds::{FileFormat, LayoutError, Limit, Selection, simplified};
-use metalith_oasis::{CellBounds, CompressedBlock, OasisWriter, Placing, RecordBuffer, Repetition};
+use metalith_oasis::{CellBounds, CompressedBlock, OasisFault, OasisWriter, Placing, RecordBuffer, Repetition};
 use metalith_testing::{mutate, oasis};
 use rand::SeedableRng;
 
@@ -132,8 +132,9 @@ fn numbers_beyond_the_largest_are_no_other_cell() {
     let number = [0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x01];
     let records = [&[13][..], &number, SQUARE].concat();
     let read = Layout::from_bytes("test.oas", oasis::around(&records), ReadLimits::default());
-    let error = read.map(|_| ()).unwrap_err().to_string();
-    assert!(error.contains(&(1u64 << 56).to_string()), "{error}");
+    let error = read.map(|_| ()).unwrap_err();
+    let number = 1 << 56;
+    assert_eq!(error.in_layout().unwrap().1, &LayoutError::CellNumber { number });
 }
 
 /// Copies of squares, texts, polygons and cells stand where the lists say.
@@ -178,15 +179,26 @@ fn copies_stand_where_they_are_said_to() {
 fn faults_have_places_and_remedies() {
     let bytes = file(&[("A", &[SQUARE, &[99]].concat())], true);
     let fault = |bytes: &[u8]| match Layout::from_bytes("test.oas", bytes, ReadLimits::default()).map(|_| ()) {
-        Err(Error::Layout { offset, cause, .. }) => (offset, cause.to_string(), cause.remedy()),
+        Err(Error::Layout { offset, cause, .. }) => (offset, cause),
         other => panic!("{other:?}"),
     };
-    let (offset, words, remedy) = fault(&bytes);
-    assert_eq!(offset, 22);
-    assert_eq!(words, "byte 10 of the CBLOCK there: record type 99 is not OASIS");
-    assert!(!remedy.is_empty());
+    let (offset, cause) = fault(&bytes);
+    let unknown = LayoutError::Oasis {
+        inner: Some(10),
+        fault: OasisFault::RecordKind(99),
+    };
+    assert_eq!((offset, &cause), (22, &unknown));
+    insta::assert_snapshot!(format!("{cause}\n  help: {}", cause.remedy()), @"
+        byte 10 of the CBLOCK there: record type 99 is not OASIS
+          help: the file is damaged: write or copy it again
+        ");
     let whole = file(&[("A", SQUARE)], false);
-    assert!(fault(&whole[..28]).1.contains("ends before END"));
+    let cut = fault(&whole[..28]).1;
+    let ends_early = LayoutError::Oasis {
+        inner: None,
+        fault: OasisFault::EndsEarly,
+    };
+    assert_eq!(cut, ends_early);
 }
 
 /// Five thousand damaged files through everything that reads; `examples/fuzz_reader.rs` makes as many as you like.

@@ -325,6 +325,7 @@ impl Process {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metalith_core::FaultKind;
 
     #[test]
     fn the_shipped_processes_are_read_and_expose_pillars() {
@@ -367,16 +368,14 @@ mod tests {
             .replace("tone = \"positive\"", "tone = \"possitive\"")
             .replace("field_used_um = 499.8", "field_used_um = 600")
             .replace("dose_uc_cm2 = 280", "dose = 280");
-        let error = Process::parse(Path::new("processes/p.toml"), text)
-            .unwrap_err()
-            .to_string();
-        for said in [
-            "possitive",
-            "larger than the field",
-            "dose_uc_cm2",
-            "unknown key `dose`",
+        let error = Process::parse(Path::new("processes/p.toml"), text).unwrap_err();
+        for (kind, key) in [
+            (FaultKind::UnknownChoice, "resist.tone"),
+            (FaultKind::Inconsistent, "writer.field_used_um"),
+            (FaultKind::Missing, "resist.dose_uc_cm2"),
+            (FaultKind::Unknown, "resist.dose"),
         ] {
-            assert!(error.contains(said), "{said} not in {error}");
+            assert!(error.has_fault(kind, key), "{kind:?} {key}: {error}");
         }
     }
 }

@@ -247,11 +247,12 @@ fn a_process_for_another_thickness_is_refused() {
         accuracy: Accuracy::Fast,
         waivers: None,
     };
-    let said = handoff(&options, &Silent).unwrap_err().to_string();
-    assert!(
-        said.contains("900 nm thick") && said.contains("400 to 700 nm"),
-        "{said}"
-    );
+    let error = handoff(&options, &Silent).unwrap_err();
+    assert_eq!(error.id(), "handoff/film-thickness");
+    insta::assert_snapshot!(error, @"
+    the film of the design is 900 nm thick, but the etch and the rules of jbx6300_asi are for 400 to 700 nm
+      help: use a process file for this thickness; if its etch and its rules are right for it, change `film_nm` in [transfer]
+    ");
     assert!(!out.exists());
 }
 
@@ -291,7 +292,11 @@ fn a_process_without_rules_for_a_shape_is_refused() {
         accuracy: Accuracy::Fast,
         waivers: None,
     };
-    let said = handoff(&options, &Silent).unwrap_err().to_string();
-    assert!(said.contains("circles") && said.contains("no decks of rules"), "{said}");
+    let error = handoff(&options, &Silent).unwrap_err();
+    assert_eq!(error.id(), "handoff/no-rules-for-pillars");
+    insta::assert_snapshot!(error, @"
+    the pillars of the design are circles, and the process has no decks of rules for them
+      help: add a section [checks.circles] with `pillar_rules`, `dose_rules` and `test_rules`
+    ");
     assert!(!out.exists());
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use metalith_core::Silent;
+use metalith_core::{Error, FaultKind, Silent};
 use metalith_handoff::{HandoffOptions, handoff, verify_handoff};
 
 use crate::{DESIGN, PROCESS, copy_of_shared, options};
@@ -28,8 +28,11 @@ fn a_file_that_is_not_read_is_not_copied() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("secret"), "a key").unwrap();
     let options = altered(folder.path(), &[("\"sin_luke_2015\"", "\"secret\"")]);
-    let error = handoff(&options, &Silent).unwrap_err().to_string();
-    assert!(error.contains("no material is called \"secret\""), "{error}");
+    let error = handoff(&options, &Silent).unwrap_err();
+    assert!(
+        error.has_fault(FaultKind::Inconsistent, "cell.pillar_material"),
+        "{error}"
+    );
     assert!(!options.out.exists());
     // Nor is one that is read and found to be no table.
     fs::write(folder.path().join("secret.csv"), "a key").unwrap();
@@ -76,15 +79,12 @@ fn film_and_process_must_agree() {
         folder.path(),
         &[("\"sin_luke_2015\"", "\"alumina_malitson_dodge_1972\"")],
     );
-    let error = handoff(&options, &Silent).unwrap_err().to_string();
-    for said in [
-        "alumina_malitson_dodge_1972",
-        "sin_luke_2015",
-        "silicon nitride",
-        "`films`",
-    ] {
-        assert!(error.contains(said), "{said}: {error}");
-    }
+    let error = handoff(&options, &Silent).unwrap_err();
+    assert_eq!(error.id(), "handoff/film-material");
+    insta::assert_snapshot!(error, @r#"
+    the film of the design is "alumina_malitson_dodge_1972", but the process etches sin_luke_2015, sin_philipp_1973: reactive ion etch of silicon nitride, stopped on fused silica
+      help: use a process file for this film, or, if its etch is right for it, add the film to `films` in [transfer]
+    "#);
     assert!(!options.out.exists());
 }
 
@@ -100,8 +100,8 @@ fn a_text_that_would_be_two_lines_is_refused() {
         process: Some(process),
         ..options(&folder.path().join("out"))
     };
-    let error = handoff(&options, &Silent).unwrap_err().to_string();
-    assert!(error.contains("`path`"), "{error}");
+    let error = handoff(&options, &Silent).unwrap_err();
+    assert_eq!(error.ids(), ["job.path/unprintable"]);
 }
 
 /// Changes of a received folder that leave every listed file and the seal as they were.
@@ -132,8 +132,11 @@ fn what_is_added_to_a_manifest_or_a_folder_is_told() {
         ("added", text.replacen("\"bytes\"", "\"remark\": 1, \"bytes\"", 1)),
     ] {
         fs::write(&manifest, altered).unwrap();
-        let error = verify_handoff(&received, &Silent).unwrap_err().to_string();
-        assert!(error.contains("not a manifest"), "{what}: {error}");
+        let error = verify_handoff(&received, &Silent).unwrap_err();
+        assert!(
+            matches!(&error, Error::Table { path, .. } if *path == manifest),
+            "{what}: {error:?}"
+        );
     }
     fs::write(&manifest, &text).unwrap();
     assert!(verify_handoff(&received, &Silent).unwrap().holds());
@@ -146,10 +149,10 @@ fn a_manifest_is_an_ordinary_file_of_bounded_length() {
     let folder = tempfile::tempdir().unwrap();
     let manifest = folder.path().join("manifest.json");
     std::os::unix::fs::symlink("/dev/zero", &manifest).unwrap();
-    let error = verify_handoff(folder.path(), &Silent).unwrap_err().to_string();
-    assert!(error.contains("not an ordinary file"), "{error}");
+    let refused = || verify_handoff(folder.path(), &Silent).unwrap_err().id();
+    assert_eq!(refused(), "file/not-ordinary");
     fs::remove_file(&manifest).unwrap();
     let long = fs::File::create(&manifest).unwrap();
     long.set_len(1 << 40).unwrap();
-    assert!(verify_handoff(folder.path(), &Silent).is_err());
+    assert_eq!(refused(), "file/too-large");
 }

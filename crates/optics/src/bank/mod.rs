@@ -230,7 +230,7 @@ impl CellBank {
                 .sum();
             if seconds > MOST_UPRIGHT_S {
                 return Err(Error::refused(
-                    "study/tables-too-many",
+                    "study/tables-too-slow",
                     format!(
                         "tables of {} upright rectangles, each in {}, would take {:.1} hours of CPU time",
                         sizes.first(),

@@ -278,14 +278,18 @@ mod tests {
 
     #[test]
     fn out_of_range_says_the_range() {
-        let error = Material::named("sin_philipp_1973")
-            .unwrap()
-            .index(1.5)
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains("0.207 to 1.24 um"), "{error}");
-        let error = Material::named("glass").unwrap_err();
-        assert!(error.remedy().contains("fused_silica_malitson_1965"), "{error}");
+        let error = Material::named("sin_philipp_1973").unwrap().index(1.5).unwrap_err();
+        assert_eq!(error.id(), "rcwa/out-of-range");
+        insta::assert_snapshot!(error, @"sin_philipp_1973 is known from 0.207 to 1.24 um, not at 1.5 um");
+        match Material::named("glass").unwrap_err() {
+            Error::UnknownMaterial { name, known } => {
+                assert!(
+                    name == "glass" && known.contains(&"fused_silica_malitson_1965"),
+                    "{known:?}"
+                );
+            }
+            other => panic!("{other:?}"),
+        }
         assert!(Material::constant(0.0, 0.0).is_err() && Material::constant(1.5, -0.1).is_err());
     }
 

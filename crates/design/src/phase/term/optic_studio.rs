@@ -318,6 +318,7 @@ mod tests {
 
     #[test]
     fn a_surface_that_is_not_flat_is_refused() {
+        let mut said = Vec::new();
         for (flat, bent) in [
             (
                 "  CURV 0.0 0 0 0 0 \"\"\n  HIDE 0 1",
@@ -327,9 +328,14 @@ mod tests {
         ] {
             let text = SAVED.replace(flat, bent);
             assert_ne!(text, SAVED);
-            let error = read_text(text.as_bytes(), None).unwrap_err().to_string();
-            assert!(error.contains("surface 2 is not flat"), "{error}");
+            said.push(refusal(text.as_bytes(), None));
         }
+        insta::assert_snapshot!(said.join("\n"), @r#"
+            lens.zmx, line 58: surface 2 is not flat: `CURV 0.02 0 0 0 0 ""`
+              help: a chip is flat and has the phase alone: optimise the lens with a flat surface (no curvature, parameters 1 to 8 at 0)
+            lens.zmx, line 64: surface 2 is not flat: `PARM 2 1E-5`
+              help: a chip is flat and has the phase alone: optimise the lens with a flat surface (no curvature, parameters 1 to 8 at 0)
+            "#);
     }
 
     fn read_text(bytes: &[u8], surface: Option<u32>) -> Result<TermForm> {
@@ -337,6 +343,15 @@ mod tests {
         let path = folder.path().join("lens.zmx");
         std::fs::write(&path, bytes).unwrap();
         read(&path, surface)
+    }
+
+    /// The text of the refusal of a file, with its name alone.
+    fn refusal(bytes: &[u8], surface: Option<u32>) -> String {
+        let error = read_text(bytes, surface).unwrap_err();
+        let Error::Table { path, .. } = &error else {
+            panic!("{error:?}");
+        };
+        metalith_testing::without_folder(&error, path.parent().unwrap())
     }
 
     #[test]
@@ -365,23 +380,37 @@ mod tests {
 
     #[test]
     fn what_is_missing_is_said() {
-        for (text, surface, wanted) in [
-            (LENS, None, "phases are on surfaces 1, 2"),
-            (LENS, Some(7), "surface 7 has no phase"),
-            ("SURF 0\nTYPE STANDARD\n", None, "no surface of type"),
-            (
-                "SURF 1\nTYPE BINARY_2\nXDAT 1 2\nXDAT 2 1\nXDAT 3 5\n",
-                None,
-                "2 coefficients",
-            ),
-            ("SURF 1\nTYPE BINARY_2\nXDAT 1 x\n", None, "needs a value"),
-            ("SURF 1\nTYPE BINARY_2\nXDAT 999999999 1\n", None, "entry 999999999"),
-            ("UNIT PARSEC\n", None, "unknown unit"),
-            ("SURF 0\nTYPE SZERNPHA\nSURF 1\n", None, "there are SZERNPHA"),
-            ("PK\u{3}\u{4}", None, "no lens in text"),
-        ] {
-            let error = read_text(text.as_bytes(), surface).unwrap_err().to_string();
-            assert!(error.contains(wanted), "{error}");
-        }
+        let said = [
+            (LENS, None),
+            (LENS, Some(7)),
+            ("SURF 0\nTYPE STANDARD\n", None),
+            ("SURF 1\nTYPE BINARY_2\nXDAT 1 2\nXDAT 2 1\nXDAT 3 5\n", None),
+            ("SURF 1\nTYPE BINARY_2\nXDAT 1 x\n", None),
+            ("SURF 1\nTYPE BINARY_2\nXDAT 999999999 1\n", None),
+            ("UNIT PARSEC\n", None),
+            ("SURF 0\nTYPE SZERNPHA\nSURF 1\n", None),
+            ("PK\u{3}\u{4}", None),
+        ]
+        .map(|(text, surface)| refusal(text.as_bytes(), surface));
+        insta::assert_snapshot!(said.join("\n"), @"
+            lens.zmx: phases are on surfaces 1, 2
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            lens.zmx: surface 7 has no phase; phases are on surfaces 1, 2
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            lens.zmx: no surface of type BINARY_1 or BINARY_2 is in the file; there are STANDARD
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            lens.zmx: surface 1 has 2 coefficients over a radius of 1000 um, and 1 are there
+              help: give the number of coefficients as XDAT 1, the radius as XDAT 2, and each coefficient after them
+            lens.zmx, line 3: `XDAT` needs a value, not `x`
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            lens.zmx, line 3: entry 999999999 of the extra data
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            lens.zmx, line 1: an unknown unit of length
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            lens.zmx: no surface of type BINARY_1 or BINARY_2 is in the file; there are SZERNPHA
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            lens.zmx: no surface of type BINARY_1 or BINARY_2 is in the file, nor any other: it is no lens in text
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            ");
     }
 }

@@ -94,6 +94,8 @@ impl OptimiseSpec {
 mod tests {
     use std::path::Path;
 
+    use metalith_core::Error;
+
     use crate::Design;
 
     /// Case of a lattice that no tables are made for.
@@ -102,11 +104,12 @@ mod tests {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/hexagonal_1550.toml");
         let text = std::fs::read_to_string(&path).unwrap();
         let text = text.replacen("[verify]", "[optimise]\ncell = \"neighbours\"\n\n[verify]", 1);
-        let error = Design::parse(&path, &text).unwrap_err().to_string();
-        assert!(
-            error.contains("a hexagonal lattice by the `neighbours` cell"),
-            "{error}"
-        );
+        let error = Design::parse(&path, &text).unwrap_err();
+        assert_eq!(error.ids(), ["optimise.cell/inconsistent"]);
+        insta::assert_snapshot!(metalith_testing::without_folder(error, path.parent().unwrap()), @"
+            hexagonal_1550.toml:53:8: a hexagonal lattice by the `neighbours` cell
+              help: use the cell `rigorous`
+            ");
     }
 
     /// Refusals of what the exchange of rings cannot do with the coupled model, each in a fault of its own.
@@ -121,21 +124,28 @@ mod tests {
         assert_eq!(with(&|text| text).unwrap(), "neighbours");
         let merit =
             |key: &'static str| move |text: String| text.replacen("log = 1.0", &format!("log = 1.0\n{key} = 0.1"), 1);
-        let changes: [(&dyn Fn(String) -> String, &str); 4] = [
-            (&merit("deconvolution"), "the merit `deconvolution`"),
-            (&merit("side_lobes"), "the merit `side_lobes`"),
-            (
-                &|text| text + "\n[optimise.robust]\nwidth_bias_nm = 5\n",
-                "errors of fabrication",
-            ),
-            (
-                &|text| text.replacen("solver = \"exchange\"", "solver = \"adam\"", 1),
-                "the solver `adam`",
-            ),
+        let changes: [&dyn Fn(String) -> String; 4] = [
+            &merit("deconvolution"),
+            &merit("side_lobes"),
+            &|text| text + "\n[optimise.robust]\nwidth_bias_nm = 5\n",
+            &|text| text.replacen("solver = \"exchange\"", "solver = \"adam\"", 1),
         ];
-        for (change, what) in changes {
-            let error = with(change).unwrap_err().to_string();
-            assert!(error.contains(&format!("{what} among unlike neighbours")), "{error}");
+        let mut said = Vec::new();
+        for change in changes {
+            let Error::Text(faults) = with(change).unwrap_err() else {
+                panic!("a cell that does not fit is a mistake of the text");
+            };
+            // Keys of the other solver may be mistakes beside it.
+            let fault = &faults.faults()[0];
+            assert_eq!(fault.id(), "optimise.cell/inconsistent");
+            said.push(fault.what.clone());
         }
+        // Which of them it is is in the words.
+        insta::assert_snapshot!(said.join("\n"), @"
+            the merit `deconvolution` among unlike neighbours
+            the merit `side_lobes` among unlike neighbours
+            errors of fabrication among unlike neighbours
+            the solver `adam` among unlike neighbours
+            ");
     }
 }
