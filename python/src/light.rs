@@ -145,7 +145,7 @@ pub fn cell<'py>(
     let (widths, wavelengths) = (widths_nm.as_array().to_vec(), wavelengths_nm.as_array().to_vec());
     drop((widths_nm, wavelengths_nm));
     let shape = shape_of(shape).map_err(error)?;
-    if shape.rectangles().is_some() {
+    if !shape.has_width() {
         return Err(error(Error::invalid(
             "the transmission of rectangles by their width",
             "give squares or circles: rectangles are told by numbers, and `metalith.psf` simulates them",

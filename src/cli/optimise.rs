@@ -202,7 +202,9 @@ fn findings(
         command: command(args),
         start: found.start.into(),
         merit: found.merit,
-        rotation_step_deg: design.cell.shape.rotated().map(metalith::RotatedRectangles::step_deg),
+        rotation_step_deg: (design.cell.shape.has_one_size())
+            .then(|| design.cell.shape.step())
+            .flatten(),
         step_limit_turns: task.limit().turns(),
         before,
         own,

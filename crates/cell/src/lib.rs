@@ -12,6 +12,7 @@ mod neighbour_band;
 mod neighbours;
 mod pointwise;
 mod polarisation;
+mod polarising;
 mod polynomial;
 mod published;
 mod rectangle;
@@ -43,6 +44,7 @@ pub use polarisation::{
     Analyser, AxisTables, FocusedLight, HandTables, LitStack, PassedTable, Polarisation, PolarisationAxis,
     PolarisedLight, PolarisedTables,
 };
+pub use polarising::polarising_cell;
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rectangle::{Handedness, OBLIQUE_RECTANGLES, RotatedRectangle, oblique_refused};

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use metalith_core::{Error, Result};
-use metalith_pillars::PillarShape;
+use metalith_pillars::{OutlineForm, PillarShape};
 use metalith_rcwa::{CellLattice, Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, transmit};
 
 /// A pillar on its substrate, as etched: everything that decides its transmission but its width.
@@ -66,7 +66,7 @@ impl CellStack {
             pitch_nm,
             lattice: CellLattice::Square,
             height_nm,
-            shape: PillarShape::Square,
+            shape: PillarShape::default(),
             film: Material::named("sin_luke_2015")?,
             substrate: Material::named("fused_silica_malitson_1965")?,
             under: Vec::new(),
@@ -101,7 +101,7 @@ impl CellStack {
     /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are rectangles,
     /// which no width tells apart: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
-        if self.shape.rectangles().is_some() {
+        if !self.shape.has_width() {
             return Err(Error::invalid(
                 "rectangular pillars, where those of a width are asked for",
                 "use squares or circles here: `photographs` and calibration know no rectangles, `optimise` no upright ones; the other commands do",
@@ -152,11 +152,11 @@ impl CellStack {
 
     /// Cross-section of the pillar where it is so wide (nm).
     fn outline(&self, width_nm: f64) -> Outline {
-        match self.shape {
+        match self.shape.outline() {
             _ if width_nm <= 0.0 => Outline::empty(),
-            PillarShape::Square => Outline::rounded(width_nm, self.corner_radius_nm),
-            PillarShape::Circle => Outline::circle(width_nm),
-            PillarShape::Rectangle(_) => Outline::empty(),
+            OutlineForm::Square => Outline::rounded(width_nm, self.corner_radius_nm),
+            OutlineForm::Circle => Outline::circle(width_nm),
+            OutlineForm::Polygon => Outline::empty(),
         }
     }
 

@@ -35,7 +35,7 @@ pub fn write_free(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
-    if free.shape.rectangles().is_some() && array.shape != free.shape {
+    if !free.shape.has_width() && array.shape != free.shape {
         return Err(Error::invalid(
             "rectangles without a design",
             "write squares or circles, or give a design with `shape = \"rectangle\"` or `\"upright_rectangle\"`",

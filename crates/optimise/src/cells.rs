@@ -5,6 +5,7 @@ use std::path::Path;
 use metalith_cell::{CellModel, Fidelity, RigorousCell, RotatedCell};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, NeighbourCell, cell_models, neighbour_cell};
+use metalith_pillars::PolarisationBasis;
 use num_complex::Complex64;
 
 use crate::robust::cells_off_height;
@@ -136,9 +137,9 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
 /// # Errors
 /// If they are upright rectangles.
 pub(super) fn check_shape(design: &Design) -> Result<()> {
-    match design.cell.shape.upright() {
-        None => Ok(()),
-        Some(_) => Err(Error::invalid(
+    match design.cell.shape.basis() {
+        None | Some(PolarisationBasis::Circular) => Ok(()),
+        Some(PolarisationBasis::Linear) => Err(Error::invalid(
             "the pillars are upright rectangles, which have a phase for each polarisation",
             "use squares, circles or rotated rectangles: the optimiser finds one phase for all light",
         )),

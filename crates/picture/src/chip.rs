@@ -11,7 +11,7 @@ use metalith_optics::{
     ArrivingLight, AsBuiltElement, AsBuiltOptics, CameraChange, ClassTable, DrawnElement, PathChange, Perturbation,
     SimulationCase, cell_direction,
 };
-use metalith_pillars::PillarMap;
+use metalith_pillars::{PillarId, PillarMap};
 use metalith_sensor::{Camera, Sampling, WavelengthSteps};
 use metalith_wave::PlaneWave;
 use num_complex::Complex64;
@@ -346,8 +346,8 @@ fn distinct_of(
 
 /// Largest index of a table of the cells of a design: a width (nm), or the number of a rectangle.
 fn last_index(design: &Design) -> u16 {
-    let shape = design.cell.shape.rectangles();
-    shape.map_or(design.cell.pitch_nm as u16, |pillars| pillars.last())
+    let last = design.cell.shape.last();
+    last.map_or(design.cell.pitch_nm as u16, |PillarId(number)| number)
 }
 
 /// Where light of an element as made goes, with the power of what passes: as [`Polarised::departing_from`].

@@ -14,7 +14,7 @@ use crate::set::read;
 /// # Errors
 /// What stands against it, with the limit and what to do.
 pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
-    if design.cell.shape.rectangles().is_some() {
+    if !design.cell.shape.has_width() {
         return Err(Error::invalid(
             format!("{} is a design of rectangles", design.path.display()),
             "plan sessions of squares or circles: sets are read of these alone",

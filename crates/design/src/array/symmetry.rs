@@ -80,11 +80,9 @@ impl Symmetry {
         seen
     }
 
-    /// Whether it leaves every pillar of a shape as it is, about its own middle: a rectangle is left by half a turn, an upright one by a
-    /// mirror about an axis too.
+    /// Whether every pillar of a kind is the same after it, about its own middle.
     pub fn keeps(self, shape: PillarShape) -> bool {
-        let is_along_axes = self.quarter_turns.is_multiple_of(2);
-        shape.rectangles().is_none() || (is_along_axes && (!self.mirrored || shape.upright().is_some()))
+        shape.keeps(self.mirrored, self.quarter_turns)
     }
 
     /// Whether it takes a lattice into itself: a hexagonal one has the symmetries of a rectangle.

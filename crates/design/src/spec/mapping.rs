@@ -11,6 +11,7 @@ use super::{ArraySpec, CellSpec, SteeredMapping, SteeringSteps};
 use metalith_cell::{Basis, InversePolynomial, MappingTable, PillarLibrary, RotationMapping};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
+use metalith_pillars::PolarisationBasis;
 
 pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
 
@@ -91,8 +92,8 @@ impl MappingSpec {
         library: LibraryFile,
     ) -> Self {
         let published = InversePolynomial::published();
-        let rotated = cell.shape.rotated().is_some();
-        let upright = cell.shape.upright().is_some();
+        let rotated = cell.shape.basis() == Some(PolarisationBasis::Circular);
+        let upright = cell.shape.basis() == Some(PolarisationBasis::Linear);
         if !rotated && !upright && !s.has("table") && cell.is_known_to_be_another(s) {
             let [least, greatest] = [cell.width_range_nm.0, cell.width_range_nm.1].map(f64::from);
             let pitch = f64::from(cell.pitch_nm);

@@ -108,6 +108,11 @@ impl Sizes {
         Self { pillars, spans }
     }
 
+    /// The pillars themselves.
+    pub fn pillars(&self) -> UprightRectangles {
+        self.pillars
+    }
+
     /// How many pillars are solved at first, in each stack.
     pub fn first(&self) -> usize {
         self.spans.iter().map(|span| span.nodes_nm.len()).sum()

@@ -21,7 +21,7 @@ use metalith_cell::{
     PolarisedLight, PolarisedTables, RotationSamples, UPRIGHT_ORDERS,
 };
 use metalith_core::{Error, Progress, Result};
-use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles};
+use metalith_pillars::{PillarShape, PolarisationBasis, Rectangles, RotatedRectangles};
 
 /// A class of rectangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,9 +66,9 @@ impl RectangleColour {
 /// Diffraction orders an axis that a bank of pillars of a shape is solved with at single wavelengths. Those of upright rectangles are as many
 /// as of pillars as drawn: with fewer, those of a lens beside a resonance have a Strehl ratio that is off by two in a hundred.
 pub fn bank_orders(shape: PillarShape) -> usize {
-    match shape.upright() {
-        Some(_) => UPRIGHT_ORDERS,
-        None => ORDERS,
+    match shape.basis() {
+        Some(PolarisationBasis::Linear) => UPRIGHT_ORDERS,
+        _ => ORDERS,
     }
 }
 
@@ -100,13 +100,8 @@ impl MadeRectangles {
         focused: FocusedLight,
         polarised: PolarisedLight,
     ) -> Result<Self> {
-        let pillars = stated.shape.rectangles();
-        let fits = matches!(
-            (pillars, focused),
-            (Some(Rectangles::Rotated(_)), FocusedLight::Circular(_))
-                | (Some(Rectangles::Upright(_)), FocusedLight::Linear(_))
-        );
-        let Some(pillars) = pillars.filter(|_| fits) else {
+        let fits = stated.shape.basis() == Some(focused.basis());
+        let (true, PillarShape::Rectangle(pillars)) = (fits, stated.shape) else {
             return Err(Error::invalid(
                 "light of a polarisation that these pillars do not focus",
                 "say circular light of rotated rectangles, linear light of upright ones, and none of others",
@@ -204,9 +199,9 @@ impl CalibratedModel {
     /// # Errors
     /// If they are rectangles and it says what counts for one width alone.
     pub fn check_shape(&self, shape: PillarShape) -> Result<()> {
-        match shape.rectangles() {
-            Some(_) => check_rectangles(self),
-            None => Ok(()),
+        match shape.has_width() {
+            false => check_rectangles(self),
+            true => Ok(()),
         }
     }
 }
