@@ -19,7 +19,7 @@ fn main() -> Result<()> {
     let blocks = match std::env::args().nth(1) {
         Some(number) => number
             .parse()
-            .map_err(|_| Error::invalid("no number of blocks", "give 0 or more"))?,
+            .map_err(|_| Error::refused("example/merits", "no number of blocks", "give 0 or more"))?,
         None => 60,
     };
     println!("focal length  cell       mapping    limit  Strehl (smallest)   wall s");

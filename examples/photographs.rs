@@ -10,9 +10,9 @@
 
 use std::path::PathBuf;
 
-use metalith::picture::restore::RestorationMethod;
-use metalith::picture::scene::{images_in, read_far_scene};
-use metalith::picture::{ImagingSystem, Rehearsal, ScenePower, Zone, ZoneScore, scores};
+use metalith::imaging::scene::{images_in, read_far_scene};
+use metalith::imaging::{ForecastScene, ImagingSystem, ScenePower, Zone, ZoneScore, scores};
+use metalith::restoration::RestorationMethod;
 use metalith::sensor::Camera;
 use metalith::{Design, Error, Result, Silent};
 
@@ -26,18 +26,18 @@ fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [design, layout, camera, folder, field, methods, more @ ..] = &arguments[..] else {
         let usage = "DESIGN LAYOUT CAMERA FOLDER FIELD_DEG METHOD,METHOD [separate]";
-        return Err(Error::invalid("too few arguments", usage));
+        return Err(Error::refused("example/photographs", "too few arguments", usage));
     };
     let field_deg = field
         .parse()
-        .map_err(|_| Error::invalid("the field is no number", "give degrees"))?;
+        .map_err(|_| Error::refused("example/photographs", "the field is no number", "give degrees"))?;
     let methods: Vec<RestorationMethod> = methods.split(',').map(str::parse).collect::<Result<_>>()?;
     let separate = more.iter().any(|a| a == "separate");
     let design = Design::read(design.as_ref())?;
     let camera = Camera::read(camera.as_ref())?;
     let photographs = images_in(folder.as_ref())?;
     let read = |path: &PathBuf| read_far_scene(path, field_deg);
-    let studio = ImagingSystem::open(
+    let system = ImagingSystem::open(
         &design,
         layout.as_ref(),
         &camera,
@@ -45,9 +45,9 @@ fn main() -> Result<()> {
         &read(&photographs[0])?,
         &Silent,
     )?;
-    let (simulation, operator) = (studio.simulation(), studio.restoration());
-    let rehearsal = Rehearsal::new(&studio, &operator);
-    let forecast = rehearsal.forecast(&studio, &operator, &Silent)?;
+    let (simulation, operator) = (system.simulation(), system.restoration());
+    let forecast_scene = ForecastScene::new(&system, &operator);
+    let forecast = forecast_scene.forecast(&system, &operator, &Silent)?;
     let mut rows: Vec<Row> = Vec::new();
     let mut powers = Vec::new();
     let mut keep = |way: String, found: Vec<ZoneScore>| match rows.iter_mut().find(|r| r.way == way) {
@@ -59,15 +59,15 @@ fn main() -> Result<()> {
     };
     for path in &photographs {
         let scene = read(path)?;
-        let frame = studio.record(&simulation, &scene, 1)?;
-        let truth = studio.truth(&scene);
+        let frame = system.record(&simulation, &scene, 1)?;
+        let truth = system.truth(&scene);
         powers.push(ScenePower::of(&truth));
-        keep("frame".into(), scores(&studio.unrestored(&operator, &frame), &truth)?);
+        keep("frame".into(), scores(&system.unrestored(&operator, &frame), &truth)?);
         for method in &methods {
             for joint in [true, false] {
                 if joint || separate {
-                    let error = &rehearsal.operator_error;
-                    let picture = studio.restore(&operator, error, &frame, *method, joint, &Silent)?;
+                    let error = &forecast_scene.operator_error;
+                    let picture = system.restore(&operator, error, &frame, *method, joint, &Silent)?;
                     let found = scores(&picture, &truth)?;
                     let words = if joint { "joint" } else { "each alone" };
                     eprintln!("{}: {}, {words}: {:.2} dB", scene.name, method.name(), found[0].psnr_db);

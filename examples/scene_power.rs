@@ -8,8 +8,8 @@
 
 use std::path::PathBuf;
 
-use metalith::picture::ScenePower;
-use metalith::picture::scene::{images_in, read_far_scene};
+use metalith::imaging::ScenePower;
+use metalith::imaging::scene::{images_in, read_far_scene};
 use metalith::{Error, Result};
 use ndarray::Array3;
 
@@ -18,7 +18,8 @@ const FIELD_DEG: f64 = 80.0;
 
 fn main() -> Result<()> {
     let folder = std::env::args_os().nth(1).map(PathBuf::from);
-    let folder = folder.ok_or_else(|| Error::invalid("no folder", "give a folder of photographs"))?;
+    let folder =
+        folder.ok_or_else(|| Error::refused("example/arguments", "no folder", "give a folder of photographs"))?;
     let power = |path: &PathBuf| {
         let scene = read_far_scene(path, FIELD_DEG)?;
         let size = (scene.view.rows, scene.view.columns, 3);
@@ -26,7 +27,8 @@ fn main() -> Result<()> {
         Ok(ScenePower::of(&picture))
     };
     let all = images_in(&folder)?.iter().map(power).collect::<Result<Vec<_>>>()?;
-    let mean = ScenePower::mean(&all).ok_or_else(|| Error::invalid("no photographs", "give a folder that has some"))?;
+    let mean = ScenePower::mean(&all)
+        .ok_or_else(|| Error::refused("example/arguments", "no photographs", "give a folder that has some"))?;
     for (zone, light, planes) in mean.by_zone() {
         println!("{}: light {light:.4}", zone.name());
         for bands in planes {

@@ -68,7 +68,7 @@ def read_table(page: str) -> tuple[dict[str, set[str]], list[str]]:
 
 def read_workspace() -> dict[str, set[str]]:
     """What each crate of the workspace uses of it, dev-dependencies left out."""
-    command = ["cargo", "metadata", "--format-version", "1", "--no-deps"]
+    command = ["cargo", "metadata", "--locked", "--format-version", "1", "--no-deps"]
     answer = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout
     packages = json.loads(answer)["packages"]
     ours = {package["name"] for package in packages}

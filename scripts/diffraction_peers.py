@@ -71,7 +71,7 @@ def run_peer(name):
 
 def run_ours(mode, repeats):
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    command = ["cargo", "run", "--release", "--quiet", "--example", "focus", "--", mode, str(repeats)]
+    command = ["cargo", "run", "--release", "--locked", "--quiet", "--example", "focus", "--", mode, str(repeats)]
     lines = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout.splitlines()
     return [json.loads(line) for line in lines]
 

@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-cargo build --release --bins --examples
+cargo build --release --locked --bins --examples
 python3 -m venv target/peers
 target/peers/bin/pip install --quiet --disable-pip-version-check -r scripts/requirements.txt \
     scipy torchoptics diffractio grcwa meent fmmax

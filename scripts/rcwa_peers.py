@@ -125,7 +125,7 @@ def main():
     names = [a for a in sys.argv[1:] if a in PEERS] or PEERS
     orders = [int(a) for a in sys.argv[1:] if a.isdigit()] or [13, 17]
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    command = ["cargo", "run", "--release", "--quiet", "--example", "cell", "--", *map(str, orders)]
+    command = ["cargo", "run", "--release", "--locked", "--quiet", "--example", "cell", "--", *map(str, orders)]
     lines = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout.splitlines()
     print(f"{'what':<12}{'orders':>9}{'CPU ms':>10}{'ratio':>8}{'| |t| - ours |':>16}")
     for line in lines:

@@ -122,7 +122,7 @@ def aligned_peer(point, along):
 
 def ours(orders, shapes):
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    command = ["cargo", "run", "--release", "--quiet", "--example", "shapes", "--"]
+    command = ["cargo", "run", "--release", "--locked", "--quiet", "--example", "shapes", "--"]
     if program := os.environ.get("SHAPES"):
         command = [program]
     # A circle on either lattice is one kind of the example, rectangles at all angles another.

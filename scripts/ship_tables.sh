@@ -6,7 +6,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 metalith=${1:-target/release/metalith}
-tables=crates/grating/tables
+tables=crates/cell/tables
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p "$tables" "$work/cache"
@@ -17,4 +17,4 @@ for design in mini_3x3 prototype_3x3 neighbours_3x3; do
 done
 cp "$work"/cache/neighbours-*.bin "$tables"
 # Cargo does not see by itself that the tables have changed.
-touch crates/grating/src/shipped.rs
+touch crates/cell/src/neighbours/shipped.rs

@@ -1,4 +1,4 @@
-//! From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
+//! Metalens design, from the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
 //! image it makes.
 //!
 //! Data runs one way. The first line makes a file; the second begins at the bytes of that file, so that
@@ -19,14 +19,14 @@
 //! | [`CellModel`] | [`cell`] | a pillar's width and a wavelength: published, fitted or rigorous |
 //! | [`Propagator`](wave::Propagator) | [`wave`] | transmissions on a lattice: folded, direct, by rings |
 //! | [`Psf`](wave::Psf) | [`wave::psf`] | a field |
-//! | [`Photograph`](wave::Photograph) | [`wave::camera`], [`wave::restore`] | a scene through PSFs, with noise, restored |
+//! | [`ImagingSystem`](imaging::ImagingSystem) | [`imaging`], [`restoration`] | a layout, a camera and a scene: a frame, and the picture restored from it |
 //! | [`verify()`] | [`mod@verify`] | a design, its array and the bytes of a layout |
 //! | [`report`] | [`report`] | anything found: one HTML page and one JSON file |
 //!
 //! Beside the line stand [`optimise`], which finds the radial phase; [`drc`], [`mod@diff`] and [`handoff`], which
 //! start from layouts too; [`calibrate`], which learns from captures what the model lacks; and [`compensate`],
-//! which draws what comes out as meant on the line that was so measured. [`grating`] solves supercells of unlike
-//! pillars; layouts of the cell of the paper are judged by its cell of pillars among unlike neighbours, unless a design says
+//! which draws what comes out as meant on the line that was so measured. [`cell`] holds supercells of unlike
+//! pillars too; layouts of the cell of the paper are judged by its cell of pillars among unlike neighbours, unless a design says
 //! otherwise. The names at the root are those that the line itself needs; each room has its own.
 //!
 //! # Conventions
@@ -84,6 +84,8 @@ extern crate self as metalith;
 pub mod cli;
 mod session;
 
+pub use metalith_attribution as attribution;
+#[cfg(feature = "baselines")]
 pub use metalith_baselines as baselines;
 pub use metalith_calibrate as calibrate;
 pub use metalith_cell as cell;
@@ -94,23 +96,27 @@ pub use metalith_drc as drc;
 pub use metalith_drc::diff;
 pub use metalith_gds as gds;
 pub use metalith_gds::extract;
-pub use metalith_grating as grating;
 pub use metalith_handoff as handoff;
+pub use metalith_imaging as imaging;
 pub use metalith_layout as layout;
 pub use metalith_optics as optics;
 pub use metalith_optimise as optimise;
-pub use metalith_picture as picture;
 pub use metalith_prior as prior;
 pub use metalith_rcwa as rcwa;
 pub use metalith_report as report;
+pub use metalith_restoration as restoration;
 pub use metalith_sensor as sensor;
 pub use metalith_study as study;
+#[cfg(feature = "training")]
+pub use metalith_training as training;
 pub use metalith_verify as verify;
 pub use metalith_verify::compensate;
 pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
-pub use metalith_core::{AtomicFile, Error, Fault, Faults, FolderLock, Progress, Result, Silent, Wedge, text};
+pub use metalith_core::{
+    AtomicFile, Error, Fault, FaultKind, Faults, FolderLock, Progress, Result, Silent, Wedge, text,
+};
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;
 pub use metalith_gds::extract::{Extraction, ExtractionPlan, extract};

@@ -64,7 +64,7 @@ impl Design {
         self.design.cell.pitch_nm
     }
 
-    /// How the pillars stand.
+    /// Lattice of the pillars.
     #[getter]
     fn lattice(&self) -> String {
         self.design.cell.lattice.to_string()
@@ -113,7 +113,7 @@ impl Design {
 #[pyclass(frozen, module = "metalith._native")]
 pub struct Array {
     pub array: PillarArray,
-    /// None for pillars that were given as arrays.
+    /// Design of the pillars; `None` for pillars that were given as arrays.
     pub design: Option<metalith::Design>,
 }
 
@@ -130,7 +130,7 @@ impl Array {
         self.array.lattice.pitch_nm()
     }
 
-    /// How the pillars stand.
+    /// Lattice of the pillars.
     #[getter]
     fn lattice(&self) -> String {
         self.array.lattice.kind().to_string()
@@ -142,7 +142,7 @@ impl Array {
         self.array.lattice.sites()
     }
 
-    /// What the pillars are.
+    /// Shape of the pillars.
     #[getter]
     fn shape(&self) -> ToldShape {
         told(self.array.shape)
@@ -166,7 +166,8 @@ impl Array {
     /// Widths of one element (nm): uint16, rows along +y, columns along +x, zero where there is no pillar.
     fn widths<'py>(&self, py: Python<'py>, element: usize) -> PyResult<Bound<'py, PyArray2<u16>>> {
         let placed = self.array.placed.get(element).ok_or_else(|| {
-            error(Error::invalid(
+            error(Error::refused(
+                "array/unknown-element",
                 format!("there is no element {element}"),
                 format!("this array has elements 0 to {}", self.array.placed.len() - 1),
             ))
@@ -191,7 +192,8 @@ impl Array {
             Some("sref") => Hierarchy::Sref,
             Some("flat") => Hierarchy::Flat,
             Some(other) => {
-                return Err(error(Error::invalid(
+                return Err(error(Error::refused(
+                    "layout/unknown-hierarchy",
                     format!("there is no hierarchy `{other}`"),
                     "use folded, sref or flat",
                 )));
@@ -202,7 +204,8 @@ impl Array {
             Some("gds") => LayoutFormat::Gds,
             Some("oas") => LayoutFormat::Oasis(OasisEncoding::default()),
             _ => {
-                return Err(error(Error::invalid(
+                return Err(error(Error::refused(
+                    "layout/unknown-ending",
                     format!("{}: this ending is not known", path.display()),
                     "name a file that ends in .gds or .oas",
                 )));
@@ -237,7 +240,8 @@ pub fn array_of_widths(
 ) -> PyResult<Array> {
     let shape = shape_of(shape).map_err(error)?;
     if widths.len() != centres_nm.len() || widths.is_empty() {
-        return Err(error(Error::invalid(
+        return Err(error(Error::refused(
+            "array/counts-differ",
             format!("{} maps of widths, {} centres", widths.len(), centres_nm.len()),
             "give one centre for each map, and at least one",
         )));
@@ -268,19 +272,22 @@ pub fn width_map(
     let widest_nm = kind.widest_nm(pitch_nm);
     if let (Some(PillarId(last)), Some((_, longer))) = (shape.last(), shape.edge_range_nm()) {
         if u32::from(longer) > pitch_nm {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "array/pillar-too-wide",
                 format!("rectangles {longer} nm long at a pitch of {pitch_nm} nm"),
                 "give edges of at most the pitch",
             ));
         }
         if let Some(wrong) = width_nm.iter().find(|n| **n > last) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "array/unknown-pillar",
                 format!("a rectangle of number {wrong}"),
                 format!("numbers go from 1 to {last}: the steps of half a turn, or the pairs of widths"),
             ));
         }
     } else if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > widest_nm) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "array/pillar-too-wide",
             format!("a pillar {wrong} nm wide"),
             format!(
                 "widths are even, so that edges are whole nanometres, and at most the distance of neighbours, {widest_nm} nm"
@@ -294,8 +301,8 @@ pub fn width_map(
     })
 }
 
-/// What a layout holds: names, centres (nm) and widths (nm) of its elements, pitch (nm) and kind of their lattices, number of
-/// pillars, number of other shapes on the layer, top cell, shape of the pillars.
+/// Contents of a layout: names, centres (nm) and widths (nm) of its elements, pitch (nm) and kind of their lattices,
+/// number of pillars, number of other shapes on the layer, top cell, shape of the pillars.
 type ReadLayout<'py> = (
     Vec<String>,
     Vec<[i64; 2]>,
@@ -352,7 +359,7 @@ pub fn read_layout<'py>(
     ))
 }
 
-/// Where the elements of an array are.
+/// Places of the elements of an array.
 fn sites(array: &Array) -> Vec<ElementSite> {
     if let Some(design) = &array.design {
         return design.sites();

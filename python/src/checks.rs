@@ -1,4 +1,4 @@
-//! Whether a layout is what it should be: rules, verification, calibration. Answers are those of the program, as JSON.
+//! Checks of a layout: rules, verification, calibration. Answers are those of the program, as JSON.
 
 use std::path::PathBuf;
 

@@ -12,15 +12,20 @@ use crate::work::error;
 /// The kind that a word names.
 pub fn kind_of(word: &str) -> Result<LatticeKind> {
     let known = LatticeKind::CHOICES.iter().find(|(name, _)| *name == word);
-    known
-        .map(|(_, kind)| *kind)
-        .ok_or_else(|| Error::invalid(format!("there is no lattice `{word}`"), "use square or hexagonal"))
+    known.map(|(_, kind)| *kind).ok_or_else(|| {
+        Error::refused(
+            "lattice/unknown",
+            format!("there is no lattice `{word}`"),
+            "use square or hexagonal",
+        )
+    })
 }
 
 /// The lattice of a square grid of so many rows and columns; `what` says whose it is.
 pub fn lattice_of(kind: LatticeKind, pitch_nm: u32, (rows, columns): (usize, usize), what: &str) -> Result<Lattice> {
     if rows != columns {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "lattice/sites",
             format!("a {what} of {rows} x {columns} places"),
             "give a square one: pad it with zeros, which are places without pillars",
         ));
@@ -28,10 +33,11 @@ pub fn lattice_of(kind: LatticeKind, pitch_nm: u32, (rows, columns): (usize, usi
     Lattice::of_kind(kind, pitch_nm, rows)
 }
 
-/// Nothing, if pillars of such a shape can stand on a lattice of the kind.
+/// Succeeds if pillars of such a shape can stand on a lattice of the kind.
 pub fn check_shape(kind: LatticeKind, shape: PillarShape) -> Result<()> {
     match kind.refusal(shape) {
-        Some(what) => Err(Error::invalid(
+        Some(what) => Err(Error::refused(
+            "lattice/squares-on-hexagons",
             what,
             "say that they are circles (`shape=\"circle\"`), or use the square lattice",
         )),
@@ -39,13 +45,13 @@ pub fn check_shape(kind: LatticeKind, shape: PillarShape) -> Result<()> {
     }
 }
 
-/// Whether a place of the grid is a site that light passes and a pillar can stand on.
+/// True if a place of the grid is a site that light passes and a pillar can stand on.
 fn is_site(lattice: Lattice, ix: usize, iy: usize) -> bool {
     let [columns, rows] = lattice.reach();
     columns.contains(&ix) && rows.contains(&iy) && lattice.has(ix, iy)
 }
 
-/// Nothing, if all places that something stands at are sites.
+/// Succeeds if all places that something stands at are sites.
 pub fn check_places<T>(lattice: Lattice, of: &Array2<T>, stands: impl Fn(&T) -> bool) -> Result<()> {
     let wrong = of
         .indexed_iter()
@@ -53,7 +59,8 @@ pub fn check_places<T>(lattice: Lattice, of: &Array2<T>, stands: impl Fn(&T) -> 
     let Some(((iy, ix), _)) = wrong else {
         return Ok(());
     };
-    Err(Error::invalid(
+    Err(Error::refused(
+        "lattice/not-a-site",
         format!("something at row {iy}, column {ix}, which is no site of the hexagonal lattice"),
         "leave zero where `is_site` of `metalith.places` is false: sites have an even sum of row and column, and rows end where \
          the columns do",
@@ -65,7 +72,8 @@ pub fn stack_on(stack: CellStack, kind: LatticeKind, shape: PillarShape) -> Resu
     check_shape(kind, shape)?;
     // Rows of a hexagonal lattice are drawn whole nanometres apart.
     if !kind.is_square() && stack.pitch_nm.fract() != 0.0 {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "lattice/off-grid",
             format!("a hexagonal lattice with a pitch of {} nm", stack.pitch_nm),
             "give a whole number of nanometres",
         ));

@@ -16,7 +16,7 @@ use crate::lattices::{check_places, kind_of, lattice_of, stack_on};
 use crate::shapes::{ToldShape, shape_of};
 use crate::work::{error, work};
 
-/// What pillars are made of, where no design says.
+/// Stack of the pillars, where no design gives it.
 pub(crate) fn stack(pitch_nm: f64, height_nm: f64, pillar: &str, substrate: &str) -> Result<CellStack> {
     let here = Path::new("");
     Ok(CellStack {
@@ -53,7 +53,8 @@ impl Given {
     fn new(values: Array2<Complex32>, pitch_nm: u32, kind: LatticeKind) -> Result<Self> {
         let lattice = lattice_of(kind, pitch_nm, values.dim(), "aperture")?;
         if values.iter().any(|v| !v.re.is_finite() || !v.im.is_finite()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "aperture/not-numbers",
                 "an aperture with values that are no numbers",
                 "give finite values",
             ));
@@ -146,7 +147,8 @@ pub fn cell<'py>(
     drop((widths_nm, wavelengths_nm));
     let shape = shape_of(shape).map_err(error)?;
     if !shape.has_width() {
-        return Err(error(Error::invalid(
+        return Err(error(Error::refused(
+            "cell/rectangle-by-width",
             "the transmission of rectangles by their width",
             "give squares or circles: rectangles are told by numbers, and `metalith.psf` simulates them",
         )));

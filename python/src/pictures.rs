@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
-use metalith::picture::scene::SceneImage;
-use metalith::picture::{self, OperatorError, Rehearsal};
+use metalith::imaging::scene::SceneImage;
+use metalith::imaging::{self, ForecastScene, OperatorError};
 use metalith::prior::NetworkDenoiser;
+use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use metalith::sensor::Camera;
 use metalith::{CalibratedModel, Error, Result};
 use ndarray::Array3;
@@ -22,15 +22,15 @@ const FAR: f64 = f64::INFINITY;
 /// A layout behind a camera, and the field of its scenes.
 #[pyclass(frozen)]
 pub struct ImagingSystem {
-    studio: picture::ImagingSystem,
-    /// What the operator of the restoration errs by; found when it is first needed.
+    system: imaging::ImagingSystem,
+    /// Error of the operator of the restoration; computed when it is first needed.
     operator_error: OnceLock<OperatorError>,
 }
 
 /// A frame that was recorded.
 #[pyclass(frozen)]
 pub struct Frame {
-    frame: picture::Frame,
+    frame: imaging::Frame,
 }
 
 #[pymethods]
@@ -50,7 +50,7 @@ impl Frame {
 
 #[pymethods]
 impl ImagingSystem {
-    /// Kernels and veil of a layout, made or taken from the disk. Scenes whose pixels are finer than half of one of the sensor are
+    /// Kernels and stray light of a layout, made or taken from the disk. Scenes whose pixels are finer than half of one of the sensor are
     /// averaged to these; truth and pictures have the size of the averaged scene then.
     #[staticmethod]
     #[pyo3(signature = (design, layout, camera, rows, columns, field_deg, distance_mm=None, model=None, prior=None, progress=None))]
@@ -69,20 +69,20 @@ impl ImagingSystem {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let design = &design.design;
-        let studio = work(py, progress, |p| {
+        let system = work(py, progress, |p| {
             let camera = Camera::read(&camera)?;
             let model = model.as_deref().map(CalibratedModel::read).transpose()?;
             let prior = prior.as_deref().map(LearnedDenoiser::read).transpose()?;
             let black = Array3::zeros((rows, columns, 3));
             let scene = SceneImage::of_rgb("scene", &black, field_deg, distance_mm.map_or(FAR, |mm| mm * 1e3));
-            let mut studio = picture::ImagingSystem::open(design, &layout, &camera, model.as_ref(), &scene, p)?;
+            let mut system = imaging::ImagingSystem::open(design, &layout, &camera, model.as_ref(), &scene, p)?;
             if let Some(prior) = prior {
-                studio.prior = prior;
+                system.prior = prior;
             }
-            Ok(studio)
+            Ok(system)
         })?;
         Ok(Self {
-            studio,
+            system,
             operator_error: OnceLock::new(),
         })
     }
@@ -99,7 +99,7 @@ impl ImagingSystem {
         let rgb = scene.as_array().to_owned();
         let frame = work(py, progress, |_| {
             let scene = self.scene(&rgb)?;
-            self.studio.record(&self.studio.simulation(), &scene, seed)
+            self.system.record(&self.system.simulation(), &scene, seed)
         })?;
         Ok(Frame { frame })
     }
@@ -107,14 +107,14 @@ impl ImagingSystem {
     /// The frame of signals that a camera recorded, full scale being one.
     fn frame(&self, planes: Vec<PyReadonlyArray2<'_, f32>>) -> PyResult<Frame> {
         let signals = planes.iter().map(|plane| plane.as_array().to_owned()).collect();
-        let frame = self.studio.frame_of(signals).map_err(error)?;
+        let frame = self.system.frame_of(signals).map_err(error)?;
         Ok(Frame { frame })
     }
 
-    /// What an ideal camera of the same channels gives of a scene, linear sRGB.
+    /// Image of a scene by an ideal camera of the same channels, linear sRGB.
     fn truth<'py>(&self, py: Python<'py>, scene: PyReadonlyArray3<'py, f64>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let scene = self.scene(&scene.as_array().to_owned()).map_err(error)?;
-        Ok(PyArray3::from_owned_array(py, self.studio.truth(&scene)))
+        Ok(PyArray3::from_owned_array(py, self.system.truth(&scene)))
     }
 
     /// The picture restored from a frame, linear sRGB.
@@ -129,9 +129,9 @@ impl ImagingSystem {
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let method: RestorationMethod = method.parse().map_err(error)?;
         let found = work(py, progress, |p| {
-            let operator = self.studio.restoration();
+            let operator = self.system.restoration();
             let expected = self.operator_error(&operator);
-            self.studio.restore(&operator, expected, &frame.frame, method, joint, p)
+            self.system.restore(&operator, expected, &frame.frame, method, joint, p)
         })?;
         Ok(PyArray3::from_owned_array(py, found))
     }
@@ -146,9 +146,9 @@ impl ImagingSystem {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Vec<Bound<'py, PyArray3<f64>>>> {
         let drawn = work(py, progress, |p| {
-            let operator = self.studio.restoration();
+            let operator = self.system.restoration();
             let expected = self.operator_error(&operator);
-            self.studio.samples(&operator, expected, &frame.frame, 0..count, p)
+            self.system.samples(&operator, expected, &frame.frame, 0..count, p)
         })?;
         Ok(drawn.into_iter().map(|d| PyArray3::from_owned_array(py, d)).collect())
     }
@@ -156,15 +156,17 @@ impl ImagingSystem {
 
 impl ImagingSystem {
     fn scene(&self, rgb: &Array3<f64>) -> Result<SceneImage> {
-        let view = self.studio.given;
+        let view = self.system.given;
         if rgb.dim() != (view.rows, view.columns, 3) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "imaging/scene-shape",
                 format!("a scene of shape {:?}", rgb.dim()),
                 format!("give one of shape ({}, {}, 3)", view.rows, view.columns),
             ));
         }
         if !rgb.iter().all(|v| v.is_finite() && *v >= 0.0) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "imaging/scene-values",
                 "a scene with light that is negative or no number",
                 "give finite values from zero, white being one",
             ));
@@ -172,9 +174,9 @@ impl ImagingSystem {
         Ok(SceneImage::of_rgb("scene", rgb, view.field_deg, view.distance_um))
     }
 
-    fn operator_error(&self, operator: &picture::FrameOperator<'_>) -> &OperatorError {
+    fn operator_error(&self, operator: &imaging::FrameOperator<'_>) -> &OperatorError {
         self.operator_error
-            .get_or_init(|| Rehearsal::new(&self.studio, operator).operator_error)
+            .get_or_init(|| ForecastScene::new(&self.system, operator).operator_error)
     }
 }
 

@@ -30,10 +30,11 @@ const PIXELS_UM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 /// Diameters of openings that are taken (um), as by the program.
 const APERTURES_UM: std::ops::RangeInclusive<f64> = 0.1..=1e5;
 
-/// Nothing, if a length that is given lies within a range (um).
+/// Succeeds if a length that is given lies within a range (um).
 fn within(what: &str, um: Option<f64>, range: &std::ops::RangeInclusive<f64>) -> Result<()> {
     match um.filter(|um| !range.contains(um)) {
-        Some(um) => Err(Error::invalid(
+        Some(um) => Err(Error::refused(
+            "option/out-of-range",
             format!("{what} = {um}"),
             format!(
                 "give a number from {} to {}, in micrometres",
@@ -55,19 +56,19 @@ struct Lit {
     shape: PillarShape,
     widths: PillarMap,
     wedge: Wedge,
-    /// From the pillars to the plane that is looked at (um).
+    /// Distance from the pillars to the plane that is viewed (um).
     distance_um: f64,
 }
 
 impl Lit {
-    /// What elements have alike that are simulated together; `by_place` where what is made of one depends on where it stands.
+    /// Properties that elements simulated together share; `by_place` where the result for one depends on its place.
     fn like(&self, by_place: bool) -> (Wedge, f64, Option<f64>, Option<[i64; 2]>) {
         let place = by_place.then_some(self.centre_nm);
         (self.wedge, self.distance_um, self.aperture_radius_um, place)
     }
 }
 
-/// In what light elements are looked at.
+/// Light in which elements are viewed.
 struct Looked {
     wavelengths_nm: Vec<f64>,
     fields_deg: Vec<(f64, f64)>,
@@ -95,10 +96,7 @@ fn simulate(
     light: &Looked,
     progress: &dyn Progress,
 ) -> Result<Vec<Found>> {
-    let by_place = match case {
-        SimulationCase::Cell(_) => false,
-        SimulationCase::Made(chip) => chip.perturbation().depends_on_place(),
-    };
+    let by_place = case.perturbation().depends_on_place();
     let mut found: Vec<(usize, Vec<Found>)> = Vec::new();
     let mut waiting: Vec<(usize, Lit)> = elements.into_iter().enumerate().collect();
     while let Some((_, first)) = waiting.first() {
@@ -187,7 +185,7 @@ fn simulate_together(
 /// PSFs for Python: a dictionary for each. With the statement of the model that they rest on, if any, as JSON.
 type ToldPsfs<'py> = (Vec<Bound<'py, PyDict>>, Option<String>);
 
-/// What is simulated as made, if anything, with the PSFs.
+/// PSFs with what is simulated as fabricated, if anything.
 fn told<'py>(py: Python<'py>, (found, made): (Vec<Found>, Option<AsBuiltChip>)) -> PyResult<ToldPsfs<'py>> {
     let one = |f: Found| {
         let dict = PyDict::new(py);
@@ -234,7 +232,8 @@ pub fn psf_of_array<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<ToldPsfs<'py>> {
     let design = array.design.as_ref().ok_or_else(|| {
-        error(Error::invalid(
+        error(Error::refused(
+            "psf/no-sensor",
             "an array of widths says nothing of the sensor",
             "give `distance_um` and what pillars are made of",
         ))
@@ -247,7 +246,8 @@ pub fn psf_of_array<'py>(
     let is_first = |k: &usize| (0..*k).all(|earlier| looks(earlier) != looks(*k));
     let chosen = elements.unwrap_or_else(|| (0..placed.len()).filter(is_first).collect());
     if let Some(wrong) = chosen.iter().find(|k| **k >= placed.len()) {
-        return Err(error(Error::invalid(
+        return Err(error(Error::refused(
+            "array/unknown-element",
             format!("there is no element {wrong}"),
             format!("this array has elements 0 to {}", placed.len() - 1),
         )));
@@ -286,8 +286,8 @@ pub fn psf_of_array<'py>(
             fast,
         };
         let case = match &made {
-            Some(chip) => SimulationCase::Made(chip),
-            None => SimulationCase::Cell(cells[0].as_ref()),
+            Some(chip) => SimulationCase::from(chip),
+            None => SimulationCase::from(cells[0].as_ref()),
         };
         Ok((simulate(lit.collect(), case, &light, p)?, made))
     })?;
@@ -346,7 +346,6 @@ pub fn psf_of_widths<'py>(
             Wanted::Model(model) => {
                 let stated = LitStack {
                     focused: shape.basis().map(|_| focused(light, shape)),
-                    polarised: light,
                     stack,
                 };
                 let chip = AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());
@@ -373,8 +372,8 @@ pub fn psf_of_widths<'py>(
             fast,
         };
         let case = match (&made, &cell) {
-            (Some(chip), _) => SimulationCase::Made(chip),
-            (None, cell) => SimulationCase::Cell(cell.as_deref().expect("a cell where there is no model")),
+            (Some(chip), _) => SimulationCase::from(chip),
+            (None, cell) => SimulationCase::from(cell.as_deref().expect("a cell where there is no model")),
         };
         Ok((simulate(lit.collect(), case, &light, p)?, made))
     })?;

@@ -1,4 +1,4 @@
-//! What pillars are, between Python and the library.
+//! Shapes of pillars, between Python and the library.
 
 use metalith::{Error, PillarShape, Rectangles, Result, RotatedRectangles, UprightRectangles};
 use numpy::{PyArray1, PyReadonlyArray1};
@@ -38,14 +38,15 @@ pub fn shape_of((word, width_nm, length_nm, steps): ToldShape) -> Result<PillarS
     }
     let known = PillarShape::CHOICES.iter().find(|(name, _)| *name == word);
     known.map(|(_, shape)| *shape).ok_or_else(|| {
-        Error::invalid(
+        Error::refused(
+            "pillars/unknown-kind",
             format!("there is no shape `{word}`"),
             "use square, circle, metalith.Rectangles or metalith.UprightRectangles",
         )
     })
 }
 
-/// Whether an edge so long has its ends on the grid of 1 nm about its middle.
+/// True if an edge so long has its ends on the grid of 1 nm about its middle.
 fn even(nm: u16) -> bool {
     nm > 0 && nm.is_multiple_of(2)
 }
@@ -53,7 +54,8 @@ fn even(nm: u16) -> bool {
 fn upright(shortest_nm: u16, step_nm: u16, lengths: u16) -> Result<UprightRectangles> {
     let most = UprightRectangles::MOST_LENGTHS;
     if !even(shortest_nm) || !even(step_nm) || !(1..=most).contains(&lengths) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "pillars/upright-rectangles",
             format!("upright rectangles of {lengths} widths from {shortest_nm} nm in steps of {step_nm} nm"),
             format!("give an even width and step, so that edges are on the 1 nm grid, and 1 to {most} widths"),
         ));
@@ -84,7 +86,8 @@ pub fn upright_numbers<'py>(
     let number = |(x, y): (u16, u16)| match (x, y) {
         (0, 0) => Ok(0),
         _ => pillars.number([x, y]).ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "array/unknown-pillar",
                 format!("a pillar of {x} x {y} nm"),
                 format!(
                     "widths go from {} to {} nm in steps of {} nm; zero along both axes where there is none",
@@ -121,13 +124,15 @@ pub fn upright_widths<'py>(
 
 fn rectangles(width_nm: u16, length_nm: u16, steps: u16) -> Result<RotatedRectangles> {
     if !even(width_nm) || !even(length_nm) || width_nm >= length_nm {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "pillars/rectangle-size",
             format!("rectangles of {width_nm} x {length_nm} nm"),
             "give even edges, so that the corners of an upright pillar are on the 1 nm grid, the width below the length",
         ));
     }
     if !(1..=MOST_STEPS).contains(&steps) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "pillars/rotations",
             format!("{steps} rotations in half a turn"),
             format!("give 1 to {MOST_STEPS} steps"),
         ));
@@ -151,7 +156,8 @@ pub fn rotation_numbers<'py>(
     let pillars = rectangles(width_nm, length_nm, steps).map_err(error)?;
     let rotations = rotations_deg.as_array();
     if rotations.iter().any(|deg| deg.is_infinite()) {
-        return Err(error(Error::invalid(
+        return Err(error(Error::refused(
+            "array/not-numbers",
             "a rotation that is infinite",
             "give degrees, or NaN where there is no pillar",
         )));

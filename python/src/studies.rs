@@ -22,7 +22,7 @@ pub fn study_plan(
     Ok(serde_json::json!({ "plan": plan, "shards": plan.cut().shards() }).to_string())
 }
 
-/// Which shards are there.
+/// Shards that are there.
 #[pyfunction]
 pub fn study_status(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
     let status = py.detach(|| Work::open(&folder)?.cut().status()).map_err(error)?;

@@ -1,31 +1,31 @@
-//! What pillars are simulated as, and in what light, by the words of a caller.
+//! Simulation of pillars and its light, by the words of a caller.
 
 use std::path::Path;
 
 use metalith::cell::{
-    Analyser, CellStack, FittedCell, FocusedLight, Handedness, PointwiseCell, Polarisation, PolarisationAxis,
-    PolarisedLight, PublishedCell, cache_folder, polarising_cell,
+    Analyser, CellStack, FittedCell, FocusedLight, Handedness, Mapping, NeighbourCell, PointwiseCell, Polarisation,
+    PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
 };
 use metalith::design::band_about;
-use metalith::grating::{Mapping, NeighbourCell};
 use metalith::{
     CalibratedModel, CellModel, Error, Fidelity, LatticeKind, OutlineForm, PillarMap, PillarShape, PolarisationBasis,
     Result,
 };
 
-/// What pillars are simulated as.
+/// Simulation that the caller asks for.
 pub enum Wanted {
-    /// As drawn, by such a cell.
+    /// Pillars as drawn, by such a cell.
     Cell(Fidelity),
-    /// As made on a measured line and bench.
+    /// Pillars as fabricated on a measured line and bench.
     Model(Box<CalibratedModel>),
 }
 
 impl Wanted {
-    /// What a word and a file name; a model has its own cells.
+    /// Simulation that a word and a file name; a model has its own cells.
     pub fn of(fidelity: Option<&str>, model: Option<&Path>) -> Result<Self> {
         match (fidelity, model) {
-            (Some(word), Some(_)) => Err(Error::invalid(
+            (Some(word), Some(_)) => Err(Error::refused(
+                "option/model-and-fidelity",
                 format!("the fidelity `{word}` and a model"),
                 "leave out one of `fidelity` and `model`: a model has its own cells",
             )),
@@ -42,7 +42,8 @@ fn fidelity(word: &str) -> Result<Fidelity> {
         "neighbours" => Ok(Fidelity::Neighbours),
         "fitted" => Ok(Fidelity::Fitted),
         "published" => Ok(Fidelity::Published),
-        _ => Err(Error::invalid(
+        _ => Err(Error::refused(
+            "cell/unknown-model",
             format!("there is no fidelity `{word}`"),
             "use rigorous, neighbours, fitted or published",
         )),
@@ -59,19 +60,22 @@ pub fn polarised(arriving: Option<&str>, analyser: Option<&str>, shape: PillarSh
     let analyser: Option<Analyser> = analyser.map(str::parse).transpose()?;
     let usual = arriving == own && analyser.is_none();
     if shape.basis() == Some(PolarisationBasis::Linear) && analyser == Some(Analyser::Circular) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/analyser",
             "a circular analyser behind upright rectangles, which focus no hand",
             "give `analyser` x, y or an angle",
         ));
     }
     if shape.basis().is_none() && !usual {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/polarisation-of-pillars",
             format!("light of a polarisation for {}", shape.plural()),
             "leave out `arriving` and `analyser`: they count for rectangles alone",
         ));
     }
     if analyser == Some(Analyser::Circular) && !matches!(arriving, Polarisation::Circular(_)) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/analyser",
             format!("a circular analyser in light that arrives {arriving}"),
             "give an array of a design, which says what the pillars focus: the analyser passes what that is converted to",
         ));
@@ -97,7 +101,8 @@ pub fn focused(light: PolarisedLight, shape: PillarShape) -> FocusedLight {
 pub fn refuse(wanted: Fidelity, shape: PillarShape, kind: LatticeKind) -> Result<()> {
     // Its polynomials are of squares.
     if shape.outline() == OutlineForm::Circle && wanted == Fidelity::Published {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "cell/model-not-for-pillar",
             format!("{} by the `{wanted}` cell", shape.plural()),
             "use rigorous, neighbours or fitted",
         ));

@@ -13,7 +13,7 @@ use crate::MetalithError;
 /// Time between two looks for Ctrl-C: no person feels it, and no call waits for it.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What the work says, for the caller's thread to read.
+/// Progress of the work, for the caller's thread to read.
 #[derive(Default)]
 struct Watched {
     what: Mutex<String>,

@@ -189,11 +189,14 @@ def test_psfs_are_those_of_the_program(array: ml.Array, tmp_path: Path) -> None:
     """The same pillars, cells and propagators of the same file: to the last bit."""
     array.write(tmp_path / "chip.oas")
     layout = ml.read_layout(tmp_path / "chip.oas")
+    cell = tmp_path / "cell.toml"
+    pillars = f'lattice = "hexagonal"\nshape = "circle"\npillar_height_nm = 900\npillar_material = "{SILICON}"\n'
+    cell.write_text(f"[cell]\npitch_nm = {PITCH_NM}\nwidth_min_nm = 150\nwidth_max_nm = 516\n{pillars}")
     samples = 64
     for fidelity in ("rigorous", "fitted"):
         out = tmp_path / fidelity
-        flags = ["--distance-um", str(FOCAL_UM), "--wavelength-nm", "1550", "--height-nm", "900"]
-        flags += ["--samples", str(samples), "--pillar-material", SILICON]
+        flags = ["--distance-um", str(FOCAL_UM), "--wavelength-nm", "1550", "--cell", str(cell)]
+        flags += ["--samples", str(samples)]
         flags += ["--fidelity", fidelity, "--out", str(out), "--quiet"]
         program = Path(sys.executable).with_name("metalith")
         run = subprocess.run([program, "psf", tmp_path / "chip.oas", *flags], capture_output=True, text=True)
@@ -305,10 +308,10 @@ def test_a_picture_is_of_its_scene(array: ml.Array, tmp_path: Path) -> None:
     camera = tmp_path / "camera.toml"
     camera.write_text(text)
     design = array.design or pytest.fail()
-    studio = ml.ImagingSystem(design, tmp_path / "chip.oas", camera, shape=shape, field_deg=30.0)
+    system = ml.ImagingSystem(design, tmp_path / "chip.oas", camera, shape=shape, field_deg=30.0)
     scene = np.full((*shape, 3), 0.02)
     scene[4:12, 18:28] = 0.9
-    restored, truth = studio.restore(studio.record(scene)), studio.truth(scene)
+    restored, truth = system.restore(system.record(scene)), system.truth(scene)
     assert restored.shape == truth.shape
     # A mirrored, shifted or blurred picture is less like the scene than this.
     assert np.corrcoef(restored.ravel(), truth.ravel())[0, 1] > 0.8

@@ -13,63 +13,63 @@ use metalith::{Error, Result};
 
 use super::{Outcome, Terminal, print_json, print_line};
 
-/// Find the effects by which a measured set differs from its model.
+/// Find the effects by which a measured set differs from its prediction.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  metalith calibrate bench/session-1 --out out/session-1\n\nWrites diagnosis.json, report.html, model.toml and, where something stands out in what is left, proposal.toml; those of an earlier run are removed. With the verdict unexplained or data_unfit there is no model.toml. Exit code 1 if too few captures can be used."
+    after_help = "Example:\n  metalith calibrate bench/session-1 --out out/session-1\n\nWrites diagnosis.json, report.html, model.toml and, if the residual shows a pattern, proposal.toml; those of an earlier run are removed. With the verdict unexplained or data_unfit there is no model.toml. Exit code 1 if too few measurements can be used."
 )]
 pub struct CalibrateArgs {
     /// Folders of sets, or their `measurement.toml`. Sessions of one plan share their simulations.
     #[arg(required = true)]
     sets: Vec<PathBuf>,
 
-    /// Folder for the answers, created if need be, one folder for each set if there are several;
-    /// `out/calibrate/` and the set's name if left out.
+    /// Folder for the results, created if need be, with a folder for each set if there are several; `out/calibrate/`
+    /// and the set's name if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// Try these effects alone, separated by commas; all of them if left out. With `--validate` all are tried, and these are the
-    /// effects that the synthetic sets have.
+    /// Try these effects only, separated by commas; all if left out. With `--validate` all are tried, and the synthetic
+    /// sets have these effects.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
 
-    /// Try the effects that this file declares by expressions as well: `[[effect]]` with name, stage and expression.
+    /// Also try the effects that this file declares by expressions: `[[effect]]` with name, stage and expression.
     #[arg(long, value_name = "FILE")]
     declare: Option<PathBuf>,
 
-    /// Where something is left that no effect explains, try the effects that are proposed for it (`proposal.toml`) as
-    /// well, and answer with them.
+    /// If a residual remains that no effect explains, also try the effects that are proposed for it (`proposal.toml`).
     #[arg(long, conflicts_with = "validate")]
     adopt: bool,
 
-    /// Validate the calibration itself instead, on synthetic sets like this one: without effects, with each
-    /// effect at three sizes, with pairs, and with effects that are not listed. Takes about an hour of CPU time;
-    /// writes validation.html, validation.json, validation.txt, and validation_trials.jsonl as it goes.
+    /// Validate the calibration itself instead, on synthetic sets like this one: without effects, with each effect at
+    /// three sizes, with pairs, and with effects that are not listed. Takes about an hour of CPU time. Writes
+    /// validation.html, validation.json, validation.txt and, set by set, validation_trials.jsonl.
     #[arg(long, alias = "proof")]
     validate: bool,
 
-    /// Synthetic sets without effect in the validation: 60, and none beside `--trial` or `--random`.
+    /// Number of synthetic sets without effect; if left out 60, with `--trial` or `--random` none.
     #[arg(long, value_name = "N", requires = "validate")]
     nulls: Option<u64>,
 
-    /// Validate on a synthetic set with these effects alone, sizes in typical sizes: `cd_bias=1+film_index=-0.5`, or each number
-    /// of an effect: `tilt=1,-0.5`. May be given several times.
+    /// Validate on one synthetic set with these effects, in typical sizes: `cd_bias=1+film_index=-0.5`, or with each
+    /// value of an effect: `tilt=1,-0.5`. May be given several times.
     #[arg(long, value_name = "EFFECTS", requires = "validate")]
     trial: Vec<String>,
 
-    /// Validate on so many synthetic sets with one effect or two of random size alone: what intervals are worth.
+    /// Validate on this number of synthetic sets with one or two effects of random size, which tests the intervals.
     #[arg(long, value_name = "N", requires = "validate", default_value_t = 0)]
     random: u64,
 
-    /// Other synthetic sets: other chips of `--random`, another noise and another bench of all.
+    /// Seed of the synthetic sets: chips of `--random`, noise and bench of all sets.
     #[arg(long, value_name = "N", requires = "validate", default_value_t = 0)]
     seed: u32,
 
-    /// Sets without noise, and only what is there is fitted: what values err by then is the model's own error.
+    /// Use sets without noise and fit only the effects that are present: the errors of values are then those of the
+    /// model itself.
     #[arg(long, requires = "validate")]
     noiseless: bool,
 
-    /// Diffraction orders along an axis that cells of synthetic sets are solved with, odd; fits use 13.
+    /// Diffraction orders along an axis for the cells of synthetic sets, odd; fits use 13.
     #[arg(long, value_name = "N", requires = "validate")]
     orders: Option<usize>,
 
@@ -98,7 +98,8 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
         }
     };
     if let Some(k) = (1..outs.len()).find(|&k| outs[..k].contains(&outs[k])) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "calibrate/same-answer",
             format!(
                 "{} and a set before it would be answered in {}",
                 args.sets[k].display(),
@@ -108,7 +109,8 @@ pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
         ));
     }
     if args.validate && args.sets.len() > 1 {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "calibrate/several-sets",
             "a validation of several sets",
             "validate one at a time: synthetic sets are made like one",
         ));

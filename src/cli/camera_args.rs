@@ -11,7 +11,7 @@ use super::{Terminal, standard_input};
 /// The chip, the camera that it is in, and the field of its scenes.
 #[derive(Args)]
 pub struct CameraArgs {
-    /// The design that the layout is of: elements, wedges, cell; `-` for standard input.
+    /// The design of the layout: elements, wedges, cell; `-` for standard input.
     #[arg(long)]
     pub design: PathBuf,
 
@@ -19,7 +19,7 @@ pub struct CameraArgs {
     #[arg(long)]
     pub camera: PathBuf,
 
-    /// The chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote.
+    /// Simulate the chip as fabricated, by the `model.toml` of `metalith calibrate`.
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
 
@@ -28,7 +28,7 @@ pub struct CameraArgs {
     pub field_deg: f64,
 }
 
-/// What the files of [`CameraArgs`] hold.
+/// Contents of the files of [`CameraArgs`].
 pub struct CameraFiles {
     pub design: Design,
     pub camera: Camera,
@@ -43,7 +43,8 @@ pub fn distance_um(distance_mm: Option<f64>) -> Result<f64> {
     match distance_mm {
         None => Ok(f64::INFINITY),
         Some(mm) if mm > 0.0 => Ok(mm * 1e3),
-        Some(_) => Err(Error::invalid(
+        Some(_) => Err(Error::refused(
+            "option/scene-distance",
             "a scene at no distance",
             "give a positive --distance-mm",
         )),

@@ -13,7 +13,7 @@ use metalith::{Design, Error, PolarisationBasis, Progress, Result};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
-/// Tabulate the cell of a design by rigorous theory, fit it, and report what its mapping does with light.
+/// Tabulate the unit cell of a design by RCWA, fit it, and report the errors of its mapping.
 #[derive(Args)]
 #[command(after_help = "Example:\n  metalith cells designs/prototype_3x3.toml --out out/cells")]
 pub struct CellsArgs {
@@ -24,11 +24,11 @@ pub struct CellsArgs {
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// Folder that libraries are kept in; `METALITH_CACHE` or the user's cache folder if left out.
+    /// Folder of cached tables; `METALITH_CACHE` or the user's cache folder if left out.
     #[arg(long, value_name = "FOLDER")]
     cache: Option<PathBuf>,
 
-    /// Power of the zero order below which a width is bad.
+    /// Power in the zeroth order of the lattice below which a width is avoided.
     #[arg(long, value_name = "SHARE", default_value_t = StudyOptions::default().threshold)]
     avoid: f64,
 
@@ -36,17 +36,17 @@ pub struct CellsArgs {
     #[arg(long, value_name = "N", default_value_t = 13)]
     orders: usize,
 
-    /// Largest error of the transmission between samples of the library.
+    /// Largest error of the transmission between samples of the table.
     #[arg(long, value_name = "T", default_value_t = 0.01)]
     tolerance: f64,
 
-    /// Find a mapping for each distinct steered element by its unlike neighbours as well. Each takes a search, and a table for
-    /// each wavelength of `compared_nm` in [mapping], of [verify] if that is left out: with four wavelengths about six CPU minutes
-    /// an element the first time.
+    /// Also find a mapping for each distinct steered element with the coupled model. Each takes a search, and a table
+    /// for each wavelength of `compared_nm` in [mapping] (of [verify] if that is left out): with four wavelengths about
+    /// six CPU minutes an element the first time.
     #[arg(long)]
     steered: bool,
 
-    /// Print the numbers of `cells.json` to standard output: all its fields but the first two, `report` and `metalith`.
+    /// Print `cells.json` to standard output, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }
@@ -61,7 +61,8 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name));
     match design.cell.shape.basis() {
         Some(_) if args.steered => {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cells/steered-rectangles",
                 "mappings of steered elements for rectangles",
                 "leave out --steered: unlike neighbours are known of squares alone",
             ));

@@ -19,30 +19,30 @@ use super::{Outcome, Terminal, print_line, standard_input};
     Example:\n  metalith check out/mini_3x3/mini_3x3_pillars.gds --design designs/mini_3x3.toml --sarif check.sarif"
 )]
 pub struct CheckArgs {
-    /// The layout, in any hierarchy, by any tool; `-` for standard input.
+    /// The layout, in any hierarchy, of any program; `-` for standard input.
     layout: PathBuf,
 
-    /// The rules; if left out those of the program: rules/sin_pillars.toml, or for a design of another cell squares.toml,
+    /// Rules file; if left out a shipped one: sin_pillars.toml, or for a design of another cell squares.toml,
     /// circles.toml or rectangles.toml.
     #[arg(long, value_name = "RULES.toml")]
     rules: Option<PathBuf>,
 
-    /// A further layout on the same glass, such as the pillars under the apertures that are checked.
+    /// Another layout on the same glass, such as the pillars under the apertures to check.
     #[arg(long, value_name = "FILE.gds")]
     with: Vec<PathBuf>,
 
-    /// The design that the layout should hold; puts the rules in force that compare with it.
+    /// The design that the layout should contain; activates the rules that compare with it.
     #[arg(long, value_name = "DESIGN.toml")]
     design: Option<PathBuf>,
 
     #[command(flatten)]
     compensated: CompensatedFor,
 
-    /// Violations that have been accepted.
+    /// File with violations that have been accepted.
     #[arg(long, value_name = "WAIVERS.toml")]
     waivers: Option<PathBuf>,
 
-    /// Most markers that are kept for each rule; all violations are counted.
+    /// Largest number of markers stored for each rule; all violations are counted.
     #[arg(long, value_name = "N", default_value_t = 100)]
     markers: usize,
 
@@ -50,7 +50,7 @@ pub struct CheckArgs {
     #[arg(long)]
     json: bool,
 
-    /// Write a report database for KLayout's marker browser; `-` prints it instead of the summary, as for the next two.
+    /// Write the result for KLayout's marker browser. `-` prints it instead of the summary; so do --junit and --sarif.
     #[arg(long, value_name = "FILE.lyrdb")]
     lyrdb: Option<PathBuf>,
 
@@ -75,7 +75,8 @@ impl CheckArgs {
             .map(|(path, _)| path)
             .partition(|path| is_standard_output(path));
         if printed.len() + usize::from(self.json) > 1 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "option/two-on-standard-output",
                 "two results for standard output",
                 "give `-` to one of --lyrdb, --junit and --sarif, without --json",
             ));
@@ -83,7 +84,7 @@ impl CheckArgs {
         super::paths::apart(inputs.map(PathBuf::as_path), &files)
     }
 
-    /// Where to write the result in which form.
+    /// Paths of the results, each with its form.
     fn outputs(&self) -> impl Iterator<Item = (&Path, Form)> {
         let all: [(&Option<PathBuf>, Form); 3] = [
             (&self.lyrdb, drc::lyrdb),

@@ -7,7 +7,7 @@ use clap::Args;
 use metalith::baselines::{
     Comparison, ComparisonResult, DiffuserSpec, Lensless, ListedDesign, MaskSpec, write_comparison,
 };
-use metalith::picture::KernelCache;
+use metalith::imaging::KernelCache;
 use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 
@@ -15,15 +15,16 @@ use super::paths::apart;
 use super::picture::Assume;
 use super::{Outcome, Terminal, images, output, print_json, print_line};
 
-/// Take the same photographs with several cameras, restore them in several ways, and print one table of scores.
+/// Take the same photographs with several simulated cameras, restore them by several methods, and print one table of
+/// scores.
 ///
-/// Cameras are layouts of designs, and cameras without a lens that are simulated on the same sensor with the same exposure
-/// and noise. The table is Markdown; `compare.html` shows the first photograph through each camera.
+/// Cameras are layouts of designs, and baseline cameras without a lens on the same sensor, with the same exposure and
+/// noise. The table is Markdown; `compare.html` shows the first photograph through each camera.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith compare photographs --camera cameras/gt1930.toml --field-deg 80 \\\n    --design log=designs/prototype_3x3.toml --design designs/robust_3x3.toml:robust.gds \\\n    --rivals flatcam,diffusercam --method tikhonov,tv --separate --assume paper --out out/compare\n\n\
-    Without `:LAYOUT` the layout of a design is looked for where `metalith layout` and `metalith run` write it. A design with a \
-    camera of its own, such as one behind a relay, has it and its field behind the layout:\n  \
+    Without `:LAYOUT` the layout is the one that `metalith layout` and `metalith run` write by default. A design with its own \
+    camera, such as one behind a relay, names camera and field after the layout:\n  \
     --design nano=designs/neural_nano_optics.toml::cameras/gt1930_relay.toml:28.9"
 )]
 pub struct CompareArgs {
@@ -31,29 +32,28 @@ pub struct CompareArgs {
     #[arg(required = true)]
     photographs: Vec<PathBuf>,
 
-    /// A design that is compared: [NAME=]DESIGN.toml[:LAYOUT[:CAMERA.toml[:FIELD_DEG]]].
+    /// A design to compare: [NAME=]DESIGN.toml[:LAYOUT[:CAMERA.toml[:FIELD_DEG]]].
     #[arg(long, value_name = "[NAME=]DESIGN[:LAYOUT]")]
     design: Vec<ComparedDesign>,
 
-    /// The camera file: sensor, light, exposure, noise of all cameras that name no other.
+    /// Camera file: sensor, light, exposure and noise of all cameras that name no other.
     #[arg(long)]
     camera: PathBuf,
 
-    /// Cameras without a lens: flatcam, diffusercam, separated by commas.
+    /// Baseline cameras without a lens: flatcam, diffusercam, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',')]
     rivals: Vec<Rival>,
 
-    /// Ways to restore the frames of designs, separated by commas: tikhonov, tv, richardson-lucy, hqs and what else
-    /// `metalith picture` has. Cameras without a lens have their own.
+    /// Restorations for designs, separated by commas, as in `metalith picture`. Baseline cameras have their own.
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
-    /// Restore by each element of an array alone too.
+    /// Restore arrays by each element alone too, and blend.
     #[arg(long)]
     separate: bool,
 
-    /// Each design also as others assume such cameras to be: `paper`, those of the array that the prototype follows; `--rivals` also with
-    /// one wavelength a colour.
+    /// Also compare each design with simplifications: `paper`, those of the paper that the prototype follows. Baseline
+    /// cameras then also have one wavelength a colour.
     #[arg(long, value_name = "WHOSE")]
     assume: Option<Assume>,
 
@@ -61,17 +61,17 @@ pub struct CompareArgs {
     #[arg(long, default_value_t = 90.0)]
     field_deg: f64,
 
-    /// Cut each photograph to the square of so many pixels in its middle.
+    /// Crop the central square of each photograph to this number of pixels.
     #[arg(long, value_name = "N", value_parser = images::scored_sides())]
     pixels: Option<u16>,
 
-    /// Weights of learnt last stages that `metalith train --stage` wrote, separated by commas: each gives the camera that it was
-    /// taught for one more way of making a picture.
+    /// Weights of last stages from `metalith train --stage`, separated by commas. Each adds a method to the camera that
+    /// it was trained for.
     #[arg(long, value_delimiter = ',', value_name = "FILE,...")]
     learnt: Vec<PathBuf>,
 
-    /// Weights of the learned perceptual distance (LPIPS, of AlexNet): the `state_dict` of the authors' package as safetensors. They
-    /// fill a column of the table that is empty without them.
+    /// Weights of LPIPS (AlexNet): the `state_dict` of the authors' package as safetensors. The column `1 - LPIPS` is
+    /// empty without them.
     #[arg(long, value_name = "FILE")]
     lpips: Option<PathBuf>,
 
@@ -86,12 +86,12 @@ pub struct CompareArgs {
     #[arg(long, short, default_value = "out/compare", value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Print the numbers of `compare.json` instead of the table: all its fields but the first two, `report` and `metalith`.
+    /// Print `compare.json` instead of the table, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 
-    /// Only plan the comparison into --out, for shards of one camera each that any number of machines make: `metalith study
-    /// run`, `submit`, `status` and `merge` of the folder.
+    /// Only plan the comparison into --out, as shards of one camera each for any number of machines: `metalith study
+    /// run`, `submit`, `status` and `merge` take the folder.
     #[arg(long, conflicts_with = "json")]
     plan: bool,
 }
@@ -103,7 +103,7 @@ pub struct LenslessArgs {
     #[arg(long, default_value_t = MaskSpec::standard().distance_um, value_name = "UM")]
     mask_distance_um: f64,
 
-    /// Width of an opening of this mask (um).
+    /// Width of an opening of the mask of `flatcam` (um).
     #[arg(long, default_value_t = MaskSpec::standard().feature_um, value_name = "UM")]
     mask_feature_um: f64,
 
@@ -111,17 +111,17 @@ pub struct LenslessArgs {
     #[arg(long, default_value_t = DiffuserSpec::standard().distance_um, value_name = "UM")]
     diffuser_distance_um: f64,
 
-    /// Distance of the random numbers that this surface is made of (um): bumps are about twice as wide.
+    /// Spacing of the random numbers that define this surface (um); bumps are about twice as wide.
     #[arg(long, default_value_t = DiffuserSpec::standard().grain_um, value_name = "UM")]
     diffuser_grain_um: f64,
 
-    /// Its opening over the sensor, along each axis.
+    /// Opening of `diffusercam` over the size of the sensor, along each axis.
     #[arg(long, default_value_t = DiffuserSpec::standard().opening, value_name = "SHARE")]
     diffuser_opening: f64,
 }
 
 impl LenslessArgs {
-    /// Whether nobody asked for another mask or surface.
+    /// True if nobody asked for another mask or surface.
     pub fn is_standard(&self) -> bool {
         let (mask, surface) = (MaskSpec::standard(), DiffuserSpec::standard());
         let own = [self.mask_distance_um, self.mask_feature_um];
@@ -194,7 +194,7 @@ impl FromStr for ComparedDesign {
 }
 
 impl ComparedDesign {
-    /// As the library has it.
+    /// Design as the library lists it.
     ///
     /// # Errors
     /// If the design cannot be read, or has no layout.
@@ -216,7 +216,8 @@ impl ComparedDesign {
         let folder = Path::new("out").join(&design.name);
         let there = ["gds", "oas"].map(|e| folder.join(format!("{}_pillars.{e}", design.name)));
         there.iter().find(|p| p.is_file()).cloned().ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "compare/no-layout",
                 format!("no layout of `{}` at {}", design.name, there[0].display()),
                 format!(
                     "write it by `metalith layout {}`, or name it behind a colon",
@@ -228,8 +229,8 @@ impl ComparedDesign {
 }
 
 impl CompareArgs {
-    /// What is asked for, as the library has it.
-    fn lineup(&self) -> Result<Comparison> {
+    /// Comparison that is asked for, as the library has it.
+    fn comparison(&self) -> Result<Comparison> {
         Ok(Comparison {
             camera: self.camera.clone(),
             designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
@@ -253,14 +254,14 @@ impl CompareArgs {
 
 pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let lineup = args.lineup()?;
+    let comparison = args.comparison()?;
     let outputs = ["compare.html", "compare.json"].map(|n| args.out.join(n));
     apart(
-        lineup.photographs.iter().map(PathBuf::as_path),
+        comparison.photographs.iter().map(PathBuf::as_path),
         &[&outputs[0], &outputs[1]],
     )?;
     if args.plan {
-        let plan = plan_comparison(&lineup, &args.out, terminal)?;
+        let plan = plan_comparison(&comparison, &args.out, terminal)?;
         terminal.clear();
         print_line!(
             "{} cameras in as many shards: {}",
@@ -269,11 +270,11 @@ pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
         );
         return Ok(Outcome::Fine);
     }
-    let open = lineup.open()?;
+    let open = comparison.open()?;
     open.notes().iter().for_each(|note| terminal.say(note));
-    let kept = KernelCache::of_user();
-    let take = |k| open.take(k, &kept, terminal);
-    let comparison = open.comparison((0..lineup.count()).map(take).collect::<Result<_>>()?);
+    let cache = KernelCache::of_user();
+    let take = |k| open.take(k, &cache, terminal);
+    let comparison = open.comparison((0..comparison.count()).map(take).collect::<Result<_>>()?);
     terminal.clear();
     match args.json {
         true => {

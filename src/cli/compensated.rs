@@ -9,11 +9,10 @@ use metalith::{CalibratedModel, Design, Error, PillarArray, Result};
 use super::Terminal;
 use super::verify::FidelityArg;
 
-/// What a layout is compared with.
+/// Design that a layout is compared with.
 #[derive(Args)]
 pub struct CompensatedFor {
-    /// The layout was made by `metalith layout --compensate MODEL`: its pillars are compared with those of the
-    /// compensated design.
+    /// `metalith layout --compensate MODEL` made the layout: its pillars are compared with the compensated design.
     #[arg(id = "compensated", long, value_name = "MODEL", requires = "design")]
     pub model: Option<PathBuf>,
 }
@@ -45,7 +44,8 @@ pub fn judged_as_made(option: &str, model: Option<&Path>, fidelity: Option<Fidel
     if model.is_none() || fidelity.is_none() {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "option/fidelity-of-compensated",
         "`--fidelity` describes pillars as drawn, and a compensated layout is judged as it is made",
         format!("leave out `--fidelity`, or `{option}` for the layout as designed"),
     ))

@@ -8,7 +8,7 @@ use metalith::{AtomicFile, Result};
 
 use super::{Arguments, Outcome, Terminal, output, print_line};
 
-/// Print what a shell needs to complete the options of this program.
+/// Print the completion script of a shell.
 #[derive(Args)]
 #[command(after_help = "Example:\n  metalith completions bash > ~/.local/share/bash-completion/completions/metalith")]
 pub struct CompletionsArgs {

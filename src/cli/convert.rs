@@ -18,13 +18,13 @@ use super::{Outcome, Terminal, print_line};
     metalith convert from_elsewhere.oas lens.gds"
 )]
 pub struct ConvertArgs {
-    /// The layout to read, `-` for standard input; its format is told by its first bytes.
+    /// The layout to read, `-` for standard input; its first bytes show its format.
     from: PathBuf,
 
     /// The layout to write, in OASIS if its name ends in .oas.
     to: PathBuf,
 
-    /// Format to write, whatever the name.
+    /// Format to write, whatever the name of the file.
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
 }

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::picture::scene::{images_in, read_far_scene};
-use metalith::picture::{DatasetManifest, DatasetOrigin, ImagingSystem, check_images, write_dataset};
+use metalith::imaging::scene::{images_in, read_far_scene};
+use metalith::imaging::{DatasetManifest, DatasetOrigin, ImagingSystem, check_images, write_dataset};
 use metalith::study::{PairsRequest, is_planned, plan_pairs};
 use metalith::{Error, Result};
 
@@ -12,11 +12,11 @@ use super::camera_args::{CameraArgs, CameraFiles};
 use super::standard_input::{self, InputFile};
 use super::{Outcome, Terminal, print_line};
 
-/// Record the frame of every image of a folder, for learning: frames, what an ideal camera gives, and a manifest.
+/// Simulate the frame of every image of a folder, for learning: frames, pictures of an ideal camera, and a manifest.
 ///
-/// Images are taken in the order of their names and must be of one size; all are read before any work. The noise of each follows
-/// from its bytes and the seed. Pairs that are there undamaged are kept if they are of the same image, seed, chip and camera: a
-/// set that was stopped goes on.
+/// Images are taken in the order of their names and must have one size; all are read before any work. The noise of each
+/// follows from its bytes and the seed. Undamaged pairs of the same image, seed, chip and camera are reused, so an
+/// interrupted run continues.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith dataset photographs --layout out/prototype_3x3/prototype_3x3_pillars.gds \\\n    --camera cameras/gt1930.toml --design designs/prototype_3x3.toml --out out/pairs"
@@ -40,12 +40,12 @@ pub struct DatasetArgs {
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Only plan the set, for shards that any number of machines make: `metalith study run`, `submit`, `status` and `merge`
-    /// of the folder.
+    /// Only plan the set, as shards for any number of machines: `metalith study run`, `submit`, `status` and `merge`
+    /// take the folder.
     #[arg(long)]
     plan: bool,
 
-    /// Images of a shard; as many as take ten minutes if left out. The set does not depend on it.
+    /// Images in a shard; as many as take ten minutes if left out. The set does not depend on it.
     #[arg(long, value_name = "N", requires = "plan", value_parser = clap::value_parser!(u64).range(1..))]
     images_per_shard: Option<u64>,
 }
@@ -83,7 +83,8 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
         return plan(args, images, terminal);
     }
     if is_planned(&args.out) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "dataset/folder-of-plan",
             format!("{} holds a plan, which is carried out in shards", args.out.display()),
             "make them by `metalith study run FOLDER --missing`, or name another folder with --out",
         ));
@@ -92,10 +93,10 @@ pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let read = |path: &Path| read_far_scene(path, args.with.field_deg);
     let layout = InputFile::of(&args.layout)?;
     let origin = DatasetOrigin::of(&design, &layout, &camera, args.with.model.as_deref())?;
-    let studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
-    let operator = studio.simulation();
-    let head = DatasetManifest::of(&studio, origin, args.seed);
-    let manifest = write_dataset(&studio, &operator, &images, &read, head, &args.out, terminal)?;
+    let system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
+    let operator = system.simulation();
+    let head = DatasetManifest::of(&system, origin, args.seed);
+    let manifest = write_dataset(&system, &operator, &images, &read, head, &args.out, terminal)?;
     terminal.clear();
     print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());
     Ok(Outcome::Fine)

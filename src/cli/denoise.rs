@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::picture::scene::read_picture;
-use metalith::picture::write_picture;
+use metalith::imaging::scene::read_picture;
+use metalith::imaging::write_picture;
 use metalith::prior::{NetworkDenoiser, with_noise};
-use metalith::wave::restore::{psnr_db, ssim_colour};
+use metalith::restoration::{psnr_db, ssim_colour};
 use metalith::{Error, Result};
 use ndarray::Array3;
 use serde::Serialize;
@@ -14,33 +14,32 @@ use serde::Serialize;
 use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line};
 
-/// Take noise out of a picture by the network that restorations use.
+/// Remove noise from a picture with the network of the learnt prior.
 ///
-/// With `--add` the noise is added first, and the result is held against the picture.
+/// With `--add` the noise is added first, and the result is compared with the picture.
 #[derive(Args)]
 #[command(after_help = "Example:\n  metalith denoise photograph.png --noise 25 --add --out clean.png")]
 pub struct DenoiseArgs {
     /// The picture: PNG, JPEG or NPY.
     picture: PathBuf,
 
-    /// Standard deviation of the noise, of 255.
+    /// Standard deviation of the noise, in steps of a scale of 255.
     #[arg(long, value_name = "LEVELS", value_parser = noise)]
     noise: f32,
 
-    /// Add normal noise of this deviation first, drawn from `--seed`.
+    /// Add normal noise of this standard deviation first, from `--seed`.
     #[arg(long)]
     add: bool,
 
-    /// Of the noise that is added.
+    /// Seed of the added noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// File of weights that `metalith train` wrote, or a network of one's own as `.onnx`; those of the program if left
-    /// out.
+    /// Weights from `metalith train`, or another network as `.onnx`; the shipped weights if left out.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
 
-    /// PNG of 16 bits for the picture without noise.
+    /// File for the picture without noise: a PNG of 16 bits.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
@@ -49,7 +48,7 @@ pub struct DenoiseArgs {
     json: bool,
 }
 
-/// How near the pictures are to the one without noise.
+/// Similarity of the pictures to the one without noise.
 #[derive(Serialize)]
 struct Scores {
     noisy_psnr_db: f64,
@@ -66,14 +65,16 @@ fn noise(text: &str) -> std::result::Result<f32, String> {
 
 pub fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.out.is_none() && !args.add {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "denoise/nothing-to-do",
             "nothing would come of this",
             "name a file with --out, or hold the result against the picture with --add",
         ));
     }
     if let Some(out) = &args.out {
         if out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "denoise/unknown-ending",
                 format!("{}: pictures are written as PNG", out.display()),
                 "name a file that ends in .png",
             ));

@@ -11,7 +11,7 @@ use super::psf::layer;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
-/// Tell two layouts apart: by geometry, whatever their hierarchy.
+/// Compare the geometry of two layouts, whatever their hierarchy.
 #[derive(Args)]
 #[command(after_help = "Exit codes: 0 same geometry, 1 different, 2 bad input.\n\
     Example:\n  metalith diff golden/lens.gds out/lens_pillars.gds --report diff.html")]
@@ -22,15 +22,15 @@ pub struct DiffArgs {
     /// The second layout.
     b: PathBuf,
 
-    /// Layer that the pillars are on.
+    /// Layer of the pillars.
     #[arg(long, value_name = "LAYER/DATATYPE", default_value = "1/0", value_parser = layer)]
     layer: LayerNumber,
 
-    /// Most changes that are listed; all are counted.
+    /// Largest number of changes in the list; all are counted.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     listed: usize,
 
-    /// Write a page with a picture of where the changes are.
+    /// Write a page that shows where the changes are.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
 

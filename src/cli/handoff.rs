@@ -13,34 +13,34 @@ use super::layout::FormatArg;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
-/// Make the folder and the archive that a cleanroom starts from, or look whether a received one is whole.
+/// Make the folder and the archive for the cleanroom, or check that a received folder is complete.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  metalith handoff designs/mini_3x3.toml --process processes/jbx6300_zep520a.toml\n  \
                   metalith handoff --verify out/mini_3x3_handoff\n\n\
-                  Exit codes: 0 fine; 1 a check failed, or the folder is not as it was sent; 2 bad input; \
-                  3 a check could not be run."
+                  Exit codes: 0 fine; 1 a check failed, or the folder was altered; 2 bad input; \
+                  3 a check could not run."
 )]
 pub struct HandoffArgs {
     /// The design file.
     #[arg(required_unless_present = "verify", conflicts_with = "verify")]
     design: Option<PathBuf>,
 
-    /// The process file: writer, resist, doses, currents, overheads. The program's own, which the hand-off then holds
-    /// in `inputs/`, if left out.
+    /// Process file: writer, resist, doses, currents, overheads. If left out a shipped one, which is then stored in
+    /// `inputs/`.
     #[arg(long, value_name = "FILE")]
     process: Option<PathBuf>,
 
-    /// Folder to make; `out/NAME_handoff` if left out. The archive stands beside it.
+    /// Folder to make; `out/NAME_handoff` if left out. The archive has the same name.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// Say whether this received folder is whole and unaltered, and do nothing else.
+    /// Only check that this received folder is complete and unaltered.
     #[arg(long, value_name = "FOLDER")]
     verify: Option<PathBuf>,
 
-    /// Hand over the layout that is compensated for this process: the `model.toml` of `metalith calibrate`. It is judged
-    /// as the process makes it, so `--fidelity` cannot be given with it.
+    /// Hand over the layout that is compensated by this `model.toml` of `metalith calibrate`. It is simulated as
+    /// fabricated, so `--fidelity` cannot be given with it.
     #[arg(long, value_name = "MODEL")]
     compensate: Option<PathBuf>,
 
@@ -48,19 +48,19 @@ pub struct HandoffArgs {
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
 
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of a perfect lens, several times faster.
+    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
     #[arg(long)]
     fast: bool,
 
-    /// The cell that the layout is judged by; what `fidelity` in [verify] of the design says if left out.
+    /// Simulation model of the pillars; `fidelity` in [verify] of the design if left out.
     #[arg(long, value_enum)]
     fidelity: Option<FidelityArg>,
 
-    /// Violations of the design rules that have been accepted.
+    /// File with violations of the design rules that have been accepted.
     #[arg(long, value_name = "FILE")]
     waivers: Option<PathBuf>,
 
-    /// Print what came out as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }

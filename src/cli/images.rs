@@ -1,12 +1,16 @@
 //! Images that are given as files, or as a folder of them, and how many pixels are asked for.
 
+#[cfg(feature = "baselines")]
 use std::path::PathBuf;
 
 use clap::builder::RangedI64ValueParser;
+#[cfg(feature = "baselines")]
 use metalith::Result;
-use metalith::picture::SCORED_SIDES;
-use metalith::picture::scene::images_in;
+use metalith::imaging::SCORED_SIDES;
+#[cfg(feature = "baselines")]
+use metalith::imaging::scene::images_in;
 
+#[cfg(feature = "baselines")]
 /// Several files, and the images of folders, in the order in which they are given.
 ///
 /// # Errors

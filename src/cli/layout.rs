@@ -23,12 +23,12 @@ pub struct LayoutArgs {
     #[command(flatten)]
     target: Target,
 
-    /// Draw pillars that come out as intended on a measured line, by the `model.toml` that `metalith calibrate`
-    /// wrote. The files are named NAME_compensated, with a report beside them.
+    /// Draw pillars that are as intended after fabrication, by the `model.toml` of `metalith calibrate`. The files are
+    /// named NAME_compensated and have a report.
     #[arg(long, value_name = "MODEL")]
     compensate: Option<PathBuf>,
 
-    /// Print what was written as JSON.
+    /// Print names and counts of the files as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -40,7 +40,7 @@ pub struct Target {
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// How the geometry is nested, instead of what the design says.
+    /// Nesting of the geometry; `hierarchy` in [layout] of the design if left out.
     #[arg(long, value_enum)]
     hierarchy: Option<HierarchyArg>,
 
@@ -55,14 +55,14 @@ pub struct FormatArgs {
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
 
-    /// How pillars are encoded in OASIS; implies `--format oasis`.
+    /// Encoding of pillars in OASIS; implies `--format oasis`.
     #[arg(long, value_enum, value_name = "ENCODING")]
     oasis: Option<EncodingArg>,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 pub enum FormatArg {
-    /// GDSII: what every writer of masks takes.
+    /// GDSII: every mask writer reads it.
     Gds,
     /// OASIS: a hundredth of the size.
     Oasis,
@@ -79,11 +79,11 @@ impl From<FormatArg> for LayoutFormat {
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum EncodingArg {
-    /// Lists of places.
+    /// Lists of places for each width: fastest to read.
     Compact,
-    /// An outline for each pillar, no repetitions, one layer a file: what mask tools take.
+    /// One outline for each pillar, no repetitions, one layer in a file: for mask tools.
     Plain,
-    /// Whichever of lists and references is smaller, cell by cell.
+    /// Lists or references, whichever is smaller for each cell.
     Smallest,
 }
 
@@ -99,7 +99,8 @@ impl FormatArgs {
             Some(EncodingArg::Smallest) => OasisEncoding::Smallest,
         };
         match (self.format, self.oasis) {
-            (Some(FormatArg::Gds), Some(_)) => Err(metalith::Error::invalid(
+            (Some(FormatArg::Gds), Some(_)) => Err(metalith::Error::refused(
+                "option/two-formats",
                 "--oasis and --format gds",
                 "leave one of them out",
             )),
@@ -110,7 +111,7 @@ impl FormatArgs {
     }
 }
 
-/// What was written.
+/// Files that were written.
 pub struct Files {
     pub pillars: Written,
     pub apertures: Written,
@@ -119,11 +120,11 @@ pub struct Files {
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum HierarchyArg {
-    /// What symmetry leaves unique, once.
+    /// Each part that symmetry leaves unique, once; copies by rotated and mirrored references.
     Folded,
-    /// One reference a pillar.
+    /// One reference for each pillar.
     Sref,
-    /// One outline a pillar.
+    /// One outline for each pillar.
     Flat,
 }
 

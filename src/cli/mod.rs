@@ -4,6 +4,7 @@ mod calibrate;
 mod camera_args;
 mod cells;
 mod check;
+#[cfg(feature = "baselines")]
 mod compare;
 mod compensated;
 mod completions;
@@ -18,16 +19,17 @@ mod new;
 mod optimise;
 mod output;
 mod paths;
-mod photographs;
 mod picture;
 mod plan;
 mod psf;
+mod renamed;
 mod restore;
 mod run;
 mod shipped_designs;
 mod standard_input;
 mod study;
 mod terminal;
+#[cfg(feature = "training")]
 mod train;
 mod verify;
 
@@ -44,7 +46,7 @@ use metalith::{Error, Faults};
 use output::{print_json, print_line};
 pub use terminal::Terminal;
 
-/// What every command answers with when it did its work.
+/// Outcome of a command that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Exit code 0.
@@ -58,8 +60,8 @@ pub enum Outcome {
 /// More threads than any machine here has cores; each takes memory of its own.
 const MOST_THREADS: i64 = 512;
 
-/// From the phase of a metalens array to the layout a cleanroom writes, and back from that file to the
-/// image it makes.
+/// Turn the phase of a metalens array into a layout that a cleanroom can write, read that file back, and simulate the
+/// image that the chip makes.
 #[derive(Parser)]
 #[command(version, propagate_version = true, arg_required_else_help = true)]
 #[command(after_help = "Exit codes: 0 fine, 1 outside limits, 2 bad input, 3 could not be done.")]
@@ -67,11 +69,11 @@ struct Arguments {
     #[command(subcommand)]
     command: Command,
 
-    /// Threads to use; all cores if left out. The answer does not depend on it.
+    /// Number of threads; all cores if left out. Results do not depend on it.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
     threads: Option<u16>,
 
-    /// Print nothing but errors and what was asked for.
+    /// Print only errors and requested output.
     #[arg(long, short, global = true)]
     quiet: bool,
 }
@@ -84,15 +86,16 @@ enum Command {
     Layout(layout::LayoutArgs),
     #[command(visible_alias = "optimize")]
     Optimise(optimise::OptimiseArgs),
-    Photographs(photographs::PhotographsArgs),
     Picture(picture::PictureArgs),
     Restore(restore::RestoreArgs),
     Dataset(dataset::DatasetArgs),
+    #[cfg(feature = "training")]
     Train(train::TrainArgs),
     Denoise(denoise::DenoiseArgs),
+    #[cfg(feature = "baselines")]
     Compare(compare::CompareArgs),
     Verify(verify::VerifyArgs),
-    Psf(psf::PsfArgs),
+    Psf(Box<psf::PsfArgs>),
     Handoff(handoff::HandoffArgs),
     Cells(cells::CellsArgs),
     Check(check::CheckArgs),
@@ -104,9 +107,15 @@ enum Command {
     Completions(completions::CompletionsArgs),
     #[command(hide = true)]
     Manual(completions::ManualArgs),
+    /// Names the commands that do its work.
+    #[command(hide = true)]
+    Photographs {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+        _ignored: Vec<OsString>,
+    },
 }
 
-/// How the program is started again, if it was started by another name than that of its file.
+/// Command by which the program is started again, if it was started by another name than its file's.
 static STARTED_AS: OnceLock<PathBuf> = OnceLock::new();
 
 /// The program as a process of its own can be started.
@@ -129,6 +138,9 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             // Help is no error, and goes to standard output.
             let _ = error.print();
+            if let Some(hint) = renamed::hint(&error, &given) {
+                output::tell(&format!("\n  help: {hint}\n"));
+            }
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
@@ -173,10 +185,16 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Run(args) => run::run(args, terminal),
         Command::Layout(args) => layout::run(args, terminal),
         Command::Optimise(args) => optimise::run(args, terminal),
-        Command::Photographs(args) => photographs::run(args, terminal),
+        Command::Photographs { .. } => Err(Error::refused(
+            "command/removed",
+            "there is no command `photographs` any more",
+            "use `picture` for one scene, `compare` for a table of many photographs and several designs",
+        )),
         Command::Dataset(args) => dataset::run(args, terminal),
+        #[cfg(feature = "training")]
         Command::Train(args) => train::run(args, terminal),
         Command::Denoise(args) => denoise::run(args, terminal),
+        #[cfg(feature = "baselines")]
         Command::Compare(args) => compare::run(args, terminal),
         Command::Picture(args) => picture::run(args, terminal),
         Command::Restore(args) => restore::run(args, terminal),

@@ -14,7 +14,7 @@ const TEMPLATE: &str = include_str!("new.toml");
 /// Marks and the edge of the chip lie this far outside the outermost lens (um): local marks, global marks, edge.
 const OUTSIDE_UM: [f64; 3] = [60.0, 150.0, 220.0];
 
-/// From the rim of a lens to the metal (um).
+/// Distance from the rim of a lens to the metal (um).
 const MARGIN_UM: f64 = 2.0;
 
 /// Sides of an opening, below the 200 vertices that the template allows.
@@ -23,10 +23,10 @@ const MOST_SIDES: u32 = 190;
 /// Finer than this no writer places an edge of metal (nm).
 const FINEST_CHORD_NM: f64 = 5.0;
 
-/// What the cell of silicon nitride is made for (nm).
+/// Wavelengths that the cell of silicon nitride is made for (nm).
 const VISIBLE_NM: std::ops::RangeInclusive<f64> = 400.0..=700.0;
 
-/// What that of amorphous silicon is (nm).
+/// Wavelengths that the cell of amorphous silicon is made for (nm).
 const INFRARED_NM: std::ops::RangeInclusive<f64> = 850.0..=1600.0;
 
 /// Designs of the repository whose cells are for other long waves, each up to a wavelength (nm).
@@ -52,7 +52,7 @@ struct StartCell {
 }
 
 impl StartCell {
-    /// That for a wavelength (nm).
+    /// Cell for a wavelength (nm).
     fn for_nm(nm: f64) -> Self {
         if !INFRARED_NM.contains(&nm) {
             return Self {
@@ -91,10 +91,10 @@ impl StartCell {
     after_help = "Examples:\n  metalith new mine.toml --diameter-um 200 --focal-length-um 480\n  metalith run mine.toml\n  metalith new pair.toml --like birefringent_532"
 )]
 pub struct NewArgs {
-    /// The file to write; the design has its name. An existing file is never replaced.
+    /// The file to write, which gives the design its name. An existing file is never replaced.
     design: PathBuf,
 
-    /// Elements along an axis.
+    /// Number of elements along an axis.
     #[arg(long, value_name = "N", default_value_t = 3)]
     elements: u32,
 
@@ -106,17 +106,17 @@ pub struct NewArgs {
     #[arg(long, value_name = "UM")]
     focal_length_um: Option<f64>,
 
-    /// Wavelength that the phase focuses and the wedges are made for (nm); the cell is one of silicon nitride for 400 to 700 nm, from
-    /// 850 to 1600 nm one of amorphous silicon for that wavelength.
+    /// Wavelength of the phase and of the wedges (nm). The pillars are silicon nitride for 400 to 700 nm, amorphous
+    /// silicon from 850 to 1600 nm.
     #[arg(long, value_name = "NM", default_value_t = 550.0)]
     wavelength_nm: f64,
 
-    /// Angle that each step from the centre element adds (degrees).
+    /// Steering angle that each step from the centre element adds (degrees).
     #[arg(long, value_name = "DEG", default_value_t = 15.0)]
     steering_deg: f64,
 
-    /// Begin with a design that comes with the program, and the files that it names, instead: other shapes of pillars, lattices,
-    /// materials, waves, phases and arrays.
+    /// Begin with a shipped design and the files that it reads instead: other pillars, lattices, materials,
+    /// wavelengths, phases and arrays.
     #[arg(long, value_name = "DESIGN", value_parser = ShippedDesign::names(), conflicts_with_all = ["elements", "diameter_um",
         "focal_length_um", "wavelength_nm", "steering_deg"])]
     like: Option<String>,
@@ -170,7 +170,8 @@ impl NewArgs {
 
 pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.design.exists() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "new/exists",
             format!("{} exists", args.design.display()),
             "give another name, or move the file away",
         ));

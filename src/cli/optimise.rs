@@ -16,11 +16,11 @@ use metalith::{Design, Hierarchy, PillarArray, Result, write_pillars};
 use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
-/// Find the phase of every ring that makes the lens work over the whole band, and report what was gained.
+/// Find the phase of every ring that is best over the whole band, and report the gain.
 #[derive(Args)]
 #[command(
-    after_help = "The section [optimise] of the design says what is optimised, for how long, and with which cell.\n\
-    Ctrl-C keeps the best so far; the same command goes on where it stopped.\n\n\
+    after_help = "The section [optimise] of the design sets merit, time and simulation model.\n\
+    Ctrl-C stores the best phase so far; the same command continues from there.\n\n\
     Example:\n  metalith optimise designs/broadband_3x3.toml --out out/optimised"
 )]
 pub struct OptimiseArgs {
@@ -32,28 +32,28 @@ pub struct OptimiseArgs {
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// Where the phase goes; `phase.csv` in the folder if left out.
+    /// File for the phase; `phase.csv` in the folder if left out.
     #[arg(long, value_name = "FILE")]
     phase: Option<PathBuf>,
 
-    /// Begin anew, whatever an interrupted run has left.
+    /// Ignore the state of an interrupted run.
     #[arg(long)]
     fresh: bool,
 
-    /// Stop when the phase is written: no report.
+    /// Stop when the phase is written, without a report.
     #[arg(long)]
     no_report: bool,
 
-    /// Print the numbers of `report.json` to standard output: all its fields but the first two, `report` and `metalith`.
+    /// Print `report.json` to standard output, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 
-    /// Only plan so many starts with other random numbers, for shards that any number of machines make: `metalith study run`,
-    /// `submit`, `status` and `merge` of the folder. `merge` writes the phase of the best.
+    /// Only plan this number of starts with other random numbers, as shards for any number of machines: `metalith study
+    /// run`, `submit`, `status` and `merge` take the folder. `merge` writes the best phase.
     #[arg(long, value_name = "STARTS", value_parser = clap::value_parser!(u64).range(1..=1_000_000), conflicts_with_all = ["phase", "fresh", "no_report", "json"])]
     plan: Option<u64>,
 
-    /// Starts of a shard.
+    /// Starts in a shard.
     #[arg(long, value_name = "N", requires = "plan", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     starts_per_shard: u64,
 }
@@ -173,7 +173,7 @@ fn findings(
     write_pillars(&alone, &array, Hierarchy::Folded, &layout, terminal)?;
     let read = read_pillars(&alone, &layout, terminal)?;
     after.push(task.judge_layout(&read.elements[0].widths, cells.judge())?);
-    let at_single_wavelengths = match cells.own().rotated() {
+    let at_single_wavelengths = match cells.at_single_wavelengths() {
         Some(cell) => {
             let single = &design.verify.wavelengths_um;
             let strehl = task.lens.strehl_of_layout(&read.elements[0].widths, cell, single)?;
@@ -229,8 +229,8 @@ fn findings(
     })
 }
 
-/// Of a robust design: what it begins from, what is best without errors in mind, and what was found, each
-/// with the same drawn errors.
+/// Figures of a robust design: what it begins from, what is best without errors in mind, and what was found, each with
+/// the same drawn errors.
 fn with_errors(
     task: &OptimiseTask,
     cells: &TaskCells,

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use serde::Serialize;
 
-/// Why standard output took no more, if not because its reader had enough.
+/// Reason why standard output took no more, if not because its reader had enough.
 static FAILED: OnceLock<String> = OnceLock::new();
 
 /// Write one line to standard output, as `println!` does, but without a panic where nobody reads it any more.
@@ -22,12 +22,12 @@ pub fn print_json(value: &impl Serialize) {
     line(format_args!("{text}"));
 }
 
-/// Whether the path of an output means standard output.
+/// True if the path of an output means standard output.
 pub fn is_standard_output(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// What [`print_line!`] calls.
+/// Prints a line, for [`print_line!`].
 pub fn line(text: Arguments<'_>) {
     let mut out = stdout().lock();
     let written = out
@@ -46,7 +46,7 @@ pub fn tell(text: &str) {
     let _ = stderr().lock().write_all(text.as_bytes());
 }
 
-/// Why something that was to be printed is not, if so. A closed pipe is no failure.
+/// Reason why something that was to be printed is not, if so. A closed pipe is no failure.
 pub fn failure() -> Option<&'static str> {
     FAILED.get().map(String::as_str)
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith::{AtomicFile, Error, Result};
+use metalith::{Error, Result};
 
 /// Refuse to write over an input, or two outputs into one file: asked before any work.
 ///
@@ -19,7 +19,8 @@ pub fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&Path]) 
         } else {
             continue;
         };
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "option/same-file",
             format!("{} {what}", output.display()),
             "name another file to write to",
         ));
@@ -33,17 +34,18 @@ pub fn name_of(path: &Path) -> String {
         .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
+#[cfg(feature = "training")]
 /// Find out whether files can be written, before the work that they are for. What stands there stays, and folders are made.
 ///
 /// # Errors
-/// As [`AtomicFile::create`].
+/// As [`metalith::AtomicFile::create`].
 pub fn writable(outputs: &[&Path]) -> Result<()> {
     outputs
         .iter()
-        .try_for_each(|output| AtomicFile::create(output).map(drop))
+        .try_for_each(|output| metalith::AtomicFile::create(output).map(drop))
 }
 
-/// What tells a file from others, whatever its path says.
+/// Identity of a file, whatever its path says.
 struct Identity {
     path: PathBuf,
     #[cfg(unix)]

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::optics::CalibratedModel;
-use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
-use metalith::picture::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
-use metalith::picture::{
-    Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport, Rehearsal,
+use metalith::imaging::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
+use metalith::imaging::{
+    ForecastScene, Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport,
     RestorationReport, ScenePower, Uncertainty, ZoneScore, check_scored, contrast_curves, picture_file, psnr_words,
     scores, worth_of_assumptions, write_pages,
 };
+use metalith::optics::CalibratedModel;
+use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
@@ -18,13 +18,12 @@ use super::paths::{apart, name_of};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
-/// Simulate the frame that the camera of a layout records of a scene, and restore the picture from it.
+/// Simulate the frame that a camera with the chip records of a scene, and restore the picture from it.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith picture out/prototype_3x3/prototype_3x3_pillars.gds --camera cameras/gt1930.toml \\\n    --design designs/prototype_3x3.toml scene.png --out out/picture\n\n\
     The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in \
-    scenes chart, star and edge; with pixels finer than half of one of the sensor it is averaged to these. Kernels are kept on the \
-    disk and used again."
+    scenes chart, star and edge; a scene with pixels finer than half a sensor pixel is averaged. Kernels are cached."
 )]
 pub struct PictureArgs {
     /// The pillar layout; `-` for standard input.
@@ -40,55 +39,57 @@ pub struct PictureArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// Distance of the scene (mm); far if left out.
+    /// Distance of the scene (mm); infinite if left out.
     #[arg(long)]
     distance_mm: Option<f64>,
 
-    /// Distance of each pixel of the scene: an NPY of millimetres, `inf` for what is far, or a grey PNG of 16 bits with whole
+    /// Distance of each pixel of the scene: an NPY in millimetres (`inf` is far), or a grey PNG of 16 bits in whole
     /// millimetres.
     #[arg(long, value_name = "FILE")]
     depth: Option<PathBuf>,
 
-    /// Wavelengths of the bands of a spectral cube (nm), separated by commas. They must hold 95 % of the light that each channel
-    /// of the camera counts.
+    /// Wavelengths of the bands of a spectral cube (nm), separated by commas. They must contain 95 % of the light that
+    /// each channel of the camera counts.
     #[arg(long, value_delimiter = ',', value_name = "NM,NM,...")]
     wavelengths_nm: Option<Vec<f64>>,
 
-    /// Pixels an axis of a built-in scene; 800 if left out.
+    /// Pixels along an axis of a built-in scene; 800 if left out.
     #[arg(long, value_parser = super::images::scored_sides())]
     pixels: Option<u16>,
 
-    /// Ways to restore: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs); the picture of the page is that of the first.
+    /// Restorations: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs), separated by commas. The page
+    /// shows the first.
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
-    /// Leave the forecast out: it costs as much as two restorations by Tikhonov.
+    /// Leave out the forecast, which costs as much as two restorations by Tikhonov.
     #[arg(long)]
     no_forecast: bool,
 
-    /// Restore by each element alone too.
+    /// Restore by each element alone too, and blend.
     #[arg(long)]
     separate: bool,
 
-    /// File of weights for the learnt prior that `metalith train` wrote, or a denoiser of one's own as `.onnx`; those of
-    /// the program if left out.
+    /// Weights of the learnt prior from `metalith train`, or another denoiser as `.onnx`; the shipped weights if left
+    /// out.
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
 
-    /// Draw so many pictures that the frame may be of, by the learnt prior, for their mean and a map of doubt.
+    /// Sample this number of pictures that the frame may show, with the learnt prior: their mean, and an uncertainty
+    /// map.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=64))]
     samples: Option<u8>,
 
-    /// Say too what the assumptions of others are worth: `paper`, those of the array that the prototype follows.
+    /// Also compute the effect of simplifications: `paper`, those of the paper that the prototype follows.
     #[arg(long, value_name = "WHOSE")]
     assume: Option<Assume>,
 
-    /// Folder for `picture.html` and `picture.json`, and beside them `frame.png` and a `restored_METHOD.png` for each way to restore,
-    /// both of 16 bits.
+    /// Folder for `picture.html`, `picture.json`, `frame.png` and a `restored_METHOD.png` for each method, images of 16
+    /// bits.
     #[arg(long, short, default_value = "out/picture", value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Print the numbers of `picture.json` to standard output: all its fields but the first two, `report` and `metalith`.
+    /// Print `picture.json` to standard output, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }
@@ -118,7 +119,8 @@ impl PictureArgs {
         let distance_um = distance_um(self.distance_mm)?;
         let built_in = self.scene.parse::<BuiltIn>().ok();
         let idle = |option: &str, what: &str| {
-            Err(Error::invalid(
+            Err(Error::refused(
+                "option/not-of-scene",
                 format!("{option} says nothing of `{}`: it is of {what}", self.scene),
                 format!("leave {option} out, or give another scene"),
             ))
@@ -160,22 +162,22 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     apart(inputs.into_iter().chain(others), &written)?;
     let layout = InputFile::of(&args.layout)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
-    let mut studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {
-        studio.prior = prior;
+        system.prior = prior;
     }
     // Once: it is asked for again and again.
-    let scene = studio.simulated(&scene).into_owned();
-    let simulation = studio.simulation_of(&scene);
-    let frame = studio.record(&simulation, &scene, args.seed)?;
-    let truth = studio.truth(&scene);
+    let scene = system.simulated(&scene).into_owned();
+    let simulation = system.simulation_of(&scene);
+    let frame = system.record(&simulation, &scene, args.seed)?;
+    let truth = system.truth(&scene);
     drop(simulation);
     if let Some(note) = frame.saturation_note(&truth) {
         terminal.say(&note);
     }
-    let operator = studio.restoration();
-    let rehearsal = Rehearsal::new(&studio, &operator);
-    let error = &rehearsal.operator_error;
+    let operator = system.restoration();
+    let forecast_scene = ForecastScene::new(&system, &operator);
+    let error = &forecast_scene.operator_error;
     let limited = error.note(&camera.channel_names());
     if let Some(note) = &limited {
         terminal.say(note);
@@ -185,11 +187,11 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     for method in methods {
         for joint in [true, false] {
             if joint || args.separate {
-                let picture = studio.restore(&operator, error, &frame, method, joint, terminal)?;
+                let picture = system.restore(&operator, error, &frame, method, joint, terminal)?;
                 let mut restoration = RestorationReport::new(method, joint, scores(&picture, &truth)?);
                 // What is lost by other methods depends on more than the spectrum of a scene.
                 if method == RestorationMethod::Tikhonov && joint && !args.no_forecast {
-                    let forecast = rehearsal.forecast(&studio, &operator, terminal)?;
+                    let forecast = forecast_scene.forecast(&system, &operator, terminal)?;
                     restoration.forecast_db = forecast.psnr_linear_db(&ScenePower::natural());
                     restoration.forecast_of_scene_db = forecast.psnr_linear_db(&ScenePower::of(&truth));
                 }
@@ -198,13 +200,13 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             }
         }
     }
-    let mut report = report(args, &studio, &scene, &frame, found, model.as_ref());
+    let mut report = report(args, &system, &scene, &frame, found, model.as_ref());
     report.of_frame.operator_error.clone_from(&error.overall);
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
-        report.contrast = contrast_curves(&studio, kind, &truth, &frame, &pictures[0]);
+        report.contrast = contrast_curves(&system, kind, &truth, &frame, &pictures[0]);
     }
-    let doubt = match args.samples {
-        Some(n) => Some(Uncertainty::of(&studio.samples(
+    let uncertainty = match args.samples {
+        Some(n) => Some(Uncertainty::of(&system.samples(
             &operator,
             error,
             &frame,
@@ -213,10 +215,10 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         )?)),
         None => None,
     };
-    report.doubt = doubt.as_ref().map(|d| d.report(&truth)).transpose()?;
+    report.uncertainty = uncertainty.as_ref().map(|d| d.report(&truth)).transpose()?;
     if let Some(Assume::Paper) = args.assume {
         drop(operator);
-        let narrow = studio.open_without_dispersion(
+        let narrow = system.open_without_dispersion(
             &design,
             &layout,
             model.as_ref(),
@@ -224,9 +226,9 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             &KernelCache::of_user(),
             terminal,
         )?;
-        report.worth = worth_of_assumptions(&studio, &narrow, &scene, args.seed, terminal)?;
+        report.worth = worth_of_assumptions(&system, &narrow, &scene, args.seed, terminal)?;
     }
-    report.of_frame.notes = studio.notes(&frame, &truth);
+    report.of_frame.notes = system.notes(&frame, &truth);
     report.of_frame.notes.extend(limited);
     let pages = PicturePages {
         report: &report,
@@ -234,7 +236,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         frame: &frame,
         restored: &pictures,
         camera: &camera,
-        doubt: doubt.as_ref(),
+        uncertainty: uncertainty.as_ref(),
     };
     write_pages(&pages, &args.out)?;
     terminal.clear();
@@ -254,12 +256,12 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         };
         print_line!("{}, {way}: {}", restoration.method, score(&restoration.scores[0]));
     }
-    if let Some(doubt) = &report.doubt {
+    if let Some(uncertainty) = &report.uncertainty {
         print_line!(
-            "mean of {} samples: {}; rank correlation of doubt and error {:.2}",
-            doubt.samples,
-            score(&doubt.scores[0]),
-            doubt.rank_correlation
+            "mean of {} samples: {}; rank correlation of uncertainty and error {:.2}",
+            uncertainty.samples,
+            score(&uncertainty.scores[0]),
+            uncertainty.rank_correlation
         );
     }
     print_line!("page: {}", outputs[0].display());
@@ -272,7 +274,7 @@ pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
 
 fn report(
     args: &PictureArgs,
-    studio: &ImagingSystem,
+    system: &ImagingSystem,
     scene: &SceneImage,
     frame: &Frame,
     restorations: Vec<RestorationReport>,
@@ -280,14 +282,14 @@ fn report(
 ) -> PictureReport {
     PictureReport {
         scene: scene.name.clone(),
-        of_frame: FrameStatement::new(studio, name_of(&args.layout), scene, frame, model),
-        frame: FrameFile::of(&studio.camera, frame),
+        of_frame: FrameStatement::new(system, name_of(&args.layout), scene, frame, model),
+        frame: FrameFile::of(&system.camera, frame),
         restorations,
-        budget: studio.budget(),
-        points: studio.point_images(),
-        homographies: studio.homographies(),
+        budget: system.budget(),
+        points: system.point_images(),
+        homographies: system.homographies(),
         contrast: Vec::new(),
-        doubt: None,
+        uncertainty: None,
         worth: Vec::new(),
     }
 }
@@ -307,9 +309,9 @@ mod tests {
     fn scenes_and_their_options_fit_or_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let small = folder.path().join("small.png").display().to_string();
-        metalith::picture::write_picture(small.as_ref(), &ndarray::Array3::from_elem((32, 40, 3), 0.5)).unwrap();
+        metalith::imaging::write_picture(small.as_ref(), &ndarray::Array3::from_elem((32, 40, 3), 0.5)).unwrap();
         let tiny = folder.path().join("tiny.png").display().to_string();
-        metalith::picture::write_picture(tiny.as_ref(), &ndarray::Array3::from_elem((8, 8, 3), 0.5)).unwrap();
+        metalith::imaging::write_picture(tiny.as_ref(), &ndarray::Array3::from_elem((8, 8, 3), 0.5)).unwrap();
         let scene = |of: &[&str]| {
             let files = [
                 "picture",

@@ -8,7 +8,8 @@ use metalith::{Result, plan_session};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
-/// Plan a bench session: the fewest captures that find every effect at a wanted size and tell it from the others.
+/// Plan a bench session: the fewest measurements that find every effect at a wanted size and distinguish it from the
+/// others.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith plan designs/mini_3x3.toml --bench bench.toml --out out/session-1\n\nWrites measurement.toml, plan.html (a check list to print) and plan.json; frames go to captures/. Exit code 1 if an effect is not found at its wanted size."
@@ -17,11 +18,11 @@ pub struct PlanArgs {
     /// The design file.
     design: PathBuf,
 
-    /// What the bench can do, and what it is to find.
+    /// Bench file: what the bench can do, and which effects it must find.
     #[arg(long, short, value_name = "BENCH")]
     bench: PathBuf,
 
-    /// The layout that was written; without it, the design's pillars are written into the folder.
+    /// The layout that was fabricated; without it, the design's pillars are written into the folder.
     #[arg(long, value_name = "FILE")]
     layout: Option<PathBuf>,
 
@@ -29,7 +30,7 @@ pub struct PlanArgs {
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// Plan for these effects alone, separated by commas; for all of them if left out.
+    /// Plan for these effects only, separated by commas; for all if left out.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
 

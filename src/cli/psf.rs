@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use metalith::cell::{Analyser, Fidelity, Handedness, Polarisation};
-use metalith::design::TALLEST_NM;
+use metalith::design::CellFile;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
@@ -24,30 +24,30 @@ use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
 /// Find the elements of any layout in GDSII or OASIS, read their pillars, and simulate their PSFs.
-#[derive(Args)]
+#[derive(Args, Clone)]
 #[command(
     after_help = "Example:\n  metalith psf lens.gds --layer 1/0 --distance-um 2400 --wavelength-nm 530 --out out/lens\n\n\
-    Light comes along the chip's normal unless --angle-x-deg, --angle-y-deg say otherwise; the window is about the \
-    element's axis unless --at-x-um, --at-y-um do. A steered element sends light along the normal far off its axis."
+    Light has normal incidence unless --angle-x-deg, --angle-y-deg say otherwise. The window is about the element's axis \
+    unless --at-x-um, --at-y-um say otherwise. A steered element sends light of normal incidence far off its axis."
 )]
 pub struct PsfArgs {
-    /// The layout, by whatever program it was written; `-` for standard input.
+    /// The layout, of any program; `-` for standard input.
     layout: PathBuf,
 
     /// Layer and datatype of the pillars.
     #[arg(long, default_value = "1/0", value_parser = layer)]
     layer: LayerNumber,
 
-    /// Cell to start from; the top cell if there is one only.
+    /// Cell to start from; the top cell if there is only one.
     #[arg(long)]
     top: Option<String>,
 
-    /// From the pillar tops to the sensor (um).
+    /// Distance from the pillar tops to the sensor (um).
     #[arg(long, default_value_t = 2400.0, value_parser = between(0.1, 1e6))]
     distance_um: f64,
 
-    /// Wavelength (nm); may be given several times. 455, 530 and 660 nm if left out; with a --camera that does not count light
-    /// from 455 to 660 nm the middle of each of its channels.
+    /// Wavelength (nm); may be given several times. 455, 530 and 660 nm if left out; with a --camera that does not
+    /// count light from 455 to 660 nm, the middle of each of its channels.
     #[arg(long = "wavelength-nm", value_parser = between(150.0, 20_000.0))]
     wavelengths_nm: Vec<f64>,
 
@@ -59,110 +59,88 @@ pub struct PsfArgs {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-STEEPEST_DEG, STEEPEST_DEG))]
     angle_y_deg: f64,
 
-    /// Middle of the window from the element's axis (um).
+    /// Middle of the PSF window from the element's axis (um).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-1e6, 1e6))]
     at_x_um: f64,
 
-    /// Middle of the window from the element's axis (um).
+    /// Middle of the PSF window from the element's axis (um).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-1e6, 1e6))]
     at_y_um: f64,
 
-    /// Samples an axis, one pitch apart.
+    /// Samples along an axis of the window, one pitch apart.
     #[arg(long, default_value_t = 256, value_parser = samples)]
     samples: usize,
 
-    /// Height of the pillars (nm), for all cells but the published one.
-    #[arg(long, default_value_t = 700.0, value_parser = between(10.0, TALLEST_NM))]
-    height_nm: f64,
+    /// The pillar and what surrounds it, for all cells but the published one: a file with a section [cell] as in a design, or a whole
+    /// design. Pitch and lattice must be the layout's. Silicon nitride 700 nm high on fused silica in air if left out.
+    #[arg(long, value_name = "FILE")]
+    cell: Option<PathBuf>,
 
-    /// Material of the pillars: a name that a design file takes, or a CSV table of its index.
-    #[arg(long, default_value = "sin_luke_2015")]
-    pillar_material: String,
+    #[arg(skip)]
+    stated: Option<CellFile>,
 
-    /// Material of the substrate, likewise.
-    #[arg(long, default_value = "fused_silica_malitson_1965")]
-    substrate_material: String,
-
-    /// Thickness of a layer between substrate and film (nm).
-    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, TALLEST_NM))]
-    spacer_nm: f64,
-
-    /// Its material.
-    #[arg(long, value_name = "MATERIAL")]
-    spacer_material: Option<String>,
-
-    /// Thickness of the film that the etch left between the pillars (nm).
-    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, TALLEST_NM))]
-    residual_nm: f64,
-
-    /// Refractive index between the pillars and towards the sensor; that of air if left out.
-    #[arg(long, value_parser = between(1.0, 3.0))]
-    ambient_index: Option<f64>,
-
-    /// Material there, in place of --ambient-index.
-    #[arg(long, value_name = "MATERIAL", conflicts_with = "ambient_index")]
-    ambient_material: Option<String>,
-
-    /// Edge of a sensor pixel (um); that of the --camera if left out, without one 5.86.
+    /// Edge of a sensor pixel (um); if left out, the one of --camera, else 5.86.
     #[arg(long, value_parser = between(0.1, 100.0))]
     pixel_um: Option<f64>,
 
-    /// The cell.
+    /// Simulation model of the pillars.
     #[arg(long, value_enum, default_value = "rigorous")]
     fidelity: FidelityArg,
 
-    /// The chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote. Distance and
-    /// angles are those stated; what the model adds to them is added.
+    /// Simulate the chip as fabricated, by the `model.toml` of `metalith calibrate`. The changes of the model are added
+    /// to the stated distance and angles.
     #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
     model: Option<PathBuf>,
 
-    /// Diameter of the openings in the metal (um), for a model whose aperture is off its place; that of the circle
-    /// around the pillars if left out.
+    /// Diameter of the openings in the metal (um), for a model with an aperture offset; the circle around the pillars
+    /// if left out.
     #[arg(long, value_parser = between(0.1, 1e5))]
     aperture_um: Option<f64>,
 
-    /// Solve the cell at the angle of incidence, for both polarisations, instead of along the normal.
+    /// Solve the unit cell at oblique incidence, the angle at which light arrives, for both polarisations; else at
+    /// normal incidence.
     #[arg(long)]
-    as_lit: bool,
+    oblique: bool,
 
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of a perfect lens, several times faster.
+    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
     #[arg(long)]
     fast: bool,
 
-    /// Simulate white light for the camera of this file too: all wavelengths from the angle of incidence.
+    /// Add polychromatic figures for the camera of this file: all wavelengths from the angle of incidence.
     #[arg(long, value_name = "CAMERA")]
     camera: Option<PathBuf>,
 
-    /// Angle in the x-z plane by which the elements steer at --wedge-wavelength-nm (degrees); with --camera it says
-    /// where each wavelength lands, which a layout does not.
+    /// Angle in the x-z plane by which the elements steer at --wedge-wavelength-nm (degrees). With --camera it decides
+    /// where each wavelength lands; a layout does not say it.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, requires = "camera")]
     wedge_x_deg: f64,
 
-    /// The same in the y-z plane.
+    /// Angle in the y-z plane by which the elements steer at --wedge-wavelength-nm (degrees).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, requires = "camera")]
     wedge_y_deg: f64,
 
-    /// Wavelength at which the elements steer by these angles (nm).
+    /// Wavelength at which the elements steer by --wedge-x-deg and --wedge-y-deg (nm).
     #[arg(long, default_value_t = 550.0, requires = "camera")]
     wedge_wavelength_nm: f64,
 
-    /// Polarisation of the light that arrives, where the pillars are rectangles (if left out, `left` at rotated ones and `x` at upright ones): `left` or `right` circular,
-    /// with (x + i y) / sqrt 2 for left and a wave along +z, linear along `x` or `y` or at an angle from x towards y (degrees),
-    /// or `unpolarised`.
+    /// Polarisation of the arriving light, for pillars that are rectangles: `left` or `right` (circular; left is (x + i
+    /// y) / sqrt 2 for a wave along +z), `x`, `y` or an angle from x towards y in degrees (linear), or `unpolarised`.
+    /// If left out, `left` for rotated and `x` for upright ones.
     #[arg(long, value_name = "POLARISATION", allow_negative_numbers = true, value_parser = polarisation)]
     arriving: Option<Polarisation>,
 
-    /// What is before the sensor, where the pillars are rectangles: `circular` (of rotated ones), which passes the hand that focused light is
-    /// converted to, or linear along `x` or `y` or at an angle from x towards y (degrees).
+    /// Analyser before the sensor, for pillars that are rectangles: `circular` (rotated ones only) passes the
+    /// handedness that focused light is converted to; `x`, `y` or an angle from x towards y in degrees passes linear
+    /// polarisation.
     #[arg(long, value_name = "ANALYSER", allow_negative_numbers = true, value_parser = analyser)]
     analyser: Option<Analyser>,
 
-    /// Circular polarisation of the light that the layout focuses, which decides what a circular --analyser passes; that of
-    /// --arriving if left out.
+    /// Circular polarisation of the light that the layout focuses, which decides what a circular --analyser passes; if left out
+    /// `arriving` of --cell, where its pillars are rotated rectangles, else that of --arriving.
     #[arg(long, value_enum, requires = "analyser")]
     focused: Option<CircularArg>,
 
-    /// Only read the pillars; simulate nothing.
+    /// Read the pillars and simulate nothing.
     #[arg(long)]
     extract_only: bool,
 
@@ -241,7 +219,8 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if args.extract_only || others <= found.pillars {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "psf/not-pillars",
         format!(
             "{}: only {} of {} shapes on layer {} are {} on a lattice",
             args.layout.display(),
@@ -260,11 +239,33 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
         &args.layout,
         "name a cell with elements of one kind by --top, or look at what is there with --extract-only --json",
     )?;
+    if let (Some(stated), Some(element)) = (&args.stated, found.elements.first()) {
+        let (own, lattice) = (&stated.cell, element.site.lattice);
+        if (own.pitch_nm, own.lattice) != (lattice.pitch_nm(), lattice.kind()) {
+            return Err(Error::refused(
+                "psf/lattices-differ",
+                format!(
+                    "{}: pillars on a {} lattice of {} nm, and {} is of a {} lattice of {} nm",
+                    args.layout.display(),
+                    lattice.kind(),
+                    lattice.pitch_nm(),
+                    stated.path.display(),
+                    own.lattice,
+                    own.pitch_nm
+                ),
+                "give by --cell the cell of the design that the layout is of",
+            ));
+        }
+    }
     if args.model.is_none()
         && !args.extract_only
         && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))
     {
-        return Err(Error::invalid(format!("{}: {what}", args.layout.display()), hint));
+        return Err(Error::refused(
+            "psf/kinds-of-pillars",
+            format!("{}: {what}", args.layout.display()),
+            hint,
+        ));
     }
     Ok(())
 }
@@ -273,7 +274,8 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
 /// told which it passes.
 fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if found.shape.basis().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/polarisation-of-pillars",
             format!(
                 "{}: light of a polarisation for {}",
                 args.layout.display(),
@@ -286,7 +288,8 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if found.shape.basis() == Some(PolarisationBasis::Linear)
         && (args.analyser == Some(Analyser::Circular) || args.focused.is_some())
     {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/not-focused",
             format!(
                 "{}: its pillars are upright rectangles, which focus linear light, and {} was asked for",
                 args.layout.display(),
@@ -302,7 +305,8 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
         ));
     }
     if args.analyser == Some(Analyser::Circular) && args.hand().is_none() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "light/analyser",
             format!(
                 "a circular analyser in light that arrives {}",
                 args.arriving(found.shape)
@@ -314,6 +318,8 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
 }
 
 pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
+    let stated = args.cell.as_deref().map(CellFile::read).transpose()?;
+    let args = &PsfArgs { stated, ..args.clone() };
     terminal.stop_on_interrupt();
     let layout = Layout::open_with(&InputFile::of(&args.layout)?, ReadLimits::default(), terminal)?;
     let plan = ExtractionPlan {
@@ -347,8 +353,8 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let (psfs, white) = match (&light, &made) {
         (None, _) => (Vec::new(), None),
-        (Some(light), Some(chip)) => simulate(SimulationCase::Made(chip), light)?,
-        (Some(light), None) => simulate(SimulationCase::Cell(args.cell(&found, light)?.as_ref()), light)?,
+        (Some(light), Some(chip)) => simulate(SimulationCase::from(chip), light)?,
+        (Some(light), None) => simulate(SimulationCase::from(args.cell(&found, light)?.as_ref()), light)?,
     };
     let model = made.as_ref().map(AsBuiltChip::statement);
     if let Some(folder) = &args.out {

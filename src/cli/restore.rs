@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::Result;
-use metalith::picture::restore::{LearnedDenoiser, RestorationMethod};
-use metalith::picture::scene::SceneImage;
-use metalith::picture::{
-    FrameNumbers, FrameStatement, ImagingSystem, Rehearsal, RestoredPicture, RestoredReport, check_scored, read_signals,
+use metalith::imaging::scene::SceneImage;
+use metalith::imaging::{
+    ForecastScene, FrameNumbers, FrameStatement, ImagingSystem, RestoredPicture, RestoredReport, check_scored,
+    read_signals,
 };
+use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use ndarray::Array3;
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
@@ -16,13 +17,12 @@ use super::paths::{apart, name_of};
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
-/// Restore the picture from a frame that a camera with the chip has recorded.
+/// Restore the picture from a frame that a real camera with the chip recorded.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith restore out/prototype_3x3/prototype_3x3_pillars.gds out/picture/frame.png \\\n    --design designs/prototype_3x3.toml --camera cameras/gt1930.toml --out out/restored\n\n\
-    The frame is a grey PNG of 8 or 16 bits of all pixels of the sensor: the mosaic of its colour filter array, without one \
-    channel by channel below one another. How bright the picture is follows from `white` in [exposure] of the camera. Kernels \
-    are those of `metalith picture`, kept on the disk."
+    The frame is a grey PNG of 8 or 16 bits with all pixels of the sensor: the mosaic of its colour filter array, else one \
+    channel below the other. `white` in [exposure] of the camera sets the brightness of the picture. Kernels are cached."
 )]
 pub struct RestoreArgs {
     /// The pillar layout; `-` for standard input.
@@ -34,40 +34,41 @@ pub struct RestoreArgs {
     #[command(flatten)]
     with: CameraArgs,
 
-    /// Number in the frame's file that stands for no signal; 0 if left out. Frames by `metalith picture` need none.
+    /// Pixel value of no signal; 0 if left out. Frames of `metalith picture` do not need it.
     #[arg(long, value_name = "N")]
     black_level: Option<u16>,
 
-    /// Number in the frame's file that stands for full scale, such as 4095; 255 of 8 bits if left out.
+    /// Pixel value of full scale, such as 4095; for 8 bits 255 if left out. Frames of `metalith picture` do not need
+    /// it.
     #[arg(long, value_name = "N")]
     white: Option<u16>,
 
-    /// Distance of the scene (mm); far if left out.
+    /// Distance of the scene (mm); infinite if left out.
     #[arg(long)]
     distance_mm: Option<f64>,
 
-    /// Pixels of the picture an axis.
+    /// Pixels of the picture along an axis.
     #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u16).range(64..=4096))]
     pixels: u16,
 
-    /// Ways to restore: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs).
+    /// Restorations: tikhonov, tv, richardson-lucy, hqs, prior (learnt from photographs), separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
-    /// Restore by each element alone too.
+    /// Restore by each element alone too, and blend.
     #[arg(long)]
     separate: bool,
 
-    /// File of weights for the learnt prior that `metalith train` wrote, or a denoiser of one's own as `.onnx`; those of
-    /// the program if left out.
+    /// Weights of the learnt prior from `metalith train`, or another denoiser as `.onnx`; the shipped weights if left
+    /// out.
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
 
-    /// Folder for `restored.html` and `restored.json`, and beside them a `restored_METHOD.png` of 16 bits for each way to restore.
+    /// Folder for `restored.html`, `restored.json` and a `restored_METHOD.png` of 16 bits for each method.
     #[arg(long, short, default_value = "out/restored", value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Print the numbers of `restored.json` to standard output: all its fields but the first two, `report` and `metalith`.
+    /// Print `restored.json` to standard output, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }
@@ -101,27 +102,27 @@ pub fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     let signals = read_signals(&args.frame, &camera, numbers)?;
     let layout = InputFile::of(&args.layout)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
-    let mut studio = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
+    let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {
-        studio.prior = prior;
+        system.prior = prior;
     }
-    let frame = studio.frame_of(signals)?;
-    let operator = studio.restoration();
-    let rehearsal = Rehearsal::new(&studio, &operator);
-    let error = &rehearsal.operator_error;
-    let mut notes = studio.notes(&frame, &Array3::zeros((1, 1, 3)));
+    let frame = system.frame_of(signals)?;
+    let operator = system.restoration();
+    let forecast_scene = ForecastScene::new(&system, &operator);
+    let error = &forecast_scene.operator_error;
+    let mut notes = system.notes(&frame, &Array3::zeros((1, 1, 3)));
     notes.extend(error.note(&camera.channel_names()));
     for note in &notes {
         terminal.say(note);
     }
     let mut restored = Vec::new();
     for (picture, method) in &wanted {
-        restored.push(studio.restore(&operator, error, &frame, *method, picture.joint, terminal)?);
+        restored.push(system.restore(&operator, error, &frame, *method, picture.joint, terminal)?);
     }
     let of_frame = FrameStatement {
         notes,
         operator_error: error.overall.clone(),
-        ..FrameStatement::new(&studio, name_of(&args.layout), &scene, &frame, model.as_ref())
+        ..FrameStatement::new(&system, name_of(&args.layout), &scene, &frame, model.as_ref())
     };
     let report = RestoredReport {
         frame: name_of(&args.frame),

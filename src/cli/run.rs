@@ -9,7 +9,7 @@ use super::layout::Target;
 use super::verify::Judging;
 use super::{Outcome, Terminal, standard_input};
 
-/// Write the layouts of a design, read them back, simulate what was written, and report.
+/// Write the layouts of a design, read them back, simulate them, and write the report.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith run designs/mini_3x3.toml --out out/mini\n\nExit code 1 if a limit of the design does not hold."

@@ -26,7 +26,7 @@ impl ShippedDesign {
         names
     }
 
-    /// One of [`ShippedDesign::names`].
+    /// Design of one of [`ShippedDesign::names`].
     ///
     /// # Panics
     /// If it is none of them.
@@ -62,7 +62,8 @@ impl ShippedDesign {
                 || std::fs::metadata(path).is_ok_and(|found| found.is_file() && found.len() == bytes.len() as u64);
             let is_it = || is_as_long() && std::fs::read(path).is_ok_and(|found| found == *bytes);
             if path.exists() && !is_it() {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "new/exists",
                     format!("{} exists and is another file", path.display()),
                     "write the design to another folder, or move the file away",
                 ));

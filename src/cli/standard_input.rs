@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use metalith::{Design, Error, Result};
 use tempfile::TempDir;
 
-/// What standard input is called in messages.
+/// Name of standard input in messages.
 const NAME: &str = "standard input";
 
 /// Most bytes of a design that is piped in: thousands of times what a person writes.
@@ -26,7 +26,8 @@ fn is_standard_input(path: &Path) -> bool {
 pub fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()> {
     match paths.into_iter().any(is_standard_input) {
         false => Ok(()),
-        true => Err(Error::invalid(
+        true => Err(Error::refused(
+            "option/plan-of-standard-input",
             "a plan of a file from standard input",
             "name the file: shards read it again",
         )),
@@ -37,7 +38,8 @@ pub fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()> {
 fn take() -> Result<io::StdinLock<'static>> {
     static TAKEN: AtomicBool = AtomicBool::new(false);
     if TAKEN.swap(true, Ordering::Relaxed) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "option/two-on-standard-input",
             "standard input is given for two files",
             "give one of them as `-`, and the others by their names",
         ));
@@ -96,7 +98,7 @@ pub fn design(path: &Path) -> Result<Design> {
     }
 }
 
-/// The same for who makes the library of its pillars, which need not be there yet.
+/// Variant of [`design`] for a caller that makes the library of its pillars, which need not be there yet.
 ///
 /// # Errors
 /// As [`design`].
@@ -115,7 +117,8 @@ fn design_text() -> Result<String> {
     let read = take()?.take(LONGEST_DESIGN + 1).read_to_string(&mut text);
     read.map_err(Error::io("read", name))?;
     if text.len() as u64 > LONGEST_DESIGN {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "design/too-long",
             format!("a design of more than {LONGEST_DESIGN} bytes on standard input"),
             "pipe in the text of a design file",
         ));

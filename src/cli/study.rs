@@ -6,16 +6,15 @@ use std::process::{Child, Command};
 use clap::{Args, Subcommand};
 use metalith::report::sig;
 use metalith::study::{
-    ComparisonPlan, MANIFEST, PairsPlan, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan,
-    submissions, write_page,
+    MANIFEST, PairsPlan, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan, submissions,
+    write_page,
 };
 use metalith::{Error, Progress, Result};
 
 use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line};
 
-/// Make a chip many times with the tolerances of its process and bench: which share of the chips holds the limits, and
-/// what decides it.
+/// Simulate many chips with the tolerances of a process and a bench: the yield, and the effects that limit it.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith study plan tolerance.toml --out out/study\n  metalith study run out/study --missing\n  metalith study merge out/study --out out/study/result.csv"
@@ -27,28 +26,28 @@ pub struct StudyArgs {
 
 #[derive(Subcommand)]
 enum Step {
-    /// Sharding a study into shards: the layout, the tables of cells, the first draw to know its time, and a manifest.
+    /// Plan a study: write the layout, solve the tables of cells, time the first draw, and cut the work into shards.
     Plan(PlanArgs),
-    /// Make one shard, or all that are missing. One that is there is left as it is.
+    /// Make one shard, or all missing ones. Existing shards stay.
     Run(RunArgs),
-    /// Say which shards are there.
+    /// List existing and missing shards.
     Status(StatusArgs),
-    /// Give what is missing to Slurm, as job arrays.
+    /// Submit missing shards to Slurm as job arrays.
     Submit(SubmitArgs),
-    /// Put all shards together: a table of the draws, and a page.
+    /// Merge all shards into a table of the draws and a page.
     Merge(MergeArgs),
 }
 
 #[derive(Args)]
 struct PlanArgs {
-    /// What varies, what is looked at, and how often.
+    /// Tolerance file: what varies, the limits, and the number of draws.
     tolerance: PathBuf,
 
     /// Folder of the study, created if need be.
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Draws of a shard; as many as take ten minutes if left out. The answer does not depend on it.
+    /// Draws in a shard; as many as take ten minutes if left out. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     draws_per_shard: Option<u64>,
 }
@@ -62,11 +61,11 @@ struct RunArgs {
     #[arg(long, value_name = "N", required_unless_present = "missing")]
     shard: Option<u64>,
 
-    /// All shards that are not there.
+    /// Make all missing shards.
     #[arg(long, conflicts_with = "shard")]
     missing: bool,
 
-    /// Processes to share them; one after the other with all threads if left out.
+    /// Number of processes; if left out, one shard after the other with all threads.
     #[arg(long, value_name = "N", requires = "missing", value_parser = clap::value_parser!(u16).range(1..=512))]
     jobs: Option<u16>,
 }
@@ -76,7 +75,7 @@ struct StatusArgs {
     /// Folder of the study.
     study: PathBuf,
 
-    /// Print it as JSON.
+    /// Print the list as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -86,11 +85,11 @@ struct SubmitArgs {
     /// Folder of the study.
     study: PathBuf,
 
-    /// What jobs of the cluster need: partition, time, memory, size of arrays.
+    /// File with what jobs need: partition, time, memory, size of arrays.
     #[arg(long, value_name = "FILE")]
     slurm: PathBuf,
 
-    /// Write the job scripts, and submit nothing.
+    /// Write the job scripts and submit nothing.
     #[arg(long)]
     dry_run: bool,
 }
@@ -100,12 +99,12 @@ struct MergeArgs {
     /// Folder of the study.
     study: PathBuf,
 
-    /// Table of the draws: .csv, .json, .jsonl, or .parquet of a program with that feature; `result.csv` in the folder of the study if left out. The page is
-    /// written beside it.
+    /// File for the table of the draws: .csv, .json, .jsonl, or .parquet in a program with that feature; `result.csv`
+    /// in the folder of the study if left out. The page is written to the same folder.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Worst draws that are simulated again, to show their PSFs.
+    /// Number of worst draws to simulate again, to show their PSFs.
     #[arg(long, value_name = "N", default_value_t = 3)]
     psfs: usize,
 }
@@ -147,7 +146,8 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let found = work.cut().status()?;
     if let Some((path, why)) = found.unusable.first() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "study/tables-unreadable",
             format!("{} cannot be used: {why}", path.display()),
             "remove it first",
         ));
@@ -196,7 +196,8 @@ fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Termina
     if failed.is_empty() {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "study/shards-not-made",
         format!("{} shards were not made, the first is {}", failed.len(), failed[0]),
         "their messages stand above; run again with --missing",
     ))
@@ -241,7 +242,8 @@ fn submit(args: &SubmitArgs) -> Result<Outcome> {
             .output()
             .map_err(Error::io("start sbatch for", &submission.script))?;
         if !answer.status.success() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/sbatch",
                 format!(
                     "sbatch refused {}: {}",
                     submission.script.display(),
@@ -259,6 +261,7 @@ fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     match Work::open(&args.study)? {
         Work::Study(plan) => merge_study(&plan, args, terminal),
         Work::Pairs(plan) => merge_pairs(&plan, args, terminal),
+        #[cfg(feature = "baselines")]
         Work::Comparison(plan) => merge_comparison(&plan, args, terminal),
         Work::Starts(plan) => merge_starts(&plan, args),
     }
@@ -268,7 +271,8 @@ fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
 fn without_table(args: &MergeArgs) -> Result<()> {
     match &args.out {
         None => Ok(()),
-        Some(_) => Err(Error::invalid(
+        Some(_) => Err(Error::refused(
+            "study/no-table",
             "this work has no table of draws",
             "leave --out out: files are written into the folder of the plan",
         )),
@@ -283,7 +287,8 @@ fn merge_pairs(plan: &PairsPlan, args: &MergeArgs, terminal: &Terminal) -> Resul
     Ok(Outcome::Fine)
 }
 
-fn merge_comparison(plan: &ComparisonPlan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
+#[cfg(feature = "baselines")]
+fn merge_comparison(plan: &metalith::study::ComparisonPlan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     without_table(args)?;
     let comparison = plan.merge(terminal)?;
     terminal.clear();

@@ -1,4 +1,4 @@
-//! What the program shows while it works: progress bars on a terminal, a line now and then where there is none.
+//! Progress that the program shows while it works: bars on a terminal, a line now and then where there is none.
 
 use std::io::IsTerminal;
 use std::path::Path;
@@ -10,7 +10,7 @@ use metalith::{FolderLock, Progress};
 
 use super::output;
 
-/// When Ctrl-C was first pressed in commands that can stop between two steps.
+/// Time when Ctrl-C was first pressed in commands that can stop between two steps.
 static ASKED: OnceLock<Instant> = OnceLock::new();
 
 /// Signals within this time are one wish to stop: a shell, `timeout` and a group of processes each send their own.
@@ -27,12 +27,12 @@ pub struct Terminal {
     log: Mutex<Log>,
 }
 
-/// What a log is told.
+/// Log of the progress of work.
 struct Log {
     work: Option<Work>,
     /// The last word on the state of the work, and whether a line has held it.
     note: Option<(String, bool)>,
-    /// When the last line was written.
+    /// Time when the last line was written.
     told: Instant,
 }
 
@@ -75,7 +75,7 @@ impl Log {
         self.line(now)
     }
 
-    /// The same after a word on the state of the work; outside of any work, the word itself.
+    /// Line after a word on the state of the work; outside of any work, the word itself.
     fn note(&mut self, text: &str, now: Instant) -> Option<String> {
         if self.work.is_none() {
             return Some(text.to_owned());
@@ -109,7 +109,7 @@ impl Log {
     }
 }
 
-/// Whether a wish to stop ends the process at once, `since` the first one.
+/// True if a wish to stop ends the process at once, `since` the first one.
 fn ends_at_once(since: Duration) -> bool {
     since >= ONE_WISH
 }

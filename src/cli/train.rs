@@ -4,24 +4,24 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::baselines::{Comparison, StageKind};
-use metalith::picture::KernelCache;
-use metalith::picture::scene::images_in;
-use metalith::picture::scene::read_picture;
-use metalith::prior::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_finisher};
+use metalith::imaging::KernelCache;
+use metalith::imaging::scene::images_in;
+use metalith::imaging::scene::read_picture;
+use metalith::training::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_post_processor};
 use metalith::{Error, Result};
 
 use super::compare::{ComparedDesign, LenslessArgs, Rival};
 use super::paths::{apart, writable};
 use super::{Outcome, Terminal, print_json, print_line};
 
-/// Teach a network from the photographs of a folder: the one that takes noise out of pictures, or the last stage of a camera.
+/// Train a network on the photographs of a folder: the denoiser of the learnt prior, or the last stage of a camera.
 ///
-/// The weights depend on the photographs, the seed and the numbers below, not on the number of threads. Training that was
-/// stopped goes on: where it stands is kept beside the weights, in a file that ends in `.state`. One photograph of twelve is
-/// held out, and the network judged by it.
+/// The weights depend on the photographs, the seed and the numbers below, not on the number of threads. Interrupted
+/// training continues from a file next to the weights that ends in `.state`. One photograph in twelve is held out and
+/// measures the quality of the network.
 ///
-/// With `--stage` the photographs are taken by a simulated camera first, and restored by the means that the stage begins with; these
-/// pictures are kept in a folder beside the weights that ends in `.pictures`.
+/// With `--stage` a simulated camera first takes the photographs, and they are restored by the methods that the stage
+/// begins with. These pictures are cached in a folder next to the weights that ends in `.pictures`.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  metalith train photographs --out denoiser.safetensors --steps 9000\n  \
@@ -32,51 +32,52 @@ pub struct TrainArgs {
     /// Folder of PNG, JPEG or NPY photographs.
     folder: PathBuf,
 
-    /// File for the weights [default: out/denoiser.safetensors, or out/KIND.safetensors for the last stage of a kind].
+    /// File for the weights [default: out/denoiser.safetensors, or out/KIND.safetensors for a last stage].
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Steps down the gradient.
+    /// Number of gradient steps.
     #[arg(long, default_value_t = TrainingSpec::default().steps)]
     steps: u64,
 
-    /// Pieces of photographs a step.
+    /// Pieces of photographs in a step.
     #[arg(long, default_value_t = TrainingSpec::default().batch)]
     batch: usize,
 
-    /// Pixels a side of a piece.
+    /// Pixels along a side of a piece.
     #[arg(long, default_value_t = TrainingSpec::default().piece)]
     piece: usize,
 
-    /// Of first weights, pieces and noise.
+    /// Seed of the first weights, the pieces and the noise.
     #[arg(long, default_value_t = TrainingSpec::default().seed)]
     seed: u64,
 
-    /// Teach the last stage of a camera instead: of the rivals `flatnet` (a mask), `unrolled-diffuser` (a rough surface) and
-    /// `multi-wiener` (the array of --design), or `blending`, the picture of one element alone after the other.
+    /// Train the last stage of a camera instead: `flatnet` for the mask of flatcam, `unrolled-diffuser` for the surface
+    /// of diffusercam, `multi-wiener` for the array of --design, or `blending` for the same array from the pictures of
+    /// its single elements.
     #[arg(long, value_name = "KIND", requires = "camera")]
     stage: Option<StageKind>,
 
-    /// The camera file of this camera: sensor, light, exposure and noise.
+    /// Camera file of this camera: sensor, light, exposure and noise.
     #[arg(long, requires = "stage")]
     camera: Option<PathBuf>,
 
-    /// The design of this camera, if it has one: DESIGN.toml[:LAYOUT].
+    /// Design of this camera, if it has one: DESIGN.toml[:LAYOUT].
     #[arg(long, value_name = "DESIGN[:LAYOUT]", requires = "stage")]
     design: Option<ComparedDesign>,
 
-    /// Angle from the left to the right edge of its photographs (degrees).
+    /// Angle from the left to the right edge of a photograph (degrees).
     #[arg(long, default_value_t = 90.0, requires = "stage")]
     field_deg: f64,
 
-    /// Cut each photograph to the square of so many pixels in its middle: a last stage is for pictures of one size.
+    /// Crop the central square of each photograph to this number of pixels: a last stage is for pictures of one size.
     #[arg(long, value_name = "N", requires = "stage", value_parser = clap::value_parser!(u16).range(32..=4096))]
     pixels: Option<u16>,
 
     #[command(flatten)]
     bare: LenslessArgs,
 
-    /// Print what came out as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -90,8 +91,8 @@ impl TrainArgs {
     }
 
     /// The camera that a last stage is for.
-    fn lineup(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Comparison> {
-        let wrong = |what: &str, hint: &str| Err(Error::invalid(what, hint));
+    fn comparison(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Comparison> {
+        let wrong = |what: &str, hint: &str| Err(Error::refused("train/stage-camera", what, hint));
         let lensless = match (kind, &self.design) {
             (StageKind::FlatNet, None) => vec![self.bare.camera(Rival::Flatcam)?],
             (StageKind::UnrolledDiffuser, None) => vec![self.bare.camera(Rival::Diffusercam)?],
@@ -124,13 +125,13 @@ impl TrainArgs {
         [out, state]: [&Path; 2],
         terminal: &Terminal,
     ) -> Result<TrainingReport> {
-        let lineup = self.lineup(kind, photographs)?;
-        let open = lineup.open()?;
-        Stacks::check(lineup.photographs.len(), open.size(), spec.piece)?;
-        let kept = KernelCache::of_user();
-        let (stacks, taught) = open.lessons(0, kind, &beside(out, ".pictures"), &kept, terminal)?;
+        let comparison = self.comparison(kind, photographs)?;
+        let open = comparison.open()?;
+        Stacks::check(comparison.photographs.len(), open.size(), spec.piece)?;
+        let cache = KernelCache::of_user();
+        let (stacks, taught) = open.training_stacks(0, kind, &beside(out, ".pictures"), &cache, terminal)?;
         let stacks = Stacks::new(stacks, taught, spec.piece)?;
-        train_finisher(&stacks, spec, out, state, terminal)
+        train_post_processor(&stacks, spec, out, state, terminal)
     }
 }
 
@@ -158,7 +159,8 @@ pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
     let report = match args.stage {
         Some(kind) => args.stage(kind, files, &spec, [&out, &state], terminal)?,
         None if !args.bare.is_standard() => {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "train/no-stage",
                 "numbers of a mask or of a rough surface, and no last stage to teach",
                 "give --stage flatnet or --stage unrolled-diffuser, or leave them out",
             ));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::cell::{cache_folder, oblique_refused};
 use metalith::design::{CellIncidence, LatticeOrders};
-use metalith::picture::thumbnail;
+use metalith::imaging::thumbnail;
 use metalith::report::{Figure, sig};
 use metalith::sensor::Camera;
 use metalith::{
@@ -23,16 +23,16 @@ use super::{Outcome, Terminal, print_json, print_line, standard_input};
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith verify designs/mini_3x3.toml out/mini_3x3/mini_3x3_pillars.gds --fast\n\n\
-    A compensated layout (--compensated MODEL) is judged as the process makes it, unless --model names another one."
+    A compensated layout (--compensated MODEL) is simulated as fabricated by that model, unless --model names another one."
 )]
 pub struct VerifyArgs {
     /// The design file.
     design: PathBuf,
 
-    /// The pillar layout, by whatever program it was written; `-` for standard input.
+    /// The pillar layout, of any program; `-` for standard input.
     layout: PathBuf,
 
-    /// Folder for `report.html` and `report.json`; that of the layout if left out.
+    /// Folder for `report.html` and `report.json`; the folder of the layout if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
@@ -46,50 +46,51 @@ pub struct VerifyArgs {
 /// How a layout is judged.
 #[derive(Args, Clone)]
 pub struct Judging {
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of a perfect lens, several times faster.
+    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
     #[arg(long)]
     fast: bool,
 
-    /// The cell that the layout is judged by; what `fidelity` in [verify] of the design says if left out. Where it says nothing,
-    /// `neighbours` for the cell of the paper, else `rigorous`.
+    /// Simulation model of the pillars; `fidelity` in [verify] of the design if left out. Without it, `neighbours` for
+    /// the published cell, else `rigorous`.
     #[arg(long, value_enum)]
     fidelity: Option<FidelityArg>,
 
-    /// Judge the chip as a measured line and bench make it: the `model.toml` that `metalith calibrate` wrote. What
-    /// it says of lamps cannot be applied to PSFs of one wavelength and point, and is listed.
+    /// Simulate the chip as fabricated, by the `model.toml` of `metalith calibrate`. Effects of lamps do not apply to
+    /// PSFs of one wavelength and point; they are listed.
     #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
     model: Option<PathBuf>,
 
-    /// Solve the cells at the angles that light arrives at, for both polarisations, as `incidence = "as_lit"` in
-    /// [verify] of the design asks for; else along the normal.
+    /// Solve the unit cells at oblique incidence, the angles at which light arrives, for both polarisations, like
+    /// `incidence = "oblique"` in [verify] of the design; else at normal incidence.
     #[arg(long)]
-    as_lit: bool,
+    oblique: bool,
 
-    /// Memory that reading back and simulating may take (MB). What takes more is simulated in parts, in more time, by the
-    /// cell that judges alone; what takes more even so is compared with its design pillar by pillar, and not simulated.
+    /// Memory for reading back and simulating (MB). Larger layouts are simulated in parts, which takes more time, and
+    /// without other models for comparison. If that does not suffice, all pillars are compared with the design and
+    /// nothing is simulated.
     #[arg(long, value_name = "MB", default_value_t = 8000.0)]
     memory_mb: f64,
 
-    /// Show on the page which picture this camera will take of a test chart: a camera file. Its kernels cost minutes of CPU
-    /// time the first time, then they are kept.
+    /// Show on the page the picture that the camera of this file takes of a test chart. Its kernels cost minutes of CPU
+    /// time the first time, then they are cached.
     #[arg(long, value_name = "CAMERA")]
     picture: Option<PathBuf>,
 
-    /// Print the numbers of `report.json` to standard output: all its fields but the first two, `report` and `metalith`.
+    /// Print `report.json` to standard output, without its first two fields, `report` and `metalith`.
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 pub enum FidelityArg {
-    /// Phase by the published polynomials, no amplitude.
+    /// Phase by the published polynomials, no loss.
     Published,
-    /// Phase by polynomials fitted to the rigorous cell, no amplitude.
+    /// Phase by polynomials fitted to `rigorous`, no loss.
     Fitted,
-    /// Complex transmission by rigorous coupled-wave analysis of a lattice of equal pillars.
+    /// Local periodic approximation (LPA): complex transmission by RCWA in a lattice of equal pillars.
     Rigorous,
-    /// Each pillar among the unlike neighbours that it has, fitted to rigorous supercells; solved once for a design in some
-    /// minutes, then kept.
+    /// Coupled model: each pillar with its neighbours, by pair sums fitted to RCWA of supercells. Solved once for a
+    /// design in some minutes, then cached.
     #[value(alias = "grating")]
     Neighbours,
 }
@@ -106,14 +107,14 @@ impl From<FidelityArg> for Fidelity {
 }
 
 impl Judging {
-    /// How a layout of this design, at `path`, will be simulated; asked before work is spent.
+    /// Simulation of a layout of this design, at `path`, decided before work is spent.
     ///
     /// # Errors
     /// If it could be neither simulated nor compared with its design, or its pillars cannot be judged by the cell.
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
         let fidelity = self.fidelity(design);
         design.check_fidelity(fidelity)?;
-        if self.as_lit && design.cell.shape.basis().is_some() {
+        if self.oblique && design.cell.shape.basis().is_some() {
             return Err(oblique_refused());
         }
         if let Some(model) = self.model()? {
@@ -123,7 +124,7 @@ impl Judging {
         Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
     }
 
-    /// Nothing, if the pillars of an array can be as the model says; asked before anything is written.
+    /// Succeeds if the pillars of an array can be as the model says; called before anything is written.
     ///
     /// # Errors
     /// If they cannot.
@@ -170,7 +171,7 @@ impl Judging {
         terminal: &Terminal,
     ) -> Result<Outcome> {
         let mut design = design.clone();
-        if self.as_lit {
+        if self.oblique {
             design.verify.incidence = CellIncidence::AsLit;
         }
         // One cell judges, in the picture too.
@@ -181,7 +182,8 @@ impl Judging {
         match self.simulation(design, layout)? {
             Simulation::Whole => {}
             _ if camera.is_some() => {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "verify/too-large",
                     "a picture of a layout whose elements are too large to be held in full",
                     "leave out --picture, or allow more memory with --memory-mb",
                 ));

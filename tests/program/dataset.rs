@@ -26,7 +26,7 @@ fn bad_images_and_planned_folders_are_refused_before_any_work() {
     let (images, out) = (folder.path().join("images"), folder.path().join("out"));
     for (name, rows) in [("a.png", 48), ("b.png", 48), ("c.png", 64)] {
         let grey = ndarray::Array3::from_elem((rows, 64, 3), 0.5);
-        metalith::picture::write_picture(&images.join(name), &grey).unwrap();
+        metalith::imaging::write_picture(&images.join(name), &grey).unwrap();
     }
     fs::write(images.join("d.png"), "no picture").unwrap();
     let ways: [&[&str]; 2] = [&[], &["--plan"]];

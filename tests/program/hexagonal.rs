@@ -57,15 +57,12 @@ fn golden_numbers_of_the_hexagonal_design() {
         "240",
         "--wavelength-nm",
         "1550",
-        "--height-nm",
-        "900",
-        "--pillar-material",
-        "a_si_pierce_1972",
         "--samples",
         "96",
         "--json",
+        "--cell",
     ];
-    let output = metalith(&args, &[&layout]);
+    let output = metalith(&args, &[&path, &layout]);
     assert_eq!(
         output.status.code(),
         Some(0),

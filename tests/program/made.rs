@@ -130,7 +130,7 @@ impl Files {
             aperture_radius_um: Some(self.design.aperture_radius_um()),
             accuracy: Accuracy::Accurate,
         };
-        let single = single_psfs(&read, SimulationCase::Made(&chip), &light, &Silent)
+        let single = single_psfs(&read, SimulationCase::from(&chip), &light, &Silent)
             .unwrap()
             .remove(0);
         psfs.push(("psf", single.psf.values));
@@ -155,12 +155,14 @@ impl Files {
         let bench = Bench::new(&self.set, Sampling::default());
         let element = bench.element_of(0.into(), perturbation).unwrap();
         let light = bench.direction_of(0.into(), perturbation, UM);
-        let sines = if self.design.verify.incidence == CellIncidence::AsLit {
-            metalith::optics::cell_direction(&light.plane, metalith::LatticeKind::Square)
-        } else {
-            [0.0; 2]
+        let plane = light.plane;
+        let sines = metalith::optics::cell_direction([plane.sin_x, plane.sin_y], metalith::LatticeKind::Square);
+        let cells = metalith::cell::Illumination::from_direction(UM, sines);
+        let cells = match self.design.verify.incidence {
+            CellIncidence::AsLit => cells.oblique(),
+            CellIncidence::Normal => cells,
         };
-        let solved = chip.cells().solve(element.widths_nm(), UM, sines, &Silent).unwrap();
+        let solved = chip.cells().solve(element.widths_nm(), &cells, &Silent).unwrap();
         let view = bench.view(0.into(), &element, perturbation, UM, &solved);
         let psf = view
             .psf(self.window(), Accuracy::Accurate, &[], &mut Scratch::default())

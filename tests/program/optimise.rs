@@ -65,8 +65,8 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
 }
 
-/// By unlike neighbours, whose tables come with the program: the layout focuses as the rings promise, pillar by pillar, and better
-/// than before.
+/// By dissimilar neighbours, whose tables come with the program: the layout focuses as the rings promise, pillar by
+/// pillar, and better than before.
 #[test]
 fn a_lens_is_optimised_among_unlike_neighbours() {
     /// Eight radii for all sites of a ring.

@@ -10,23 +10,23 @@ use super::run::{metalith, report};
 
 /// What `psf` finds of a file with options: the numbers of its PSF, or what it says.
 fn psf(layout: &Path, options: &[&str]) -> Result<Value, String> {
+    let cell = layout.with_file_name("cell.toml");
+    let text = "[cell]\npitch_nm = 354\npillar_height_nm = 600\nwidth_min_nm = 100\nwidth_max_nm = 250\n\
+                pillar_material = \"tio2_siefke_2016\"\n";
+    fs::write(&cell, text).unwrap();
     let flags = [
         "psf",
         "--distance-um",
         "80",
         "--wavelength-nm",
         "532",
-        "--height-nm",
-        "600",
-        "--pillar-material",
-        "tio2_siefke_2016",
         "--samples",
         "96",
         "--pixel-um",
         "1.4",
         "--json",
     ];
-    let output = metalith(&[&flags, options].concat(), &[layout]);
+    let output = metalith(&[&flags, options, &["--cell"]].concat(), &[&cell, layout]);
     match output.status.code() {
         Some(0) => Ok(serde_json::from_slice::<Value>(&output.stdout).unwrap()["psfs"][0].clone()),
         Some(2) => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
@@ -79,6 +79,19 @@ fn a_design_and_options_name_the_same_light() {
         );
     }
 
+    // A whole design says which light is focused; the pillars must be of its lattice.
+    let other = design("mini_3x3");
+    let words = [
+        "psf",
+        "--arriving",
+        "45",
+        "--analyser",
+        "circular",
+        "--extract-only",
+        "--cell",
+    ];
+    assert_eq!(metalith(&words, &[&path, &layout]).status.code(), Some(0));
+    assert_eq!(metalith(&words, &[&other, &layout]).status.code(), Some(2));
     let said = psf(&layout, &["--arriving", "45", "--analyser", "circular"]).unwrap_err();
     assert!(
         said.contains("linearly polarised at 45 degrees from x towards y") && said.contains("--focused"),

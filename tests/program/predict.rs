@@ -258,7 +258,7 @@ fn oblique_light_sees_another_cell_and_the_normal_is_its_limit() {
 fn a_design_may_ask_for_cells_as_they_are_lit() {
     let folder = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(root().join("designs/mini_3x3.toml")).unwrap();
-    let spec = "[verify]\nincidence = \"as_lit\"\n";
+    let spec = "[verify]\nincidence = \"oblique\"\n";
     let text = text
         .replace("[verify]\n", spec)
         .replace("width_step_nm = 2", "width_step_nm = 20");

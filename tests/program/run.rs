@@ -74,7 +74,7 @@ pub(super) fn numbers(report: &Value) -> Value {
 }
 
 /// Share of the light that the sum over pairs puts elsewhere than supercells that it was not fitted to: as of real rows in
-/// crates/grating/tests/neighbours.rs. Measured for the shipped tables: 0.012 to 0.024.
+/// crates/design/tests/neighbours.rs. Measured for the shipped tables: 0.012 to 0.024.
 const LEFT_OUT: f64 = 0.035;
 
 #[test]
@@ -329,8 +329,8 @@ fn a_layout_from_anywhere_is_found_and_simulated() {
     assert!(said.contains("against the sites that hold a pillar"), "{said}");
 }
 
-/// White light on the axis, by unlike neighbours: as `run` has it with the design, which knows by its mapping how often each width
-/// stands beside which others, where `psf` counts the widths of the layout.
+/// White light on the axis, by dissimilar neighbours: as `run` has it with the design, which knows by its mapping how
+/// often each width stands beside which others, where `psf` counts the widths of the layout.
 #[test]
 fn white_light_without_a_design_is_that_of_a_run() {
     /// Of shares and contrasts between 0.4 and 0.9. Tables by the two counts differ by 0.003; equal neighbours are 0.024 off.

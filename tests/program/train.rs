@@ -12,7 +12,7 @@ fn photographs(folder: &Path) -> PathBuf {
     let at = folder.join("photographs");
     for k in 0..3 {
         let stripes = ndarray::Array3::from_shape_fn((56, 56, 3), |(y, x, c)| ((x + k * y + c) % 9) as f64 / 9.0);
-        metalith::picture::write_picture(&at.join(format!("{k}.png")), &stripes).unwrap();
+        metalith::imaging::write_picture(&at.join(format!("{k}.png")), &stripes).unwrap();
     }
     at
 }

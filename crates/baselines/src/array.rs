@@ -1,9 +1,9 @@
-//! The chip of a design before its sensor, as a contender.
+//! The chip of a design before its sensor, as a camera.
 
 use metalith_core::{Progress, Result};
-use metalith_picture::restore::{Blend, Recorded, RestorationMethod, restore_each};
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal};
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{ForecastScene, Frame, FrameOperator, ImagingSystem, OperatorError};
+use metalith_restoration::{Blend, FrameModel, Recorded, RestorationMethod, restore_each};
 use ndarray::{Array2, Array3, Zip};
 
 use crate::baseline_camera::{BaselineCamera, Method, no_stage};
@@ -12,7 +12,7 @@ use crate::wiener;
 
 /// A chip that is open for scenes of one field, and the ways of restoring its frames.
 pub struct ArrayCamera<'a> {
-    studio: &'a ImagingSystem,
+    system: &'a ImagingSystem,
     simulation: FrameOperator<'a>,
     restoration: FrameOperator<'a>,
     error: OperatorError,
@@ -21,29 +21,29 @@ pub struct ArrayCamera<'a> {
 }
 
 /// An element is shown alone where it has at least this share of its most trusted place; elsewhere the blend stands in its picture.
-const LEAST_TRUST: f32 = 0.02;
+const LEAST_WEIGHT: f32 = 0.02;
 
 impl<'a> ArrayCamera<'a> {
-    /// For a studio and these methods, by all elements at once and, if asked for, by each alone.
-    pub fn new(studio: &'a ImagingSystem, methods: &[RestorationMethod], separate: bool) -> Self {
-        let restoration = studio.restoration();
-        let error = Rehearsal::new(studio, &restoration).operator_error;
+    /// Camera for an imaging system and these methods, by all elements at once and, if asked for, by each alone.
+    pub fn new(system: &'a ImagingSystem, methods: &[RestorationMethod], separate: bool) -> Self {
+        let restoration = system.restoration();
+        let error = ForecastScene::new(system, &restoration).operator_error;
         let alone = separate && restoration.elements() > 1;
         let ways = methods.iter().flat_map(|m| {
             let kinds: &[bool] = if alone { &[true, false] } else { &[true] };
             kinds.iter().map(move |joint| (*m, *joint))
         });
         Self {
-            simulation: studio.simulation(),
+            simulation: system.simulation(),
             restoration,
             error,
             ways: ways.collect(),
             stages: Vec::new(),
-            studio,
+            system,
         }
     }
 
-    /// With learnt last stages, each a further way.
+    /// Same camera with learnt last stages, each a further method.
     #[must_use]
     pub fn with_stages(mut self, stages: Vec<Stage>) -> Self {
         self.stages = stages;
@@ -52,24 +52,24 @@ impl<'a> ArrayCamera<'a> {
 
     /// The blend of all elements, then the picture of each alone.
     fn blend_and_elements(&self, recorded: &Recorded<'_>, progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
-        let shape = (self.studio.view.rows, self.studio.view.columns);
+        let shape = (self.system.view.rows, self.system.view.columns);
         let mut blend = Blend::new(shape, self.restoration.inputs());
         let mut alone = vec![None; self.restoration.elements()];
         restore_each(
             recorded,
             RestorationMethod::Tikhonov,
             progress,
-            &mut |element, picture, trust| {
-                blend.add(picture, trust);
-                alone[element] = Some((picture.clone(), trust.clone()));
+            &mut |element, picture, inverse_variance| {
+                blend.add(picture, inverse_variance);
+                alone[element] = Some((picture.clone(), inverse_variance.clone()));
             },
         )?;
         let blend = blend.finished();
-        for (picture, trust) in alone.iter_mut().flatten() {
-            for ((plane, trust), blend) in picture.iter_mut().zip(trust).zip(&blend) {
-                let least = LEAST_TRUST * trust.iter().copied().fold(0.0, f32::max);
+        for (picture, inverse_variance) in alone.iter_mut().flatten() {
+            for ((plane, inverse_variance), blend) in picture.iter_mut().zip(inverse_variance).zip(&blend) {
+                let least = LEAST_WEIGHT * inverse_variance.iter().copied().fold(0.0, f32::max);
                 Zip::from(plane)
-                    .and(&*trust)
+                    .and(&*inverse_variance)
                     .and(blend)
                     .for_each(|p, t, b| *p = if *t > least { *p } else { *b });
             }
@@ -85,7 +85,7 @@ impl<'a> ArrayCamera<'a> {
 }
 
 impl BaselineCamera for ArrayCamera<'_> {
-    fn ways(&self) -> Vec<Method> {
+    fn methods(&self) -> Vec<Method> {
         let several = self.restoration.elements() > 1;
         let way = |(method, joint): &(RestorationMethod, bool)| Method {
             method: method.name().to_owned(),
@@ -100,7 +100,7 @@ impl BaselineCamera for ArrayCamera<'_> {
     }
 
     fn channel_names(&self) -> Vec<String> {
-        self.studio.camera.channel_names()
+        self.system.camera.channel_names()
     }
 
     fn limits(&self) -> Option<String> {
@@ -108,15 +108,15 @@ impl BaselineCamera for ArrayCamera<'_> {
     }
 
     fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
-        self.studio.record(&self.simulation, scene, seed)
+        self.system.record(&self.simulation, scene, seed)
     }
 
     fn truth(&self, scene: &SceneImage) -> Array3<f64> {
-        self.studio.truth(scene)
+        self.system.truth(scene)
     }
 
     fn unrestored(&self, frame: &Frame) -> Option<Array3<f64>> {
-        Some(self.studio.unrestored(&self.restoration, frame))
+        Some(self.system.unrestored(&self.restoration, frame))
     }
 
     fn restore(&self, frame: &Frame, way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
@@ -127,31 +127,31 @@ impl BaselineCamera for ArrayCamera<'_> {
             }
             None => {
                 let (method, joint) = self.ways[way];
-                self.studio
+                self.system
                     .restore(&self.restoration, &self.error, frame, method, joint, progress)
             }
         }
     }
 
     fn pictures(&self, frame: &Frame, kind: StageKind, progress: &dyn Progress) -> Result<Vec<Array3<f64>>> {
-        frame.is_of(self.restoration.frame(), self.studio.gain.len())?;
-        let (light, trust) = frame.light(&self.studio.camera, &self.error);
+        frame.is_of(self.restoration.frame(), self.system.gain.len())?;
+        let (light, inverse_variance) = frame.light(&self.system.camera, &self.error);
         let recorded = Recorded {
             operator: &self.restoration,
             light: &light,
-            trust: &trust,
-            prior: &self.studio.prior,
+            inverse_variance: &inverse_variance,
+            prior: &self.system.prior,
         };
         match kind {
             StageKind::MultiWiener => {
-                let all = wiener::pictures(self.studio, &recorded, progress)?;
-                Ok(all.iter().map(|planes| self.studio.colours.rgb(planes)).collect())
+                let all = wiener::pictures(self.system, &self.restoration, &recorded, progress)?;
+                Ok(all.iter().map(|planes| self.system.colours.rgb(planes)).collect())
             }
             StageKind::Blending => {
                 let all = self.blend_and_elements(&recorded, progress)?;
                 Ok(all
                     .iter()
-                    .map(|planes| self.studio.picture(&self.restoration, planes))
+                    .map(|planes| self.system.picture(&self.restoration, planes))
                     .collect())
             }
             _ => no_stage(kind, "an array"),
@@ -189,13 +189,13 @@ mod tests {
             ..plain
         };
         let cells = cell_models(&design, &[metalith_cell::Fidelity::Published]).unwrap();
-        let case = SimulationCase::Cell(cells[0].as_ref());
+        let case = SimulationCase::from(cells[0].as_ref());
         let rgb = Array3::from_shape_fn((64, 64, 3), |(y, x, c)| {
             0.1 + 0.7 * f64::from(u8::from((x / 8 + y / 11 + c) % 3 == 0))
         });
         let scene = SceneImage::of_rgb("", &rgb, 60.0, f64::INFINITY);
-        let studio = ImagingSystem::of_pillars(&design, &extraction, case, &camera, &scene, Some(5), &Silent).unwrap();
-        let ready = ArrayCamera::new(&studio, &[RestorationMethod::Tikhonov], true);
+        let system = ImagingSystem::of_pillars(&design, &extraction, case, &camera, &scene, Some(5), &Silent).unwrap();
+        let ready = ArrayCamera::new(&system, &[RestorationMethod::Tikhonov], true);
         let frame = ready.record(&scene, 1).unwrap();
         let truth = ready.truth(&scene);
         let wiener = ready.pictures(&frame, StageKind::MultiWiener, &Silent).unwrap();

@@ -1,8 +1,8 @@
-//! What a camera must be able to do to be compared.
+//! Interface of a camera that can be compared.
 
 use metalith_core::{Progress, Result};
-use metalith_picture::Frame;
-use metalith_picture::scene::SceneImage;
+use metalith_imaging::Frame;
+use metalith_imaging::scene::SceneImage;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
@@ -13,12 +13,12 @@ use crate::stage::StageKind;
 pub struct Method {
     /// Name of the method.
     pub method: String,
-    /// By all elements at once, or by each alone; none where there is one element.
+    /// True if by all elements at once, false if by each alone; `None` where there is one element.
     pub joint: Option<bool>,
 }
 
 impl Method {
-    /// In words, for tables.
+    /// Words for tables.
     pub fn words(&self) -> String {
         match self.joint {
             None => self.method.clone(),
@@ -31,12 +31,12 @@ impl Method {
 /// A camera that is ready to take scenes of one size and field.
 pub trait BaselineCamera {
     /// Ways of making a picture of its frames.
-    fn ways(&self) -> Vec<Method>;
+    fn methods(&self) -> Vec<Method>;
 
     /// Names of its channels, in the order of the planes of a frame without a colour filter array.
     fn channel_names(&self) -> Vec<String>;
 
-    /// What limits its restorations, for a person; nothing where that is the light and the noise of its frames alone.
+    /// Limit of its restorations, for a person; `None` where it is the light and the noise of its frames alone.
     fn limits(&self) -> Option<String> {
         None
     }
@@ -47,7 +47,7 @@ pub trait BaselineCamera {
     /// If the scene has another size or field than the camera was made ready for.
     fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame>;
 
-    /// What a perfect camera of the same channels would give, linear sRGB `[row, column, colour]`.
+    /// Image by a perfect camera of the same channels, linear sRGB `[row, column, colour]`.
     fn truth(&self, scene: &SceneImage) -> Array3<f64>;
 
     /// The frame as a picture, where it is one: linear sRGB of the size of the scene.
@@ -66,9 +66,10 @@ pub trait BaselineCamera {
     fn pictures(&self, frame: &Frame, kind: StageKind, progress: &dyn Progress) -> Result<Vec<Array3<f64>>>;
 }
 
-/// That a camera has no such last stage.
+/// Error that a camera has no such last stage.
 pub(crate) fn no_stage<T>(kind: StageKind, camera: &str) -> Result<T> {
-    Err(metalith_core::Error::invalid(
+    Err(metalith_core::Error::refused(
+        "compare/stage-of-another-camera",
         format!("the last stage `{}` is not for {camera}", kind.name()),
         "flatnet is for FlatCam, unrolled-diffuser for DiffuserCam, multi-wiener and blending for arrays",
     ))

@@ -2,8 +2,8 @@
 
 use metalith_core::srgb::encoded;
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, Zone, ZoneScore, scores};
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{Frame, Zone, ZoneScore, scores};
 use metalith_prior::PerceptualDistance;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
@@ -14,15 +14,15 @@ use crate::cpu::{cpu_seconds, since};
 /// Scores of one way of making pictures, in all zones.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MethodScores {
-    /// None for the bare frame.
+    /// Method; `None` for the bare frame.
     pub way: Option<Method>,
     /// Over the photographs: PSNR of the mean squared error, mean of SSIM.
     pub mean: Vec<ZoneScore>,
     /// One less the learned perceptual distance (LPIPS) of sRGB values, mean over the photographs; none without its weights.
     pub one_less_lpips: Option<f64>,
-    /// For a picture (s), if the system tells; of a bare frame, none.
+    /// CPU time for a picture (s), if the system reports it; `None` for a bare frame.
     pub cpu_s: Option<f64>,
-    /// Of each photograph, in their order.
+    /// Scores of each photograph, in their order.
     pub photographs: Vec<Vec<ZoneScore>>,
 }
 
@@ -31,7 +31,7 @@ pub struct MethodScores {
 pub struct ComparedCamera {
     /// Name in the table.
     pub name: String,
-    /// What it is, in a sentence.
+    /// Description in a sentence.
     pub words: String,
     /// Angle from the left to the right edge of its scenes (degrees).
     pub field_deg: f64,
@@ -39,7 +39,7 @@ pub struct ComparedCamera {
     pub ways: Vec<MethodScores>,
     /// To simulate a frame (s), if the system tells.
     pub frame_cpu_s: Option<f64>,
-    /// What limits its restorations, in words, if something but its frames does.
+    /// Limit of its restorations, in words, if something but its frames limits them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<String>,
     /// The first photograph; it is not kept with the scores.
@@ -54,7 +54,7 @@ pub struct Shown {
     pub scene: Array3<f64>,
     pub frame: Frame,
     pub channel_names: Vec<String>,
-    /// By each way, linear sRGB.
+    /// Pictures by each method, linear sRGB.
     pub pictures: Vec<Array3<f64>>,
 }
 
@@ -68,9 +68,9 @@ pub struct ComparisonResult {
     /// Rows and columns that they were given in, if those are finer than a camera is simulated with: they are averaged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub averaged_from: Option<[usize; 2]>,
-    /// Of the sensor and its light.
+    /// Name of the camera file: its sensor and its light.
     pub camera: String,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
     pub cameras: Vec<ComparedCamera>,
 }
@@ -81,7 +81,7 @@ pub struct ComparisonResult {
 /// # Errors
 /// If there are none, they differ in size, or the user stopped it.
 pub fn compare(
-    contender: &dyn BaselineCamera,
+    camera: &dyn BaselineCamera,
     (name, words): (&str, &str),
     photographs: &[SceneImage],
     seed: u64,
@@ -90,12 +90,12 @@ pub fn compare(
 ) -> Result<ComparedCamera> {
     let first = photographs
         .first()
-        .ok_or_else(|| Error::invalid("no photographs", "give at least one"))?;
-    let limits = contender.limits();
+        .ok_or_else(|| Error::refused("compare/no-photographs", "no photographs", "give at least one"))?;
+    let limits = camera.limits();
     if let Some(limits) = &limits {
         progress.warn(&format!("{name}: {limits}"));
     }
-    let ways = contender.ways();
+    let ways = camera.methods();
     let mut bare = Judged::default();
     let mut found: Vec<Judged> = ways.iter().map(|_| Judged::default()).collect();
     let mut seconds: Vec<Option<f64>> = vec![Some(0.0); ways.len()];
@@ -104,13 +104,13 @@ pub fn compare(
     let add = |sum: &mut Option<f64>, moment: Option<f64>| *sum = sum.zip(since(moment)).map(|(a, b)| a + b);
     for photograph in photographs {
         let begun = cpu_seconds();
-        let frame = contender.record(photograph, seed)?;
+        let frame = camera.record(photograph, seed)?;
         add(&mut frame_s, begun);
-        let truth = contender.truth(photograph);
+        let truth = camera.truth(photograph);
         if let Some(note) = frame.saturation_note(&truth) {
             progress.warn(&format!("{name}, {}: {note}", photograph.name));
         }
-        if let Some(picture) = contender.unrestored(&frame) {
+        if let Some(picture) = camera.unrestored(&frame) {
             bare.add(&picture, &truth, perceptual)?;
         }
         let mut pictures = Vec::new();
@@ -119,7 +119,7 @@ pub fn compare(
                 return Err(Error::Interrupted);
             }
             let begun = cpu_seconds();
-            let picture = contender.restore(&frame, k, progress)?;
+            let picture = camera.restore(&frame, k, progress)?;
             add(&mut seconds[k], begun);
             found[k].add(&picture, &truth, perceptual)?;
             let scores = &found[k].scores;
@@ -137,7 +137,7 @@ pub fn compare(
         shown.get_or_insert(Shown {
             scene: truth,
             frame,
-            channel_names: contender.channel_names(),
+            channel_names: camera.channel_names(),
             pictures,
         });
     }

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::{Error, Progress, Result, part};
 use metalith_design::Design;
-use metalith_picture::restore::RestorationMethod;
-use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{ApproximationSet, ImagingSystem, KernelCache, SceneView, check_scored, simulated_view};
+use metalith_imaging::scene::{SceneImage, read_far_scene};
+use metalith_imaging::{ApproximationSet, ImagingSystem, KernelCache, SceneView, check_scored, simulated_view};
 use metalith_prior::PerceptualDistance;
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ use crate::lensless::of_one_wavelength;
 use crate::stage::Stage;
 use crate::{ArrayCamera, BaselineCamera, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
 
-/// What is compared: designs, cameras without a lens, photographs, and how.
+/// Comparison: designs, cameras without a lens, photographs, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Comparison {
@@ -27,13 +27,13 @@ pub struct Comparison {
     pub lensless: Vec<Lensless>,
     /// Names of the ways to restore the frames of designs.
     pub methods: Vec<String>,
-    /// By each element of an array alone too.
+    /// True for pictures by each element of an array alone too.
     pub separate: bool,
     /// Each design also as the paper assumes such cameras to be, and those without a lens with one wavelength a colour.
     pub paper: bool,
     /// Angle from the left to the right edge of a photograph (degrees).
     pub field_deg: f64,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
     pub photographs: Vec<PathBuf>,
     /// Photographs are cut to the square of so many pixels in their middle.
@@ -51,7 +51,7 @@ pub struct Comparison {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ListedDesign {
-    /// That of the design if left out.
+    /// Name; the name of the design if left out.
     pub name: Option<String>,
     pub design: PathBuf,
     pub layout: PathBuf,
@@ -71,23 +71,23 @@ pub enum Lensless {
     DiffuserCam(DiffuserSpec),
 }
 
-/// A lineup whose files were read.
-pub struct OpenLineup<'a> {
+/// A comparison whose files were read.
+pub struct OpenComparison<'a> {
     pub(crate) of: &'a Comparison,
     pub(crate) camera: Camera,
     methods: Vec<RestorationMethod>,
-    /// With the camera of each.
+    /// Designs with the camera of each.
     pub(crate) designs: Vec<(Design, Camera)>,
-    /// In the pixels that all cameras are simulated in.
+    /// Photographs in the pixels that all cameras are simulated in.
     pub(crate) photographs: Vec<SceneImage>,
-    /// As they were given.
+    /// View of the photographs as they were given.
     given: SceneView,
     pub(crate) stages: Vec<Stage>,
-    /// What pictures are judged by too.
+    /// Perceptual distance that pictures are also scored by.
     perceptual: Option<PerceptualDistance>,
 }
 
-/// What is done with a camera that is ready: it, its name and words in the table, its photographs.
+/// Callback for a camera that is ready: it, its name and words in the table, its photographs.
 pub(crate) type Ready<'f> = dyn FnMut(&dyn BaselineCamera, (&str, &str), &[SceneImage]) -> Result<()> + 'f;
 
 impl Comparison {
@@ -95,9 +95,10 @@ impl Comparison {
     ///
     /// # Errors
     /// If nothing is compared, a file cannot be read, or photographs are not of one size.
-    pub fn open(&self) -> Result<OpenLineup<'_>> {
+    pub fn open(&self) -> Result<OpenComparison<'_>> {
         if self.designs.is_empty() && self.lensless.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "compare/no-camera",
                 "no camera to compare",
                 "give --design, --rivals or both",
             ));
@@ -110,10 +111,15 @@ impl Comparison {
             .map(|p| self.photograph(p))
             .collect::<Result<_>>()?;
         let Some(first) = photographs.first().map(|p| p.view) else {
-            return Err(Error::invalid("no photographs", "give at least one"));
+            return Err(Error::refused(
+                "compare/no-photographs",
+                "no photographs",
+                "give at least one",
+            ));
         };
         if let Some(other) = photographs.iter().find(|p| p.view != first) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "compare/photographs-differ-in-size",
                 format!(
                     "`{}` has {} x {} pixels, the first photograph {} x {}",
                     other.name, other.view.columns, other.view.rows, first.columns, first.rows
@@ -131,7 +137,7 @@ impl Comparison {
             true => photograph,
             false => photograph.averaged(&view),
         };
-        let open = OpenLineup {
+        let open = OpenComparison {
             of: self,
             camera,
             methods,
@@ -180,7 +186,8 @@ impl Comparison {
 fn middle(mut scene: SceneImage, pixels: usize) -> Result<SceneImage> {
     let SceneView { rows, columns, .. } = scene.view;
     if rows.min(columns) < pixels {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "compare/photograph-too-small",
             format!("`{}` has {columns} x {rows} pixels, fewer than {pixels}", scene.name),
             "give a smaller --pixels, or larger photographs",
         ));
@@ -193,31 +200,31 @@ fn middle(mut scene: SceneImage, pixels: usize) -> Result<SceneImage> {
     Ok(scene)
 }
 
-impl OpenLineup<'_> {
+impl OpenComparison<'_> {
     /// Let camera `k` take all photographs.
     ///
     /// # Errors
     /// If photographs are too small to be scored, it cannot be made ready, or the user stopped it.
-    pub fn take(&self, k: usize, kept: &KernelCache, progress: &dyn Progress) -> Result<ComparedCamera> {
-        self.take_first(k, self.photographs.len(), kept, progress)
+    pub fn take(&self, k: usize, cache: &KernelCache, progress: &dyn Progress) -> Result<ComparedCamera> {
+        self.take_first(k, self.photographs.len(), cache, progress)
     }
 
-    /// The same of the first so many photographs, of all if there are no more.
+    /// Takes the first so many photographs, or all if there are no more.
     ///
     /// # Errors
-    /// As [`OpenLineup::take`].
+    /// As [`OpenComparison::take`].
     pub fn take_first(
         &self,
         k: usize,
         photographs: usize,
-        kept: &KernelCache,
+        cache: &KernelCache,
         progress: &dyn Progress,
     ) -> Result<ComparedCamera> {
         check_scored(&self.photographs[0].view)?;
         let mut found = None;
-        self.ready(k, kept, progress, &mut |contender, names, all| {
+        self.ready(k, cache, progress, &mut |camera, names, all| {
             let (all, perceptual) = (&all[..photographs.min(all.len())], self.perceptual.as_ref());
-            found = Some(compare(contender, names, all, self.of.seed, perceptual, progress)?);
+            found = Some(compare(camera, names, all, self.of.seed, perceptual, progress)?);
             Ok(())
         })?;
         Ok(found.expect("a camera that is ready takes photographs"))
@@ -226,10 +233,10 @@ impl OpenLineup<'_> {
     /// Make the kernels of camera `k` where they are kept.
     ///
     /// # Errors
-    /// As [`OpenLineup::take`].
-    pub fn prepare(&self, k: usize, kept: &KernelCache, progress: &dyn Progress) -> Result<()> {
+    /// As [`OpenComparison::take`].
+    pub fn prepare(&self, k: usize, cache: &KernelCache, progress: &dyn Progress) -> Result<()> {
         match k < self.designs.len() * self.of.kinds() {
-            true => self.ready(k, kept, progress, &mut |_, _, _| Ok(())),
+            true => self.ready(k, cache, progress, &mut |_, _, _| Ok(())),
             false => Ok(()),
         }
     }
@@ -257,13 +264,13 @@ impl OpenLineup<'_> {
     pub(crate) fn ready(
         &self,
         k: usize,
-        kept: &KernelCache,
+        cache: &KernelCache,
         progress: &dyn Progress,
         then: &mut Ready<'_>,
     ) -> Result<()> {
         let kinds = self.of.kinds();
         match k.checked_sub(self.designs.len() * kinds) {
-            None => self.ready_design(k / kinds, k % kinds == 1, kept, progress, then),
+            None => self.ready_design(k / kinds, k % kinds == 1, cache, progress, then),
             Some(k) => self.ready_lensless(k / kinds, k % kinds == 1, progress, then),
         }
     }
@@ -272,7 +279,7 @@ impl OpenLineup<'_> {
         &self,
         k: usize,
         as_the_paper: bool,
-        kept: &KernelCache,
+        cache: &KernelCache,
         progress: &dyn Progress,
         then: &mut Ready<'_>,
     ) -> Result<()> {
@@ -283,27 +290,27 @@ impl OpenLineup<'_> {
             photographs.iter_mut().for_each(|p| p.view.field_deg = field_deg);
         }
         let first = &photographs[0];
-        let studio = ImagingSystem::open_kept(design, &listed.layout, camera, None, first, kept, progress)?;
+        let system = ImagingSystem::open_cached(design, &listed.layout, camera, None, first, cache, progress)?;
         if !as_the_paper {
             let elements = match design.elements().len() {
                 1 => "one element".into(),
                 n => format!("{n} elements"),
             };
             let words = format!(
-                "the layout of `{}` behind `{}`, {elements}, pillars by the cell `{}`, veil and dispersion included.",
+                "the layout of `{}` behind `{}`, {elements}, pillars by the cell `{}`, stray light and dispersion included.",
                 design.name, camera.name, design.verify.fidelity
             );
-            let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
+            let ready = ArrayCamera::new(&system, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
             return then(&ready, (name, &words), &photographs);
         }
-        let narrow = studio.open_without_dispersion(design, &listed.layout, None, first, kept, progress)?;
-        drop(studio);
-        let studio = narrow.assuming(ApproximationSet::paper())?;
+        let narrow = system.open_without_dispersion(design, &listed.layout, None, first, cache, progress)?;
+        drop(system);
+        let system = narrow.assuming(ApproximationSet::paper())?;
         let words = format!(
-            "`{}` as the paper assumes such cameras to be: one kernel for each element and colour, brightness by a Butterworth filter, one wavelength a colour, no veil, patches of 420 x 420 pixels.",
+            "`{}` as the paper assumes such cameras to be: one kernel for each element and colour, brightness by a Butterworth filter, one wavelength a colour, no stray light, patches of 420 x 420 pixels.",
             design.name
         );
-        let ready = ArrayCamera::new(&studio, &self.methods, self.of.separate);
+        let ready = ArrayCamera::new(&system, &self.methods, self.of.separate);
         then(&ready, (&format!("{name}, paper's assumptions"), &words), &photographs)
     }
 
@@ -359,8 +366,8 @@ mod tests {
     fn fine_photographs_are_averaged_for_all_cameras() {
         let folder = tempfile::tempdir().unwrap();
         let photograph = folder.path().join("fine.png");
-        metalith_picture::write_picture(&photograph, &Array3::from_elem((100, 1500, 3), 0.5)).unwrap();
-        let lineup = Comparison {
+        metalith_imaging::write_picture(&photograph, &Array3::from_elem((100, 1500, 3), 0.5)).unwrap();
+        let comparison = Comparison {
             camera: "../../cameras/gt1930.toml".into(),
             designs: vec![ListedDesign {
                 name: None,
@@ -380,14 +387,14 @@ mod tests {
             learnt: Vec::new(),
             lpips: None,
         };
-        let open = lineup.open().unwrap();
+        let open = comparison.open().unwrap();
         let found = open.comparison(Vec::new());
         assert_eq!((found.size, found.averaged_from), ([91, 1374], Some([100, 1500])));
         assert_eq!(open.photographs[0].planes[0].dim(), (91, 1374));
         assert!(found.markdown().contains("1374 x 91 pixels (averaged from 1500 x 100)"));
         let coarse = Comparison {
             designs: Vec::new(),
-            ..lineup.clone()
+            ..comparison.clone()
         };
         assert_eq!(coarse.open().unwrap().comparison(Vec::new()).averaged_from, None);
     }

@@ -1,4 +1,4 @@
-//! How much work was done.
+//! CPU time of the work.
 
 /// User and system time of this process so far (s), where the system tells it in `/proc`: fields 14 and 15, hundredths.
 pub fn cpu_seconds() -> Option<f64> {

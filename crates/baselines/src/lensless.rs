@@ -1,9 +1,9 @@
-//! What cameras without a lens have in common: a sensor, light of a flat scene on its pixels, exposure, colours.
+//! Parts that cameras without a lens share: a sensor, light of a flat scene on its pixels, exposure, colours.
 
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::scene::SceneImage;
-use metalith_picture::spectra::{SceneSpectrum, rgb_basis};
-use metalith_picture::{
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::spectra::{SceneSpectrum, rgb_basis};
+use metalith_imaging::{
     ChannelColours, Frame, SceneView, counts_channel, expose, gains, sensitivity, without_dispersion,
 };
 use metalith_sensor::{Camera, Sampling};
@@ -18,7 +18,7 @@ pub struct LenslessBench {
     pub view: SceneView,
     pub sampling: Sampling,
     colours: ChannelColours,
-    /// What light at sines far from the normal brings less, at each pixel of the scene.
+    /// Fall-off of light at sines far from the normal, at each pixel of the scene.
     falloff: Array2<f32>,
     gain: Vec<f64>,
 }
@@ -40,7 +40,7 @@ pub trait Lensless {
     /// If the user stopped it.
     fn sent(&self, frame: &Frame, progress: &dyn Progress) -> Result<Vec<Array2<f32>>>;
 
-    /// Which learnt last stage can follow.
+    /// Kind of the learnt last stage that can follow.
     fn stage_kind(&self) -> StageKind;
 
     /// The one that does.
@@ -54,7 +54,7 @@ pub trait Lensless {
 }
 
 impl<T: Lensless> BaselineCamera for T {
-    fn ways(&self) -> Vec<Method> {
+    fn methods(&self) -> Vec<Method> {
         let learnt = self.stage().map(|stage| stage.kind.words());
         let way = |method: &str| Method {
             method: method.into(),
@@ -121,21 +121,24 @@ pub fn of_one_wavelength(camera: &Camera) -> Result<Camera> {
 const WIDEST_DEG: f64 = 150.0;
 
 impl LenslessBench {
-    /// For scenes of this size and field, at wavelengths at most `step_nm` apart. It still has to be given its exposure.
+    /// Bench for scenes of this size and field, at wavelengths at most `step_nm` apart. It still has to be given its
+    /// exposure.
     ///
     /// # Errors
-    /// If a channel counts no visible light, the camera tells no three colours apart, the sensor is one line of pixels, or the scene
-    /// is near.
+    /// If a channel counts no visible light, the camera distinguishes no three colours, the sensor is one line of
+    /// pixels, or the scene is near.
     pub fn new(camera: &Camera, view: SceneView, step_nm: f64) -> Result<Self> {
         if !(view.field_deg > 0.0 && view.field_deg < WIDEST_DEG) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lensless/field-of-view",
                 format!("a field of {} degrees", view.field_deg),
                 format!("give a field of more than 0 and less than {WIDEST_DEG} degrees"),
             ));
         }
         let [rows, columns] = [camera.sensor.rows, camera.sensor.columns];
         if rows.min(columns) < 2 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lensless/sensor-size",
                 format!("a sensor of {columns} x {rows} pixels behind a camera without a lens"),
                 "give a sensor of at least 2 x 2 pixels: each colour has its own in a square of these",
             ));
@@ -143,13 +146,15 @@ impl LenslessBench {
         let sampling = camera.sampling(BAND_NM, step_nm)?;
         let colours = ChannelColours::of(&sampling.channels);
         if !colours.has_colours() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lensless/colours",
                 format!("camera `{}` tells no three colours apart", camera.name),
                 "compare cameras without a lens behind a camera of colours",
             ));
         }
         if view.distance_um.is_finite() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lensless/near-scene",
                 "a scene near to a camera without a lens",
                 "compare such cameras on scenes that are far away",
             ));
@@ -168,7 +173,7 @@ impl LenslessBench {
         })
     }
 
-    /// With the exposure that suits the light of a white scene.
+    /// Same bench with the exposure that suits the light of a white scene.
     ///
     /// # Errors
     /// If none of it reaches the sensor.
@@ -210,7 +215,7 @@ impl LenslessBench {
         weights
     }
 
-    /// The same for a grey surface.
+    /// Weights for a grey surface.
     pub fn grey_weights(&self, channel: usize) -> Vec<f64> {
         let own: Vec<Vec<f64>> = rgb_basis().iter().map(|b| self.weights(channel, b)).collect();
         (0..own[0].len()).map(|i| own.iter().map(|w| w[i]).sum()).collect()
@@ -233,7 +238,7 @@ impl LenslessBench {
         sent.iter().map(one).collect()
     }
 
-    /// What a perfect camera with these channels would give.
+    /// Image by a perfect camera with these channels.
     pub fn truth(&self, scene: &SceneImage) -> Array3<f64> {
         self.colours.rgb(&self.ideal(scene))
     }
@@ -253,6 +258,11 @@ impl LenslessBench {
         self.sampling.channels.len()
     }
 
+    /// Rows and columns of the scene.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.view.rows, self.view.columns)
+    }
+
     /// Rows and columns of the sensor.
     pub fn frame(&self) -> [usize; 2] {
         [self.camera.sensor.rows as usize, self.camera.sensor.columns as usize]
@@ -263,14 +273,15 @@ impl LenslessBench {
         expose(&self.camera, &self.gain, light, seed)
     }
 
-    /// That a scene is one of those that this is for.
+    /// Checks that a scene is one of those that this bench is for.
     ///
     /// # Errors
     /// If it has another size or field.
     pub fn sees(&self, scene: &SceneImage) -> Result<()> {
         match scene.view == self.view {
             true => Ok(()),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "compare/scenes-differ",
                 format!("the scene `{}` has another size or field than the first", scene.name),
                 "give scenes of one size and field at a time",
             )),
@@ -297,7 +308,7 @@ pub fn falloff([tx, ty]: [f64; 2]) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use metalith_picture::restore::SceneStatistics;
+    use metalith_restoration::SceneStatistics;
     use metalith_sensor::ColourFilter;
 
     /// A small camera, a scene of the statistics of photographs.
@@ -315,7 +326,7 @@ pub(crate) mod tests {
             distance_um: f64::INFINITY,
         };
         let bench = LenslessBench::new(&camera, view, 50.0).unwrap();
-        let planes = SceneStatistics::colours().random_scene(&view, 7);
+        let planes = SceneStatistics::colours().random_scene((view.rows, view.columns), 7);
         let scene = bench.scene_of(planes.iter().map(|p| p.mapv(|v| v.clamp(0.0, 1.0))).collect());
         (camera, scene)
     }

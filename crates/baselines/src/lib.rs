@@ -7,13 +7,13 @@
 //!
 //! | question | file |
 //! | --- | --- |
-//! | what a camera must be able to do | `contender` |
+//! | what a camera must be able to do | `baseline_camera` |
 //! | the chip of a design before its sensor | `array` |
 //! | what cameras without a lens have in common | `lensless` |
 //! | a mask that is a product of two sequences | `flatcam/` |
 //! | the caustic of a random surface | `diffusercam/` |
-//! | learnt last stages, what they are taught by, and pictures by Wiener filters for one of them | `stage`, `teaching`, `wiener` |
-//! | which cameras, from their files | `lineup` |
+//! | learnt last stages, what they are taught by, and pictures by Wiener filters for one of them | `stage`, `provenance`, `training_stacks` (feature `training`), `wiener` |
+//! | which cameras, from their files | `comparison` |
 //! | scores of all photographs | `compare` |
 //! | the table, the page | `table`, `page` |
 
@@ -26,15 +26,17 @@ mod diffusercam;
 mod flatcam;
 mod lensless;
 mod page;
+mod provenance;
 mod stage;
 mod table;
-mod teaching;
+#[cfg(feature = "training")]
+mod training_stacks;
 mod wiener;
 
 pub use array::ArrayCamera;
 pub use baseline_camera::{BaselineCamera, Method};
 pub use compare::{ComparedCamera, ComparisonResult, MethodScores, compare};
-pub use comparison::{Comparison, Lensless, ListedDesign, OpenLineup};
+pub use comparison::{Comparison, Lensless, ListedDesign, OpenComparison};
 pub use diffusercam::{DiffuserCam, DiffuserSpec};
 pub use flatcam::{FlatCam, MaskSpec};
 pub use page::write_comparison;

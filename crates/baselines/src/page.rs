@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::{Result, srgb};
-use metalith_picture::{Zone, shown};
+use metalith_imaging::{Zone, shown};
 use metalith_report::{Cell, Column, Page, PhotoRow, Table, write_json};
 
 use crate::compare::{ComparedCamera, ComparisonResult};
@@ -75,7 +75,7 @@ fn table(
     what: &str,
     unit: &str,
     digits: usize,
-    of: fn(&metalith_picture::ZoneScore) -> f64,
+    of: fn(&metalith_imaging::ZoneScore) -> f64,
 ) {
     let mut columns = vec![Column::text("Camera"), Column::text("Picture")];
     columns.extend(Zone::ALL.map(|z| Column::number(format!("{what}, {}", z.name()), unit)));

@@ -5,14 +5,15 @@ use std::str::FromStr;
 
 use metalith_core::text::hex;
 use metalith_core::{Error, Result, srgb};
-use metalith_picture::SceneView;
+use metalith_imaging::SceneView;
 use metalith_prior::{PostProcessor, Provenance};
 use metalith_sensor::Camera;
 use ndarray::Array3;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-/// What a network makes one picture of. All have the same layers and, but for the blend, the same number of weights.
+/// Kind of the pictures that a network makes one picture of. All have the same layers and, but for the blend, the same
+/// number of weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StageKind {
     /// Pictures by Tikhonov of a mask's frame, by five strengths: after FlatNet (Khan et al., IEEE Trans. Pattern Anal. Mach.
@@ -29,7 +30,7 @@ pub enum StageKind {
     Blending,
 }
 
-/// Pictures of a frame that each of the rivals' last stages sees.
+/// Pictures of a frame that the last stage of each baseline camera sees.
 pub const PICTURES: usize = 5;
 
 impl StageKind {
@@ -56,7 +57,7 @@ impl StageKind {
         }
     }
 
-    /// Whether it is of the chip of a design.
+    /// True if it is of the chip of a design.
     pub fn is_of_design(self) -> bool {
         matches!(self, Self::MultiWiener | Self::Blending)
     }
@@ -67,7 +68,8 @@ impl FromStr for StageKind {
 
     fn from_str(text: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|k| k.name() == text).ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "compare/unknown-stage",
                 format!("`{text}` is no learnt last stage"),
                 "use flatnet, unrolled-diffuser, multi-wiener or blending",
             )
@@ -79,25 +81,25 @@ impl FromStr for StageKind {
 #[derive(Clone, Debug)]
 pub struct Stage {
     pub kind: StageKind,
-    finisher: PostProcessor,
+    post_processor: PostProcessor,
 }
 
 impl Stage {
-    /// Of a file that `metalith train --stage` wrote.
+    /// Stage of a file that `metalith train --stage` wrote.
     ///
     /// # Errors
     /// If it cannot be read, is damaged, or is of another network.
     pub fn read(path: &Path) -> Result<Self> {
-        let finisher = PostProcessor::read(path)?;
+        let post_processor = PostProcessor::read(path)?;
         Ok(Self {
-            kind: finisher.taught().kind.parse()?,
-            finisher,
+            kind: post_processor.provenance().kind.parse()?,
+            post_processor,
         })
     }
 
-    /// What it was taught for.
-    pub fn taught(&self) -> &Provenance {
-        self.finisher.taught()
+    /// Provenance: what it was trained for.
+    pub fn provenance(&self) -> &Provenance {
+        self.post_processor.provenance()
     }
 
     /// One picture of those that were restored from a frame, all linear sRGB `[row, column, colour]`.
@@ -106,7 +108,7 @@ impl Stage {
     /// If there are more or fewer than it was taught by.
     pub fn finish(&self, pictures: &[Array3<f64>]) -> Result<Array3<f64>> {
         let shown: Vec<Array3<f32>> = pictures.iter().map(encoded).collect();
-        let found = self.finisher.finish(&shown)?;
+        let found = self.post_processor.finish(&shown)?;
         Ok(found.mapv(|v| srgb::linear(f64::from(v).clamp(0.0, 1.0))))
     }
 }
@@ -119,7 +121,7 @@ pub(crate) fn encoded(picture: &Array3<f64>) -> Array3<f32> {
 /// SHA-256 of all that decides frames but the scene and the noise: what stands before the sensor, the sensor and its light, the field.
 pub(crate) fn camera_digest(optics: &impl Serialize, camera: &Camera, view: &SceneView) -> Result<String> {
     let field = [view.rows as f64, view.columns as f64, view.field_deg];
-    let text =
-        serde_json::to_vec(&(optics, camera, field)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+    let text = serde_json::to_vec(&(optics, camera, field))
+        .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
     Ok(hex(&Sha256::digest(text)))
 }

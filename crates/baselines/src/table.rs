@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use metalith_picture::Zone;
+use metalith_imaging::Zone;
 
 use crate::compare::{ComparisonResult, MethodScores};
 
 impl MethodScores {
-    /// What was scored, in words.
+    /// Words for what was scored.
     pub fn words(&self) -> String {
         self.way
             .as_ref()
@@ -16,7 +16,7 @@ impl MethodScores {
 }
 
 impl ComparisonResult {
-    /// How many photographs were taken, in words.
+    /// Words for the number of photographs.
     pub(crate) fn counted(&self) -> String {
         match self.photographs.len() {
             1 => "1 photograph".into(),
@@ -24,7 +24,7 @@ impl ComparisonResult {
         }
     }
 
-    /// What photographs were made of, in words behind their size; nothing if they are as they were given.
+    /// Words behind the size of photographs for what they were made of; empty if they are as they were given.
     pub(crate) fn averaged(&self) -> String {
         let from = self.averaged_from;
         from.map_or_else(String::new, |[rows, columns]| {
@@ -52,7 +52,7 @@ impl ComparisonResult {
         );
         for camera in &self.cameras {
             for way in &camera.ways {
-                let list = |digits: usize, of: fn(&metalith_picture::ZoneScore) -> f64| {
+                let list = |digits: usize, of: fn(&metalith_imaging::ZoneScore) -> f64| {
                     let all = way.mean.iter().map(|s| format!("{:.digits$}", of(s)));
                     all.collect::<Vec<_>>().join(" / ")
                 };

@@ -1,12 +1,12 @@
 //! An array's frame, made sharp by Wiener deconvolution with the kernels of one place of each element's field after the other, and laid on
 //! the scene: the pictures that a Multi-Wiener-Net begins with (Yanny et al., Optica 9, 96 (2022)).
 //!
-//! Kernels are those of a grey surface. The veil of a grey scene is subtracted; what neighbours' sub-images overlap stays.
+//! Kernels are those of a grey surface. The stray light of a grey scene is subtracted; what neighbours' sub-images overlap stays.
 
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::restore::{Recorded, SceneStatistics, without_veil};
-use metalith_picture::{FftScratch, FrameOperator, ImagingSystem, SquareFft, sensor_um};
-use metalith_wave::kernels::fft_size;
+use metalith_imaging::{FrameOperator, ImagingSystem, sensor_um};
+use metalith_restoration::{FrameModel, Recorded, SceneStatistics, without_stray_light};
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use ndarray::{Array2, Zip};
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -17,15 +17,15 @@ use crate::stage::PICTURES;
 /// half of the way to each corner.
 const PLACES: [[f64; 2]; PICTURES] = [[0.0, 0.0], [-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5]];
 
-/// What deconvolutions of one camera have in common.
+/// Parts that deconvolutions of one camera share.
 struct Tiles<'a> {
-    studio: &'a ImagingSystem,
+    system: &'a ImagingSystem,
     fft: SquareFft,
     /// First row and column of the square about each element.
     first: Vec<[i64; 2]>,
     /// The element whose axis is nearest to each pixel.
     nearest: Array2<u16>,
-    /// What slopes and bends count of each frequency, over the power of scenes on this sensor.
+    /// Weights of slopes and bends at each frequency, over the power of scenes on this sensor.
     prior: Vec<f32>,
 }
 
@@ -34,29 +34,26 @@ struct Tiles<'a> {
 /// # Errors
 /// If the user stopped it.
 pub fn pictures(
-    studio: &ImagingSystem,
+    system: &ImagingSystem,
+    operator: &FrameOperator<'_>,
     recorded: &Recorded<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<Array2<f32>>>> {
-    let operator = recorded.operator;
-    let tiles = Tiles::new(studio, operator);
-    let view = operator.view();
-    let ones = vec![Array2::<f32>::ones((view.rows, view.columns)); operator.inputs()];
-    let all: Vec<usize> = (0..operator.elements()).collect();
-    let white = operator.apply_elements(&ones, &all, false);
+    let tiles = Tiles::new(system, operator);
+    let white = operator.apply_elements(&operator.white(), &operator.all_elements(), false);
     let [rows, columns] = operator.frame();
     let everywhere = vec![Array2::<f32>::ones((rows, columns)); operator.channels()];
     let reference = operator.unrestored(&white, &everywhere);
-    let light = without_veil(recorded);
+    let light = without_stray_light(recorded);
     let noise: Vec<f32> = recorded
-        .trust
+        .inverse_variance
         .iter()
         .zip(&white)
         .map(|(t, w)| relative_noise(t, w))
         .collect();
     let even: Vec<Array2<f32>> = light
         .par_iter()
-        .zip(recorded.trust)
+        .zip(recorded.inverse_variance)
         .map(|(l, t)| filled(l, t))
         .collect();
     progress.begin("restoring by Wiener filters", PICTURES as u64);
@@ -82,23 +79,23 @@ pub fn pictures(
 
 /// Variance that noise has in each frequency of a frame whose missing pixels were filled in, over the square of the mean light of a white
 /// scene: fewer pixels, more noise.
-fn relative_noise(trust: &Array2<f32>, white: &Array2<f32>) -> f32 {
-    let known = trust.iter().filter(|t| **t > 0.0);
+fn relative_noise(inverse_variance: &Array2<f32>, white: &Array2<f32>) -> f32 {
+    let known = inverse_variance.iter().filter(|t| **t > 0.0);
     let (sum, count) = known.fold((0.0, 0usize), |(s, n), t| (s + 1.0 / f64::from(*t), n + 1));
     let mean = white.iter().map(|v| f64::from(*v)).sum::<f64>() / white.len() as f64;
     let count = count.max(1) as f64;
-    let variance = sum / count * (trust.len() as f64 / count);
+    let variance = sum / count * (inverse_variance.len() as f64 / count);
     (variance / (mean * mean).max(f64::MIN_POSITIVE)) as f32
 }
 
 /// Light in all pixels, from those about each that are known: weights fall linearly to the next but one.
-fn filled(light: &Array2<f32>, trust: &Array2<f32>) -> Array2<f32> {
+fn filled(light: &Array2<f32>, inverse_variance: &Array2<f32>) -> Array2<f32> {
     let (rows, columns) = light.dim();
     Array2::from_shape_fn((rows, columns), |(y, x)| {
         let (mut sum, mut all) = (0.0, 0.0);
         for i in y.saturating_sub(1)..(y + 2).min(rows) {
             for j in x.saturating_sub(1)..(x + 2).min(columns) {
-                if trust[[i, j]] > 0.0 {
+                if inverse_variance[[i, j]] > 0.0 {
                     let w = (if i == y { 1.0 } else { 0.5 }) * (if j == x { 1.0 } else { 0.5 });
                     sum += w * light[[i, j]];
                     all += w;
@@ -110,12 +107,12 @@ fn filled(light: &Array2<f32>, trust: &Array2<f32>) -> Array2<f32> {
 }
 
 impl<'a> Tiles<'a> {
-    fn new(studio: &'a ImagingSystem, operator: &FrameOperator<'_>) -> Self {
-        let spec = &studio.bank.spec;
+    fn new(system: &'a ImagingSystem, operator: &FrameOperator<'_>) -> Self {
+        let spec = &system.bank.spec;
         let [rows, columns] = operator.frame();
         // Rows and columns of the axes of the elements.
-        let sensor = &studio.camera.sensor;
-        let axes: Vec<[f64; 2]> = studio.elements.iter().map(|e| sensor.pixel_at(e.centre_um)).collect();
+        let sensor = &system.camera.sensor;
+        let axes: Vec<[f64; 2]> = system.elements.iter().map(|e| sensor.pixel_at(e.centre_um)).collect();
         let reach = (spec.reach_um / spec.pixel_um).ceil() as usize;
         let fft = SquareFft::new(fft_size(2 * (reach + spec.window)));
         let half = (fft.size() / 2) as i64;
@@ -126,10 +123,10 @@ impl<'a> Tiles<'a> {
             best.unwrap_or(0) as u16
         });
         Self {
-            studio,
+            system,
             first,
             nearest,
-            prior: prior(studio, &fft),
+            prior: prior(system, &fft),
             fft,
         }
     }
@@ -181,13 +178,13 @@ impl<'a> Tiles<'a> {
 
     /// The kernel of a grey surface, on pixels, of sum one, its middle in the first place of a square; and what filling in pixels blurs.
     fn kernel(&self, element: usize, channel: usize, place: [f64; 2]) -> Vec<f32> {
-        let (bank, n) = (&self.studio.bank, self.fft.size());
+        let (bank, n) = (&self.system.bank, self.fft.size());
         let last = (bank.spec.nodes - 1) as f64;
         let node = place.map(|p| (0.5 * (p + 1.0) * last).round() as usize);
         let (window, side) = (bank.spec.window as i64, bank.spec.side());
         let mut square = vec![0.0; n * n];
         let mut energy = 0.0;
-        for basis in self.studio.primaries() {
+        for basis in self.system.primaries() {
             let kept = bank.kernel(element, node, channel, basis);
             let kernel = kept.turned();
             for dy in 1 - window / 2..window / 2 {
@@ -215,10 +212,10 @@ impl<'a> Tiles<'a> {
 }
 
 /// One over the spectrum of a channel of natural scenes on the pixels of the sensor, in the order of a transform.
-fn prior(studio: &ImagingSystem, fft: &SquareFft) -> Vec<f32> {
+fn prior(system: &ImagingSystem, fft: &SquareFft) -> Vec<f32> {
     let n = fft.size();
     // Pixels of the sensor for a pixel of the scene: what scenes have beyond their own finest detail is taken to be like it.
-    let scale = sensor_um(&studio.design, &studio.camera) * studio.view.pixel() / studio.camera.sensor.pixel_um;
+    let scale = sensor_um(&system.design, &system.camera) * system.view.pixel() / system.camera.sensor.pixel_um;
     let strength = SceneStatistics::grey(1).terms(1.0).slopes / (scale * scale);
     let squared: Vec<f64> = (0..n)
         .map(|k| {
@@ -244,16 +241,17 @@ mod tests {
         const ROUNDING: f32 = 1e-5;
         let ramp = Array2::from_shape_fn((12, 14), |(y, x)| 1.0 + 0.3 * y as f32 + 0.2 * x as f32);
         // One pixel of a square of two by two is known, with a variance of a quarter.
-        let trust = Array2::from_shape_fn(ramp.dim(), |(y, x)| if y % 2 == 0 && x % 2 == 1 { 4.0 } else { 0.0 });
-        let light = &ramp * &trust.mapv(|t| t / 4.0);
-        let found = filled(&light, &trust);
+        let inverse_variance =
+            Array2::from_shape_fn(ramp.dim(), |(y, x)| if y % 2 == 0 && x % 2 == 1 { 4.0 } else { 0.0 });
+        let light = &ramp * &inverse_variance.mapv(|t| t / 4.0);
+        let found = filled(&light, &inverse_variance);
         for y in 1..10 {
             for x in 1..12 {
                 assert!((found[[y, x]] - ramp[[y, x]]).abs() < ROUNDING, "{y} {x}");
             }
         }
         // Four pixels for each that is known, light of two.
-        let noise = relative_noise(&trust, &Array2::from_elem(ramp.dim(), 2.0));
+        let noise = relative_noise(&inverse_variance, &Array2::from_elem(ramp.dim(), 2.0));
         assert!((noise - 0.25 * 4.0 / 4.0).abs() < ROUNDING, "{noise}");
     }
 }

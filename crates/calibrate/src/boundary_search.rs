@@ -6,10 +6,9 @@ use std::cell::{Cell, RefCell};
 use crate::diagnosis::Diagnosis;
 use crate::effects::StitchedFields;
 use crate::proposal::{FieldBoundary, WORTH_PROPOSING, boundary_of_fields};
-use crate::search::{Evidence, SearchState};
 use crate::session::{Session, Simulations};
 use crate::set::MeasuredSet;
-use crate::surrogate::Surrogate;
+use crate::statistics::{Evidence, SearchState, Surrogate};
 use metalith_core::{Progress, Result};
 
 /// Share of the error above noise that a boundary must remove for it to be tried before pairs of other effects are.

@@ -7,10 +7,9 @@ use serde::Serialize;
 
 use crate::bench::{Bench, Sampling};
 use crate::cells::CellSource;
-use crate::fit::{FitProblem, held_out, mean_error};
 use crate::set::{MeasuredSet, PerCapture};
 use crate::simulator::Simulator;
-use crate::surrogate::Surrogate;
+use crate::statistics::{FitProblem, Measurements, Surrogate, held_out, mean_error};
 use metalith_optics::Perturbation;
 
 /// The error of one fidelity of the cell.
@@ -82,13 +81,13 @@ fn polynomials(
 fn rung(name: &str, problem: &FitProblem<'_>) -> Rung {
     let fit = problem.nuisance_fit();
     let residual = |c| {
-        let image = problem.image(&fit.theta, c);
+        let image = problem.prediction(&fit.theta, c);
         fit.nuisances.residual(problem.data, &image, c)
     };
     Rung {
         fidelity: name.into(),
-        fit: fit.chi2 / problem.pixels(),
+        fit: fit.chi2 / problem.points(),
         held_out: mean_error(&held_out(problem, &fit.equations, &fit)),
-        residuals: problem.data.captures().map(residual).collect(),
+        residuals: problem.data.indices().map(residual).collect(),
     }
 }

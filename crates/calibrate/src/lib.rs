@@ -9,40 +9,40 @@
 //! | `set` | the measured set and its files | |
 //! | `effects` | what chips and benches are known to do to light, one file each | `set` |
 //! | `bench`, `cells`, `optics`, `simulator` | the simulated bench | `set`, `effects` |
-//! | `forward_model` | what the statistics know of the simulator | |
-//! | `surrogate` | the forward model, interpolated | `forward_model` |
-//! | `fit` | least squares, cross-validation, null test | `surrogate` |
-//! | `search` | which effects explain a residual | `fit` |
-//! | `proposal` | effects for what is left | `search`, `session` |
+//! | `data`, `screening`, `speckle`, `grouping` | captures, nuisances and noise as `metalith-attribution` needs them | `bench` |
+//! | `simulator_model`, `smooth_shape`, `cell_error` | the simulated bench as its forward model | `data` |
+//! | `statistics` | the types of `metalith-attribution` for these captures | `data` |
+//! | `proposal` | effects for what is left | `statistics`, `session` |
 //! | `session`, `diagnosis`, `boundary_search`, `page`, `run` | a set from its files to its answer | all above |
 //! | `planning` | which captures to take of a design before it is measured | all above |
 //! | `validate` | the calibration judged on synthetic sets | all above |
 
 mod bench;
 mod boundary_search;
+mod cell_error;
 mod cells;
+mod data;
 mod diagnosis;
 mod effects;
-mod extent;
 mod fidelity;
-mod fit;
-mod forward_model;
-#[cfg(test)]
-mod linear_model;
+mod grouping;
 mod names;
 mod optics;
 mod page;
 mod planning;
 mod proposal;
 mod run;
-mod search;
+mod screening;
 mod session;
 mod set;
 mod simulator;
 mod simulator_model;
 mod smooth_residual;
-mod surrogate;
+mod smooth_shape;
+mod speckle;
+mod statistics;
 mod validate;
+mod width_parts;
 
 pub use bench::{Bench, Sampling};
 pub use diagnosis::{
@@ -51,18 +51,18 @@ pub use diagnosis::{
 };
 pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects, of_any_chip};
 pub use fidelity::Rung;
-pub use fit::WidthParts;
 pub use planning::{
     BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, check_not_begun,
     check_plannable, plan,
 };
 pub use proposal::{FieldBoundary, Proposed, boundary_of_fields, propose};
 pub use run::{Calibration, calibrate};
-pub use search::Evidence;
 pub use session::{Screening, Session, Settings, Simulations};
 pub use set::{Bayer, Capture, Channel, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
 pub use set::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
+pub use statistics::Evidence;
 pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 pub use validate::{
     ClaimedNumber, Coverage, DetectionLimit, Validation, ValidationPlan, ValidationTrial, validate, write_validation,
 };
+pub use width_parts::WidthParts;

@@ -3,19 +3,22 @@
 
 use std::path::PathBuf;
 
+use metalith_attribution::RandomNoise;
 use metalith_core::{Error, Progress, Result};
 
 use crate::bench::{Bench, Sampling};
 use crate::cells::{CellSource, RigorousCells};
+use crate::data::Data;
 use crate::diagnosis::Diagnosis;
 use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
-use crate::fit::{Data, Fit, FitProblem, WidthParts, half_widths};
 use crate::names::unknown_names;
-use crate::search::{DefectNoise, EndsSearch, Evidence, UnusableCapture, attribute_set, fit_of, unusable_captures};
+use crate::screening::{UnusableCapture, unusable_captures};
 use crate::set::{MeasuredSet, PerCapture};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
-use crate::surrogate::Surrogate;
+use crate::speckle::DefectNoise;
+use crate::statistics::{EndsSearch, Evidence, Fit, FitProblem, Surrogate, attribute_set, fit_of, half_widths};
+use crate::width_parts::WidthParts;
 
 /// How a set is worked on.
 #[derive(Clone, Debug)]
@@ -128,8 +131,7 @@ impl<'a> Session<'a> {
     /// If a cell cannot be solved, or the user stopped it.
     pub fn simulate(&self, progress: &dyn Progress) -> Result<Simulations> {
         let nothing = vec![0.0; self.simulator.slots.len()];
-        let led = self.data.led_of_captures();
-        let smooth = self.settings.smooth_terms.then_some((&led, self.data.leds));
+        let smooth = self.settings.smooth_terms;
         let surrogate = Surrogate::simulate(&self.simulator, &nothing, smooth, progress)?;
         let random = self.simulator.effects.iter().position(|e| e.random());
         let defects = match random {
@@ -200,7 +202,10 @@ impl<'a> Session<'a> {
         progress: &dyn Progress,
     ) -> Result<Evidence> {
         let problem = self.screened(simulations, screening);
-        let defects = simulations.defects.as_ref().map(|(effect, noise)| (*effect, noise));
+        let defects = simulations
+            .defects
+            .as_ref()
+            .map(|(effect, noise)| (*effect, noise as &dyn RandomNoise<Data>));
         attribute_set(&problem, self.settings.refine, defects, ends, progress)
     }
 
@@ -219,7 +224,7 @@ impl<'a> Session<'a> {
         let problem = self.problem(simulations);
         let fit = fit_of(problem, effects, full && self.settings.refine, progress)?;
         let parts = half_widths(&fit.problem, &fit.fit);
-        Ok((fit.fit, parts))
+        Ok((fit.fit, parts.iter().map(WidthParts::from).collect()))
     }
 
     /// The answer for the set, and the evidence for it where there was enough to search in.
@@ -246,7 +251,7 @@ impl<'a> Session<'a> {
     ) -> Result<(Diagnosis, Option<Evidence>)> {
         let screening = self.screen(simulations);
         if screening.is_data_unfit() {
-            let error = screening.fit.chi2 / self.screened(simulations, &screening).pixels().max(1.0);
+            let error = screening.fit.chi2 / self.screened(simulations, &screening).points().max(1.0);
             return Ok((Diagnosis::data_unfit(self.set(), error, &screening.unusable), None));
         }
         let ladder = if self.settings.compare_fidelities {
@@ -287,6 +292,6 @@ pub fn check_effects(known: &[Box<dyn Effect>], wanted: &[String]) -> Result<()>
     let known: Vec<String> = known.iter().map(|e| e.name()).collect();
     unknown_names(&known, wanted).map_or(Ok(()), |what| {
         let hint = format!("known effects are {}", known.join(", "));
-        Err(Error::invalid(what, hint))
+        Err(Error::refused("effects/unknown", what, hint))
     })
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::bench::{Bench, Lit};
 use super::cells::{CellSource, PillarTable};
 use super::effects::Effect;
-use super::forward_model::Slot;
 use super::optics::PixelGrid;
+use super::statistics::Slot;
 use metalith_core::{Progress, Result};
 use metalith_optics::{CellChange, Perturbation, to_middle_tops};
 
@@ -61,17 +61,6 @@ impl<'a> Simulator<'a> {
         (0..self.slots.len())
             .filter(|&s| self.slots[s].effect == effect)
             .collect()
-    }
-
-    /// The name of a number: that of its effect, with its axis or number where this has several.
-    pub fn slot_name(&self, slot: usize) -> String {
-        let slot = &self.slots[slot];
-        let effect = &self.effects[slot.effect];
-        match (effect.parameters().len(), slot.index) {
-            (1, _) => effect.name(),
-            (2, index) => format!("{} {}", effect.name(), ["x", "y"][index]),
-            (_, index) => format!("{} {}", effect.name(), index + 1),
-        }
     }
 
     /// What the numbers mean together.

@@ -2,11 +2,13 @@
 
 use metalith_core::{Progress, Result};
 
+use crate::cell_error::CellError;
 use crate::effects::{Stage, ValueError, separate_by};
-use crate::forward_model::{ForwardModel, ParameterPoint, Slot, SmoothTerm, TRANSMISSION_TERMS};
 use crate::optics::PixelGrid;
 use crate::set::PerCapture;
 use crate::simulator::Simulator;
+use crate::smooth_shape::{SmoothShape, TRANSMISSION_TERMS};
+use crate::statistics::{ForwardModel, ModelError, ParameterPoint, Slot, SmoothGroups, SmoothTerm};
 use metalith_optics::{Perturbation, zernike};
 
 /// Cells are solved at multiples of this share of a typical size; the surrogate covers the difference.
@@ -21,18 +23,18 @@ const ERROR_OF_LIGHT: f64 = 0.002;
 impl Simulator<'_> {
     fn perturbation_at(&self, point: &ParameterPoint) -> Perturbation {
         let mut perturbation = self.perturbation(&point.theta);
-        match point.smooth {
+        match point.smooth.and_then(|k| SmoothShape::all().nth(k)) {
             None => {}
-            Some(term @ SmoothTerm::Path(k)) => {
+            Some(term @ SmoothShape::Path(k)) => {
                 perturbation
                     .geometry
                     .add_wavefront(zernike::FIRST + k as u32, term.step());
             }
-            Some(term @ SmoothTerm::Transmission(k)) => {
+            Some(term @ SmoothShape::Transmission(k)) => {
                 perturbation.geometry.transmission = vec![0.0; TRANSMISSION_TERMS];
                 perturbation.geometry.transmission[k] = term.step();
             }
-            Some(term @ SmoothTerm::Phase(k)) => {
+            Some(term @ SmoothShape::Phase(k)) => {
                 perturbation.geometry.transmission_phase_rad = vec![0.0; TRANSMISSION_TERMS];
                 perturbation.geometry.transmission_phase_rad[k] = term.step();
             }
@@ -46,8 +48,14 @@ impl Simulator<'_> {
 }
 
 impl ForwardModel for Simulator<'_> {
+    type Prediction = PixelGrid;
+
     fn effects(&self) -> usize {
         self.effects.len()
+    }
+
+    fn effect_name(&self, effect: usize) -> String {
+        self.effects[effect].name()
     }
 
     fn slots(&self) -> &[Slot] {
@@ -91,17 +99,43 @@ impl ForwardModel for Simulator<'_> {
                 .any(|(s, v)| *v != 0.0 && s.effect != own && is_stack(s.effect))
     }
 
-    fn image_bytes(&self) -> f64 {
+    fn prediction_bytes(&self) -> f64 {
         self.bench.grid_bytes()
     }
 
-    fn images(&self, points: &[ParameterPoint], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
+    fn memory_hint(&self) -> String {
+        "give smaller windows (`rows` and `cols` of [camera]) or fewer captures, or try fewer effects (`--effects NAMES`): memory goes \
+         with the area of a window on the sensor, whatever its pixels"
+            .into()
+    }
+
+    fn smooth_terms(&self) -> Vec<SmoothTerm> {
+        SmoothShape::all().map(SmoothShape::term).collect()
+    }
+
+    fn smooth_groups(&self) -> SmoothGroups {
+        let set = self.bench.set();
+        SmoothGroups {
+            of: set.captures.iter().map(|c| c.led.into()).collect(),
+            count: set.leds.len(),
+        }
+    }
+
+    fn model_error(&self) -> ModelError {
+        CellError::MEASURED.of_model()
+    }
+
+    fn cautious_model_error(&self) -> ModelError {
+        CellError::CAUTIOUS.of_model()
+    }
+
+    fn predictions(&self, points: &[ParameterPoint], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
         let perturbations: Vec<_> = points.iter().map(|p| self.perturbation_at(p)).collect();
         let exposed = self.expose(&perturbations, progress)?;
         Ok(exposed.into_iter().map(PerCapture::from).collect())
     }
 
-    fn width_biases_nm(&self, theta: &[f64]) -> Vec<Option<f64>> {
+    fn reference_values(&self, theta: &[f64]) -> Vec<Option<f64>> {
         let geometry = self.perturbation(theta).geometry;
         let set = self.bench.set();
         set.sem
@@ -133,7 +167,7 @@ mod tests {
     use crate::cells::CellSource;
     use crate::effects;
     use crate::set::MeasuredSet;
-    use crate::surrogate::check_calibration_fits;
+    use crate::statistics::check_calibration_fits;
     use metalith_cell::PublishedCell;
     use metalith_core::Silent;
     use metalith_gds::extract::GdsPillars;
@@ -166,7 +200,7 @@ mod tests {
             let simulator = simulator(&set);
             let grids = simulator.expose(&[Perturbation::default()], &Silent).unwrap().remove(0);
             let held: usize = grids.iter().map(PixelGrid::bytes).sum();
-            let ratio = held as f64 / simulator.image_bytes();
+            let ratio = held as f64 / simulator.prediction_bytes();
             assert!((1.0 / OFF..OFF).contains(&ratio), "{pixels} x {pixel_um} um: {ratio}");
         }
     }

@@ -2,9 +2,9 @@
 
 use ndarray::Array2;
 
-use crate::fit::{Fit, FitProblem, covariance, minimise};
-use crate::forward_model::{PATH_TERMS, TRANSMISSION_TERMS};
 use crate::simulator::Simulator;
+use crate::smooth_shape::{PATH_TERMS, TRANSMISSION_TERMS};
+use crate::statistics::{Fit, FitProblem, covariance, minimise};
 use metalith_optics::legendre;
 use metalith_optics::zernike;
 
@@ -54,7 +54,7 @@ impl SmoothResidual {
         let all: Vec<usize> = (0..equations.size() - 1).collect();
         let (_, without) = minimise(&total, &(0..first).collect::<Vec<_>>());
         let (x, with) = minimise(&total, &all);
-        let pixels = problem.pixels();
+        let pixels = problem.points();
         let covariance = covariance(&total, &all);
         let sigma = |k: usize| (covariance[(first + k, first + k)] * (with / pixels).max(1.0)).sqrt();
         let paths: Vec<f64> = (0..PATH_TERMS).map(|k| x[first + k]).collect();

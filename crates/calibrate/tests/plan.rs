@@ -87,7 +87,7 @@ fn settings(cache: PathBuf, only: &[&str]) -> Settings {
     }
 }
 
-/// What is done to the chip of a session comes back in its captures, and is found with its size.
+/// Effects on the chip of a session come back in its captures, and are found with their sizes.
 fn each_is_found(folder: &Path, plan: &CapturePlan, like: &MeasuredSet, settings: &Settings) {
     let synthesizer = Synthesizer::new(like, settings).unwrap();
     for (name, size) in [("cd_bias", 6.0), ("gap", 2.0)] {

@@ -1,5 +1,5 @@
-//! What the rigorous table of a cell says of it: fits, widths to stay away from, mappings; and their page. What unlike neighbours
-//! say of mappings for steered elements. Of rotated rectangles the phase by their rotation.
+//! Study of a cell by its rigorous table: fits, widths to stay away from, mappings; and their page. Also mappings for
+//! steered elements by the coupled model, and the phase of rotated rectangles by their rotation.
 
 mod library;
 mod page;

@@ -12,7 +12,7 @@ use metalith_design::Design;
 use metalith_pillars::UprightRectangles;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, fixed, sig, write_json};
 
-/// What the pillars of a design do at the wavelength of the mapping.
+/// Study of the pillars of a design at the wavelength of the mapping.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LibraryStudy {
     pub name: String,
@@ -23,11 +23,11 @@ pub struct LibraryStudy {
     /// mirror image.
     pub turns_x: Vec<f64>,
     pub passed_x: Vec<f64>,
-    /// Of all sizes, those that are the nearest to any pair of phases.
+    /// Library of the sizes, of all, that are the nearest to any pair of phases.
     #[serde(rename = "library")]
     pub nearest: PillarLibrary,
     pub errors: LibraryErrors,
-    /// What the library of the design leaves, if it has one already.
+    /// Errors of the library of the design, if it has one already.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub design: Option<LibraryErrors>,
 }
@@ -39,7 +39,8 @@ impl LibraryStudy {
     /// If the pillars are no upright rectangles, the cell cannot be solved, or the user stopped it.
     pub fn new(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Self> {
         let pillars = design.cell.shape.upright().ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "cells/kind-of-pillar",
                 format!("the pillars of {} are {}", design.name, design.cell.shape.plural()),
                 "this study is of upright rectangles",
             )

@@ -174,8 +174,8 @@ fn maps(page: &mut Page, study: &CellStudy) {
     );
 }
 
-/// Where a resonance takes most light: width, wavelength (nm), label. Local minima in width every 20 nm
-/// of wavelength.
+/// Places where a resonance takes most light: width, wavelength (nm), label. Local minima in width every 20 nm of
+/// wavelength.
 fn dips(study: &CellStudy) -> Vec<(f64, f64, String)> {
     let mut found = Vec::new();
     for curve in study.curves.iter().step_by(10) {

@@ -13,27 +13,27 @@ use metalith_report::{Axis, Cell, Chart, Column, Page, Table, counted, fixed, si
 /// Terms that mappings are fitted with; designs take no more.
 const TERMS: [usize; 4] = [1, 2, 3, 4];
 
-/// What one rotation does.
+/// Response at one rotation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RotationPoint {
     pub number: u16,
-    /// As drawn (degrees).
+    /// Rotation as drawn (degrees).
     pub rotation_deg: f64,
-    /// What the lattice adds to twice the rotation, in phase of the converted light (rad).
+    /// Phase that the lattice adds to twice the rotation, in the converted light (rad).
     pub added_rad: f64,
     /// Power of the converted and of the unconverted light over the arriving.
     pub converted: f64,
     pub unconverted: f64,
 }
 
-/// What a cell of rectangles does at the wavelength of the mapping.
+/// Study of a cell of rectangles at the wavelength of the mapping.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RotationStudy {
     pub name: String,
     pub wavelength_um: f64,
     /// All rotations that the design may write.
     pub points: Vec<RotationPoint>,
-    /// What the mapping of the design leaves, and half of the phase.
+    /// Error of the mapping of the design, and of half of the phase.
     pub design: MappingError,
     pub half: MappingError,
     /// Mappings by the number of their terms.
@@ -47,7 +47,8 @@ impl RotationStudy {
     /// If the pillars are no rectangles, or the cell cannot be solved.
     pub fn new(design: &Design) -> Result<Self> {
         let pillars = design.cell.shape.rotated().ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "cells/kind-of-pillar",
                 format!("the pillars of {} are {}", design.name, design.cell.shape.plural()),
                 "this study is of rotated rectangles",
             )
@@ -56,26 +57,26 @@ impl RotationStudy {
         let wavelength_um = design.mapping.wavelength_um;
         let stack = design.cell_stack()?;
         let full = stack.full_transmission(wavelength_um)?.powi(2);
-        let cell = RotatedCell::new(stack, pillars, arriving);
-        let curve = RotationCurve::new(&cell, wavelength_um)?;
-        let point = |number: u16| -> Result<RotationPoint> {
+        let response = RotatedCell::new(stack, pillars, arriving).at(wavelength_um)?;
+        let curve = RotationCurve::new(response.clone());
+        let point = |number: u16| {
             let rotation = pillars.drawn_rotation(number);
-            let [converted, unconverted] = cell.response(rotation, wavelength_um)?;
-            Ok(RotationPoint {
+            let [converted, unconverted] = response.at(rotation);
+            RotationPoint {
                 number,
                 rotation_deg: rotation.to_degrees(),
-                added_rad: curve.added(arriving.geometric_phase(rotation) / 2.0)?,
+                added_rad: curve.added(arriving.geometric_phase(rotation) / 2.0),
                 converted: converted.norm_sqr() / full,
                 unconverted: unconverted.norm_sqr() / full,
-            })
+            }
         };
         Ok(Self {
             name: design.name.clone(),
             wavelength_um,
-            points: (1..=pillars.steps).map(point).collect::<Result<_>>()?,
-            design: curve.error(&design.mapping.rotation, pillars)?,
-            half: curve.error(&RotationMapping::default(), pillars)?,
-            fits: TERMS.into_iter().map(|terms| curve.fit(terms)).collect::<Result<_>>()?,
+            points: (1..=pillars.steps).map(point).collect(),
+            design: curve.error(&design.mapping.rotation),
+            half: curve.error(&RotationMapping::default()),
+            fits: TERMS.into_iter().map(|terms| curve.fit(terms)).collect(),
         })
     }
 

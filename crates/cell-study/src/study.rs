@@ -28,7 +28,7 @@ const BEST_DEGREES: [usize; 3] = [2, 3, 5];
 const HIGHEST_INVERSE: usize = 6;
 const HIGHEST_FORWARD: usize = 6;
 
-/// What [`CellStudy::new`] is asked.
+/// Options of [`CellStudy::new`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StudyOptions {
     /// Power of the zero order below which a width is bad.
@@ -49,7 +49,8 @@ impl StudyOptions {
     pub fn check(&self) -> Result<()> {
         match (0.0..1.0).contains(&self.threshold) {
             true => Ok(()),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "cells/bad-zero-order",
                 format!("widths are bad below a zero order of {}", self.threshold),
                 "give a share of the incident power, such as 0.3",
             )),
@@ -63,7 +64,7 @@ pub struct MappingStudy {
     pub name: &'static str,
     /// Against rigorous phase at the wavelength of the mapping.
     pub phase: MappingError,
-    /// At the wavelengths of [`CellStudy::compared_um`].
+    /// Orders at the wavelengths of [`CellStudy::compared_um`].
     pub led: Vec<RampOrders>,
     /// Over the band.
     pub band: Vec<RampOrders>,
@@ -85,7 +86,7 @@ impl MappingStudy {
 pub struct InverseTrial {
     pub basis: Basis,
     pub degree: usize,
-    /// None where no polynomial of this degree stays within the widths of the cell.
+    /// Fit; `None` where no polynomial of this degree stays within the widths of the cell.
     pub fit: Option<InverseFit>,
 }
 

@@ -1,5 +1,5 @@
-//! How far transmissions by few diffraction orders are from those by many, over widths and the three design wavelengths,
-//! and what extrapolation over the number of orders would gain.
+//! Errors of transmissions by few diffraction orders against those by many, over widths and the three design
+//! wavelengths, and what extrapolation over the number of orders would gain.
 //!
 //! `cargo run --release -p metalith-cell --example truncation` (half a CPU minute)
 

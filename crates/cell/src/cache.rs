@@ -6,11 +6,9 @@
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
-use serde::Serialize;
 
 use super::column::WidthSpectrum;
 use super::kept;
-use super::table::TableSpec;
 use metalith_core::Result;
 
 const MAGIC: [u8; 8] = *b"MLCELL\0\x01";
@@ -27,17 +25,6 @@ pub fn cache_folder() -> Option<PathBuf> {
         let base = variable("XDG_CACHE_HOME").or_else(|| variable("HOME").map(|home| home.join(".cache")))?;
         Some(base.join("metalith"))
     })
-}
-
-/// The inputs as text: equal if and only if the table is the same.
-pub(super) fn inputs(spec: &TableSpec) -> Vec<u8> {
-    #[derive(Serialize)]
-    struct Inputs<'a> {
-        solver: u32,
-        spec: &'a TableSpec,
-    }
-    let solver = kept::solver_of(spec.stack.shape);
-    serde_json::to_vec(&Inputs { solver, spec }).expect("plain data serialises")
 }
 
 /// Name of the file for these inputs.
@@ -73,7 +60,7 @@ pub(super) fn read(
     columns.map(Some).ok_or_else(|| "it holds other columns".into())
 }
 
-/// What is left to read.
+/// Bytes that have not been read yet.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {

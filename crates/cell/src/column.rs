@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use metalith_core::Result;
+use metalith_core::{Result, lagrange_weight};
 
 /// Distance of the first samples (um). Between them t turns by less than an eighth of a turn; every
 /// interval is checked in its middle, so none in the end is longer than half of this.
@@ -101,13 +101,8 @@ pub(super) fn lagrange(places: &[f64], value: impl Fn(usize) -> Complex64, x: f6
     let near = &places[first..first + count];
     let mut sum = Complex64::ZERO;
     for (i, &place) in near.iter().enumerate() {
-        let weight: f64 = near
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != i)
-            .map(|(_, &other)| (x - other) / (place - other))
-            .product();
-        sum += value(first + i) * weight;
+        let others = near.iter().enumerate().filter(|(j, _)| *j != i);
+        sum += value(first + i) * lagrange_weight(x, place, others.map(|(_, other)| *other));
     }
     sum
 }

@@ -30,7 +30,7 @@ pub struct BadCell {
     pub wavelength_um: f64,
     /// Power of the zero order over the incident.
     pub zero_order: f64,
-    /// Whether a wider pillar here has less phase.
+    /// True if a wider pillar here has less phase.
     pub backwards: bool,
 }
 
@@ -41,7 +41,8 @@ impl PhaseCurve {
     /// As [`CellModel::transmissions`]; also if there are fewer than two widths.
     pub fn new(cell: &dyn CellModel, wavelength_um: f64, widths_nm: &[u16]) -> Result<Self> {
         let (Some(&widest), true) = (widths_nm.last(), widths_nm.len() > 1) else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/curve-too-short",
                 "a phase curve over fewer than two widths",
                 "widen the range of widths of the cell",
             ));
@@ -71,7 +72,7 @@ impl PhaseCurve {
         self.t.iter().map(Complex64::norm_sqr)
     }
 
-    /// Whether the phase falls from the width before to the width after.
+    /// True if the phase falls from the width before to the width after.
     pub fn backwards(&self, index: usize) -> bool {
         let last = self.turns.len() - 1;
         self.turns[(index + 1).min(last)] < self.turns[index.saturating_sub(1)]

@@ -27,7 +27,7 @@ pub fn solver_of(shape: PillarShape) -> u32 {
 /// Length of the checksum.
 const CHECKSUM: usize = 32;
 
-/// Why a kept file is not used.
+/// Reason why a cached file is not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unusable {
@@ -54,7 +54,7 @@ pub fn seal(magic: [u8; 8], inputs: &[u8], content: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// What stands before the content.
+/// Header before the content.
 fn before_content(magic: [u8; 8], inputs: &[u8]) -> Vec<u8> {
     let length = u32::try_from(inputs.len()).expect("inputs are short");
     [&magic[..], &length.to_le_bytes(), inputs].concat()
@@ -93,7 +93,7 @@ pub fn write(file: &Path, magic: [u8; 8], inputs: &[u8], content: &[u8]) -> Resu
 pub struct KeptWriter {
     path: PathBuf,
     file: AtomicFile,
-    /// Of all that was written.
+    /// Digest of all that was written.
     digest: Sha256,
 }
 
@@ -148,9 +148,9 @@ pub fn read(file: &Path, magic: [u8; 8], inputs: &[u8], longest: u64) -> Result<
     })
 }
 
-/// What `decode` makes of the content kept in a file, which it reads piece by piece and whose length in bytes it is told;
-/// else as [`read`]. The checksum is known after the last piece alone: until then lengths in the content may be wrong, and
-/// `decode` must take none for more than the content has.
+/// Variant of [`read`] that returns what `decode` makes of the content of a file, which `decode` reads piece by piece
+/// and whose length in bytes it receives. The checksum is known after the last piece alone: until then lengths in the
+/// content may be wrong, and `decode` must take none for more than the content has.
 ///
 /// # Errors
 /// The reason, in words; also if `decode` makes nothing of it.
@@ -238,15 +238,15 @@ impl CacheEntry {
         }
     }
 
-    /// The same table, which may have come with the program: `find` gives the bytes of a file by its name. These count before
-    /// those of the folder, so that every machine has the same.
+    /// Same table, which may be shipped with the program: `find` gives the bytes of a file by its name. These count
+    /// before those of the folder, so that every machine has the same.
     #[must_use]
     pub fn or_shipped(mut self, find: impl FnOnce(&str) -> Option<&'static [u8]>) -> Self {
         self.shipped = find(&self.name);
         self
     }
 
-    /// Whether it came with the program.
+    /// True if it came with the program.
     pub fn is_shipped(&self) -> bool {
         self.shipped_content().is_some()
     }
@@ -259,7 +259,7 @@ impl CacheEntry {
         Some(self.folder.as_ref()?.join(&self.name))
     }
 
-    /// What is kept, if it is there and `decode` knows it.
+    /// Content of the cache, if it is there and `decode` knows it.
     pub fn read<T>(&self, decode: impl Fn(&[u8]) -> Option<T>, progress: &dyn Progress) -> Option<T> {
         if let Some(table) = self.shipped_content().and_then(&decode) {
             return Some(table);
@@ -338,7 +338,7 @@ mod tests {
         body.extend(digest);
         assert_eq!(open(&body, MAGIC, b"inputs"), Err(Unusable::OtherInputs));
     }
-    /// What is made of the content piece by piece is of the same bytes, and of damaged ones nothing.
+    /// Content decoded piece by piece has the same bytes, and damaged content gives nothing.
     #[test]
     fn pieces_are_the_bytes_of_the_whole() {
         let folder = tempfile::tempdir().unwrap();

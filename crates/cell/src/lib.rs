@@ -5,10 +5,10 @@ mod column;
 mod curve;
 mod exact;
 mod fit;
+mod illumination;
 pub mod kept;
 mod library;
 mod model;
-mod neighbour_band;
 mod neighbours;
 mod pointwise;
 mod polarisation;
@@ -16,6 +16,7 @@ mod polarising;
 mod polynomial;
 mod published;
 mod rectangle;
+mod response;
 mod rigorous;
 mod rotated;
 mod rotation;
@@ -30,13 +31,14 @@ pub use fit::{
     FittedCell, ForwardFit, InverseFit, MappingError, RotationCurve, RotationFit, curves_over, fit_forward,
     fit_inverse, forward_errors, round_trip,
 };
+pub use illumination::{Illumination, Incidence, Spectral};
 pub use library::{LibraryErrors, LibraryPillar, PillarLibrary};
 pub use metalith_rcwa::Material;
-pub use model::{CellModel, Fidelity, ObliqueTables, POLARISATION_SHARE, dark};
-pub use neighbour_band::{BandNode, BandResponse};
+pub use model::{CellModel, Fidelity};
 pub use neighbours::{
-    FittedNeighbours, NEIGHBOUR_DEGREE, NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourResponse, SiteResponse,
-    neighbours,
+    BandNode, BandResponse, Blaze, CoarseCell, ElementRow, FittedNeighbours, Mapping, NEIGHBOUR_DEGREE,
+    NEIGHBOUR_TERMS, NEIGHBOURS, NeighbourBasis, NeighbourCell, NeighbourResponse, NeighbourTable, NeighbourTableSpec,
+    Orientation, RealRow, SiteGrid, SiteResponse, SolvedRow, neighbours, sites_by,
 };
 pub use pointwise::PointwiseCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, tabulate};
@@ -48,8 +50,9 @@ pub use polarising::polarising_cell;
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rectangle::{Handedness, OBLIQUE_RECTANGLES, RotatedRectangle, oblique_refused};
+pub use response::{CellResponse, JonesTables, NeighbourTables, ObliqueTables, POLARISATION_SHARE, dark};
 pub use rigorous::RigorousCell;
-pub use rotated::{RotatedCell, RotationSamples, Truncation};
+pub use rotated::{RotatedCell, RotationResponse, RotationSamples, Truncation};
 pub use rotation::RotationMapping;
 pub use stack::{CellStack, MOST_SUBSTRATE_K, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};

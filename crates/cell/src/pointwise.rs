@@ -3,21 +3,22 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{CellModel, CellStack, Fidelity, ObliqueTables};
-use metalith_core::Result;
+use super::{CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, ObliqueTables};
+use metalith_core::{Progress, Result};
 use metalith_rcwa::Orders;
 
 /// Median phase error over the cell's whole range 0.002 rad: finer than the table, and for a few
 /// wavelengths faster than making one.
 pub const ORDERS: usize = 17;
 
-/// The same for oblique light, where less is saved by symmetry: median error 0.007 rad.
+/// Number of orders for oblique light, where less is saved by symmetry: median error 0.007 rad.
 pub const OBLIQUE_ORDERS: usize = 11;
 
-/// For one of many wavelengths of a band: resonances move by some 0.3 nm, which no average over a band tells.
+/// Number of orders for one of many wavelengths of a band: resonances move by some 0.3 nm, which no average over a band
+/// shows.
 pub const BAND_ORDERS: usize = 9;
 
-/// The same for oblique light.
+/// Number of orders for oblique light of one of many wavelengths of a band.
 pub const OBLIQUE_BAND_ORDERS: usize = 7;
 
 /// Solves every width of a list at each wavelength that is asked for.
@@ -39,7 +40,7 @@ impl PointwiseCell {
         Self::with_orders(stack, widths_nm, orders)
     }
 
-    /// The same with another number of diffraction orders.
+    /// Cell with another number of diffraction orders.
     pub fn with_orders(stack: CellStack, widths_nm: impl IntoIterator<Item = u16>, orders: Orders) -> Self {
         let mut widths_nm = widths_nm.into_iter().filter(|w| *w > 0).collect::<Vec<_>>();
         widths_nm.sort_unstable();
@@ -51,7 +52,7 @@ impl PointwiseCell {
         }
     }
 
-    /// At most as many orders as the cell was made with.
+    /// Orders, at most as many as the cell was made with.
     fn at_most(&self, orders: usize) -> Result<Orders> {
         Ok(Orders::new(orders.min(self.orders.along_axis()))?)
     }
@@ -82,22 +83,15 @@ impl CellModel for PointwiseCell {
         Fidelity::Rigorous
     }
 
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        self.normal(self.orders.along_axis(), wavelength_um, max_width_nm)
-    }
-
-    fn transmissions_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        self.normal(BAND_ORDERS, wavelength_um, max_width_nm)
-    }
-
-    fn oblique(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        self.tilted(OBLIQUE_ORDERS, wavelength_um, sines, max_width_nm)
-            .map(Some)
-    }
-
-    fn oblique_in_band(&self, wavelength_um: f64, sines: [f64; 2], max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        self.tilted(OBLIQUE_BAND_ORDERS, wavelength_um, sines, max_width_nm)
-            .map(Some)
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let (um, sines) = (light.wavelength_um, light.cell_sines());
+        if sines == [0.0; 2] {
+            let orders = light.spectral.choose(self.orders.along_axis(), BAND_ORDERS);
+            return self.normal(orders, um, widest_nm).map(CellResponse::Scalar);
+        }
+        let orders = light.spectral.choose(OBLIQUE_ORDERS, OBLIQUE_BAND_ORDERS);
+        let tables = self.tilted(orders, um, sines, widest_nm)?;
+        Ok(CellResponse::Jones(JonesTables::Oblique(tables)))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
@@ -146,17 +140,21 @@ fn spread(widths_nm: &[u16], solved: &[Complex64], max_width_nm: u16) -> Vec<Com
 mod tests {
     use super::*;
     use crate::Material;
+    use metalith_core::Silent;
 
-    /// What a band passes is the same as by many orders.
+    /// Mean power of a band by few orders equals the result by many orders.
     #[test]
     fn fewer_orders_do_for_the_mean_over_a_band() {
-        /// Of the mean power that passes over 400 to 700 nm and all widths; of the mean |t - t exact| / |t|.
+        /// Tolerance of the mean power that passes over 400 to 700 nm and all widths; of the mean |t - t exact| / |t|.
         const POWER: f64 = 0.005;
         const AMPLITUDE: f64 = 0.05;
         let cell = PointwiseCell::new(crate::stack::tests::paper(), (100..=300).step_by(20));
         let (mut power, mut exact, mut apart, mut count) = (0.0, 0.0, 0.0, 0.0);
         for um in (0..24).map(|i| 0.406_25 + 0.0125 * f64::from(i)) {
-            let coarse = cell.transmissions_in_band(um, 300).unwrap();
+            let coarse = cell
+                .response(&Illumination::normal(um).in_band(), 300, &Silent)
+                .unwrap();
+            let coarse = coarse.focused().unwrap();
             let fine = cell.transmissions(um, 300).unwrap();
             for w in (100..=300).step_by(20) {
                 power += coarse[w].norm_sqr();
@@ -172,18 +170,21 @@ mod tests {
 
     #[test]
     fn fewer_orders_do_for_the_mean_of_oblique_light() {
-        /// Of the mean power that passes over 410 to 690 nm, some widths and both polarisations.
+        /// Tolerance of the mean power that passes over 410 to 690 nm, some widths and both polarisations.
         const POWER: f64 = 0.02;
         let cell = PointwiseCell::new(crate::stack::tests::paper(), [120, 160, 200, 240]);
-        let power = |tables: Option<ObliqueTables>| -> f64 {
-            let tables = tables.expect("the cell knows angles");
+        let power = |light: Illumination<'_>| -> f64 {
+            let CellResponse::Jones(JonesTables::Oblique(tables)) = cell.response(&light, 300, &Silent).unwrap() else {
+                panic!("the cell knows angles")
+            };
             let widths = [120, 160, 200, 240];
             tables.passed().flat_map(|t| widths.map(|w| t[w].norm_sqr())).sum()
         };
         let (mut coarse, mut fine) = (0.0, 0.0);
         for um in (0..8).map(|i| 0.41 + 0.04 * f64::from(i)) {
-            coarse += power(cell.oblique_in_band(um, [-0.2588, 0.0], 300).unwrap());
-            fine += power(cell.oblique(um, [-0.2588, 0.0], 300).unwrap());
+            let light = Illumination::from_direction(um, [-0.2588, 0.0]).oblique();
+            coarse += power(light.in_band());
+            fine += power(light);
         }
         println!("{coarse} {fine}");
         assert!((coarse / fine - 1.0).abs() < POWER, "{coarse} {fine}");

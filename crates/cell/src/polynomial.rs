@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Which powers of the phase a polynomial has.
+/// Powers of the phase that a polynomial has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {

@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
-use super::{CellModel, CellStack, Fidelity, ForwardPolynomial};
-use metalith_core::{Error, Result};
+use super::{CellModel, CellResponse, CellStack, Fidelity, ForwardPolynomial, Illumination};
+use metalith_core::{Error, Progress, Result};
 
 /// Wavelengths that the polynomials were published for (um).
 const PUBLISHED_UM: (f64, f64) = (0.4, 0.7);
@@ -33,13 +33,17 @@ impl PublishedCell {
     pub fn of_stack(stack: &CellStack) -> Result<Self> {
         match stack.is_of_the_paper() {
             true => Ok(Self::new(stack.pitch_nm as u32)),
-            false => Err(Error::invalid(Self::OTHERS, Self::ANOTHER_CELL)),
+            false => Err(Error::refused(
+                "cell/published-for-other-cell",
+                Self::OTHERS,
+                Self::ANOTHER_CELL,
+            )),
         }
     }
 
-    /// Why it does not judge other pillars than those of the paper.
+    /// Reason why it does not simulate other pillars than the paper's.
     pub const OTHERS: &str = "the `published` cell is of squares of silicon nitride alone, 700 nm high and 350 nm apart, on fused silica, in air";
-    /// What to do instead.
+    /// Remedy: what to do instead.
     pub const ANOTHER_CELL: &str =
         "ask for `rigorous` or `fitted`, as `fidelity` in [verify] of a design or with --fidelity";
 }
@@ -49,10 +53,12 @@ impl CellModel for PublishedCell {
         Fidelity::Published
     }
 
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let wavelength_um = light.wavelength_um;
         let (short, long) = PUBLISHED_UM;
         if !(short - ROUNDING_UM..=long + ROUNDING_UM).contains(&wavelength_um) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/published-wavelength",
                 format!(
                     "the `published` cell at {} nm: its polynomials are of {} to {} nm",
                     (wavelength_um * 1e4).round() / 10.0,
@@ -63,11 +69,11 @@ impl CellModel for PublishedCell {
             ));
         }
         let mut table = vec![Complex64::new(0.0, 0.0)];
-        table.extend((1..=max_width_nm).map(|width| {
+        table.extend((1..=widest_nm).map(|width| {
             let turns = self.forward.turns(f64::from(width) / self.pitch_nm, wavelength_um);
             Complex64::cis(std::f64::consts::TAU * turns.fract())
         }));
-        Ok(table)
+        Ok(CellResponse::Scalar(table))
     }
 
     fn full_transmission(&self, _wavelength_um: f64) -> Result<f64> {

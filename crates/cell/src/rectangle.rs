@@ -1,4 +1,4 @@
-//! Rectangular pillars, rotated: cells that tell polarisations apart.
+//! Rectangular pillars, rotated: cells that distinguish polarisations.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use metalith_rcwa::{Incidence, LayerStack, Orders, Outline, Side, solve};
 
 use super::CellStack;
 
-/// Which way circularly polarised light turns, seen against it.
+/// Handedness: the way in which circularly polarised light turns, seen against it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Handedness {
@@ -24,7 +24,8 @@ impl Handedness {
     /// Name and value of each, as design files and options have them.
     pub const CHOICES: [(&'static str, Self); 2] = [("left", Self::Left), ("right", Self::Right)];
 
-    /// What a pillar that is rotated by an angle (rad) adds to the phase of light that arrives so and leaves the other way (rad).
+    /// Phase (rad) that a pillar that is rotated by an angle (rad) adds to light that arrives in this hand and leaves
+    /// in the other.
     pub fn geometric_phase(self, rotation: f64) -> f64 {
         match self {
             Self::Left => 2.0 * rotation,
@@ -67,7 +68,8 @@ impl CellStack {
             rotation,
         } = *pillar;
         if ![width_nm, length_nm, rotation].iter().all(|v| v.is_finite()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/rectangle-does-not-fit",
                 format!("a pillar of {width_nm} x {length_nm} nm, rotated by {rotation} rad"),
                 "give both edges in nm and the angle in rad",
             ));
@@ -86,7 +88,8 @@ impl CellStack {
     /// Refuses rounded corners, which no rectangle is solved with.
     pub(super) fn check_sharp(&self) -> Result<()> {
         if self.corner_radius_nm > 0.0 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/rounded-rectangle",
                 "rectangles with rounded corners",
                 "leave the corner radius at 0: rectangles are solved with sharp corners",
             ));
@@ -113,16 +116,16 @@ impl CellStack {
     }
 }
 
-/// What cells of rectangles are not solved for, and what to do instead.
+/// Message on what cells of rectangles are not solved for, and what to do instead.
 pub const OBLIQUE_RECTANGLES: [&str; 2] = [
     "rectangular pillars in light that arrives at an angle",
-    "leave out --as-lit, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
+    "leave out --oblique, or set `incidence = \"normal\"` in [verify]: their cells are solved along the normal",
 ];
 
-/// Why cells of rectangles are not solved in light that arrives at an angle.
+/// Error for cells of rectangles in light that arrives at an angle.
 pub fn oblique_refused() -> Error {
     let [what, hint] = OBLIQUE_RECTANGLES;
-    Error::invalid(what, hint)
+    Error::refused("cell/oblique-not-possible", what, hint)
 }
 
 #[cfg(test)]
@@ -132,8 +135,9 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// What the lattice, which does not turn with the pillar, may add to the geometric phase (rad): 0.0126 for the pillar of the
-    /// test with 13 orders, 0.0137 with 17; others, that reach nearer to their neighbours, have some hundredths.
+    /// Phase that the lattice, which does not turn with the pillar, may add to the geometric phase (rad): 0.0126 for
+    /// the pillar of the test with 13 orders, 0.0137 with 17; others, that reach nearer to their neighbours, have some
+    /// hundredths.
     const GEOMETRIC: f64 = 0.015;
 
     /// A quarter of a turn leaves the lattice alike: what it does to the phase is exact, but for what tells x from y in the

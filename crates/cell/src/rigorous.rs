@@ -5,7 +5,7 @@ use std::path::Path;
 use num_complex::Complex64;
 
 use super::table::{CellTable, Origin, TableSpec};
-use super::{CellModel, Fidelity};
+use super::{CellModel, CellResponse, Fidelity, Illumination};
 use metalith_core::{Progress, Result};
 
 /// Complex transmission of the zero order from a table of rigorous coupled-wave analysis.
@@ -29,7 +29,7 @@ impl RigorousCell {
         Self { table }
     }
 
-    /// What it looks up.
+    /// Table that it looks values up in.
     pub fn table(&self) -> &CellTable {
         &self.table
     }
@@ -40,10 +40,10 @@ impl CellModel for RigorousCell {
         Fidelity::Rigorous
     }
 
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let mut t = self.table.transmissions(wavelength_um, max_width_nm)?;
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let mut t = self.table.transmissions(light.wavelength_um, widest_nm)?;
         t[0] = Complex64::ZERO;
-        Ok(t)
+        Ok(CellResponse::Scalar(t))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {

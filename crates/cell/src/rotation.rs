@@ -1,4 +1,4 @@
-//! From phase to the rotation of a rectangular pillar.
+//! Mapping from phase to the rotation of a rectangular pillar.
 
 use serde::Serialize;
 
@@ -6,20 +6,20 @@ use serde::Serialize;
 /// adds to twice the rotation, which repeats every quarter turn.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RotationMapping {
-    /// Of sin(2 k phase), k from one (rad), for light that arrives left circularly polarised.
+    /// Coefficients of sin(2 k phase), k from one (rad), for light that arrives left circularly polarised.
     pub sines: Vec<f64>,
-    /// Of cos(2 k phase) alike.
+    /// Coefficients of cos(2 k phase), k from one (rad), for the same light.
     pub cosines: Vec<f64>,
 }
 
 impl RotationMapping {
-    /// Whether the rotation is half of the phase.
+    /// True if the rotation is half of the phase.
     pub fn is_half(&self) -> bool {
         self.sines.iter().chain(&self.cosines).all(|c| *c == 0.0)
     }
 
-    /// What is added to half of a phase (rad). For light of the other handedness, which a mirror exchanges, it is that of the
-    /// same phase as for this one with the whole rotation reversed.
+    /// Rotation that is added to half of a phase (rad). For light of the other handedness, which a mirror exchanges,
+    /// the whole rotation for the same phase is reversed.
     pub fn added(&self, phase: f64) -> f64 {
         let sum = |terms: &[f64], wave: fn(f64) -> f64| -> f64 {
             let each = (1u32..).zip(terms);

@@ -14,7 +14,7 @@ use metalith_rcwa::{CellLattice, Incidence, Layer, LayerStack, Material, Orders,
 pub struct CellStack {
     /// Pitch of the lattice (nm).
     pub pitch_nm: f64,
-    /// How the pillars stand.
+    /// Lattice of the pillars.
     #[serde(skip_serializing_if = "is_square")]
     pub lattice: CellLattice,
     /// Height of the pillar (nm).
@@ -22,7 +22,7 @@ pub struct CellStack {
     /// Cross-section of the pillar; its width is the edge of a square, the diameter of a circle.
     #[serde(skip_serializing_if = "PillarShape::is_square")]
     pub shape: PillarShape,
-    /// What the pillar is etched from.
+    /// Material that the pillar is etched from.
     pub film: Material,
     pub substrate: Material,
     /// Unstructured layers between substrate and pillar, from the substrate upwards: a spacer, what the etch left of the film.
@@ -36,7 +36,7 @@ pub struct CellStack {
     pub corner_radius_nm: f64,
     /// Thickness of the mask left on top (nm); 0 for none.
     pub mask_height_nm: f64,
-    /// What the mask is of.
+    /// Material of the mask.
     pub mask: Material,
 }
 
@@ -78,8 +78,8 @@ impl CellStack {
         })
     }
 
-    /// Whether it is the cell of the paper, whose polynomials are published: squares of any silicon nitride, 700 nm high on a pitch of
-    /// 350 nm, on fused silica, in air.
+    /// True if it is the cell of the paper, whose polynomials are published: squares of any silicon nitride, 700 nm
+    /// high on a pitch of 350 nm, on fused silica, in air.
     pub fn is_of_the_paper(&self) -> bool {
         /// Refractive indices of silicon nitrides at 550 nm, from rich in nitrogen to rich in silicon.
         const NITRIDES: std::ops::Range<f64> = 1.8..2.4;
@@ -98,19 +98,20 @@ impl CellStack {
     /// zero leaves the bare substrate.
     ///
     /// # Errors
-    /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are rectangles,
-    /// which no width tells apart: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
+    /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are
+    /// rectangles, which no width distinguishes: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
         if !self.shape.has_width() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/rectangle-by-width",
                 "rectangular pillars, where those of a width are asked for",
-                "use squares or circles here: `photographs` and calibration know no rectangles, `optimise` no upright ones; the other commands do",
+                "use squares or circles here: calibration knows no rectangles, `optimise` no upright ones; the other commands do",
             ));
         }
         self.layers_of(wavelength_um, |wider_nm| self.outline((width_nm + wider_nm).max(0.0)))
     }
 
-    /// How many cross-sections stand for the walls of a pillar: one where they are upright.
+    /// Number of cross-sections that stand for the walls of a pillar: one where they are upright.
     pub fn slices(&self) -> usize {
         if self.taper == 0.0 { 1 } else { TAPER_SLICES }
     }
@@ -195,7 +196,8 @@ impl CellStack {
         let cosine = |index: Complex64| (1.0 - (sines[0].powi(2) + sines[1].powi(2)) / index.re.powi(2)).sqrt();
         let (below, above) = (cosine(layers.below), cosine(layers.above));
         if above.is_nan() || above <= 0.0 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "light/evanescent",
                 format!("light at sines of {:.4}, {:.4} leaves no pillar", sines[0], sines[1]),
                 "use an angle of less than 90 degrees in air",
             ));
@@ -260,7 +262,8 @@ impl CellStack {
         if k <= MOST_SUBSTRATE_K {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "cell/absorbing-substrate",
             format!(
                 "the substrate {} has k = {k} at {:.1} nm, where light arrives through it",
                 self.substrate,
@@ -295,7 +298,8 @@ impl CellStack {
         if width_nm.is_finite() && width_nm >= 0.0 {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "cell/width-out-of-range",
             format!("a pillar {width_nm} nm wide"),
             "give its width in nm, zero for a site without pillar",
         ))
@@ -304,26 +308,30 @@ impl CellStack {
     fn check(&self) -> Result<()> {
         let lean = self.taper.abs();
         if lean.is_nan() || lean >= MOST_TAPER {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/side-wall",
                 format!("walls that lean by {} degrees", self.taper.to_degrees()),
                 "use an angle from upright below 45 degrees",
             ));
         }
         if !(self.height_nm.is_finite() && self.height_nm > 0.0) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/height",
                 format!("pillars {} nm high", self.height_nm),
                 "give a positive height",
             ));
         }
         let sound = |v: f64| v.is_finite() && v >= 0.0;
         if let Some(under) = self.under.iter().find(|u| !sound(u.height_nm)) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/residual-film",
                 format!("{} nm of {} under the pillars", under.height_nm, under.material),
                 "give a thickness of zero or more",
             ));
         }
         if !sound(self.corner_radius_nm) || !sound(self.mask_height_nm) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/corner-radius",
                 format!(
                     "a corner radius of {} nm with {} nm of mask",
                     self.corner_radius_nm, self.mask_height_nm

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::cache;
 use super::column::{WidthSpectrum, lagrange};
+use super::kept;
 use super::stack::CellStack;
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
@@ -67,7 +68,8 @@ impl TableSpec {
     fn check(&self) -> Result<()> {
         let (short, long) = self.band_um;
         if !(short > 0.0 && long > short && long - short <= WIDEST_BAND_UM) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/band",
                 format!("a band from {short} to {long} um"),
                 format!("give two rising, positive wavelengths at most {WIDEST_BAND_UM} um apart"),
             ));
@@ -75,19 +77,22 @@ impl TableSpec {
         let (low, high) = self.widths_nm;
         let pitch = self.stack.pitch_nm;
         if !(1.0..=LARGEST_PITCH_NM).contains(&pitch) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/pitch",
                 format!("a table of a cell with a pitch of {pitch} nm"),
                 format!("use a pitch from 1 to {LARGEST_PITCH_NM} nm"),
             ));
         }
         if low == 0 || low > high || f64::from(high) > pitch {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/width-range",
                 format!("pillars from {low} to {high} nm wide on a pitch of {pitch} nm"),
                 "give a range of widths above zero that fits into the pitch",
             ));
         }
         if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/tolerance",
                 format!("a tolerance of {} in t", self.tolerance),
                 "give a positive number, such as 0.01",
             ));
@@ -105,7 +110,7 @@ pub struct CellTable {
     columns: Vec<WidthSpectrum>,
 }
 
-/// Where a table came from.
+/// Origin of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// Read from this file, whose inputs are the same and whose checksum holds.
@@ -158,7 +163,7 @@ impl CellTable {
     /// As [`CellTable::compute`].
     pub fn obtain(spec: &TableSpec, folder: Option<&Path>, progress: &dyn Progress) -> Result<(Self, Origin)> {
         spec.check()?;
-        let inputs = cache::inputs(spec);
+        let inputs = inputs(spec);
         let widths = spec.columns_nm();
         let file = folder.map(|folder| folder.join(cache::file_name(&inputs)));
         if let Some(file) = &file {
@@ -179,7 +184,7 @@ impl CellTable {
         Ok((table, Origin::Computed(kept)))
     }
 
-    /// What it was made for.
+    /// Specification that it was made for.
     pub fn spec(&self) -> &TableSpec {
         &self.spec
     }
@@ -198,7 +203,8 @@ impl CellTable {
         self.check_wavelength(wavelength_um)?;
         let pitch = self.spec.stack.pitch_nm;
         if !(0.0..=pitch).contains(&width_nm) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/width-out-of-range",
                 format!("a pillar {width_nm} nm wide on a pitch of {pitch} nm"),
                 "give a width from zero to the pitch",
             ));
@@ -220,7 +226,8 @@ impl CellTable {
         let last = usize::from(max_width_nm);
         let pitch = self.spec.stack.pitch_nm;
         if f64::from(max_width_nm) > pitch {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/width-out-of-range",
                 format!("a pillar {max_width_nm} nm wide on a pitch of {pitch} nm"),
                 "the layout has pillars that the cell cannot hold: correct it or the design's pitch",
             ));
@@ -248,7 +255,8 @@ impl CellTable {
         if wavelength_um >= short - slack && wavelength_um <= long + slack {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "cell/wavelength-out-of-band",
             format!("the cell library spans {short} to {long} um, not {wavelength_um} um"),
             "make the library for a wider band",
         ))
@@ -263,6 +271,17 @@ impl TableSpec {
         let nearest = self.stack.lattice.nearest_nm(self.stack.pitch_nm);
         f64::from(width_nm).min(nearest - lean).max(0.0)
     }
+}
+
+/// The inputs as text: equal if and only if the table is the same.
+fn inputs(spec: &TableSpec) -> Vec<u8> {
+    #[derive(Serialize)]
+    struct Inputs<'a> {
+        solver: u32,
+        spec: &'a TableSpec,
+    }
+    let solver = kept::solver_of(spec.stack.shape);
+    serde_json::to_vec(&Inputs { solver, spec }).expect("plain data serialises")
 }
 
 #[cfg(test)]

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-/// What an error came from, for [`std::error::Error::source`].
+/// Cause of an error, for [`std::error::Error::source`].
 pub type Cause = Box<dyn std::error::Error + Send + Sync>;
 
 /// Result of every fallible operation of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What went wrong. The text of each variant names the place and the remedy.
+/// Error of the library. The text of each variant names the place and the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -50,6 +50,8 @@ pub enum Error {
     /// A value that cannot be: out of range, inconsistent, not physical.
     #[error("{what}\n  help: {hint}")]
     Invalid {
+        /// The identity of the refusal, `subject/cause`: the text may change, the identity stays.
+        id: &'static str,
         what: String,
         hint: String,
         /// The error of the crate that found it, which can be matched on, if it has errors of its own.
@@ -62,9 +64,10 @@ pub enum Error {
 }
 
 impl Error {
-    /// A value that cannot be, with the remedy.
-    pub fn invalid(what: impl Into<String>, hint: impl Into<String>) -> Self {
+    /// A value that cannot be, by the identity of the refusal (`subject/cause`), with the remedy.
+    pub fn refused(id: &'static str, what: impl Into<String>, hint: impl Into<String>) -> Self {
         Self::Invalid {
+            id,
             what: what.into(),
             hint: hint.into(),
             source: None,
@@ -75,6 +78,26 @@ impl Error {
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::Io { action, path, source }
+    }
+
+    /// The identity of what went wrong, `subject/cause`, for callers and tests: the text may change, the identity stays. Several
+    /// mistakes of one text file have identities each, see [`Faults`](crate::Faults).
+    pub fn id(&self) -> &'static str {
+        match self {
+            #[cfg(feature = "documents")]
+            Self::Text(_) => "text/mistakes",
+            Self::Layout { .. } => "layout/format",
+            Self::Io { .. } => "file/system",
+            Self::Table { .. } => "table/format",
+            Self::Invalid { id, .. } => id,
+            Self::Interrupted => "run/interrupted",
+        }
+    }
+
+    /// True if the error is a text with a mistake of this kind at the key with this path, such as `lens.diameter_um`.
+    #[cfg(feature = "documents")]
+    pub fn has_fault(&self, kind: crate::FaultKind, key: &str) -> bool {
+        matches!(self, Self::Text(faults) if faults.has(kind, key))
     }
 
     /// Exit code of the program: 2 for bad input, 3 for what could not be done.

@@ -1,10 +1,11 @@
-//! What every room of the project stands on: errors, progress, whole files, documents with spans, tables, NPY.
+//! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY.
 
 mod cross;
 #[cfg(feature = "documents")]
 pub mod document;
 mod error;
 pub mod file;
+mod lagrange;
 mod layer;
 #[cfg(feature = "npy")]
 pub mod npy;
@@ -17,9 +18,10 @@ mod zernike;
 
 pub use cross::cross_corners;
 #[cfg(feature = "documents")]
-pub use document::{Fault, Faults};
+pub use document::{Fault, FaultKind, Faults};
 pub use error::{Error, Result};
 pub use file::{AtomicFile, AtomicFolder, FolderLock};
+pub use lagrange::lagrange_weight;
 pub use layer::LayerNumber;
 pub use plane::part;
 pub use progress::{Progress, Silent};

@@ -10,11 +10,11 @@ pub struct Array {
     /// Entries along each axis, slowest first.
     pub shape: Vec<u64>,
     pub values: Vec<f64>,
-    /// Whether the file has whole numbers, uint8 or uint16.
+    /// True if the file holds whole numbers, uint8 or uint16.
     pub whole: bool,
 }
 
-/// Why a file holds no array that can be used.
+/// Reason why a file holds no array that can be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NpyError {
@@ -52,7 +52,7 @@ pub fn read(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, Np
     read_from(BufReader::new(File::open(path)?), takes)
 }
 
-/// As [`read`], from anything that can be read.
+/// Variant of [`read`] for anything that can be read.
 ///
 /// # Errors
 /// As [`read`].

@@ -1,11 +1,11 @@
-//! How long work tells whoever waits for it how far it is, and hears that it should stop.
+//! Progress of long work: it reports how far it is, and learns that it should stop.
 
-/// What a caller may watch of a long piece of work. The library prints nothing itself.
+/// Observer of a long piece of work. The library prints nothing itself.
 pub trait Progress: Sync {
     /// A piece of work of `steps` equal steps begins; it ends where the next one begins.
     fn begin(&self, what: &str, steps: u64);
 
-    /// So many steps more are done. Called from any thread.
+    /// Reports that so many steps more are done. Called from any thread.
     fn advance(&self, steps: u64);
 
     /// A word on the state of the work, such as the best merit so far.
@@ -17,8 +17,8 @@ pub trait Progress: Sync {
         self.note(text);
     }
 
-    /// Whether the user asked to stop; long work looks here between steps and then returns
-    /// [`crate::error::Error::Interrupted`], or the best it has where that is of use.
+    /// True if the user asked to stop; long work asks between steps and then returns
+    /// [`crate::error::Error::Interrupted`], or the best result so far where that is of use.
     fn stopped(&self) -> bool {
         false
     }

@@ -19,7 +19,7 @@ pub fn encoded(light: f64) -> f64 {
     }
 }
 
-/// How fast the value rises with light from 0 to 1.
+/// Slope of the value over light from 0 to 1.
 pub fn slope(light: f64) -> f64 {
     if light <= 0.003_130_8 {
         12.92

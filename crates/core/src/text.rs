@@ -4,8 +4,8 @@
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// Whether a character can stand in one line of a terminal, of HTML and of XML 1.0 as itself: no control
-/// character, no end of a line, nothing that changes the direction of a line, no code point that is no character.
+/// True if a character can stand unchanged in one line of a terminal, of HTML and of XML 1.0: no control character, no
+/// end of a line, nothing that changes the direction of a line, no code point that is no character.
 pub fn is_printable(c: char) -> bool {
     let directs = matches!(
         c,
@@ -32,7 +32,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// As [`printable`], several lines: ends of lines and tabs stay.
+/// Variant of [`printable`] for several lines: ends of lines and tabs stay.
 pub fn printable_lines(text: &str) -> Cow<'_, str> {
     let stays = |c: char| is_printable(c) || c == '\n' || c == '\t';
     if text.chars().all(stays) {
@@ -88,7 +88,7 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// As [`printable`], and cut at 80 characters: for quoting in a message what may be of any length.
+/// Variant of [`printable`] that cuts at 80 characters, to quote a text of any length in a message.
 pub fn quoted(text: &str) -> String {
     const LONGEST: usize = 80;
     match text.char_indices().nth(LONGEST) {

@@ -56,7 +56,7 @@ impl Zernike {
         }
     }
 
-    /// At a place of the unit disc, with a largest value of one.
+    /// Value at a place of the unit disc; the largest value is one.
     pub fn value(self, x: f64, y: f64) -> f64 {
         let (n, a) = (self.n, self.m.unsigned_abs());
         let r = x.hypot(y);
@@ -76,7 +76,7 @@ impl Zernike {
         }
     }
 
-    /// What [`Zernike::value`] times this has an rms of over the disc: one.
+    /// Factor that brings the rms of [`Zernike::value`] over the disc to one.
     pub fn norm(self) -> f64 {
         let norm = f64::from(self.n + 1).sqrt();
         if self.m == 0 { norm } else { norm * 2f64.sqrt() }

@@ -3,14 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use metalith_cell::{
-    CellModel, CellStack, Fidelity, FittedCell, LitStack, PointwiseCell, PublishedCell, TableSpec, UniformLayer,
-    cache_folder, polarising_cell,
+    CellModel, CellStack, Fidelity, FittedCell, LitStack, Mapping, NeighbourCell, PointwiseCell, PublishedCell,
+    TableSpec, UniformLayer, cache_folder, polarising_cell,
 };
 use metalith_core::{Error, Result};
-use metalith_grating::{Mapping, NeighbourCell};
 use metalith_rcwa::{CellLattice, Material};
 
-use crate::spec::UnderSpec;
+use crate::spec::{CellSpec, UnderSpec};
 use crate::{Design, PillarRule};
 
 /// The band of designs whose wavelengths are all visible (um): that of colour sensors.
@@ -41,7 +40,7 @@ impl Design {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// The same pillars in the light that the design is verified in.
+    /// Stack of the same pillars in the light that the design is verified in.
     ///
     /// # Errors
     /// As [`Design::cell_stack`].
@@ -49,7 +48,6 @@ impl Design {
         Ok(LitStack {
             stack: self.cell_stack()?,
             focused: self.focused(),
-            polarised: self.verify.light(),
         })
     }
 
@@ -70,26 +68,7 @@ impl Design {
     /// # Errors
     /// If a material is not known or its table cannot be read.
     pub fn cell_stack(&self) -> Result<CellStack> {
-        let material = |name: &str| Material::resolve(name, self.folder());
-        let layer = |under: &UnderSpec| -> Result<UniformLayer> {
-            Ok(UniformLayer {
-                material: material(&under.material)?,
-                height_nm: under.height_nm,
-            })
-        };
-        let cell = &self.cell;
-        Ok(CellStack {
-            lattice: CellLattice::drawn(cell.lattice, cell.pitch_nm),
-            shape: cell.shape,
-            film: material(&cell.pillar_material)?,
-            substrate: material(&cell.substrate_material)?,
-            under: cell.under.iter().map(layer).collect::<Result<_>>()?,
-            ambient: match &cell.ambient_material {
-                Some(name) => material(name)?,
-                None => Material::constant(cell.ambient_index, 0.0)?,
-            },
-            ..CellStack::paper(f64::from(cell.pitch_nm), cell.pillar_height_nm)?
-        })
+        self.cell.stack(self.folder())
     }
 
     /// The table of the cell that the design needs, over its band.
@@ -118,6 +97,34 @@ impl Design {
             Some(band) => named.fold(band, |(short, long), &l| (short.min(l), long.max(l))),
             None => band_about(named.copied(), stack.range_um()),
         }
+    }
+}
+
+impl CellSpec {
+    /// The cell with upright walls, sharp corners and no mask. Paths of materials count from `folder`.
+    ///
+    /// # Errors
+    /// If a material is not known or its table cannot be read.
+    pub fn stack(&self, folder: &Path) -> Result<CellStack> {
+        let material = |name: &str| Material::resolve(name, folder);
+        let layer = |under: &UnderSpec| -> Result<UniformLayer> {
+            Ok(UniformLayer {
+                material: material(&under.material)?,
+                height_nm: under.height_nm,
+            })
+        };
+        Ok(CellStack {
+            lattice: CellLattice::drawn(self.lattice, self.pitch_nm),
+            shape: self.shape,
+            film: material(&self.pillar_material)?,
+            substrate: material(&self.substrate_material)?,
+            under: self.under.iter().map(layer).collect::<Result<_>>()?,
+            ambient: match &self.ambient_material {
+                Some(name) => material(name)?,
+                None => Material::constant(self.ambient_index, 0.0)?,
+            },
+            ..CellStack::paper(f64::from(self.pitch_nm), self.pillar_height_nm)?
+        })
     }
 }
 
@@ -163,7 +170,8 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                     Ok(Box::new(PointwiseCell::new(stack, design.cell.widths_nm())))
                 }
                 Fidelity::Neighbours => Ok(Box::new(neighbour_cell(design, cache_folder())?)),
-                Fidelity::Calibrated => Err(Error::invalid(
+                Fidelity::Calibrated => Err(Error::refused(
+                    "cell/no-calibrated-model",
                     "a calibrated cell without the model it is calibrated by",
                     "read the model that `metalith calibrate` wrote and make a `AsBuiltChip` of it",
                 )),
@@ -180,7 +188,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
         .collect()
 }
 
-/// The cell of unlike neighbours, with tables at the wavelengths that the design is verified at, which are kept in the folder
+/// The coupled model, with tables at the wavelengths that the design is verified at, which are kept in the folder
 /// `cache`.
 ///
 /// # Errors
@@ -191,7 +199,7 @@ pub fn neighbour_cell(design: &Design, cache: Option<PathBuf>) -> Result<Neighbo
     Ok(cell.tabulated_at(&design.verify.wavelengths_um))
 }
 
-/// How often the elements of a design draw each width beside which others: one mapping for each rule.
+/// Mappings of a design, one for each rule: how often its elements draw each width next to which others.
 pub fn mappings(design: &Design) -> Vec<Mapping> {
     let rules = PillarRule::all(design);
     rules.iter().map(|rule| Mapping::new(|u| rule.width_nm(u))).collect()

@@ -27,7 +27,7 @@ pub struct Design {
     pub name: String,
     /// One line for people.
     pub title: String,
-    /// Where the design was read from.
+    /// Path that the design was read from.
     pub path: PathBuf,
     pub cell: CellSpec,
     pub lens: LensSpec,
@@ -35,7 +35,7 @@ pub struct Design {
     pub mapping: MappingSpec,
     pub layout: LayoutSpec,
     pub verify: VerifySpec,
-    /// How `metalith optimise` finds the phase; decides nothing of the layout.
+    /// Settings by which `metalith optimise` finds the phase; they have no effect on the layout.
     pub optimise: OptimiseSpec,
 }
 
@@ -58,7 +58,7 @@ impl Design {
             .with_files(LibraryFile::Needed)
     }
 
-    /// As [`Design::read`] and [`Design::parse_without_library`].
+    /// Reads a design as [`Design::read`] and [`Design::parse_without_library`] do.
     ///
     /// # Errors
     /// As [`Design::read`].
@@ -66,8 +66,8 @@ impl Design {
         Self::parse_without_library(path, &load(path)?)
     }
 
-    /// As [`Design::parse`], for who makes the library of its pillars: the file of that may not be there yet. Until it is, the
-    /// design has no pillars.
+    /// Variant of [`Design::parse`] for a caller that makes the library of its pillars: the file of the library may not
+    /// be there yet. Until it is, the design has no pillars.
     ///
     /// # Errors
     /// As [`Design::parse`].
@@ -147,8 +147,8 @@ impl Design {
         Ok(self)
     }
 
-    /// Nothing, if all bands that the design says are where its materials are known: else only a simulation would find out, after
-    /// the layout is written.
+    /// Checks that all bands that the design says are where its materials are known: else only a simulation would find
+    /// out, after the layout is written.
     fn check_bands(&self, stack: &CellStack) -> Result<()> {
         let bands = [
             ("cell", self.cell.band_um),
@@ -163,7 +163,8 @@ impl Design {
         };
         for (section, band_um) in bands.into_iter().filter_map(|(section, band)| Some((section, band?))) {
             if !(is_known(band_um.0) && is_known(band_um.1)) {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "design/band-beyond-materials",
                     format!(
                         "{}: `band_nm` of [{section}] is {}, and the materials of [cell] are known from {}",
                         self.path.display(),
@@ -197,12 +198,12 @@ impl Design {
         })
     }
 
-    /// The light that pillars give the phase of the design, if they tell polarisations apart.
+    /// The light that pillars give the phase of the design, if they distinguish polarisations.
     pub fn focused(&self) -> Option<FocusedLight> {
         self.cell.focused(self.verify.polarisation)
     }
 
-    /// Of upright rectangles, the axis of the light that the design is verified in.
+    /// Axis of the light that the design is verified in, for upright rectangles.
     pub fn axis(&self) -> PolarisationAxis {
         match self.focused() {
             Some(FocusedLight::Linear(axis)) => axis,
@@ -234,13 +235,14 @@ impl Design {
         }
     }
 
-    /// Nothing, if all elements are of one round lens.
+    /// Succeeds if all elements are of one round lens.
     ///
     /// # Errors
     /// If they are not; `who` knows one round lens alone.
     pub fn one_lens(&self, who: &str) -> Result<()> {
         if self.array.has_own_lenses() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "design/individual-lenses",
                 format!(
                     "{who} knows one lens for all elements, and elements of the design have their own, or rotated ones"
                 ),
@@ -249,7 +251,8 @@ impl Design {
             ));
         }
         if self.lens.outline.is_some() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "design/polygonal-aperture",
                 format!("{who} knows round lenses alone, and the aperture of the design is a polygon"),
                 "leave `aperture` of [lens] out: simulate the round lens about it",
             ));
@@ -257,13 +260,14 @@ impl Design {
         Ok(())
     }
 
-    /// Nothing, if the phase of the lens is one over the radius alone.
+    /// Succeeds if the phase of the lens is one over the radius alone.
     ///
     /// # Errors
     /// If phases over the plane are added to it, of whichever element; `who` knows none.
     pub fn radial_phase(&self, who: &str) -> Result<()> {
         if self.lens.along_y.is_some() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "design/two-phases",
                 format!(
                     "{who} knows one phase for all light, and {} has another in [phase.y]",
                     self.path.display()
@@ -274,7 +278,8 @@ impl Design {
         if self.lens.terms.is_empty() {
             return Ok(());
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "design/phase-not-radial",
             format!(
                 "{who} knows phases over the radius alone, and {} adds {} over the plane by [[phase.term]]",
                 self.path.display(),
@@ -309,8 +314,8 @@ impl Design {
         self.array.elements()
     }
 
-    /// Where they are in a layout, in the same order. All have the lattice of the largest; where these overlap, each has the part
-    /// that its own pillars stand in.
+    /// Places of the elements in a layout, in the same order. All have the lattice of the largest; where these overlap,
+    /// each has the part that its own pillars stand in.
     pub fn sites(&self) -> Vec<ElementSite> {
         let lattice = self.lattice();
         let roomy = self.array.has_room_for(lattice.sides_nm());
@@ -331,7 +336,7 @@ impl Design {
         Footprint::of(self.lens_of(element), rotation_deg, &self.cell).map(|footprint| footprint.ends_nm)
     }
 
-    /// Where some of them are in a layout, in the order of `chosen`.
+    /// Places of some of the elements in a layout, in the order of `chosen`.
     ///
     /// # Panics
     /// If one is no element of the design.

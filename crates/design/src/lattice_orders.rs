@@ -1,4 +1,5 @@
-//! Where the lattice of the pillars itself diffracts: into which medium, and in which of the light that the design names.
+//! Orders of the lattice of the pillars: the medium into which it diffracts, and the light of the design for which it
+//! does.
 
 use std::cmp::Ordering;
 
@@ -8,7 +9,7 @@ use crate::{Design, FieldAngle};
 use metalith_core::Result;
 use metalith_pillars::LatticeKind;
 
-/// What lies on one side of the pillars.
+/// Medium on one side of the pillars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Medium {
@@ -19,10 +20,10 @@ pub enum Medium {
 }
 
 impl Medium {
-    /// Both, that of the sensor first.
+    /// Media on both sides, the side of the sensor first.
     pub const BOTH: [Self; 2] = [Self::Ambient, Self::Substrate];
 
-    /// What it is called in a sentence.
+    /// Words for it in a sentence.
     pub fn words(self) -> &'static str {
         match self {
             Self::Ambient => "the medium over the pillars",
@@ -31,12 +32,12 @@ impl Medium {
     }
 }
 
-/// Which light a design is asked about.
+/// Light for which a design is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AskedLight {
-    /// From the middle of the field of each element, at the wavelengths of `[verify]`.
+    /// Light from the middle of the field of each element, at the wavelengths of `[verify]`.
     Middle,
-    /// From all field angles of `[verify]` too, and at the shortest wavelength of the band.
+    /// Light from all field angles of `[verify]` too, and at the shortest wavelength of the band.
     All,
 }
 
@@ -46,9 +47,10 @@ pub struct LatticeOrders {
     pub medium: Medium,
     /// Wavelength in vacuum (um).
     pub wavelength_um: f64,
-    /// In light along the normal there are orders below this wavelength (um), by the index at [`Self::wavelength_um`].
+    /// Wavelength (um) below which there are orders in light along the normal, by the index at [`Self::wavelength_um`].
     pub normal_edge_um: f64,
-    /// The same in the light of the element and the field angle below, of all that which has the longest (um).
+    /// Wavelength (um) below which there are orders in the light of the element and the field angle below, which have
+    /// the longest of all.
     pub edge_um: f64,
     /// Steps of that element from the middle, as in its label.
     pub element: (i32, i32),
@@ -59,7 +61,7 @@ pub struct LatticeOrders {
 }
 
 impl LatticeOrders {
-    /// From which wavelength on there are none, in words.
+    /// Words for the wavelength from which on there are none.
     pub fn edge_words(&self) -> String {
         let normal = format!("below {:.1} nm along the normal", self.normal_edge_um * 1e3);
         if self.incidence_sin == [0.0; 2] {
@@ -72,7 +74,7 @@ impl LatticeOrders {
         )
     }
 
-    /// What is found, in words.
+    /// Words for what is found.
     pub fn words(&self) -> String {
         format!(
             "at {:.1} nm the lattice diffracts into {}: orders exist {}",
@@ -100,9 +102,10 @@ impl LatticeOrders {
 }
 
 impl Design {
-    /// Where the lattice of the pillars diffracts, beside the zeroth order that forms the image: one entry for each medium and
-    /// wavelength at which it does, wavelengths rising; of several elements and field angles that which has orders up to the
-    /// longest wavelength. An order exists where the light that arrives and a vector of the lattice together are less than the index.
+    /// Orders other than the zeroth, which forms the image, into which the lattice of the pillars diffracts: one entry
+    /// for each medium and wavelength at which it does, wavelengths rising; of several elements and field angles the
+    /// one which has orders up to the longest wavelength. An order exists where the light that arrives and a vector of
+    /// the lattice together are less than the index.
     ///
     /// # Errors
     /// If a material is not known at a wavelength.
@@ -185,7 +188,7 @@ mod tests {
 
     use super::*;
 
-    /// Of sums of a few numbers near one, in um.
+    /// Tolerance of sums of a few numbers near one, in um.
     const ROUNDING_UM: f64 = 1e-12;
 
     fn changed(name: &str, changes: &[(&str, &str)]) -> Design {

@@ -1,6 +1,7 @@
 //! The design of a metalens array: its text, the phase of every site, the width of every pillar.
 
 pub mod array;
+mod cell_file;
 mod cells;
 mod design;
 mod lattice_orders;
@@ -8,8 +9,9 @@ pub mod phase;
 mod spec;
 
 pub use array::{PillarArray, PillarRule};
+pub use cell_file::CellFile;
 pub use cells::{VISIBLE_UM, band_about, cell_models, mappings, neighbour_cell};
 pub use design::Design;
 pub use lattice_orders::{AskedLight, LatticeOrders, Medium};
-pub use metalith_grating::NeighbourCell;
+pub use metalith_cell::NeighbourCell;
 pub use spec::*;

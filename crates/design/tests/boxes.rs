@@ -1,4 +1,4 @@
-//! What maps of phases have to cover, and how near elements may stand: both go by the box about an aperture.
+//! Tests of the box about an aperture: what maps of phases have to cover, and how near elements may stand.
 
 use std::path::{Path, PathBuf};
 
@@ -56,7 +56,7 @@ const RECTANGLE: (&str, &str) = ("diameter_um = 60", "aperture = \"rectangle\"\n
 /// A map of 72 x 27 um for an aperture of 60 x 24 um, as it stands and turned: the map turns with the aperture.
 #[test]
 fn a_map_covers_the_box_about_its_aperture() {
-    /// From a place to the nearest entry (entries), and rounding of a rotation.
+    /// Distance from a place to the nearest entry (entries), and rounding of a rotation.
     const NEAREST: f64 = 0.5 + 1e-6;
     /// Half a pitch along the rim, by the area.
     const RIM: f64 = 0.35 / 2.0 * 2.0 * (60.0 + 24.0) / (60.0 * 24.0);

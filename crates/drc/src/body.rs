@@ -71,7 +71,7 @@ impl Body<'_> {
         }
     }
 
-    /// Whether a place is inside, not on the edge.
+    /// True if a place is inside, not on the edge.
     pub fn holds(&self, p: Point) -> bool {
         let r = self.bounds();
         let within = p.x > r.x0 && p.x < r.x1 && p.y > r.y0 && p.y < r.y1;
@@ -95,7 +95,7 @@ impl Body<'_> {
         }
     }
 
-    /// Whether they share area.
+    /// True if they share area.
     pub fn overlaps(&self, other: &Self) -> bool {
         let (a, b) = (self.bounds(), other.bounds());
         let boxes = a.x0 < b.x1 && b.x0 < a.x1 && a.y0 < b.y1 && b.y0 < a.y1;
@@ -105,7 +105,7 @@ impl Body<'_> {
         }
     }
 
-    /// Whether they are the same area drawn twice.
+    /// True if they are the same area drawn twice.
     pub fn equals(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Rect(a), Self::Rect(b)) | (Self::Disc(a), Self::Disc(b)) => a == b,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use metalith_core::document::Section;
 use metalith_gds::LayerNumber;
 
-/// What rules of all families ask of the file.
+/// Context of a check: what rules of all families ask of the file.
 pub(super) struct Context {
     pub layers: BTreeMap<String, LayerNumber>,
     pub pillars: LayerNumber,
@@ -32,7 +32,7 @@ impl Context {
         }
     }
 
-    /// Whether the deck has this check on this layer.
+    /// True if the deck has this check on this layer.
     pub fn covers(&self, check: &str, layer: LayerNumber) -> bool {
         self.covered
             .iter()

@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use include_dir::{Dir, include_dir};
+
 use super::context::Context;
 use super::rule::{DeckRule, Rule, Severity};
 use super::{aperture, budget, density, design, field, lattice, layers, marks, outline, spacing, tree, width};
@@ -14,42 +16,10 @@ use metalith_design::Design;
 use metalith_gds::LayerNumber;
 use metalith_pillars::PillarShape;
 
-/// The decks that ship with the program, by the names of their files; the first is the standard one.
-const SHIPPED: [(&str, &str); 18] = [
-    ("sin_pillars.toml", include_str!("../../../rules/sin_pillars.toml")),
-    ("sin_apertures.toml", include_str!("../../../rules/sin_apertures.toml")),
-    ("dose_matrix.toml", include_str!("../../../rules/dose_matrix.toml")),
-    (
-        "test_structures.toml",
-        include_str!("../../../rules/test_structures.toml"),
-    ),
-    ("test_openings.toml", include_str!("../../../rules/test_openings.toml")),
-    ("squares.toml", include_str!("../../../rules/squares.toml")),
-    ("circles.toml", include_str!("../../../rules/circles.toml")),
-    ("rectangles.toml", include_str!("../../../rules/rectangles.toml")),
-    ("openings.toml", include_str!("../../../rules/openings.toml")),
-    ("asi_pillars.toml", include_str!("../../../rules/asi_pillars.toml")),
-    (
-        "asi_900_pillars.toml",
-        include_str!("../../../rules/asi_900_pillars.toml"),
-    ),
-    ("tio2_circles.toml", include_str!("../../../rules/tio2_circles.toml")),
-    (
-        "tio2_rectangles.toml",
-        include_str!("../../../rules/tio2_rectangles.toml"),
-    ),
-    ("csi_pillars.toml", include_str!("../../../rules/csi_pillars.toml")),
-    ("dose_circles.toml", include_str!("../../../rules/dose_circles.toml")),
-    (
-        "dose_rectangles.toml",
-        include_str!("../../../rules/dose_rectangles.toml"),
-    ),
-    ("test_circles.toml", include_str!("../../../rules/test_circles.toml")),
-    (
-        "test_rectangles.toml",
-        include_str!("../../../rules/test_rectangles.toml"),
-    ),
-];
+/// The decks that ship with the program.
+static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../rules");
+
+const STANDARD: &str = "sin_pillars.toml";
 
 /// Version of the format of rule files that this program reads.
 const SCHEMA: i64 = 1;
@@ -66,7 +36,7 @@ pub struct Deck {
     pub pillars: Vec<LayerNumber>,
     path: PathBuf,
     text: String,
-    /// In the order of the file; shared by all clones.
+    /// Rules in the order of the file; shared by all clones.
     rules: Arc<[DeckRule]>,
 }
 
@@ -94,7 +64,7 @@ impl Deck {
     /// # Panics
     /// Never: it is tested.
     pub fn standard() -> Self {
-        Self::shipped(Path::new(SHIPPED[0].0)).expect("it is the first of the list")
+        Self::shipped(Path::new(STANDARD)).expect("it is one of them")
     }
 
     /// The deck of what holds of every layout of pillars of this shape.
@@ -117,8 +87,9 @@ impl Deck {
 
     /// The deck of the program whose file has the name at the end of `path`, if there is one.
     pub fn shipped(path: &Path) -> Option<Self> {
-        let (name, text) = SHIPPED.iter().find(|(name, _)| path.ends_with(name))?;
-        let deck = Self::parse(&Path::new("rules").join(name), (*text).to_owned());
+        let file = SHIPPED.get_file(path.file_name()?)?;
+        let text = file.contents_utf8().expect("rules are text");
+        let deck = Self::parse(&Path::new("rules").join(file.path()), text.to_owned());
         Some(deck.expect("the decks of the program are sound"))
     }
 
@@ -295,8 +266,9 @@ mod tests {
 
     #[test]
     fn the_decks_of_the_program_are_sound() {
-        for (name, _) in SHIPPED {
-            assert!(!Deck::shipped(Path::new(name)).unwrap().rules().is_empty());
+        assert!(SHIPPED.files().count() > 10);
+        for file in SHIPPED.files() {
+            assert!(!Deck::shipped(file.path()).unwrap().rules().is_empty());
         }
         let deck = Deck::standard();
         assert!(deck.rules().len() > 30);

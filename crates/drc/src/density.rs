@@ -86,7 +86,7 @@ impl Windows {
         }
     }
 
-    /// Whether any of them is full where all sites of an element have pillars.
+    /// True if any of them is full where all sites of an element have pillars.
     fn any_within(&self, phase: &ElementPhase<'_>) -> bool {
         let lattice = phase.lattice();
         (0..self.fill.len()).any(|k| {
@@ -100,7 +100,7 @@ impl Windows {
         })
     }
 
-    /// Whether the one in the middle is within a circle about the centres of the pillars (um).
+    /// True if the one in the middle is within a circle about the centres of the pillars (um).
     fn middle_within(&self, lattice: Lattice, radius_um: f64) -> bool {
         let half = |axis: usize| 0.5 * (self.sites[axis] - 1) as f64 * lattice.steps_um()[axis];
         !self.fill.is_empty() && half(0).hypot(half(1)) <= radius_um
@@ -125,8 +125,8 @@ impl Windows {
 }
 
 impl FillRule {
-    /// Whether an element would hold a full window if none of its pillars were missing: of a design by its sites, else as far
-    /// as the circle about the pillars that there are tells.
+    /// True if an element would hold a full window if none of its pillars were missing: by the sites of the design, or
+    /// else by the circle about the pillars that there are.
     fn could_run(&self, flat: &FlatLayout<'_>) -> bool {
         let lens = flat.design.map(LensPhase::of);
         let designed = flat.design.map_or_else(Vec::new, Design::elements);

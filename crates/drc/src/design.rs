@@ -19,7 +19,7 @@ enum Against {
     /// Share of neighbouring sites whose phase differs by more than pi.
     PhaseStep(f64),
     NoLatticeOrders {
-        /// One of both; none for both.
+        /// Medium that the rule checks; `None` for both.
         medium: Option<Medium>,
         light: AskedLight,
     },
@@ -167,14 +167,14 @@ fn steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<
     all_steps(work, lattice, phase)
 }
 
-/// Whether it is more than half a turn from one site to another, by the [parts](ElementPhase::parts) of their phases: that of maps
-/// which are known up to whole turns goes the short way.
+/// True if the phase differs by more than half a wave from one site to another, by the [parts](ElementPhase::parts) of
+/// their phases: the part of maps, which are known up to whole waves, goes the short way.
 fn is_steep(from: [f64; 2], to: [f64; 2]) -> bool {
     let mapped = to[1] - from[1];
     ((to[0] - from[0]) + (mapped - mapped.round())).abs() > 0.5
 }
 
-/// As [`steps`], to the neighbours of a lattice of any kind.
+/// Variant of [`steps`] to the neighbours of a lattice of any kind.
 fn steps_to_neighbours(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
     let (n, mut all, mut steep) = (lattice.sites(), 0, 0);
     let phases = |iy: usize| -> Vec<Option<[f64; 2]>> { (0..n).map(|ix| phase.parts(ix, iy)).collect() };
@@ -198,7 +198,7 @@ fn steps_to_neighbours(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'
     Ok((all, steep))
 }
 
-/// As [`steps`], of any phase on a square lattice.
+/// Variant of [`steps`] for any phase on a square lattice.
 fn all_steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
     let (mut all, mut steep) = (0, 0);
     // Phases of the row before; every site is computed once.
@@ -221,7 +221,7 @@ fn all_steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Res
     Ok((all, steep))
 }
 
-/// As [`steps`] of a phase that is the same in all eighths: steps along the rows of a quarter stand for all.
+/// Variant of [`steps`] for a phase that is equal in all eighths: steps along the rows of a quarter stand for all.
 fn radial_steps(work: &Work<'_>, lattice: Lattice, phase: &ElementPhase<'_>) -> Result<(u64, u64), Stop> {
     let (n, mut all, mut steep) = (lattice.sites(), 0, 0);
     let odd = n % 2;

@@ -19,7 +19,7 @@ pub(super) struct DrawnOutline<'a> {
 }
 
 impl<'a> DrawnOutline<'a> {
-    /// Of a shape whose points are these.
+    /// Outline of a shape with these points.
     pub fn new(
         shape: &metalith_gds::Shape<'_>,
         points: &'a [Point],
@@ -57,14 +57,14 @@ impl<'a> DrawnOutline<'a> {
         self.rect.or_else(|| metalith_gds::rectangle_of(self.corners()))
     }
 
-    /// Whether two sides cross, or touch where they should not.
+    /// True if two sides cross, or touch where they should not.
     pub fn crosses_itself(&self) -> bool {
         *self
             .crosses
             .get_or_init(|| self.rect.is_none() && crosses_itself(self.corners()))
     }
 
-    /// Whether all sides are along the axes.
+    /// True if all sides are along the axes.
     pub fn is_manhattan(&self) -> bool {
         self.rect.is_some() || self.corners().windows(2).all(|s| s[0].x == s[1].x || s[0].y == s[1].y)
     }

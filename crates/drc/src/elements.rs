@@ -1,4 +1,4 @@
-//! Where the elements of a layout are: as designed, or as found.
+//! Places of the elements of a layout: as designed, or as found.
 
 use super::deck::Deck;
 use super::input::CheckInput;

@@ -19,7 +19,7 @@ pub struct Marker {
     pub words: String,
     /// Hash of rule and position, the same in every run and for every hierarchy: waivers refer to it.
     pub hash: String,
-    /// Whether a waiver covers it.
+    /// True if a waiver covers it.
     pub waived: bool,
 }
 
@@ -87,7 +87,7 @@ impl Findings {
         self.at(&ring, words);
     }
 
-    /// The same place in every copy of a cell.
+    /// Records the same place in every copy of a cell.
     pub fn copies(&mut self, points: &[Point], placements: &[Transform], words: impl Fn() -> String) {
         for (k, placement) in placements.iter().enumerate() {
             if self.markers.len() >= self.most && self.waivers.is_empty() {

@@ -71,11 +71,11 @@ pub(super) struct FlatLayout<'a> {
     pub array: Option<&'a PillarArray>,
     pub unit_nm: f64,
     pub pillars: LayerNumber,
-    /// What pillars are.
+    /// Shape of the pillars.
     pub shape: PillarShape,
     /// Elements with the pillars on their lattices.
     pub elements: Vec<ExtractedElement<StoredPillars>>,
-    /// Why there are none, if there are none.
+    /// Reason why there are no elements, if there are none.
     pub no_elements: String,
     pub loose: BTreeMap<LayerNumber, Loose>,
     /// Squares inside an element that are not on its sites.
@@ -86,9 +86,9 @@ pub(super) struct FlatLayout<'a> {
     pub text_count: u64,
     /// Areas by layer, references followed.
     pub counts: BTreeMap<LayerNumber, u64>,
-    /// Why the layout was not read to its end, if it was not.
+    /// Reason why the layout was not read to its end, if it was not.
     pub unread: Option<String>,
-    /// Why not all geometry is here, if it is not.
+    /// Reason why not all geometry is here, if it is not.
     pub incomplete: Option<String>,
 }
 

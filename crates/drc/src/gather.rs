@@ -123,7 +123,7 @@ pub(super) fn gather<'a>(
     })
 }
 
-/// For each width and direction whether no rule on the pillar layer finds anything in such a square.
+/// Table by width and direction: true if no rule on the pillar layer finds anything in such a square.
 fn pass_table(pillars: LayerNumber, unit_nm: f64, rules: &[(&DeckRule, &mut Findings)]) -> [Vec<bool>; 2] {
     [false, true].map(|clockwise| {
         (0..TABLE)
@@ -139,14 +139,14 @@ fn pass_table(pillars: LayerNumber, unit_nm: f64, rules: &[(&DeckRule, &mut Find
 
 struct Gather<'r, 'p> {
     pillars: LayerNumber,
-    /// What pillars are.
+    /// Shape of the pillars.
     shape: PillarShape,
     finder: PillarFinder,
-    /// Whether no rule finds anything in outlines of pillars that are no squares.
+    /// Memory of outlines of pillars that are no squares: true if no rule finds anything in them.
     sound: OutlineMemo<bool>,
     /// Such as are upright boxes, drawn counter-clockwise and clockwise: all of these are sound.
     sound_boxes: [BoxMemo<()>; 2],
-    /// The same of those with more corners, from the middle of the box around them: all of these are sound.
+    /// Sound outlines with more corners, from the middle of the box around them.
     sound_rings: HashSet<Box<[Point]>, RandomState>,
     relative: Vec<Point>,
     /// Further layers whose shapes count as if they were on that one.
@@ -197,7 +197,7 @@ impl Gather<'_, '_> {
         Ok(())
     }
 
-    /// As [`Gather::show`]; whether no rule found anything.
+    /// Variant of [`Gather::show`] that returns true if no rule found anything.
     ///
     /// # Errors
     /// If that is too much work.
@@ -208,7 +208,7 @@ impl Gather<'_, '_> {
         Ok(total(&self.rules) == before)
     }
 
-    /// As [`Gather::show`], of a rectangle that is the same wherever it stands: a sound one is looked at once.
+    /// Variant of [`Gather::show`] for a rectangle that is equal wherever it stands: a sound one is checked once.
     ///
     /// # Errors
     /// If that is too much work.
@@ -224,8 +224,8 @@ impl Gather<'_, '_> {
         self.remembered(shape, placements, |own| own.passes(shape, placements))
     }
 
-    /// What `ask` says of an outline, whether no rule finds anything in it, for all outlines that are known to be the same; one in which
-    /// something is found is shown each time.
+    /// Answer of `ask` for an outline, remembered for all outlines that are known to be equal: true if no rule finds
+    /// anything in it. One in which something is found is shown each time.
     ///
     /// # Errors
     /// If that is too much work.
@@ -252,7 +252,8 @@ impl Gather<'_, '_> {
         }
     }
 
-    /// The same of an outline of any number of corners. Those of a cell that stands in a million places are told by their number.
+    /// Variant of [`Gather::show`] for an outline of any number of corners. Outlines of a cell that stands in a million
+    /// places are identified by their number.
     ///
     /// # Errors
     /// If that is too much work.
@@ -472,12 +473,16 @@ impl Gather<'_, '_> {
 /// The error that ends a visit.
 fn ended(stop: Stop) -> Error {
     match stop {
-        Stop::TooMuch(why) => Error::invalid(why, "write the layout with simpler outlines or fewer copies"),
+        Stop::TooMuch(why) => Error::refused(
+            "check/too-complex",
+            why,
+            "write the layout with simpler outlines or fewer copies",
+        ),
         Stop::Interrupted => Error::Interrupted,
     }
 }
 
-/// Whether a rectangle is drawn clockwise.
+/// True if a rectangle is drawn clockwise.
 #[inline]
 fn turns_right(outline: Outline<'_>) -> bool {
     let mut points = outline.points();

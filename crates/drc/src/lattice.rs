@@ -29,7 +29,7 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
 
 /// Squares in an element are on its sites.
 struct OnLattice {
-    /// None for that of the design.
+    /// Pitch (nm); `None` for the pitch of the design.
     pitch_nm: Option<f64>,
 }
 

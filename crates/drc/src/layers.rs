@@ -118,7 +118,7 @@ impl Rule for LayerRule {
 }
 
 impl Within {
-    /// In database units; none if nothing is drawn there.
+    /// Area in database units; `None` if nothing is drawn there.
     fn area(&self, flat: &FlatLayout<'_>) -> Option<Rect> {
         let um = match self {
             Self::Drawn(frame) => {

@@ -97,7 +97,8 @@ pub fn check(layout: &Layout, deck: &Deck, input: &CheckInput<'_>, progress: &dy
 fn same_unit(layout: &Layout, input: &CheckInput<'_>) -> Result<()> {
     match input.with.iter().find(|other| other.unit_nm() != layout.unit_nm()) {
         None => Ok(()),
-        Some(other) => Err(Error::invalid(
+        Some(other) => Err(Error::refused(
+            "layout/units-differ",
             format!(
                 "{} has a database unit of {} nm, {} one of {} nm",
                 layout.path().display(),

@@ -10,7 +10,7 @@ use metalith_gds::{LayerNumber, Point, Rect};
 use metalith_pillars::PillarRows;
 
 enum Marks {
-    /// Nothing on `others` within a distance of a mark (nm).
+    /// Rule that allows nothing on `others` within a distance of a mark (nm).
     KeepOut {
         marks: LayerNumber,
         others: Vec<LayerNumber>,

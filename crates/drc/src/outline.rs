@@ -1,4 +1,4 @@
-//! How outlines are drawn: squares, right angles, no crossings, no needless or doubled vertices.
+//! Rules of how outlines are drawn: squares, right angles, no crossings, no needless or doubled vertices.
 
 use super::context::Context;
 use super::drawn::DrawnOutline;
@@ -12,7 +12,7 @@ use metalith_gds::{LayerNumber, circle_of, tilted_rectangle_of};
 enum OutlineCheck {
     Square,
     Circle,
-    /// At any angle.
+    /// Rectangle at any angle.
     Rectangle,
     Manhattan,
     /// Sharpest angle (degrees).
@@ -32,7 +32,7 @@ enum OutlineCheck {
 struct OutlineRule {
     layers: Vec<LayerNumber>,
     form: OutlineCheck,
-    /// Whether a more serious rule of the deck looks at each of the layers too: crossing, acute, area.
+    /// True, for each of the layers, if a more serious rule of the deck checks it too: crossing, acute, area.
     more_serious: Vec<[bool; 3]>,
 }
 
@@ -67,8 +67,8 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
 }
 
 impl OutlineRule {
-    /// Whether a more serious rule reports this outline: each defect has one name. The rule that says that pillars
-    /// are squares reports every outline that is not a square, whatever else is wrong with it.
+    /// True if a more serious rule reports this outline: each defect has one name. The rule that says that pillars are
+    /// squares reports every outline that is not a square, whatever else is wrong with it.
     fn reported_elsewhere(&self, outline: &DrawnOutline<'_>) -> bool {
         let k = self.layers.iter().position(|&l| l == outline.layer).unwrap_or(0);
         let [crossing, acute, area] = self.more_serious[k];

@@ -40,7 +40,7 @@ pub(super) fn near<'s>(
     Ok(())
 }
 
-/// Of [`near`] the pairs with loose shapes.
+/// Pairs of [`near`] with loose shapes.
 fn near_loose<'s>(
     flat: &'s FlatLayout<'_>,
     loose: &'s Loose,
@@ -78,7 +78,7 @@ fn near_loose<'s>(
     Ok(())
 }
 
-/// Of [`near`] the pairs of pillars of two elements, which stand on the rims of lenses that are near one another.
+/// Pairs of [`near`] of pillars of two elements, which stand on the rims of lenses that are near one another.
 fn near_elements<'s>(flat: &'s FlatLayout<'_>, reach: i64, f: &mut impl FnMut(Body<'s>, Body<'s>)) -> Result<(), Stop> {
     let around: Vec<Rect> = (0..flat.elements.len()).map(|k| around_element(flat, k)).collect();
     // Elements beyond what numbers of the format reach are compared though they may be far from one another.

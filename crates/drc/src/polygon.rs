@@ -21,19 +21,19 @@ pub(super) fn on_segment(a: Point, b: Point, p: Point) -> bool {
     side(a, b, p) == 0 && p.x >= a.x.min(b.x) && p.x <= a.x.max(b.x) && p.y >= a.y.min(b.y) && p.y <= a.y.max(b.y)
 }
 
-/// Whether two segments share a point.
+/// True if two segments share a point.
 fn meet(a: Point, b: Point, c: Point, d: Point) -> bool {
     cross(a, b, c, d) || on_segment(a, b, c) || on_segment(a, b, d) || on_segment(c, d, a) || on_segment(c, d, b)
 }
 
-/// Whether two segments cross at a point inside both.
+/// True if two segments cross at a point inside both.
 pub(super) fn cross(a: Point, b: Point, c: Point, d: Point) -> bool {
     let (s1, s2) = (side(a, b, c).signum(), side(a, b, d).signum());
     let (s3, s4) = (side(c, d, a).signum(), side(c, d, b).signum());
     s1 * s2 < 0 && s3 * s4 < 0
 }
 
-/// Whether a point is inside a closed ring (not on its edge).
+/// True if a point is inside a closed ring (not on its edge).
 pub(super) fn inside(ring: &[Point], p: Point) -> bool {
     let mut within = false;
     for s in ring.windows(2) {
@@ -86,7 +86,7 @@ pub(super) fn distance(a: &[Point], b: &[Point]) -> f64 {
     }
 }
 
-/// Whether two closed rings share area.
+/// True if two closed rings share area.
 pub(super) fn overlap(a: &[Point], b: &[Point]) -> bool {
     let crossing = a
         .windows(2)

@@ -23,7 +23,7 @@ pub struct RuleReport {
     pub status: Status,
     /// Places where it does not, all of them.
     pub violations: u64,
-    /// Those of them that a waiver covers.
+    /// Number of violations that a waiver covers.
     pub waived: u64,
     /// The first of them.
     pub markers: Vec<Marker>,
@@ -49,7 +49,7 @@ pub struct DrcReport {
     /// Shapes with all references followed.
     pub shapes: u64,
     pub elements: usize,
-    /// What pillars are: as the design says, or as they were found.
+    /// Shape of the pillars: as the design says, or as they were found.
     #[serde(skip)]
     pub shape: PillarShape,
     pub pillars_on_lattices: u64,
@@ -57,7 +57,7 @@ pub struct DrcReport {
     pub rules: Vec<RuleReport>,
     /// Warnings about the check itself: waivers that cover nothing or have expired.
     pub warnings: Vec<String>,
-    /// For each of them the hash of its waiver.
+    /// Hash of the waiver of each of them.
     #[serde(skip)]
     pub warned: Vec<String>,
     /// Hashes of the waivers that cover something.

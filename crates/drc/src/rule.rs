@@ -9,7 +9,7 @@ use super::work::Stop;
 use metalith_core::document::Section;
 use metalith_gds::LayerNumber;
 
-/// How much a violation matters.
+/// Severity of a violation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -19,7 +19,7 @@ pub enum Severity {
     Error,
 }
 
-/// How a rule ended.
+/// Outcome of a rule.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "status", content = "reason")]
 pub enum Status {
@@ -35,7 +35,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// In one word.
+    /// Status in one word.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Run => "run",
@@ -47,7 +47,7 @@ impl Status {
     }
 }
 
-/// Why a rule did not run.
+/// Reason why a rule did not run.
 #[derive(Debug)]
 pub(super) enum NotRun {
     /// There was nothing to run it on.
@@ -69,10 +69,10 @@ impl From<Stop> for NotRun {
     }
 }
 
-/// Why a rule that compares with a design did not run where there is none.
+/// Reason why a rule that compares with a design did not run where there is none.
 pub(super) const NO_DESIGN: &str = "no design was given: name it with --design";
 
-/// Whether the limit of a rule is that of the design, by `from = "design"`, in place of a number.
+/// True if the design sets the limit of a rule, by `from = "design"`, in place of a number.
 pub(super) fn from_design(s: &Section<'_, '_>) -> bool {
     s.has("from") && s.choice("from", &[("design", true)], None)
 }
@@ -85,7 +85,7 @@ pub(super) struct DeckRule {
     pub id: String,
     pub check: String,
     pub severity: Severity,
-    /// Whether it applies without a design; some rules are written to wait for one.
+    /// True if it applies without a design; some rules are written to wait for one.
     pub always: bool,
     pub rule: Box<dyn Rule>,
 }
@@ -113,8 +113,8 @@ pub(super) trait Rule: Send + Sync {
         &[]
     }
 
-    /// Whether a square of this width with five points is clean at any position. Millions of
-    /// equal squares are decided by this once.
+    /// True if a square of this width with five points is clean at any position. One call decides millions of equal
+    /// squares. Millions of equal squares are decided by this once.
     fn passes_square(&self, _width_nm: f64, _clockwise: bool) -> bool {
         false
     }

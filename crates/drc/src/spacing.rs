@@ -139,7 +139,8 @@ fn report_gap(
 /// wide, farther ones are at least a pitch apart.
 const SQUARE: &[(usize, isize)] = &[(0, 1), (1, 0), (1, 1), (1, -1)];
 
-/// The same to half of the six neighbours on a hexagonal lattice, in its grid. Farther ones are the root of three of a pitch away.
+/// Steps to half of the six neighbours on a hexagonal lattice, in its grid. Farther ones are the root of three of a
+/// pitch away.
 const HEXAGONAL: &[(usize, isize)] = &[(0, 2), (1, 1), (1, -1)];
 
 /// Share of the pitch below which gaps to farther ones than these are not.
@@ -149,15 +150,16 @@ const HEXAGONAL_REACH: f64 = 0.73;
 /// have.
 const MOST_PAIRS: usize = 1 << 20;
 
-/// Whether pillars of two widths or numbers are too near one another, a step apart: a lens has millions of pairs of some hundred.
+/// Pairs of widths or numbers whose verdict is known: whether they are too near one another, a step apart. A lens has
+/// millions of pairs of some hundred widths.
 struct KnownPairs {
-    /// From the first width or number to that of the second; none are remembered if they are too many.
+    /// Number of entries of one first width or number; zero, and nothing remembered, if they are too many.
     row: usize,
     near: Vec<Option<bool>>,
 }
 
 impl KnownPairs {
-    /// Of widths or numbers below this one.
+    /// Pairs of widths or numbers below this one.
     fn below(row: usize) -> Self {
         let pairs = if row <= MOST_PAIRS / row.max(1) { row * row } else { 0 };
         Self {

@@ -103,7 +103,7 @@ impl Waivers {
         })
     }
 
-    /// Those for a rule that have not expired.
+    /// Waivers for a rule that have not expired.
     pub(super) fn valid(&self, rule: &str, today: Date) -> Vec<Waiver> {
         let holds = |w: &&Waiver| w.rule == rule && w.expires >= today;
         self.list.iter().filter(holds).cloned().collect()
@@ -120,7 +120,7 @@ impl Waivers {
 }
 
 impl Waiver {
-    /// As a section of a file of waivers.
+    /// Section of the waiver in a file of waivers.
     pub fn text(&self) -> String {
         format!(
             "[[waiver]]\nrule = {:?}\nhash = {:?}\nreason = {:?}\nauthor = {:?}\nexpires = \"{}\"\n",

@@ -97,7 +97,7 @@ impl WidthBound {
 }
 
 impl WidthBound {
-    /// The same for sides that are known to `off`.
+    /// Variant for sides that are known to `off`.
     fn wrong_within(&self, small: f64, large: f64, off: f64) -> Option<String> {
         match &self.want {
             WidthLimit::Max(_) => self.wrong(small, large - off),

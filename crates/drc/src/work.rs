@@ -1,4 +1,4 @@
-//! How much a check may hold and do: in proportion to its files, so that a few bytes cannot cost hours.
+//! Limits of the memory and work of a check: in proportion to its files, so that a few bytes cannot cost hours.
 
 use std::cell::Cell;
 
@@ -43,7 +43,7 @@ impl Allowance {
     }
 }
 
-/// Why work ended early.
+/// Reason why work ended early.
 #[derive(Debug, PartialEq)]
 pub(super) enum Stop {
     /// Over a limit; the text says which one.
@@ -91,7 +91,7 @@ impl<'p> Work<'p> {
         self.look()
     }
 
-    /// Whether the user asked to stop, for work whose size the design sets and not the layout.
+    /// Fails if the user asked to stop: for work whose size the design sets and not the layout.
     ///
     /// # Errors
     /// If so.

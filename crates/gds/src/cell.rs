@@ -1,4 +1,4 @@
-//! What is kept of a cell after the first reading: numbers, not shapes.
+//! Record of a cell after the first reading: numbers, not shapes.
 
 use super::shape::Rect;
 use metalith_core::LayerNumber;
@@ -11,13 +11,13 @@ pub struct LayoutCell {
     /// Its bytes in the file, from BGNSTR to behind ENDSTR. In OASIS from its record CELL, or the CBLOCK that has it,
     /// to the next cell or CBLOCK.
     pub bytes: std::ops::Range<u64>,
-    /// What is drawn in it, by layer, in the order of first use.
+    /// Shapes drawn in it, by layer, in the order of first use.
     pub layers: Vec<(LayerNumber, LayerTally)>,
-    /// Which cells it refers to.
+    /// Cells that it refers to.
     pub children: Vec<Child>,
     /// Elements with properties.
     pub with_properties: u64,
-    /// How often the cell stands in the layout, all references followed; at most `u64::MAX`.
+    /// Number of copies of the cell in the layout, all references followed; at most `u64::MAX`.
     pub placements: u64,
     /// Longest chain of references that ends here; a top cell has zero.
     pub depth: u32,
@@ -65,14 +65,14 @@ pub struct Child {
     pub(super) cut: bool,
 }
 
-/// What one cell has on one layer.
+/// Tally of one cell on one layer.
 #[derive(Clone, Debug)]
 pub struct LayerTally {
     pub boundaries: u64,
     pub boxes: u64,
     pub paths: u64,
     pub texts: u64,
-    /// Of all their strings.
+    /// Bytes of all their strings.
     pub text_bytes: u64,
     pub nodes: u64,
     pub vertices: u64,

@@ -6,7 +6,7 @@ use super::oasis::OasisCells;
 use super::record::kind;
 use crate::error::{LayoutError, Result};
 
-/// Which format a layout is in: told by its first bytes.
+/// Format of a layout, identified by its first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileFormat {
     Gds,

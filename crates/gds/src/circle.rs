@@ -5,15 +5,15 @@ use super::shape::{Point, Rect, rounding};
 /// Fewest corners of a polygon that is taken for a circle.
 const FEWEST_CORNERS: usize = 8;
 
-/// How far inside the circle the middle of a side may be, in parts of the radius: that of an octagon, and a little.
+/// Largest distance of the middle of a side inside the circle, in parts of the radius: an octagon's, and a little.
 const SAGITTA: f64 = 0.08;
 
-/// How far the area may be off that of the circle, in parts of it: an octagon has a tenth less. Tells a circle from one that
-/// is gone round twice.
+/// Largest error of the area, in parts of the circle's: an octagon has a tenth less. It distinguishes a circle from one
+/// that is gone round twice.
 const AREA: f64 = 0.15;
 
-/// How far the corners may be in the mean from the circle in the box around them, if it is theirs (halves of database units).
-/// Where no corner is on an axis the box is too small.
+/// Largest mean distance of the corners from the circle in the box around them, if it is their circle (halves of
+/// database units). Where no corner is on an axis the box is too small.
 const LEVEL: f64 = 1.0;
 
 /// The square around the circle that a closed outline stands for, if it does: all corners on one circle to within their rounding,
@@ -54,7 +54,7 @@ struct Circle {
 }
 
 impl Circle {
-    /// That in a square.
+    /// The circle inscribed in a square.
     fn within(square: &Rect) -> Self {
         Self {
             x: (square.x0 + square.x1) as f64,
@@ -63,8 +63,8 @@ impl Circle {
         }
     }
 
-    /// That nearest to corners in the least squares of x^2 + y^2 (I. Kasa, IEEE Trans. Instrum. Meas. 25, 8 (1976)); `around` is
-    /// the box around them. None if they are on a line.
+    /// The circle nearest to corners in the least squares of x^2 + y^2 (I. Kasa, IEEE Trans. Instrum. Meas. 25, 8
+    /// (1976)); `around` is the box around them. `None` if they are on a line.
     fn through(corners: &[Point], around: &Rect) -> Option<Self> {
         let count = corners.len() as f64;
         let middle = Self::within(around);
@@ -91,7 +91,7 @@ impl Circle {
         })
     }
 
-    /// From its middle to a place.
+    /// Vector from its middle to a place.
     fn to(&self, x: i64, y: i64) -> [f64; 2] {
         [x as f64 - self.x, y as f64 - self.y]
     }
@@ -239,8 +239,9 @@ mod tests {
         }
     }
 
-    /// As other programs draw them: the box around an odd number of corners is no square and beside the middle, and that
-    /// around corners beside the axes is too small. Also where a unit is a tenth of a nanometre, with corners on either grid.
+    /// Circles as other programs draw them: the box around an odd number of corners is no square and beside the middle,
+    /// and that around corners beside the axes is too small. Also where a unit is a tenth of a nanometre, with corners
+    /// on either grid.
     #[test]
     fn circles_of_any_number_of_corners_are_where_they_are() {
         for corners in 8..=40 {
@@ -255,7 +256,7 @@ mod tests {
         }
     }
 
-    /// What is nearly a circle: fewer corners than are taken for one, an oval, one corner off, half of one.
+    /// Polygons that are nearly circles: fewer corners than are taken for one, an oval, one corner off, half of one.
     #[test]
     fn other_polygons_are_no_circles_for_being_fitted() {
         for turned in [0.0, 0.5] {

@@ -8,7 +8,7 @@ use super::transform::Transform;
 use crate::error::{Error, LayoutError, Limit, Result};
 use metalith_core::LayerNumber;
 
-/// Which element the records between a head and ENDEL make.
+/// Kind of element that the records between a head and ENDEL make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ElementKind {
     Boundary,
@@ -51,7 +51,7 @@ pub(super) struct ElementContent {
     pub angle_deg: f64,
     pub columns: u16,
     pub rows: u16,
-    /// Of a path; negative if magnification leaves it alone.
+    /// Width of a path; negative if magnification leaves it unchanged.
     pub width: i32,
     pub path_type: i16,
     pub extensions: [i32; 2],
@@ -189,7 +189,7 @@ impl ElementContent {
         input.fault(record.offset, cause)
     }
 
-    /// Whether everything that this element needs was there.
+    /// Checks that everything that this element needs was there.
     fn check(&self, input: &Input, has_layer: bool, has_datatype: bool) -> Result<()> {
         let (element, points) = match self.kind {
             ElementKind::Boundary => ("BOUNDARY", 3..=usize::MAX),
@@ -233,7 +233,7 @@ impl ElementContent {
         Ok(())
     }
 
-    /// Where the first copy of the cell referred to stands.
+    /// Transform of the first copy of the cell referred to.
     pub fn transform(&self) -> Option<Transform> {
         let at = self.points.first().copied().unwrap_or_default();
         Transform::of_reference(self.mirror, self.magnification, self.angle_deg, at)
@@ -247,8 +247,8 @@ impl ElementContent {
         }
     }
 
-    /// Where copy `k` of an array stands: columns first. Distances that do not divide are rounded a copy,
-    /// so that the last one is where the file says.
+    /// Place of copy `k` of an array: columns first. Distances that do not divide are rounded a copy, so that the last
+    /// one is where the file says.
     pub fn origin(&self, k: u64) -> Point {
         if self.kind != ElementKind::Array {
             return self.points[0];
@@ -266,7 +266,7 @@ impl ElementContent {
         )
     }
 
-    /// Where copy `k` of the cell referred to stands.
+    /// Transform of copy `k` of the cell referred to.
     pub fn copy(&self, k: u64) -> Transform {
         let origin = self.origin(k);
         match self.transform().unwrap_or(Transform::IDENTITY) {

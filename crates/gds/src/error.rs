@@ -1,4 +1,4 @@
-//! What can go wrong in reading a layout: causes with numbers and places, and for each a remedy.
+//! Errors of reading a layout: causes with numbers and places, and for each a remedy.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use super::record;
 /// Result of reading a layout.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why a layout could not be read.
+/// Reason why a layout could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -41,7 +41,7 @@ pub enum Error {
         cause: LayoutError,
     },
 
-    /// What was to be read out of the layout is not there or too much.
+    /// Error of extraction: what was to be read out of the layout is not there or too much.
     #[error("{}: {cause}", path.display())]
     Extraction {
         path: PathBuf,
@@ -53,12 +53,12 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
 
-    /// What a [`super::Visitor`] returned.
+    /// Error that a [`super::Visitor`] returned.
     #[error(transparent)]
     Visitor(metalith_core::Error),
 }
 
-/// What is wrong at a place of a layout.
+/// Fault at a place of a layout.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LayoutError {
@@ -160,7 +160,7 @@ pub enum LayoutError {
     Limit { limit: Limit, found: u64, most: u64 },
 }
 
-/// Which of [`super::ReadLimits`].
+/// Limit of [`super::ReadLimits`] that was exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Limit {
@@ -177,7 +177,7 @@ pub enum Limit {
     Placements,
     /// Shapes, every reference followed.
     FlatShapes,
-    /// The same, from a file as short as this one.
+    /// Limit of the flat shapes of a file as short as this one.
     FlatShapesOfShortFile,
     /// Bytes of texts, every reference followed.
     FlatTexts,
@@ -217,7 +217,7 @@ impl Limit {
     }
 }
 
-/// Why nothing was extracted from a layout.
+/// Reason why nothing was extracted from a layout.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExtractionError {
@@ -255,7 +255,7 @@ fn in_block(inner: Option<u64>) -> String {
 }
 
 impl LayoutError {
-    /// What to do about it.
+    /// Remedy for the error.
     pub fn remedy(&self) -> String {
         match self {
             Self::EndsEarly { .. } | Self::EndsInRecord { .. } => CUT_SHORT.into(),
@@ -308,7 +308,19 @@ impl LayoutError {
 }
 
 impl ExtractionError {
-    /// What to do about it.
+    /// Identity of the error, `subject/cause`: the text may change, the identity stays.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Sites { .. } => "extract/sites",
+            Self::NoElements { .. } => "extract/no-elements",
+            Self::Groups { .. } => "extract/groups",
+            Self::Scattered { .. } => "extract/scattered",
+            Self::Sparse { .. } => "extract/sparse",
+            Self::Lattice { .. } => "extract/lattice",
+        }
+    }
+
+    /// Remedy for the error.
     pub fn remedy(&self) -> String {
         match self {
             Self::Sites { most, .. } => {
@@ -333,7 +345,7 @@ impl Error {
         move |source| Self::Io { action, path, source }
     }
 
-    /// What is wrong with the layout, and at which byte, if it is the layout.
+    /// Fault of the layout, and the byte that it is at, if the layout is the cause.
     pub fn in_layout(&self) -> Option<(u64, &LayoutError)> {
         match self {
             Self::Layout { offset, cause, .. } => Some((*offset, cause)),
@@ -342,7 +354,7 @@ impl Error {
     }
 }
 
-/// What a visitor returns ends the visit and comes back as it was.
+/// Error of a visitor, which ends the visit and comes back unchanged.
 impl From<metalith_core::Error> for Error {
     fn from(error: metalith_core::Error) -> Self {
         match error {
@@ -355,7 +367,7 @@ impl From<metalith_core::Error> for Error {
 /// One text with its remedy, for a program; the cause stays its source.
 impl From<Error> for metalith_core::Error {
     fn from(error: Error) -> Self {
-        let (what, hint) = match error {
+        let (id, what, hint) = match error {
             Error::Io { action, path, source } => return Self::Io { action, path, source },
             Error::Interrupted => return Self::Interrupted,
             Error::Visitor(error) => return error,
@@ -372,11 +384,16 @@ impl From<Error> for metalith_core::Error {
                     source: Some(Box::new(error)),
                 };
             }
-            Error::NotAFile { .. } => (error.to_string(), "name a GDSII or OASIS file".into()),
-            Error::Changed { .. } => (error.to_string(), BEING_WRITTEN.into()),
-            Error::Extraction { ref cause, .. } => (error.to_string(), cause.remedy()),
+            Error::NotAFile { .. } => (
+                "file/not-ordinary",
+                error.to_string(),
+                "name a GDSII or OASIS file".into(),
+            ),
+            Error::Changed { .. } => ("file/replaced-meanwhile", error.to_string(), BEING_WRITTEN.into()),
+            Error::Extraction { ref cause, .. } => (cause.id(), error.to_string(), cause.remedy()),
         };
         Self::Invalid {
+            id,
             what,
             hint,
             source: Some(Box::new(error)),

@@ -1,4 +1,4 @@
-//! Where the bytes come from: a file read through one buffer, or bytes in memory.
+//! Source of the bytes: a file read through one buffer, or bytes in memory.
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
@@ -67,7 +67,7 @@ impl Source {
         })
     }
 
-    /// Which format the first bytes are those of; GDSII has no mark of its own.
+    /// Format that the first bytes are of; GDSII has no mark of its own.
     pub fn format(&self) -> Result<FileFormat> {
         let mut first = Vec::new();
         let most = metalith_oasis::MAGIC.len() as u64;

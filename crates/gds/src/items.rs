@@ -41,7 +41,7 @@ pub enum CellItem<'a> {
     },
 }
 
-/// What takes the content of cells.
+/// Consumer of the content of cells.
 pub trait CellConsumer {
     /// A cell begins; what follows up to the next call is in it.
     ///
@@ -57,8 +57,8 @@ pub trait CellConsumer {
 }
 
 impl Layout {
-    /// Whether all elements can be written one by one: copies multiplied, references not followed, within the limits
-    /// of a file of this size.
+    /// Checks that all elements can be written one by one: copies multiplied, references not followed, within the
+    /// limits of a file of this size.
     ///
     /// # Errors
     /// [`LayoutError::Limit`] if not.

@@ -93,7 +93,7 @@ impl Layout {
         }
     }
 
-    /// Where it was read from.
+    /// Path that it was read from.
     pub fn path(&self) -> &Path {
         self.source.path()
     }
@@ -108,7 +108,7 @@ impl Layout {
         self.trailing
     }
 
-    /// Which format it is in.
+    /// Format that it is in.
     pub fn format(&self) -> FileFormat {
         self.format
     }
@@ -239,7 +239,7 @@ impl Layout {
         }
     }
 
-    /// Whether every reference leads to a cell, and none round in a circle.
+    /// Checks that every reference leads to a cell, and none round in a circle.
     pub(super) fn sound(&self) -> Result<()> {
         let cause = |f: Faulty, of: fn(String, String) -> LayoutError| self.fault(f.offset, of(f.cell, f.name));
         if let Some(f) = self.circles().into_iter().next() {

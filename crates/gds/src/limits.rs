@@ -1,4 +1,4 @@
-//! What keeps reading bounded, whatever the bytes say.
+//! Limits that keep reading bounded, whatever the bytes say.
 
 /// Limits of one reading. A file of a few hundred bytes can describe more squares than there are atoms
 /// in the wafer; past a limit reading ends with an error that says which.
@@ -20,8 +20,8 @@ pub struct ReadLimits {
     pub placements: u64,
     /// Shapes in the whole layout with every reference followed.
     pub flat_shapes: u64,
-    /// The same from a short file, and how many more for each of its bytes: arrays of arrays make of a few hundred
-    /// bytes any number of shapes. A lens of elements that share their eighths has 8 shapes a byte.
+    /// Largest number of shapes from a short file, and how many more for each of its bytes: arrays of arrays make of a
+    /// few hundred bytes any number of shapes. A lens of elements that share their eighths has 8 shapes a byte.
     pub short_file_shapes: u64,
     pub shapes_per_byte: u64,
     /// Bytes of all texts with every reference followed, and 64 for each of them: whoever keeps texts keeps them
@@ -38,7 +38,7 @@ impl ReadLimits {
     }
 }
 
-/// What a text costs beside its bytes, where texts are kept.
+/// Memory of a text in addition to its bytes, where texts are kept.
 pub(super) const TEXT_BYTES: u64 = 64;
 
 impl Default for ReadLimits {

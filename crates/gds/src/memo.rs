@@ -1,4 +1,4 @@
-//! What has been said of an outline, remembered for its copies elsewhere.
+//! Memory of answers for outlines, for their copies elsewhere.
 
 use super::shape::{Outline, Point, Rect};
 use super::transform::Transform;
@@ -15,7 +15,7 @@ const BOX_SETS: usize = 1 << 8;
 /// Bits of an edge of such a box; longer ones are asked about each time.
 const EDGE_BITS: u32 = 31;
 
-/// Outlines with numbers that are remembered: those with higher ones are told by their corners.
+/// Outlines with numbers that are remembered: those with higher ones are identified by their corners.
 const NUMBERED: usize = 1 << 12;
 
 /// Orientations that an outline may be asked about in.
@@ -70,7 +70,7 @@ impl<T: Copy> OutlineMemo<T> {
         *self.numbered[number][usize::from(orientation) % ORIENTATIONS].get_or_insert_with(ask)
     }
 
-    /// The same of one without a number.
+    /// Variant for an outline without a number.
     #[inline]
     fn by_corners(&mut self, points: &[Point], orientation: u8, ask: impl FnOnce() -> T) -> T {
         let Some(key) = key(points, orientation) else {
@@ -94,7 +94,7 @@ impl<T: Copy> OutlineMemo<T> {
 
 /// Answers about upright boxes that hold wherever these stand, by their edges. Memory and time are bounded, whatever the boxes are.
 pub struct BoxMemo<T> {
-    /// In sets of [`WAYS`], zero where there is none: apart from the answers, so that a set is read at once.
+    /// Keys in sets of [`WAYS`], zero where there is none: apart from the answers, so that a set is read at once.
     keys: Vec<u64>,
     answers: Vec<Option<T>>,
 }
@@ -143,7 +143,7 @@ impl<T: Copy> BoxMemo<T> {
         self.answers[place] = Some(answer);
     }
 
-    /// Both edges; none of long ones and of boxes without area.
+    /// Key from both edges; `None` for long ones and for boxes without area.
     #[inline]
     fn key(r: &Rect) -> Option<u64> {
         let (width, height) = (r.width() as u64, r.height() as u64);

@@ -30,7 +30,7 @@ pub(super) type Texts = Arc<HashMap<u64, Vec<u8>>>;
 /// Elements between two looks at whether the user stopped reading.
 const ELEMENTS_AT_A_TIME: u32 = 1 << 12;
 
-/// Where the copies of a repeated element stand.
+/// Places of the copies of a repeated element.
 pub(super) struct Copies<'a> {
     pub repetition: &'a Repetition,
     /// Number of them; at most `u64::MAX`.
@@ -78,7 +78,7 @@ pub(super) struct OasisCells {
     path: PathBuf,
     texts: Texts,
     element: ElementContent,
-    /// Whether texts that are in no table are an error: not before the tables were read.
+    /// True if texts that are in no table are an error: not before the tables were read.
     resolve: bool,
 }
 

@@ -12,14 +12,14 @@ use metalith_pillars::{OutlineForm, PillarId, PillarShape};
 pub struct DrawnPillar {
     /// The box around it.
     pub around: Rect,
-    /// What tells it from others, where its width does not.
+    /// Number that identifies it, where its width does not.
     pub number: Option<u16>,
-    /// Whether the corners are those of the pillar of this number, to the database unit.
+    /// True if the corners are those of the pillar of this number, to the database unit.
     pub exact: bool,
 }
 
-/// What an outline in any place is, if it may be a pillar of this shape; a database unit is so long (nm). It may have more
-/// vertices than it needs.
+/// Pillar that an outline in any place is, if it may be one of this shape; a database unit is so long (nm). It may have
+/// more vertices than it needs.
 pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<DrawnPillar> {
     let of_width = |around| DrawnPillar {
         around,
@@ -56,15 +56,15 @@ pub struct PillarFinder {
     /// Whether pillars are recognised by their corners, and those are the corners of upright boxes.
     boxed: bool,
     unit_nm: f64,
-    /// Of outlines as they are placed; boxes from the first corner.
+    /// Answers for outlines as they are placed; boxes from the first corner.
     known: OutlineMemo<Option<DrawnPillar>>,
-    /// Of upright boxes.
+    /// Answers for upright boxes.
     boxes: BoxMemo<Option<DrawnPillar>>,
     placed: Vec<Point>,
 }
 
 impl PillarFinder {
-    /// Of one layout, whose database unit is so long (nm).
+    /// Finder for one layout, whose database unit is so long (nm).
     pub fn new(shape: PillarShape, unit_nm: f64) -> Self {
         Self {
             shape,
@@ -76,13 +76,13 @@ impl PillarFinder {
         }
     }
 
-    /// Whether pillars have the same corners in an orientation that leaves an upright box as it is: half a turn does so to every
-    /// rectangle, a mirror about an axis to upright ones.
+    /// True if pillars have the same corners in an orientation that leaves an upright box unchanged: half a turn leaves
+    /// every rectangle unchanged, a mirror about an axis upright ones.
     pub(super) fn keeps(&self, orientation: u8) -> bool {
         self.shape.outline() == OutlineForm::Polygon && self.shape.keeps(orientation & 4 != 0, 0)
     }
 
-    /// As [`pillar_of`], of a shape where it is placed.
+    /// Variant of [`pillar_of`] for a shape where it is placed.
     #[inline]
     pub fn placed(&mut self, shape: &Shape<'_>, placement: &Transform) -> Option<DrawnPillar> {
         match shape.rect {
@@ -181,7 +181,8 @@ mod tests {
         assert_eq!(found.number, Some(37));
     }
 
-    /// Each size in each orientation, twice, one unit longer too: boxes are told by their edges as placed, and by nothing else.
+    /// Each size in each orientation, twice, one unit longer too: boxes are identified by their edges as placed, and by
+    /// nothing else.
     #[test]
     fn upright_pillars_are_told_by_their_edges_in_every_orientation() {
         let pillars = UprightRectangles::of_lengths([90, 100, 150, 200].into_iter()).unwrap();

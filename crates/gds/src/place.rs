@@ -1,4 +1,4 @@
-//! Where every cell stands: the transforms of its copies, from the top down.
+//! Places of every cell: the transforms of its copies, from the top down.
 
 use super::cells::CellInput;
 use super::element::{ElementContent, ElementKind};

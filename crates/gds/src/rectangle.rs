@@ -12,7 +12,7 @@ pub struct TiltedRectangle {
     corners: [[f64; 2]; 4],
     /// The shorter and the longer edge (database units).
     pub edges: [f64; 2],
-    /// By how much corners may be off (database units).
+    /// Tolerance of corners (database units).
     slack: f64,
 }
 
@@ -53,12 +53,12 @@ pub fn tilted_rectangle_of(points: &[Point], unit_nm: f64) -> Option<TiltedRecta
 }
 
 impl TiltedRectangle {
-    /// How far its edges may be off (database units): corners on the grid move an edge by less than one and a half of it.
+    /// Tolerance of its edges (database units): corners on the grid move an edge by less than one and a half of it.
     pub fn edges_off(&self) -> f64 {
         self.slack
     }
 
-    /// Whether it is a square to within the rounding of its corners.
+    /// True if it is a square to within the rounding of its corners.
     pub fn is_square(&self) -> bool {
         self.edges[1] - self.edges[0] <= 2.0 * self.slack
     }
@@ -70,7 +70,7 @@ impl TiltedRectangle {
         found.map(|PillarId(number)| number)
     }
 
-    /// Whether all corners are among these, from the middle.
+    /// True if all corners are among these, from the middle.
     pub fn has_corners(&self, drawn: &[Point]) -> bool {
         let is_drawn = |corner: &[f64; 2]| drawn.iter().any(|p| [p.x as f64, p.y as f64] == *corner);
         self.corners.iter().all(is_drawn)

@@ -17,7 +17,7 @@ use crate::error::{Error, LayoutError, Limit, Result};
 use metalith_core::text::printable_bytes;
 use metalith_core::{LayerNumber, Progress};
 
-/// What the first reading found.
+/// Result of the first reading.
 pub(super) struct Scan {
     pub title: String,
     /// Database unit in user units, and in metres.
@@ -44,7 +44,7 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
     scan_with(&mut input, source.bytes(), &mut walk)
 }
 
-/// As [`scan`], with a walk that may be told to use the grammar alone.
+/// Variant of [`scan`] with a walk that may be set to use the grammar alone.
 pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> Result<Scan> {
     if let &[_, _, first, ..] = input.window()?
         && first != kind::HEADER
@@ -119,7 +119,7 @@ fn read_units(input: &Input, record: record::Record) -> Result<[f64; 2]> {
     Ok(units)
 }
 
-/// What is kept of the cells met so far, and the counts of the one being read.
+/// Record of the cells met so far, and the counts of the one being read.
 pub(super) struct Tally {
     limits: ReadLimits,
     cells: Vec<LayoutCell>,
@@ -133,7 +133,8 @@ pub(super) struct Tally {
     touched: Vec<u32>,
     tallies: usize,
     path: Vec<Point>,
-    /// Whether there is a path of absolute width, and a reference that magnifies: together nobody knows what they mean.
+    /// True if there is a path of absolute width. Together with a reference that magnifies (`magnified`) its meaning is
+    /// not defined.
     absolute: bool,
     magnified: bool,
 }
@@ -199,7 +200,7 @@ impl Tally {
         self.cells.last_mut().expect("a cell was begun").with_properties += 1;
     }
 
-    /// What was found in a file whose cells may have numbers, with the names of these.
+    /// Result for a file whose cells may have numbers, with the names of these.
     pub fn finish_numbered(
         mut self,
         units: [f64; 2],
@@ -459,7 +460,7 @@ mod tests {
         bytes
     }
 
-    /// What is recognised by its bytes is what the grammar says it is, in both readings.
+    /// Elements recognised by their bytes are what the grammar says, in both readings.
     #[test]
     fn recognised_elements_are_those_of_the_grammar() {
         let bytes = sample();

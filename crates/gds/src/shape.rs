@@ -1,14 +1,14 @@
-//! What stands on a layer.
+//! Shapes on a layer.
 
 use super::transform::{Transform, turned};
 use metalith_core::LayerNumber;
 use metalith_pillars::{OutlineForm, PillarShape};
 
-/// By how much a corner of a circle or a rectangle may be off its place, in database units or in nanometres, whichever is more:
-/// corners are rounded to one of these grids, twice where a cell is placed at an angle.
+/// Tolerance of the place of a corner of a circle or a rectangle, in database units or in nanometres, whichever is
+/// more: corners are rounded to one of these grids, twice where a cell is placed at an angle.
 const ROUNDED: f64 = 1.5;
 
-/// The same in database units, of which one is so long (nm).
+/// Tolerance of the place of a corner in database units, of which one is so long (nm).
 pub(super) fn rounding(unit_nm: f64) -> f64 {
     ROUNDED * (1.0 / unit_nm).max(1.0)
 }
@@ -75,7 +75,7 @@ impl Rect {
         }
     }
 
-    /// The same, farther by a step.
+    /// Same rectangle, farther by a step.
     #[inline]
     pub(super) fn moved(&self, by: Point) -> Self {
         Self {
@@ -107,7 +107,7 @@ impl Rect {
     }
 }
 
-/// Which element of the format a shape was.
+/// Element of the format that a shape was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ShapeKind {
     Boundary,
@@ -120,21 +120,21 @@ pub enum ShapeKind {
 /// pillars are known by the box around them, or by the copy that was looked at before.
 #[derive(Clone, Copy, Debug)]
 pub struct Outline<'a> {
-    /// As they were read.
+    /// Points as they were read.
     pub(super) points: &'a [Point],
-    /// What takes them into the cell, exactly.
+    /// Transform that takes the points into the cell, exactly.
     pub(super) at: Transform,
     /// The number of these points in the layout, if they are of a cell that is placed shape by shape: all copies have it.
     pub(super) number: Option<u32>,
 }
 
 impl<'a> Outline<'a> {
-    /// Of points of the cell.
+    /// Outline of points of the cell.
     pub fn new(points: &'a [Point]) -> Self {
         Self::at(points, Transform::IDENTITY)
     }
 
-    /// Of points that are turned by quarters, mirrored and moved.
+    /// Outline of points that are turned by quarters, mirrored and moved.
     pub(super) fn at(points: &'a [Point], at: Transform) -> Self {
         debug_assert!(at.is_square());
         Self {
@@ -144,7 +144,7 @@ impl<'a> Outline<'a> {
         }
     }
 
-    /// The same, whose points have this number in the layout.
+    /// Same outline, whose points have this number in the layout.
     #[inline]
     pub(super) fn numbered(self, number: u32) -> Self {
         Self {
@@ -153,7 +153,7 @@ impl<'a> Outline<'a> {
         }
     }
 
-    /// Whether its points are told by a number from others of the layout.
+    /// True if a number identifies its points among the outlines of the layout.
     #[inline]
     pub fn has_number(&self) -> bool {
         self.number.is_some()
@@ -179,7 +179,7 @@ impl<'a> Outline<'a> {
         self.points().map(|p| placement.apply(p)).collect()
     }
 
-    /// How its points are turned as a placement has them, as the orientation of a [`Transform`], if only by quarters and mirrors.
+    /// Turn of its points in a placement, as the orientation of a [`Transform`], if only by quarters and mirrors.
     #[inline]
     pub(super) fn orientation(self, placement: &Transform) -> Option<u8> {
         match (self.at, *placement) {
@@ -204,7 +204,7 @@ pub struct Shape<'a> {
     pub layer: LayerNumber,
     /// The outline as the file has it: the last point repeats the first where the format is kept.
     pub outline: Outline<'a>,
-    /// The same as an upright rectangle, if it is one, with area and with five points.
+    /// Upright rectangle that the shape is, if it is one, with area and with five points.
     pub rect: Option<Rect>,
     /// The square around the circle that it stands for, if it does: see [`crate::circle_of`].
     pub circle: Option<Rect>,
@@ -213,8 +213,8 @@ pub struct Shape<'a> {
 }
 
 impl Shape<'_> {
-    /// The square around it, if it may be a pillar of this shape as it stands, by its box alone; rectangles are told by their
-    /// corners, where they are placed: see [`crate::pillar_of`].
+    /// The square around it, if it may be a pillar of this shape as it stands, by its box alone; rectangles are
+    /// identified by their corners, where they are placed: see [`crate::pillar_of`].
     #[inline]
     pub fn pillar(&self, shape: PillarShape) -> Option<&Rect> {
         match shape.outline() {

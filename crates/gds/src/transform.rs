@@ -1,4 +1,4 @@
-//! How a reference places a cell: mirror at the x axis, magnify, turn, shift, in this order.
+//! Placement of a cell by a reference: mirror at the x axis, magnify, turn, shift, in this order.
 
 use super::limits::{FARTHEST, MAGNIFICATION};
 use super::shape::{Point, Rect};
@@ -55,7 +55,7 @@ impl Transform {
         })
     }
 
-    /// The same, farther by a step.
+    /// Same transform, farther by a step.
     pub(super) fn moved(self, by: Point) -> Self {
         match self {
             Self::Square { orientation, dx, dy } => Self::Square {
@@ -71,7 +71,7 @@ impl Transform {
         }
     }
 
-    /// Where a point of the cell stands.
+    /// Place of a point of the cell.
     #[inline]
     pub fn apply(&self, p: Point) -> Point {
         match *self {
@@ -86,7 +86,7 @@ impl Transform {
         }
     }
 
-    /// Where a rectangle of the cell stands, if it still is an upright one whatever its size.
+    /// Place of a rectangle of the cell, if it is still an upright one whatever its size.
     #[inline]
     pub fn apply_rect(&self, r: &Rect) -> Option<Rect> {
         let between = |ax: i64, ay: i64, bx: i64, by: i64| Rect {
@@ -115,7 +115,7 @@ impl Transform {
         Some((self.apply(Point::new(r.x0, r.y0)), self.apply(Point::new(r.x1, r.y1))))
     }
 
-    /// How many times as long lengths are.
+    /// Factor by which lengths grow.
     pub fn magnification(&self) -> f64 {
         match self {
             Self::Square { .. } => 1.0,
@@ -159,12 +159,12 @@ impl Transform {
             })
     }
 
-    /// Whether shapes keep their size and right angles stay on the axes.
+    /// True if shapes keep their size and right angles stay on the axes.
     pub fn is_square(&self) -> bool {
         matches!(self, Self::Square { .. })
     }
 
-    /// Whether a counter-clockwise outline becomes a clockwise one.
+    /// True if a counter-clockwise outline becomes a clockwise one.
     pub fn mirrors(&self) -> bool {
         match self {
             Self::Square { orientation, .. } => orientation & 4 != 0,

@@ -171,7 +171,7 @@ fn flat_text_bytes(cells: &[LayoutCell], placements: &[u64]) -> u64 {
     })
 }
 
-/// What of the layout is beyond the limits, known before anything is expanded. `bytes` is the size of the file.
+/// Limit that the layout exceeds, found before anything is expanded. `bytes` is the size of the file.
 pub(super) fn beyond(
     cells: &[LayoutCell],
     placements: &[u64],

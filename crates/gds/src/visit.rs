@@ -16,7 +16,7 @@ use super::walk::{Sink, SinkError, Walk};
 use crate::error::Result;
 use metalith_core::{LayerNumber, Progress, Silent};
 
-/// What takes the shapes of a layout.
+/// Consumer of the shapes of a layout.
 pub trait Visitor {
     /// A cell begins whose shapes, up to the next call, stand at `placements`. Small cells without
     /// references are not announced: their shapes come as if drawn in the cells that refer to them.
@@ -42,7 +42,7 @@ pub trait Visitor {
     }
 }
 
-/// What of a layout is visited.
+/// Selection of a layout that is visited.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
     /// Name of the cell to start from; the top cell if there is one only.
@@ -64,7 +64,7 @@ impl Layout {
         self.visit_by(Walk::new(self.limits(), progress), selection, visitor)
     }
 
-    /// As [`Layout::visit`] by the grammar alone.
+    /// Variant of [`Layout::visit`] by the grammar alone.
     #[cfg(test)]
     pub(super) fn visit_slowly<V: Visitor>(
         &self,
@@ -146,7 +146,7 @@ struct InlineShape {
     points: Vec<Point>,
     rect: Option<Rect>,
     circle: Option<Rect>,
-    /// Of all such shapes of the layout.
+    /// Number among all such shapes of the layout.
     number: u32,
 }
 

@@ -11,7 +11,7 @@ use super::shape::Point;
 use crate::error::{Error, LayoutError, Result};
 use metalith_core::{LayerNumber, Progress};
 
-/// What takes the elements of a cell.
+/// Consumer of the elements of a cell.
 pub(super) trait Sink {
     /// A BOUNDARY of five points; most of them are upright squares.
     fn five_points(&mut self, offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError>;
@@ -26,7 +26,7 @@ pub(super) trait Sink {
     fn repeated(&mut self, element: &ElementContent, copies: &Copies<'_>) -> Result<(), SinkError>;
 }
 
-/// Why a sink ends the reading: a cause at the element that it was given, or an error as it is.
+/// Reason why a sink ends the reading: a cause at the element that it was given, or an error as it is.
 pub(super) enum SinkError {
     Here(LayoutError),
     With(Error),
@@ -55,7 +55,7 @@ pub(super) struct Walk<'a> {
     pub limits: &'a ReadLimits,
     pub progress: &'a dyn Progress,
     element: ElementContent,
-    /// Whether [`super::fast`] may be used: tests read with and without.
+    /// True if [`super::fast`] may be used: tests read with and without.
     fast: bool,
     reported: u64,
 }
@@ -126,7 +126,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// As many of the two common elements as follow one another.
+    /// Reads as many of the two common elements as follow one another.
     fn fast_run<S: Sink>(&mut self, input: &mut Input, sink: &mut S) -> Result<()> {
         loop {
             let base = input.offset();

@@ -3,7 +3,7 @@
 use crate::LayerNumber;
 use crate::fast::BOUNDARY_BYTES;
 
-/// Where the points of a BOUNDARY without optional record begin.
+/// Offset at which the points of a BOUNDARY without optional record begin.
 const POINTS: usize = 20;
 
 /// A square on one layer: a BOUNDARY with five points and no optional record.
@@ -11,9 +11,6 @@ const POINTS: usize = 20;
 pub struct SquareRecord([u8; BOUNDARY_BYTES]);
 
 impl SquareRecord {
-    /// Length of the element in the file.
-    pub const BYTES: usize = BOUNDARY_BYTES;
-
     /// The template for squares on a layer.
     pub fn on(layer: LayerNumber) -> Self {
         let mut record = [0; BOUNDARY_BYTES];

@@ -109,8 +109,8 @@ fn fill(
     Ok(contents.checks)
 }
 
-/// The cell of the pillars as drawn that judges, or that stands beside a chip as made: a compensated layout is right when it is
-/// made, not as it is drawn.
+/// The cell of the pillars as drawn that judges, or that stands beside a chip as fabricated: a compensated layout is
+/// right when it is made, not as it is drawn.
 fn judging(options: &HandoffOptions, sources: &Sources) -> Fidelity {
     match &sources.model {
         Some(_) => Fidelity::Rigorous,
@@ -193,7 +193,8 @@ fn seal(files: &Listing, sources: &Sources, options: &HandoffOptions, progress: 
     differ.extend(there.other.iter().map(String::as_str));
     differ.extend(there.empty.iter().map(String::as_str));
     if let Some(first) = differ.first() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "handoff/folder-changed",
             format!("{first} was added or removed while the hand-off was made"),
             "let nothing else write into its folder, and try again",
         ));

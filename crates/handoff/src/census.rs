@@ -110,7 +110,7 @@ impl LayoutStatistics {
 #[derive(Default)]
 struct Counter {
     layers: BTreeMap<LayerNumber, LayerSum>,
-    /// Of the cell that is being visited, in its own coordinates.
+    /// Bounds of the cell that is being visited, in its own coordinates.
     own: BTreeMap<LayerNumber, Rect>,
     placements: Vec<Transform>,
 }

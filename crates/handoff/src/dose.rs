@@ -34,7 +34,8 @@ impl Beam {
                 clock_mhz: clock(shot_step_nm),
             })
             .ok_or_else(|| {
-                Error::invalid(
+                Error::refused(
+                    "handoff/beam-current",
                     format!(
                         "{current_na} nA is too much for a dose of {dose_uc_cm2} uC/cm2 at {} MHz",
                         writer.clock_max_mhz
@@ -71,10 +72,10 @@ pub struct WriteTime {
     pub job_s: f64,
 }
 
-/// How the time of a job is computed, for the page.
+/// Formula of the time of a job, for the page.
 pub(super) const FORMULA: &str =
     "time = dose x area / current  +  shapes x overhead a shape  +  fields x overhead a field  +  overhead of the job";
-/// How step and clock follow from the dose, for the page.
+/// Formulas of step and clock from the dose, for the page.
 pub(super) const DOSE_FORMULA: &str = "dose [uC/cm2] = current [pA] x 100 / (clock [MHz] x step^2 [nm2])";
 
 impl WriteTime {

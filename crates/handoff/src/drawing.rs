@@ -276,7 +276,8 @@ impl Drawing {
     fn write_gds(&self, path: &Path) -> Result<()> {
         let mut bytes = Vec::new();
         self.tree.write(&mut bytes).map_err(|e| {
-            Error::invalid(
+            Error::refused(
+                "layout/encoding",
                 format!("{} cannot be encoded: {e:?}", path.display()),
                 "please report this with the design and the process file",
             )

@@ -50,8 +50,8 @@ pub(super) fn exposures(
     Ok(exposures)
 }
 
-/// How much the pillars of the array change on the shots of each beam, root mean square over all pillars (nm): their widths, or of
-/// rotated rectangles, which have no edges along the shots, the places of their corners.
+/// Change of the pillars of the array on the shots of each beam, root mean square over all pillars (nm): of their
+/// widths, or, for rotated rectangles, which have no edges along the shots, of the places of their corners.
 pub(super) fn snapping(array: &PillarArray, process: &Process) -> Result<Vec<(Beam, f64)>> {
     let mut counts: Vec<u64> = Vec::new();
     let histograms: Vec<_> = array.classes.iter().map(|c| c.widths.histogram()).collect();

@@ -10,10 +10,11 @@ use super::zip;
 use metalith_core::{Error, Result};
 use metalith_design::Design;
 
-/// Whether the process can make the design at all.
+/// Checks that the process can make the design at all.
 pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     if !process.exposes_pillars() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "handoff/tone",
             format!(
                 "with this resist and transfer {}: the pillars of the layout would become holes",
                 process.exposed_becomes()
@@ -23,7 +24,8 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     }
     let film = design.cell.pillar_material.as_str();
     if !process.transfer.etches(film) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "handoff/film-material",
             format!(
                 "the film of the design is \"{film}\", but the process etches {}: {}",
                 process.transfer.films.join(", "),
@@ -36,7 +38,8 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
         process.transfer.reaches(design.cell.pillar_height_nm),
         process.transfer.film_nm,
     ) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "handoff/film-thickness",
             format!(
                 "the film of the design is {} nm thick, but the etch and the rules of {} are for {low} to {high} nm",
                 design.cell.pillar_height_nm, process.name
@@ -46,7 +49,8 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     }
     if process.checks.of_shape(design.cell.shape).is_none() {
         let shapes = design.cell.shape.plural();
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "handoff/no-rules-for-pillars",
             format!("the pillars of the design are {shapes}, and the process has no decks of rules for them"),
             match design.cell.shape.is_square() {
                 true => "add `pillar_rules`, `dose_rules` and `test_rules` to [checks]".to_owned(),
@@ -56,7 +60,8 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     }
     let taken = design.layout.layers.all();
     if let Some((key, layer)) = taken.iter().find(|(_, l)| l.layer == process.dose_matrix.layer) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "handoff/layer-taken",
             format!(
                 "layer {} of the dose matrix is that of `{key}` in the design",
                 layer.layer
@@ -67,8 +72,8 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     Ok(())
 }
 
-/// Whether a hand-off may be put at this place: nothing is there, or an empty folder, or nothing but an older hand-off
-/// with its archive.
+/// Checks that a hand-off may be put at this place: nothing is there, or an empty folder, or nothing but an older
+/// hand-off with its archive.
 ///
 /// # Errors
 /// If something else is there, with the name of the first such file.
@@ -78,7 +83,8 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
         match std::fs::symlink_metadata(path) {
             Ok(found) if (kind == "folder" && found.is_dir()) || (kind == "file" && found.is_file()) => {}
             Ok(_) => {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "handoff/in-the-way",
                     format!("{} is there and is no {kind}", path.display()),
                     hint,
                 ));
@@ -94,7 +100,8 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
     let handed_off = there.as_ref().is_some_and(|t| t.files.contains_key(manifest::NAME));
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     if !handed_off && archive.exists() && !zip::is_packed_here(archive, &name)? {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "handoff/in-the-way",
             format!("{} is there, and is not the archive of a hand-off", archive.display()),
             hint,
         ));
@@ -108,7 +115,8 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
     let strange = there.files.keys().find(|name| !listed(name));
     match strange.or(there.other.first()) {
         None => Ok(()),
-        Some(name) => Err(Error::invalid(
+        Some(name) => Err(Error::refused(
+            "handoff/foreign-file",
             format!("{} holds {name}, which no hand-off put there", folder.display()),
             hint,
         )),

@@ -154,7 +154,7 @@ pub(super) fn write(
     })
 }
 
-/// From the opening over the reference lens to the edge of its chip (nm): rule decks require a margin there.
+/// Distance from the opening over the reference lens to the edge of its chip (nm): rule decks require a margin there.
 const BESIDE_REFERENCE: i64 = 50_000;
 
 /// The design with one hyperbolic lens on a chip of its own, at full size.

@@ -19,7 +19,7 @@ impl Listing {
         }
     }
 
-    /// Where something of the folder lies.
+    /// Path of something in the folder.
     pub fn at(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }

@@ -25,7 +25,7 @@ const BLOCK: usize = 1 << 20;
 #[serde(deny_unknown_fields)]
 pub struct ManifestEntry {
     pub bytes: u64,
-    /// In hexadecimal.
+    /// Digest in hexadecimal.
     pub sha256: String,
 }
 
@@ -41,7 +41,7 @@ pub struct Manifest {
     /// SHA-256 of all inputs that determine the layout.
     pub design_digest: String,
     pub process: String,
-    /// By path in the folder, with `/` between its parts.
+    /// Entries by path in the folder, with `/` between its parts.
     #[serde(deserialize_with = "each_once")]
     pub files: BTreeMap<String, ManifestEntry>,
     /// SHA-256 over all of the above: one number to read out over a telephone.
@@ -128,7 +128,7 @@ impl Manifest {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct HandoffVerification {
     pub manifest: Manifest,
-    /// Whether the seal is that of the contents of the manifest.
+    /// True if the seal is the seal of the contents of the manifest.
     pub seal_holds: bool,
     /// Listed, but not there.
     pub missing: Vec<String>,
@@ -139,7 +139,7 @@ pub struct HandoffVerification {
 }
 
 impl HandoffVerification {
-    /// Whether it is complete and unaltered.
+    /// True if it is complete and unaltered.
     pub fn holds(&self) -> bool {
         self.seal_holds && self.missing.is_empty() && self.altered.is_empty() && self.unknown.is_empty()
     }

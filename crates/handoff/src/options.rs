@@ -22,7 +22,7 @@ pub struct HandoffOptions {
     /// The cell that the layout is judged by, that of the design if left out; the published polynomials are shown beside
     /// it.
     pub fidelity: Option<Fidelity>,
-    /// How closely the layout is simulated.
+    /// Accuracy with which the layout is simulated.
     pub accuracy: Accuracy,
     /// The calibrated model that the layout is compensated for, and judged by, if any.
     pub compensate: Option<PathBuf>,

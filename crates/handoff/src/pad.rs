@@ -23,7 +23,7 @@ const SIZES: [i64; 4] = [-2, -1, 1, 2];
 /// Shortest edge of a rectangle of a pad (nm).
 const SHORTEST: i64 = 20;
 
-/// What is drawn where something is measured.
+/// Drawn size of something that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DrawnSize {
     /// Width, diameter, shorter edge of a rotated rectangle, or edge along x of an upright one (nm).
@@ -70,7 +70,7 @@ pub(super) fn whole_mdeg(deg: f64) -> f64 {
 pub(super) struct PadPillar {
     form: PillarForm,
     number: u16,
-    /// Of rectangles whether the pad is told by its size, not by a number.
+    /// True if a pad of rectangles is identified by its size, not by a number.
     by_size: bool,
 }
 
@@ -119,7 +119,7 @@ impl PadPillar {
         DrawnSize::of(self.form.shape(), self.number)
     }
 
-    /// What stands beside the pad, in digits: its width (nm), its rotation (degrees), or its edges.
+    /// Digits next to the pad: its width (nm), its rotation (degrees), or its edges.
     pub fn digits(&self) -> String {
         let drawn = self.drawn();
         match (drawn.length_nm, drawn.rotation_deg) {

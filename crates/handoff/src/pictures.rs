@@ -88,7 +88,7 @@ fn arrow(plan: &mut Plan, layer: PlanLayer, reach: f64, upright: bool) {
 /// Height of pillars that distances in the cross-section are chosen for (um).
 const DRAWN_HEIGHT_UM: f64 = 0.7;
 
-/// What happens to the film where the first step exposes, and to the metal where the second does.
+/// Figure of tone: what happens to the film where the first step exposes, and to the metal where the second does.
 pub(super) fn tone(design: &Design, process: &Process) -> Figure {
     let mut plan = Plan::new("Tone of both steps, in cross-section").width(900.0);
     let glass = plan.layer("substrate");
@@ -258,7 +258,7 @@ pub(super) fn dose_matrix(
 /// Characters of a name that there is room for in a structure with a width: not those of lines.
 const LONGEST_LABEL: usize = 7;
 
-/// Where each test structure is.
+/// Figure of the place of each test structure.
 pub(super) fn tests(structures: &[Structure], frame: RectNm, border: (i64, i64)) -> Figure {
     let mut plan = Plan::new("Test structures").width(1000.0);
     let edge = plan.outlines("frame");

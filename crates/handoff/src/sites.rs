@@ -24,15 +24,15 @@ type Range<T> = Option<(T, T)>;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetrologySite {
     pub id: String,
-    /// Which file it is in: `pillars` or `tests`.
+    /// File that it is in: `pillars` or `tests`.
     pub file: &'static str,
     /// Element or structure.
     pub place: String,
-    /// On the chip, seen from the pillar side, origin in its middle (um); for test structures from their
-    /// lower left corner.
+    /// Place on the chip, seen from the pillar side, origin in its middle (um); for test structures from their lower
+    /// left corner.
     pub x_um: f64,
     pub y_um: f64,
-    /// From the middle of the element (um).
+    /// Place from the middle of the element (um).
     pub element_x_um: Option<f64>,
     pub element_y_um: Option<f64>,
     #[serde(flatten)]
@@ -105,8 +105,8 @@ pub(super) fn sites(
     sites
 }
 
-/// What to look for: widths in equal steps inside the range, not its ends, where few pillars are (nm); of rectangles the numbers
-/// of a few rotations or sizes.
+/// Pillars to look for: widths in equal steps inside the range, not its ends, where few pillars are (nm); of
+/// rectangles, the numbers of a few rotations or sizes.
 fn targets(design: &Design) -> Vec<u16> {
     if let Some(numbers) = standing_for_all(design, &ROTATIONS_DEG) {
         return numbers;
@@ -144,8 +144,8 @@ fn neighbours(shape: PillarShape, site: &BestSite) -> (Range<u16>, Range<f64>, O
     }
 }
 
-/// How far a width or number is from another; of rotations, of which the last is next to the first, the short way round; of upright
-/// rectangles the edge that differs more.
+/// Distance of a width or number from another: of rotations, the short way round, as the last is next to the first; of
+/// upright rectangles, the difference of the edge that differs more.
 fn from_own(shape: PillarShape, own: u16, other: u16) -> i32 {
     let apart = i32::from(other) - i32::from(own);
     match shape.last() {
@@ -162,8 +162,8 @@ fn from_own(shape: PillarShape, own: u16, other: u16) -> i32 {
     }
 }
 
-/// For each width or rotation and each ring of the lens the site whose neighbours differ least from it; among equals
-/// the one nearest the x axis, where a stage finds it by moving along one axis.
+/// Sites to measure: for each width or rotation and each ring of the lens, the site whose neighbours differ least from
+/// it; among equals the one nearest the x axis, where a stage finds it by moving along one axis.
 fn best_sites(map: &PillarMap, shape: PillarShape, radius_um: f64, targets: &[u16], zones: usize) -> Vec<BestSite> {
     let n = map.lattice.sites();
     let mut best: Vec<Option<(u64, BestSite)>> = (0..targets.len() * zones).map(|_| None).collect();

@@ -26,7 +26,7 @@ pub(super) struct Sources {
     /// The decks of the process, in its order.
     decks: Vec<(PathBuf, Deck)>,
     pub waivers: Option<Waivers>,
-    /// What the layout is compensated for.
+    /// Model that the layout is compensated for.
     pub model: Option<CalibratedModel>,
     kept: Vec<InputCopy>,
 }
@@ -166,7 +166,8 @@ fn read_design(path: &Path) -> Result<(Design, Vec<InputCopy>)> {
     let same_files = files_of(path, &design)? == named;
     for ((path, ..), bytes) in named.iter().zip(&before) {
         if !same_files || read_at_most(path, LONGEST, "an input of a hand-off")? != *bytes {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "file/replaced-meanwhile",
                 format!("{} changed while it was read", path.display()),
                 "try again when nothing writes to it",
             ));

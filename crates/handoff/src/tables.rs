@@ -33,8 +33,8 @@ impl Csv {
     }
 }
 
-/// As RFC 4180 asks: quoted where a comma, quote or line end would be taken for structure. A text that a spreadsheet
-/// would compute as a formula has an apostrophe before it, which makes it a text there.
+/// Cell of a table as RFC 4180 asks: quoted where a comma, quote or line end would be taken for structure. A text that
+/// a spreadsheet would compute as a formula has an apostrophe before it, which makes it a text there.
 fn quoted(cell: &str) -> String {
     let cell = match cell.chars().next() {
         Some('=' | '+' | '-' | '@' | '\t' | '\r') if cell.parse::<f64>().is_err() => format!("'{cell}"),

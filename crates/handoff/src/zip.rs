@@ -34,8 +34,8 @@ struct PackedFile {
     offset: u64,
 }
 
-/// Whether an archive was packed here, with files of a folder of this name: by how its first entry begins. Others date their
-/// entries.
+/// True if this program packed the archive, with files of a folder of this name. The beginning of its first entry
+/// decides: other programs date their entries.
 ///
 /// # Errors
 /// If the file cannot be read.

@@ -1,4 +1,4 @@
-//! What a layout has beside its pillars: polygons and a label, in no format yet.
+//! Shapes of a layout other than its pillars: polygons and a label, in no format yet.
 
 use gds21::GdsElement;
 use metalith_design::{Design, LayoutLayer};
@@ -48,7 +48,7 @@ impl<'a> FixedShapes<'a> {
             .push((&design.layout.layers.label, text, (-x / 2 + inset, -y / 2 + inset)));
     }
 
-    /// As elements of GDSII.
+    /// Shapes as elements of GDSII.
     pub fn gds(&self) -> Vec<GdsElement> {
         let polygons = self
             .polygons

@@ -3,11 +3,11 @@
 use metalith_design::Design;
 use metalith_pillars::{CHORD_ERROR, PillarId, PillarShape};
 
-/// How pillars are drawn: their shape, and how near to a circle polygons are.
+/// Form in which pillars are drawn: their shape, and the tolerance of the polygons of circles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PillarForm {
     shape: PillarShape,
-    /// Of circles (nm).
+    /// Chord error of circles (nm).
     chord_error_nm: f64,
 }
 
@@ -29,18 +29,18 @@ impl PillarForm {
         }
     }
 
-    /// The same chords for pillars of another shape.
+    /// Same chord error for pillars of another shape.
     #[must_use]
     pub fn with_shape(self, shape: PillarShape) -> Self {
         Self { shape, ..self }
     }
 
-    /// What the pillars are.
+    /// Shape of the pillars.
     pub fn shape(&self) -> PillarShape {
         self.shape
     }
 
-    /// Whether a pillar is an upright square, which both formats have a short record for.
+    /// True if a pillar is an upright square, which both formats have a short record for.
     pub fn is_square(&self) -> bool {
         self.shape.is_square()
     }
@@ -50,7 +50,7 @@ impl PillarForm {
         self.shape.corners(PillarId(number), self.chord_error_nm)
     }
 
-    /// How far it reaches from its middle along x and y (nm).
+    /// Reach of a pillar from its middle along x and y (nm).
     pub fn reach(&self, number: u16) -> (i64, i64) {
         self.shape.reach(PillarId(number))
     }

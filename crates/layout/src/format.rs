@@ -1,18 +1,18 @@
-//! In which format a layout is written.
+//! Format in which a layout is written.
 
 use std::path::Path;
 
 /// Format of a layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LayoutFormat {
-    /// What every writer of masks takes.
+    /// GDSII, which every writer of masks takes.
     #[default]
     Gds,
     /// A hundredth of the size.
     Oasis(OasisEncoding),
 }
 
-/// How pillars are encoded in OASIS. All hold the same geometry.
+/// Encoding of pillars in OASIS. All hold the same geometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OasisEncoding {
     /// Strips of 32 columns; in each, one list of places for each width. Cells of which outlines take less than two thirds of
@@ -26,7 +26,7 @@ pub enum OasisEncoding {
 }
 
 impl LayoutFormat {
-    /// How names of its files end.
+    /// Extension of the names of its files.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Gds => "gds",

@@ -12,14 +12,14 @@ use metalith_design::array::PillarArray;
 use metalith_design::{Hierarchy, LayoutLayer};
 use metalith_pillars::PillarShape;
 
-/// What a layout needs beside its pillars.
+/// Contents of a layout other than its pillars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FreeLayout<'a> {
     /// Name of the top cell: letters, digits and `_`.
     pub top: &'a str,
-    /// Of the pillars.
+    /// Layer of the pillars.
     pub layer: LayerNumber,
-    /// What the pillars are.
+    /// Shape of the pillars.
     pub shape: PillarShape,
 }
 
@@ -36,14 +36,21 @@ pub fn write_free(
     progress: &dyn Progress,
 ) -> Result<Written> {
     if !free.shape.has_width() && array.shape != free.shape {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "layout/rectangles-without-design",
             "rectangles without a design",
             "write squares or circles, or give a design with `shape = \"rectangle\"` or `\"upright_rectangle\"`",
         ));
     }
     let number = |n: u16| {
         let hint = format!("layers and datatypes go to {}", i16::MAX);
-        i16::try_from(n).map_err(|_| Error::invalid(format!("there is no layer {}", free.layer), hint))
+        i16::try_from(n).map_err(|_| {
+            Error::refused(
+                "layout/unknown-layer",
+                format!("there is no layer {}", free.layer),
+                hint,
+            )
+        })
     };
     let layer = LayoutLayer {
         layer: number(free.layer.layer)?,

@@ -1,4 +1,5 @@
-//! From pillars to the bytes that a cleanroom writes, GDSII or OASIS, streamed, and back to the pillars of a design.
+//! Layouts: pillars written as the bytes that a cleanroom takes, GDSII or OASIS, streamed, and read back as the pillars
+//! of a design.
 //!
 //! In GDSII gds21 builds and encodes the library, the cells, references, marks and labels; the pillars, of which
 //! there are millions, are records of our own between the bytes that it made. In OASIS all is written by
@@ -43,7 +44,7 @@ pub struct Written {
     pub bytes: u64,
     /// Name of its top cell.
     pub top_cell: String,
-    /// What a person should know of how it was written, such as why nothing was folded.
+    /// Remarks for people on how it was written, such as why nothing was folded.
     pub remarks: Vec<String>,
     /// Further files that belong to it: one for each further layer, where a file may have one only.
     pub beside: Vec<PathBuf>,
@@ -94,15 +95,15 @@ pub fn write_apertures_as(design: &Design, format: LayoutFormat, path: &Path) ->
     }
 }
 
-/// What an array of pillars is written as, in any format.
+/// Form in which an array of pillars is written, in any format.
 struct PillarLayout<'a> {
     /// Name of the top cell.
     top: String,
-    /// Of all cells, where the format has a date.
+    /// Date of all cells, where the format has a date.
     date: NaiveDateTime,
     layer: &'a LayoutLayer,
     form: PillarForm,
-    /// What the top cell has beside the pillars.
+    /// Shapes of the top cell other than the pillars.
     fixed: FixedShapes<'a>,
 }
 
@@ -163,13 +164,13 @@ impl<'a> PillarLayout<'a> {
     }
 }
 
-/// What a person should know if nothing could be copied.
+/// Remark for people if nothing could be copied.
 fn no_copies(array: &PillarArray) -> Option<String> {
     (array.placed.len() == array.classes.len() && array.placed.len() > 1)
         .then(|| "no two elements are copies of one another: each is written by itself".into())
 }
 
-/// What a person should know of a class that has no symmetry.
+/// Remark for people on a class that has no symmetry.
 fn no_symmetry(array: &PillarArray, class: usize) -> Option<String> {
     let first = array.first_of(class)?;
     (array.classes[class].group.members().len() == 1).then(|| {
@@ -204,7 +205,8 @@ fn top_cell(design: &Design) -> String {
     if is_of_a_part(&name) { name + "_TOP" } else { name }
 }
 
-/// Whether a cell of an element, of its parts or of its pillars may have this name: `E0`, `LENS0`, `LENS0_A`, `W120`, `R17`.
+/// True if a cell of an element, of its parts or of its pillars may have this name: `E0`, `LENS0`, `LENS0_A`, `W120`,
+/// `R17`.
 fn is_of_a_part(name: &str) -> bool {
     let lens = name.strip_prefix("LENS").map(|rest| match rest.split_once('_') {
         Some((number, letter)) if letter.len() == 1 => number,
@@ -235,9 +237,10 @@ fn polygon(layer: &LayoutLayer, corners: &[(i64, i64)]) -> GdsElement {
     .into()
 }
 
-/// What gds21 refuses to encode would be a mistake of ours; it is reported, not hidden.
+/// Error for what gds21 refuses to encode: a mistake of this program, which is reported, not hidden.
 fn encoding(error: impl std::fmt::Debug) -> Error {
-    Error::invalid(
+    Error::refused(
+        "layout/encoding",
         format!("the layout cannot be encoded: {error:?}"),
         "please report this with the design file",
     )

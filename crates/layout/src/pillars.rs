@@ -33,7 +33,7 @@ pub(super) struct PillarWriter<'a> {
     bytes: u64,
     /// References of the top cell, in the order of the elements.
     placed: Vec<GdsElement>,
-    /// What blocks are encoded into: memory that is asked for once.
+    /// Buffers into which blocks are encoded, allocated once.
     buffers: [Vec<u8>; BLOCKS],
 }
 
@@ -44,7 +44,7 @@ struct PlacedPillar {
     width: u16,
 }
 
-/// What is written for a pillar.
+/// Bytes that are written for a pillar.
 enum Template {
     Square(SquareRecord),
     Polygons(ByWidth<PolygonRecord>),

@@ -7,7 +7,8 @@ use metalith_design::Design;
 use metalith_gds::extract::{Extraction, ExtractionPlan, extract, fits};
 use metalith_gds::{Layout, ReadLimits};
 
-/// What is read of a layout of this design: its elements, in the order of [`Design::elements`], and its pillars.
+/// Plan of what is read of a layout of this design: its elements, in the order of [`Design::elements`], and its
+/// pillars.
 pub fn extraction_plan(design: &Design) -> ExtractionPlan {
     ExtractionPlan::given(design.layout.layers.pillars.number(), design.sites()).of_shape(design.cell.shape)
 }

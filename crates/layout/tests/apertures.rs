@@ -54,8 +54,8 @@ fn of(elements: &str) -> metalith_core::Result<Design> {
     Design::parse(&design("hologram"), &text(elements))
 }
 
-/// Whether a place from the middle of an element is in its aperture, by what shapes are, not by polygons (nm); a place within a
-/// nanometre of the rim of the hexagon, whose corners are on no grid, may be either.
+/// Place of a point relative to the aperture of an element, from its middle and by the shapes, not by polygons (nm):
+/// true inside; a place within a nanometre of the rim of the hexagon, whose corners are on no grid, may be either.
 fn inside(element: usize, x: i64, y: i64) -> Option<bool> {
     let within = |a: i64, b: i64, c: i64, d: i64| (a..=b).contains(&x) && (c..=d).contains(&y);
     match element {

@@ -44,8 +44,8 @@ fn golden_bytes_of_the_mini_design() {
     golden("mini_3x3/apertures.gds.gz", &fs::read(apertures).unwrap());
 }
 
-/// What a folded layout of a design is, in number: its digest and how many pillars have each width, or of rectangles each
-/// number of a rotation.
+/// Record of a folded layout of a design, in numbers: its digest, and the number of pillars of each width or, of
+/// rectangles, of each number of a rotation.
 fn record(name: &str, folder: &Path) -> serde_json::Value {
     let design = Design::read(&design(name)).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
@@ -293,7 +293,7 @@ fn count_oasis(bytes: &[u8]) -> u64 {
     }
 }
 
-/// For each cell its squares, and cells below it with their number.
+/// Number of squares of each cell, and cells below it with their number.
 type CellCounts = BTreeMap<u64, (u64, Vec<(u64, u64)>)>;
 
 fn squares_below(cells: &CellCounts, cell: u64) -> u64 {
@@ -301,7 +301,8 @@ fn squares_below(cells: &CellCounts, cell: u64) -> u64 {
     squares + below.iter().map(|(c, n)| n * squares_below(cells, *c)).sum::<u64>()
 }
 
-/// From one format into the other and back: the same geometry, cell by cell, of layouts of this program and of others.
+/// Round trip from one format into the other: the same geometry, cell by cell, of layouts of this program and of
+/// others.
 #[test]
 fn converted_layouts_are_the_same_geometry() {
     let folder = tempfile::tempdir().unwrap();

@@ -98,8 +98,8 @@ fn each_pillar_is_read_back_as_one_of_its_element() {
     }
 }
 
-/// Elements that are found have the ends that they are found with, so that strips whose squares overlap are told apart without the
-/// design.
+/// Elements that are found have the ends that they are found with, so that strips whose squares overlap are
+/// distinguished without the design.
 #[test]
 fn strips_are_found_without_the_design() {
     let text = std::fs::read_to_string(design("hologram")).unwrap();

@@ -1,8 +1,8 @@
-//! What can go wrong in reading and writing OASIS: causes with numbers and places, and for each a remedy.
+//! Errors of reading and writing OASIS: causes with numbers and places, and for each a remedy.
 
 use crate::record;
 
-/// Why a layout could not be read or written.
+/// Reason why a layout could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OasisError {
@@ -26,7 +26,7 @@ fn inside(inner: Option<u64>) -> String {
     inner.map_or_else(String::new, |inner| format!(", byte {inner} of the CBLOCK there"))
 }
 
-/// What is wrong at a place of a layout.
+/// Fault at a place of a layout.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OasisFault {
@@ -109,7 +109,7 @@ pub enum OasisFault {
     Limit { limit: OasisLimit, found: u64, most: u64 },
 }
 
-/// Which of [`crate::OasisLimits`].
+/// Limit of [`crate::OasisLimits`] that was exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OasisLimit {
@@ -142,7 +142,7 @@ const REWRITE: &str = "the file is damaged: write or copy it again";
 const REPORT: &str = "the tool that wrote this file breaks the format: report it there";
 
 impl OasisFault {
-    /// What to do about it.
+    /// Remedy for the error.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NoMagic => "is this an OASIS file? It begins with %SEMI-OASIS",

@@ -1,4 +1,4 @@
-//! What keeps reading bounded, whatever the bytes say.
+//! Limits that keep reading bounded, whatever the bytes say.
 
 /// Limits of one reading. A thousand bytes can describe a list of a million places; past a limit reading ends with
 /// an error that says which.

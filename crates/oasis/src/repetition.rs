@@ -2,7 +2,7 @@
 
 use crate::number::{put_step, put_unsigned};
 
-/// Where the copies of an element stand, from the first.
+/// Places of the copies of an element, from the first.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Repetition {
     /// `count[0]` x `count[1]` copies, `step[0]` and `step[1]` apart (grid steps). The first count is at least 2.

@@ -66,7 +66,7 @@ fn fault_of(records: &[u8]) -> (u64, OasisFault) {
 
 /// Layer 1/0, 10 x 10 at the origin; the rest from what follows.
 const SQUARE: &[u8] = &[20, 0xDB, 1, 0, 10, 0, 0];
-/// The same with a repetition, whose bytes follow.
+/// Record of a square with a repetition, whose bytes follow.
 const SQUARES: &[u8] = &[20, 0xDF, 1, 0, 10, 0, 0];
 
 fn corner_places(repetition: &[u8]) -> Vec<[i64; 2]> {

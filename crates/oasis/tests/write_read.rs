@@ -1,4 +1,4 @@
-//! What is written is what is read, record by record.
+//! Round trips: each record that is written is read back equal.
 
 use std::io::Cursor;
 

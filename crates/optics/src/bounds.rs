@@ -1,4 +1,4 @@
-//! What the numbers of a perturbation must lie within.
+//! Bounds of the numbers of a perturbation.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -15,15 +15,15 @@ const MOST_TERMS: usize = 36;
 /// A number of a perturbation that cannot be.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PerturbationFault {
-    /// Where it is, from the perturbation on: `geometry.cd_bias_nm`, `path.tilt_mrad.1` for the second of a list.
+    /// Path of the value, from the perturbation on: `geometry.cd_bias_nm`, `path.tilt_mrad.1` for the second of a list.
     pub key: String,
-    /// What is wrong, without the place.
+    /// Fault, without the place.
     pub what: String,
-    /// What can be.
+    /// Hint on which values are allowed.
     pub hint: String,
 }
 
-/// In one line, with the place.
+/// Text of the fault in one line, with the place.
 impl fmt::Display for PerturbationFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "`{}`: {}; {}", self.key, self.what, self.hint)

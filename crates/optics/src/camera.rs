@@ -1,4 +1,4 @@
-//! What the camera of a perturbation makes of a PSF: declared kernels, a Gaussian blur, and a veil.
+//! Effect of the camera of a perturbation on a PSF: declared kernels, a Gaussian blur, and stray light.
 
 mod kernels;
 
@@ -15,7 +15,8 @@ use super::declared::compiled;
 use metalith_wave::Psf;
 
 impl CameraChange {
-    /// What declared kernels make of images of `rows` x `cols` samples `step_um` apart; none where none is declared.
+    /// Filter of the declared kernels for images of `rows` x `cols` samples `step_um` apart; `None` where none is
+    /// declared.
     pub fn kernels(&self, (rows, cols): (usize, usize), step_um: f64) -> Option<KernelFilter> {
         let terms = compiled(&self.declared, |_| true);
         (!terms.is_empty()).then(|| KernelFilter::new(&terms, [rows, cols], step_um))

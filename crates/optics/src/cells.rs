@@ -9,7 +9,9 @@ use rayon::prelude::*;
 use super::CellChange;
 use super::bank::CellBank;
 use super::stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
-use metalith_cell::{BAND_ORDERS, CellStack, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, POLARISATION_SHARE, dark};
+use metalith_cell::{
+    BAND_ORDERS, CellStack, Illumination, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, POLARISATION_SHARE, dark,
+};
 use metalith_core::{Error, Progress, Result};
 use metalith_rcwa::Orders;
 
@@ -17,18 +19,18 @@ use metalith_rcwa::Orders;
 /// four neighbours, or solved themselves where that is not good enough: near resonances and cutoffs.
 pub const NODE_STEP_NM: f64 = 0.5;
 
-/// Where a node is farther than this from the cubic through its four neighbours, transmission is not smooth: a
-/// guided-mode resonance or a cutoff is near, and widths beside the node are solved themselves. Between other nodes
-/// a cubic errs by about a sixteenth of it.
+/// Distance of a node from the cubic through its four neighbours above which transmission is not smooth: a guided-mode
+/// resonance or a cutoff is near, and widths next to the node are solved individually. Between other nodes a cubic errs
+/// by about a sixteenth of it.
 const ROUGH: f64 = 0.01;
 
 /// A width this near to a node is that node [steps].
 const ON_NODE: f64 = 1e-6;
 
-/// The same four times for light along the normal; else s into s, p into p, s into p and p into s.
+/// Transmissions from s into s, p into p, s into p and p into s; for light along the normal, four equal ones.
 type Polarised = [Complex64; 4];
 
-/// What is solved of a cell.
+/// Quantity of a cell that is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 enum Solve {
     /// A site without pillar.
@@ -49,36 +51,37 @@ pub struct RealisedCells {
     /// under a bias common to all are solved exactly at their width.
     offset_nm: f64,
     known: Mutex<HashMap<(WaveKey, Solve), Polarised>>,
-    /// Where transmissions are taken from instead of being solved.
+    /// Bank from which transmissions are taken instead of being solved.
     bank: Option<(Arc<CellBank>, CellChange)>,
     /// The cells at the rim of a lens, where they differ from these in its middle, and how much higher they are (nm).
     rim: Option<(Box<Self>, f64)>,
 }
 
-/// What sites of some widths transmit: one table for light along the normal; else one for each polarisation that is
+/// Transmission of sites of some widths: one table for light along the normal; else one for each polarisation that is
 /// kept (s, p), and one for each that is turned into the other where the direction is in no plane of symmetry of the
-/// cell. See [`super::AsBuiltOptics::share`].
+/// cell. See [`super::IncoherentFields::weight`].
 pub struct SolvedWidths {
-    /// In the order of the widths that were asked for.
+    /// Transmissions in the order of the widths that were asked for.
     pub pillars: Vec<Vec<Complex64>>,
-    /// Of a site without pillar, for each table.
+    /// Transmission of a site without pillar, for each table.
     pub bare: Vec<Complex64>,
-    /// Of light that passes a site as it is, for each table: what is left of it in the light of that table.
+    /// Amplitude of light that passes a site unmodulated in the light of each table.
     pub unseen: Vec<Complex64>,
-    /// Of the light that arrives, what the light of each table is a part of. What leaves by different tables does not interfere.
+    /// Share of the light that arrives of which the light of each table is a part. What leaves by different tables does
+    /// not interfere.
     pub share: f64,
-    /// The same at the rim of a lens, to the tops of the pillars in its middle; none where it is alike.
+    /// Transmissions at the rim of a lens, to the tops of the pillars in its middle; `None` where they are equal.
     pub rim: Option<Box<Self>>,
 }
 
 impl SolvedWidths {
-    /// Of light that is not polarised, what arrives for each of so many tables: one table is for either polarisation alike.
+    /// Share of unpolarised light that arrives for each of so many tables: one table is for both polarisations.
     pub fn share_of(tables: usize) -> f64 {
         if tables == 1 { 1.0 } else { POLARISATION_SHARE }
     }
 }
 
-/// Where a width lies among the nodes.
+/// Place of a width among the nodes.
 #[derive(Clone, Copy)]
 enum Among {
     On(i64),
@@ -139,11 +142,12 @@ impl RealisedCells {
         }
     }
 
-    /// That a bank has no answer.
+    /// Error that a bank has no answer.
     pub(super) fn along_normal_alone() -> Error {
-        Error::invalid(
+        Error::refused(
+            "study/oblique",
             "tables of cells are for light along the normal",
-            "leave out `incidence = \"as_lit\"`",
+            "leave out `incidence = \"oblique\"`",
         )
     }
 
@@ -152,50 +156,17 @@ impl RealisedCells {
         &self.stack
     }
 
-    /// Transmission of pillars of these widths (nm), zero-order, as `CellModel::transmissions` has it; and as
-    /// `CellModel::oblique` has it where `sines` are not zero: those of the direction in air along x and y.
-    /// Widths that no pillar can have are those of the nearest that can be.
+    /// Transmission of pillars of these widths (nm), zero-order, as [`metalith_cell::PointwiseCell`] has it, along the normal or in
+    /// oblique light. Widths that no pillar can have are those of the nearest that can be.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn solve(
-        &self,
-        widths_nm: &[f64],
-        wavelength_um: f64,
-        sines: [f64; 2],
-        progress: &dyn Progress,
-    ) -> Result<SolvedWidths> {
-        let orders = if sines == [0.0; 2] { ORDERS } else { OBLIQUE_ORDERS };
-        self.solve_with(orders, widths_nm, wavelength_um, sines, progress)
-    }
-
-    /// The same for one of many wavelengths that a band is averaged over, as `CellModel::transmissions_in_band`.
-    ///
-    /// # Errors
-    /// As [`RealisedCells::solve`].
-    pub fn solve_in_band(
-        &self,
-        widths_nm: &[f64],
-        wavelength_um: f64,
-        sines: [f64; 2],
-        progress: &dyn Progress,
-    ) -> Result<SolvedWidths> {
-        let orders = if sines == [0.0; 2] {
-            BAND_ORDERS
-        } else {
-            OBLIQUE_BAND_ORDERS
+    pub fn solve(&self, widths_nm: &[f64], light: &Illumination<'_>, progress: &dyn Progress) -> Result<SolvedWidths> {
+        let (wavelength_um, sines) = (light.wavelength_um, light.cell_sines());
+        let orders = match sines == [0.0; 2] {
+            true => light.spectral.choose(ORDERS, BAND_ORDERS),
+            false => light.spectral.choose(OBLIQUE_ORDERS, OBLIQUE_BAND_ORDERS),
         };
-        self.solve_with(orders, widths_nm, wavelength_um, sines, progress)
-    }
-
-    fn solve_with(
-        &self,
-        orders: usize,
-        widths_nm: &[f64],
-        wavelength_um: f64,
-        sines: [f64; 2],
-        progress: &dyn Progress,
-    ) -> Result<SolvedWidths> {
         let (mut solved, columns) = self.solve_columns(orders, widths_nm, wavelength_um, sines, None, progress)?;
         if let Some((cells, higher_nm)) = &self.rim {
             let asked = Some(columns.as_slice());
@@ -316,7 +287,7 @@ impl RealisedCells {
     }
 }
 
-/// Whether a node is off the cubic through its four neighbours, for any polarisation.
+/// True if a node is off the cubic through its four neighbours, for any polarisation.
 fn rough(node: i64, at: &impl Fn(i64) -> Polarised) -> bool {
     let [a, b, c, d, e] = [-2, -1, 0, 1, 2].map(|k| at(node + k));
     (0..4).any(|p| ((b[p] + d[p]) * (2.0 / 3.0) - (a[p] + e[p]) / 6.0 - c[p]).norm() > ROUGH)
@@ -342,7 +313,7 @@ mod tests {
         for um in [0.455, 0.53, 0.66] {
             // Halfway between nodes, where a cubic errs most.
             let widths: Vec<f64> = (0..67).map(|k| 100.0 + 3.0 * f64::from(k)).collect();
-            let solved = cells.solve(&widths, um, [0.0; 2], &Silent).unwrap();
+            let solved = cells.solve(&widths, &Illumination::normal(um), &Silent).unwrap();
             for (w, t) in widths.iter().zip(&solved.pillars[0]) {
                 let error = (stack.transmission(*w, um, orders).unwrap() - t).norm();
                 squares += error * error;
@@ -362,7 +333,7 @@ mod tests {
         let orders = Orders::new(ORDERS).unwrap();
         let cells = RealisedCells::new(stack.clone(), -9.3);
         let widths = [150.0 - 9.3, 152.0 - 9.3];
-        let solved = cells.solve(&widths, 0.53, [0.0; 2], &Silent).unwrap();
+        let solved = cells.solve(&widths, &Illumination::normal(0.53), &Silent).unwrap();
         // Widths agree to rounding, and a transmission's slope is below one a nanometre.
         const ROUNDING: f64 = 1e-12;
         for (w, t) in widths.iter().zip(&solved.pillars[0]) {

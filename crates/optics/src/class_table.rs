@@ -1,4 +1,4 @@
-//! What the sites of an element transmit in one light, those that are alike by one number.
+//! Transmission of the sites of an element in one light, equal sites by one number.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use metalith_wave::Aperture;
 
-/// What the sites of each class transmit at one wavelength and polarisation.
+/// Transmission of the sites of each class at one wavelength and polarisation.
 #[derive(Clone, Debug)]
 pub struct ClassTable {
     /// Field ratio, foot to top of the pillars; zero for class zero. Of pillars that differ over the lens, in its middle.
@@ -25,7 +25,7 @@ pub struct ClassTable {
 const STEPS: u16 = 127;
 
 impl ClassTable {
-    /// Of classes of widths.
+    /// Table of classes of widths.
     pub(super) fn of_widths(t: Vec<Complex32>, scattered: f64) -> Self {
         Self {
             t,
@@ -35,8 +35,8 @@ impl ClassTable {
         }
     }
 
-    /// Of an element whose sites transmit as an aperture says, each by itself, rounded to 127 steps of its real and imaginary part. Sites that pass nothing
-    /// pass nothing after it.
+    /// Table of an element whose sites transmit as an aperture says, each individually, rounded to 127 steps of its
+    /// real and imaginary part. Sites that pass nothing pass nothing after it.
     pub fn of_sites(aperture: &dyn Aperture) -> Self {
         let n = aperture.lattice().sites();
         let row = |iy: usize| {
@@ -70,7 +70,7 @@ impl ClassTable {
         self.sites.as_deref().unwrap_or(by_width)
     }
 
-    /// What all sites of an element that has these classes by width transmit together.
+    /// Sum of the transmissions of all sites of an element that has these classes by width.
     pub fn sum(&self, by_width: &[u16]) -> Complex64 {
         let mut counts = vec![0u32; self.t.len()];
         for class in self.classes(by_width) {
@@ -88,7 +88,7 @@ impl ClassTable {
             .sum()
     }
 
-    /// The same sites with all light multiplied by this.
+    /// Same sites with all light multiplied by this.
     #[must_use]
     pub fn scaled(mut self, by: f32) -> Self {
         self.t.iter_mut().for_each(|t| *t *= by);

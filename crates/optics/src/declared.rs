@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use super::expression::{Expression, ExpressionFault, Input};
 use metalith_pillars::Lattice;
 
-/// What an expression stands for.
+/// Quantity that an expression stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DeclaredQuantity {
@@ -38,7 +38,7 @@ pub enum DeclaredQuantity {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DeclaredTerm {
-    /// Of the effect that it belongs to.
+    /// Name of the effect that it belongs to.
     pub name: String,
     pub quantity: DeclaredQuantity,
     pub expression: String,
@@ -81,7 +81,7 @@ impl DeclaredQuantity {
         }
     }
 
-    /// Whether it acts on the light that leaves each site.
+    /// True if it acts on the light that leaves each site.
     pub fn is_pupil(self) -> bool {
         matches!(self, Self::OpdNm | Self::PhaseRad | Self::Amplitude)
     }
@@ -124,12 +124,12 @@ impl CompiledTerm {
         out.iter_mut().for_each(|v| *v = finite(*v));
     }
 
-    /// Whether it differs from one wavelength to another.
+    /// True if it differs from one wavelength to another.
     pub fn depends_on_wavelength(&self) -> bool {
         self.uses("wavelength")
     }
 
-    /// Whether it depends on a variable.
+    /// True if it depends on a variable.
     pub fn uses(&self, variable: &str) -> bool {
         let place = self.quantity.variables().iter().position(|v| *v == variable);
         place.is_some_and(|place| self.expression.uses(place))

@@ -1,4 +1,4 @@
-//! How much is exposed around a pillar.
+//! Density: area that is exposed around a pillar.
 
 use metalith_pillars::{PillarId, PillarMap, PillarShape};
 use rayon::prelude::*;

@@ -13,7 +13,7 @@ use super::expression::Input;
 use super::pupil::PupilTerms;
 use super::shifted_aperture::ShiftedAperture;
 use super::stitching::displace;
-use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, RectangleClass, density, zernike};
+use super::{ArrivingLight, GeometryChange, NODE_STEP_NM, RectangleClass, SolvedWidths, density, zernike};
 use metalith_core::{Error, Result};
 use metalith_pillars::{Lattice, PillarMap, PillarShape};
 use metalith_wave::Aperture;
@@ -49,13 +49,13 @@ impl<'a> DrawnElement<'a> {
         }
     }
 
-    /// The same with its centre at a place on the chip (um), instead of on the chip's axis.
+    /// Same element with its centre at a place on the chip (um), instead of on the chip's axis.
     #[must_use]
     pub fn placed(self, centre_um: [f64; 2]) -> Self {
         Self { centre_um, ..self }
     }
 
-    /// The same of pillars of another shape: how much of the area they fill depends on it.
+    /// Same element with pillars of another shape, on which the area that they fill depends.
     #[must_use]
     pub fn of_shape(self, shape: PillarShape) -> Self {
         Self { shape, ..self }
@@ -81,7 +81,7 @@ impl<'a> DrawnElement<'a> {
         geometry.cd_bias_nm + own[site % n]
     }
 
-    /// What density and declared terms add to the widths of a row (nm).
+    /// Width that density and declared terms add to a row (nm).
     fn added_nm(&self, iy: usize, geometry: &GeometryChange, terms: &[CompiledTerm]) -> Vec<f64> {
         let lattice = self.pillars.lattice;
         let n = lattice.sites();
@@ -118,8 +118,8 @@ impl<'a> DrawnElement<'a> {
 }
 
 impl DrawnElement<'_> {
-    /// What density and declared terms add to the widths, mean over the pillars and rounded to the next node of the
-    /// cells, in steps of [`BIAS_STEP_NM`]: for accounts that know drawn widths but no places.
+    /// Width that density and declared terms add, mean over the pillars and rounded to the next node of the cells, in
+    /// steps of [`BIAS_STEP_NM`]: for accounts that know drawn widths but no places.
     pub fn mean_site_steps(&self, geometry: &GeometryChange) -> i32 {
         let Some(steps) = self.site_steps(geometry) else {
             return 0;
@@ -161,7 +161,7 @@ pub struct AsBuiltElement {
     class: Vec<u16>,
     /// Width of each class (nm), of rectangles what their edges are off by, zero without pillar; that of class zero is of no use.
     width_nm: Vec<f64>,
-    /// Of rectangles each class, that of class zero of no use; else nothing.
+    /// Classes of rectangles, the class of number zero unused; empty for other pillars.
     rectangle: Vec<RectangleClass>,
     /// Sites in each class.
     count: Vec<u32>,
@@ -175,9 +175,9 @@ impl AsBuiltElement {
     /// Most memory that a site takes (bytes): class, path, phase and amplitude, and while it is made the steps of its width.
     pub const MOST_BYTES_PER_SITE: usize = 2 + 3 * 4 + 4;
 
-    /// What a change of pillars and apertures makes of an element. Each site has the width of its pillar, biased
-    /// and by the density around it; what the shifted aperture covers is blocked. Light through the
-    /// crescent that opens on the other side meets no pillar, is not focused, and is left out.
+    /// Element after a change of pillars and apertures. Each site has the width of its pillar, biased and by the
+    /// density around it; what the shifted aperture covers is blocked. Light through the crescent that opens on the
+    /// other side meets no pillar, is not focused, and is left out.
     ///
     /// # Errors
     /// If the widths fall into more classes than can be numbered.
@@ -252,7 +252,7 @@ impl AsBuiltElement {
         })
     }
 
-    /// The same with the missing pillars gone from random places instead of counted with their mean.
+    /// Same element with the missing pillars gone from random places instead of counted with their mean.
     #[must_use]
     pub fn with_pillars_removed(mut self, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -271,7 +271,7 @@ impl AsBuiltElement {
         self
     }
 
-    /// Where the sites are.
+    /// Lattice of the sites.
     pub fn lattice(&self) -> Lattice {
         self.lattice
     }
@@ -291,7 +291,7 @@ impl AsBuiltElement {
         &self.class
     }
 
-    /// Of rectangles each class, from the first open one on; of others nothing.
+    /// Classes of rectangles, from the first open one on; empty for other pillars.
     pub fn rectangles(&self) -> &[RectangleClass] {
         self.rectangle.get(1..).unwrap_or_default()
     }
@@ -301,15 +301,16 @@ impl AsBuiltElement {
         &self.width_nm[1..]
     }
 
-    /// What each class transmits, of a pillar of some width (nm) and of a site without one: missing pillars
-    /// mixed in, and the light that sees no pillar added.
+    /// Transmission of each class, from a pillar of some width (nm) and from a site without one: missing pillars mixed
+    /// in, and unmodulated light added.
     pub fn table(&self, pillar: impl Fn(f64) -> Complex64, bare: Complex64) -> ClassTable {
         let of = |width: f64| if width > 0.0 { pillar(width) } else { bare };
         let open: Vec<Complex64> = self.widths_nm().iter().map(|w| of(*w)).collect();
         self.table_of(&open, bare, Complex64::ONE)
     }
 
-    /// The same of a table that is looked up by what is drawn: by the nearest width (nm), or by the number of a rectangle.
+    /// Transmission of each class from a table by what is drawn: by the nearest width (nm), or by the number of a
+    /// rectangle.
     pub fn table_by_number(&self, table: &[Complex64], bare: Complex64) -> ClassTable {
         let at = |k: usize| table.get(k).copied().unwrap_or_default();
         if self.rectangles().is_empty() {
@@ -324,8 +325,8 @@ impl AsBuiltElement {
         self.table_of(&open, bare, Complex64::ONE)
     }
 
-    /// The same from the transmission of each class, in the order of [`AsBuiltElement::widths_nm`]; `unseen`: what the light of this table
-    /// has of light that sees no pillar.
+    /// Transmission of each class from the values of pillars, in the order of [`AsBuiltElement::widths_nm`]; `unseen`:
+    /// the part of unmodulated light in the light of this table.
     ///
     /// # Panics
     /// If there is not one value for each of them.
@@ -345,6 +346,22 @@ impl AsBuiltElement {
         ClassTable::of_widths(t, self.missing * (1.0 - self.missing) * scattered)
     }
 
+    /// A table for each polarisation that was solved for the classes, to the rim of the lens where it differs there.
+    pub(crate) fn tables_of(&self, solved: &SolvedWidths) -> Vec<ClassTable> {
+        let tables = |solved: &SolvedWidths| -> Vec<ClassTable> {
+            let polarisations = solved.pillars.iter().zip(&solved.bare).zip(&solved.unseen);
+            polarisations
+                .map(|((t, bare), unseen)| self.table_of(t, *bare, *unseen))
+                .collect()
+        };
+        let mut own = tables(solved);
+        if let Some(rim) = &solved.rim {
+            let pairs = own.iter_mut().zip(tables(rim));
+            pairs.for_each(|(table, rim)| table.set_rim(&rim));
+        }
+        own
+    }
+
     /// The element as an aperture at one wavelength (um), without the wave that arrives.
     pub fn aperture<'a>(&'a self, table: &'a ClassTable, wavelength_um: f64) -> MadeAperture<'a> {
         MadeAperture {
@@ -355,7 +372,7 @@ impl AsBuiltElement {
         }
     }
 
-    /// The same with the curvature of the wave that arrives, for propagators that know plane waves alone.
+    /// Aperture with the curvature of the wave that arrives, for propagators that know plane waves alone.
     pub fn lit_aperture<'a>(&'a self, table: &'a ClassTable, light: &ArrivingLight) -> MadeAperture<'a> {
         MadeAperture {
             sphere: light.sphere(self.lattice),
@@ -364,7 +381,7 @@ impl AsBuiltElement {
     }
 }
 
-/// What stands at a site on the mean: a pillar, or with the share `missing` none; and the light that sees neither, times `unseen`.
+/// Mean transmission of a site: a pillar, or with the share `missing` none; and unmodulated light, times `unseen`.
 pub fn mixed(
     geometry: &GeometryChange,
     missing: f64,
@@ -379,7 +396,8 @@ pub fn mixed(
 const MOST_CLASS: u16 = u16::MAX - 1;
 
 fn too_many() -> Error {
-    Error::invalid(
+    Error::refused(
+        "model/too-many-widths",
         format!("widths as made fall into more than {MOST_CLASS} classes of {BIAS_STEP_NM} nm"),
         "lower `cd_bias_density_nm` of the model, or draw fewer widths",
     )

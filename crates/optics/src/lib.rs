@@ -1,11 +1,37 @@
-//! The chip as made: what a measured line and bench make of a drawn layout, for every command in one place.
+//! An element in light, whatever it is simulated as: pillars as drawn, or the chip as a measured process and bench make it.
+//!
+//! # The question: a light
+//!
+//! An [`Illumination`](metalith_cell::Illumination) is a wavelength, the direction that light arrives from, the polarisation of source
+//! and analyser, whether cells are solved along the normal or for that direction, and whether the wavelength is reported itself or one
+//! of many of a band.
+//!
+//! # The answer of a pillar: a cell model
+//!
+//! A [`CellModel`](metalith_cell::CellModel) answers with a [`CellResponse`](metalith_cell::CellResponse): one transmission for each
+//! width or number (`Scalar`), tables by polarisation (`Jones`), or by the pillar and its neighbours (`Neighbours`). A new model is one
+//! implementation of `CellModel::response`; nothing here or above is changed for it.
+//!
+//! # The answer of an element: fields that do not interfere
+//!
+//! ```text
+//! cell model, or AsBuiltChip      ->  SimulationCase
+//! with a lattice                  ->  CaseOptics: holds what cells have answered
+//! with the pillars of an element  ->  ElementOptics: as drawn, or as fabricated
+//! with an Illumination            ->  IncoherentFields: apertures, weight, arriving wave, added distance, camera
+//! with a window on the sensor     ->  PSF
+//! ```
+//!
+//! As drawn, rows are read when light passes them, so that elements of any size work, also those whose pillars are computed or held
+//! folded. As fabricated, and among neighbours, elements are held as a map. Pictures ask for many directions of one element: they take
+//! [`CaseOptics::classes`], for which pillars as drawn are those of a chip without a perturbation.
+//!
+//! # The chip as fabricated
 //!
 //! ```text
 //! pillars as read from a layout  ->  DrawnElement
 //! stated cell, model file        ->  AsBuiltChip
 //! both                           ->  AsBuiltElement: sites in classes of realised width, aperture, wavefront
-//! with a wave                    ->  AsBuiltOptics: transmission of each class, light that arrives, distance, camera
-//! with a window                  ->  PSF
 //! ```
 //!
 //! A [`Perturbation`] is applied as follows; what is zero changes nothing.
@@ -29,10 +55,13 @@ mod chip;
 mod class_table;
 mod declared;
 mod density;
+mod drawn;
 mod element;
 pub mod expression;
+mod fields;
 mod light;
 mod model;
+mod neighbour_pillars;
 mod not_applied;
 mod perturbation;
 mod pupil;
@@ -46,15 +75,17 @@ pub mod zernike;
 pub use bank::{BankRange, CellBank};
 pub use bounds::PerturbationFault;
 pub use camera::{KernelFilter, blur, veiled};
-pub use case::SimulationCase;
+pub use case::{CaseOptics, ClassFields, ElementOptics, FocusedSites, Placement, SimulationCase};
 pub use cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
-pub use chip::{AsBuiltChip, AsBuiltOptics, ModelStatement, spread};
+pub use chip::{AsBuiltChip, ModelStatement};
 pub use class_table::ClassTable;
 pub use declared::{CompiledTerm, DeclaredQuantity, DeclaredTerm};
 pub use density::{RANGE_UM, fill};
 pub use element::{AsBuiltElement, BIAS_STEP_NM, DrawnElement, MadeAperture, mixed, realised_nm};
+pub use fields::{Field, IncoherentFields, spread};
 pub use light::{ArrivingLight, cell_direction};
 pub use model::CalibratedModel;
+pub use neighbour_pillars::NeighbourPillars;
 pub use not_applied::{Applied, NotApplied};
 pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
 pub use rectangles::{RectangleClass, bank_orders};

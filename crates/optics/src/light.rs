@@ -3,6 +3,7 @@
 use num_complex::Complex32;
 
 use super::PathChange;
+use metalith_cell::Illumination;
 use metalith_core::turned_sine;
 use metalith_pillars::{Lattice, LatticeKind};
 use metalith_wave::PlaneWave;
@@ -17,9 +18,19 @@ pub struct ArrivingLight {
     pub source_per_m: f64,
 }
 
+/// The plane wave that arrives.
+pub(crate) fn wave_of(light: &Illumination<'_>) -> PlaneWave {
+    PlaneWave {
+        wavelength_um: light.wavelength_um,
+        sin_x: light.sines[0],
+        sin_y: light.sines[1],
+    }
+}
+
 impl ArrivingLight {
-    /// What a stated wave is on a path with a change: the angle in each plane of incidence is larger by the tilt. Where that is
-    /// a right angle or more its sine is one: a wave along the chip, which [`Propagator`](metalith_wave::Propagator)s refuse.
+    /// Light of a stated wave on a path with a change: the angle in each plane of incidence is larger by the tilt.
+    /// Where that is a right angle or more its sine is one: a wave along the chip, which
+    /// [`Propagator`](metalith_wave::Propagator)s refuse.
     pub fn new(stated: &PlaneWave, path: &PathChange) -> Self {
         let turn = |sine: f64, mrad: f64| {
             if mrad == 0.0 {
@@ -57,7 +68,7 @@ impl ArrivingLight {
             .collect()
     }
 
-    /// What curvature alone makes of the wave along x and along y; nothing for a plane wave.
+    /// Factors of the curvature along x and along y; `None` for a plane wave.
     pub fn sphere(&self, lattice: Lattice) -> Option<[Vec<Complex32>; 2]> {
         let turns = |axis, i| self.sag_um(lattice.place_um(axis, i)) / self.plane.wavelength_um;
         let along = |axis| (0..lattice.sites()).map(|i| cis(turns(axis, i))).collect();
@@ -68,10 +79,10 @@ impl ArrivingLight {
 /// Directions closer than this see the same cell (sine): a thousandth of the angle over which a resonance passes.
 const SAME_DIRECTION: f64 = 1e-5;
 
-/// The direction that a cell of such a lattice cannot tell from that of a wave: both sines positive, and on a square lattice
+/// The direction that a cell of such a lattice cannot tell from one with these sines: both positive, and on a square lattice
 /// the larger along x.
-pub fn cell_direction(wave: &PlaneWave, lattice: LatticeKind) -> [f64; 2] {
-    let [x, y] = [wave.sin_x, wave.sin_y].map(|s| (s.abs() / SAME_DIRECTION).round() * SAME_DIRECTION);
+pub fn cell_direction(sines: [f64; 2], lattice: LatticeKind) -> [f64; 2] {
+    let [x, y] = sines.map(|s| (s.abs() / SAME_DIRECTION).round() * SAME_DIRECTION);
     match lattice {
         LatticeKind::Square => [x.max(y), x.min(y)],
         LatticeKind::Hexagonal => [x, y],

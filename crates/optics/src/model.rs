@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Perturbation, PerturbationFault};
 use metalith_cell::CellStack;
-use metalith_core::document::{self, Fault, Faults};
+use metalith_core::document::{self, Fault, FaultKind, Faults};
 use metalith_core::text::quoted;
 use metalith_core::{AtomicFile, Error, Result};
 use metalith_pillars::PillarId;
@@ -14,16 +14,16 @@ use metalith_pillars::PillarId;
 /// Version of the format that is written. The first called its perturbation `departure`; it is still read.
 const SCHEMA: u32 = 2;
 
-/// What a session has taught, in a file that later designs are simulated and compensated with.
+/// Model that a session has calibrated, in a file that later designs are simulated and compensated with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibratedModel {
     schema: u32,
     /// The session that it comes from.
     pub set: String,
-    /// In words: what was found.
+    /// Finding of the calibration, in words.
     pub finding: String,
-    /// How chips and bench differ from what is stated.
+    /// Differences of chips and bench from what is stated.
     #[serde(alias = "departure")]
     pub perturbation: Perturbation,
 }
@@ -39,7 +39,8 @@ impl CalibratedModel {
         }
     }
 
-    /// Nothing, if pillars of a stack can be as the model says that are drawn so often, by width or number, on each of some elements.
+    /// Succeeds if pillars of a stack that are drawn so often, by width or number, on each of some elements can be as
+    /// the model says.
     ///
     /// # Errors
     /// If the bias of all widths leaves nothing of the narrowest that is drawn, or joins the widest.
@@ -54,7 +55,8 @@ impl CalibratedModel {
         }
     }
 
-    /// The same of pillars whose edges are drawn from the one to the other of these (nm), `nearest_nm` from middle to middle.
+    /// Check of pillars whose edges are drawn from the one to the other of these (nm), `nearest_nm` from middle to
+    /// middle.
     fn check_bias(&self, edges_nm: [f64; 2], nearest_nm: f64) -> Result<()> {
         let bias_nm = self.perturbation.geometry.cd_bias_nm;
         let [narrowest, widest] = edges_nm.map(|nm| nm + bias_nm);
@@ -65,7 +67,8 @@ impl CalibratedModel {
             true => format!("makes pillars of {widest} nm, {nearest_nm} nm from one to the next"),
             false => format!("leaves nothing of pillars drawn {} nm wide", edges_nm[0]),
         };
-        Err(Error::invalid(
+        Err(Error::refused(
+            "model/bias-out-of-range",
             format!("`cd_bias_nm` = {bias_nm} of the model {what}"),
             format!(
                 "set it in [perturbation.geometry] between {} and {}",
@@ -91,6 +94,8 @@ impl CalibratedModel {
         let written = "give the `model.toml` that `metalith calibrate` has written";
         let model: Self = toml::from_str(text).map_err(|e| {
             let fault = Fault {
+                kind: FaultKind::Inconsistent,
+                key: String::new(),
                 span: e.span().unwrap_or(0..0),
                 what: quoted(e.message()),
                 hint: written.into(),

@@ -1,5 +1,5 @@
-//! What of a perturbation a simulation applies, and what it says of the bench alone: a simulation of other light cannot apply
-//! that.
+//! Parts of a perturbation that a simulation applies, and parts on the bench alone, which a simulation of other light
+//! cannot apply.
 
 use std::fmt;
 
@@ -66,8 +66,8 @@ fn words(value: &toml::Value) -> String {
 }
 
 impl Perturbation {
-    /// What a simulation applies: all that the model file has otherwise than a chip and a bench as stated, by its keys, less what
-    /// is [not applied](Self::not_applied).
+    /// Parts that a simulation applies: all that the model file has otherwise than a chip and a bench as stated, by its
+    /// keys, less what is [not applied](Self::not_applied).
     pub fn applied(&self) -> Vec<Applied> {
         let table = |p: &Self| toml::Table::try_from(p).expect("plain data serialises");
         let (own, stated) = (table(self), table(&Self::default()));
@@ -86,8 +86,8 @@ impl Perturbation {
         all
     }
 
-    /// What a PSF of one wavelength and one point of the scene, or a picture, leaves out, each quantity that is not zero with
-    /// the reason. Everything else of a perturbation is applied.
+    /// Parts that a PSF of one wavelength and one point of the scene, or a picture, leaves out, each quantity that is
+    /// not zero with the reason. Everything else of a perturbation is applied.
     pub fn not_applied(&self) -> Vec<NotApplied> {
         let light = &self.light;
         let mut out = Vec::new();

@@ -1,4 +1,4 @@
-//! What may differ from what is stated: the numbers that every effect sets, all zero for a perfect chip.
+//! Differences from what is stated: the numbers that every effect sets, all zero for a perfect chip.
 
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use super::declared::{CompiledTerm, DeclaredQuantity, DeclaredTerm, compiled};
 use super::stitching::Stitching;
 use super::zernike;
 
-/// How chip and bench differ from what was drawn and stated. The default differs in nothing.
+/// Differences of chip and bench from what was drawn and stated. The default differs in nothing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Perturbation {
@@ -32,14 +32,14 @@ pub struct GeometryChange {
     pub zero_order: f64,
     /// Phase of that light at the top of the pillars, relative to what arrives at their foot (rad).
     pub zero_order_phase: f64,
-    /// From the pillars to their aperture along x and y (um).
+    /// Offset from the pillars to their aperture along x and y (um).
     pub aperture_offset_um: [f64; 2],
     /// Optical path over the lens (nm), by Zernike polynomial from Noll's fifth on, normalised to an rms of one over
     /// the aperture: aberrations, and the free terms that are no effect.
     pub wavefront_nm: Vec<f64>,
     /// A free term: relative change of amplitude over the range of widths, by Legendre polynomial from the first on.
     pub transmission: Vec<f64>,
-    /// The same for its phase (rad).
+    /// Coefficients of the phase of the transmission (rad).
     pub transmission_phase_rad: Vec<f64>,
     /// Widths that stand at -1 and +1 of those polynomials (nm).
     pub transmission_range_nm: [f64; 2],
@@ -77,7 +77,7 @@ fn is_zero(v: &f64) -> bool {
 }
 
 impl CellChange {
-    /// That of the pillars in the middle of a lens.
+    /// Change of the pillars in the middle of a lens.
     #[must_use]
     pub fn in_the_middle(&self) -> Self {
         Self {
@@ -86,7 +86,7 @@ impl CellChange {
         }
     }
 
-    /// That of the pillars at its rim; none where they are like those in the middle.
+    /// Change of the pillars at its rim; `None` where it is equal to the change in the middle.
     pub fn at_the_rim(&self) -> Option<Self> {
         (self.rim_height_nm != 0.0).then(|| Self {
             height_nm: self.height_nm + self.rim_height_nm,
@@ -116,7 +116,7 @@ pub struct PathChange {
 }
 
 impl PathChange {
-    /// What is added to the distance of chip and sensor at an element whose centre is at this place on the chip (um).
+    /// Distance that is added between chip and sensor at an element whose centre is at this place on the chip (um).
     pub fn added_distance_um(&self, centre_um: [f64; 2]) -> f64 {
         let lean = |axis: usize| 1e-3 * self.sensor_tilt_mrad[axis] * (centre_um[axis] - self.sensor_pivot_um[axis]);
         let declared = compiled(&self.declared, |_| true);
@@ -181,7 +181,7 @@ impl GeometryChange {
         self.cd_bias_nm + self.cd_bias_density_nm * fill
     }
 
-    /// Whether the bias differs from site to site.
+    /// True if the bias differs from site to site.
     pub fn varies_by_site(&self) -> bool {
         self.cd_bias_density_nm != 0.0 || self.declared.iter().any(|t| t.quantity == DeclaredQuantity::WidthNm)
     }
@@ -243,15 +243,15 @@ pub fn legendre(coefficients: &[f64], x: f64) -> f64 {
 }
 
 impl Perturbation {
-    /// Whether what is made of an element depends on where on the chip it stands, or on which way it is turned by
-    /// boundaries of write fields and declared terms, of which it may.
+    /// True if the result for an element depends on its place on the chip, or, by boundaries of write fields and
+    /// declared terms, on its orientation.
     pub fn depends_on_place(&self) -> bool {
         let tilted = self.path.sensor_tilt_mrad != [0.0; 2];
         tilted || !self.geometry.stitching.is_empty() || self.declared().next().is_some()
     }
 
-    /// Whether what is made of an element has no direction and no place of its own: elements that are alike by a symmetry are made
-    /// alike by it.
+    /// True if the result for an element depends on no direction and no place: elements that are equal by a symmetry
+    /// are fabricated equal by it.
     pub fn keeps_symmetry(&self) -> bool {
         let (geometry, path) = (&self.geometry, &self.path);
         geometry.aperture_offset_um == [0.0; 2]

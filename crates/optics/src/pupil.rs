@@ -17,7 +17,7 @@ pub struct PupilTerms {
     /// Phase in turns and relative change of amplitude of each site; empty for none.
     turns: Vec<f32>,
     amplitude: Vec<f32>,
-    /// Those that differ from one wavelength to another.
+    /// Terms that differ from one wavelength to another.
     by_wavelength: Vec<CompiledTerm>,
 }
 

@@ -10,7 +10,8 @@ use num_complex::Complex64;
 /// Nodes that a function goes through at the most: four poles.
 pub(crate) const MOST_NODES: usize = 8;
 
-/// Which of the nodes, rising, the function at `x` goes through: the nearest on either side, as many on one as on the other where there are.
+/// Range of the nodes, rising, that the function at `x` goes through: the nearest on either side, as many on one as on
+/// the other where there are.
 pub(crate) fn around(nodes: &[f64], x: f64) -> Range<usize> {
     let count = nodes.len().min(MOST_NODES);
     let above = nodes.partition_point(|node| *node <= x);

@@ -5,7 +5,7 @@ use metalith_pillars::Lattice;
 /// Least share of a drawn site that its own aperture leaves open: its middle is within.
 const LEAST_DRAWN: f64 = 0.5;
 
-/// What a shifted aperture leaves open of each site.
+/// Open part of each site under a shifted aperture.
 pub struct ShiftedAperture {
     lattice: Lattice,
     radius_um: f64,
@@ -13,7 +13,7 @@ pub struct ShiftedAperture {
 }
 
 impl ShiftedAperture {
-    /// One of a radius (um) whose centre is off that of the pillars (um); nothing if it is not.
+    /// Aperture of a radius (um) whose centre is off the centre of the pillars (um); `None` if it is not.
     pub fn new(lattice: Lattice, radius_um: f64, offset_um: [f64; 2]) -> Option<Self> {
         (offset_um != [0.0; 2]).then_some(Self {
             lattice,
@@ -47,7 +47,8 @@ mod tests {
     /// Sites that pass, over the area that two circles share: what squares at their rims leave, relative.
     const AREA: f64 = 1e-3;
 
-    /// What a move of 2 nm changes, over what the area does by: a jump of one site as a whole would be twice as much.
+    /// Change by a move of 2 nm, relative to the change of the area: a jump of one site as a whole would be twice as
+    /// much.
     const SLOPE: f64 = 0.1;
 
     fn passing(offset_um: [f64; 2]) -> f64 {

@@ -21,8 +21,8 @@ pub fn perturbed(stated: &CellStack, change: &CellChange) -> CellStack {
     }
 }
 
-/// What brings the transmission of pillars at the rim, `rim_nm` higher than those in the middle, from their tops to the plane
-/// of the tops in the middle: the air between them is counted once.
+/// Factor that brings the transmission of pillars at the rim, `rim_nm` higher than those in the middle, from their tops
+/// to the plane of the tops in the middle: the air between them is counted once.
 ///
 /// # Errors
 /// If the wavelength is outside the range of the ambient.

@@ -169,7 +169,7 @@ mod tests {
         }
     }
 
-    /// On a hexagonal lattice as well, for displacements towards all sides; what is between sites stays dark.
+    /// Displaced waves on a hexagonal lattice as well, towards all sides; what is between sites stays dark.
     #[test]
     fn a_displaced_wave_on_a_hexagonal_lattice_has_another_phase() {
         /// Interpolated between sites, (0.5 * 1.5 * 2.5)^2 / 6! of the sixth derivative: at one radian from site to site
@@ -205,7 +205,7 @@ mod tests {
     /// A displaced wave is behind by its wave vector times the displacement.
     #[test]
     fn a_displaced_wave_has_another_phase() {
-        /// At one radian from site to site: (1 / pi)^6 of the interpolation.
+        /// Tolerance at one radian from site to site: (1 / pi)^6 of the interpolation.
         const TOLERANCE: f32 = 2e-3;
         let wave = |ix: usize, iy: usize| Complex32::from_polar(1.0, ix as f32 - 0.5 * iy as f32);
         let stitching = Stitching {

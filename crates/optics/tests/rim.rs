@@ -1,11 +1,10 @@
 //! Pillars that are higher at the rim of a lens than in its middle.
 
-use metalith_cell::{CellStack, ORDERS};
+use metalith_cell::{CellStack, Illumination, ORDERS};
 use metalith_core::Silent;
 use metalith_optics::{AsBuiltChip, CalibratedModel, DrawnElement, Perturbation, perturbed, to_middle_tops};
 use metalith_pillars::{Lattice, PillarMap};
 use metalith_rcwa::Orders;
-use metalith_wave::{Aperture, PlaneWave};
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 
@@ -22,7 +21,7 @@ const SMOOTH: f64 = 2.5e-3;
 /// And of all: of one width in thirty a resonance passes between the two heights.
 const ALL: f64 = 0.02;
 
-/// What a site at a radius transmits is that of the pillar solved with the height that it has there.
+/// Transmission of a site at a radius equals the pillar solved with the height that it has there.
 #[test]
 fn heights_between_middle_and_rim_are_those_of_solved_pillars() {
     let stack = CellStack::paper(350.0, 700.0).unwrap();
@@ -42,8 +41,8 @@ fn heights_between_middle_and_rim_are_those_of_solved_pillars() {
             };
             let drawn = DrawnElement::new(&map, radius_um);
             let element = chip.element(&drawn).unwrap();
-            let view = chip.view(&element, &PlaneWave::normal(um), false, &Silent).unwrap();
-            let aperture = element.aperture(&view.tables[0], um);
+            let fields = chip.view(&element, &Illumination::normal(um), &Silent).unwrap();
+            let aperture = fields.fields[0].aperture(&fields.light).unwrap();
             let mut row = vec![Complex32::ZERO; SITES];
             aperture.fill_row(SITES / 2, &mut row);
             let double = |t: Complex32| Complex64::new(f64::from(t.re), f64::from(t.im));

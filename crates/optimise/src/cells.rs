@@ -1,29 +1,31 @@
 //! The cells that a design is optimised and judged with.
 
 use std::path::Path;
+use std::sync::Arc;
 
-use metalith_cell::{CellModel, Fidelity, RigorousCell, RotatedCell};
+use metalith_cell::{CellModel, CellResponse, Fidelity, Illumination, RigorousCell, RotatedCell};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, NeighbourCell, cell_models, neighbour_cell};
 use metalith_pillars::PolarisationBasis;
-use num_complex::Complex64;
 
-use crate::robust::cells_off_height;
+use crate::merit::robust::cells_off_height;
 
 /// Cells that a design is optimised and judged with.
 pub struct TaskCells {
     own: Box<dyn CellModel>,
-    /// If there is a report, and the own one is another.
+    /// Cell of the report, if there is a report and the own cell is another.
     judge: Option<Box<dyn CellModel>>,
+    /// Of rotated rectangles, the own one solved for single wavelengths.
+    at_single_wavelengths: Option<Arc<RotatedCell>>,
     off_height: Vec<RigorousCell>,
 }
 
 impl TaskCells {
-    /// Those that a design names; tables are taken from the folder `cache`, or made and kept there. `report`: also what a
-    /// report judges with.
+    /// Cells that a design names; tables are taken from the folder `cache`, or made and kept there. `report`: also what
+    /// a report judges with.
     ///
     /// # Errors
-    /// If a material is not known over the band, unlike neighbours have one table alone, or the user stopped it.
+    /// If a material is not known over the band, dissimilar neighbours have one table alone, or the user stopped it.
     pub fn of(design: &Design, report: bool, cache: Option<&Path>, progress: &dyn Progress) -> Result<Self> {
         let rigorous = || -> Result<Box<dyn CellModel>> {
             Ok(Box::new(
@@ -33,9 +35,11 @@ impl TaskCells {
         check_shape(design)?;
         if let Some(pillars) = design.cell.shape.rotated() {
             let arriving = design.cell.arriving.unwrap_or_default();
+            let cell = Arc::new(RotatedCell::new(design.cell_stack()?, pillars, arriving));
             return Ok(Self {
-                own: Box::new(RotationBand(RotatedCell::new(design.cell_stack()?, pillars, arriving))),
+                own: Box::new(RotationBand(Arc::clone(&cell))),
                 judge: None,
+                at_single_wavelengths: Some(cell),
                 off_height: Vec::new(),
             });
         }
@@ -52,12 +56,22 @@ impl TaskCells {
             }
             _ => Vec::new(),
         };
-        Ok(Self { own, judge, off_height })
+        Ok(Self {
+            own,
+            judge,
+            at_single_wavelengths: None,
+            off_height,
+        })
     }
 
-    /// What is optimised with.
+    /// Cell that is optimised with.
     pub fn own(&self) -> &dyn CellModel {
         self.own.as_ref()
+    }
+
+    /// The own one for single wavelengths, where it answers for those of a band alone.
+    pub fn at_single_wavelengths(&self) -> Option<&dyn CellModel> {
+        self.at_single_wavelengths.as_deref().map(|cell| cell as _)
     }
 
     /// The cell of equal neighbours that figures are by too.
@@ -65,7 +79,7 @@ impl TaskCells {
         self.judge.as_deref().unwrap_or(self.own())
     }
 
-    /// What layouts are judged with: the truest of these.
+    /// Cell that layouts are simulated with: the truest of these.
     pub fn judge(&self) -> &dyn CellModel {
         match self.own.fidelity() {
             Fidelity::Neighbours => self.own(),
@@ -82,27 +96,23 @@ impl TaskCells {
 
 /// Rotated rectangles at the many wavelengths of a band, each solved as one of them: the light that they convert, by the number of
 /// the rotation.
-struct RotationBand(RotatedCell);
+struct RotationBand(Arc<RotatedCell>);
 
 impl CellModel for RotationBand {
     fn fidelity(&self) -> Fidelity {
         self.0.fidelity()
     }
 
-    fn transmissions(&self, wavelength_um: f64, most: u16) -> Result<Vec<Complex64>> {
-        self.0.transmissions_in_band(wavelength_um, most)
+    fn response(&self, light: &Illumination<'_>, last: u16, progress: &dyn Progress) -> Result<CellResponse> {
+        self.0.response(&light.in_band(), last, progress)
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
         self.0.full_transmission(wavelength_um)
     }
-
-    fn rotated(&self) -> Option<&RotatedCell> {
-        Some(&self.0)
-    }
 }
 
-/// The cell of unlike neighbours, whose tables are solved here where there are none.
+/// The coupled model, whose tables are solved here where there are none.
 fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<NeighbourCell> {
     let tables = &design.verify.wavelengths_um;
     let ends = |all: &[f64]| {
@@ -112,7 +122,8 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
     let ((first, last), band) = (ends(tables), design.optimise.band_um);
     let words = |(a, b): (f64, f64)| format!("from {:.0} to {:.0} nm", a * 1e3, b * 1e3);
     if first >= last {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "optimise/neighbours-one-wavelength",
             format!(
                 "a table of unlike neighbours at one wavelength alone, for a band {}",
                 words(band)
@@ -129,17 +140,18 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
         ));
     }
     let cell = neighbour_cell(design, cache.map(Path::to_owned))?;
-    cell.among_neighbours_in_band(band.0, &|_| [0.0; 2], progress)?;
+    cell.response(&Illumination::normal(band.0).in_band(), 0, progress)?;
     Ok(cell)
 }
-/// Nothing, if the pillars of a design are such as a phase is found for.
+/// Succeeds if the pillars of a design are such as a phase is found for.
 ///
 /// # Errors
 /// If they are upright rectangles.
-pub(super) fn check_shape(design: &Design) -> Result<()> {
+pub(crate) fn check_shape(design: &Design) -> Result<()> {
     match design.cell.shape.basis() {
         None | Some(PolarisationBasis::Circular) => Ok(()),
-        Some(PolarisationBasis::Linear) => Err(Error::invalid(
+        Some(PolarisationBasis::Linear) => Err(Error::refused(
+            "optimise/upright-rectangles",
             "the pillars are upright rectangles, which have a phase for each polarisation",
             "use squares, circles or rotated rectangles: the optimiser finds one phase for all light",
         )),

@@ -1,13 +1,13 @@
-//! What was gained: Strehl ratios off the grid that was optimised on, three ways.
+//! Gain of an optimisation: Strehl ratios off the grid that was optimised on, three ways.
 
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::focus::{Strehl, judging_wavelengths};
-use super::limit::{largest_step, largest_step_in_layout};
-use super::robust;
-use super::run::OptimiseTask;
+use crate::merit::focus::{Strehl, judging_wavelengths};
+use crate::merit::robust;
+use crate::rings::limit::{largest_step, largest_step_in_layout};
+use crate::run::OptimiseTask;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Result};
 use metalith_design::Design;
@@ -64,7 +64,7 @@ impl OptimiseTask {
         judging_wavelengths(self.spec.band_um.0 * 1e3, self.spec.band_um.1 * 1e3)
     }
 
-    /// From the widths that phases (turns) make, with one cell.
+    /// Strehl ratios from the widths that phases (waves) give, with one cell.
     ///
     /// # Errors
     /// If the cell does not cover the band.
@@ -74,7 +74,7 @@ impl OptimiseTask {
         Ok(Judged::new("rings", cell.fidelity(), strehl, largest_step(turns)))
     }
 
-    /// From the pillars of a layout of the lens alone, summed over every pillar.
+    /// Strehl ratios from the pillars of a layout of the lens alone, summed over every pillar.
     ///
     /// # Errors
     /// If a width is none that a phase is mapped to, or the cell does not cover the band.
@@ -88,7 +88,7 @@ impl OptimiseTask {
     /// draw. `cells` as in [`OptimiseTask::solve`].
     ///
     /// # Errors
-    /// If a cell does not cover the band, or knows unlike neighbours.
+    /// If a cell does not cover the band, or is coupled.
     pub fn judge_errors(
         &self,
         turns: &[f64],
@@ -97,7 +97,8 @@ impl OptimiseTask {
         draws: usize,
     ) -> Result<Vec<f64>> {
         if cells.iter().any(|cell| cell.fidelity() == Fidelity::Neighbours) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "optimise/errors-among-neighbours",
                 "errors of fabrication among unlike neighbours",
                 "judge them with the cell `rigorous`",
             ));
@@ -108,8 +109,8 @@ impl OptimiseTask {
             .into_iter()
             .map(|error| {
                 let rows = self.lens.focal_rows(&band, error, cells)?;
-                let blocks = vec![(super::MeritKind::Log, 1.0, rows)];
-                let problem = super::FieldProblem::new(blocks, cells, self.mapping.clone(), 1 << 30)?;
+                let blocks = vec![(crate::MeritKind::Log, 1.0, rows)];
+                let problem = crate::FieldProblem::new(blocks, cells, self.mapping.clone(), 1 << 30)?;
                 Ok(problem.merit_of_widths(&widths).exp())
             })
             .collect()

@@ -5,13 +5,13 @@ use std::path::Path;
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::judge::Judged;
-use super::mapping::step;
+use crate::judge::Judged;
+use crate::rings::mapping::step;
 use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, Verdict, sig, write_json};
 
-/// What the figures of an optimisation are by, in words for people.
+/// Basis of the figures of an optimisation, in words for people.
 const BY_EQUAL_NEIGHBOURS: &str = "Merit, Strehl ratios before and after and those of the layout that is read back take each pillar for one \
      of a lattice of equal pillars. `metalith run` judges by unlike neighbours where that is the `fidelity` of [verify], as it is by \
      default for the cell of the paper, and may give other Strehl ratios.";
@@ -40,7 +40,7 @@ pub struct OptimiseReport {
     pub rotation_step_deg: Option<f64>,
     /// Limit on the step (turns).
     pub step_limit_turns: f64,
-    /// What gains are counted from, judged in each way: the design's own phase, or where that is a table, a hyperbolic one.
+    /// Reference of gains, judged in each way: the design's own phase, or where that is a table, a hyperbolic one.
     pub before: Vec<Judged>,
     /// The table that the design has.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -72,15 +72,15 @@ pub struct OptimiseReport {
 }
 
 impl OptimiseReport {
-    /// Whether every step of the optimised phase keeps the limit, rings and layout.
+    /// True if every step of the optimised phase keeps the limit, rings and layout.
     pub fn limit_kept(&self) -> bool {
         self.after
             .iter()
             .all(|j| j.largest_step_turns <= self.step_limit_turns + 1e-6)
     }
 
-    /// What the limit on the step costs, in words, where what was found is worse than what it is counted from and that has larger
-    /// steps.
+    /// Cost of the limit on the step, in words, where the result is worse than its reference and the reference has
+    /// larger steps.
     pub fn limit_costs(&self) -> Option<String> {
         let (before, after) = (self.before.first()?, self.after.first()?);
         limit_costs(
@@ -99,7 +99,8 @@ impl OptimiseReport {
         ]
     }
 
-    /// Whether pillars were taken for equals of their neighbours, and what counts of light that they change, in words for people.
+    /// Words for people on whether pillars were taken for equals of their neighbours, and on what counts of the light
+    /// that they change.
     pub fn neighbours(&self) -> &'static str {
         if self.rotation_step_deg.is_some() {
             return BY_CONVERTED_LIGHT;
@@ -177,7 +178,7 @@ impl OptimiseReport {
         page
     }
 
-    /// What not every optimisation has.
+    /// Sections that not every optimisation has.
     fn rest(&self, page: &mut Page) {
         if !self.merit_over_limit.is_empty() {
             let mut chart = Chart::new(
@@ -374,7 +375,8 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, variance.sqrt())
 }
 
-/// Of the largest step (turns) and the Strehl ratio before, the limit and the ratio after, and what wider limits reach.
+/// Words from the largest step (waves) and the Strehl ratio before, the limit and the ratio after, and what wider
+/// limits reach.
 fn limit_costs(before: (f64, f64), after: (f64, f64), over_limit: &[(f64, f64)]) -> Option<String> {
     let ((step, was), (limit, is)) = (before, after);
     if step <= limit || is >= was {

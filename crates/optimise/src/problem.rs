@@ -1,20 +1,21 @@
 //! The merit that a design asks for.
 
-use rayon::prelude::*;
-
-use super::PixelWindow;
-use super::deconvolution::Deconvolution;
-use super::field::{FieldPoint, FieldProblem, MeritKind};
-use super::focus::{FabricationError, Lens, wavelengths};
-use super::kernel::RingField;
-use super::mapping::Mapping;
-use super::robust;
-use super::views::Views;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Progress, Result};
 use metalith_design::{MeritSpec, OptimiseSpec, ViewSpec};
 use metalith_wave::camera::Noise;
-use metalith_wave::restore::Scene;
+use rayon::prelude::*;
+
+use crate::PixelWindow;
+use crate::image::deconvolution::Deconvolution;
+use crate::image::scene::Scene;
+use crate::image::views::Views;
+use crate::merit::field::{FieldProblem, MeritKind};
+use crate::merit::field_point::FieldPoint;
+use crate::merit::focus::{FabricationError, Lens, wavelengths};
+use crate::merit::robust;
+use crate::rings::kernel::RingField;
+use crate::rings::mapping::Mapping;
 
 /// Radii at which side lobes are sampled, out to four times the radius where they begin.
 const SIDE_LOBE_POINTS: usize = 48;

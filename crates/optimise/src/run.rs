@@ -1,21 +1,21 @@
-//! From a design to its optimised phase.
+//! Run from a design to its optimised phase.
 
-use super::cells::check_shape;
-use super::checkpoint::Checkpoint;
-use super::field::FieldProblem;
-use super::focus::Lens;
-use super::limit::StepLimit;
-use super::mapping::Mapping;
-use super::problem;
-use super::rings::Rings;
-use super::start::Start;
+use crate::cells::check_shape;
+use crate::merit::field::FieldProblem;
+use crate::merit::focus::Lens;
+use crate::problem;
+use crate::rings::limit::StepLimit;
+use crate::rings::mapping::Mapping;
+use crate::rings::sites::Rings;
+use crate::solvers::checkpoint::Checkpoint;
+use crate::solvers::start::Start;
 use metalith_cell::CellModel;
 use metalith_core::{Error, Result};
 use metalith_design::array::PillarRule;
 use metalith_design::phase::RadialPhase;
 use metalith_design::{Design, MeritSpec, OptimiseSpec, StartSpec};
 
-/// What an optimisation found.
+/// Result of an optimisation.
 #[derive(Clone, Debug)]
 pub struct Optimised {
     /// Phase of each ring (turns), in [0, 1).
@@ -28,7 +28,7 @@ pub struct Optimised {
     pub start: &'static str,
     /// Merit at every fiftieth part of the way.
     pub history: Vec<(u32, f64)>,
-    /// Where to go on if it was interrupted.
+    /// Checkpoint to go on from if it was interrupted.
     pub interrupted: Option<Checkpoint>,
 }
 
@@ -37,16 +37,16 @@ pub struct Optimised {
 pub struct OptimiseTask {
     /// The rings and the distance to the sensor.
     pub lens: Lens,
-    /// From phase to width.
+    /// Mapping from phase to width.
     pub mapping: Mapping,
-    /// How it is to be optimised.
+    /// Settings of the optimisation.
     pub spec: OptimiseSpec,
     /// The design's own phase (turns).
     pub own_turns: Vec<f64>,
-    /// What gains are counted from: the design's own phase, or where that is a table, which may well be an
+    /// Reference phase (waves) of gains: the design's own phase, or where that is a table, which may well be an
     /// optimised one, a hyperbolic lens for the middle of the band.
     pub reference_turns: Vec<f64>,
-    pub(super) limit: StepLimit,
+    pub(crate) limit: StepLimit,
 }
 
 impl OptimiseTask {
@@ -87,7 +87,7 @@ impl OptimiseTask {
         self.limit
     }
 
-    /// The same task without errors of fabrication in mind.
+    /// Same task without errors of fabrication.
     pub fn regardless_of_errors(&self) -> Self {
         let mut plain = self.clone();
         plain.spec.robust = None;
@@ -103,12 +103,12 @@ impl OptimiseTask {
             .collect()
     }
 
-    pub(super) fn field_problem(&self, merit: &MeritSpec, cells: &[&dyn CellModel]) -> Result<Option<FieldProblem>> {
+    pub(crate) fn field_problem(&self, merit: &MeritSpec, cells: &[&dyn CellModel]) -> Result<Option<FieldProblem>> {
         problem::field_problem(&self.lens, &self.spec, merit, cells, &self.mapping)
     }
 
     /// The start of one chain of several.
-    pub(super) fn start(&self, chain: u32) -> Result<Start> {
+    pub(crate) fn start(&self, chain: u32) -> Result<Start> {
         let band_um = self.spec.band_um;
         let log_asphere = Start::LogAsphere { band_um };
         let hyperbolic = Start::Hyperbolic {
@@ -126,7 +126,8 @@ impl OptimiseTask {
             StartSpec::Random => Start::Random,
             StartSpec::Previous => Start::Previous(self.own_turns.clone()),
             StartSpec::Log => {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "optimise/log-from-itself",
                     "the merit `log` cannot begin with its own result",
                     "use start = \"all\" or \"log_asphere\"; \"log\" is for Adam, and for the merit `deconvolution`",
                 ));

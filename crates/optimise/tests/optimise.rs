@@ -16,9 +16,9 @@ use num_complex::Complex64;
 /// The kernel at full size, on the axis: a broadband phase, every ring of the 1 mm lens.
 #[test]
 fn the_kernel_agrees_with_direct_sum_and_fold() {
-    /// Of the matched peak. Apertures hold transmissions in single precision.
+    /// Tolerance as a share of the matched peak. Apertures hold transmissions in single precision.
     const DIRECT: f64 = 1e-6;
-    /// What the accurate mode is asked for.
+    /// Tolerance of the accurate mode.
     const FOLD: f64 = 1e-5;
     let lattice = Lattice::covering(1_000_000, 350).unwrap();
     let rings = Rings::new(lattice, 1_000_000).unwrap();
@@ -91,7 +91,7 @@ fn design(folder: &Path, optimise: &str) -> std::path::PathBuf {
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
 const ADAM: &str =
     "[optimise]\ncell = \"published\"\nstep_nm = 5\nsolver = \"adam\"\nstart = \"hyperbolic\"\nsteps = 40\n";
-/// Of few views of a small window; two merits in one sum.
+/// Settings of few views of a small window; two merits in one sum.
 const IMAGES: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nstart = \"hyperbolic\"\nblocks = 24\n\
     [optimise.merit]\ndeconvolution = 1\nlog = 0.01\n\
     [optimise.views]\nangles_deg = [0, 15]\nstep_nm = 30\npixels = 16\n";
@@ -148,7 +148,7 @@ fn an_interrupted_run_goes_on_to_the_same_end() {
 
 #[test]
 fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
-    /// What broadband phases gain over a hyperbolic one at the least; the paper's gain is several times.
+    /// Least gain of broadband phases over a hyperbolic one; the paper's gain is several times.
     const GAIN: f64 = 1.5;
     let folder = tempfile::tempdir().unwrap();
     let cell = PublishedCell::new(350);

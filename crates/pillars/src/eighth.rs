@@ -25,7 +25,7 @@ impl EighthMap {
         tiles * (tiles + 1) / 2 * (TILE * TILE) as u64
     }
 
-    /// Where the width of the site (a, b) of the triangle is.
+    /// Index of the width of the site (a, b) of the triangle.
     #[inline]
     fn index(a: usize, b: usize) -> usize {
         let (row, column) = (a / TILE, b / TILE);

@@ -7,10 +7,10 @@ use metalith_core::{LayerNumber, Progress, Result};
 
 use crate::{Lattice, PillarMap, PillarShape};
 
-/// Where an element is and which lattice its pillars should stand on.
+/// Place of an element, and the lattice that its pillars should stand on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ElementSite {
-    /// For messages and reports.
+    /// Name for messages and reports.
     pub name: String,
     /// Centre of the lattice in the layout (nm).
     pub centre_nm: [i64; 2],
@@ -55,7 +55,7 @@ impl ElementSite {
     }
 }
 
-/// What reads pillars out of a layout: crates that only need the widths take it from their caller, and know no format.
+/// Reader of pillars out of a layout: crates that only need the widths take it from their caller, and know no format.
 pub trait PillarReader: Sync {
     /// Widths of the pillars of each element, all of this shape, in the order given.
     ///

@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::{PillarRows, PillarShape};
 use metalith_core::{Error, Result};
 
-/// How the sites of a lattice lie.
+/// Kind of a lattice: the arrangement of its sites.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LatticeKind {
@@ -24,12 +24,12 @@ impl LatticeKind {
     /// Name and value of each, as design files and measured sets have them.
     pub const CHOICES: [(&'static str, Self); 2] = [("square", Self::Square), ("hexagonal", Self::Hexagonal)];
 
-    /// Whether it is square.
+    /// True if it is square.
     pub fn is_square(&self) -> bool {
         *self == Self::Square
     }
 
-    /// Why pillars of a shape cannot stand on it; none if they can.
+    /// Reason why pillars of a shape cannot stand on it; `None` if they can.
     pub fn refusal(self, shape: PillarShape) -> Option<&'static str> {
         let stands = self.is_square() || shape == PillarShape::Circle;
         (!stands).then_some("a hexagonal lattice of pillars that are no circles")
@@ -97,19 +97,22 @@ impl Lattice {
     /// As [`Lattice::new`]; also if the places of a hexagonal lattice are an even number.
     pub fn of_kind(kind: LatticeKind, pitch_nm: u32, sites: usize) -> Result<Self> {
         if pitch_nm == 0 || !pitch_nm.is_multiple_of(2) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lattice/off-grid",
                 format!("a pitch of {pitch_nm} nm puts pillar centres off the 1 nm grid"),
                 "use an even, positive number of nanometres",
             ));
         }
         if sites == 0 || sites > 1 << 20 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lattice/sites",
                 format!("a lattice of {sites} sites an axis"),
                 "use between 1 and 1,048,576 sites an axis",
             ));
         }
         if kind == LatticeKind::Hexagonal && sites.is_multiple_of(2) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "lattice/sites",
                 format!("a hexagonal lattice of {sites} places an axis"),
                 "use an odd number: one is in the centre",
             ));
@@ -143,12 +146,12 @@ impl Lattice {
         Self::of_kind(kind, pitch_nm, sites)
     }
 
-    /// How the sites lie.
+    /// Arrangement of the sites.
     pub fn kind(&self) -> LatticeKind {
         self.kind
     }
 
-    /// Whether it is square.
+    /// True if it is square.
     pub fn is_square(&self) -> bool {
         self.kind.is_square()
     }
@@ -193,7 +196,7 @@ impl Lattice {
         x * y
     }
 
-    /// Whether a place of the grid is a site.
+    /// True if a place of the grid is a site.
     pub fn has(&self, ix: usize, iy: usize) -> bool {
         self.is_square() || (ix + iy).is_multiple_of(2)
     }
@@ -232,7 +235,7 @@ impl Lattice {
         [all, middle - rows..middle + rows + 1]
     }
 
-    /// Of these the columns and rows whose places from the centre are within two ends along x and along y, both included (nm).
+    /// Columns and rows whose places from the centre are within two ends along x and along y, both included (nm).
     pub fn within(&self, ends_nm: [[i64; 2]; 2]) -> [std::ops::Range<usize>; 2] {
         let (reach, steps) = (self.reach(), self.steps_nm());
         [0, 1].map(|axis| {
@@ -254,8 +257,8 @@ impl Lattice {
         })
     }
 
-    /// What a lens that takes all of it needs along x and along y (nm): from its first place to its last, and a pitch, so that
-    /// pillars of two such lenses side by side are a pitch apart.
+    /// Sides of a lens that takes all of it, along x and along y (nm): from its first place to its last, and a pitch,
+    /// so that pillars of two such lenses side by side are a pitch apart.
     pub fn sides_nm(&self) -> [i64; 2] {
         self.ends_nm(&self.reach())
             .map(|[first, last]| last - first + i64::from(self.pitch_nm))
@@ -364,11 +367,11 @@ impl Lattice {
 /// read back from one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PillarMap {
-    /// Where the sites are.
+    /// Lattice of the sites.
     pub lattice: Lattice,
-    /// What tells the pillar at each site from others of its shape, zero where there is none: the width of a square or a circle (nm),
-    /// the number of a rectangle. Shape `[sites, sites]`, row index along +y, column index along +x. It is its own index into tables of
-    /// the cell.
+    /// Number that identifies the pillar at each site among others of its shape, zero where there is none: the width of
+    /// a square or a circle (nm), the number of a rectangle. Shape `[sites, sites]`, row index along +y, column index
+    /// along +x. It is its own index into tables of the cell.
     pub number: Array2<u16>,
 }
 
@@ -393,8 +396,8 @@ impl PillarMap {
         PillarRows::circle_um(self)
     }
 
-    /// How many pillars there are of each width (nm), or of each number of a rectangle, which is the index; the first entry counts empty
-    /// sites.
+    /// Number of pillars of each width (nm), or of each number of a rectangle, which is the index; the first entry
+    /// counts empty sites.
     pub fn histogram(&self) -> Vec<u64> {
         PillarRows::histogram(self)
     }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::{EighthMap, PillarRows, PillarShape};
 
-/// How the pillars of one element differ from the intended ones.
+/// Differences of the pillars of one element from the intended ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PillarCheck {
     /// Pillars that were read back.
@@ -61,7 +61,7 @@ impl PillarCheck {
         self.sites(meant, got, 1);
     }
 
-    /// So many sites that are alike.
+    /// Counts so many equal sites.
     #[inline]
     fn sites(&mut self, meant: u16, got: u16, sites: u64) {
         self.pillars += sites * u64::from(got != 0);
@@ -77,7 +77,7 @@ impl PillarCheck {
         }
     }
 
-    /// Nothing was compared so far.
+    /// Check that has compared nothing so far.
     fn alike() -> Self {
         Self {
             largest_nm: Some(0),
@@ -85,7 +85,7 @@ impl PillarCheck {
         }
     }
 
-    /// The same of pillars of this shape.
+    /// Same check for pillars of this shape.
     #[must_use]
     pub fn of_shape(self, shape: PillarShape) -> Self {
         Self {

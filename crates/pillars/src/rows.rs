@@ -7,7 +7,7 @@ use crate::{Lattice, PillarMap};
 /// The pillars of one element, each told by a number: the width of a square or a circle (nm), the number of a rectangle. An element of 10 mm has 800 million sites: who reads it row by row needs none but a row
 /// of them in memory.
 pub trait PillarRows: Sync {
-    /// Where the sites are.
+    /// Lattice of the sites.
     fn lattice(&self) -> Lattice;
 
     /// The pillar in column `ix` of row `iy`, zero where there is none.
@@ -16,7 +16,8 @@ pub trait PillarRows: Sync {
     /// The pillars of some columns of row `iy`. What is not held anyway is made in `room`.
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16];
 
-    /// As [`PillarRows::row`], for who asks only where pillars are: any number but zero stands for one.
+    /// Variant of [`PillarRows::row`] for a caller that asks only where pillars are: any number but zero stands for
+    /// one.
     fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         self.row(iy, columns, room)
     }
@@ -70,7 +71,7 @@ pub trait PillarRows: Sync {
         None
     }
 
-    /// How many pillars there are of each number, which is the index; the first entry counts empty sites.
+    /// Number of pillars of each number, which is the index; the first entry counts empty sites.
     fn histogram(&self) -> Vec<u64> {
         let n = self.lattice().sites();
         let (mut counts, mut room) = (Vec::new(), Vec::new());

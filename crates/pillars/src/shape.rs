@@ -75,7 +75,7 @@ impl PillarShape {
     /// Name and value of each kind that differs by its width alone, as design files and options have them.
     pub const CHOICES: [(&'static str, Self); 2] = [("square", Self::Square), ("circle", Self::Circle)];
 
-    /// Whether it is the square: what designs had before there were others, and what is then left out of keys and digests.
+    /// True if it is the square, which is left out of keys and digests: the default of designs.
     pub fn is_square(&self) -> bool {
         *self == Self::Square
     }

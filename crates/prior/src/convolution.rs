@@ -18,7 +18,7 @@ const PIECE: usize = 128 * BLOCK;
 
 /// Shape of a convolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shape {
+pub struct Shape {
     pub inputs: usize,
     /// A multiple of four.
     pub outputs: usize,
@@ -44,19 +44,19 @@ impl Shape {
 
 /// Weights in the order in which they are used.
 #[derive(Clone, Debug)]
-pub(crate) struct Packed {
+pub struct Packed {
     shape: Shape,
     /// `[output / 4][input][tap][output % 4]`
     values: Vec<f32>,
 }
 
 impl Packed {
-    /// For the way forward.
+    /// Weights packed for the forward pass.
     pub fn forward(shape: Shape, weights: &[f32]) -> Self {
         Self::by(shape, |o, i, t| weights[(o * shape.inputs + i) * shape.taps + t])
     }
 
-    /// For the gradient of the inputs: channels exchanged, taps mirrored.
+    /// Weights packed for the gradient of the inputs: channels exchanged, taps mirrored.
     pub fn backward(shape: Shape, weights: &[f32]) -> Self {
         let mirrored = Shape {
             inputs: shape.outputs,
@@ -184,7 +184,7 @@ impl WithSimd for Piece<'_> {
 }
 
 /// Add the gradient of the weights to `gradient`: of each the sum over positions of input times gradient of output.
-pub(crate) fn add_weight_gradient(shape: Shape, input: &Features, output: &Features, gradient: &mut [f32]) {
+pub fn add_weight_gradient(shape: Shape, input: &Features, output: &Features, gradient: &mut [f32]) {
     Arch::new().dispatch(WeightGradient {
         shape,
         input,
@@ -259,7 +259,7 @@ fn products<S: Simd, const N: usize>(simd: S, a: [&[f32]; OUTPUTS], b: [&[f32]; 
 mod tests {
     use super::*;
 
-    /// Of sums of some hundred products of order one in single precision.
+    /// Tolerance of sums of some hundred products of order one in single precision.
     const SINGLE: f32 = 2e-5;
 
     fn value(k: usize) -> f32 {

@@ -24,7 +24,7 @@ enum Kind {
 }
 
 impl NetworkDenoiser {
-    /// With the weights that come with the program.
+    /// Denoiser with the weights that are shipped with the program.
     ///
     /// # Errors
     /// If they are damaged.
@@ -32,8 +32,8 @@ impl NetworkDenoiser {
         Ok(Self::of_weights(&shipped_weights()?))
     }
 
-    /// With the weights of a file that `metalith train` wrote, or a network of one's own in a file `*.onnx` (built with the
-    /// feature `onnx`).
+    /// Denoiser with the weights of a file that `metalith train` wrote, or a user's network in a file `*.onnx` (built
+    /// with the feature `onnx`).
     ///
     /// # Errors
     /// If the file cannot be read or is of another network.
@@ -64,7 +64,8 @@ impl NetworkDenoiser {
         Self::of_network(Network::new(&Plan::new(Size::DENOISER), weights))
     }
 
-    pub(crate) fn of_network(network: Network) -> Self {
+    /// Denoiser of a network in memory.
+    pub fn of_network(network: Network) -> Self {
         Self {
             network: Kind::Own(network),
         }
@@ -85,7 +86,8 @@ impl NetworkDenoiser {
         };
         let (rows, columns, colours) = picture.dim();
         if colours != COLOURS || rows == 0 || columns == 0 || deviation.dim() != picture.dim() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "denoise/shapes",
                 format!(
                     "values of shape {:?}, deviations of shape {:?}",
                     picture.dim(),
@@ -107,7 +109,7 @@ impl NetworkDenoiser {
         Ok(Array3::from_shape_fn((rows, columns, COLOURS), |at| clean[at]))
     }
 
-    /// The same with noise of one deviation everywhere.
+    /// Variant of [`NetworkDenoiser::denoise`] for noise of one deviation everywhere.
     ///
     /// # Errors
     /// As [`NetworkDenoiser::denoise`].
@@ -116,14 +118,14 @@ impl NetworkDenoiser {
     }
 }
 
-/// What the network sees.
-pub(crate) fn input(picture: &Array3<f32>, deviation: &Array3<f32>) -> Features {
+/// Input of the network.
+pub fn input(picture: &Array3<f32>, deviation: &Array3<f32>) -> Features {
     let means: Vec<Array2<f32>> = deviation.axis_iter(Axis(2)).map(over_squares).collect();
     squares(picture, &means)
 }
 
 /// Means over squares of 2 x 2.
-pub(crate) fn over_squares(plane: ArrayView2<'_, f32>) -> Array2<f32> {
+pub fn over_squares(plane: ArrayView2<'_, f32>) -> Array2<f32> {
     let (rows, columns) = plane.dim();
     Array2::from_shape_fn((rows / 2, columns / 2), |(y, x)| {
         let row = |y: usize| plane[[y, 2 * x]] + plane[[y, 2 * x + 1]];

@@ -3,14 +3,14 @@
 use ndarray::ArrayView2;
 
 /// Positions that a convolution takes at a time, whatever the width of a register; a plane is a multiple of it.
-pub(crate) const BLOCK: usize = 16;
+pub const BLOCK: usize = 16;
 
 /// Planes `[channel][row][column]` of single precision.
 ///
 /// Behind each row stands one zero, which is also what the next row has before it; a row of zeros stands above and one
 /// below. So a neighbour of a pixel is at a fixed distance from it, and a whole plane can be taken as one line.
 #[derive(Clone, Debug)]
-pub(crate) struct Features {
+pub struct Features {
     pub channels: usize,
     pub rows: usize,
     pub columns: usize,
@@ -35,7 +35,7 @@ impl Features {
         self.columns + 1
     }
 
-    /// Where the first pixel of a plane is.
+    /// Index of the first pixel of a plane.
     pub fn origin(&self) -> usize {
         self.stride() + 1
     }

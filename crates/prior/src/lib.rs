@@ -1,10 +1,8 @@
-//! What pictures look like, learnt from photographs by a small network.
+//! Prior of pictures that a small network learnt from photographs.
 //!
 //! ```text
-//! photographs -> pieces with noise -> gradients -> weights           (`train`)
 //! noisy picture, map of its noise    -> expected picture             (`NetworkDenoiser::denoise`)
 //! the same, and a seed               -> one of the pictures it may be of  (`NetworkDenoiser::sample`)
-//! pictures of frames, their scenes   -> weights                      (`train_finisher`)
 //! pictures restored from one frame   -> one picture                  (`PostProcessor::finish`)
 //! two pictures, weights of others    -> how different they look      (`PerceptualDistance`)
 //! ```
@@ -13,30 +11,32 @@
 //! needed for is small enough, they are three times as fast as those of the general packages that were measured (see
 //! docs/method/prior.md), and the order of their sums is known.
 
-mod adam;
-mod checkpoint;
 mod convolution;
 mod denoiser;
-mod examples;
 mod features;
-mod learning;
 mod network;
+mod noise;
 #[cfg(feature = "onnx")]
 mod onnx;
 mod perceptual;
 mod post_processor;
 mod sample;
 mod squares;
-mod stacks;
-mod training;
 mod weights;
 
 pub use denoiser::NetworkDenoiser;
-pub use examples::{Photographs, with_noise};
-pub use learning::{TrainingReport, TrainingSpec};
 pub use network::COLOURS;
+pub use noise::with_noise;
 pub use perceptual::PerceptualDistance;
-pub use post_processor::{PostProcessor, Provenance, train_finisher};
+pub use post_processor::{PostProcessor, Provenance};
 pub use sample::SAMPLING_STEPS;
-pub use stacks::{Stack, Stacks};
-pub use training::{JUDGED, train};
+
+/// The parts of the networks that a training needs: layers, gradients, files of weights.
+pub mod parts {
+    pub use crate::denoiser::{input, over_squares};
+    pub use crate::features::Features;
+    pub use crate::network::{Layer, Network, Plan, Size, Trace};
+    pub use crate::post_processor::STAGE;
+    pub use crate::squares::{cut, piled, seen};
+    pub use crate::weights::write_weights;
+}

@@ -13,11 +13,11 @@ const LEVELS: usize = 3;
 /// Colours of a picture.
 pub const COLOURS: usize = 3;
 /// Rows and columns that the network takes are multiples of this, in its own resolution: half of the picture's.
-pub(crate) const MULTIPLE: usize = 1 << (LEVELS - 1);
+pub const MULTIPLE: usize = 1 << (LEVELS - 1);
 
-/// How large a network is.
+/// Size of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Size {
+pub struct Size {
     /// Channels that it sees, in its own resolution.
     pub inputs: usize,
     /// Channels at each resolution.
@@ -27,15 +27,15 @@ pub(crate) struct Size {
 }
 
 impl Size {
-    /// Of the denoiser: four pixels of each colour, and the noise of each colour.
+    /// Size of the denoiser: four pixels of each colour, and the noise of each colour.
     pub const DENOISER: Self = Self {
         inputs: 4 * COLOURS + COLOURS,
         channels: [32, 64, 96],
         blocks: 2,
     };
 
-    /// Of the last stage of a camera that sees so many pictures, and one map of where it is.
-    pub fn finisher(pictures: usize) -> Self {
+    /// Size of the last stage of a camera that sees so many pictures, and one map of where it is.
+    pub fn post_processor(pictures: usize) -> Self {
         Self {
             inputs: 4 * COLOURS * pictures + 1,
             channels: [24, 48, 64],
@@ -58,23 +58,23 @@ enum Step {
 
 /// One convolution of the network.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Layer {
+pub struct Layer {
     /// Name in files of weights.
     pub name: String,
     pub shape: Shape,
-    /// Where its weights begin.
+    /// Index where its weights begin.
     pub start: usize,
 }
 
-/// What a network does, without its weights.
+/// Plan of a network, without its weights.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan {
+pub struct Plan {
     pub layers: Vec<Layer>,
     steps: Vec<Step>,
 }
 
 impl Plan {
-    /// Of a network of this size.
+    /// Plan of a network of this size.
     pub fn new(size: Size) -> Self {
         let mut plan = Self {
             layers: Vec::new(),
@@ -140,21 +140,21 @@ impl Plan {
 
 /// The network with its weights, made ready for use.
 #[derive(Clone, Debug)]
-pub(crate) struct Network {
+pub struct Network {
     plan: Plan,
     forward: Vec<Packed>,
-    /// For gradients only.
+    /// Weights for gradients only.
     backward: Vec<Packed>,
 }
 
-/// What the way forward leaves for the way back: of each step its input, and what is between two convolutions.
-pub(crate) struct Trace {
+/// Trace of the forward pass for the backward pass: the input of each step, and what is between two convolutions.
+pub struct Trace {
     inputs: Vec<Features>,
     between: Vec<Option<Features>>,
 }
 
 impl Network {
-    /// With the weights of a plan.
+    /// Network with the weights of a plan.
     pub fn new(plan: &Plan, weights: &[f32]) -> Self {
         let of = |layer: &Layer| Packed::forward(layer.shape, Self::part(layer, weights));
         Self {
@@ -164,7 +164,7 @@ impl Network {
         }
     }
 
-    /// That can be taught.
+    /// Network that can be trained.
     pub fn for_learning(plan: &Plan, weights: &[f32]) -> Self {
         let of = |layer: &Layer| Packed::backward(layer.shape, Self::part(layer, weights));
         Self {
@@ -177,12 +177,12 @@ impl Network {
         &weights[layer.start..layer.start + layer.shape.weights()]
     }
 
-    /// The answer of the network: `[12, rows, columns]` of `[inputs, rows, columns]`, both sides multiples of [`MULTIPLE`].
+    /// The answer of the network: `[12, rows, columns]` of `[inputs, rows, columns]`, both sides multiples of `MULTIPLE`, four.
     pub fn apply(&self, input: Features) -> Features {
         self.walk(input, |_, _| ())
     }
 
-    /// The same, with what the way back needs.
+    /// Output of the network, with the trace that the backward pass needs.
     pub fn traced(&self, input: Features) -> (Features, Trace) {
         let mut trace = Trace {
             inputs: Vec::new(),

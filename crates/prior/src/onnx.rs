@@ -26,23 +26,23 @@ const TRIAL: [usize; 2] = [2 * SIDE, 3 * SIDE];
 /// Value and deviation of the picture that is tried.
 const TRIED: [f32; 2] = [0.5, 0.1];
 
-/// How a network is told of the deviation of the noise, in the unit of the picture.
+/// Form in which a network receives the deviation of the noise, in the unit of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// As a fourth plane of its only input, the mean over colours.
+    /// Fourth plane of its only input, the mean over colours.
     FourPlanes,
-    /// As planes four to six of its only input.
+    /// Planes four to six of its only input.
     SixPlanes,
-    /// Not at all: it finds out by itself, or knows one.
+    /// Not at all: it finds out on its own, or knows one.
     Blind,
-    /// As a second input `[1, 1, rows, columns]`, the mean over colours.
+    /// Second input `[1, 1, rows, columns]`, the mean over colours.
     Map,
-    /// As one number, a second input of this many dimensions.
+    /// Single number, a second input of this many dimensions.
     Number(usize),
 }
 
 impl Form {
-    /// Those that may be of a network with so many inputs.
+    /// Forms that may be of a network with so many inputs.
     fn of_inputs(inputs: usize) -> &'static [Self] {
         match inputs {
             1 => &[Self::FourPlanes, Self::SixPlanes, Self::Blind],
@@ -97,7 +97,7 @@ pub struct OnnxNetwork {
     path: PathBuf,
     model: InferenceModel,
     form: Form,
-    /// For the size that came last.
+    /// Network prepared for the size that came last.
     ready: Mutex<Option<Ready>>,
 }
 
@@ -138,7 +138,7 @@ impl OnnxNetwork {
         Err(fault(path, refused.join("; ")))
     }
 
-    /// How it is told of the noise.
+    /// Form in which it receives the noise.
     #[cfg(test)]
     fn form(&self) -> Form {
         self.form
@@ -213,7 +213,7 @@ fn declared(model: &InferenceModel, shapes: &[Vec<usize>]) -> Option<String> {
     })
 }
 
-/// What a network says, or why it does not: files from anywhere may break what reads them.
+/// Result of a network, or the reason why it has none: files from anywhere may break what reads them.
 fn guarded<T>(work: impl FnOnce() -> TractResult<T>) -> std::result::Result<T, String> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(answer) => answer.map_err(|e| format!("{e:#}")),

@@ -1,4 +1,4 @@
-//! How different two pictures look: the learned perceptual distance (LPIPS), for a user who has its weights.
+//! Perceptual distance of two pictures as they look (LPIPS, learned), for a user who has its weights.
 //!
 //! Zhang, Isola, Efros, Shechtman and Wang, "The unreasonable effectiveness of deep features as a perceptual metric", CVPR
 //! 2018: both pictures go through the five convolutions of AlexNet; what each of them finds at a place is made a vector of
@@ -25,7 +25,7 @@ struct Stage {
     stride: usize,
     /// Zeros on each side.
     margin: usize,
-    /// Whether the greatest of three by three is taken before it, every second place.
+    /// True if the greatest of three by three is taken before it, every second place.
     pooled: bool,
 }
 
@@ -40,7 +40,7 @@ const fn stage(name: &'static str, features: [usize; 2], [taps, stride, margin]:
     }
 }
 
-/// With the names that the authors' package gives them (`lpips.LPIPS(net="alex").state_dict()`).
+/// Stages with the names that the authors' package gives them (`lpips.LPIPS(net="alex").state_dict()`).
 const STAGES: [Stage; 5] = [
     stage("net.slice1.0", [3, 64], [11, 4, 2], false),
     stage("net.slice2.3", [64, 192], [5, 1, 2], true),
@@ -49,7 +49,7 @@ const STAGES: [Stage; 5] = [
     stage("net.slice5.10", [256, 256], [3, 1, 1], false),
 ];
 
-/// Of sRGB from -1 to 1, what the network was taught to expect of it: mean and deviation of each colour.
+/// Mean of each colour of sRGB from -1 to 1 that the network was trained to expect; its deviation follows.
 const MEAN: [f32; 3] = [-0.030, -0.088, -0.188];
 const DEVIATION: [f32; 3] = [0.458, 0.448, 0.450];
 /// Least length of a vector of features.
@@ -68,12 +68,12 @@ struct Layer {
     /// `[feature, feature before, row, column]`.
     weights: Vec<f32>,
     bias: Vec<f32>,
-    /// What a squared difference of each feature counts.
+    /// Weight of a squared difference of each feature.
     counts: Vec<f32>,
 }
 
 impl PerceptualDistance {
-    /// From a file of safetensors, in half or single precision.
+    /// Distance by the weights of a file of safetensors, in half or single precision.
     ///
     /// # Errors
     /// If it cannot be read, or a tensor is missing or of another shape: all of them at once.
@@ -121,7 +121,8 @@ impl PerceptualDistance {
     pub fn between(&self, a: ArrayView3<'_, f64>, b: ArrayView3<'_, f64>) -> Result<f64> {
         let (rows, columns, colours) = a.dim();
         if a.dim() != b.dim() || colours != 3 || rows.min(columns) < LEAST_PIXELS {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "score/shapes",
                 format!(
                     "pictures of {:?} and {:?} have no perceptual distance",
                     a.shape(),
@@ -189,7 +190,7 @@ fn pooled(features: &Array3<f32>) -> Array3<f32> {
 }
 
 impl Layer {
-    /// What the convolution finds, nothing negative.
+    /// Output of the convolution, nothing negative.
     fn features(&self, stage: &Stage, before: Array3<f32>) -> Array3<f32> {
         let before = if stage.pooled { pooled(&before) } else { before };
         let (from, rows, columns) = before.dim();
@@ -256,9 +257,9 @@ mod tests {
     use super::*;
     use safetensors::tensor::TensorView;
 
-    /// Of single precision against the double precision of `scripts/lpips_reference.py`.
+    /// Tolerance of single precision against the double precision of `scripts/lpips_reference.py`.
     const SINGLE: f64 = 2e-4;
-    /// What that script prints.
+    /// Number that the script prints.
     const REFERENCE: f64 = 0.320_873_53;
 
     /// Numbers that the script makes too.

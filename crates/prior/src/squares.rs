@@ -1,15 +1,16 @@
 //! Pictures as a network sees them, and what it makes of them.
 
-use ndarray::{Array2, Array3, Axis};
+use metalith_core::{Error, Result};
+use ndarray::{Array2, Array3, Axis, concatenate};
 
 use crate::features::Features;
 use crate::network::{COLOURS, MULTIPLE, Network};
 
 /// Sides of a network's input in the picture: two pixels a square, and halves of them.
-pub(crate) const SIDE: usize = 2 * MULTIPLE;
+pub const SIDE: usize = 2 * MULTIPLE;
 
 /// Planes `[row, column, plane]` of pictures, four pixels of a square as channels, and maps of half as many rows and columns.
-pub(crate) fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features {
+pub fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features {
     let (rows, columns, count) = pictures.dim();
     let mut planes = Features::zero(count, rows, columns);
     for (c, plane) in pictures.axis_iter(Axis(2)).enumerate() {
@@ -25,7 +26,7 @@ pub(crate) fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features 
 }
 
 /// A picture with what the network answers added to it.
-pub(crate) fn corrected(network: &Network, input: Features, mut picture: Array3<f32>) -> Array3<f32> {
+pub fn corrected(network: &Network, input: Features, mut picture: Array3<f32>) -> Array3<f32> {
     let answer = network.apply(input).shuffled();
     for c in 0..COLOURS {
         let mut plane = picture.index_axis_mut(Axis(2), c);
@@ -37,13 +38,40 @@ pub(crate) fn corrected(network: &Network, input: Features, mut picture: Array3<
 }
 
 /// Larger by its mirror image at the far sides.
-pub(crate) fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
+pub fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
     let (h, w, n) = picture.dim();
     let back = |i: usize, n: usize| if i < n { i } else { (2 * n - 1).saturating_sub(i) };
     Array3::from_shape_fn((rows, columns, n), |(y, x, c)| picture[[back(y, h), back(x, w), c]])
 }
 
 /// A piece of so many rows, columns and planes from a place on; the first planes alone.
-pub(crate) fn cut<T: Copy>(planes: &Array3<T>, place: [usize; 2], size: [usize; 3]) -> Array3<T> {
+pub fn cut<T: Copy>(planes: &Array3<T>, place: [usize; 2], size: [usize; 3]) -> Array3<T> {
     Array3::from_shape_fn(size, |(y, x, c)| planes[[place[0] + y, place[1] + x, c]])
+}
+
+/// Pictures behind one another: `[row, column, colour]`.
+pub fn piled(pictures: &[Array3<f32>], size: (usize, usize, usize)) -> Result<Array3<f32>> {
+    if pictures.is_empty() || pictures.iter().any(|p| p.dim() != size) || size.2 != COLOURS {
+        return Err(Error::refused(
+            "stage/shapes",
+            "pictures of one frame that differ in size, or none",
+            "give pictures in colour of the size of the scene",
+        ));
+    }
+    let views: Vec<_> = pictures.iter().map(|p| p.view()).collect();
+    Ok(concatenate(Axis(2), &views).expect("all are of one size"))
+}
+
+/// Input of the last stage for a piece of such pictures whose first pixel is at `place` of a whole of so many rows and
+/// columns: the squared distance from its middle, a corner's being one, tells where it is.
+pub fn seen(piece: &Array3<f32>, place: [usize; 2], whole: [usize; 2]) -> Features {
+    let (rows, columns, _) = piece.dim();
+    let from_middle = |i: usize, a: usize| {
+        let half = 0.5 * whole[a] as f32;
+        ((place[a] + 2 * i + 1) as f32 - half) / half
+    };
+    let map = Array2::from_shape_fn((rows / 2, columns / 2), |(y, x)| {
+        0.5 * (from_middle(y, 0).powi(2) + from_middle(x, 1).powi(2))
+    });
+    squares(piece, &[map])
 }

@@ -12,24 +12,25 @@ use crate::network::{Layer, Plan, Size};
 
 /// The weights that come with the program: see its model card, `crates/prior/weights/README.md`.
 static SHIPPED: &[u8] = include_bytes!("../weights/denoiser.safetensors");
-/// Where a file says what its weights were learnt from: one word alone, so that the same weights are the same bytes.
+/// Key under which a file says what its weights were learnt from: one word alone, so that the same weights are the same
+/// bytes.
 const TRAINING: &str = "training";
 /// Longest file of weights (bytes): a hundred times what the network needs.
 const LONGEST: u64 = 256 << 20;
 
-/// Those that come with the program.
-pub(crate) fn shipped_weights() -> Result<Vec<f32>> {
+/// Weights that are shipped with the program.
+pub fn shipped_weights() -> Result<Vec<f32>> {
     let path = Path::new("the shipped weights");
     parse(SHIPPED, path, &Plan::new(Size::DENOISER))
 }
 
-/// Those of a denoiser in a file.
-pub(crate) fn read_weights(path: &Path) -> Result<Vec<f32>> {
+/// Weights of a denoiser in a file.
+pub fn read_weights(path: &Path) -> Result<Vec<f32>> {
     parse(&read(path)?, path, &Plan::new(Size::DENOISER))
 }
 
-/// Those of a network whose size follows from what the file says they were learnt from.
-pub(crate) fn read_described<T>(
+/// Weights of a network whose size follows from what the file says they were learnt from.
+pub fn read_described<T>(
     path: &Path,
     described: impl Fn(&serde_json::Value) -> Option<(T, Size)>,
 ) -> Result<(T, Vec<f32>)> {
@@ -62,7 +63,7 @@ fn shape(layer: &Layer) -> Vec<usize> {
 }
 
 /// Write weights in half precision, with what they were learnt from.
-pub(crate) fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training: &str) -> Result<()> {
+pub fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training: &str) -> Result<()> {
     let about = HashMap::from([(TRAINING.to_owned(), training.to_owned())]);
     let halves: Vec<Vec<u8>> = plan
         .layers
@@ -76,7 +77,8 @@ pub(crate) fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training:
         let view = TensorView::new(Dtype::F16, shape(layer), bytes).expect("two bytes a weight");
         (layer.name.clone(), view)
     });
-    let bytes = safetensors::serialize(views, Some(about)).map_err(|e| Error::invalid(e.to_string(), "report this"))?;
+    let bytes = safetensors::serialize(views, Some(about))
+        .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
     AtomicFile::write(path, &bytes)
 }
 

@@ -1,4 +1,4 @@
-//! What can go wrong in solving a cell: causes with numbers, and for each a remedy.
+//! Errors of solving a cell: causes with numbers, and for each a remedy.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use super::{Orders, SiteLattice};
 /// Result of solving a cell.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why a cell was not solved, or a material is not known.
+/// Reason why a cell was not solved, or a material is not known.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -104,7 +104,7 @@ pub enum Error {
     },
 }
 
-/// What is wrong with a table of indices.
+/// Fault in a table of indices.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
@@ -140,7 +140,39 @@ impl Error {
         move |source| Self::Io { path, source }
     }
 
-    /// What to do about it.
+    /// Identity of the error, `subject/cause`: the text may change, the identity stays.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Wavelength { .. } => "rcwa/wavelength",
+            Self::Angle => "rcwa/angle",
+            Self::NoIncidentWave { .. } => "rcwa/no-incident-wave",
+            Self::Orders { .. } => "rcwa/orders",
+            Self::TooLarge { .. } => "rcwa/too-large",
+            Self::Sites { .. } => "rcwa/sites",
+            Self::CellCount { .. } => "rcwa/cell-count",
+            Self::UnlikeCells { .. } => "rcwa/unlike-cells",
+            Self::OutlineCount { .. } => "rcwa/outline-count",
+            Self::RotatedSite { .. } => "rcwa/rotated-site",
+            Self::SupercellOrders { .. } => "rcwa/supercell-orders",
+            Self::SupercellTooLarge { .. } => "rcwa/supercell-too-large",
+            Self::Pitch { .. } => "rcwa/pitch",
+            Self::Row { .. } => "rcwa/row",
+            Self::StaggeredOutline { .. } => "rcwa/staggered-outline",
+            Self::Index { .. } => "rcwa/index",
+            Self::Height { .. } => "rcwa/height",
+            Self::Width { .. } => "rcwa/width",
+            Self::Polarising => "rcwa/polarising",
+            Self::NoModes { .. } => "rcwa/no-modes",
+            Self::Cutoff => "rcwa/cutoff",
+            Self::UnknownMaterial { .. } => "rcwa/unknown-material",
+            Self::MaterialIndex { .. } => "rcwa/material-index",
+            Self::OutOfRange { .. } => "rcwa/out-of-range",
+            Self::Io { .. } => "file/system",
+            Self::Table { .. } => "rcwa/material-table",
+        }
+    }
+
+    /// Remedy for the error.
     pub fn remedy(&self) -> String {
         match self {
             Self::Wavelength { .. } => "use a positive number of micrometres".into(),
@@ -211,6 +243,7 @@ impl From<Error> for metalith_core::Error {
                 source,
             },
             other => Self::Invalid {
+                id: other.id(),
                 what: other.to_string(),
                 hint: other.remedy(),
                 source: Some(Box::new(other)),

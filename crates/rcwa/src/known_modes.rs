@@ -15,7 +15,7 @@ use super::{CellLattice, Result};
 pub(super) struct Section {
     pub family: Family,
     pub kept: RetainedOrders,
-    /// Of the incident wave over k0.
+    /// Transverse wave vector of the incident wave over k0.
     pub k: [f64; 2],
     pub steps: [f64; 2],
     pub pitch_nm: f64,
@@ -33,8 +33,8 @@ pub(super) struct KnownModes {
 }
 
 impl KnownModes {
-    /// Room for layers of a stack in the symmetries of both polarisations. Of a stack that is solved by itself, nothing is kept: see
-    /// [`KnownModes::default`].
+    /// Room for layers of a stack in the symmetries of both polarisations. Of a stack that is solved individually,
+    /// nothing is kept: see [`KnownModes::default`].
     pub fn of_layers(layers: usize) -> Self {
         Self {
             room: 2 * layers,

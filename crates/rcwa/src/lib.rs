@@ -33,12 +33,12 @@ pub use supercell::{SiteLattice, SiteLayer, Supercell, SupercellOrder, Supercell
 
 pub use error::{Error, Result, TableError};
 
-/// Where a wave comes from.
+/// Side that a wave comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Side {
-    /// From below: the substrate of the cell.
+    /// Incidence from below: the substrate of the cell.
     Below,
-    /// From above: the air over the pillars.
+    /// Incidence from above: the air over the pillars.
     Above,
 }
 
@@ -66,7 +66,7 @@ impl Incidence {
         }
     }
 
-    /// At an angle measured in air, the plane of incidence at an azimuth from x (rad).
+    /// Wave at an angle measured in air, the plane of incidence at an azimuth from x (rad).
     pub fn in_air(wavelength_um: f64, side: Side, theta: f64, azimuth: f64) -> Self {
         let sin = theta.sin();
         Self {
@@ -75,7 +75,7 @@ impl Incidence {
         }
     }
 
-    /// From the components of the wave vector along x and y over that in vacuum.
+    /// Wave with these sines: the components of the wave vector along x and y over the wave number in vacuum.
     pub fn of_sines(wavelength_um: f64, side: Side, sines: [f64; 2]) -> Self {
         Self {
             wavelength_um,
@@ -152,8 +152,8 @@ pub fn solve_each(stacks: &[LayerStack], incidence: &Incidence, orders: Orders) 
         .collect()
 }
 
-/// Without use of symmetry: the slow way, which the fast one is tested against. A wave along the normal
-/// is turned off it by a millionth, where the modes still differ.
+/// Solves without use of symmetry: the slow way, which the fast one is tested against. A wave along the normal is
+/// turned off it by a millionth, where the modes still differ.
 #[doc(hidden)]
 pub fn solve_without_symmetry(stack: &LayerStack, incidence: &Incidence, orders: Orders) -> Result<Response> {
     solve_with(stack, incidence, orders, false, &mut KnownModes::default())
@@ -247,8 +247,8 @@ pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orde
     })
 }
 
-/// Where a mode or an order is at its very cutoff the formulas divide zero by zero. The field itself is finite: it is
-/// the limit of those at the wavelengths beside it, which are tried then.
+/// Solves beside a cutoff where the wavelength is at one. The field itself is finite: it is the limit of the fields at
+/// neighbouring wavelengths, which are tried then.
 fn off_cutoff<T>(wavelength_um: f64, mut solve: impl FnMut(f64) -> Result<T>) -> Result<T> {
     /// Relative, the closest that works. What vanishes at the cutoff goes with the root of the distance: 1e-6 of the
     /// answer for the first.
@@ -277,7 +277,7 @@ struct Part {
     ends: Ends,
     /// Transverse amplitudes of the incident zero order, for each column.
     incident: Vec<[Complex64; 2]>,
-    /// Whether x and y are exchanged.
+    /// True if x and y are exchanged.
     turned: bool,
 }
 

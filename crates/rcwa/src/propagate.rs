@@ -1,4 +1,4 @@
-//! From one wave that arrives to the fields at both ends of a stack.
+//! Propagation of one incident wave to the fields at both ends of a stack.
 //!
 //! From the far side inwards, each layer sees what follows as an admittance, G = Y E; its backward
 //! waves at its far end are b = (v + Y w)^-1 (v - Y w) X a, where X only ever decays, so that no height
@@ -34,13 +34,13 @@ pub(super) struct Ends {
     pub reflected: Mat<Complex64>,
 }
 
-/// What follows a layer.
+/// Load: what follows a layer.
 enum Load<'a> {
     Medium(&'a Medium),
     Admittance(Mat<Complex64>),
 }
 
-/// What the way back through a layer needs.
+/// Quantities that the way back through a layer needs.
 struct Crossed<'a> {
     modes: &'a Modes,
     /// Modes that reach the other end, and by what factor.

@@ -1,11 +1,11 @@
-//! What a solution says: the zero order as a matrix, the power of every order.
+//! Results of a solution: the zeroth order as a matrix, the power of every order.
 
 use num_complex::Complex64;
 
 use super::{Error, Result};
 use super::{Incidence, LayerStack, Orders, Part, Problem, solve};
 
-/// How a stack answers a plane wave.
+/// Response of a stack to a plane wave.
 ///
 /// The unit vectors: s lies in the plane of the lattice, p has its transverse part along the transverse
 /// wave vector (at normal incidence from azimuth 0, p is x and s is y). Fields along p are amplitudes
@@ -14,8 +14,9 @@ use super::{Incidence, LayerStack, Orders, Part, Problem, solve};
 pub struct Response {
     /// Zero order at the far side: `transmission[out][in]`, 0 for s and 1 for p; field ratios.
     pub transmission: [[Complex64; 2]; 2],
-    /// The same by transverse fields along the axes: `jones[out][in]`, 0 for x and 1 for y; ratios of the parts of the field
-    /// that lie in the plane of the lattice, whatever the angle. [`circular`](crate::circular) has it in circular polarisation.
+    /// Jones matrix of the transverse fields along the axes: `jones[out][in]`, 0 for x and 1 for y; ratios of the parts
+    /// of the field that lie in the plane of the lattice, whatever the angle. [`circular`](crate::circular) has it in
+    /// circular polarisation.
     pub jones: [[Complex64; 2]; 2],
     /// Zero order that returns, alike. A reflected p has its transverse part where the incident has it.
     pub reflection: [[Complex64; 2]; 2],
@@ -206,7 +207,7 @@ pub(super) fn finite(value: Complex64) -> Result<Complex64> {
     }
 }
 
-/// What [`converge`] found.
+/// Outcome of [`converge`].
 #[derive(Clone, Debug)]
 pub struct Convergence {
     /// The answer with the most orders.
@@ -215,7 +216,7 @@ pub struct Convergence {
     pub orders: Orders,
     /// Largest change of an entry of the transmission in the last step.
     pub change: f64,
-    /// Whether the change was within the tolerance.
+    /// True if the change was within the tolerance.
     pub converged: bool,
 }
 

@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::{Error, Result};
 
-/// What the layers need of a number.
+/// Number type that the layers need.
 pub(super) trait Scalar:
     faer::traits::ComplexField
     + Copy

@@ -1,4 +1,4 @@
-//! What the solver is given: layers on a lattice, in optical constants.
+//! Input of the solver: layers on a lattice, in optical constants.
 
 use metalith_pillars::LatticeKind;
 use num_complex::Complex64;
@@ -8,7 +8,7 @@ use super::basis::RetainedOrders;
 use super::outline::Outline;
 use super::{Error, Result};
 
-/// Where the pillars of a cell stand.
+/// Lattice on which the pillars of a cell stand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CellLattice {
@@ -65,7 +65,7 @@ impl CellLattice {
         }
     }
 
-    /// Whether a sixth of a turn leaves it alike, but for rounding.
+    /// True if a sixth of a turn leaves it unchanged, but for rounding.
     pub fn is_hexagonal(self, pitch_nm: f64) -> bool {
         const ROUNDING: f64 = 1e-12;
         matches!(self, Self::Staggered { row_nm } if (row_nm - ROW_OF_HEXAGONAL * pitch_nm).abs() <= ROUNDING * pitch_nm)
@@ -80,11 +80,11 @@ const ROW_OF_HEXAGONAL: f64 = 0.866_025_403_784_438_6;
 pub struct LayerStack {
     /// Pitch of the lattice (nm).
     pub pitch_nm: f64,
-    /// How the pillars stand; rows that are staggered have circles.
+    /// Lattice of the pillars; staggered rows have circles.
     pub lattice: CellLattice,
     /// Complex index of the half-space below, where the substrate is.
     pub below: Complex64,
-    /// From the substrate upwards.
+    /// Layers from the substrate upwards.
     pub layers: Vec<Layer>,
     /// Complex index of the half-space above.
     pub above: Complex64,
@@ -124,7 +124,7 @@ impl Orders {
     /// Largest number of orders along an axis; past it a matrix alone takes gigabytes.
     pub const MOST: usize = 127;
 
-    /// So many orders along each axis.
+    /// Orders, so many along each axis.
     ///
     /// # Errors
     /// If the number is zero, even or above [`Orders::MOST`].
@@ -147,7 +147,7 @@ impl Orders {
 }
 
 impl LayerStack {
-    /// The same stack seen from the other side.
+    /// Same stack seen from the other side.
     pub(super) fn flipped(&self) -> Self {
         Self {
             pitch_nm: self.pitch_nm,
@@ -158,7 +158,7 @@ impl LayerStack {
         }
     }
 
-    /// Whether a quarter of a turn leaves it alike, so that x and y polarisation see the same.
+    /// True if a quarter of a turn leaves it unchanged, so that x and y polarisation respond equally.
     pub(super) fn is_square(&self) -> bool {
         self.lattice == CellLattice::Square && self.layers.iter().all(|l| l.outline.is_square())
     }
@@ -172,26 +172,26 @@ impl LayerStack {
         [wavelength_nm / self.pitch_nm, wavelength_nm / along_y]
     }
 
-    /// Whether both axes mirror it.
+    /// True if both axes mirror it.
     pub(super) fn is_mirrored(&self) -> bool {
         self.layers.iter().all(|l| l.outline.is_mirrored())
     }
 
-    /// Whether any pillar has sides along the axes.
+    /// True if any pillar has sides along the axes.
     pub(super) fn has_upright(&self) -> bool {
         self.layers
             .iter()
             .any(|l| l.outline.is_upright() && !l.outline.is_empty())
     }
 
-    /// Whether any pillar has sides that are not along the axes.
+    /// True if any pillar has sides that are not along the axes.
     fn has_slanted(&self) -> bool {
         self.layers
             .iter()
             .any(|l| !l.outline.is_upright() && !l.outline.is_empty())
     }
 
-    /// Which plane waves are kept of so many orders.
+    /// Plane waves that are retained of so many orders.
     pub(super) fn kept(&self, orders: Orders) -> RetainedOrders {
         match self.lattice {
             CellLattice::Square if self.has_slanted() && !self.has_upright() => {

@@ -161,7 +161,7 @@ fn a_sixth_of_a_turn_and_mirrors_change_nothing() {
     }
 }
 
-/// Where first orders run, six of them carry the same of unpolarised light.
+/// First orders, where they propagate: six of them carry equal power of unpolarised light.
 #[test]
 fn power_is_kept_in_all_orders() {
     let cell = hexagonal(1400.0, 700.0);

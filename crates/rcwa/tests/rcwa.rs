@@ -16,8 +16,8 @@ const OFF_NORMAL: f64 = 1e-5;
 /// The oblique truth is known well enough to judge by where its own bound is below this.
 const BOUND_OF_USE: f64 = 0.005;
 
-/// What the solver may add to the truth's own bound, in |t| and in rad, with so many orders, and the least share of
-/// the points that must keep to it: resonances of high quality shift by more.
+/// Error that the solver may add to the bound of the reference, in |t| and in rad, with so many orders, and the least
+/// share of the points that must keep to it: resonances of high quality shift by more.
 struct Agreement {
     orders: usize,
     amplitude: f64,

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 /// Rounding of the eigenvectors of a few hundred unknowns, whose condition is about 10^4.
 const ROUNDING: f64 = 1e-9;
-/// The same where x and y are told apart by 1e-9, so that modes do not come in pairs; a resonance feels that more.
+/// Tolerance where x and y are distinguished by 1e-9, so that modes do not come in pairs; a resonance feels that more.
 const TOLD_APART: f64 = 1e-7;
 
 /// A pillar of titanium dioxide, or what is near it.
@@ -74,7 +74,8 @@ fn a_quarter_of_a_turn_exchanges_the_axes() {
     assert!(largest(&mirrored, &expected) < TOLD_APART, "{mirrored:?} {expected:?}");
 }
 
-/// At the corners the normal jumps, and neither rule has much left to say: both come to one answer, slowly.
+/// Rectangle with upright sides: at its corners the normal jumps, and neither rule is better: both come to one answer,
+/// slowly.
 #[test]
 fn an_upright_rectangle_by_either_rule() {
     // 0.0144 with 25 orders each, in a square and in a circle: the pillar is at a resonance.
@@ -85,7 +86,8 @@ fn an_upright_rectangle_by_either_rule() {
     assert!(turned[0][1].norm() < ROUNDING && turned[1][0].norm() < ROUNDING);
 }
 
-/// Stacks that are solved together, of which some differ in heights alone, have the answers that each has by itself, bit by bit.
+/// Stacks that are solved together, of which some differ in heights alone, have the answers that each has individually,
+/// bit by bit.
 #[test]
 fn stacks_that_are_solved_together_are_those_solved_one_by_one() {
     let of = |width_nm: f64, height_nm: f64, mask_nm: f64| {

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 /// the table, six digits after the point, and a little of their own.
 const PRINTED: f64 = 2e-6;
 
-/// Nothing absorbs: what is missing from the power is the rounding of eigenvectors.
+/// Tolerance of the power where nothing absorbs: the rounding of eigenvectors.
 const ROUNDING: f64 = 1e-10;
 
 /// Rows to compare: cells, wavelength (nm), incidence. Each is solved at the first offset of the pillars and for both

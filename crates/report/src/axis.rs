@@ -204,12 +204,12 @@ impl Fitted {
         }
     }
 
-    /// How far from the left edge of a drawing a chart may begin whose axis this is, so that labels and title beside it do not
-    /// touch.
+    /// Distance from the left edge of a drawing at which a chart with this axis may begin, so that labels and title
+    /// next to it do not touch.
     pub fn left(&self) -> f64 {
         /// Enough for five digits.
         const USUAL: f64 = 66.0;
-        /// Of the title, and of the ticks between labels and chart.
+        /// Width of the title, and of the ticks between labels and chart.
         const BESIDE: f64 = 30.0;
         let widths = self.ticks().labelled.into_iter().map(|(_, label)| text_width(&label));
         widths.fold(USUAL, |left, width| left.max(width + BESIDE))

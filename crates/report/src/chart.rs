@@ -316,7 +316,8 @@ fn draw(series: &Series, colour: usize, x: &Fitted, y: &Fitted) -> Group {
     }
 }
 
-/// At most four points a column of the drawing (first, lowest, highest, last): looks the same, stays small.
+/// Points of a line thinned to at most four a column of the drawing (first, lowest, highest, last): looks the same,
+/// stays small.
 fn thinned(points: &[Option<(f64, f64)>]) -> Vec<Option<(f64, f64)>> {
     if points.len() < 3000 || points.iter().any(Option::is_none) {
         return points.to_vec();

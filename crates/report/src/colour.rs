@@ -1,11 +1,11 @@
-//! Colours: series that colour-blind readers can tell apart, and maps of equal perceived steps.
+//! Colours: series that colour-blind readers can distinguish, and maps of equal perceived steps.
 
 use metalith_core::srgb::encoded;
 
 /// Number of series with a colour and dash of their own; further ones begin again.
 pub const SERIES: usize = 7;
 
-/// From a share between 0 and 1 to a colour.
+/// Map from a share between 0 and 1 to a colour.
 ///
 /// The first and the last are straight in lightness in the Oklab space (B. Ottosson, "A perceptual color space for
 /// image processing", 2020), so that equal steps of the value look equally large, also in grey print.

@@ -136,9 +136,9 @@ pub(super) fn shading<'a>(
     (axis.range(low, high), shading)
 }
 
-/// What a title beside a colour bar may be longer than it: drawings have so much room above and below it.
+/// Length by which a title next to a colour bar may exceed it: drawings have so much room above and below the bar.
 const BESIDE_BAR: f64 = 20.0;
-/// From one line of a title to the next.
+/// Distance from one line of a title to the next.
 const LINE: f64 = 14.0;
 
 /// A title in as many lines as it takes for each to be no longer than the room that there is; a word is never broken.

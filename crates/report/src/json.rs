@@ -14,10 +14,16 @@ use metalith_core::{Error, Result};
 /// # Errors
 /// If the file cannot be written, or `numbers` is not a map of fields.
 pub fn write_json(path: &Path, report: &str, numbers: &impl Serialize) -> Result<()> {
-    let fields = serde_json::to_value(numbers)
-        .map_err(|e| Error::invalid(format!("numbers of {report} have no JSON: {e}"), "report this as a bug"))?;
+    let fields = serde_json::to_value(numbers).map_err(|e| {
+        Error::refused(
+            "internal/serialisation",
+            format!("numbers of {report} have no JSON: {e}"),
+            "report this as a bug",
+        )
+    })?;
     let Value::Object(fields) = fields else {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "internal/serialisation",
             format!("numbers of {report} are not a map of fields"),
             "report this as a bug",
         ));

@@ -143,7 +143,7 @@ impl Page {
         self
     }
 
-    /// What most readers may skip, folded behind a line of words; unfolded in print.
+    /// Section that most readers may skip, folded behind a line of words; unfolded in print.
     pub fn details(&mut self, words: impl AsRef<str>, fill: impl FnOnce(&mut Page)) -> &mut Self {
         let mut inner = Page::new("", "");
         inner.sections.clone_from(&self.sections);

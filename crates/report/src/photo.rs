@@ -20,7 +20,7 @@ struct Photo {
     label: String,
     /// Rows and columns of the picture that was given.
     shape: (usize, usize),
-    /// What is shown of it.
+    /// Pixels that are shown.
     bytes: Array3<u8>,
 }
 

@@ -12,7 +12,7 @@ const SHADES: f64 = 254.0;
 /// More pixels an axis than a page shows are averaged away.
 const LARGEST: usize = 720;
 
-/// How values become shares of the colour map.
+/// Shading: how values become shares of the colour map.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shading {
     pub map: ColourMap,

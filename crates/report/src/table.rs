@@ -3,7 +3,7 @@
 use super::number::{count, exact, fixed, sig};
 use super::page::{escape, inline};
 
-/// How something that was to hold ended.
+/// Verdict on a requirement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     Pass,
@@ -43,7 +43,7 @@ impl Verdict {
 /// Letters of an entry that is not broken over lines.
 const KEPT_WHOLE: usize = 28;
 
-/// What stands above a column.
+/// Heading of a column.
 #[derive(Clone, Debug)]
 pub struct Column {
     name: String,

@@ -1,11 +1,11 @@
-//! How much light is let in.
+//! Exposure: the amount of light that a camera lets in.
 
 use metalith_core::document::{Limits, Section};
 use serde::Serialize;
 
 use crate::Sensor;
 
-/// How much light is let in.
+/// Amount of light that a camera lets in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Exposure {
     /// Time (s).
@@ -14,7 +14,7 @@ pub struct Exposure {
     pub white: f64,
 }
 
-/// What decides whether a white surface is within the largest signal of a sensor.
+/// Keys that decide whether a white surface is within the largest signal of a sensor.
 const SIGNAL: [&str; 6] = [
     "exposure.white",
     "sensor.bits",
@@ -25,7 +25,7 @@ const SIGNAL: [&str; 6] = [
 ];
 
 impl Exposure {
-    /// From its section, for a sensor that must be able to hold it.
+    /// Reads the exposure from its section, for a sensor that must be able to hold it.
     pub(crate) fn read(s: &Section<'_, '_>, sensor_section: &Section<'_, '_>, sensor: &Sensor) -> Self {
         let exposure = Self {
             time_s: s.float("time_ms", Limits::new(1e-3..=1e6, "ms")) * 1e-3,

@@ -121,7 +121,7 @@ fn flat_channel(name: &str, band_nm: [f64; 2]) -> Channel {
     }
 }
 
-/// What the file says, before the curves that it names are read.
+/// Contents of the file before the curves that it names are read.
 struct Draft {
     name: String,
     sensor: Sensor,

@@ -1,6 +1,6 @@
 //! A camera cut into wavelengths that are simulated, and narrow parts of its channels between them.
 
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, lagrange_weight};
 
 use crate::{Camera, Channel, Illuminant};
 
@@ -11,12 +11,13 @@ const MOST_PARTS: f64 = 2000.0;
 const MOST_WAVELENGTHS: usize = 100;
 /// Share of the weight of a channel that is left out at each of its ends.
 const LEFT_OUT: f64 = 1e-3;
-/// The same of a narrow band: with a thousandth, the image of a point in the light of an LED of 33 nm errs by 9e-4 of
-/// the peak behind a wedge of 15 degrees, with this by 2e-4 (lens of 60 um).
+/// Share of a narrow band that is left out: with a thousandth, the image of a point in the light of an LED of 33 nm
+/// errs by 9e-4 of the peak behind a wedge of 15 degrees, with this by 2e-4 (lens of 60 um).
 const LEFT_OUT_OF_NARROW: f64 = 1e-4;
-/// How far the edge of an image that is out of focus may move from one wavelength of a narrow band to the next, over what a sensor tells
-/// apart: a pixel, or the finest image of the lens. Behind a lens of 140 um in pixels of 0.5 um, LEDs of 18 and 33 nm make spots
-/// that are wrong by 5e-4 and 2e-4 of the peak with 0.4, where twice as much made them wrong by up to 5e-2.
+/// Largest move of the edge of an image that is out of focus from one wavelength of a narrow band to the next, relative
+/// to what a sensor resolves: a pixel, or the finest image of the lens. Behind a lens of 140 um in pixels of 0.5 um,
+/// LEDs of 18 and 33 nm make spots that are wrong by 5e-4 and 2e-4 of the peak with 0.4, where twice as much made them
+/// wrong by up to 5e-2.
 const MOVED: f64 = 0.4;
 
 /// Places within a part at which its weight is taken.
@@ -27,13 +28,13 @@ const WITHIN: usize = 8;
 pub struct Sampling {
     /// Wavelengths (nm), rising.
     pub wavelengths_nm: Vec<f64>,
-    /// In the order of the camera's.
+    /// Channels in the order of the camera's.
     pub channels: Vec<ChannelSampling>,
-    /// How images of a point between these wavelengths follow from those at them.
+    /// Rule by which images of a point between these wavelengths follow from those at them.
     pub blend: Blend,
 }
 
-/// How the image of a point at a wavelength follows from its images at others.
+/// Rule by which the image of a point at a wavelength follows from its images at others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blend {
     /// A mean of the two next to it.
@@ -43,10 +44,10 @@ pub enum Blend {
     Cubic,
 }
 
-/// How far apart wavelengths are simulated.
+/// Steps between simulated wavelengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WavelengthSteps {
-    /// At most (nm).
+    /// Largest step (nm).
     pub most_nm: f64,
     /// Share of a wavelength in a narrow band by which the edge of an image moves by [`MOVED`] pixels, and by as many of the finest
     /// images of the lens in light of 1 um.
@@ -54,7 +55,7 @@ pub struct WavelengthSteps {
 }
 
 impl From<f64> for WavelengthSteps {
-    /// At most so far (nm), whatever the lens.
+    /// Steps of at most so much (nm), whatever the lens.
     fn from(most_nm: f64) -> Self {
         Self {
             most_nm,
@@ -64,8 +65,12 @@ impl From<f64> for WavelengthSteps {
 }
 
 impl WavelengthSteps {
-    /// The same behind lenses of these radii and focal lengths (um), in pixels of this size (um): as the one asks for that asks for
-    /// the closest.
+    /// The largest distance of wavelengths that polychromatic figures and pictures are simulated with (nm): eight intervals over a
+    /// channel of 100 nm. How much this weighs is reported for each channel.
+    pub const USUAL_NM: f64 = 12.5;
+
+    /// Steps behind lenses of these radii and focal lengths (um), in pixels of this size (um): the closest that any of
+    /// the lenses needs.
     ///
     /// The focus of a metalens moves by the share that the wavelength does, and the edge of the light about it by that share of the
     /// radius.
@@ -83,7 +88,7 @@ impl WavelengthSteps {
         }
     }
 
-    /// In a narrow band that begins at a wavelength (nm).
+    /// Step in a narrow band that begins at a wavelength (nm).
     fn narrow_nm(&self, first_nm: f64) -> f64 {
         let [pixel, finest] = self.image;
         first_nm * pixel.max(finest * first_nm * 1e-3)
@@ -102,8 +107,7 @@ impl Blend {
 
 /// Lagrange's weight of the value at `i` in the polynomial through those at 0, 1, 2, ... of so many, at a place `u`.
 pub fn lagrange(i: usize, count: usize, u: f64) -> f64 {
-    let others = (0..count).filter(|j| *j != i);
-    others.map(|j| (u - j as f64) / (i as f64 - j as f64)).product()
+    lagrange_weight(u, i as f64, (0..count).filter(|j| *j != i).map(|j| j as f64))
 }
 
 impl Sampling {
@@ -161,7 +165,7 @@ impl ChannelSampling {
 pub struct ChannelPart {
     /// Its ends (nm).
     pub nm: [f64; 2],
-    /// What the channel counts of it, of any scale: photons times efficiency.
+    /// Weight of its light in the channel, in any scale: photons times efficiency.
     pub weight: f64,
     /// Place of its middle among the wavelengths: `i + s` is share `s` of the way from wavelength `i` to the next.
     pub place: f64,
@@ -187,7 +191,7 @@ impl Channel {
             .collect()
     }
 
-    /// Whether it counts any light of an illuminant.
+    /// True if it counts any light of an illuminant.
     pub(crate) fn counts_any(&self, illuminant: &Illuminant) -> bool {
         self.parts(illuminant).iter().any(|p| p.weight > 0.0)
     }
@@ -225,7 +229,8 @@ impl Camera {
             let kept: f64 = parts.iter().map(|p| p.weight).sum();
             if kept <= 0.0 {
                 let [short, long] = range_nm.map(|nm| (nm * 10.0).round() / 10.0);
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "camera/no-light",
                     format!(
                         "channel `{}` of the camera counts no light from {short} to {long} nm",
                         channel.name
@@ -255,7 +260,7 @@ impl Camera {
     }
 }
 
-/// Of the narrowest channel.
+/// Number of steps in the narrowest channel.
 const STEPS_IN_A_BAND: f64 = 4.0;
 /// Wavelengths are at least so far apart (nm), unless less is asked for or the lens makes other images within it.
 const CLOSEST_NM: f64 = 5.0;

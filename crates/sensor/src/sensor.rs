@@ -12,8 +12,8 @@ pub struct Sensor {
     pub rows: u32,
     /// Middle of the sensor from the middle of the chip, x and y (um).
     pub offset_um: [f64; 2],
-    /// From the pillar tops to the sensor below the middle of the chip (um), if the camera says it: else the focal length that
-    /// the lenses of a design share.
+    /// Distance from the pillar tops to the sensor below the middle of the chip (um), if the camera says it: else the
+    /// focal length that the lenses of a design share.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_um: Option<f64>,
     /// Tilt of the sensor against the chip about the y and the x axis: the distance grows with x and with y (rad).
@@ -26,7 +26,8 @@ pub struct Sensor {
     pub noise: SensorNoise,
 }
 
-/// Which channel each pixel counts: the square of two by two pixels in the corner of the first row and column.
+/// Colour filter: the channel that each pixel counts, in the square of two by two pixels in the corner of the first row
+/// and column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ColourFilter {
@@ -38,11 +39,11 @@ pub enum ColourFilter {
     Gbrg,
 }
 
-/// What noise comes from.
+/// Sources of noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorNoise {
-    /// By the numbers of a data sheet.
+    /// Noise by the numbers of a data sheet.
     Electrons {
         /// Electrons that fill a pixel; full scale.
         full_well_e: f64,
@@ -51,7 +52,7 @@ pub enum SensorNoise {
         /// Electrons a second without light.
         dark_current_e_s: f64,
     },
-    /// By the two numbers of a paper, in units of full scale.
+    /// Noise by the two numbers of a paper, in units of full scale.
     FullScale {
         /// Signal of one photon, a_p.
         photon: f64,
@@ -99,8 +100,8 @@ impl SensorNoise {
         }
     }
 
-    /// For images between zero and full scale, exposed for so long (s). Electrons that come without light vary by the
-    /// root of their number, which is taken for part of reading; their mean is subtracted by every camera.
+    /// Noise of images between zero and full scale, exposed for so long (s). Electrons that come without light vary by
+    /// the root of their number, which is taken for part of reading; their mean is subtracted by every camera.
     pub fn of_exposure(&self, time_s: f64) -> Noise {
         match *self {
             Self::Electrons {

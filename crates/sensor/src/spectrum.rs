@@ -18,7 +18,7 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// From samples with rising wavelengths (nm) and values that are not negative; nothing if they are not so.
+    /// Spectrum from samples with rising wavelengths (nm) and values that are not negative; `None` if they are not.
     pub fn new(samples: Vec<(f64, f64)>) -> Option<Self> {
         let rising = samples.is_sorted_by(|a, b| a.0 < b.0);
         let physical = samples

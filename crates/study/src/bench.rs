@@ -1,4 +1,4 @@
-//! What draws are judged with: the designs, their layouts as read back, and tables of cells.
+//! Bench that judges draws: the designs, their layouts as read back, and tables of cells.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -46,7 +46,7 @@ pub(crate) struct Bench {
     current: Mutex<Option<Arc<Subject>>>,
 }
 
-/// Where the layout and the tables of each design are, by its number.
+/// Paths of the layout and the tables of each design, by its number.
 pub(crate) struct Files {
     pub layouts: Vec<std::path::PathBuf>,
     pub cells: Vec<std::path::PathBuf>,
@@ -59,7 +59,7 @@ pub(crate) struct Subject {
     array: PillarArray,
     layout: ReadLayout,
     bank: Arc<CellBank>,
-    /// What restorations know, if it is not the chip of the draw.
+    /// Chip that restorations know, if it is not the chip of the draw.
     known: Option<KnownChip>,
 }
 
@@ -70,21 +70,22 @@ pub struct JudgedDraw {
     pub picture: Option<TakenPicture>,
 }
 
-/// What all draws make of a pillar, at the least and at the most.
+/// Range of what all draws make of a pillar, from the least to the most.
 struct MadeRange {
     bias_nm: [f64; 2],
     changes: [CellChange; 2],
 }
 
 impl Bench {
-    /// For a tolerance that was read. `key`: of the random numbers.
+    /// Bench for a tolerance that was read. `key`: of the random numbers.
     pub fn new(tolerance: Tolerance, key: [u8; 32], files: Files) -> Result<Self> {
         let base = match &tolerance.model {
             Some(path) => CalibratedModel::read(path)?.perturbation,
             None => Perturbation::default(),
         };
         if base.declared().next().is_some() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/declared-effects",
                 "a model with declared effects: how wide their pillars become is not known before they are drawn",
                 "give a model without declared effects",
             ));
@@ -163,9 +164,10 @@ impl Bench {
     ) -> Result<Subject> {
         let design = self.tolerance.design(number)?;
         if design.verify.incidence == CellIncidence::AsLit {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/oblique",
                 "a study takes the cells along the normal, and the design asks for them as they are lit",
-                "leave out `incidence = \"as_lit\"` in [verify] of the design of the study",
+                "leave out `incidence = \"oblique\"` in [verify] of the design of the study",
             ));
         }
         check_rectangles(&design, &self.made, self.picture.is_some())?;
@@ -276,7 +278,6 @@ fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Re
     let stated = LitStack {
         stack: bank.stated().clone(),
         focused: design.focused(),
-        polarised: design.verify.light(),
     };
     Ok(AsBuiltChip::in_light(&stated, model)?.from_bank(bank))
 }
@@ -287,13 +288,15 @@ fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Res
         return Ok(());
     }
     if made.changes.iter().any(|change| change.corner_rounding_nm != 0.0) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "study/corner-rounding",
             "`corner_rounding` of rectangles",
             "leave it out of the study and of its model: rectangles are solved with sharp corners",
         ));
     }
     if has_picture {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "study/pictures-of-rectangles",
             "pictures of rectangles in a study",
             "leave out [picture]; `metalith picture` takes the picture of the chip as drawn",
         ));
@@ -328,8 +331,8 @@ impl MadeRange {
         }
     }
 
-    /// What the tables of a design must hold for all draws. Those of other designs count too: designs whose pillars are
-    /// alike then have the same tables.
+    /// Range that the tables of a design must hold for all draws. Ranges of other designs count too: designs whose
+    /// pillars are alike then have the same tables.
     fn range(&self, design: &Design, layout: &ReadLayout) -> Result<BankRange> {
         let histograms = layout.extraction().elements.iter().map(|e| e.widths.histogram());
         let mut drawn: BTreeSet<u16> = BTreeSet::new();

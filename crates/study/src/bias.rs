@@ -1,4 +1,4 @@
-//! Whether all draws of a design can be: asked before the first of them is judged.
+//! Check that all draws of a design can exist, made before the first of them is judged.
 
 use metalith_cell::CellStack;
 use metalith_core::{Error, Result};
@@ -7,7 +7,7 @@ use metalith_optics::{CalibratedModel, Perturbation};
 
 use crate::draw::Sampler;
 
-/// Nothing, if pillars can be as wide as every draw of a design makes them.
+/// Succeeds if pillars can be as wide as every draw of a design makes them.
 ///
 /// # Errors
 /// With the draw that leaves nothing of the narrowest pillar, or joins the widest ones.
@@ -36,7 +36,8 @@ pub(crate) fn check_biases(
         made.geometry.cd_bias_nm = bias_nm;
         let model = CalibratedModel::new(String::new(), String::new(), made);
         model.check_drawn(stack, counts.clone()).map_err(|error| match error {
-            Error::Invalid { what, hint, .. } => Error::invalid(
+            Error::Invalid { id, what, hint, .. } => Error::refused(
+                id,
                 format!("draw {k} of the study: {what}"),
                 format!("vary `cd_bias` over less, or {hint}"),
             ),

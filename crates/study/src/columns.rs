@@ -15,7 +15,7 @@ pub(crate) struct Column {
 /// Values of a column, in the order of the draws.
 pub(crate) enum Values {
     Whole(Vec<u64>),
-    /// None where there is no number.
+    /// Numbers; `None` where there is none.
     Number(Vec<Option<f64>>),
     Switch(Vec<bool>),
     Text(Vec<String>),

@@ -7,7 +7,7 @@ use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
-use metalith_picture::KernelCache;
+use metalith_imaging::KernelCache;
 use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -26,7 +26,7 @@ pub struct ComparisonPlan {
     work: String,
     /// SHA-256 of all that decides the answers, in hexadecimal.
     pub key: String,
-    pub lineup: Comparison,
+    pub comparison: Comparison,
     /// Folder of the plan.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -47,7 +47,7 @@ impl Manifest for ComparisonPlan {
 }
 
 impl ComparisonPlan {
-    /// What stands in the manifest under `work`.
+    /// Value of `work` in the manifest.
     pub(crate) const WORK: &'static str = "compare";
 
     /// The plan in a folder.
@@ -58,12 +58,12 @@ impl ComparisonPlan {
         Self::open_in(folder)
     }
 
-    /// How it is cut: each camera for itself.
+    /// Division of the work: each camera for itself.
     pub fn cut(&self) -> Sharding {
         Sharding {
             key: self.key.clone(),
             part: "camera",
-            parts: self.lineup.count() as u64,
+            parts: self.comparison.count() as u64,
             per_shard: 1,
             folder: self.folder.clone(),
         }
@@ -74,12 +74,12 @@ impl ComparisonPlan {
     /// # Errors
     /// If a file has changed since it was planned, kernels are not there, or the user stopped it.
     pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
-        if key(&self.lineup)? != self.key {
+        if key(&self.comparison)? != self.key {
             return Err(another_plan(&self.folder));
         }
-        let open = self.lineup.open()?;
-        let kept = KernelCache::only(&self.folder);
-        let camera = |k: u64| open.take(k as usize, &kept, progress);
+        let open = self.comparison.open()?;
+        let cache = KernelCache::only(&self.folder);
+        let camera = |k: u64| open.take(k as usize, &cache, progress);
         shards.iter().try_for_each(|n| self.cut().make(*n, &camera, progress))
     }
 
@@ -89,26 +89,29 @@ impl ComparisonPlan {
     /// If cameras are missing or there twice; as [`ComparisonPlan::run`].
     pub fn merge(&self, progress: &dyn Progress) -> Result<ComparisonResult> {
         let mut cameras: Vec<ComparedCamera> = self.cut().whole(&|_| None)?;
-        if key(&self.lineup)? != self.key {
+        if key(&self.comparison)? != self.key {
             return Err(another_plan(&self.folder));
         }
-        let open = self.lineup.open()?;
-        let kept = KernelCache::only(&self.folder);
+        let open = self.comparison.open()?;
+        let cache = KernelCache::only(&self.folder);
         for (k, camera) in cameras.iter_mut().enumerate() {
-            camera.shown = open.take_first(k, 1, &kept, progress)?.shown;
+            camera.shown = open.take_first(k, 1, &cache, progress)?.shown;
         }
         Ok(open.comparison(cameras))
     }
 }
 
 /// SHA-256 of everything that decides the answers.
-fn key(lineup: &Comparison) -> Result<String> {
+fn key(comparison: &Comparison) -> Result<String> {
     let mut hash = Sha256::new();
     hash.update(env!("CARGO_PKG_VERSION"));
     // What is asked for, with the names of the files; what they say follows.
-    hash.update(serde_json::to_vec(lineup).map_err(|e| Error::invalid(e.to_string(), "report this"))?);
-    let mut files = Camera::read(&lineup.camera)?.files;
-    for listed in &lineup.designs {
+    hash.update(
+        serde_json::to_vec(comparison)
+            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?,
+    );
+    let mut files = Camera::read(&comparison.camera)?.files;
+    for listed in &comparison.designs {
         let design = Design::read(&listed.design)?;
         let solver = metalith_cell::kept::solver_of(design.cell.shape);
         hash.update(format!("{solver} {} ", design.optics_digest()?));
@@ -119,11 +122,11 @@ fn key(lineup: &Comparison) -> Result<String> {
         }
     }
     files.extend(
-        lineup
+        comparison
             .photographs
             .iter()
-            .chain(&lineup.learnt)
-            .chain(&lineup.lpips)
+            .chain(&comparison.learnt)
+            .chain(&comparison.lpips)
             .cloned(),
     );
     for path in files {
@@ -137,30 +140,30 @@ fn key(lineup: &Comparison) -> Result<String> {
 ///
 /// # Errors
 /// If a file cannot be used, the folder holds another plan, or the user stopped it.
-pub fn plan_comparison(lineup: &Comparison, folder: &Path, progress: &dyn Progress) -> Result<ComparisonPlan> {
-    let lineup = placed(lineup)?;
-    let open = lineup.open()?;
+pub fn plan_comparison(comparison: &Comparison, folder: &Path, progress: &dyn Progress) -> Result<ComparisonPlan> {
+    let comparison = placed(comparison)?;
+    let open = comparison.open()?;
     open.notes().iter().for_each(|note| progress.warn(note));
-    let key = key(&lineup)?;
+    let key = key(&comparison)?;
     if let Some(known) = ComparisonPlan::known_in(folder, &key)? {
         return Ok(known);
     }
-    for k in 0..lineup.count() {
+    for k in 0..comparison.count() {
         open.prepare(k, &KernelCache::made(folder), progress)?;
     }
     let plan = ComparisonPlan {
         schema: SCHEMA,
         work: ComparisonPlan::WORK.into(),
         key,
-        lineup: lineup.clone(),
+        comparison: comparison.clone(),
         folder: folder.to_owned(),
     };
     plan.write_in(folder)?;
     Ok(plan)
 }
 
-/// The same with paths that hold wherever a shard is made.
-fn placed(lineup: &Comparison) -> Result<Comparison> {
+/// Copy with paths that hold wherever a shard is made.
+fn placed(comparison: &Comparison) -> Result<Comparison> {
     let design = |listed: &ListedDesign| {
         Ok(ListedDesign {
             design: absolute(&listed.design)?,
@@ -170,11 +173,15 @@ fn placed(lineup: &Comparison) -> Result<Comparison> {
         })
     };
     Ok(Comparison {
-        camera: absolute(&lineup.camera)?,
-        designs: lineup.designs.iter().map(design).collect::<Result<_>>()?,
-        photographs: lineup.photographs.iter().map(|p| absolute(p)).collect::<Result<_>>()?,
-        learnt: lineup.learnt.iter().map(|p| absolute(p)).collect::<Result<_>>()?,
-        lpips: lineup.lpips.as_deref().map(absolute).transpose()?,
-        ..lineup.clone()
+        camera: absolute(&comparison.camera)?,
+        designs: comparison.designs.iter().map(design).collect::<Result<_>>()?,
+        photographs: comparison
+            .photographs
+            .iter()
+            .map(|p| absolute(p))
+            .collect::<Result<_>>()?,
+        learnt: comparison.learnt.iter().map(|p| absolute(p)).collect::<Result<_>>()?,
+        lpips: comparison.lpips.as_deref().map(absolute).transpose()?,
+        ..comparison.clone()
     })
 }

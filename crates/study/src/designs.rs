@@ -27,7 +27,7 @@ const FIXED: [(&str, &str); 5] = [
 /// A number, choice or switch of the design file at each of some values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignGrid {
-    /// From the top of the design file, such as `cell.pillar_height_nm`.
+    /// Path of the key from the top of the design file, such as `cell.pillar_height_nm`.
     pub key: String,
     pub values: Vec<Scalar>,
 }
@@ -50,7 +50,7 @@ impl Tolerance {
         setting(&self.design_grids, design)
     }
 
-    /// One of the designs, by number.
+    /// Design by its number.
     ///
     /// # Errors
     /// As [`Design::read`].
@@ -59,7 +59,7 @@ impl Tolerance {
             return Design::read(&self.design);
         }
         let text = with_values(&load(&self.design)?, &self.setting(number))
-            .map_err(|NoPlace { what, hint, .. }| Error::invalid(what, hint))?;
+            .map_err(|NoPlace { what, hint, .. }| Error::refused("study/design-key", what, hint))?;
         Design::parse(&self.design, &text)
     }
 }
@@ -104,8 +104,8 @@ pub(crate) fn design_grid(s: &Section<'_, '_>) -> DesignGrid {
     DesignGrid { key, values }
 }
 
-/// Whether all designs can be read, with the place of the values that make one that cannot. `sections`: where each of the
-/// grids stands.
+/// Checks that all designs can be read; the error names the place of the values that make one that cannot. `sections`:
+/// where each of the grids stands.
 pub(crate) fn check(
     design: &std::path::Path,
     root: &Section<'_, '_>,

@@ -17,7 +17,7 @@ const MOST_TRIES: usize = 10_000;
 /// The amounts of one draw, in the order of `Sampler::names`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// In the unit of each quantity.
+    /// Amounts in the unit of each quantity.
     pub amounts: Vec<f64>,
 }
 
@@ -26,7 +26,7 @@ struct Quantity {
     /// Name of its effect, with the number of its parameter where there are several.
     name: String,
     unit: String,
-    /// None for a key of the design.
+    /// Number of the effect; `None` for a key of the design.
     effect: Option<usize>,
     source: Source,
 }
@@ -46,7 +46,7 @@ pub(crate) struct Sampler {
 }
 
 impl Sampler {
-    /// For a tolerance that was read; `base` is what its model says.
+    /// Sampler for a tolerance that was read; `base` is what its model says.
     pub fn new(tolerance: &Tolerance, base: Perturbation) -> Self {
         let effects = effects();
         let at = |name: &str| {
@@ -96,7 +96,7 @@ impl Sampler {
         }
     }
 
-    /// What everything that does not vary is taken from.
+    /// Perturbation from which everything that does not vary is taken.
     pub fn base(&self) -> &Perturbation {
         &self.base
     }
@@ -109,7 +109,7 @@ impl Sampler {
             .collect()
     }
 
-    /// Whether a quantity is drawn, and not one of a grid.
+    /// True if a quantity is drawn, and not one of a grid.
     pub fn is_random(&self, quantity: usize) -> bool {
         matches!(self.quantities[quantity].source, Source::Random(_))
     }
@@ -192,7 +192,8 @@ impl Sampler {
                 return Ok(amount);
             }
         }
-        Err(Error::invalid(
+        Err(Error::refused(
+            "study/amount-impossible",
             format!("`{}` is hardly ever within what a chip can have", quantity.name),
             "give a distribution that overlaps with the physical range of the effect",
         ))
@@ -211,7 +212,7 @@ impl Sampler {
         }
     }
 
-    /// What these amounts make of a chip.
+    /// Perturbation of a chip by these amounts.
     pub fn perturbation(&self, drawn: &Drawn) -> Perturbation {
         let mut to = self.base.clone();
         for (e, effect) in self.effects.iter().enumerate() {
@@ -291,7 +292,7 @@ mod tests {
         assert!((0..3000).all(|k| draw(k)[5] >= 0.0));
     }
 
-    /// What varies is not counted from the model that all else is taken from.
+    /// Quantities that vary are not counted from the model that all else is taken from.
     #[test]
     fn what_varies_takes_the_place_of_what_the_model_says() {
         let mut drawer = drawer(2.0);

@@ -1,4 +1,4 @@
-//! What the page of a study says of the values of its grid.
+//! Values of the grid on the page of a study.
 
 use std::collections::BTreeSet;
 

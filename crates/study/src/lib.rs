@@ -30,6 +30,7 @@
 mod bench;
 mod bias;
 mod columns;
+#[cfg(feature = "baselines")]
 mod comparison;
 mod designs;
 mod draw;
@@ -54,6 +55,7 @@ mod work;
 mod yields;
 
 pub use bench::JudgedDraw;
+#[cfg(feature = "baselines")]
 pub use comparison::{ComparisonPlan, plan_comparison};
 pub use designs::DesignGrid;
 pub use draw::Drawn;

@@ -13,18 +13,18 @@ pub const MANIFEST: &str = "plan.json";
 /// Longest manifest.
 const LONGEST: u64 = 64 << 20;
 
-/// What stands in the manifest of one kind of work.
+/// Manifest of one kind of work.
 pub(crate) trait Manifest: Serialize + DeserializeOwned {
     /// SHA-256 of all that decides the answers, in hexadecimal.
     fn key(&self) -> &str;
 
-    /// Whether this version of the program can go by it.
+    /// True if this version of the program can go by it.
     fn is_known(&self) -> bool;
 
     /// Remember where it was read.
     fn place(&mut self, folder: &Path);
 
-    /// That of a folder.
+    /// Manifest of a folder.
     ///
     /// # Errors
     /// If there is none, or it cannot be read.
@@ -37,7 +37,7 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
         Ok(found)
     }
 
-    /// That of a folder if it holds one, which must be of this key.
+    /// Manifest of a folder if it holds one, which must be of this key.
     ///
     /// # Errors
     /// If it cannot be read, or is another.
@@ -64,7 +64,7 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
     }
 }
 
-/// Whether a folder holds a plan, of whatever work.
+/// True if a folder holds a plan, of whatever work.
 pub fn is_planned(folder: &Path) -> bool {
     folder.join(MANIFEST).is_file()
 }
@@ -87,9 +87,10 @@ fn fault(folder: &Path, what: String) -> Error {
     }
 }
 
-/// What to say of a folder whose plan is not that of these files.
+/// Error for a folder whose plan is not the plan of these files.
 pub(crate) fn another_plan(folder: &Path) -> Error {
-    Error::invalid(
+    Error::refused(
+        "study/another-plan",
         format!(
             "{} holds another plan, or a file of it has changed since, or another version of the program planned it",
             folder.display()

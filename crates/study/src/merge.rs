@@ -28,9 +28,9 @@ pub struct StudyResult {
     pub grid: Vec<GridPoint>,
     /// Draws at each combination of values of several grids, where these are few enough to be read.
     pub combinations: Vec<GridPoint>,
-    /// Of the limits that depend on the draw.
+    /// Responses of the limits that depend on the draw.
     pub responses: Vec<Response>,
-    /// What it takes for a yield of 90 %.
+    /// Tightening of tolerances for a yield of 90 %.
     pub tightenings: Vec<Tightening>,
     /// All draws, in the order of their numbers.
     #[serde(skip)]
@@ -94,7 +94,8 @@ fn check_counts(plan: &Plan, draws: &[DrawRecord]) -> Result<()> {
     let wanted = (plan.quantities.len(), plan.limits.len());
     let other = draws.iter().find(|d| (d.amounts.len(), d.reached.len()) != wanted);
     other.map_or(Ok(()), |d| {
-        Err(Error::invalid(
+        Err(Error::refused(
+            "study/damaged-draw",
             format!(
                 "draw {} has {} amounts and {} limits, of {} and {}",
                 d.draw,
@@ -171,7 +172,7 @@ pub enum TableFormat {
 }
 
 impl TableFormat {
-    /// By the ending of the name of a file.
+    /// Format by the ending of the name of a file.
     ///
     /// # Errors
     /// If the ending is another, or the program was built without Parquet.
@@ -183,11 +184,13 @@ impl TableFormat {
             #[cfg(feature = "parquet")]
             Some("parquet") => Ok(Self::Parquet),
             #[cfg(not(feature = "parquet"))]
-            Some("parquet") => Err(Error::invalid(
+            Some("parquet") => Err(Error::refused(
+                "study/no-parquet",
                 "this program was built without Parquet",
                 "build it with `--features parquet`, or name a file that ends in .csv, .json or .jsonl",
             )),
-            _ => Err(Error::invalid(
+            _ => Err(Error::refused(
+                "study/unknown-ending",
                 format!("{}: this ending is not known", path.display()),
                 "name a file that ends in .csv, .json, .jsonl or .parquet",
             )),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::Result;
-use metalith_picture::pictures_side_by_side;
+use metalith_imaging::pictures_side_by_side;
 use metalith_report::{
     Axis, Cell, Chart, Column, Figure, ImageGrid, Page, Ranking, Table, count, fixed, sig, write_json,
 };

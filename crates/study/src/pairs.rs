@@ -7,12 +7,12 @@ use metalith_core::file::{file_digest, read_at_most};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
-use metalith_optics::CalibratedModel;
-use metalith_picture::scene::{SceneImage, read_far_scene};
-use metalith_picture::{
+use metalith_imaging::scene::{SceneImage, read_far_scene};
+use metalith_imaging::{
     DatasetManifest, DatasetOrigin, DatasetPair, ImagingSystem, KernelCache, PairWriter, check_images,
     write_dataset_manifest,
 };
+use metalith_optics::CalibratedModel;
 use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -25,20 +25,20 @@ const SCHEMA: u32 = 2;
 /// Longest image (bytes).
 const LONGEST: u64 = 1 << 30;
 
-/// What a set for learning is made of.
+/// Request for a data set for learning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PairsRequest {
     pub design: PathBuf,
     pub layout: PathBuf,
     pub camera: PathBuf,
-    /// The chip as made; as drawn if left out.
+    /// The chip as fabricated; as drawn if left out.
     pub model: Option<PathBuf>,
     /// Angle from the left to the right edge of a scene (degrees).
     pub field_deg: f64,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
-    /// In the order of the pairs.
+    /// Paths in the order of the pairs.
     pub images: Vec<PathBuf>,
 }
 
@@ -82,7 +82,7 @@ impl Manifest for PairsPlan {
 }
 
 impl PairsPlan {
-    /// What stands in the manifest under `work`.
+    /// Value of `work` in the manifest.
     pub(crate) const WORK: &'static str = "dataset";
 
     /// The plan in a folder.
@@ -93,7 +93,7 @@ impl PairsPlan {
         Self::open_in(folder)
     }
 
-    /// How it is cut.
+    /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {
         Sharding {
             key: self.key.clone(),
@@ -112,15 +112,16 @@ impl PairsPlan {
         if hex(&self.request.key(&self.digests)?) != self.key {
             return Err(another_plan(&self.folder));
         }
-        let studio = self.request.studio(&KernelCache::only(&self.folder), progress)?;
-        let operator = studio.simulation();
-        let writer = PairWriter::new(&studio, &operator, self.request.seed, &self.folder);
+        let system = self.request.system(&KernelCache::only(&self.folder), progress)?;
+        let operator = system.simulation();
+        let writer = PairWriter::new(&system, &operator, self.request.seed, &self.folder);
         let pair = |k: u64| {
             let k = k as usize;
             let image = &self.request.images[k];
             // Before anything of another image is written.
             if image_digest(image)? != self.digests[k] {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "study/input-changed",
                     format!("{} has changed since the set was planned", image.display()),
                     "plan it again into another folder",
                 ));
@@ -148,7 +149,7 @@ impl PairsPlan {
 }
 
 impl PairsPlan {
-    /// Whether the files of all pairs have the digests that their shards state.
+    /// Checks that the files of all pairs have the digests that their shards state.
     fn check_files(&self, pairs: &[DatasetPair], progress: &dyn Progress) -> Result<()> {
         progress.begin("checking the pairs", pairs.len() as u64);
         let is =
@@ -169,7 +170,8 @@ impl PairsPlan {
         let mut shards: Vec<u64> = bad.iter().map(|k| k / self.images_per_shard).collect();
         shards.dedup();
         let first = self.cut().path(shards[0]);
-        Err(Error::invalid(
+        Err(Error::refused(
+            "study/damaged-pairs",
             format!(
                 "files of {} of {} pairs are damaged or not there: {}",
                 bad.len(),
@@ -217,19 +219,20 @@ impl PairsRequest {
         read_far_scene(image, self.field_deg)
     }
 
-    fn studio(&self, kept: &KernelCache, progress: &dyn Progress) -> Result<ImagingSystem> {
+    fn system(&self, cache: &KernelCache, progress: &dyn Progress) -> Result<ImagingSystem> {
         let design = Design::read(&self.design)?;
         let camera = Camera::read(&self.camera)?;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let first = self.images.first();
-        let first = first.ok_or_else(|| Error::invalid("no images", "give a folder with at least one"))?;
-        ImagingSystem::open_kept(
+        let first =
+            first.ok_or_else(|| Error::refused("study/no-images", "no images", "give a folder with at least one"))?;
+        ImagingSystem::open_cached(
             &design,
             &self.layout,
             &camera,
             model.as_ref(),
             &self.scene(first)?,
-            kept,
+            cache,
             progress,
         )
     }
@@ -261,16 +264,16 @@ pub fn plan_pairs(
         return Ok(known);
     }
     check_images(&request.images, progress)?;
-    let studio = request.studio(&KernelCache::made(folder), progress)?;
+    let system = request.system(&KernelCache::made(folder), progress)?;
     let origin = DatasetOrigin::of(
-        &studio.design,
+        &system.design,
         &request.layout,
-        &studio.camera,
+        &system.camera,
         request.model.as_deref(),
     )?;
     let begun = Instant::now();
-    let operator = studio.simulation();
-    let writer = PairWriter::new(&studio, &operator, request.seed, folder);
+    let operator = system.simulation();
+    let writer = PairWriter::new(&system, &operator, request.seed, folder);
     writer.write(&request.images[0], 0, &|p| request.scene(p))?;
     let seconds_per_image = begun.elapsed().as_secs_f64();
     let plan = PairsPlan {
@@ -279,7 +282,7 @@ pub fn plan_pairs(
         key,
         images_per_shard: parts_per_shard(images_per_shard, seconds_per_image, digests.len() as u64),
         seconds_per_image,
-        head: DatasetManifest::of(&studio, origin, request.seed),
+        head: DatasetManifest::of(&system, origin, request.seed),
         request,
         digests,
         folder: folder.to_owned(),
@@ -289,7 +292,7 @@ pub fn plan_pairs(
 }
 
 impl PairsRequest {
-    /// The same with paths that hold wherever a shard is made.
+    /// Copy with paths that hold wherever a shard is made.
     fn placed(&self) -> Result<Self> {
         Ok(Self {
             design: absolute(&self.design)?,

@@ -19,7 +19,8 @@ use crate::columns::{Column, Values};
 /// If the writer of the file fails.
 pub(crate) fn write(columns: &[Column], to: &mut (impl Write + Send)) -> Result<()> {
     let told = |error: ParquetError| {
-        Error::invalid(
+        Error::refused(
+            "study/parquet",
             format!("the Parquet file cannot be written: {error}"),
             "name a file that ends in .csv, .json or .jsonl",
         )

@@ -7,13 +7,13 @@ use metalith_core::document::{Limits, Section};
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_gds::extract::Extraction;
-use metalith_optics::{AsBuiltChip, SimulationCase};
-use metalith_picture::restore::RestorationMethod;
-use metalith_picture::scene::{BuiltIn, SceneImage, chart, read_far_scene};
-use metalith_picture::{
-    Frame, FrameOperator, ImagingSystem, OperatorError, Rehearsal, SCORED_SIDES, ScenePower, Zone, ZoneScore,
+use metalith_imaging::scene::{BuiltIn, SceneImage, chart, read_far_scene};
+use metalith_imaging::{
+    ForecastScene, Frame, FrameOperator, ImagingSystem, OperatorError, SCORED_SIDES, ScenePower, Zone, ZoneScore,
     check_scored, sampling_of, scores,
 };
+use metalith_optics::{AsBuiltChip, SimulationCase};
+use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
 use ndarray::Array3;
 
@@ -34,11 +34,11 @@ pub struct PictureSpec {
     pub kernels: KnownKernels,
     /// Places an axis of the field of each element at which kernels are formed; as `metalith picture` has them if left out.
     pub nodes: Option<usize>,
-    /// Of the noise, the same in all draws: they differ by the chip alone.
+    /// Seed of the noise, equal in all draws: they differ by the chip alone.
     pub seed: u64,
 }
 
-/// What pictures are taken of.
+/// Scene that pictures are taken of.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneChoice {
     /// A built-in scene of so many pixels an axis.
@@ -49,9 +49,9 @@ pub enum SceneChoice {
 /// Whose kernels the restoration knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KnownKernels {
-    /// Those of the draw: every camera is calibrated.
+    /// Kernels of the draw: every camera is calibrated.
     Draw,
-    /// Those of the chip as designed, or as the model of the study has it: no camera is calibrated.
+    /// Kernels of the chip as designed, or as the model of the study has it: no camera is calibrated.
     Design,
 }
 
@@ -112,29 +112,29 @@ pub(crate) struct PictureBench {
 
 /// The chip that a restoration knows when cameras are not calibrated.
 pub(crate) struct KnownChip {
-    studio: ImagingSystem,
+    system: ImagingSystem,
     operator_error: OperatorError,
 }
 
 /// The picture of one draw.
 pub struct TakenPicture {
-    /// What an ideal camera gives, linear sRGB `[row, column, colour]`.
+    /// Image by an ideal camera, linear sRGB `[row, column, colour]`.
     pub truth: Array3<f64>,
     pub frame: Frame,
     /// Linear sRGB `[row, column, colour]`.
     pub restored: Array3<f64>,
-    /// By zone.
+    /// Scores by zone.
     pub scores: Vec<ZoneScore>,
     /// Expected PSNR of linear light of natural scenes (dB), by zone; none of methods without a forecast.
     pub forecast_db: Vec<f64>,
-    /// What to say of the restoration, if its operator limits it.
+    /// Note on the restoration, if its operator limits it.
     pub note: Option<String>,
     /// Names of the channels of the camera.
     pub channels: Vec<String>,
 }
 
 impl PictureBench {
-    /// With the camera and the scene that are named.
+    /// Bench with the camera and the scene that are named.
     ///
     /// # Errors
     /// If one of them cannot be read, or the scene is too small to be scored.
@@ -158,19 +158,19 @@ impl PictureBench {
         Ok(nm.into_iter().map(|nm| (nm * 1e-3, BAND_ORDERS)).collect())
     }
 
-    /// Whether restorations know the chip as designed, and not that of the draw.
+    /// True if restorations know the chip as designed, not the chip of the draw.
     pub fn knows_design(&self) -> bool {
         self.spec.kernels == KnownKernels::Design
     }
 
-    fn studio(
+    fn system(
         &self,
         design: &Design,
         extraction: &Extraction,
         chip: &AsBuiltChip,
         progress: &dyn Progress,
     ) -> Result<ImagingSystem> {
-        let case = SimulationCase::Made(chip);
+        let case = SimulationCase::from(chip);
         ImagingSystem::of_pillars(
             design,
             extraction,
@@ -193,9 +193,9 @@ impl PictureBench {
         chip: &AsBuiltChip,
         progress: &dyn Progress,
     ) -> Result<KnownChip> {
-        let studio = self.studio(design, extraction, chip, progress)?;
-        let operator_error = Rehearsal::new(&studio, &studio.restoration()).operator_error;
-        Ok(KnownChip { studio, operator_error })
+        let system = self.system(design, extraction, chip, progress)?;
+        let operator_error = ForecastScene::new(&system, &system.restoration()).operator_error;
+        Ok(KnownChip { system, operator_error })
     }
 
     /// The picture that a chip takes; `known` is what its restoration knows, itself if left out.
@@ -210,23 +210,30 @@ impl PictureBench {
         known: Option<&KnownChip>,
         progress: &dyn Progress,
     ) -> Result<TakenPicture> {
-        let studio = self.studio(design, extraction, chip, progress)?;
-        let frame = studio.record(&studio.simulation(), &self.scene, self.spec.seed)?;
-        let operator: FrameOperator<'_> = known.map_or(&studio, |k| &k.studio).restoration();
-        let mut rehearsal = Rehearsal::new(&studio, &operator);
+        let system = self.system(design, extraction, chip, progress)?;
+        let frame = system.record(&system.simulation(), &self.scene, self.spec.seed)?;
+        let operator: FrameOperator<'_> = known.map_or(&system, |k| &k.system).restoration();
+        let mut forecast_scene = ForecastScene::new(&system, &operator);
         if let Some(known) = known {
             // Nobody knows by how much this chip is another one.
-            rehearsal.operator_error.clone_from(&known.operator_error);
+            forecast_scene.operator_error.clone_from(&known.operator_error);
         }
         let method = self.spec.method;
-        let restored = studio.restore(&operator, &rehearsal.operator_error, &frame, method, true, progress)?;
+        let restored = system.restore(
+            &operator,
+            &forecast_scene.operator_error,
+            &frame,
+            method,
+            true,
+            progress,
+        )?;
         let forecast_db = match method {
-            RestorationMethod::Tikhonov => rehearsal
-                .forecast(&studio, &operator, progress)?
+            RestorationMethod::Tikhonov => forecast_scene
+                .forecast(&system, &operator, progress)?
                 .psnr_linear_db(&ScenePower::natural()),
             _ => Vec::new(),
         };
-        let truth = studio.truth(&self.scene);
+        let truth = system.truth(&self.scene);
         let channels = self.camera.channel_names();
         Ok(TakenPicture {
             scores: scores(&restored, &truth)?,
@@ -234,7 +241,7 @@ impl PictureBench {
             frame,
             restored,
             forecast_db,
-            note: rehearsal.operator_error.note(&channels),
+            note: forecast_scene.operator_error.note(&channels),
             channels,
         })
     }

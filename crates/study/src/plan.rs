@@ -27,7 +27,7 @@ use crate::tolerance::Tolerance;
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 2;
 
-/// Where the pillars of a study are read from.
+/// Source of the pillars of a study.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {
@@ -46,7 +46,7 @@ pub struct Plan {
     pub key: String,
     /// The file of the study, absolute.
     pub tolerance: PathBuf,
-    /// Where the layout of each design is: one, or one for each combination of values of keys of the design.
+    /// Layouts of the designs: one, or one for each combination of values of keys of the design.
     pub layouts: Vec<Layout>,
     /// Tables of cells of each design, by their names in the folder of the study; designs of one pillar share them.
     pub cells: Vec<String>,
@@ -65,7 +65,7 @@ pub struct Plan {
     pub folder: PathBuf,
 }
 
-/// How a study is planned.
+/// Settings of a plan of a study.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PlanSettings {
     /// Draws of a shard; as many as take ten minutes if left out.
@@ -81,7 +81,7 @@ impl Plan {
         Self::open_in(folder)
     }
 
-    /// How it is cut.
+    /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {
         Sharding {
             key: self.key.clone(),
@@ -92,7 +92,7 @@ impl Plan {
         }
     }
 
-    /// Where the layouts and the tables are.
+    /// Paths of the layouts and the tables.
     pub(crate) fn files(&self) -> Files {
         let layouts = self.layouts.iter().map(|l| layout_path(l, &self.folder));
         let cells = self.cells.iter().map(|name| self.folder.join(name));
@@ -236,7 +236,8 @@ impl Plan {
         for limit in &bench.tolerance.limits {
             if !first.record.figures.contains_key(&limit.figure) {
                 let known: Vec<&str> = first.record.figures.keys().map(String::as_str).collect();
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "study/unknown-figure",
                     format!("there is no figure `{}` to limit", limit.figure),
                     format!("this design has: {}", known.join(", ")),
                 ));
@@ -246,7 +247,8 @@ impl Plan {
         if design > 0 && limits != self.limits {
             let setting = bench.tolerance.setting(design).into_iter();
             let setting: Vec<String> = setting.map(|(key, value)| format!("{key} = {value}")).collect();
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/limits-differ",
                 format!(
                     "with {} other limits count than with the first values of the grid",
                     setting.join(", ")

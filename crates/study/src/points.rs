@@ -1,4 +1,4 @@
-//! What draws are like at each value of a grid.
+//! Statistics of draws at each value of a grid.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ pub struct GridPoint {
     pub held: u64,
     /// Wilson's interval of 95 % of the yield.
     pub interval: [f64; 2],
-    /// By key: those of the draws where the figure is a number.
+    /// Figures by key, over the draws where the figure is a number.
     pub figures: BTreeMap<String, Spread>,
 }
 

@@ -1,4 +1,4 @@
-//! What is kept of one draw: amounts, figures and limits.
+//! Record of one draw: amounts, figures and limits.
 
 use std::collections::BTreeMap;
 
@@ -12,16 +12,16 @@ use crate::tolerance::FigureLimit;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DrawRecord {
     pub draw: u64,
-    /// In the order and units of the plan's quantities.
+    /// Amounts in the order and units of the plan's quantities.
     pub amounts: Vec<f64>,
     /// Values of the keys of the design that vary.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub design: BTreeMap<String, Scalar>,
-    /// By key; the worst over the elements of the array. None where it is not a number.
+    /// Figures by key; the worst over the elements of the array. `None` where it is not a number.
     pub figures: BTreeMap<String, Option<f64>>,
-    /// What was reached of each limit of the plan, in its order; none where it is not a number.
+    /// Value reached for each limit of the plan, in its order; `None` where it is not a number.
     pub reached: Vec<Option<f64>>,
-    /// Whether all limits hold.
+    /// True if all limits hold.
     pub passed: bool,
 }
 
@@ -31,12 +31,12 @@ pub struct LimitStatement {
     /// Key in the design file, or of the figure.
     pub key: String,
     pub limit: f64,
-    /// Whether it is the least that is allowed, not the most.
+    /// True if it is the least that is allowed, not the most.
     pub at_least: bool,
 }
 
 impl LimitStatement {
-    /// Of a limit of the design.
+    /// Statement of a limit of the design.
     pub(crate) fn of_check(check: &Check) -> Self {
         Self {
             key: check.key.into(),
@@ -45,7 +45,7 @@ impl LimitStatement {
         }
     }
 
-    /// Of a limit of the study.
+    /// Statement of a limit of the study.
     pub(crate) fn of_figure(limit: &FigureLimit) -> Self {
         Self {
             key: limit.figure.clone(),
@@ -54,12 +54,12 @@ impl LimitStatement {
         }
     }
 
-    /// Whether what was reached holds it; what is not a number does not.
+    /// True if what was reached holds it; what is not a number does not.
     pub fn holds(&self, reached: Option<f64>) -> bool {
         reached.is_some_and(|r| self.margin(r) >= 0.0)
     }
 
-    /// How far what was reached is on the right side.
+    /// Margin: distance of the value reached from the limit, positive on the right side.
     pub fn margin(&self, reached: f64) -> f64 {
         if self.at_least {
             reached - self.limit

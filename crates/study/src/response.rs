@@ -1,4 +1,4 @@
-//! How margins follow from what varies: a quadratic fit, and what it says of variances and of tighter tolerances.
+//! Response of margins to what varies: a quadratic fit, and its statements on variances and on tighter tolerances.
 //!
 //! The fit serves to divide and to extrapolate inwards; yields themselves are counted, never fitted. How much of the
 //! variance it predicts, on draws that it was not fitted to, is reported beside everything that rests on it.
@@ -14,7 +14,7 @@ const DRAWS_PER_TERM: usize = 4;
 /// A margin that varies by less than this of its size does not depend on the draw.
 const CONSTANT: f64 = 1e-12;
 
-/// How the margin of one limit follows from the quantities.
+/// Response of the margin of one limit to the quantities.
 #[derive(Clone, Debug, Serialize)]
 pub struct Response {
     /// Key of the limit.
@@ -33,12 +33,12 @@ pub struct Response {
     limit: usize,
 }
 
-/// How tight one quantity, or all of them, must be.
+/// Tightening of one quantity, or of all of them, that a yield needs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tightening {
     /// Name of the quantity; `all` for all that are drawn.
     pub quantity: String,
-    /// What its spread has to be multiplied by for the yield that was asked for; none if even zero is not enough.
+    /// Factor on its spread for the yield that was asked for; `None` if even zero is not enough.
     pub factor: Option<f64>,
     /// Yield by the fit with no spread of it left.
     pub best_yield: f64,
@@ -179,7 +179,7 @@ impl Table {
         })
     }
 
-    /// As many terms as the draws allow.
+    /// Terms of the fit, as many as the draws allow.
     fn terms(&self, draws: usize) -> Option<Vec<Term>> {
         let n = self.names.len();
         let linear = std::iter::once(Term::One).chain((0..n).map(Term::Linear));
@@ -191,7 +191,7 @@ impl Table {
         choices.into_iter().find(|t| 2 * t.len() * DRAWS_PER_TERM <= draws)
     }
 
-    /// How tight each quantity alone, and all together, must be for a yield over all limits.
+    /// Tightening of each quantity alone, and of all together, for a yield over all limits.
     pub fn tightenings(
         &self,
         wanted: f64,

@@ -12,7 +12,7 @@ pub struct Run<'p> {
 }
 
 impl<'p> Run<'p> {
-    /// For the draws of a plan; layouts and tables are read when a draw asks for them.
+    /// Run for the draws of a plan; layouts and tables are read when a draw asks for them.
     ///
     /// # Errors
     /// If a file of the study has changed.
@@ -32,12 +32,12 @@ impl<'p> Run<'p> {
         self.plan.cut().make(number, &draw, progress)
     }
 
-    /// What a draw looks like in full.
+    /// Full result of a draw.
     pub(crate) fn judged(&self, k: u64, progress: &dyn Progress) -> Result<JudgedDraw> {
         self.bench.draw(k, &Quiet(progress))
     }
 
-    /// What draws are made by.
+    /// Sampler that makes the draws.
     pub(crate) fn drawer(&self) -> &crate::draw::Sampler {
         &self.bench.drawer
     }

@@ -19,7 +19,7 @@ const SHARD_SECONDS: f64 = 600.0;
 pub struct Sharding {
     /// SHA-256 of all that decides the answers, in hexadecimal.
     pub key: String,
-    /// What a part is called.
+    /// Name of a part.
     pub part: &'static str,
     pub parts: u64,
     pub per_shard: u64,
@@ -46,7 +46,7 @@ struct Header {
     end: u64,
 }
 
-/// How far the work is.
+/// Progress of the work.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Status {
     pub shards: u64,
@@ -77,7 +77,8 @@ impl Sharding {
     /// If there is none of this number.
     pub fn shard(&self, number: u64) -> Result<Shard> {
         if number >= self.shards() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/unknown-shard",
                 format!("there is no shard {number}"),
                 format!("this plan has shards 0 to {}", self.shards() - 1),
             ));
@@ -90,7 +91,7 @@ impl Sharding {
         })
     }
 
-    /// Where a shard is, or will be.
+    /// Path where a shard is, or will be.
     pub fn path(&self, number: u64) -> PathBuf {
         self.folder.join(FOLDER).join(format!("{number:06}.jsonl"))
     }
@@ -133,7 +134,7 @@ impl Sharding {
         file.commit()
     }
 
-    /// Whether a shard is there; no more than its first line is read.
+    /// True if a shard is there; no more than its first line is read.
     ///
     /// # Errors
     /// If what is there belongs to another plan, or is no shard.
@@ -164,7 +165,7 @@ impl Sharding {
         }
     }
 
-    /// Why a file with this first line is not that shard.
+    /// Reason why a file with this first line is not that shard.
     fn refusal(&self, shard: Shard, first_line: &str) -> Option<String> {
         match self.own_header(first_line) {
             Err(why) => Some(why.into()),
@@ -179,7 +180,7 @@ impl Sharding {
         }
     }
 
-    /// How far the work is.
+    /// Progress of the work.
     ///
     /// # Errors
     /// If its folder cannot be read.
@@ -217,7 +218,8 @@ impl Sharding {
         for (file, path) in files.iter().enumerate() {
             for (k, part) in self.read(path, number)? {
                 let Some(place) = found.get_mut(k as usize) else {
-                    return Err(Error::invalid(
+                    return Err(Error::refused(
+                        "study/unknown-draw",
                         format!(
                             "{} holds {} {k}, and the plan has {}",
                             path.display(),
@@ -234,7 +236,8 @@ impl Sharding {
             }
         }
         if let Some((k, a, b)) = twice.first() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/draws-twice",
                 format!(
                     "{} {}s are there twice, the first is {k}: in {} and in {}",
                     twice.len(),
@@ -247,7 +250,8 @@ impl Sharding {
         }
         let missing: Vec<u64> = (0..self.parts).filter(|k| found[*k as usize].is_none()).collect();
         if !missing.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/draws-missing",
                 format!(
                     "{} of {} {}s are missing in {}: {}",
                     missing.len(),
@@ -296,7 +300,8 @@ fn line(value: &impl Serialize) -> String {
 }
 
 fn refused(path: &Path, why: &str) -> Error {
-    Error::invalid(
+    Error::refused(
+        "study/shard-refused",
         format!("{} {why}", path.display()),
         "remove the file if it came here by mistake; its shard is then made again",
     )

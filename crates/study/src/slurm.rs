@@ -9,14 +9,14 @@ use metalith_core::{AtomicFile, Result};
 use crate::manifest::absolute;
 use crate::sharding::Sharding;
 
-/// What the jobs of a cluster need.
+/// Requirements of the jobs of a cluster.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Slurm {
     /// The program as the nodes see it.
     pub program: String,
     pub partition: Option<String>,
     pub account: Option<String>,
-    /// As `--time` takes it.
+    /// Time limit as `--time` takes it.
     pub time: String,
     pub cpus_per_task: u64,
     pub memory_mb: Option<u64>,

@@ -38,15 +38,15 @@ pub struct StartsPlan {
     pub folder: PathBuf,
 }
 
-/// What one start came to.
+/// Result of one start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StartRecord {
     pub start: u64,
-    /// Of its random numbers.
+    /// Seed of its random numbers.
     pub seed: u64,
     /// Name of the phases that it began from.
     pub from: String,
-    /// As it was optimised; larger is better.
+    /// Merit as it was optimised; larger is better.
     pub merit: f64,
     /// Phase of each ring (turns), in [0, 1).
     pub turns: Vec<f64>,
@@ -55,11 +55,11 @@ pub struct StartRecord {
 /// All starts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartsResult {
-    /// In their order.
+    /// Starts in their order.
     pub starts: Vec<StartRecord>,
-    /// Which of them is the best; the first of equals.
+    /// Number of the best of them; the first of equals.
     pub best: usize,
-    /// Where its phase was written.
+    /// Path where its phase was written.
     pub phase: PathBuf,
 }
 
@@ -78,7 +78,7 @@ impl Manifest for StartsPlan {
 }
 
 impl StartsPlan {
-    /// What stands in the manifest under `work`.
+    /// Value of `work` in the manifest.
     pub(crate) const WORK: &'static str = "starts";
 
     /// The plan in a folder.
@@ -89,7 +89,7 @@ impl StartsPlan {
         Self::open_in(folder)
     }
 
-    /// How it is cut.
+    /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {
         Sharding {
             key: self.key.clone(),
@@ -111,7 +111,8 @@ impl StartsPlan {
         }
         let folder = self.folder.join(CELLS);
         if let Some(gone) = self.cells.iter().map(|name| folder.join(name)).find(|p| !p.is_file()) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/input-missing",
                 format!("{} is not there", gone.display()),
                 "plan the starts again; a shard makes no tables of its own",
             ));
@@ -147,8 +148,13 @@ impl StartsPlan {
         let task = OptimiseTask::of(&design)?;
         let finite = starts.iter().enumerate().filter(|(_, s)| s.merit.is_finite());
         let best = finite.max_by(|(i, a), (j, b)| a.merit.total_cmp(&b.merit).then(j.cmp(i)));
-        let (best, found) =
-            best.ok_or_else(|| Error::invalid("no start has a merit", "look at [optimise] of the design"))?;
+        let (best, found) = best.ok_or_else(|| {
+            Error::refused(
+                "study/no-merit",
+                "no start has a merit",
+                "look at [optimise] of the design",
+            )
+        })?;
         let phase = self.folder.join("phase.csv");
         let remarks = [
             format!(

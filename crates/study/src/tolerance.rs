@@ -23,7 +23,7 @@ const AMOUNT: Limits = Limits::new(-1e6..=1e6, "");
 /// Normal distributions end here: a process with a tail beyond is not described by one (standard deviations).
 pub(crate) const TAIL_SD: f64 = 3.0;
 
-/// What varies, what is looked at, and how often.
+/// Tolerance: what varies, what is looked at, and how often.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
     /// The file it was read from.
@@ -38,7 +38,7 @@ pub struct Tolerance {
     pub accuracy: Accuracy,
     pub varied: Vec<Varied>,
     pub grids: Vec<Grid>,
-    /// What varies in the design.
+    /// Keys of the design that vary.
     pub design_grids: Vec<DesignGrid>,
     /// The picture that each draw takes.
     pub picture: Option<PictureSpec>,
@@ -51,11 +51,11 @@ pub struct Tolerance {
 pub struct Varied {
     /// Name of the effect.
     pub effect: String,
-    /// Of each of its parameters, independently, in the unit of the effect.
+    /// Distribution of each of its parameters, independently, in the unit of the effect.
     pub distribution: Distribution,
 }
 
-/// Where amounts come from.
+/// Source of amounts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distribution {
     /// Mean and standard deviation, without what is beyond three of them or not physical.

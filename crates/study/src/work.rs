@@ -4,6 +4,7 @@ use std::path::Path;
 
 use metalith_core::{Progress, Result};
 
+#[cfg(feature = "baselines")]
 use crate::comparison::ComparisonPlan;
 use crate::manifest;
 use crate::pairs::PairsPlan;
@@ -19,6 +20,7 @@ pub enum Work {
     /// Frames and scenes for learning.
     Pairs(PairsPlan),
     /// Cameras side by side.
+    #[cfg(feature = "baselines")]
     Comparison(ComparisonPlan),
     /// Starts of the optimiser.
     Starts(StartsPlan),
@@ -33,17 +35,28 @@ impl Work {
         let known: serde_json::Value = manifest::read(folder)?;
         match known.get("work").and_then(|w| w.as_str()) {
             Some(PairsPlan::WORK) => Ok(Self::Pairs(PairsPlan::open(folder)?)),
+            #[cfg(feature = "baselines")]
             Some(ComparisonPlan::WORK) => Ok(Self::Comparison(ComparisonPlan::open(folder)?)),
+            #[cfg(not(feature = "baselines"))]
+            Some("compare") => Err(metalith_core::Error::refused(
+                "study/no-baselines",
+                format!(
+                    "{} holds a comparison, which this program was built without",
+                    folder.display()
+                ),
+                "build it with the feature `baselines`",
+            )),
             Some(StartsPlan::WORK) => Ok(Self::Starts(StartsPlan::open(folder)?)),
             _ => Ok(Self::Study(Plan::open(folder)?)),
         }
     }
 
-    /// How it is cut.
+    /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {
         match self {
             Self::Study(plan) => plan.cut(),
             Self::Pairs(plan) => plan.cut(),
+            #[cfg(feature = "baselines")]
             Self::Comparison(plan) => plan.cut(),
             Self::Starts(plan) => plan.cut(),
         }
@@ -72,6 +85,7 @@ impl Work {
                 missing.into_iter().try_for_each(|n| run.shard(n, progress))
             }
             Self::Pairs(plan) => plan.run(&missing, progress),
+            #[cfg(feature = "baselines")]
             Self::Comparison(plan) => plan.run(&missing, progress),
             Self::Starts(plan) => plan.run(&missing, progress),
         }

@@ -15,7 +15,7 @@ pub struct Yield {
 }
 
 impl Yield {
-    /// Of a count.
+    /// Yield of a count.
     pub fn of(key: String, held: u64, of: u64) -> Self {
         Self {
             key,

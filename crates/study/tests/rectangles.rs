@@ -38,12 +38,12 @@ fn as_drawn(small: &Small, folder: &Path) -> Design {
     design
 }
 
-/// A design judged by the pillars that are drawn, or with a model by the chip as made.
+/// A design judged by the pillars that are drawn, or with a model by the chip as fabricated.
 fn judged(small: &Small, model: Option<Perturbation>) -> Verification {
     judged_with(small, model, None)
 }
 
-/// The same with a folder that what is solved of a chip as made is kept in.
+/// Judgement with a folder in which solved cells of a chip as fabricated are cached.
 fn judged_with(small: &Small, model: Option<Perturbation>, kept: Option<&Path>) -> Verification {
     let folder = tempfile::tempdir().unwrap();
     let design = as_drawn(small, folder.path());
@@ -97,7 +97,7 @@ const VARIED: &str =
 #[test]
 #[ignore = "second tier: two minutes of CPU time, in scripts/slow_tests.sh"]
 fn made_rectangles_are_those_that_are_drawn_so() {
-    /// Of 17 orders an axis for 25 or 41, and of corners that round to the grid otherwise: 3e-4 at 532 nm.
+    /// Tolerance of 17 orders an axis for 25 or 41, and of corners that round to the grid otherwise: 3e-4 at 532 nm.
     const AS_DRAWN: f64 = 2e-3;
     let small = rotated().in_light("\"unpolarised\"");
     let found = of_draws(&small, VARIED);
@@ -118,7 +118,8 @@ fn made_rectangles_are_those_that_are_drawn_so() {
 #[test]
 #[ignore = "second tier: two minutes of CPU time, in scripts/slow_tests.sh"]
 fn draws_of_upright_rectangles_have_the_figures_of_their_models() {
-    /// Of rational functions between 5 nm of the edges, and between nodes of the height: a thousandth of a transmission (rms).
+    /// Tolerance of rational functions between 5 nm of the edges, and between nodes of the height: a thousandth of a
+    /// transmission (rms).
     const OF_TABLES: f64 = 2e-3;
     // 4 nm and 5 nm are no nodes of the tables.
     let varied = "[[grid]]\neffect = \"cd_bias\"\nvalues = [-2, 4, 5]\n[[grid]]\neffect = \"film_height\"\nvalues = [0, 5, 10]\n";
@@ -158,10 +159,12 @@ fn what_rectangles_have_no_meaning_for_is_told() {
     }
 }
 
-/// Of Strehl ratios: transmissions are of one solver, classes of a made chip in single precision, and fields of fast propagation.
+/// Tolerance of Strehl ratios: transmissions are of one solver, classes of a chip as fabricated in single precision,
+/// and fields of fast propagation.
 const ROUNDING: f64 = 1e-5;
 
-/// The same of a steeper lens of rotated ones, 2e-5 by fast propagation; where they have other edges, corners are rounded to the grid otherwise.
+/// Tolerance of Strehl ratios of a steeper lens of rotated rectangles, 2e-5 by fast propagation; where they have other
+/// edges, corners are rounded to the grid otherwise.
 const OF_GRID: f64 = 2e-4;
 
 fn made(bias_nm: f64, height_nm: f64) -> Option<Perturbation> {
@@ -227,7 +230,8 @@ fn a_chip_that_is_wider_or_lower_is_that_which_is_drawn_so() {
     alike(&found, &drawn, OF_GRID);
 }
 
-/// What the first run by a model has solved the second one takes from the folder; its report has the same bytes.
+/// Cache of a run by a model: the second run takes from the folder what the first has solved; its report has the same
+/// bytes.
 #[test]
 fn a_second_run_by_a_model_solves_nothing_and_says_the_same() {
     let folder = tempfile::tempdir().unwrap();
@@ -248,7 +252,7 @@ fn a_second_run_by_a_model_solves_nothing_and_says_the_same() {
     assert!(kept().len() > files.len());
 }
 
-/// What a model has besides, of light that sees no pillar and of pillars that are gone, counts along both axes.
+/// Light that passes no pillar and missing pillars of a model count along both axes.
 #[test]
 #[ignore = "second tier: two minutes of CPU time, in scripts/slow_tests.sh"]
 fn light_that_sees_no_pillar_and_missing_ones_lower_what_is_focused() {

@@ -8,10 +8,10 @@ use std::path::Path;
 use common::{SMALL_CAMERA, tolerance};
 use metalith_core::Silent;
 use metalith_core::document::Scalar;
+use metalith_imaging::scene::{BuiltIn, chart};
+use metalith_imaging::{ForecastScene, ImagingSystem, scores};
 use metalith_optics::{CalibratedModel, Perturbation};
-use metalith_picture::restore::RestorationMethod;
-use metalith_picture::scene::{BuiltIn, chart};
-use metalith_picture::{ImagingSystem, Rehearsal, scores};
+use metalith_restoration::RestorationMethod;
 use metalith_study::{Plan, PlanSettings, Run, Work, merge, plan, write_page};
 
 fn run_shard(plan: &Plan, number: u64) -> metalith_core::Result<()> {
@@ -300,16 +300,16 @@ fn pictures_are_figures_of_a_draw() {
     let layout = folder.path().join("draw/layout.gds");
     let pillars = metalith_layout::read_pillars(&design, &layout, &Silent).unwrap();
     let cells = metalith_design::cell_models(&design, &[metalith_cell::Fidelity::Rigorous]).unwrap();
-    let case = metalith_optics::SimulationCase::Cell(cells[0].as_ref());
-    let studio = ImagingSystem::of_pillars(&design, &pillars, case, &camera, &scene, Some(5), &Silent).unwrap();
-    let frame = studio.record(&studio.simulation(), &scene, 1).unwrap();
-    let operator = studio.restoration();
-    let error = Rehearsal::new(&studio, &operator).operator_error;
+    let case = metalith_optics::SimulationCase::from(cells[0].as_ref());
+    let system = ImagingSystem::of_pillars(&design, &pillars, case, &camera, &scene, Some(5), &Silent).unwrap();
+    let frame = system.record(&system.simulation(), &scene, 1).unwrap();
+    let operator = system.restoration();
+    let error = ForecastScene::new(&system, &operator).operator_error;
     let method = RestorationMethod::Tikhonov;
-    let picture = studio
+    let picture = system
         .restore(&operator, &error, &frame, method, true, &Silent)
         .unwrap();
-    let direct = scores(&picture, &studio.truth(&scene)).unwrap();
+    let direct = scores(&picture, &system.truth(&scene)).unwrap();
     for (score, key) in direct.iter().zip(["picture_psnr_db", "picture_psnr_db_centre"]) {
         let drawn = of(&own[0], key);
         assert!(

@@ -9,9 +9,9 @@ use common::{SMALL_CAMERA, tolerance};
 use metalith_baselines::{Comparison, ComparisonResult, Lensless, ListedDesign, MaskSpec};
 use metalith_core::Silent;
 use metalith_design::Design;
+use metalith_imaging::scene::read_far_scene;
+use metalith_imaging::{DatasetManifest, DatasetOrigin, ImagingSystem, write_dataset};
 use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells};
-use metalith_picture::scene::read_far_scene;
-use metalith_picture::{DatasetManifest, DatasetOrigin, ImagingSystem, write_dataset};
 use metalith_study::{PairsRequest, Work, plan_comparison, plan_pairs, plan_starts};
 
 /// The layout of a design, written into a folder.
@@ -26,7 +26,7 @@ fn layout_of(design: &Design, folder: &Path) -> PathBuf {
 fn image(folder: &Path, k: usize) -> PathBuf {
     let stripes = ndarray::Array3::from_shape_fn((64, 64, 3), |(y, x, c)| ((y * k + x + c) % 7) as f64 / 7.0);
     let path = folder.join(format!("image_{k}.png"));
-    metalith_picture::write_picture(&path, &stripes).unwrap();
+    metalith_imaging::write_picture(&path, &stripes).unwrap();
     path
 }
 
@@ -104,15 +104,15 @@ fn pairs_of_shards_are_those_of_one_run() {
 
     let scene = |path: &Path| read_far_scene(path, 50.0);
     let camera = metalith_sensor::Camera::read(&at("camera.toml")).unwrap();
-    let kept = metalith_picture::KernelCache::made(&at("alone"));
+    let kept = metalith_imaging::KernelCache::made(&at("alone"));
     let first = scene(&images[0]).unwrap();
-    let studio = ImagingSystem::open_kept(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
+    let system = ImagingSystem::open_cached(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
     let origin = DatasetOrigin::of(&design, &layout, &camera, None).unwrap();
     let write = |seed| {
-        let head = DatasetManifest::of(&studio, origin.clone(), seed);
+        let head = DatasetManifest::of(&system, origin.clone(), seed);
         write_dataset(
-            &studio,
-            &studio.simulation(),
+            &system,
+            &system.simulation(),
             &images,
             &scene,
             head,
@@ -202,7 +202,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     let camera = SMALL_CAMERA.replace(mono, &three.collect::<String>());
     fs::write(at("camera.toml"), camera).unwrap();
     let design = Design::read(&at("design.toml")).unwrap();
-    let lineup = Comparison {
+    let comparison = Comparison {
         camera: at("camera.toml"),
         designs: vec![ListedDesign {
             name: Some("small".into()),
@@ -222,7 +222,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         learnt: Vec::new(),
         lpips: None,
     };
-    let planned = plan_comparison(&lineup, &at("parts"), &Silent).unwrap();
+    let planned = plan_comparison(&comparison, &at("parts"), &Silent).unwrap();
     assert_eq!(planned.cut().shards(), 4);
     let work = Work::open(&at("parts")).unwrap();
     work.run(&[1, 2, 3], &Silent).unwrap();
@@ -230,8 +230,8 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     assert!(missing.contains("1 of 4 cameras are missing"), "{missing}");
     work.run(&[0], &Silent).unwrap();
     let merged = planned.merge(&Silent).unwrap();
-    let open = lineup.open().unwrap();
-    let kept = metalith_picture::KernelCache::only(&at("parts"));
+    let open = comparison.open().unwrap();
+    let kept = metalith_imaging::KernelCache::only(&at("parts"));
     let cameras = (0..4).map(|k| open.take(k, &kept, &Silent).unwrap()).collect();
     let direct = open.comparison(cameras);
     // Numbers of a line of JSON come back to rounding.
@@ -257,7 +257,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         assert!(page.contains(part), "{part}");
     }
     fs::remove_file(planned.cut().path(1)).unwrap();
-    fs::copy(&lineup.photographs[0], &lineup.photographs[1]).unwrap();
+    fs::copy(&comparison.photographs[0], &comparison.photographs[1]).unwrap();
     let changed = work.run(&[1], &Silent).unwrap_err().to_string();
     assert!(changed.contains("a file of it has changed"), "{changed}");
 }

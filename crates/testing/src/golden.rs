@@ -54,7 +54,7 @@ fn write(path: &Path, bytes: &[u8]) {
     out.finish().unwrap();
 }
 
-/// Where two files part, in lines if they are text.
+/// Place where two files part, in lines if they are text.
 fn describe(expected: Option<&[u8]>, found: &[u8]) -> String {
     let Some(expected) = expected else {
         return format!("new, {} bytes", found.len());

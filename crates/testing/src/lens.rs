@@ -17,7 +17,7 @@ pub fn width(ix: i32, iy: i32) -> i32 {
     160 + 2 * ((ix * 7 + iy * 11) % 41)
 }
 
-/// What a chip is made of; change it, then write it.
+/// Contents of a chip; change it, then write it.
 pub struct Chip {
     /// (column, row, x from its site, y from its site, width) of each pillar.
     pub pillars: Vec<(i32, i32, i32, i32, i32)>,
@@ -89,7 +89,7 @@ pub fn cross(gds: &mut Gds, x: i32, y: i32, length: i32, width: i32) {
     cross_on(gds, 3, x, y, length, width);
 }
 
-/// The same on any layer.
+/// Cross on any layer.
 pub fn cross_on(gds: &mut Gds, layer: i16, x: i32, y: i32, length: i32, width: i32) {
     let corners = cross_corners(length / 2, width / 2);
     let closed = corners.iter().chain(&corners[..1]);

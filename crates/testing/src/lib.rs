@@ -1,4 +1,4 @@
-//! What the tests of several crates stand on: golden files, layouts made byte by byte, small measured sets.
+//! Helpers that the tests of several crates share: golden files, layouts made byte by byte, small measured sets.
 
 pub mod gds;
 mod golden;

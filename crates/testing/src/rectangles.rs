@@ -1,4 +1,5 @@
-//! Small lenses of rectangles that are drawn wider, higher or in other light: what chips as made are compared with.
+//! Small lenses of rectangles that are drawn wider, higher or in other light: what chips as fabricated are compared
+//! with.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ const EVERY_NM: u32 = 30;
 /// A small lens, whose design is a text.
 #[derive(Clone, Debug)]
 pub struct Small {
-    /// Of upright rectangles; else rotated ones.
+    /// True for upright rectangles; false for rotated ones.
     is_upright: bool,
     bias_nm: i32,
     height_nm: i32,
@@ -19,7 +20,7 @@ pub struct Small {
     light: String,
 }
 
-/// Of upright rectangles, whose light along x and along y goes to two places.
+/// Design of upright rectangles, whose light along x and along y goes to two places.
 pub fn upright() -> Small {
     Small {
         is_upright: true,
@@ -29,7 +30,7 @@ pub fn upright() -> Small {
     }
 }
 
-/// Of rotated rectangles.
+/// Design of rotated rectangles.
 pub fn rotated() -> Small {
     Small {
         is_upright: false,
@@ -39,14 +40,14 @@ pub fn rotated() -> Small {
 }
 
 impl Small {
-    /// The same in this light: the value of `polarisation` of `[verify]`, and more keys.
+    /// Same design in this light: the value of `polarisation` of `[verify]`, and more keys.
     #[must_use]
     pub fn in_light(mut self, light: &str) -> Self {
         light.clone_into(&mut self.light);
         self
     }
 
-    /// The same with both edges of all pillars wider, and all higher (nm).
+    /// Same design with both edges of all pillars wider, and all higher (nm).
     #[must_use]
     pub fn changed(&self, wider_nm: i32, higher_nm: i32) -> Self {
         Self {
@@ -56,8 +57,8 @@ impl Small {
         }
     }
 
-    /// What both edges of all pillars are wider by (nm). Designs of upright rectangles do not say it: the same pillars of their library have
-    /// other edges.
+    /// Length by which both edges of all pillars are wider (nm). Designs of upright rectangles do not say it: the same
+    /// pillars of their library have other edges.
     pub fn wider_nm(&self) -> i32 {
         self.bias_nm
     }

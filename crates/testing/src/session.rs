@@ -84,7 +84,7 @@ const SMALL: Lenses = Lenses {
     leds: &[500, 560],
 };
 
-/// As large as those of the chips that twins of a bench have measured.
+/// Lenses as large as on the chips that twins of a bench have measured.
 const MIDDLE: Lenses = Lenses {
     changes: &[
         ["\ndiameter_um = 60\n", "\ndiameter_um = 140\n"],
@@ -134,18 +134,18 @@ pub fn small_design() -> Design {
     SMALL.design()
 }
 
-/// The same with two lenses of 140 um; their design.
+/// Set with two lenses of 140 um; their design.
 pub fn middle_set(folder: &Path) -> Design {
     set_of(folder, &MIDDLE, &BEAMS[..2]);
     MIDDLE.design()
 }
 
-/// The same with three lenses that are not in one line.
+/// Set with three lenses that are not in one line.
 pub fn set_of_three(folder: &Path) -> PathBuf {
     set_of(folder, &SMALL, &BEAMS)
 }
 
-/// The same with one to three lenses of 1 mm in one colour.
+/// Set with one to three lenses of 1 mm in one colour.
 pub fn full_size_set(folder: &Path, elements: usize) -> PathBuf {
     set_of(folder, &FULL_SIZE, &BEAMS[..elements.clamp(1, BEAMS.len())])
 }

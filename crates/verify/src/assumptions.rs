@@ -1,4 +1,4 @@
-//! What a simulation assumes, and how much each assumption weighs for the design at hand.
+//! Assumptions of a simulation, and the weight of each for the design at hand.
 
 use metalith_cell::{Fidelity, FocusedLight, ORDERS, Truncation};
 use metalith_design::{CellIncidence, Design, Element};
@@ -111,7 +111,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     page.table(table);
 }
 
-/// What is assumed of the angle at which light arrives at the cells, where they are not solved for each.
+/// Assumption on the angle at which light arrives at the cells, where they are not solved for each.
 fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Verification) {
     let prototype = |size: String| {
         if design.cell.is_of_the_paper() {
@@ -129,7 +129,7 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
             if design.cell.shape.basis().is_some() {
                 "rectangles are solved along the normal alone"
             } else {
-                "--as-lit solves them at the angle at which light arrives, both polarisations"
+                "--oblique solves them at the angle at which light arrives, both polarisations"
             },
         );
         return;
@@ -146,7 +146,7 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
                 sig(widest_deg, 3)
             ))
         },
-        "--as-lit solves them for each field angle: a table of 50 to 60 CPU s for each wavelength and direction that has none yet",
+        "--oblique solves them for each field angle: a table of 50 to 60 CPU s for each wavelength and direction that has none yet",
     );
     if let Some(camera) = &found.camera {
         let ends = [camera.wavelengths_nm.first(), camera.wavelengths_nm.last()];
@@ -154,7 +154,7 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
         row(
             "In white light, which arrives from one direction, cells are lit from where the element looks at each wavelength",
             in_degrees(apart.fold(0.0, f64::max)),
-            "angle between both directions for the outermost element; --as-lit lights cells from the point itself",
+            "angle between both directions for the outermost element; --oblique lights cells from the point itself",
         );
     }
 }
@@ -167,7 +167,8 @@ fn in_degrees(apart_deg: f64) -> String {
     }
 }
 
-/// Of the corner element of `designs/prototype_3x3.toml`, at 455, 530 and 660 nm: docs/method/verify.md, "Angle of incidence".
+/// Effect of the angle on the corner element of `designs/prototype_3x3.toml`, at 455, 530 and 660 nm:
+/// docs/method/verify.md, "Angle of incidence".
 const OF_ANGLE: &str =
     "57 to 83 % along the normal, 48 to 85 % as lit in the middle of its field and 21 to 77 % at 15° from there";
 
@@ -184,7 +185,7 @@ fn white_apart_deg(design: &Design, wavelength_um: f64) -> f64 {
     design.elements().iter().map(apart).fold(0.0, f64::max)
 }
 
-/// What is assumed of the polarisation of light, and what steps and grid do to the phase of rotated rectangles.
+/// Assumptions on the polarisation of light, and the effect of steps and grid on the phase of rotated rectangles.
 fn polarised(
     row: &mut impl FnMut(&str, String, &str),
     design: &Design,
@@ -277,7 +278,7 @@ fn polarised(
     );
 }
 
-/// What the sums over pairs put elsewhere than supercells that they were not fitted to, by wavelength.
+/// Light that the sums over pairs put elsewhere than supercells that they were not fitted to, by wavelength.
 fn left_out(found: &Verification) -> String {
     let mut by_um: Vec<(f64, [f64; 2])> = Vec::new();
     for order in found.distinct.iter().flat_map(|d| &d.orders) {

@@ -1,4 +1,4 @@
-//! What is assumed of the polarisation of light at upright rectangles, and of the library that they are chosen from.
+//! Assumptions on the polarisation of light at upright rectangles, and on the library that they are chosen from.
 
 use metalith_cell::{FocusedLight, UPRIGHT_ORDERS};
 use metalith_design::Design;

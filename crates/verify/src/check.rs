@@ -8,17 +8,17 @@ use metalith_design::LimitSpec;
 /// One limit and what was reached.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
-    /// What is limited, in words, with where the worst of it is.
+    /// Quantity that is limited, in words, with the place of its worst value.
     pub what: String,
     /// Key of the limit in the design file.
     pub key: &'static str,
     pub reached: f64,
     pub limit: f64,
-    /// Whether the limit is the least or the most that is allowed.
+    /// Sense of the limit: the least or the most that is allowed.
     pub sense: Sense,
 }
 
-/// Which side of a limit is the right one.
+/// Side of a limit that is the right one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sense {
@@ -27,7 +27,7 @@ pub enum Sense {
 }
 
 impl Check {
-    /// Whether the limit holds; what is not a number holds no limit.
+    /// True if the limit holds; what is not a number holds no limit.
     pub fn passed(&self) -> bool {
         match self.sense {
             Sense::AtMost => self.reached <= self.limit,

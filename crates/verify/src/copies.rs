@@ -1,4 +1,4 @@
-//! Which elements are simulated, and what of their figures is that of copies too.
+//! Choice of elements that are simulated, and of their figures that hold for copies too.
 //!
 //! Pillars that are the same up to a symmetry do the same to light that is turned with them. Field angles are those of the chip:
 //! a copy is asked for the same ones, which for the element that is simulated come from other sides.
@@ -30,7 +30,7 @@ pub(super) struct Chosen {
     pub element: Element,
     /// Number of elements that it stands for, itself among them.
     pub copies: usize,
-    /// Those of the design, then those of its copies.
+    /// Field angles of the design, then field angles of its copies.
     pub angles: Vec<AskedAngle>,
 }
 
@@ -60,8 +60,9 @@ impl Chosen {
         missing
     }
 
-    /// What turns it into another element, pillars and wedge, and the field angles that are then to be simulated besides: by that of
-    /// several symmetries which leaves fewest; none if nothing does, or the other has another lens.
+    /// Symmetry that turns it into another element, pillars and wedge, and the field angles that are then to be
+    /// simulated besides: of several symmetries, the one that leaves fewest. `None` if no symmetry does, or the other
+    /// has another lens.
     fn turned_into(&self, design: &Design, array: &PillarArray, other: usize) -> Option<(Symmetry, Vec<AskedAngle>)> {
         let [from, to] = [self.index, other].map(|k| &array.placed[k]);
         if from.class != to.class {
@@ -80,9 +81,9 @@ impl Chosen {
     }
 }
 
-/// Choose the elements that are simulated: one of all that are alike by a symmetry which turns their light too, and of those
-/// that are not as intended the first, or all where some may be so; each by itself where what is made of them is not `symmetric`. Elements are
-/// told which one they are simulated as.
+/// Choose the elements that are simulated: one of all that are alike by a symmetry which turns their light too, and of
+/// those that are not as intended the first, or all where some may be so; each individually where what is made of them
+/// is not `symmetric`. Elements are told which one they are simulated as.
 pub(super) fn choose(
     design: &Design,
     array: &PillarArray,
@@ -126,7 +127,7 @@ pub(super) fn turned(symmetry: Symmetry, field: FieldAngle) -> FieldAngle {
     FieldAngle { x_deg, y_deg }
 }
 
-/// Where a symmetry takes the place (x, y), in words.
+/// Place to which a symmetry takes (x, y), in words.
 pub(super) fn place_words(symmetry: Symmetry) -> String {
     let ((ax, ay), (bx, by)) = (symmetry.point(1, 0), symmetry.point(0, 1));
     let name = |of_x: i64, of_y: i64| match (of_x, of_y) {
@@ -196,7 +197,7 @@ mod tests {
         let (design, array) = read("mini_3x3", &[]);
         assert_eq!(all_are_covered(&design, &array), [(4, 3), (4, 4), (1, 2)]);
         // In the middle of the field all are alike, and so they are for a field that is symmetric.
-        let angles = "field_x_deg = [0, 15]         # counted from where an element looks\nfield_y_deg = [0, 0]";
+        let angles = "field_x_deg = [0, 15]         # from the viewing direction of an element\nfield_y_deg = [0, 0]";
         let (design, array) = read("mini_3x3", &[(angles, "field_x_deg = [0]")]);
         assert_eq!(all_are_covered(&design, &array), [(4, 1), (4, 1), (1, 1)]);
         let cross = "field_x_deg = [0, 8, -8, 0, 0]\nfield_y_deg = [0, 0, 0, 8, -8]";

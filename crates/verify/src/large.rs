@@ -25,10 +25,10 @@ fn compare_held(array: &PillarArray, placed: &PlacedElement, found: &StoredPilla
     }
 }
 
-/// As [`verify`](super::verify), for elements of any size: a thread holds spectra of at most `part_bytes` at a time, and
-/// elements that the file folds by all eight symmetries take an eighth of the memory of others. The figures are the same to
-/// the last bit. Cells of lattices of equal pillars judge, in `cases`; a chip as made, and pillars among unlike
-/// neighbours, are for elements that are held in full.
+/// Variant of [`verify`](super::verify) for elements of any size: a thread holds spectra of at most `part_bytes` at a
+/// time, and elements that the file folds by all eight symmetries take an eighth of the memory of others. The figures
+/// are the same to the last bit. Cells of lattices of equal pillars judge, in `cases`; a chip as fabricated, and
+/// pillars among dissimilar neighbours, are for elements that are held in full.
 ///
 /// # Errors
 /// As [`verify`](super::verify).

@@ -1,5 +1,5 @@
-//! From the bytes of a layout to a verdict: what was written is read back, compared with what was meant,
-//! and simulated.
+//! Verification of a layout, from its bytes to a verdict: the file is read back, compared with the design, and
+//! simulated.
 
 mod assumptions;
 mod birefringence;
@@ -26,7 +26,6 @@ mod white_page;
 
 use std::path::Path;
 
-use num_complex::{Complex32, Complex64};
 use serde::Serialize;
 
 use metalith_cell::Fidelity;
@@ -37,7 +36,7 @@ use metalith_design::{AskedLight, Design, Element, FieldAngle, LatticeOrders};
 use metalith_gds::extract::{ExtractedElement, Extraction, Survey, UnrecognisedShapes, extract};
 use metalith_gds::{self, Layout};
 use metalith_layout::extraction_plan;
-use metalith_optics::{AsBuiltChip, ModelStatement};
+use metalith_optics::ModelStatement;
 use metalith_pillars::PillarRows;
 use metalith_wave::Accuracy;
 use metalith_wave::propagation::Steepness;
@@ -59,7 +58,7 @@ pub use single_white::{SingleWhite, single_white, white_sampling};
 pub use white::CameraStatement;
 pub use white_channels::{Contrast, WhiteChannel};
 
-/// What the file is, in number.
+/// Facts of the file, in numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct LayoutFacts {
     pub file: String,
@@ -81,7 +80,7 @@ pub struct ElementCheck {
     /// Index into [`Verification::distinct`] of the element that it is simulated as, itself or one that it is a copy of, if it is
     /// as intended.
     pub copy_of: Option<usize>,
-    /// What turns that element into this one: pillars, field angles, and the places where light lands.
+    /// Symmetry that turns that element into this one: pillars, field angles, and the places where light lands.
     pub turned: Option<Symmetry>,
 }
 
@@ -92,9 +91,9 @@ pub struct DistinctElement {
     /// Number of elements that it stands for.
     pub copies: usize,
     pub phase: PhaseErrors,
-    /// Where the design phase is too steep for the lattice.
+    /// Places where the design phase is too steep for the lattice.
     pub steepness: Steepness,
-    /// Where light goes by the mapping's own account, one entry a wavelength.
+    /// Orders that the mapping sends light into by its own transmission, one entry a wavelength.
     pub orders: Vec<OrderEfficiencies>,
     /// One entry for each wavelength and field angle of the design; then for each wavelength those that are asked of copies
     /// and come from other sides than these.
@@ -116,7 +115,7 @@ pub struct Verification {
     /// The calibrated model that the layout is judged by, if it is judged as made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelStatement>,
-    /// Whether the layout is compared with an array whose widths were moved on purpose.
+    /// True if the layout is compared with an array whose widths were moved on purpose.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub compensated: bool,
     /// `accurate` or `fast`.
@@ -128,13 +127,13 @@ pub struct Verification {
     pub elements: Vec<ElementCheck>,
     pub foreign: UnrecognisedShapes,
     pub distinct: Vec<DistinctElement>,
-    /// Of a design of rotated rectangles: how near their lattice is to the phase that is asked.
+    /// Error of the lattice of a design of rotated rectangles against the phase that is asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotations: Option<EqualRotations>,
     /// Light of the design of which the lattice of the pillars sends some into oblique orders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lattice_orders: Vec<LatticeOrders>,
-    /// Why nothing was simulated, if nothing was.
+    /// Reason why nothing was simulated, if nothing was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_simulated: Option<String>,
     /// Every limit of the design, held or not.
@@ -142,7 +141,7 @@ pub struct Verification {
 }
 
 impl Verification {
-    /// Whether all limits hold.
+    /// True if all limits hold.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(Check::passed)
     }
@@ -161,7 +160,7 @@ impl Verification {
     }
 }
 
-/// Whether a layout of this design, at `path`, can be simulated: asked before work is spent on one that cannot.
+/// Checks that a layout of this design, at `path`, can be simulated, before work is spent on one that cannot.
 ///
 /// # Errors
 /// If the elements have more lattice sites together than are held at a time, or the camera of the design cannot be
@@ -189,7 +188,7 @@ pub fn verify(
     verify_layout(design, array, &layout, cases, accuracy, progress)
 }
 
-/// As [`verify`], of a layout that is open.
+/// Variant of [`verify`] for a layout that is open.
 ///
 /// # Errors
 /// As [`verify`].
@@ -276,7 +275,7 @@ pub fn wavelengths_um(design: &Design) -> Result<(Vec<f64>, Vec<f64>)> {
     Ok((single, white::wavelengths_um(design)?))
 }
 
-/// What was read of a layout.
+/// Contents read of a layout.
 struct Found<'a> {
     layout: LayoutFacts,
     elements: Vec<ElementCheck>,
@@ -298,14 +297,18 @@ fn judge(
 ) -> Result<Verification> {
     let mut elements = found.elements;
     let lens = LensPhase::of(&design.as_verified());
-    let responses = MappingResponse::new(design, cases.judge)?;
-    let mut simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes)?;
-    let chosen = copies::choose(design, array, &mut elements, cases.judge.keeps_symmetry());
-    simulator.add_directions(&chosen, progress)?;
-    let mut white = white::WhiteSimulator::new(design, array.lattice, cases.judge, part_bytes)?;
-    if let Some(white) = &mut white {
+    let simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes);
+    let chosen = copies::choose(
+        design,
+        array,
+        &mut elements,
+        cases.judge.perturbation().keeps_symmetry(),
+    );
+    simulator.solve(&chosen, progress)?;
+    let white = white::WhiteSimulator::new(design, array.lattice, cases.judge)?;
+    if let Some(white) = &white {
         let shown: Vec<Element> = chosen.iter().map(|one| one.element).collect();
-        white.add_directions(&shown, progress)?;
+        white.solve(simulator.judge(), &shown, progress)?;
     }
     let in_white = white.as_ref().map_or(0, white::WhiteSimulator::psfs);
     let psfs: usize = chosen.iter().map(|one| simulator.psfs(one) + in_white).sum();
@@ -320,7 +323,7 @@ fn judge(
         simulated.push(DistinctElement {
             element,
             copies: one.copies,
-            phase: responses.errors(&read, &phase, &rule, progress)?,
+            phase: phase_errors(design, &read, &phase, &rule, progress)?,
             steepness: Steepness::of(&array.lattice, |ix, iy| phase.turns(ix, iy)),
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&one, &phase, &read, progress)?,
@@ -335,10 +338,7 @@ fn judge(
         design: design.name.clone(),
         design_digest: design.digest(),
         fidelity: cases.judge.fidelity(),
-        model: match cases.judge {
-            SimulationCase::Made(chip) => Some(chip.statement()),
-            SimulationCase::Cell(_) => None,
-        },
+        model: cases.judge.statement(),
         compensated: array.compensated,
         accuracy: match accuracy {
             Accuracy::Accurate => "accurate",
@@ -349,7 +349,7 @@ fn judge(
         elements,
         foreign: found.foreign,
         distinct: simulated,
-        rotations: EqualRotations::of(design, cases.judge)?,
+        rotations: EqualRotations::of(design, simulator.judge(), progress)?,
         lattice_orders: design.lattice_orders(AskedLight::All)?,
         not_simulated: None,
         checks: Vec::new(),
@@ -358,46 +358,20 @@ fn judge(
     Ok(verification)
 }
 
-/// What pillars transmit at the wavelength of the mapping, in the case that judges.
-enum MappingResponse<'a> {
-    ByWidth(Vec<Complex64>),
-    Made(f64, &'a AsBuiltChip),
-}
-
-impl<'a> MappingResponse<'a> {
-    fn new(design: &Design, judge: SimulationCase<'a>) -> Result<Self> {
-        let um = design.mapping.wavelength_um;
-        Ok(match judge {
-            SimulationCase::Cell(cell) => Self::ByWidth(cell.transmissions(um, design.cell.most())?),
-            SimulationCase::Made(chip) => Self::Made(um, chip),
-        })
-    }
-
-    /// Phase errors of an element's pillars.
-    fn errors(
-        &self,
-        read: &optics::ReadElement<'_>,
-        phase: &ElementPhase<'_>,
-        rule: &PillarRule,
-        progress: &dyn Progress,
-    ) -> Result<PhaseErrors> {
-        let widths = read.widths;
-        let errors = |table: &[Complex64], class: &(dyn Fn(usize, u16) -> usize + Sync)| {
-            let response = PillarResponse { table, class };
-            PhaseErrors::of(widths, phase, rule, &response)
-        };
-        match (self, &read.made[0]) {
-            (Self::Made(um, chip), Some(made)) => {
-                let single = |t: &Complex32| Complex64::new(f64::from(t.re), f64::from(t.im));
-                let focused = chip.focused_table(made, *um, progress)?;
-                let table: Vec<_> = focused.t.iter().map(single).collect();
-                let classes = made.classes();
-                Ok(errors(&table, &|site, _| usize::from(classes[site])))
-            }
-            (Self::ByWidth(table), _) => Ok(errors(table, &|_, width_nm| usize::from(width_nm))),
-            (Self::Made(..), None) => unreachable!("a made chip has made elements"),
-        }
-    }
+/// Phase errors of an element's pillars at the wavelength of the mapping, in the case that judges.
+fn phase_errors(
+    design: &Design,
+    read: &optics::ReadElement<'_>,
+    phase: &ElementPhase<'_>,
+    rule: &PillarRule,
+    progress: &dyn Progress,
+) -> Result<PhaseErrors> {
+    let sites = read.cases[0].focused(design.mapping.wavelength_um, progress)?;
+    let response = PillarResponse {
+        table: &sites.table,
+        class: &|site, number| sites.class(site, number),
+    };
+    Ok(PhaseErrors::of(read.widths, phase, rule, &response))
 }
 
 fn compare<W>(

@@ -1,4 +1,5 @@
-//! What is assumed of the media beside the pillars: light is lost on no way through them, and is sent into no oblique order.
+//! Assumptions on the media around the pillars: light is lost on no way through them, and is sent into no oblique
+//! order.
 
 use std::f64::consts::TAU;
 
@@ -38,7 +39,7 @@ pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, fo
     }
 }
 
-/// What a substrate that absorbs a little takes, at the wavelength of the band at which it does most.
+/// Loss in a substrate that absorbs a little, at the wavelength of the band at which it absorbs most.
 fn loss(design: &Design) -> Option<String> {
     let substrate = design.cell_stack().ok()?.substrate;
     let (wavelength_um, k) = substrate.most_absorbing(design.band_um().ok()?);

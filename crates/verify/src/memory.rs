@@ -1,4 +1,4 @@
-//! What a simulation takes, before any work is spent on it.
+//! Memory that a simulation takes, estimated before any work is spent on it.
 
 use std::path::Path;
 
@@ -16,14 +16,15 @@ const DESIGNED_BYTES: f64 = 2.0;
 /// Bytes of each site of the element that is being simulated: its width, and single-precision fields of the propagation
 /// on all threads. From the peaks of 3 x 3 and 5 x 5 lenses of 1 mm, 438 and 851 MB.
 const SIMULATED_BYTES: f64 = 36.0;
-/// What a run takes whatever its size (MB).
+/// Memory of a run whatever its size (MB).
 const BASE_MB: f64 = 60.0;
-/// What a thread holds beside spectra, as a share of all of them: rows of the window, columns for the contrast, transforms.
+/// Memory of a thread other than spectra, as a share of all of them: rows of the window, columns for the contrast,
+/// transforms.
 const BESIDE_SPECTRA: f64 = 0.1;
 /// Parts that a field is formed in at most: all rows of the element are transformed once for each.
 const MOST_PARTS: usize = 32;
 
-/// How a layout of a design is simulated within a given memory.
+/// Way in which a layout of a design is simulated within a given memory.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Simulation {
     /// All elements held in full: [`verify`](super::verify).
@@ -42,8 +43,8 @@ pub enum Simulation {
 }
 
 impl Simulation {
-    /// Choose for a design whose layout is at `path`, with all threads of this program. `by_site` says that the case that
-    /// judges knows a chip as made, or unlike neighbours, and needs elements that are held in full.
+    /// Choose for a design whose layout is at `path`, with all threads of this program. `by_site` says that the case
+    /// that judges knows a chip as fabricated, or dissimilar neighbours, and needs elements that are held in full.
     ///
     /// # Errors
     /// If the pillars of the elements are more than can be held to be compared, or the camera of the design cannot be used.
@@ -89,8 +90,8 @@ fn whole_mb(design: &Design) -> f64 {
     BASE_MB + 1e-6 * sites * (READ_BYTES * elements + DESIGNED_BYTES * distinct + SIMULATED_BYTES)
 }
 
-/// How elements are held that are read folded: of those that are round lenses and nothing else on a square
-/// lattice, an eighth; rectangles are not symmetric.
+/// Memory of elements that are read folded: of round lenses and nothing else on a square lattice, an eighth; rectangles
+/// are not symmetric.
 fn holdings(design: &Design) -> Vec<Holding> {
     let held = |element: &Element| {
         let lens = design.lens_of(element);

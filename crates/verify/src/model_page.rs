@@ -3,7 +3,7 @@
 use metalith_optics::ModelStatement;
 use metalith_report::Page;
 
-/// What the model changes, and what of it is not applied.
+/// Section on what the model changes, and what of it is not applied.
 pub(super) fn write(page: &mut Page, model: &ModelStatement) {
     page.paragraph(format!(
         "Pillars, apertures, light and sensor are those of the calibrated model of {}: {}. {}",

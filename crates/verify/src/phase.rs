@@ -17,7 +17,7 @@ pub struct PhaseError {
     pub largest_rad: f64,
 }
 
-/// What a written element does to the phase that was asked of it, at the wavelength of the mapping.
+/// Errors of the phase of a written element against the phase that was asked of it, at the wavelength of the mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhaseErrors {
     /// Width as written, or rotation as drawn, against the unrounded one, by [`PillarRule::turns_of_width`].
@@ -26,7 +26,7 @@ pub struct PhaseErrors {
     pub mapping: PhaseError,
 }
 
-/// What pillars transmit at the wavelength of the mapping.
+/// Transmission of pillars at the wavelength of the mapping.
 pub struct PillarResponse<'a> {
     /// Transmission of each class of pillars, zero where the aperture is shut.
     pub table: &'a [Complex64],

@@ -45,19 +45,19 @@ pub struct PsfPair {
     pub wavelength_um: f64,
     /// Counted from where the element looks.
     pub field: FieldAngle,
-    /// Where the design asks copies of the element alone for this light: the first of them, and its field angle. The figures are
-    /// those of the element that is simulated, turned as the copy is.
+    /// First copy of the element, and its field angle, where the design asks copies alone for this light. The figures
+    /// are of the element that is simulated, turned as the copy is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub copy: Option<CopyAngle>,
     /// Direction sines of the light as it arrives at the chip.
     pub incidence_sin: [f64; 2],
-    /// Where the chief ray meets the sensor, from the element's axis (um).
+    /// Place where the chief ray meets the sensor, from the element's axis (um).
     pub chief_ray_um: [f64; 2],
     /// Frequency bins that had to be relabelled towards the mean ray.
     pub relabelled: u64,
-    /// Of the unrounded design phase.
+    /// Figures of the target phase.
     pub designed: PsfResult,
-    /// Of the pillars that were read back, in each case; the first one judges.
+    /// Figures of the pillars that were read back, in each case; the first case judges.
     pub extracted: Vec<(Fidelity, PsfResult)>,
     /// Rms difference of the judged PSF from the designed one, both of the same energy in the window, over the
     /// rms of the designed one.
@@ -70,9 +70,9 @@ pub struct PsfPair {
 /// share one scale. Row index along +y.
 #[derive(Clone, Debug)]
 pub struct PsfImages {
-    /// Of the unrounded design phase.
+    /// PSF of the target phase.
     pub designed: Array2<f32>,
-    /// Of the layout, in the case that judges.
+    /// PSF of the layout, in the case that judges.
     pub extracted: Array2<f32>,
     /// Distance of the samples (um).
     pub step_um: f64,
@@ -131,7 +131,7 @@ impl PsfPair {
     }
 }
 
-/// Where light goes by the mapping's own account, at one wavelength, by one cell.
+/// Orders that the mapping sends light into by its own transmission, at one wavelength, by one cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OrderEfficiencies {
     pub wavelength_um: f64,
@@ -144,16 +144,17 @@ pub struct OrderEfficiencies {
     pub second: f64,
     /// Share in all orders of the mapping: the rest is reflected, absorbed or diffracted by the lattice itself.
     pub transmitted: f64,
-    /// Of pillars that change polarisation, the share that leaves in the hand in which it arrived and reaches the sensor: it passes
-    /// the element as if there were no phase. The shares above are what is converted of the hand that is focused, through an analyser
-    /// if there is one.
+    /// Share, for pillars that change polarisation, that leaves in the hand in which it arrived and reaches the sensor:
+    /// it passes the element as if there were no phase. The shares above are what is converted of the hand that is
+    /// focused, through an analyser if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unconverted: Option<f64>,
-    /// Of these, where the other hand arrives too, the share that is converted of it and reaches the sensor: it diverges.
+    /// Share of the other hand, where it arrives too, that such pillars convert and that reaches the sensor: it
+    /// diverges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diverging: Option<f64>,
-    /// Of the cell that knows unlike neighbours: share of the light that its sum over pairs puts elsewhere, in the light of this
-    /// element, than supercells that were left out of its fit. Mean over their sites and both polarisations.
+    /// Share of the light, for the coupled model, that its sum over pairs puts elsewhere, in the light of this element,
+    /// than supercells that were left out of its fit. Mean over their sites and both polarisations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out: Option<f64>,
 }
@@ -165,7 +166,7 @@ impl OrderEfficiencies {
         all.into_iter().collect()
     }
 
-    /// Of a mapping, by the table of a cell at one wavelength; `full` is |t| of a cell that passes everything.
+    /// Orders of a mapping, by the table of a cell at one wavelength; `full` is |t| of a cell that passes everything.
     pub(super) fn of(
         rule: &PillarRule,
         wavelength_um: f64,
@@ -190,8 +191,9 @@ impl OrderEfficiencies {
         }
     }
 
-    /// The same of pillars that tell polarisations apart, in light of which one or both arrive, as shares of all of it. Over a
-    /// whole turn of the phase, light that is converted of one hand does not interfere with what is not of the other.
+    /// Orders of pillars that distinguish polarisations, in light of which one or both arrive, as shares of all of it.
+    /// Over a whole turn of the phase, light that is converted of one hand does not interfere with what is not of the
+    /// other.
     pub(super) fn of_light(
         self,
         tables: &PolarisedTables,

@@ -9,29 +9,28 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::case::TransmissionTables;
 use super::single_white::SingleWhite;
 use super::white::CameraStatement;
 use super::{model_page, white_page};
-use metalith_cell::{CellModel, Fidelity, PolarisedLight};
+use metalith_cell::{Fidelity, Illumination, PolarisedLight};
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_gds::extract::{ElementSite, Extraction};
-use metalith_optics::{AsBuiltChip, ModelStatement, SimulationCase};
+use metalith_optics::{CaseOptics, ElementOptics, ModelStatement, Placement, SimulationCase};
 use metalith_pillars::{Lattice, LatticeKind, PillarMap};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
 use metalith_wave::psf::{IdealPsf, PixelFrequencies, Psf, PsfMetrics};
-use metalith_wave::{Accuracy, FoldedPropagator, Pillars, PlaneWave, Scratch, Window};
+use metalith_wave::{Accuracy, Pillars, Scratch, Window};
 
-/// In what light, and where on the sensor.
+/// Lighting: the light, and the place on the sensor.
 #[derive(Clone, Debug)]
 pub struct Lighting {
     /// Wavelengths (um).
     pub wavelengths_um: Vec<f64>,
     /// Direction sines of the incident light, in air.
     pub incidence_sin: [f64; 2],
-    /// Whether cells are solved at that angle, for both polarisations, or along the normal.
+    /// True if cells are solved at that angle, for both polarisations; false for along the normal.
     pub cells_as_lit: bool,
-    /// From the pillar tops to the sensor (um).
+    /// Distance from the pillar tops to the sensor (um).
     pub distance_um: f64,
     /// Middle of the window, from the axis of an element (um).
     pub at_um: [f64; 2],
@@ -75,12 +74,27 @@ pub fn single_psfs(
         "simulating elements",
         (elements.len() * light.wavelengths_um.len()) as u64,
     );
+    let optics = case.optics(kind_of(&elements), largest_number(&elements));
+    let read = elements.iter().map(|(site, widths)| light.read(&optics, site, widths));
+    let read = read.collect::<Result<Vec<_>>>()?;
     let mut all = Vec::new();
     for &wavelength_um in &light.wavelengths_um {
-        let psfs = match case {
-            SimulationCase::Cell(cell) => by_cell(&elements, cell, light, wavelength_um, progress)?,
-            SimulationCase::Made(chip) => as_made(&elements, chip, light, wavelength_um, progress)?,
-        };
+        let lit = light.illumination(wavelength_um);
+        let fields = read.iter().map(|element| element.in_light(&lit, progress));
+        let fields = fields.collect::<Result<Vec<_>>>()?;
+        let psfs = fields
+            .par_iter()
+            .zip(&elements)
+            .map_init(Scratch::default, |scratch, (fields, (_, widths))| {
+                if progress.stopped() {
+                    return Err(Error::Interrupted);
+                }
+                let window = light.window(widths.lattice);
+                let psf = fields.psf(window, light.accuracy, &light.reported_lp_mm(), scratch)?;
+                progress.advance(1);
+                Ok(psf)
+            });
+        let psfs = psfs.collect::<Result<Vec<_>>>()?;
         let full = case.full_transmission(wavelength_um)?;
         let focus = [light.at_um[0], light.at_um[1], light.distance_um];
         for ((site, widths), psf) in elements.iter().zip(psfs) {
@@ -99,79 +113,6 @@ pub fn single_psfs(
     Ok(all)
 }
 
-/// The PSF of each element by a cell.
-fn by_cell(
-    elements: &[(&ElementSite, &PillarMap)],
-    cell: &dyn CellModel,
-    light: &Lighting,
-    wavelength_um: f64,
-    progress: &dyn Progress,
-) -> Result<Vec<Psf>> {
-    let widest = largest_number(elements);
-    let lattice = kind_of(elements);
-    let mut tables = TransmissionTables::new(cell, lattice, wavelength_um, widest, light.polarised)?;
-    let wave = light.wave(wavelength_um);
-    tables.add_neighbours(cell, &[wave], progress)?;
-    if light.cells_as_lit {
-        tables.add_directions(cell, &[wave], widest, progress)?;
-    }
-    elements
-        .par_iter()
-        .map_init(Scratch::default, |scratch, (_, widths)| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
-            let (window, radius_um) = (light.window(widths.lattice), widths.circle_um());
-            let fold = FoldedPropagator::plan(widths.lattice, radius_um, wavelength_um, window, light.accuracy)?;
-            let psf = tables.psf(*widths, &wave, &wave, &fold, &light.reported_lp_mm(), scratch)?;
-            progress.advance(1);
-            Ok(psf)
-        })
-        .collect()
-}
-
-/// The PSF of each element as made.
-fn as_made(
-    elements: &[(&ElementSite, &PillarMap)],
-    chip: &AsBuiltChip,
-    light: &Lighting,
-    wavelength_um: f64,
-    progress: &dyn Progress,
-) -> Result<Vec<Psf>> {
-    let wave = light.wave(wavelength_um);
-    let radius_um = |widths: &PillarMap| match light.aperture_radius_um {
-        Some(radius) => radius,
-        None => widths.circle_um(),
-    };
-    let made = elements
-        .iter()
-        .map(|(site, widths)| {
-            let drawn = chip.drawn(widths, radius_um(widths));
-            chip.element(&drawn.placed(site.centre_nm.map(|c| c as f64 * 1e-3)))
-        })
-        .collect::<Result<Vec<_>>>()?;
-    let views = made
-        .iter()
-        .map(|element| chip.view(element, &wave, light.cells_as_lit, progress))
-        .collect::<Result<Vec<_>>>()?;
-    views
-        .par_iter()
-        .map_init(Scratch::default, |scratch, view| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
-            let psf = view.psf(
-                light.window(view.element.lattice()),
-                light.accuracy,
-                &light.reported_lp_mm(),
-                scratch,
-            )?;
-            progress.advance(1);
-            Ok(psf)
-        })
-        .collect()
-}
-
 /// The kind of lattice that the elements of a layout stand on.
 pub(super) fn kind_of(elements: &[(&ElementSite, &PillarMap)]) -> LatticeKind {
     elements.first().map_or(LatticeKind::Square, |(_, w)| w.lattice.kind())
@@ -183,15 +124,31 @@ pub(super) fn largest_number(elements: &[(&ElementSite, &PillarMap)]) -> u16 {
 }
 
 impl Lighting {
-    fn wave(&self, wavelength_um: f64) -> PlaneWave {
-        PlaneWave {
-            wavelength_um,
-            sin_x: self.incidence_sin[0],
-            sin_y: self.incidence_sin[1],
-        }
+    /// The light at a wavelength (um).
+    pub(super) fn illumination(&self, wavelength_um: f64) -> Illumination<'static> {
+        let light = Illumination {
+            polarised: self.polarised,
+            ..Illumination::from_direction(wavelength_um, self.incidence_sin)
+        };
+        if self.cells_as_lit { light.oblique() } else { light }
     }
 
-    /// Where contrast is reported (line pairs a millimetre).
+    /// An element as read.
+    pub(super) fn read<'r>(
+        &self,
+        optics: &'r CaseOptics<'_>,
+        site: &ElementSite,
+        widths: &'r PillarMap,
+    ) -> Result<Box<dyn ElementOptics + 'r>> {
+        let placement = Placement {
+            radius_um: widths.circle_um(),
+            aperture_radius_um: self.aperture_radius_um.unwrap_or_else(|| widths.circle_um()),
+            centre_um: site.centre_nm.map(|c| c as f64 * 1e-3),
+        };
+        optics.element(widths, &placement)
+    }
+
+    /// Frequencies at which contrast is reported (line pairs a millimetre).
     fn reported_lp_mm(&self) -> [f64; 2] {
         PixelFrequencies::of(self.pixel_um).reported()
     }
@@ -212,21 +169,21 @@ pub(super) fn distinct(found: &Extraction) -> Vec<(&ElementSite, &PillarMap)> {
     kept
 }
 
-/// What is reported of the PSFs of one layout.
+/// Report of the PSFs of one layout.
 pub struct SinglePsfReport<'a> {
     /// Name of the layout file.
     pub file: &'a str,
     pub found: &'a Extraction,
     pub psfs: &'a [SinglePsf],
-    /// What no layout says and was taken for granted, and its value.
+    /// Assumptions that no layout states, each with its value.
     pub assumptions: &'a [(&'static str, String)],
-    /// Of the model that chips were made by, if any.
+    /// Model that chips were made by, if any.
     pub model: Option<&'a ModelStatement>,
     /// White light for a camera, if one was named.
     pub white: Option<&'a (CameraStatement, Vec<SingleWhite>)>,
 }
 
-/// What Strehl ratios of a layout without a design are against, in words for people.
+/// Reference of Strehl ratios of a layout without a design, in words for people.
 pub const STREHL_AGAINST: &str = "Strehl ratios are against the sites that hold a pillar; `run` and `verify` divide by the whole \
      aperture, so that both differ where pillars are missing.";
 

@@ -4,16 +4,15 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::case::TransmissionTables;
 use super::single::{Lighting, distinct, kind_of, largest_number};
-use super::white::{CameraStatement, STEP_NM, step_nm};
+use super::white::{CameraStatement, step_nm};
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
-use metalith_optics::SimulationCase;
+use metalith_optics::{IncoherentFields, SimulationCase};
 use metalith_sensor::{Camera, Sampling, WavelengthSteps};
 use metalith_wave::psf::{BandSample, IdealPsf};
-use metalith_wave::{Accuracy, FoldedPropagator, Pillars, Scratch, Window};
+use metalith_wave::{Accuracy, Pillars, Scratch, Window};
 
 /// One distinct element of a layout in white light.
 #[derive(Clone, Debug, Serialize)]
@@ -30,9 +29,9 @@ pub struct SingleWhite {
 /// As [`Camera::sampling`].
 pub fn white_sampling(camera: &Camera, known_nm: [f64; 2], lenses_um: &[[f64; 2]]) -> Result<Sampling> {
     let steps = |most_nm: f64| WavelengthSteps::from(most_nm).behind(lenses_um.iter().copied(), camera.sensor.pixel_um);
-    let sampling = camera.sampling(known_nm, steps(STEP_NM))?;
+    let sampling = camera.sampling(known_nm, steps(WavelengthSteps::USUAL_NM))?;
     let most_nm = step_nm(sampling.ends_nm());
-    if most_nm > STEP_NM {
+    if most_nm > WavelengthSteps::USUAL_NM {
         return camera.sampling(known_nm, steps(most_nm));
     }
     Ok(sampling)
@@ -65,71 +64,35 @@ pub fn single_white(
         sines: light.incidence_sin,
         distance_um: light.distance_um,
     };
-    let tables = sampling.wavelengths_nm.iter().map(|nm| match case {
-        SimulationCase::Made(_) => Ok(None),
-        SimulationCase::Cell(cell) => {
-            let (lattice, um) = (kind_of(&elements), nm * 1e-3);
-            let mut tables = TransmissionTables::in_band(cell, lattice, um, widest, light.polarised)?;
-            tables.add_neighbours_in_band(cell, um, &|um| point().wave(um), progress)?;
-            if light.cells_as_lit {
-                tables.add_directions(cell, &[point().wave(um)], widest, progress)?;
-            }
-            Ok(Some(tables))
-        }
-    });
-    let tables = tables.collect::<Result<Vec<_>>>()?;
+    let optics = case.optics(kind_of(&elements), widest);
     let mut all = Vec::new();
     for (site, widths) in elements {
-        let made = match case {
-            SimulationCase::Cell(_) => None,
-            SimulationCase::Made(chip) => {
-                let radius = light.aperture_radius_um.unwrap_or_else(|| widths.circle_um());
-                let drawn = chip
-                    .drawn(widths, radius)
-                    .placed(site.centre_nm.map(|c| c as f64 * 1e-3));
-                Some((chip, chip.element(&drawn)?))
-            }
+        let element = light.read(&optics, site, widths)?;
+        let fields = |nm: &f64| {
+            Ok((
+                nm * 1e-3,
+                element.in_light(&light.illumination(nm * 1e-3).in_band(), progress)?,
+            ))
         };
-        let views = sampling.wavelengths_nm.iter().map(|nm| match &made {
-            Some((chip, element)) => {
-                let wave = point().wave(nm * 1e-3);
-                chip.view_in_band(element, &wave, light.cells_as_lit, progress)
-                    .map(Some)
-            }
-            None => Ok(None),
-        });
-        let views = views.collect::<Result<Vec<_>>>()?;
-        let sample = |scratch: &mut Scratch, (nm, tables, view): (&f64, &Option<TransmissionTables>, _)| {
+        let fields = sampling.wavelengths_nm.iter().map(fields).collect::<Result<Vec<_>>>()?;
+        let sample = |scratch: &mut Scratch, (um, fields): &(f64, IncoherentFields<'_>)| {
             if progress.stopped() {
                 return Err(Error::Interrupted);
             }
-            let (point, um) = (point(), nm * 1e-3);
-            let (wave, landing) = (point.wave(um), point.landing_um(um)?);
+            let landing = point().landing_um(*um)?;
             let pitch = widths.lattice.pitch_um();
             let window = Window::about(landing, pitch, light.samples, light.distance_um);
-            let psf = match (view, tables) {
-                (Some(view), _) => metalith_optics::AsBuiltOptics::psf(view, window, Accuracy::Fast, &lp_mm, scratch)?,
-                (None, Some(tables)) => {
-                    let fold = FoldedPropagator::plan(widths.lattice, widths.circle_um(), um, window, Accuracy::Fast)?;
-                    tables.psf(widths, &wave, &wave, &fold, &lp_mm, scratch)?
-                }
-                (None, None) => unreachable!("a case is a cell or a made chip"),
-            };
+            let psf = fields.psf(window, Accuracy::Fast, &lp_mm, scratch)?;
             // Sites as drawn, whatever they transmit.
             let ones = vec![Complex64::ONE; usize::from(widest) + 1];
             let focus = [landing[0], landing[1], light.distance_um];
-            let full = case.full_transmission(um)?;
-            let matched = IdealPsf::of(&Pillars::new(widths, &ones)?, focus, um, full);
+            let full = case.full_transmission(*um)?;
+            let matched = IdealPsf::of(&Pillars::new(widths, &ones)?, focus, *um, full);
             progress.advance(1);
             Ok(per_light(landing, psf, matched.power_um2))
         };
-        let tasks: Vec<_> = sampling.wavelengths_nm.iter().zip(&tables).zip(&views).collect();
-        let samples: Vec<BandSample> = tasks
-            .into_par_iter()
-            .map_init(Scratch::default, |scratch, ((nm, tables), view)| {
-                sample(scratch, (nm, tables, view.as_ref()))
-            })
-            .collect::<Result<_>>()?;
+        let samples = fields.par_iter().map_init(Scratch::default, sample);
+        let samples: Vec<BandSample> = samples.collect::<Result<_>>()?;
         let shown = Channels {
             point: point(),
             samples: &samples,
@@ -152,7 +115,8 @@ pub fn single_white(
 mod tests {
     use super::*;
 
-    /// What a camera counts is simulated, whatever its band: of short-wave infrared, and of the visible between 390 and 720 nm.
+    /// Light that a camera counts is simulated, whatever its band: of short-wave infrared, and of the visible between
+    /// 390 and 720 nm.
     #[test]
     fn a_camera_is_sampled_over_its_own_light() {
         let sampled = |name: &str, known_nm: [f64; 2]| {

@@ -1,4 +1,4 @@
-//! How much light an element sends into each order of its design phase, by what its sites transmit.
+//! Light that an element sends into each order of its design phase, by the transmission of its sites.
 
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
@@ -17,9 +17,9 @@ const EVERY: usize = 4;
 /// Shares of the arriving light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SiteShares {
-    /// In the orders 0, 1 and 2 of the phase.
+    /// Shares in the orders 0, 1 and 2 of the phase.
     pub orders: [f64; 3],
-    /// In all.
+    /// Share transmitted in all.
     pub transmitted: f64,
 }
 
@@ -97,7 +97,7 @@ mod tests {
     use metalith_pillars::Lattice;
     use metalith_wave::PhaseMap;
 
-    /// Of a block's thousand sites, what other orders add.
+    /// Share that other orders add, of a block's thousand sites.
     const OTHERS: f64 = 0.01;
 
     struct Mixed<'a>(&'a ElementPhase<'a>, [f64; 3]);

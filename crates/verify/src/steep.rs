@@ -1,9 +1,10 @@
-//! What cells do not tell of steep phases, by the truth of blazed rows (`golden/truth`).
+//! Errors of cells on steep phases, by the truth of blazed rows (`golden/truth`).
 
 use metalith_design::{Design, Element};
 use metalith_report::fixed;
 
-/// What a row of unlike pillars of the shipped mapping shows at 455, 530 and 660 nm, behind the turns of its phase a pitch.
+/// Results of a row of unlike pillars of the shipped mapping at 455, 530 and 660 nm, after the waves of its phase a
+/// pitch.
 type Row = (f64, [f64; 3]);
 
 /// Share by which a cell in an infinite lattice of equal pillars overstates the first order of a blazed row at 455,
@@ -33,9 +34,9 @@ const NOT_COUNTED: [Row; 6] = [
 
 /// Steepness of the phases of a design.
 pub(super) struct Slopes {
-    /// Of the steepest wedge alone, in the middle of its element (turns a pitch).
+    /// Slope of the steepest wedge alone, in the middle of its element (waves a pitch).
     middle: f64,
-    /// The same with the slope of the steepest lens at its rim.
+    /// Slope with the slope of the steepest lens at its rim added.
     rim: f64,
 }
 
@@ -56,7 +57,7 @@ impl Slopes {
         }
     }
 
-    /// By how much the first order is overstated by equal neighbours, in words.
+    /// Excess by which the local periodic approximation overstates the first order, in words.
     pub fn overstated(&self) -> String {
         let worst = |turns: f64| percent(between(&OVERSTATED, turns).into_iter().fold(0.0, f64::max));
         format!(
@@ -67,7 +68,7 @@ impl Slopes {
         )
     }
 
-    /// How much of the light that passes the sum over pairs does not count, in words.
+    /// Share of the light that passes which the sum over pairs does not count, in words.
     pub fn not_counted(&self) -> String {
         let shares = |turns: f64| up_to(&NOT_COUNTED, turns).map(percent).join(", ");
         format!(
@@ -84,7 +85,7 @@ fn percent(share: f64) -> String {
     fixed(share * 100.0, 0)
 }
 
-/// What stands before a number that is of the steepest row, where a phase is steeper.
+/// Words before a number of the steepest row, where a phase is steeper.
 fn beyond(rows: &[Row], turns: f64) -> &'static str {
     if turns > rows[rows.len() - 1].0 { "over " } else { "" }
 }
@@ -109,9 +110,9 @@ fn up_to(rows: &[Row], turns: f64) -> [f64; 3] {
 mod tests {
     use std::collections::BTreeMap;
 
+    use metalith_cell::{Blaze, NeighbourTable, NeighbourTableSpec};
     use metalith_core::Silent;
     use metalith_design::mappings;
-    use metalith_grating::{Blaze, NeighbourTable, NeighbourTableSpec};
     use metalith_rcwa::SiteLattice;
     use num_complex::Complex64;
 

@@ -7,21 +7,17 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::case::TransmissionTables;
-use super::optics::ReadElement;
+use super::optics::{ReadElement, incidence};
 use super::white_channels::{Channels, Point, WhiteChannel, per_light};
+use metalith_cell::{Illumination, Incidence};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::phase::ElementPhase;
-use metalith_design::{CellIncidence, Design, Element};
-use metalith_optics::{AsBuiltOptics, SimulationCase};
+use metalith_design::{Design, Element};
+use metalith_optics::{CaseOptics, IncoherentFields, SimulationCase};
 use metalith_pillars::Lattice;
 use metalith_sensor::{Camera, Sampling, WavelengthSteps};
 use metalith_wave::psf::{BandSample, PixelFrequencies};
-use metalith_wave::{Accuracy, FoldedPropagator, PlaneWave, Scratch, Window};
-
-/// Largest distance of the wavelengths that are simulated (nm): eight intervals over a channel of 100 nm. How much
-/// this weighs is reported for each channel.
-pub(super) const STEP_NM: f64 = 12.5;
+use metalith_wave::{Accuracy, Scratch, Window};
 
 /// Steps that the visible has.
 const MOST_STEPS: f64 = 24.0;
@@ -47,7 +43,7 @@ impl CameraStatement {
         }
     }
 
-    /// Where the contrast of its channels is told.
+    /// Frequencies at which the contrast of its channels is stated.
     pub fn frequencies(&self) -> PixelFrequencies {
         PixelFrequencies::of(self.pixel_um)
     }
@@ -83,7 +79,7 @@ pub(super) fn wavelengths_um(design: &Design) -> Result<Vec<f64>> {
     Ok(sampling.map_or_else(Vec::new, |s| s.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect()))
 }
 
-/// Where the light of one wavelength lands from a point that an element looks at (um).
+/// Place where the light of one wavelength lands from a point in the viewing direction of an element (um).
 ///
 /// # Errors
 /// As [`Point::landing_um`].
@@ -93,67 +89,30 @@ pub(super) fn landing_um(element: &Element, wavelength_um: f64, distance_um: f64
 
 /// Distance of the wavelengths (nm): a band that is much wider than the visible has as many as that.
 pub(super) fn step_nm([short, long]: [f64; 2]) -> f64 {
-    STEP_NM.max((long - short) / MOST_STEPS)
+    WavelengthSteps::USUAL_NM.max((long - short) / MOST_STEPS)
 }
 
-/// One wavelength, with what all elements share.
-struct Colour {
-    wavelength_um: f64,
-    /// |t| of a cell that passes everything.
-    full: f64,
-    /// Of a cell, by drawn width; a chip as made has its own by site.
-    tables: Option<TransmissionTables>,
-}
-
-/// What the elements of a design are simulated with in white light.
+/// Simulator of the elements of a design in white light.
 pub(super) struct WhiteSimulator<'a> {
     design: &'a Design,
     lattice: Lattice,
-    judge: SimulationCase<'a>,
-    /// Spectra that a thread may hold at a time, if not all (bytes): see [`FoldedPropagator::within`].
-    part_bytes: Option<usize>,
     camera: Camera,
     sampling: Sampling,
-    colours: Vec<Colour>,
+    /// Wavelength (um) and |t| of a cell that passes everything.
+    colours: Vec<(f64, f64)>,
     lp_mm: Vec<f64>,
 }
 
 impl<'a> WhiteSimulator<'a> {
-    /// Solve the cells along the normal at the wavelengths of the camera; nothing if there is no camera to be had.
+    /// Simulator at the wavelengths of the camera; `None` if there is no camera to be had.
     ///
     /// # Errors
-    /// As [`camera_of`]; also if a cell cannot be solved.
-    pub fn new(
-        design: &'a Design,
-        lattice: Lattice,
-        judge: SimulationCase<'a>,
-        part_bytes: Option<usize>,
-    ) -> Result<Option<Self>> {
+    /// As [`camera_of`]; also if a wavelength is outside what the cell covers.
+    pub fn new(design: &'a Design, lattice: Lattice, judge: SimulationCase<'_>) -> Result<Option<Self>> {
         let Some((camera, sampling)) = camera_of(design)? else {
             return Ok(None);
         };
-        let largest_number = design.cell.most();
-        let colour = |nm: &f64| {
-            let wavelength_um = nm * 1e-3;
-            let tables = match judge {
-                SimulationCase::Made(_) => None,
-                SimulationCase::Cell(cell) => {
-                    let light = design.verify.light();
-                    Some(TransmissionTables::in_band(
-                        cell,
-                        lattice.kind(),
-                        wavelength_um,
-                        largest_number,
-                        light,
-                    )?)
-                }
-            };
-            Ok(Colour {
-                wavelength_um,
-                full: judge.full_transmission(wavelength_um)?,
-                tables,
-            })
-        };
+        let colour = |nm: &f64| Ok((nm * 1e-3, judge.full_transmission(nm * 1e-3)?));
         let mut lp_mm = PixelFrequencies::of(camera.sensor.pixel_um).drawn().to_vec();
         lp_mm.extend(design.verify.limits.white_mtf_lp_mm);
         lp_mm.sort_by(f64::total_cmp);
@@ -162,50 +121,46 @@ impl<'a> WhiteSimulator<'a> {
             colours: sampling.wavelengths_nm.iter().map(colour).collect::<Result<_>>()?,
             design,
             lattice,
-            judge,
-            part_bytes,
             camera,
             sampling,
             lp_mm,
         }))
     }
 
-    /// Obtain what pillars transmit among unlike neighbours, from a cell that knows, in light from where these elements look at each
-    /// wavelength; if the design asks for light as it arrives, in that of the point, which other cells are solved for then.
+    /// Solve the cells for the light of a point, at which these elements look.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
-    pub fn add_directions(&mut self, elements: &[Element], progress: &dyn Progress) -> Result<()> {
-        let SimulationCase::Cell(cell) = self.judge else {
-            return Ok(());
-        };
-        let (design, as_lit) = (self.design, self.as_lit());
-        let lit = |element: &Element, um: f64| lit(design, element, um);
-        for colour in &mut self.colours {
-            if let Some(tables) = &mut colour.tables {
-                for element in elements {
-                    tables.add_neighbours_in_band(cell, colour.wavelength_um, &|um| lit(element, um), progress)?;
-                }
-            }
+    pub fn solve(&self, judge: &CaseOptics<'_>, elements: &[Element], progress: &dyn Progress) -> Result<()> {
+        if incidence(self.design) == Incidence::Oblique {
+            let all = elements.len() * self.colours.len();
+            progress.begin("solving cells for oblique white light", all as u64);
         }
-        if !as_lit {
-            return Ok(());
-        }
-        progress.begin(
-            "solving cells as they are lit by white light",
-            (elements.len() * self.colours.len()) as u64,
-        );
-        for colour in &mut self.colours {
-            if let Some(tables) = &mut colour.tables {
-                let waves: Vec<_> = elements.iter().map(|e| lit(e, colour.wavelength_um)).collect();
-                tables.add_directions(cell, &waves, design.cell.most(), progress)?;
+        for (um, _) in &self.colours {
+            for element in elements {
+                self.in_light(element, *um, |light| judge.response(light, progress))?;
+                progress.advance(1);
             }
         }
         Ok(())
     }
 
-    fn as_lit(&self) -> bool {
-        self.design.verify.incidence == CellIncidence::AsLit
+    /// Result of `with` for the light of a point at a wavelength (um). Coupled cells are solved for it in oblique
+    /// incidence, else for light from where the element looks at the wavelength.
+    fn in_light<T>(&self, element: &Element, um: f64, with: impl FnOnce(&Illumination<'_>) -> Result<T>) -> Result<T> {
+        let looks = |um| <[f64; 2]>::from(element.wedge.looks_at(um));
+        let light = Illumination {
+            incidence: incidence(self.design),
+            polarised: self.design.verify.light(),
+            ..Illumination::from_direction(um, self.point(element).sines).in_band()
+        };
+        with(&match light.incidence {
+            Incidence::Oblique => light,
+            Incidence::Normal => Illumination {
+                viewing: Some(&looks),
+                ..light
+            },
+        })
     }
 
     /// Number of PSFs of one element.
@@ -213,7 +168,7 @@ impl<'a> WhiteSimulator<'a> {
         self.colours.len()
     }
 
-    /// What the figures are for.
+    /// Statement of the camera that the figures are for.
     pub fn statement(&self) -> CameraStatement {
         CameraStatement::of(&self.camera, &self.sampling)
     }
@@ -229,25 +184,19 @@ impl<'a> WhiteSimulator<'a> {
         read: &ReadElement<'_>,
         progress: &dyn Progress,
     ) -> Result<Vec<WhiteChannel>> {
-        let as_lit = self.as_lit();
-        let view = |colour: &Colour| match (self.judge, &read.made[0]) {
-            (SimulationCase::Made(chip), Some(made)) => {
-                let wave = self.point(element).wave(colour.wavelength_um);
-                chip.view_in_band(made, &wave, as_lit, progress).map(Some)
-            }
-            _ => Ok(None),
-        };
-        let views = self.colours.iter().map(view).collect::<Result<Vec<_>>>()?;
+        let fields =
+            |(um, _): &(f64, f64)| self.in_light(element, *um, |light| read.cases[0].in_light(light, progress));
+        let fields = self.colours.iter().map(fields).collect::<Result<Vec<_>>>()?;
         let area_um2 = phase.open_um2();
         let samples = self
             .colours
             .par_iter()
-            .zip(views)
-            .map_init(Scratch::default, |scratch, (colour, view)| {
+            .zip(fields)
+            .map_init(Scratch::default, |scratch, ((um, full), fields)| {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let sample = self.sample(element, (colour, area_um2), view.as_ref(), read, scratch);
+                let sample = self.sample(element, (*um, full * full * area_um2), &fields, scratch);
                 progress.advance(1);
                 sample
             })
@@ -266,45 +215,19 @@ impl<'a> WhiteSimulator<'a> {
     fn sample(
         &self,
         element: &Element,
-        (colour, area_um2): (&Colour, f64),
-        view: Option<&AsBuiltOptics<'_>>,
-        read: &ReadElement<'_>,
+        (um, arriving_um2): (f64, f64),
+        fields: &IncoherentFields<'_>,
         scratch: &mut Scratch,
     ) -> Result<BandSample> {
         let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
-        let point = self.point(element);
-        let wave = point.wave(colour.wavelength_um);
-        let landing = point.landing_um(colour.wavelength_um)?;
+        let landing = self.point(element).landing_um(um)?;
         let pitch = self.lattice.pitch_um();
         let window = Window::about(landing, pitch, spec.window_samples, lens.focal_length_um);
-        let psf = match (view, &colour.tables) {
-            (Some(view), _) => view.psf(window, Accuracy::Fast, &self.lp_mm, scratch)?,
-            (None, Some(tables)) => {
-                let radius_um = lens.radius_um();
-                let fold =
-                    FoldedPropagator::plan(self.lattice, radius_um, colour.wavelength_um, window, Accuracy::Fast)?;
-                let fold = match self.part_bytes {
-                    Some(bytes) => fold.within(bytes),
-                    None => fold,
-                };
-                let lit = lit(self.design, element, colour.wavelength_um);
-                tables.psf(read.widths, &wave, &lit, &fold, &self.lp_mm, scratch)?
-            }
-            (None, None) => unreachable!("a case is a cell or a made chip"),
-        };
-        Ok(per_light(landing, psf, colour.full * colour.full * area_um2))
+        let psf = fields.psf(window, Accuracy::Fast, &self.lp_mm, scratch)?;
+        Ok(per_light(landing, psf, arriving_um2))
     }
 
     fn point(&self, element: &Element) -> Point {
         Point::of(element, self.design.lens_of(element).focal_length_um)
-    }
-}
-
-/// The light that cells of an element are solved for: that of the point if the design asks for it, else from where the element looks
-/// at the wavelength.
-fn lit(design: &Design, element: &Element, wavelength_um: f64) -> PlaneWave {
-    match design.verify.incidence {
-        CellIncidence::AsLit => Point::of(element, design.lens_of(element).focal_length_um).wave(wavelength_um),
-        CellIncidence::Normal => PlaneWave::looked_at(&element.wedge, wavelength_um),
     }
 }

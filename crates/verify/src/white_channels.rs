@@ -27,9 +27,9 @@ pub struct WhiteChannel {
     pub incidence_sin: [f64; 2],
     /// Wavelengths up to which 10, 50 and 90 % of the light that passes have come (nm).
     pub wavelengths_nm: [f64; 3],
-    /// Where the chief ray lands at these three, from the element's axis (um).
+    /// Places where the chief ray lands at these three, from the element's axis (um).
     pub chief_ray_um: [[f64; 2]; 3],
-    /// From the first to the last of these places (um).
+    /// Distance from the first to the last of these places (um).
     pub spread_um: f64,
     /// Direction of the line between them, from the x axis (degrees, above -90 to 90); none where there is no spread.
     pub spread_direction_deg: Option<f64>,
@@ -37,7 +37,7 @@ pub struct WhiteChannel {
     pub peak_um: [f64; 2],
     /// Share of the light that arrives at the element in a square of one pixel about the brightest place.
     pub energy_1_pixel: f64,
-    /// The same in a square of two pixels an edge.
+    /// Share of the energy in a square of two pixels an edge.
     pub energy_2_pixels: f64,
     /// Share of the light that arrives at the element and passes it.
     pub energy_passed: f64,
@@ -61,7 +61,7 @@ impl WhiteChannel {
         found.map_or([f64::NAN; 2], |c| c.mtf)
     }
 
-    /// The same along the worse of x and y.
+    /// Contrast along the worse of x and y.
     pub fn least_contrast(&self, lp_mm: f64) -> f64 {
         let [x, y] = self.contrast_at(lp_mm);
         x.min(y)
@@ -85,7 +85,7 @@ pub(super) fn per_light(landing_um: [f64; 2], mut psf: Psf, power_um2: f64) -> B
     BandSample { landing_um, psf }
 }
 
-/// What channels are made of.
+/// Parts that channels are made of.
 pub(super) struct Channels<'a> {
     pub point: Point,
     /// One at each wavelength of the sampling.
@@ -174,12 +174,12 @@ pub(super) struct Point {
     pub wedge: Wedge,
     /// Direction sines of the light of all wavelengths.
     pub sines: [f64; 2],
-    /// From the pillar tops to the sensor (um).
+    /// Distance from the pillar tops to the sensor (um).
     pub distance_um: f64,
 }
 
 impl Point {
-    /// In the direction in which an element looks at the wavelength of its wedge.
+    /// Point in the viewing direction of an element at the wavelength of its wedge.
     pub(super) fn of(element: &Element, distance_um: f64) -> Self {
         let (x, y) = element.wedge.looks_at(element.wedge.wavelength_um);
         Self {
@@ -198,7 +198,7 @@ impl Point {
         }
     }
 
-    /// Where its chief ray of one wavelength lands, from the element's axis (um).
+    /// Place where its chief ray of one wavelength lands, from the element's axis (um).
     ///
     /// # Errors
     /// If it does not reach the sensor.

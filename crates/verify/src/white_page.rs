@@ -34,7 +34,7 @@ pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctEle
     channels(page, camera, &element.white, &alone);
 }
 
-/// The same of the channels of any element, beside contrasts of single wavelengths.
+/// Figure of the channels of any element, beside contrasts of single wavelengths.
 pub(super) fn channels(
     page: &mut Page,
     camera: &CameraStatement,
@@ -125,7 +125,8 @@ fn table(camera: &CameraStatement, channels: &[WhiteChannel]) -> Table {
     ))
 }
 
-/// How much is simulated of what channels count, from the least share of one: rounded down, since no less is simulated.
+/// Words for the share of what channels count that is simulated, from the least share of one: rounded down, since no
+/// less is simulated.
 fn simulated_words(least: f64) -> String {
     if least < 1.0 {
         let percent = fixed((least * 1000.0).floor() / 10.0, 1);

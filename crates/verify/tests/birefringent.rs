@@ -1,10 +1,10 @@
 //! Light along x and along y behind upright rectangles, from a design to its figures.
 
 use metalith_cell::{
-    Analyser, AxisTables, CellModel, Fidelity, PillarLibrary, Polarisation, PolarisationAxis, PolarisedLight,
-    PolarisedTables,
+    Analyser, AxisTables, CellModel, CellResponse, Fidelity, Illumination, JonesTables, PillarLibrary, Polarisation,
+    PolarisationAxis, PolarisedLight, PolarisedTables,
 };
-use metalith_core::{Result, Silent};
+use metalith_core::{Progress, Result, Silent};
 use metalith_design::{Design, PillarArray, cell_models};
 use metalith_layout::{read_pillars, write_pillars};
 use metalith_testing::design;
@@ -12,7 +12,7 @@ use metalith_verify::{Lighting, SimulationCase, SimulationCases, SinglePsf, Veri
 use metalith_wave::Accuracy;
 use num_complex::Complex64;
 
-/// Of the largest sample: tables and fields are in single precision.
+/// Tolerance as a share of the largest sample: tables and fields are in single precision.
 const ROUNDING: f64 = 1e-5;
 
 const WAVELENGTH_UM: f64 = 0.532;
@@ -45,15 +45,12 @@ impl CellModel for IdealRetarders {
         Fidelity::Rigorous
     }
 
-    fn transmissions(&self, _wavelength_um: f64, last: u16) -> Result<Vec<Complex64>> {
-        Ok(self.table(PolarisationAxis::X, last))
-    }
-
-    fn polarised(&self, _wavelength_um: f64, last: u16) -> Result<Option<PolarisedTables>> {
-        Ok(Some(PolarisedTables::Axes(AxisTables {
+    fn response(&self, _light: &Illumination<'_>, last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let tables = PolarisedTables::Axes(AxisTables {
             focused: PolarisationAxis::X,
             along: PolarisationAxis::ALL.map(|axis| self.table(axis, last)),
-        })))
+        });
+        Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
     }
 
     fn full_transmission(&self, _wavelength_um: f64) -> Result<f64> {
@@ -81,7 +78,7 @@ fn image((design, _, folder): &Lens, arriving: Polarisation, analyser: Option<An
         aperture_radius_um: None,
         accuracy: Accuracy::Accurate,
     };
-    let case = SimulationCase::Cell(&cell);
+    let case = SimulationCase::from(&cell as &dyn CellModel);
     single_psfs(&found, case, &light, &Silent).unwrap().remove(0)
 }
 
@@ -151,12 +148,13 @@ fn judged((design, array, folder): &Lens, polarisation: Option<Polarisation>) ->
     verify(&design, array, &path, &cases, Accuracy::Accurate, &Silent).unwrap()
 }
 
-/// By the rigorous cell and the limits of the design: light along y is judged by its own phase, and both are mirror images.
+/// Results by the rigorous cell and the limits of the design: light along y is judged by its own phase, and both are
+/// mirror images.
 #[test]
 fn each_polarisation_is_judged_by_its_own_phase() {
-    /// Of two pillars that are as near the library takes one.
+    /// Tolerance for two pillars that are as near: the library takes one.
     const MIRRORED: f64 = 0.01;
-    /// What cells pass of the phases that are asked for, of all pairs and of this lens.
+    /// Tolerance of what cells pass of the phases that are asked for, of all pairs and of this lens.
     const FOLLOWS: f64 = 0.03;
     let lens = lens();
     let [x, y] = [None, Some(Polarisation::Linear(90.0))].map(|light| judged(&lens, light));

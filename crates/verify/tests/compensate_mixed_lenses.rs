@@ -8,7 +8,7 @@ use metalith_layout::write_pillars;
 use metalith_optics::{CalibratedModel, Perturbation};
 use metalith_verify::compensate::{compensate, compensation_cases};
 
-/// What widths are short by (nm): five steps of those that may be drawn.
+/// Shortfall of widths (nm): five steps of those that may be drawn.
 const SHORT_NM: f64 = 10.0;
 
 #[test]

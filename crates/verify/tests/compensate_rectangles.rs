@@ -17,7 +17,7 @@ const LIBRARY: &str = "width_x_nm,width_y_nm,turns_x,turns_y,passed_x,passed_y
 120,140,0.30217,0.32352,0.9768,0.9736
 140,140,0.45898,0.39648,0.9745,0.9745
 ";
-/// What edges are short by (nm): one step of the widths that may be drawn.
+/// Shortfall of edges (nm): one step of the widths that may be drawn.
 const SHORT_NM: f64 = 20.0;
 
 /// A shipped design, smaller.

@@ -70,7 +70,7 @@ fn verified(design: &Design, accuracy: Accuracy) -> Verification {
 /// Its figures are those that it has alone.
 #[test]
 fn a_rotated_lens_has_its_own_figures() {
-    /// Of Strehl ratios above a hundredth: fields are true to 1e-5 of that of a perfect lens.
+    /// Tolerance of Strehl ratios above a hundredth: fields are true to 1e-5 of the field of a perfect lens.
     const SAME: f64 = 1e-3;
     let term = "[[phase.term]]\nsource = \"polynomial\"\npowers_x = [2, 3]\npowers_y = [0, 0]\ncoefficients_rad = [4.0, 3.0]\n";
     let plain = "\n[[element]]\nx_um = -70\ny_um = 0\n";

@@ -1,9 +1,10 @@
 //! Source and detector of light at rotated rectangles, from a design to its figures.
 
 use metalith_cell::{
-    Analyser, CellModel, Fidelity, HandTables, Handedness, Polarisation, PolarisedLight, PolarisedTables,
+    Analyser, CellModel, CellResponse, Fidelity, HandTables, Handedness, Illumination, JonesTables, Polarisation,
+    PolarisedLight, PolarisedTables,
 };
-use metalith_core::{Result, Silent};
+use metalith_core::{Progress, Result, Silent};
 use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 use metalith_layout::{read_pillars, write_pillars};
 use metalith_pillars::RotatedRectangles;
@@ -12,7 +13,7 @@ use metalith_verify::{Lighting, SimulationCase, SimulationCases, SinglePsf, Veri
 use metalith_wave::{Accuracy, Psf};
 use num_complex::Complex64;
 
-/// Of the largest sample: tables and fields are in single precision.
+/// Tolerance as a share of the largest sample: tables and fields are in single precision.
 const ROUNDING: f64 = 1e-5;
 
 /// A quarter as large as the shipped one, so that it is simulated at once.
@@ -37,7 +38,7 @@ fn lens() -> (Design, PillarArray, tempfile::TempDir) {
     (design, array, folder)
 }
 
-/// Half-wave plates that nothing but their rotation tells apart.
+/// Half-wave plates that nothing but their rotation distinguishes.
 struct IdealPlates(RotatedRectangles);
 
 impl IdealPlates {
@@ -54,17 +55,15 @@ impl CellModel for IdealPlates {
         Fidelity::Rigorous
     }
 
-    fn transmissions(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Vec<Complex64>> {
-        Ok(self.table(|rotation| Complex64::cis(2.0 * rotation)))
-    }
-
-    fn polarised(&self, _wavelength_um: f64, _max_width_nm: u16) -> Result<Option<PolarisedTables>> {
+    fn response(&self, _light: &Illumination<'_>, _last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
         let none = || self.table(|_| Complex64::ZERO);
-        Ok(Some(PolarisedTables::Hands(HandTables {
+        let tables = PolarisedTables::Hands(HandTables {
             focused: Handedness::Left,
             converted: [2.0, -2.0].map(|k| self.table(|rotation| Complex64::cis(k * rotation))),
             unconverted: [none(), none()],
-        })))
+            rotation: None,
+        });
+        Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
     }
 
     fn full_transmission(&self, _wavelength_um: f64) -> Result<f64> {
@@ -91,7 +90,7 @@ fn of_ideal_plates(arriving: Polarisation, analyser: Option<Analyser>) -> Single
         aperture_radius_um: None,
         accuracy: Accuracy::Accurate,
     };
-    single_psfs(&found, SimulationCase::Cell(&plates), &light, &Silent)
+    single_psfs(&found, SimulationCase::from(&plates as &dyn CellModel), &light, &Silent)
         .unwrap()
         .remove(0)
 }
@@ -183,7 +182,8 @@ fn judged(
     .unwrap()
 }
 
-/// By the rigorous cell, in all figures that are energies: of one wavelength, of white light, and of where light goes.
+/// Results by the rigorous cell, in all figures that are energies: of one wavelength, of white light, and of where
+/// light goes.
 #[test]
 fn unpolarised_light_is_the_mean_of_both_hands_and_of_both_axes() {
     let lens = lens();

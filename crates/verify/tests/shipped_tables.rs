@@ -1,7 +1,7 @@
-//! A first run of a shipped 3 x 3 solves no table of unlike neighbours: they come with the program.
+//! A first run of a shipped 3 x 3 solves no table of dissimilar neighbours: they come with the program.
 
+use metalith_cell::{NeighbourTable, NeighbourTableSpec};
 use metalith_design::{Design, mappings};
-use metalith_grating::{NeighbourTable, NeighbourTableSpec};
 use metalith_optics::cell_direction;
 use metalith_wave::propagation::incident;
 
@@ -25,7 +25,7 @@ fn tables_of_the_shipped_designs_come_with_the_program() {
                 let wave = incident(&element.wedge, wavelength_um, [0.0; 2]).unwrap();
                 let spec = NeighbourTableSpec {
                     wavelength_um,
-                    sines: cell_direction(&wave, design.cell.lattice),
+                    sines: cell_direction([wave.sin_x, wave.sin_y], design.cell.lattice),
                 };
                 assert!(
                     NeighbourTable::is_shipped(&spec, &stack, &mappings),

@@ -1,4 +1,4 @@
-//! What can go wrong on the way of light, as causes that a caller can match on.
+//! Errors of simulating light, as causes that a caller can match on.
 
 use metalith_pillars::Lattice;
 
@@ -8,7 +8,7 @@ use crate::{PlaneWave, Window};
 /// Result of every fallible operation of this crate.
 pub type Result<T, E = WaveError> = std::result::Result<T, E>;
 
-/// What went wrong. The text says what and where; [`WaveError::hint`] says what to do.
+/// Error of a simulation. The text says what and where; [`WaveError::hint`] says what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WaveError {
@@ -75,7 +75,7 @@ pub enum WaveError {
 
     /// A direction behind the element that never meets the sensor.
     #[error("light that leaves an element with sines {}, {} does not reach the sensor", sines[0] + 0.0, sines[1] + 0.0)]
-    SensorIrradiance { sines: [f64; 2] },
+    MissesSensor { sines: [f64; 2] },
 
     /// Pixels that reach beyond the window that the PSF is known on.
     #[error("{pixels} pixels of {pixel_um} um about {centre_um:?} um do not fit into the window")]
@@ -89,26 +89,9 @@ pub enum WaveError {
     #[error("PSFs on windows of different samples cannot be compared")]
     Samples,
 
-    /// Kernels of a blur that do not fit together.
-    #[error("{kernels} kernels, the first of {shape:?} pixels, for {grid:?} patches")]
-    Kernels {
-        kernels: usize,
-        shape: (usize, usize),
-        grid: [usize; 2],
-    },
-
     /// A map of the sensor's plane without a size, or too large for memory.
     #[error("a map of {0} x {0} squares of {1} um at {2} um", grid.cells, grid.cell_um, grid.distance_um)]
     Map { grid: LandingGrid, most: usize },
-
-    /// An image smaller than what is to be measured of it.
-    #[error("an image of {rows} x {columns} pixels")]
-    SmallImage {
-        rows: usize,
-        columns: usize,
-        /// Pixels an axis that it must have.
-        least: usize,
-    },
 }
 
 /// An angle as people gave it: without what the way to radians and back left in its last digits, zero without a sign.
@@ -117,7 +100,27 @@ fn degrees(rad: f64) -> f64 {
 }
 
 impl WaveError {
-    /// What to do about it.
+    /// Identity of the error, `subject/cause`: the text may change, the identity stays.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Window { .. } => "wave/window",
+            Self::Fade { .. } => "wave/fade",
+            Self::Wave { .. } => "wave/wave",
+            Self::Lattice { .. } => "wave/lattice",
+            Self::Band { .. } => "wave/band",
+            Self::Shape { .. } => "wave/shape",
+            Self::Count { .. } => "wave/count",
+            Self::Width { .. } => "wave/width",
+            Self::Rings { .. } => "wave/rings",
+            Self::Incidence { .. } => "wave/incidence",
+            Self::MissesSensor { .. } => "wave/misses-sensor",
+            Self::Pixels { .. } => "wave/pixels",
+            Self::Samples => "wave/samples",
+            Self::Map { .. } => "wave/map",
+        }
+    }
+
+    /// Remedy for the error.
     pub fn hint(&self) -> String {
         match self {
             Self::Window { .. } => {
@@ -138,21 +141,17 @@ impl WaveError {
             Self::Incidence { .. } => {
                 "keep field angles smaller: light arrives at less than 90 degrees from the chip's normal".into()
             }
-            Self::SensorIrradiance { .. } => "keep wedge and field angle smaller at the longest wavelength".into(),
+            Self::MissesSensor { .. } => "keep wedge and field angle smaller at the longest wavelength".into(),
             Self::Pixels { .. } => "use fewer pixels, or form the PSF on a larger window".into(),
             Self::Samples => "form both on the same number of samples and with the same step".into(),
-            Self::Kernels { .. } => {
-                "give one kernel for each patch, all of the same odd number of pixels and with energy in them".into()
-            }
             Self::Map { most, .. } => format!("use positive lengths and at most {most} squares"),
-            Self::SmallImage { least, .. } => format!("give an image of at least {least} x {least} pixels"),
         }
     }
 }
 
 impl From<WaveError> for metalith_core::Error {
     fn from(error: WaveError) -> Self {
-        Self::invalid(error.to_string(), error.hint())
+        Self::refused(error.id(), error.to_string(), error.hint())
     }
 }
 

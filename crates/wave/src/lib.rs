@@ -3,13 +3,10 @@
 pub mod camera;
 mod error;
 pub mod kernels;
-mod photograph;
 pub mod propagation;
 pub mod psf;
-pub mod restore;
 
 pub use error::{Result, WaveError};
-pub use photograph::Photograph;
 pub use propagation::{
     Accuracy, Aperture, Direct, Fade, Field, FoldedPropagator, Hankel, PhaseFunction, PhaseMap, PhaseSites,
     PillarFunction, Pillars, PlaneWave, Propagator, Scratch, Window,

@@ -345,7 +345,7 @@ fn rings_agree_with_the_lattice_on_the_axis() {
     assert!((field[0] - direct[0]).norm() < SAME_SUM * direct[0].norm());
 }
 
-/// The veil by rays: all power of a steered lens goes where it is steered, once, and squares hold what wave optics brings
+/// The stray light by rays: all power of a steered lens goes where it is steered, once, and squares hold what wave optics brings
 /// there.
 #[test]
 fn rays_land_where_wave_optics_has_them() {

@@ -8,18 +8,19 @@ use metalith_wave::{
 };
 use num_complex::Complex64;
 
-/// Of the field on the axis, of the place of its peak, and of the Strehl ratio: what is asked of ideal lenses.
+/// Tolerance asked of ideal lenses: of the field on the axis, of the place of its peak, and of the Strehl ratio.
 const IDEAL: f64 = 1e-3;
-/// Of the light that an element passes: what is asked of the orders of a hologram. A square about an order loses the tail
-/// of its spot and has those of its neighbours.
+/// Tolerance asked of the orders of a hologram, as a share of the light that an element passes. A square about an order
+/// loses the tail of its spot and has those of its neighbours.
 const ORDERS: f64 = 1e-2;
-/// Of the same, between two ways to compute the same field.
+/// Tolerance between two ways to compute the same field, as a share of the light that an element passes.
 const ACCURATE: f64 = 1e-4;
 
 const PITCH_NM: u32 = 350;
 
-/// On the axis behind a slow lens `2 pi U / (k a^2) = sinc(x) / z` with `x = a^2 (1 / z - 1 / f) / (2 lambda)`: Li and Wolf,
-/// Opt. Commun. 39, 211 (1981). With a Fresnel number of about one its peak is far in front of the focus.
+/// Intensity on the axis behind a slow lens: `2 pi U / (k a^2) = sinc(x) / z` with `x = a^2 (1 / z - 1 / f) / (2
+/// lambda)`: Li and Wolf, Opt. Commun. 39, 211 (1981). With a Fresnel number of about one its peak is far in front of
+/// the focus.
 #[test]
 fn a_slow_lens_has_its_peak_where_diffraction_puts_it() {
     let (um, radius_um, focus_um) = (0.55, 100.0, 20_000.0);
@@ -117,7 +118,7 @@ fn coefficient(period: usize, order: [i32; 2], turns: impl Fn(usize, usize) -> f
     sum / (period * period) as f64
 }
 
-/// Where a sampled function has its largest value, by the parabola through the largest sample and its neighbours.
+/// Place of the largest value of a sampled function, by the parabola through the largest sample and its neighbours.
 fn top_of(places: &[f64], value: &dyn Fn(usize) -> f64) -> f64 {
     let k = (1..places.len() - 1)
         .max_by(|a, b| value(*a).total_cmp(&value(*b)))

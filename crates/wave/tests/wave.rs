@@ -12,9 +12,9 @@ use std::f64::consts::TAU;
 
 /// Places of the reference are given to so many samples.
 const SAME_PLACE: f64 = 1e-6;
-/// What the accurate mode is asked for: a part in 1e5 of the largest field of the lens.
+/// Tolerance of the accurate mode: a part in 1e5 of the largest field of the lens.
 const ACCURATE: f64 = 1e-5;
-/// What the fast mode is asked for.
+/// Tolerance of the fast mode.
 const FAST: f64 = 1e-3;
 /// |U| at the focus of the steered lens in matched light at 550 nm, largest of its reference field.
 const STEERED_PEAK: f64 = 554.1;

@@ -22,7 +22,7 @@ fn wedge() -> Wedge {
     }
 }
 
-/// From where the element looks at the wavelength of its wedge.
+/// Wave from the viewing direction of the element at the wavelength of its wedge.
 fn wave(nm: f64) -> PlaneWave {
     let (sin_x, sin_y) = wedge().looks_at(wedge().wavelength_um);
     PlaneWave {
@@ -115,9 +115,9 @@ fn brute_force(centre_um: [f64; 2], samples: usize) -> Psf {
 
 #[test]
 fn eight_intervals_and_their_chief_rays_are_every_nanometre() {
-    /// Of contrast, for intervals of 12.5 nm over which the focus moves by 2 %, and for twice as many.
+    /// Tolerances of contrast, for intervals of 12.5 nm over which the focus moves by 2 %, and for twice as many.
     const CONTRAST: [f64; 2] = [0.005, 0.0015];
-    /// Of the share of all light in a square of two pixels.
+    /// Tolerance of the share of all light in a square of two pixels.
     const ENERGY: f64 = 0.002;
     let exact = brute_force([0.0; 2], 320);
     let exact_otf = exact.otf.as_ref().unwrap();

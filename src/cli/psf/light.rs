@@ -20,14 +20,14 @@ pub(super) struct PsfLight {
 /// White light for a camera.
 pub(super) struct WhiteLight {
     pub camera: Camera,
-    /// What of it is simulated.
+    /// Sampling of it that is simulated.
     pub sampling: Sampling,
     /// Single wavelengths that stand for its channels (um).
     colours_um: Vec<f64>,
 }
 
 impl WhiteLight {
-    /// What a camera counts behind lenses of these radii and focal lengths (um), as far as cells are known.
+    /// Light that a camera counts behind lenses of these radii and focal lengths (um), as far as cells are known.
     fn of(camera: Camera, known_um: (f64, f64), lenses_um: &[[f64; 2]]) -> Result<Self> {
         let sampling = white_sampling(&camera, [known_um.0 * 1e3, known_um.1 * 1e3], lenses_um)?;
         let [short, long] = sampling.ends_nm();
@@ -102,6 +102,7 @@ impl PsfArgs {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use metalith::design::CellFile;
     use metalith::{Design, PillarShape};
 
     use super::*;
@@ -112,13 +113,20 @@ mod tests {
         psf: PsfArgs,
     }
 
-    /// The options, of a layout that is not there.
-    fn options(words: &[&str]) -> PsfArgs {
+    /// The options, of a layout that is not there, with the cell of a file of this text.
+    fn options(words: &[&str], cell: Option<&str>) -> PsfArgs {
         let words = [&["metalith", "layout.gds"][..], words].concat();
-        Program::try_parse_from(words).map_err(|e| e.to_string()).unwrap().psf
+        let options = Program::try_parse_from(words).map_err(|e| e.to_string()).unwrap().psf;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cell.toml");
+        let stated = cell.map(|text| {
+            std::fs::write(&path, text).unwrap();
+            CellFile::read(&path).unwrap()
+        });
+        PsfArgs { stated, ..options }
     }
 
-    /// Of pillars of this shape on a square lattice of 350 nm.
+    /// Extraction without pillars, of this shape on a square lattice of 350 nm.
     fn nothing(shape: PillarShape) -> Extraction {
         Extraction {
             top: String::new(),
@@ -139,14 +147,15 @@ mod tests {
         nm.iter().map(|nm| nm * 1e-3).collect()
     }
 
-    const SILICON: [&str; 2] = ["--pillar-material", "a_si_pierce_1972"];
+    const SILICON: &str = "[cell]\npitch_nm = 350\npillar_height_nm = 700\nwidth_min_nm = 100\nwidth_max_nm = 300\n\
+                           pillar_material = \"a_si_pierce_1972\"\n";
 
     /// Wavelengths, tables and pixels are of the camera, where it does not count the usual light.
     #[test]
     fn light_is_that_of_the_camera() {
         let found = nothing(PillarShape::Circle);
         let light = |words: &[&str]| {
-            let options = options(&[&SILICON[..], words].concat());
+            let options = options(words, Some(SILICON));
             let light = options.light(&found).unwrap();
             let pixel_um = options.pixel_um(&light);
             (light, pixel_um)
@@ -165,7 +174,7 @@ mod tests {
         let (visible, pixel_um) = light(&["--camera", &camera("gt1930")]);
         assert_eq!((visible.wavelengths_um, pixel_um), (um(&USUAL_NM), 5.86));
         // Silicon nitride of the paper's polynomials says nothing of the infrared.
-        let published = options(&["--fidelity", "published", "--camera", &camera("swir")]);
+        let published = options(&["--fidelity", "published", "--camera", &camera("swir")], None);
         assert!(published.light(&found).is_err());
     }
 
@@ -174,7 +183,7 @@ mod tests {
     fn the_band_is_that_of_the_light() {
         let found = nothing(PillarShape::Circle);
         let band = |words: &[&str]| {
-            let options = options(&[&SILICON[..], words].concat());
+            let options = options(words, Some(SILICON));
             let known_um = options.stack(&found).unwrap().range_um();
             options.light(&found).unwrap().band_um(known_um)
         };
@@ -193,7 +202,7 @@ mod tests {
         );
     }
 
-    /// The options say the cell of a design by the words of its file.
+    /// A whole design states the cell, by its section alone.
     #[test]
     fn the_cell_is_that_of_a_design() {
         let path = metalith_testing::design("mini_3x3");
@@ -203,25 +212,12 @@ mod tests {
         let text = text.replacen("ambient_index = 1.0", "ambient_index = 1.33", 1);
         let text = text.replacen("pillar_height_nm = 700", "pillar_height_nm = 20000", 1);
         let design = Design::parse(&path, &text).unwrap();
-        let words = [
-            "--height-nm",
-            "20000",
-            "--spacer-nm",
-            "40",
-            "--spacer-material",
-            "alumina_malitson_dodge_1972",
-            "--residual-nm",
-            "25",
-            "--ambient-index",
-            "1.33",
-        ];
+        let options = options(&[], Some(&text));
         let found = nothing(PillarShape::Square);
-        let stack = options(&words).stack(&found).unwrap();
+        let stack = options.stack(&found).unwrap();
         assert_eq!(stack, design.cell_stack().unwrap());
-        let told = options(&words).assumptions(&found, None);
+        let told = options.assumptions(&found, None);
         let (_, pillars) = told.iter().find(|(what, _)| *what == "pillars").unwrap();
         assert!(pillars.contains("40 nm of alumina") && pillars.contains("25 nm") && pillars.contains("n = 1.33"));
-        let error = options(&["--spacer-nm", "40"]).stack(&found).unwrap_err().to_string();
-        assert!(error.contains("--spacer-material"), "{error}");
     }
 }

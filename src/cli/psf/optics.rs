@@ -1,13 +1,11 @@
-//! What the options of `metalith psf` say of cells, light and sensor, and what is taken for granted.
-
-use std::path::Path;
+//! Cells, light and sensor by the options of `metalith psf`, and the assumptions beside them.
 
 use metalith::cell::{
-    CellStack, FittedCell, FocusedLight, Handedness, LitStack, PointwiseCell, Polarisation, PolarisationAxis,
-    PolarisedLight, PublishedCell, UniformLayer, cache_folder, polarising_cell,
+    CellStack, FittedCell, FocusedLight, Handedness, LitStack, Mapping, NeighbourCell, PointwiseCell, Polarisation,
+    PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
 };
-use metalith::grating::{Mapping, NeighbourCell};
-use metalith::rcwa::{CellLattice, Material};
+use metalith::design::CellFile;
+use metalith::rcwa::CellLattice;
 use metalith::report::{exact, sig};
 use metalith::verify::Lighting;
 use metalith::{
@@ -16,6 +14,9 @@ use metalith::{
 };
 
 use super::{FidelityArg, PsfArgs, PsfLight};
+
+/// Height of pillars that no file states (nm).
+const USUAL_HEIGHT_NM: f64 = 700.0;
 
 impl PsfArgs {
     fn pitch_nm(found: &Extraction) -> u32 {
@@ -31,69 +32,45 @@ impl PsfArgs {
 
     /// The cell of the layout's own lattice.
     pub(super) fn stack(&self, found: &Extraction) -> Result<CellStack> {
-        let material = |name: &str| Material::resolve(name, Path::new(""));
-        let paper = CellStack::paper(f64::from(Self::pitch_nm(found)), self.height_nm)?;
-        let film = material(&self.pillar_material)?;
-        let mut under = Vec::new();
-        if self.spacer_nm > 0.0 {
-            let name = self.spacer_material.as_ref().ok_or_else(|| {
-                Error::invalid(
-                    format!("a spacer of {} nm of no material", exact(self.spacer_nm)),
-                    "add --spacer-material: a name or the path of a CSV table",
-                )
-            })?;
-            under.push(UniformLayer {
-                material: material(name)?,
-                height_nm: self.spacer_nm,
-            });
-        }
-        if self.residual_nm > 0.0 {
-            under.push(UniformLayer {
-                material: film.clone(),
-                height_nm: self.residual_nm,
-            });
-        }
+        let pitch_nm = Self::pitch_nm(found);
+        let stated = match &self.stated {
+            Some(file) => file.stack()?,
+            None => CellStack::paper(f64::from(pitch_nm), USUAL_HEIGHT_NM)?,
+        };
         Ok(CellStack {
-            lattice: CellLattice::drawn(Self::lattice_kind(found), Self::pitch_nm(found)),
+            pitch_nm: f64::from(pitch_nm),
+            lattice: CellLattice::drawn(Self::lattice_kind(found), pitch_nm),
             shape: found.shape,
-            film,
-            substrate: material(&self.substrate_material)?,
-            under,
-            ambient: match (&self.ambient_material, self.ambient_index) {
-                (Some(name), _) => material(name)?,
-                (None, Some(index)) => Material::constant(index, 0.0)?,
-                (None, None) => paper.ambient.clone(),
-            },
-            ..paper
+            ..stated
         })
     }
 
-    /// What pillars are of, in words.
+    /// Material of the pillars, in words.
     fn pillars(&self) -> String {
+        let Some(CellFile { cell, .. }) = &self.stated else {
+            return format!("{USUAL_HEIGHT_NM} nm of sin_luke_2015 on fused_silica_malitson_1965, lit from there");
+        };
         let mut words = format!(
             "{} nm of {} on {}, lit from there",
-            sig(self.height_nm, 5),
-            self.pillar_material,
-            self.substrate_material
+            sig(cell.pillar_height_nm, 5),
+            cell.pillar_material,
+            cell.substrate_material
         );
-        if let (true, Some(material)) = (self.spacer_nm > 0.0, &self.spacer_material) {
-            words += &format!(
-                "; a spacer of {} nm of {material} below the film",
-                exact(self.spacer_nm)
-            );
+        for layer in &cell.under {
+            let height = exact(layer.height_nm);
+            words += &match layer.material == cell.pillar_material {
+                true => format!("; {height} nm of the film left between them"),
+                false => format!("; a spacer of {height} nm of {} below the film", layer.material),
+            };
         }
-        if self.residual_nm > 0.0 {
-            words += &format!("; {} nm of the film left between them", exact(self.residual_nm));
-        }
-        match (&self.ambient_material, self.ambient_index) {
-            (Some(material), _) => words += &format!("; in {material}"),
-            (None, Some(index)) => words += &format!("; in n = {}", exact(index)),
-            (None, None) => {}
-        }
+        words += &match &cell.ambient_material {
+            Some(material) => format!("; in {material}"),
+            None => format!("; in n = {}", exact(cell.ambient_index)),
+        };
         words
     }
 
-    /// What no layout says, and is taken from the options or their defaults. Without light nothing is simulated.
+    /// Assumptions that no layout states, taken from the options or their defaults. Without light nothing is simulated.
     pub(super) fn assumptions(&self, found: &Extraction, light: Option<&PsfLight>) -> Vec<(&'static str, String)> {
         let mut all = vec![
             (
@@ -170,8 +147,9 @@ impl PsfArgs {
 
     /// The circular polarisation that the layout focuses, if options say.
     pub(super) fn hand(&self) -> Option<Handedness> {
-        match (self.focused, self.arriving) {
-            (Some(focused), _) => Some(focused.into()),
+        let stated = self.stated.as_ref().and_then(|file| file.cell.arriving);
+        match (self.focused.map(Handedness::from).or(stated), self.arriving) {
+            (Some(focused), _) => Some(focused),
             (None, Some(Polarisation::Circular(hand))) => Some(hand),
             (None, None) => Some(Handedness::default()),
             (None, Some(_)) => None,
@@ -202,13 +180,12 @@ impl PsfArgs {
         let stated = LitStack {
             stack: self.stack(found)?,
             focused: shape.basis().map(|_| self.focused(shape)),
-            polarised: self.polarised_light(shape),
         };
         model.check_drawn(&stated.stack, found.elements.iter().map(|e| e.widths.histogram()))?;
         Ok(AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref()))
     }
 
-    /// What solves it for the pillars as drawn.
+    /// Cell that solves it for the pillars as drawn.
     pub(super) fn cell(&self, found: &Extraction, light: &PsfLight) -> Result<Box<dyn CellModel>> {
         let stack = self.stack(found)?;
         let focused = self.focused(found.shape);
@@ -245,7 +222,8 @@ impl PsfArgs {
     pub(super) fn wedge(&self) -> Result<Wedge> {
         let sines = [self.wedge_x_deg, self.wedge_y_deg].map(|deg| deg.to_radians().sin());
         if !(self.wedge_wavelength_nm > 0.0 && sines[0].hypot(sines[1]) < 1.0) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "option/wedge",
                 "a wedge that steers beyond the horizon or at no wavelength",
                 "give smaller --wedge-x-deg and --wedge-y-deg, and a positive --wedge-wavelength-nm",
             ));
@@ -261,7 +239,7 @@ impl PsfArgs {
         Lighting {
             wavelengths_um: light.wavelengths_um.clone(),
             incidence_sin: [self.angle_x_deg, self.angle_y_deg].map(|deg| deg.to_radians().sin()),
-            cells_as_lit: self.as_lit,
+            cells_as_lit: self.oblique,
             distance_um: self.distance_um,
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,

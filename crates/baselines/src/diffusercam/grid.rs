@@ -1,8 +1,8 @@
 //! Grids of places of the scene: one for each pixel of the sensor in the simulation, every second in the restoration.
 
-use metalith_picture::scene::averaged;
-use metalith_picture::{FftScratch, SceneView, SquareFft};
-use metalith_wave::kernels::fft_size;
+use metalith_imaging::SceneView;
+use metalith_imaging::scene::averaged;
+use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use ndarray::Array2;
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -20,20 +20,20 @@ pub struct FineGrid {
     /// Place of the sensor's first pixel in the whole image.
     first: [i64; 2],
     fft: SquareFft,
-    /// By channel and plane of the scene.
+    /// Kernels by channel and plane of the scene.
     kernels: Vec<Vec<Vec<Complex32>>>,
 }
 
 impl FineGrid {
-    /// For a scene, the tangent of a step, rows and columns of the sensor, and kernels by channel and plane of the scene, all
-    /// of one shape.
+    /// Grid for a scene, the tangent of a step, rows and columns of the sensor, and kernels by channel and plane of the
+    /// scene, all of one shape.
     pub fn new(view: &SceneView, step: f64, frame: [usize; 2], kernels: &[Vec<Array2<f32>>]) -> Self {
         let half = half_of(view, step);
         let (rows, columns) = kernels[0][0].dim();
         let kernel = [rows, columns];
         let first = [0, 1].map(|a| (half[a] + kernel[a] / 2) as i64 - (frame[a] / 2) as i64);
         let fft = SquareFft::new(fft_size(Self::places(view, step, kernel)));
-        let spectrum = |k: &Array2<f32>| transformed(&fft, k);
+        let spectrum = |k: &Array2<f32>| fft.of_plane(k, &mut FftScratch::default());
         Self {
             half,
             step,
@@ -64,7 +64,10 @@ impl FineGrid {
 
     /// Frames of all channels from planes of the scene on the grid.
     pub fn frames(&self, planes: &[Array2<f32>]) -> Vec<Array2<f32>> {
-        let spectra: Vec<Vec<Complex32>> = planes.par_iter().map(|p| transformed(&self.fft, p)).collect();
+        let spectra: Vec<Vec<Complex32>> = planes
+            .par_iter()
+            .map(|p| self.fft.of_plane(p, &mut FftScratch::default()))
+            .collect();
         self.kernels
             .par_iter()
             .map(|own| {
@@ -75,7 +78,9 @@ impl FineGrid {
                         .zip(plane)
                         .for_each(|((s, k), p)| *s += k * p);
                 }
-                let whole = inverse(&self.fft, &mut sum);
+                let whole = self
+                    .fft
+                    .to_plane(&mut sum, (self.fft.size(), self.fft.size()), &mut FftScratch::default());
                 let n = self.fft.size() as i64;
                 let [rows, columns] = self.frame;
                 Array2::from_shape_fn((rows, columns), |(y, x)| {
@@ -100,12 +105,13 @@ pub struct CoarseGrid {
     pub data: [usize; 2],
     /// Values an axis of the transforms.
     pub size: usize,
-    /// What a place of the scene sends to the squares, around the first one.
+    /// Kernel from a place of the scene to the squares, around the first one.
     pub kernel: Array2<f32>,
 }
 
 impl CoarseGrid {
-    /// For the kernel of a grey surface on the pixels of a sensor, and the pixels of a square that count the channel.
+    /// Grid for the kernel of a grey surface on the pixels of a sensor, and the pixels of a square that count the
+    /// channel.
     pub fn new(fine: &FineGrid, grey: &Array2<f32>, places: &[[usize; 2]]) -> Self {
         let half = fine.half.map(|h| h / 2);
         // The finer grid and this one have their middles together: its first place is that of `skipped`.
@@ -175,8 +181,8 @@ impl CoarseGrid {
     }
 
     /// Mean variance of the light of a square, for how much each pixel is to be trusted.
-    pub fn variance(&self, trust: &Array2<f32>) -> f64 {
-        let known = trust.iter().filter(|t| **t > 0.0);
+    pub fn variance(&self, inverse_variance: &Array2<f32>) -> f64 {
+        let known = inverse_variance.iter().filter(|t| **t > 0.0);
         let (sum, count) = known.fold((0.0, 0.0), |(s, n), t| (s + 1.0 / f64::from(*t), n + 1.0));
         sum / f64::max(count, 1.0) / self.places.len() as f64
     }
@@ -228,26 +234,6 @@ fn sampled(plane: &Array2<f32>, view: &SceneView, half: [usize; 2], step: f64) -
     })
 }
 
-/// The spectrum of a plane in the first corner of a square.
-pub fn transformed(fft: &SquareFft, plane: &Array2<f32>) -> Vec<Complex32> {
-    let n = fft.size();
-    let mut square = vec![0.0f32; n * n];
-    for (row, line) in plane.rows().into_iter().zip(square.chunks_exact_mut(n)) {
-        line.iter_mut().zip(row).for_each(|(to, v)| *to = *v);
-    }
-    let mut spectrum = vec![Complex32::ZERO; fft.entries()];
-    fft.forward(&mut square, plane.nrows(), &mut spectrum, &mut FftScratch::default());
-    spectrum
-}
-
-/// The square of a spectrum, which is used up.
-pub fn inverse(fft: &SquareFft, spectrum: &mut [Complex32]) -> Array2<f32> {
-    let n = fft.size();
-    let mut square = vec![0.0f32; n * n];
-    fft.inverse(spectrum, &mut square, fft.size(), &mut FftScratch::default());
-    Array2::from_shape_vec((n, n), square).expect("as many values")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -255,7 +241,7 @@ mod tests {
     /// Stripes of one pixel, three and a half of which are a step: a place sees their mean, and not the stripe that it is on.
     #[test]
     fn scenes_that_are_finer_than_the_steps_are_averaged() {
-        /// Of half of a stripe that a box has more of one kind.
+        /// Tolerance of half of a stripe that a box has more of one kind.
         const UNEVEN: f32 = 0.16;
         let view = SceneView {
             rows: 200,

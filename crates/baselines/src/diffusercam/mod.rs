@@ -8,25 +8,25 @@ mod admm;
 mod grid;
 mod surface;
 
+use admm::{Deconvolution, Descent};
+use grid::{CoarseGrid, FineGrid, on_scene};
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::restore::SceneStatistics;
-use metalith_picture::scene::SceneImage;
-use metalith_picture::spectra::rgb_basis;
-use metalith_picture::{Frame, OperatorError, SceneView};
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::spectra::rgb_basis;
+use metalith_imaging::{Frame, OperatorError, SceneView};
+use metalith_restoration::SceneStatistics;
 use metalith_sensor::Camera;
 use ndarray::Array2;
 use rayon::prelude::*;
+use surface::RoughSurface;
 
 use crate::lensless::{Lensless, LenslessBench};
 use crate::stage::{PICTURES, Stage, StageKind};
-use admm::{Deconvolution, Descent};
-use grid::{CoarseGrid, FineGrid, on_scene};
-use surface::RoughSurface;
 
 /// A rough surface before a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DiffuserSpec {
-    /// From the surface to the sensor (um).
+    /// Distance from the surface to the sensor (um).
     pub distance_um: f64,
     /// Distance of the random numbers that the surface is made of (um): bumps are about twice as wide.
     pub grain_um: f64,
@@ -34,13 +34,13 @@ pub struct DiffuserSpec {
     pub power: f64,
     /// Width and height of its opening, over those of the sensor.
     pub opening: f64,
-    /// Of its random numbers.
+    /// Seed of its random numbers.
     pub seed: u64,
 }
 
 impl DiffuserSpec {
-    /// As thin as the array of a prototype; bumps that focus on the sensor; of the openings 0.4, 0.15, 0.1 and 0.05 the one with
-    /// the best pictures. Smaller ones are better still, and pinholes.
+    /// Standard surface: as thin as the array of a prototype; bumps that focus on the sensor; of the openings 0.4,
+    /// 0.15, 0.1 and 0.05 the one with the best pictures. Smaller ones are better still, and pinholes.
     pub fn standard() -> Self {
         Self {
             distance_um: 2400.0,
@@ -64,7 +64,8 @@ impl DiffuserSpec {
                 opening,
                 ..Self::standard()
             }),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "diffusercam/geometry",
                 format!("a rough surface of grain {grain_um} um at {distance_um} um with an opening of {opening}"),
                 "give a distance from 1, a grain from 5 to 100000 um, an opening from 0.01 to 2",
             )),
@@ -74,15 +75,15 @@ impl DiffuserSpec {
 
 /// Distance of the wavelengths that caustics are traced at (nm).
 const STEP_NM: f64 = 50.0;
-/// What the surface is made of.
+/// Material of the surface.
 const MATERIAL: &str = "fused_silica_malitson_1965";
-/// Of the pictures that the learnt last stage sees: few rounds each, as unrolled networks have, and penalties of slopes from weak to
-/// strong, the one that follows from the noise first.
+/// Rounds for the pictures that the learnt last stage sees: few rounds each, as unrolled networks have, and penalties
+/// of slopes from weak to strong, the one that follows from the noise first.
 const STAGE_ROUNDS: usize = 10;
 const STAGE_SLOPES: [f32; PICTURES] = [1.0, 0.25, 4.0, 0.0625, 16.0];
 /// Places along an axis of the scene and the caustic together: 256 MB a plane.
 const MOST_PLACES: usize = 8192;
-/// Of the random scene and of its noise.
+/// Seed of the random scene and of its noise.
 const SEED: u64 = 1;
 
 /// A rough surface before a sensor, ready for scenes of one size and field.
@@ -90,19 +91,19 @@ pub struct DiffuserCam {
     bench: LenslessBench,
     spec: DiffuserSpec,
     fine: FineGrid,
-    /// By channel.
+    /// Solvers by channel.
     solvers: Vec<Deconvolution>,
-    /// What the operator of the restoration errs by, as a share of the light, by channel.
+    /// Error of the operator of the restoration, as a share of the light, by channel.
     error: OperatorError,
     stage: Option<Stage>,
 }
 
 impl DiffuserCam {
-    /// For a surface before the sensor of a camera.
+    /// Camera of a surface before the sensor of a camera.
     ///
     /// # Errors
-    /// If the camera tells no colours apart, the scene is near, no light reaches the sensor, or scene and caustic have too many
-    /// places.
+    /// If the camera distinguishes no colours, the scene is near, no light reaches the sensor, or scene and caustic
+    /// have too many places.
     pub fn new(spec: &DiffuserSpec, camera: &Camera, view: SceneView, progress: &dyn Progress) -> Result<Self> {
         let bench = LenslessBench::new(camera, view, STEP_NM)?;
         let pixel = camera.sensor.pixel_um;
@@ -112,7 +113,8 @@ impl DiffuserCam {
         let caustic = opening.map(|n| n + 2 * surface.border(pixel));
         let places = FineGrid::places(&view, step, caustic);
         if places > MOST_PLACES {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "diffusercam/too-large",
                 format!("a scene and a caustic of {places} places along an axis, more than {MOST_PLACES}"),
                 "bring the rough surface nearer to the sensor, make its grain finer, or give a narrower field",
             ));
@@ -163,16 +165,16 @@ impl DiffuserCam {
         Ok(camera)
     }
 
-    /// With a learnt last stage behind it.
+    /// Same camera with a learnt last stage behind it.
     #[must_use]
     pub fn with_stage(mut self, stage: Option<Stage>) -> Self {
         self.stage = stage;
         self
     }
 
-    /// By descent, sent light of each channel.
+    /// Light of each channel sent by the scene, by descent.
     fn sent_by(&self, frame: &Frame, descents: &[Descent], progress: &dyn Progress) -> Result<Vec<Vec<Array2<f32>>>> {
-        let (_, trust) = frame.light(&self.bench.camera, &self.error);
+        let (_, inverse_variance) = frame.light(&self.bench.camera, &self.error);
         let light = frame.recorded_light(&self.bench.camera);
         let rounds: usize = descents.iter().map(|d| d.rounds).sum();
         progress.begin("restoring by total variation", (rounds * light.len()) as u64);
@@ -180,10 +182,10 @@ impl DiffuserCam {
         let one = |descent: &Descent| {
             light
                 .par_iter()
-                .zip(&trust)
+                .zip(&inverse_variance)
                 .zip(&self.solvers)
-                .map(|((light, trust), solver)| {
-                    let variance = solver.grid().variance(trust);
+                .map(|((light, inverse_variance), solver)| {
+                    let variance = solver.grid().variance(inverse_variance);
                     let found = solver.solve(&solver.grid().data(light), variance, *descent, progress)?;
                     Ok(on_scene(&found, step, &self.bench.view))
                 })
@@ -194,7 +196,7 @@ impl DiffuserCam {
 
     /// Root mean square difference of what the restoration knows and the simulation on a random scene, over the light.
     fn operator_error(&self) -> OperatorError {
-        let planes = SceneStatistics::colours().random_scene(&self.bench.view, SEED);
+        let planes = SceneStatistics::colours().random_scene(self.bench.shape(), SEED);
         let scene = self.bench.scene_of(planes);
         let light = self.light(&scene);
         let ideal = self.bench.ideal(&scene);
@@ -258,7 +260,7 @@ mod tests {
     use crate::baseline_camera::BaselineCamera;
     use crate::lensless::tests::small;
     use metalith_core::Silent;
-    use metalith_picture::scores;
+    use metalith_imaging::scores;
 
     #[test]
     fn a_picture_comes_out_of_a_caustic() {

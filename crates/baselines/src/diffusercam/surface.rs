@@ -12,7 +12,7 @@ use super::DiffuserSpec;
 pub struct RoughSurface {
     numbers: Array2<f64>,
     grain_um: f64,
-    /// How far beyond the opening rays may land (um): four standard deviations of their way.
+    /// Distance beyond the opening at which rays may land (um): four standard deviations of their way.
     border_um: f64,
 }
 
@@ -21,7 +21,7 @@ const RAYS: usize = 4;
 /// Root mean square over all places of the second derivative along one axis, for random numbers of deviation one, a grid of
 /// one: of both splines, the integrals 8/3 and 151/315.
 const BEND: f64 = 1.130_6;
-/// Of the substrate and the resist that such surfaces are made of, where the power is stated (550 nm).
+/// Index of the substrate and the resist that such surfaces are made of, where the power is stated (550 nm).
 const INDEX: f64 = 1.46;
 /// Root mean square of the first derivative, as [`BEND`]: the integrals 2/3 and 151/315.
 const SLOPE: f64 = 0.565_3;
@@ -29,7 +29,7 @@ const SLOPE: f64 = 0.565_3;
 const MOST_BENT: f64 = 0.5;
 
 impl RoughSurface {
-    /// With an opening of this height and width (um).
+    /// Surface with an opening of this height and width (um).
     pub fn new(spec: &DiffuserSpec, opening_um: [f64; 2]) -> Self {
         let [rows, columns] = opening_um.map(|um| (um / spec.grain_um).ceil() as usize + 4);
         let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_surface_has_its_power_and_keeps_the_light() {
-        /// Of a mean over some hundred bumps.
+        /// Tolerance of a mean over some hundred bumps.
         const DRAW: f64 = 0.1;
         let spec = DiffuserSpec {
             grain_um: 40.0,

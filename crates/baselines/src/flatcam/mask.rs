@@ -10,12 +10,12 @@ use rustfft::FftPlanner;
 pub struct MaskSpec {
     /// Width of one member of a sequence (um).
     pub feature_um: f64,
-    /// From the mask to the sensor (um).
+    /// Distance from the mask to the sensor (um).
     pub distance_um: f64,
 }
 
 impl MaskSpec {
-    /// As published: openings of 30 um, half a millimetre before the sensor.
+    /// Mask as published: openings of 30 um, half a millimetre before the sensor.
     pub fn standard() -> Self {
         Self {
             feature_um: 30.0,
@@ -23,7 +23,7 @@ impl MaskSpec {
         }
     }
 
-    /// With openings of this width, at this distance (um).
+    /// Mask with openings of this width, at this distance (um).
     ///
     /// # Errors
     /// If one of them is not from 1 to 100 000 um.
@@ -33,7 +33,8 @@ impl MaskSpec {
                 feature_um,
                 distance_um,
             }),
-            false => Err(Error::invalid(
+            false => Err(Error::refused(
+                "flatcam/geometry",
                 format!("a mask with openings of {feature_um} um at {distance_um} um"),
                 "give lengths from 1 to 100000 um",
             )),
@@ -53,7 +54,8 @@ impl MaskSpec {
     pub fn check_reach(&self, reach_um: f64) -> Result<()> {
         match self.samples(reach_um) {
             count if count <= MOST_SAMPLES => Ok(()),
-            count => Err(Error::invalid(
+            count => Err(Error::refused(
+                "flatcam/too-large",
                 format!("a shadow of {count} samples along an axis, more than {MOST_SAMPLES}"),
                 "give wider openings, a nearer mask or a narrower field",
             )),

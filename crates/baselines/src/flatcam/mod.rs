@@ -10,9 +10,9 @@ mod solve;
 
 use faer::Mat;
 use metalith_core::{Error, Progress, Result};
-use metalith_picture::restore::SceneStatistics;
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{Frame, SceneView};
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{Frame, SceneView};
+use metalith_restoration::SceneStatistics;
 use metalith_sensor::Camera;
 use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
@@ -31,27 +31,27 @@ const STRENGTHS: ([f64; 2], usize) = ([-9.0, -1.0], 17);
 /// Strengths of the pictures that the learnt last stage sees, over the chosen one: that one first. What it does with them is a filter of
 /// singular values of its own, as these pictures can be added with any weights.
 const STAGE_STRENGTHS: [f64; PICTURES] = [1.0, 0.1, 10.0, 0.01, 100.0];
-/// Of the random scene and of its noise.
+/// Seed of the random scene and of its noise.
 const SEED: u64 = 1;
 
 /// A mask before a sensor, ready for scenes of one size and field.
 pub struct FlatCam {
     bench: LenslessBench,
-    /// By wavelength: along rows and along columns of the frame, `[pixel, place of the scene]`.
+    /// Shadows by wavelength: along rows and along columns of the frame, `[pixel, place of the scene]`.
     shadows: Vec<[Mat<f32>; 2]>,
-    /// By channel, for each place of its pixels in the square of two by two.
+    /// Systems by channel, for each place of its pixels in the square of two by two.
     systems: Vec<Vec<([usize; 2], TwoFactors)>>,
-    /// By channel.
+    /// Strength of the prior by channel.
     strength: Vec<f64>,
     stage: Option<Stage>,
 }
 
 impl FlatCam {
-    /// For a mask before the sensor of a camera. The strength of the prior is chosen on a random scene, not on those that
-    /// will be taken.
+    /// Camera of a mask before the sensor of a camera. The strength of the prior is chosen on a random scene, not on
+    /// those that will be taken.
     ///
     /// # Errors
-    /// If the camera tells no colours apart, the scene is near, a decomposition fails, or the user stopped it.
+    /// If the camera distinguishes no colours, the scene is near, a decomposition fails, or the user stopped it.
     pub fn new(mask: &MaskSpec, camera: &Camera, view: SceneView, progress: &dyn Progress) -> Result<Self> {
         let bench = LenslessBench::new(camera, view, STEP_NM)?;
         let [rows, columns] = bench.frame();
@@ -117,18 +117,18 @@ impl FlatCam {
         Ok(camera)
     }
 
-    /// With a learnt last stage behind it.
+    /// Same camera with a learnt last stage behind it.
     #[must_use]
     pub fn with_stage(mut self, stage: Option<Stage>) -> Self {
         self.stage = stage;
         self
     }
 
-    /// By channel, the strength that restores a random scene best.
+    /// Strength by channel that restores a random scene best.
     fn chosen_strengths(&self) -> Vec<f64> {
         let scene = self
             .bench
-            .scene_of(SceneStatistics::colours().random_scene(&self.bench.view, SEED));
+            .scene_of(SceneStatistics::colours().random_scene(self.bench.shape(), SEED));
         let frame = self.bench.record(&self.light(&scene), SEED);
         let truth = self.bench.ideal(&scene);
         let light = frame.recorded_light(&self.bench.camera);
@@ -167,7 +167,7 @@ impl FlatCam {
         sums.into_iter().map(|sum| sum.mapv(|v| v * scale)).collect()
     }
 
-    /// By relative strength, sent light of each channel.
+    /// Light of each channel sent by the scene, by relative strength.
     fn sent_by(&self, frame: &Frame, relative: &[f64], progress: &dyn Progress) -> Vec<Vec<Array2<f32>>> {
         progress.begin("restoring", self.bench.channels() as u64);
         let light = frame.recorded_light(&self.bench.camera);
@@ -257,7 +257,7 @@ mod tests {
     use crate::lensless::of_one_wavelength;
     use crate::lensless::tests::small;
     use metalith_core::Silent;
-    use metalith_picture::scores;
+    use metalith_imaging::scores;
 
     #[test]
     fn a_picture_comes_out_of_the_shadows_of_a_mask() {
@@ -305,7 +305,7 @@ mod tests {
         assert!(found > dark + GAINED_DB, "{found} {dark}");
     }
 
-    /// With one wavelength a colour the shadow that the restoration knows is the one that was cast.
+    /// Restoration with one wavelength a colour: the shadow that the restoration knows is the one that was cast.
     #[test]
     fn a_mask_is_undone_better_without_dispersion() {
         let (camera, scene) = small(48, 300, 260);

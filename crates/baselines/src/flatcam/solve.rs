@@ -18,7 +18,7 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Of every second pixel from the first on: those that count one channel.
+    /// Factor of every second pixel from the first on: those that count one channel.
     ///
     /// # Errors
     /// If the decomposition fails.
@@ -29,7 +29,8 @@ impl Factor {
             all[(2 * i + first, j)]
         });
         let svd = (&own * &root).thin_svd().map_err(|e| {
-            Error::invalid(
+            Error::refused(
+                "flatcam/singular-values",
                 format!("no singular values of a mask: {e:?}"),
                 "use another size of the scene",
             )
@@ -51,7 +52,7 @@ fn correlated(n: usize) -> Mat<f64> {
     })
 }
 
-/// Both axes.
+/// Factors of both axes.
 pub struct TwoFactors {
     down: Factor,
     across: Factor,

@@ -76,8 +76,8 @@ fn resolved_um(set: &MeasuredSet, capture: &Capture) -> f64 {
 /// Standard deviations of its place by which a window can be moved before its surroundings end.
 const PLACE_SIGMAS: f64 = 3.0;
 
-/// What must be known around a window that reaches so far from its middle along an axis (um), so that nothing that is faded out comes
-/// into it, wherever it is: the fade is a share of window and surroundings.
+/// Margin (um) to compute around a window that reaches so far from its middle along an axis (um), so that nothing that
+/// is faded out comes into it, wherever it is: the fade is a share of window and surroundings.
 fn margin_um(half_um: f64, camera: &RelayCamera) -> f64 {
     let moved = PLACE_SIGMAS * camera.registration_sigma_px * camera.pixel_um;
     (2.0 * PixelGrid::FADED * half_um + moved) / (1.0 - 2.0 * PixelGrid::FADED)
@@ -165,7 +165,7 @@ impl<'a> Bench<'a> {
         self.set
     }
 
-    /// What the pixel grids of all captures take, about (bytes): the bins that the light of each lens reaches.
+    /// Memory of the pixel grids of all captures, about (bytes): the bins that the light of each lens reaches.
     pub fn grid_bytes(&self) -> f64 {
         let of_group = |g: &FocusSeries| {
             let first = &self.set.captures[g.captures[0]];

@@ -6,12 +6,13 @@ use metalith_cell::PublishedCell;
 use metalith_core::Silent;
 use metalith_design::Design;
 use metalith_gds::extract::GdsPillars;
-use metalith_layout::read_pillars;
-use metalith_optics::{Perturbation, SimulationCase};
-use metalith_picture::scene::SceneImage;
-use metalith_picture::{
+use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{
     BankSpec, BetweenNodes, ChipInLight, Detail, FrameOperator, KernelBank, SceneSpace, StrayLight, element_views,
 };
+use metalith_layout::read_pillars;
+use metalith_optics::{Perturbation, SimulationCase};
+use metalith_restoration::FrameModel;
 use metalith_sensor::{Blend, Camera, Channel, Illuminant, Led, Response, Spectrum};
 use metalith_testing::session::{PIXELS, middle_set, small_design, small_set};
 use ndarray::{Array2, Array3};
@@ -21,10 +22,10 @@ use crate::cells::CellSource;
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
 
-/// Of the peak: the goal, for a point at a place of kernels and between places. Found behind lenses of 60 um, at a place: 5.8e-4 and 1.3e-4 ahead, 9.3e-4 and 2.6e-4 steered
-/// (455, 530 nm). A spot of 0.1 um has 5e-4, 3e-4, 9e-4 and 2e-4 by its size alone: a bench takes every part of a
-/// source for the same image, which coma changes where 455 nm is out of focus. The bench is within 6e-5 of accurate
-/// fields 1 nm apart.
+/// Goal for the error as a share of the peak, for a point at a place of kernels and between places. Found behind lenses
+/// of 60 um, at a place: 5.8e-4 and 1.3e-4 ahead, 9.3e-4 and 2.6e-4 steered (455, 530 nm). A spot of 0.1 um has 5e-4,
+/// 3e-4, 9e-4 and 2e-4 by its size alone: a bench takes every part of a source for the same image, which coma changes
+/// where 455 nm is out of focus. The bench is within 6e-5 of accurate fields 1 nm apart.
 const OF_THE_PEAK: f64 = 1e-3;
 /// Standard deviation of the spot on the sensor (um): nearly a point, and smooth between points a twelfth of a
 /// micrometre apart.
@@ -33,9 +34,9 @@ const SPOT_UM: f64 = 0.07;
 const LAMPS: [[f64; 2]; 2] = [[455.0, 18.0], [530.0, 33.0]];
 /// Pixels of the picture an axis of a pixel of the bench, so that a small spot is smooth between its points.
 const FINER: usize = 3;
-/// From the axis to the next place of kernels (um), where they are blended linearly. With places 10.4 um apart, as those of light
-/// of wide bands, this spot about one of them is wrong by 1.6e-3 and 1.9e-3 of the peak at 455 nm, and by 5e-2 and 6e-2 in the
-/// middle between four.
+/// Distance from the axis to the next place of kernels (um), where they are blended linearly. With places 10.4 um
+/// apart, as those of light of wide bands, this spot about one of them is wrong by 1.6e-3 and 1.9e-3 of the peak at 455
+/// nm, and by 5e-2 and 6e-2 in the middle between four.
 const PLACE_UM: f64 = 1.0;
 
 /// The lenses that look at the spot.
@@ -106,7 +107,7 @@ impl Lenses {
             let window = [0, 1].map(|a| element.centre_um[a] + capture.window_centre_um[a]);
             let camera = lamp(centre_nm, width_nm, window);
             let cell = published();
-            let case = SimulationCase::Cell(&cell);
+            let case = SimulationCase::from(&cell as &dyn metalith_cell::CellModel);
             let chip = ChipInLight::new(&self.design, &extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
             let scene = spot(capture.aoi_rad[0].sin(), focal_um);
             let views = element_views(&self.design, &camera);

@@ -4,7 +4,7 @@ use super::light::light;
 use super::{Bench, FocusSeries};
 use crate::set::CaptureIndex;
 use metalith_core::Result;
-use metalith_optics::{ArrivingLight, AsBuiltElement, AsBuiltOptics, DrawnElement, Perturbation, SolvedWidths};
+use metalith_optics::{ArrivingLight, AsBuiltElement, DrawnElement, IncoherentFields, Perturbation, SolvedWidths};
 
 impl Bench<'_> {
     /// The element of a capture with a perturbation applied.
@@ -16,7 +16,7 @@ impl Bench<'_> {
         AsBuiltElement::new(drawn, &perturbation.geometry)
     }
 
-    /// That element under the light of the capture, at one wavelength (um). `solved`: transmission of its widths.
+    /// Element under the light of the capture, at one wavelength (um). `solved`: transmission of its widths.
     pub fn view<'a>(
         &self,
         capture: CaptureIndex,
@@ -24,9 +24,9 @@ impl Bench<'_> {
         perturbation: &Perturbation,
         wavelength_um: f64,
         solved: &SolvedWidths,
-    ) -> AsBuiltOptics<'a> {
+    ) -> IncoherentFields<'a> {
         let light = self.direction_of(capture, perturbation, wavelength_um);
-        AsBuiltOptics::new(element, light, perturbation, solved)
+        IncoherentFields::as_built(element, light, perturbation, solved)
     }
 
     /// The incident wave at the element of a capture, at one wavelength (um).

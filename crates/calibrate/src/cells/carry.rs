@@ -12,7 +12,7 @@ const MOST_ALIKE: isize = 14;
 /// A second difference of the ratio of two pillars above this, over one step of the table, indicates a resonance.
 const BENT: f64 = 0.06;
 
-/// With few orders, a resonance is found at most this many steps from its true width.
+/// Largest number of steps from its true width at which few orders find a resonance.
 const BESIDE: usize = 1;
 
 /// Transmissions over width at one wavelength.

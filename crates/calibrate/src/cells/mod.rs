@@ -33,7 +33,7 @@ const FINE: usize = 13;
 /// Orders along an axis for a changed pillar.
 const COARSE: usize = 9;
 
-/// The same for tapered walls, which take six layers and are close to upright ones.
+/// Number of orders for tapered walls, which take six layers and are close to upright ones.
 const LEANING: usize = 7;
 
 /// And for pillars with unequal sides, which only synthetic sets contain.
@@ -77,8 +77,8 @@ impl RigorousCells {
         }
     }
 
-    /// The same with other orders, and no correction for upright pillars: for synthetic sets, which must not share the
-    /// truncation error of the fits. Tapered walls take six layers, and fewer orders.
+    /// Same cells with other orders, and no correction for upright pillars: for synthetic sets, which must not share
+    /// the truncation error of the fits. Tapered walls take six layers, and fewer orders.
     pub fn with_orders(mut self, fine: usize, leaning: usize) -> Self {
         (self.fine, self.coarse, self.leaning) = (fine, fine, leaning);
         self

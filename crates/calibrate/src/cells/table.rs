@@ -12,9 +12,9 @@ const MAGIC: [u8; 8] = *b"MLETCH\0\x01";
 pub struct PillarTable {
     pub first_nm: f64,
     pub step_nm: f64,
-    /// For each wavelength, the transmissions of all widths.
+    /// Transmissions of all widths, for each wavelength.
     pub t: Vec<Vec<Complex64>>,
-    /// For each wavelength, the transmission of a site without a pillar.
+    /// Transmission of a site without a pillar, for each wavelength.
     pub bare: Vec<Complex64>,
 }
 
@@ -42,7 +42,7 @@ impl PillarTable {
         kept::seal(MAGIC, &inputs, &content)
     }
 
-    /// From the cached bytes, if they hold this number of widths and wavelengths; else `None`.
+    /// Table from the cached bytes, if they hold this number of widths and wavelengths; else `None`.
     pub fn from_bytes(
         bytes: &[u8],
         solver: u32,

@@ -87,7 +87,7 @@ fn a_change_solved_with_few_orders_is_that_with_many() {
 /// What few orders do to transmission as a smooth function of width, in the mean of the spectrum of an LED: coefficients of
 /// the polynomials that intervals count with, root mean square over LEDs and polynomials, of amplitude and of phase.
 fn smooth_error(cells: &RigorousCells, few: usize, many: usize, leds: &[Vec<f64>]) -> [f64; 2] {
-    use crate::forward_model::TRANSMISSION_TERMS;
+    use crate::smooth_shape::TRANSMISSION_TERMS;
     use metalith_optics::legendre;
     use nalgebra::{DMatrix, DVector};
     let tables = [few, many].map(|orders| cells.solved(&CellChange::default(), orders, &Silent).unwrap());
@@ -135,7 +135,7 @@ fn smooth_error(cells: &RigorousCells, few: usize, many: usize, leds: &[Vec<f64>
 #[test]
 #[ignore = "second tier: a minute of CPU time, in scripts/slow_tests.sh"]
 fn the_error_of_a_cell_in_intervals_is_that_of_its_truncation() {
-    use crate::fit::ModelError;
+    use crate::cell_error::CellError;
     /// Relative: the constants are rounded, and other films have other resonances.
     const TOLERANCE: f64 = 1.2;
     /// Orders that stand for all.
@@ -157,11 +157,11 @@ fn the_error_of_a_cell_in_intervals_is_that_of_its_truncation() {
     for (few, many) in [(FINE, MANY), (FINE, crate::validate::synthetic::ORDERS)] {
         let [amplitude, phase] = smooth_error(&cells, few, many, &leds);
         println!("{few} orders against {many}: amplitude {amplitude:.5}, phase {phase:.5} rad");
-        let ModelError {
+        let CellError {
             amplitude: a,
             phase_rad,
             ..
-        } = ModelError::MEASURED;
+        } = CellError::MEASURED;
         assert!(amplitude < TOLERANCE * a && phase < TOLERANCE * phase_rad);
         // Of more orders the error is that which intervals count with, and not a part of it.
         if many == MANY {

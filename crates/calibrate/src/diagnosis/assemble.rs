@@ -9,11 +9,15 @@ use super::pattern::{untold_colours, untold_tilt};
 use super::{CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, Ranked, SetVerdict};
 use crate::effects::Effect;
 use crate::fidelity::Rung;
-use crate::fit::{Fit, HeldOutErrors, WidthParts, error_of_capture, mean_error};
-use crate::search::{EXPLAINED, Evidence, Finding, Rejection, TriedEffect, UnusableCapture, may_leave};
+use crate::screening::UnusableCapture;
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
 use crate::simulator_model::separating_measurement;
+use crate::statistics::{
+    EXPLAINED, Evidence, Finding, Fit, HeldOutErrors, IntervalParts, Rejection, TriedEffect, error_of_measurement,
+    may_leave, mean_error,
+};
+use crate::width_parts::WidthParts;
 
 /// The measure of error.
 const MEASURE: &str = "reduced chi-square per pixel";
@@ -33,7 +37,7 @@ impl Diagnosis {
         ladder: Vec<Rung>,
     ) -> Self {
         let (set, finding) = (simulator.bench.set(), &evidence.finding);
-        let pixels = evidence.problem(simulator).pixels();
+        let pixels = evidence.problem(simulator).points();
         let pair = |fit: &Fit, held: &HeldOutErrors| ErrorPair {
             fit: fit.chi2 / pixels,
             held_out: mean_error(held),
@@ -59,8 +63,8 @@ impl Diagnosis {
         let later = finding.later.iter().enumerate();
         let captures = set.captures.iter_enumerated().map(|(c, capture)| CaptureError {
             capture: capture.name.clone(),
-            before: error_of_capture(&finding.held_before[c]),
-            after: error_of_capture(&finding.held_after[c]),
+            before: error_of_measurement(&finding.held_before[c]),
+            after: error_of_measurement(&finding.held_after[c]),
         });
         Self {
             set: set.title.clone(),
@@ -73,7 +77,7 @@ impl Diagnosis {
             patterns: patterns.iter().map(|p| FreePattern::new(simulator, p)).collect(),
             proposal: None,
             unexplained_share,
-            missing_by_grain: evidence.missing_by_speckle,
+            missing_by_grain: evidence.amount_by_noise,
             left_out: left_out(set, unusable),
             captures: captures.collect(),
             ladder,
@@ -150,18 +154,28 @@ fn found_effects(simulator: &Simulator<'_>, finding: &Finding, verdict: SetVerdi
     for (&effect, alternatives) in finding.chosen.iter().zip(&finding.alternatives) {
         let slots = simulator.slots_of(effect);
         let values: Vec<f64> = slots.iter().map(|&s| finding.after.theta[s]).collect();
-        let widths = finding.after.pick(&slots, &finding.half_widths);
+        let widths = reported_widths(&finding.after.pick(&slots, &finding.half_widths));
         let others: Vec<usize> = alternatives.iter().map(|a| a.effect).collect();
         effects.push(FoundEffect::new(simulator, effect, &values, &widths, &others));
         if verdict == SetVerdict::OneOf {
             for a in alternatives {
                 let rest = others.iter().copied().filter(|&o| o != a.effect);
                 let rest: Vec<usize> = rest.chain([effect]).collect();
-                effects.push(FoundEffect::new(simulator, a.effect, &a.values, &a.half_widths, &rest));
+                effects.push(FoundEffect::new(
+                    simulator,
+                    a.effect,
+                    &a.values,
+                    &reported_widths(&a.half_widths),
+                    &rest,
+                ));
             }
         }
     }
     effects
+}
+
+fn reported_widths(parts: &[IntervalParts]) -> Vec<WidthParts> {
+    parts.iter().map(WidthParts::from).collect()
 }
 
 /// What captures of few elements or of one colour leave open: distances of their own would do as well as a tilt of the sensor, and

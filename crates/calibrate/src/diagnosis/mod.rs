@@ -12,7 +12,7 @@ use serde_json::Value;
 pub use pattern::{FreePattern, GroupValue, PatternCourse, Slope};
 
 use crate::fidelity::Rung;
-use crate::fit::WidthParts;
+use crate::width_parts::WidthParts;
 
 /// The verdict on a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

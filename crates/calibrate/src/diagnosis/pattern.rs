@@ -3,9 +3,10 @@
 use metalith_report::sig;
 use serde::Serialize;
 
-use crate::search::{Course, Grouping, Pattern};
+use crate::grouping::{Grouping, linear_trend};
 use crate::set::{CaptureIndex, MeasuredSet};
 use crate::simulator::Simulator;
+use crate::statistics::{LinearTrend, Pattern};
 
 /// A quantity that was fitted free for each element, colour, distance or angle, where this removes most of what is left.
 #[derive(Clone, Debug, Serialize)]
@@ -79,7 +80,7 @@ fn course_of(by: Grouping) -> (&'static str, &'static str, f64) {
 impl FreePattern {
     /// As it is reported.
     pub fn new(simulator: &Simulator<'_>, pattern: &Pattern) -> Self {
-        let set = simulator.bench.set();
+        let (set, by) = (simulator.bench.set(), Grouping::of(pattern));
         let slot = simulator.slots[pattern.slot];
         let effect = &simulator.effects[slot.effect];
         // Some effects report another number than the one that is fitted.
@@ -94,10 +95,10 @@ impl FreePattern {
                 _ => format!("{}[{}]", effect.name(), slot.index),
             },
             unit: unit.into(),
-            by: pattern.by.word().into(),
+            by: by.word().into(),
             values: values
                 .map(|(&c, &(value, sigma))| GroupValue {
-                    group: label(set, pattern.by, c),
+                    group: label(set, by, c),
                     value,
                     sigma,
                 })
@@ -106,12 +107,12 @@ impl FreePattern {
             after: pattern.chi2.0,
             course: None,
         };
-        let gradient = effect.as_gradient().filter(|_| pattern.by == Grouping::Element);
-        out.course = pattern.course(set).map(|c| out.course_from(&c, pattern.by, gradient));
+        let gradient = effect.as_gradient().filter(|_| by == Grouping::Element);
+        out.course = linear_trend(pattern, set).map(|c| out.course_from(&c, by, gradient));
         out
     }
 
-    fn course_from(&self, course: &Course, by: Grouping, gradient: Option<&str>) -> PatternCourse {
+    fn course_from(&self, course: &LinearTrend, by: Grouping, gradient: Option<&str>) -> PatternCourse {
         let (of, per, factor) = course_of(by);
         let slopes = course.extent.directions.iter().zip(&course.slopes);
         let slopes = slopes.map(|(along, (value, sigma))| Slope {
@@ -127,9 +128,9 @@ impl FreePattern {
             at_middle: [course.at_middle.0, course.at_middle.1],
             slopes: slopes.collect(),
             off: course.off,
-            spare: course.spare,
+            spare: course.degrees_of_freedom,
             means: gradient.filter(|_| course.is_linear).map(str::to_owned),
-            remark: (course.spare == 0).then(|| match by == Grouping::Element && self.quantity == "gap" {
+            remark: (course.degrees_of_freedom == 0).then(|| match by == Grouping::Element && self.quantity == "gap" {
                 true => untold_tilt(self.values.len()),
                 false => untold(self.values.len(), &self.by, "a slope", "a value of its own"),
             }),

@@ -3,7 +3,7 @@
 use super::{Effect, Parameter, Stage, ValueError};
 use metalith_optics::Perturbation;
 
-/// From the pillars to their aperture along x and y. Light through the crescent that opens on the far side is
+/// Offset from the pillars to their aperture along x and y. Light through the crescent that opens on the far side is
 /// not deflected and left out.
 pub struct ApertureOffset;
 

@@ -360,7 +360,7 @@ impl Effect for DeclaredEffect {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ValueError, gap::Gap};
+    use super::super::{gap::Gap, value_error_of};
     use super::*;
 
     const SOUND: &str = r#"
@@ -410,7 +410,7 @@ start = 5.0
     fn a_declared_effect_has_the_error_of_its_stage() {
         let mut effect = read(SOUND).unwrap().remove(0);
         effect.name = "gap_of_the_lid".into();
-        assert_eq!(effect.value_error(), ValueError::of_stage(effect.stage()));
+        assert_eq!(effect.value_error(), value_error_of(effect.stage()));
         assert_ne!(effect.value_error(), Gap.value_error());
     }
 

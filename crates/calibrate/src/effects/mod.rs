@@ -29,8 +29,9 @@ mod value_error;
 mod zero_order;
 
 pub use declared::{DeclaredEffect, DeclaredParameter, MOST_PARAMETERS};
+pub use metalith_attribution::{Parameter, ValueError};
 pub use stitching::StitchedFields;
-pub use value_error::ValueError;
+pub use value_error::value_error_of;
 
 use super::set::MeasuredSet;
 use metalith_core::{Error, Result};
@@ -49,32 +50,6 @@ pub enum Stage {
     Source,
     /// The camera.
     Camera,
-}
-
-/// A parameter of an effect, chosen so that the image depends on it almost linearly.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameter {
-    /// Physical limits.
-    pub range: (f64, f64),
-    /// A typical magnitude.
-    pub typical: f64,
-    /// A value that is sound although it may be an end of the range: no effect, or a size of zero.
-    pub sound_end: f64,
-}
-
-impl Parameter {
-    const fn new(low: f64, high: f64, typical: f64) -> Self {
-        Self {
-            range: (low, high),
-            typical,
-            sound_end: 0.0,
-        }
-    }
-
-    /// Whether it can only be positive.
-    pub fn one_sided(&self) -> bool {
-        self.range.0 >= 0.0
-    }
 }
 
 /// An error that a chip or a bench may have.
@@ -125,7 +100,7 @@ pub trait Effect: Send + Sync {
     /// What its values err by besides noise and the cell: as measured, or what those that were not measured of its stage are
     /// given.
     fn value_error(&self) -> ValueError {
-        ValueError::of_stage(self.stage())
+        value_error_of(self.stage())
     }
 
     /// Set its parameters.
@@ -245,7 +220,11 @@ pub fn with_declared(set: &MeasuredSet, declared: &[DeclaredEffect]) -> Result<V
         let is_reserved = StitchedFields::NAMES.contains(&own.name.as_str());
         if is_reserved || effects.iter().any(|e| e.name() == own.name) {
             let what = format!("there is an effect `{}` already", own.name);
-            return Err(Error::invalid(what, "give the declared effect another name"));
+            return Err(Error::refused(
+                "effects/name-taken",
+                what,
+                "give the declared effect another name",
+            ));
         }
         effects.push(Box::new(own.clone()));
     }

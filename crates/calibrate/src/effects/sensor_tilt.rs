@@ -1,8 +1,8 @@
 //! The sensor is tilted against the chip: elements stand at unlike distances from it.
 
 use super::{Effect, Parameter, Stage, ValueError};
-use crate::extent::Extent;
 use crate::set::MeasuredSet;
+use metalith_attribution::Extent;
 use metalith_optics::Perturbation;
 
 /// Difference of distance at the outermost element for a tilt of typical size, and for the largest (um).

@@ -8,7 +8,7 @@ use metalith_optics::{Perturbation, Stitching};
 const MOST_NM: f64 = 300.0;
 const TYPICAL_NM: f64 = 25.0;
 
-/// How far a boundary may be from its stated place, and a typical distance, over the diameter of a lens.
+/// Largest distance of a boundary from its stated place, and a typical one, over the diameter of a lens.
 const REACH: f64 = 0.1;
 const TYPICAL: f64 = 0.02;
 
@@ -25,7 +25,7 @@ pub struct StitchedFields {
 impl StitchedFields {
     /// Names of such effects, by the axis that the boundary is across.
     pub const NAMES: [&'static str; 2] = ["stitching_x", "stitching_y"];
-    /// Which of their numbers is the place of the boundary.
+    /// Index, among their numbers, of the place of the boundary.
     pub const PLACE: usize = 2;
 
     /// Boundaries across x and across y for the lenses of a set that says where they run.

@@ -1,4 +1,4 @@
-//! From the pillars of an element to the pixels of a camera, planned once and run many times.
+//! Optics from the pillars of an element to the pixels of a camera, planned once and run many times.
 
 mod spectrum;
 

@@ -19,7 +19,7 @@ const REACH_SIGMAS: f64 = 3.6;
 /// beyond it.
 const REACH_OF_NARROW: (f64, f64) = (2.8, 6.0);
 
-/// At most so many standard deviations, whatever the line: work goes with their number.
+/// Largest number of standard deviations, whatever the line: work goes with their number.
 const MOST_SIGMAS: f64 = 5.2;
 
 impl Quadrature {

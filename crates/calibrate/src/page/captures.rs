@@ -2,9 +2,8 @@
 
 use ndarray::Array2;
 
-use crate::fit::{HeldOutErrors, beam_groups, error_of_capture};
-use crate::search::{Evidence, Finding};
 use crate::session::{Session, Simulations};
+use crate::statistics::{Evidence, Finding, HeldOutErrors, cluster_groups, error_of_measurement};
 use metalith_report::{Axis, Chart, ImageGrid, Page, fixed, sig};
 
 /// Range of the colours of residuals [standard deviations of the noise].
@@ -22,7 +21,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Sim
     // Before anything was found, the camera was the only noise.
     let plain = session.problem(simulations);
     let wide = |a: &Array2<f32>| a.mapv(f64::from);
-    for (place, group) in beam_groups(&problem).iter().enumerate() {
+    for (place, group) in cluster_groups(&problem).iter().enumerate() {
         let first = &set.captures[group[0]];
         let words = format!(
             "Element ({}, {}), {} nm, light at {} degrees",
@@ -47,7 +46,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Sim
                 let name = format!("{} um", fixed(set.captures[c].distance_um, 0));
                 let factor = data.scale[c] * finding.after.nuisances.flux[data.beam[c].led];
                 let model = problem
-                    .image(&finding.after.theta, c)
+                    .prediction(&finding.after.theta, c)
                     .pixels(finding.after.nuisances.shift_um[c]);
                 seen.image(format!("camera, {name}"), wide(&data.signal[c]).mapv(|v| v.max(0.1)));
                 seen.image(
@@ -58,12 +57,12 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Sim
                     finding
                         .before
                         .nuisances
-                        .residual(&session.data, &plain.image(&finding.before.theta, c), c);
+                        .residual(&session.data, &plain.prediction(&finding.before.theta, c), c);
                 let after = finding
                     .after
                     .nuisances
-                    .residual(data, &problem.image(&finding.after.theta, c), c);
-                let error = |h: &HeldOutErrors| error_of_capture(&h[c]).map_or_else(String::new, |e| sig(e, 3));
+                    .residual(data, &problem.prediction(&finding.after.theta, c), c);
+                let error = |h: &HeldOutErrors| error_of_measurement(&h[c]).map_or_else(String::new, |e| sig(e, 3));
                 left.image(
                     format!("before, {name}: {}", error(&finding.held_before)),
                     wide(&before),

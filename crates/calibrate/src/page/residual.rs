@@ -1,10 +1,10 @@
 //! What the effects leave, which effects are hard to distinguish, and the nuisances.
 
-use crate::fit::{FitProblem, Nuisances};
-use crate::search::{Evidence, cosines};
+use crate::data::Nuisances;
 use crate::session::{Session, Simulations};
 use crate::simulator_model::separating_measurement;
 use crate::smooth_residual::SmoothResidual;
+use crate::statistics::{Evidence, FitProblem, ForwardModel, cosines};
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, fixed, sig};
 
 /// Pairs of signatures with a cosine above this are listed.

@@ -1,4 +1,4 @@
-//! What a person has put into the folder of a planned session, and a new plan would take away.
+//! Files that a person has put into the folder of a planned session, and a new plan would take away.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -30,7 +30,8 @@ pub(super) fn digests(folder: &Path) -> Result<BTreeMap<String, String>> {
 /// If there are frames in it, or a file that a person fills in is not as it was planned.
 pub fn check_not_begun(folder: &Path) -> Result<()> {
     let refuse = |what: String| {
-        Err(Error::invalid(
+        Err(Error::refused(
+            "plan/folder-in-use",
             what,
             "give another folder with --out, or move what is there away",
         ))

@@ -1,4 +1,4 @@
-//! What a bench can do and what is asked of it: `BENCH.toml`, with every fault found in one go.
+//! Bench file `BENCH.toml`: what a bench can do and what is asked of it, with every fault found in one go.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::set::{Led, PerLed, RelayCamera};
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
 
-/// What a bench can do.
+/// Abilities of a bench.
 #[derive(Clone, Debug)]
 pub struct BenchFile {
     /// Full angle of the uniform disc that the source is (rad).
@@ -33,7 +33,7 @@ pub struct BenchFile {
     pub peak: f64,
     /// Captures that a session may have.
     pub most_captures: usize,
-    /// Where a boundary of write fields runs through every lens (um), if it is known.
+    /// Place where a boundary of write fields runs through every lens (um), if it is known.
     pub field_boundary_um: Option<[f64; 2]>,
     /// Widths by SEM that could be taken.
     pub sem: Option<SemOffer>,
@@ -41,7 +41,7 @@ pub struct BenchFile {
     pub wanted: BTreeMap<String, f64>,
 }
 
-/// What a scanning electron microscope could add.
+/// Measurements that a scanning electron microscope could add.
 #[derive(Clone, Copy, Debug)]
 pub struct SemOffer {
     /// Pillars that are measured.

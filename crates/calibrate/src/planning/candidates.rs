@@ -8,7 +8,6 @@ use metalith_pillars::{PillarMap, PillarReader};
 use ndarray::Array2;
 
 use super::bench_file::{BenchFile, SemOffer};
-use super::limits::check_plannable;
 use crate::set::read::WINDOW_CENTRE_UM;
 use crate::set::{
     Capture, ElementIndex, LedIndex, MeasuredElement, MeasuredSet, PerCapture, PerElement, SemSite, Stack,
@@ -31,10 +30,10 @@ pub struct Candidates {
     pub unseen: usize,
 }
 
-/// All that the bench could take of a design, whose layout is at `layout`.
+/// All that the bench could take of a design that can be planned, whose layout is at `layout`.
 ///
 /// # Errors
-/// As [`check_plannable`]; if the layout cannot be read, or nothing can be seen of any element.
+/// If the layout cannot be read, or nothing can be seen of any element.
 pub fn candidates(
     design: &Design,
     bench: &BenchFile,
@@ -42,13 +41,13 @@ pub fn candidates(
     reader: &dyn PillarReader,
     progress: &dyn Progress,
 ) -> Result<Candidates> {
-    check_plannable(design, bench)?;
     let chosen = chosen_elements(design, bench)?;
     let sites = design.sites_of(&chosen);
     let layer = design.layout.layers.pillars.number();
     let maps = reader.pillars(layout, layer, design.cell.shape, &sites, progress)?;
     if let Some(empty) = maps.iter().zip(&sites).find(|(map, _)| map.pillars() == 0) {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "measured-set/element-not-in-layout",
             format!("the layout has no pillars of element {}", empty.1.name),
             "give the layout that was written from this design",
         ));
@@ -56,7 +55,8 @@ pub fn candidates(
     let set = session(design, bench, layout, &chosen, maps)?;
     let (captures, unseen) = captures(design, bench, &set, &chosen);
     if captures.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "plan/no-light",
             "no capture of this bench would see light",
             "name angles in `field_deg` that the elements look at",
         ));
@@ -73,7 +73,8 @@ pub fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element
     let all = design.elements();
     let is_round = |e: &Element| design.lens_of(e).outline.is_none();
     let not_round = |what: String| {
-        Error::invalid(
+        Error::refused(
+            "plan/element-not-round",
             what,
             "name round elements by `elements` of the bench: captures are predicted through round openings",
         )
@@ -90,7 +91,8 @@ pub fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element
     }
     for index in &bench.elements {
         let Some(own) = all.iter().find(|e| index_of(e) == *index) else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "plan/unknown-element",
                 format!("the design has no element {index:?}"),
                 "correct `elements` of the bench",
             ));
@@ -210,8 +212,8 @@ fn captures(design: &Design, bench: &BenchFile, set: &MeasuredSet, chosen: &[Ele
     (out, unseen)
 }
 
-/// Where light of a wavelength (um) lands from the element's axis, in the focal plane, to a hundredth of a micrometre; none
-/// if it leaves too steeply.
+/// Place where light of a wavelength (um) lands from the element's axis, in the focal plane, to a hundredth of a
+/// micrometre; `None` if it leaves too steeply.
 fn landing_um(wedge: Wedge, aoi_deg: [f64; 2], wavelength_um: f64, f_um: f64) -> Option<[f64; 2]> {
     let turn = [wedge.sin_x, wedge.sin_y];
     let sines = [0, 1].map(|k| aoi_deg[k].to_radians().sin() + turn[k] * wavelength_um / wedge.wavelength_um);

@@ -11,8 +11,7 @@
 use nalgebra::DMatrix;
 
 use super::information::Information;
-use crate::fit::{covariance, projected};
-use crate::search::LEAST_GAIN;
+use crate::statistics::{LEAST_GAIN, covariance, projected};
 
 /// Gain in reduced chi-square per pixel that is asked for: twice what a calibration takes for more than the error of its
 /// own model, because what comes back is noisy.

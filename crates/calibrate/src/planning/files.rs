@@ -16,7 +16,7 @@ use crate::set::{Bayer, Channel};
 /// Step of the tables of materials (nm).
 const TABLE_STEP_NM: f64 = 2.0;
 
-/// How much farther than the spectra of all LEDs tables reach (nm).
+/// Range by which tables reach beyond the spectra of all LEDs (nm).
 const TABLE_MARGIN_NM: f64 = 15.0;
 
 /// Write the set: its `measurement.toml`, the tables that it names, and an empty folder for frames. `layout` is the path of
@@ -175,7 +175,7 @@ fn word<T: PartialEq>(choices: &[(&'static str, T)], chosen: Option<T>) -> Optio
     choices.iter().find(|c| c.1 == chosen).map(|c| c.0)
 }
 
-/// Without what the way to other units and back has added.
+/// Number without what the conversion to other units and back has added.
 fn rounded(v: f64) -> f64 {
     (v * 1e6).round() / 1e6
 }

@@ -8,11 +8,11 @@ use super::bench_file::BenchFile;
 use super::candidates::{Candidates, sem_sites};
 use crate::bench::{Bench, Sampling};
 use crate::cells::{CellSource, RigorousCells};
+use crate::data::{Data, Nuisances};
 use crate::effects::Effect;
-use crate::fit::{Data, FitProblem, Nuisances};
 use crate::set::{Capture, MeasuredSet, PerCapture};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
-use crate::surrogate::Surrogate;
+use crate::statistics::{FitProblem, Measurements, Surrogate};
 
 /// Captures that are simulated at once: each holds an image for two sizes of every parameter.
 const TOGETHER: usize = 12;
@@ -22,7 +22,7 @@ pub struct Told {
     /// With its scale set to the exposure, and what it would show.
     pub capture: Capture,
     /// Inner products of flux of each LED, black level, every parameter, and the residual, as
-    /// [`crate::fit::NormalEquations`] has them.
+    /// [`metalith_attribution::NormalEquations`] has them.
     pub form: DMatrix<f64>,
     /// Pixels that count.
     pub pixels: f64,
@@ -81,7 +81,7 @@ pub fn information(
         }
         let simulator = Simulator::new(Bench::new(&set, sampling), cells, effects(&set)?);
         let nothing = vec![0.0; simulator.slots.len()];
-        let surrogate = Surrogate::beside(&simulator, &nothing, None, progress)?;
+        let surrogate = Surrogate::beside(&simulator, &nothing, false, progress)?;
         let exposed = exposed(&set, &surrogate, bench.peak);
         let data = Data::new(&exposed);
         let problem = FitProblem::new(&simulator, surrogate, &data);
@@ -89,13 +89,13 @@ pub fn information(
         let fit = problem.at(&slots, nothing, Nuisances::stated(&data));
         if out.told.is_empty() {
             out.prior = fit.nuisances.prior(&data, fit.equations.size());
-            out.widths = bench.sem.map(|_| fit.equations.widths.clone());
+            out.widths = bench.sem.map(|_| fit.equations.references.clone());
         }
-        for ((c, capture), form) in exposed.captures.iter_enumerated().zip(&fit.equations.captures) {
+        for ((c, capture), form) in exposed.captures.iter_enumerated().zip(&fit.equations.measurements) {
             out.told.push(Told {
                 capture: capture.clone(),
                 form: form.clone(),
-                pixels: data.pixels(c) as f64,
+                pixels: data.points(c) as f64,
             });
         }
         cells = simulator.cells;

@@ -5,13 +5,12 @@ use metalith_core::{Progress, Result};
 use serde::Serialize;
 
 use super::choice::{Choice, NEEDED, Picked, Requirement, energy, lookalike};
+use crate::data::{Data, Nuisances};
 use crate::effects::Effect;
-use crate::fit::{Data, FitProblem, Nuisances, half_widths};
-use crate::search::SEM_DECIDES;
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
 use crate::simulator_model::separating_measurement;
-use crate::surrogate::Surrogate;
+use crate::statistics::{FitProblem, ForwardModel, Measurements, REFERENCES_DECIDE, Surrogate, half_widths};
 
 /// Margin that is enough: the choice stops at one, and its sums round.
 const ENOUGH: f64 = 1.0 - 1e-6;
@@ -97,8 +96,8 @@ pub fn effects(
         theta[r.slot] = r.size;
         // The session shows the effect, so that nothing is left but the noise.
         let mut data = stated.clone();
-        for c in stated.captures() {
-            let shown = surrogate.image(&theta, c).pixels([0.0; 2]);
+        for c in stated.indices() {
+            let shown = surrogate.prediction(&theta, c).pixels([0.0; 2]);
             data.signal[c] = shown.mapv(|v| (f64::from(v) * stated.scale[c]) as f32);
         }
         let problem = FitProblem::new(simulator, surrogate.clone(), &data);
@@ -164,7 +163,7 @@ pub fn confusions(
             needed: NEEDED,
             captures_could: *reachable,
             sem_chi2,
-            sem_decides: sem_chi2.is_some_and(|chi2| chi2 >= SEM_DECIDES),
+            sem_decides: sem_chi2.is_some_and(|chi2| chi2 >= REFERENCES_DECIDE),
             separate_by: separating_measurement(simulator, own, &[other]),
         };
         match out.iter_mut().find(|(a, b, _)| [*a, *b] == pair) {

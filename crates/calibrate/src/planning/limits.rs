@@ -1,4 +1,5 @@
-//! Whether a session of a design can be planned: what a measured set may say is checked before any work is spent.
+//! Check that a session of a design can be planned: it compares the design with what a measured set may say, before any
+//! work is spent.
 
 use metalith_core::document::Limits;
 use metalith_core::{Error, Result};
@@ -8,14 +9,15 @@ use super::bench_file::BenchFile;
 use super::candidates::{chosen_elements, distances_um, lens_diameter_um};
 use crate::set::read;
 
-/// Nothing, if a set of the design can be planned and read: pillars that are squares or circles, elements that are round, and all
-/// within what a set may say.
+/// Succeeds if a set of the design can be planned and read: pillars that are squares or circles, elements that are
+/// round, and all within what a set may say.
 ///
 /// # Errors
 /// What stands against it, with the limit and what to do.
 pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
     if !design.cell.shape.has_width() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "plan/rectangles",
             format!("{} is a design of rectangles", design.path.display()),
             "plan sessions of squares or circles: sets are read of these alone",
         ));
@@ -49,7 +51,11 @@ pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
         .iter()
         .find_map(|led| Some((led, read::beyond_tables(led, &cell)?)));
     beyond.map_or(Ok(()), |(led, (what, hint))| {
-        Err(Error::invalid(format!("the LED of {} nm: {what}", led.name()), hint))
+        Err(Error::refused(
+            "plan/led-out-of-range",
+            format!("the LED of {} nm: {what}", led.name()),
+            hint,
+        ))
     })
 }
 
@@ -61,7 +67,8 @@ fn check(design: &Design, numbers: Vec<(&str, f64, Limits)>, hint: &str) -> Resu
     };
     let (low, high) = range.into_inner();
     let path = design.path.display();
-    Err(Error::invalid(
+    Err(Error::refused(
+        "plan/out-of-range",
         format!("{what} of {path} is {value} {unit}: a measured set may say {low} to {high} {unit}"),
         hint,
     ))

@@ -45,9 +45,9 @@ pub use limits::check_plannable;
 use crate::bench::{Bench, Sampling};
 use crate::effects::{self, Effect};
 use crate::session::check_effects;
-use crate::set::{LedIndex, MeasuredSet, PerCapture};
+use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
-use crate::surrogate::{Surrogate, check_calibration_fits};
+use crate::statistics::{Surrogate, check_calibration_fits};
 use candidates::{Candidates, sem_sites};
 use choice::{Choice, Picked, Place, Requirement};
 use information::{Information, cells_of, exposed};
@@ -144,6 +144,7 @@ impl CapturePlan {
 /// cannot be solved, a calibration of the set would not fit into memory, a file cannot be written, or the user stopped it.
 pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn Progress) -> Result<CapturePlan> {
     let (design, bench) = (request.design, request.bench);
+    check_plannable(design, bench)?;
     let candidates = candidates::candidates(design, bench, request.layout, reader, progress)?;
     let effects = |set: &MeasuredSet| wanted_effects(set, request);
     let cells = cells_of(&candidates.set, SAMPLING, request.cache.clone());
@@ -163,9 +164,8 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
 
     let simulator = Simulator::new(Bench::new(&set, SAMPLING), cells, known);
     check_calibration_fits(&simulator)?;
-    let led = set.captures.iter().map(|c| c.led).collect::<PerCapture<LedIndex>>();
     let nothing = vec![0.0; simulator.slots.len()];
-    let surrogate = Surrogate::beside(&simulator, &nothing, Some((&led, set.leds.len())), progress)?;
+    let surrogate = Surrogate::beside(&simulator, &nothing, true, progress)?;
     let shown = exposed(&set, &surrogate, bench.peak);
     let margins = choice.margins(&picked);
     let detections: Vec<(Requirement, f64, bool)> = choice

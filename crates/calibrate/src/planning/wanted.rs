@@ -1,4 +1,4 @@
-//! What is asked of a session: each effect at a size, and told from every other.
+//! Wanted result of a session: each effect at a size, and distinguished from every other.
 
 use metalith_core::{Error, Result};
 use metalith_report::{exact, sig};
@@ -17,7 +17,7 @@ fn asked(effect: &dyn Effect) -> impl Iterator<Item = (usize, Parameter)> + use<
     all.filter(move |(k, _)| *k == 0 || !is_dormant)
 }
 
-/// Nothing, if all wanted sizes are of effects of a set and within what physics allows.
+/// Succeeds if all wanted sizes are of effects of a set and within what physics allows.
 ///
 /// # Errors
 /// If a name is not known; if a size is beyond, with what sizes are counted from.
@@ -56,7 +56,7 @@ fn beyond(effect: &dyn Effect, wanted: f64, parameter: &Parameter, set: &Measure
     };
     let [low, high] = ends.map(|end| sig(end, 3));
     let what = format!("`{name} = {wanted}` of [wanted]: it may be {low} to {high} {unit}");
-    Error::invalid(what.trim_end(), hint)
+    Error::refused("plan/beyond-bench", what.trim_end(), hint)
 }
 
 /// Each parameter of each effect is to be detected, and to be told from each other effect. Parameters that change nothing

@@ -2,9 +2,9 @@
 //! a value for each.
 
 use crate::effects::{DeclaredEffect, DeclaredParameter, Effect, MOST_PARAMETERS};
-use crate::fit::SIGMAS_95;
-use crate::search::{Grouping, Pattern};
+use crate::grouping::{Grouping, linear_trend};
 use crate::simulator::Simulator;
+use crate::statistics::{Pattern, SIGMAS_95};
 use metalith_optics::DeclaredQuantity;
 
 /// Fewest elements: two values are always on a line.
@@ -38,7 +38,7 @@ struct Quantity<'a> {
 /// direction in which elements differ if its values are linear and no effect was tried that is this, else with a value for each; none
 /// if no expression stands for it, or a declared effect cannot have so many values.
 pub(super) fn declared(simulator: &Simulator<'_>, pattern: &Pattern) -> Option<DeclaredEffect> {
-    if pattern.by != Grouping::Element || pattern.groups.len() < ELEMENTS {
+    if Grouping::of(pattern) != Grouping::Element || pattern.groups.len() < ELEMENTS {
         return None;
     }
     let slot = simulator.slots[pattern.slot];
@@ -127,7 +127,7 @@ impl Quantity<'_> {
         if simulator.effects.iter().any(|e| is_tried(e.as_ref())) {
             return None;
         }
-        let course = self.pattern.course(simulator.bench.set()).filter(|c| c.is_linear)?;
+        let course = linear_trend(self.pattern, simulator.bench.set()).filter(|c| c.is_linear)?;
         let names: &[&str] = match course.extent.directions.as_slice() {
             [_] => &["slope"],
             _ => &["slope_x", "slope_y"],

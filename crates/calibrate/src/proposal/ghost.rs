@@ -4,7 +4,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::effects::{DeclaredEffect, DeclaredParameter};
-use crate::fit::{Fit, FitProblem};
+use crate::statistics::{Fit, FitProblem, Measurements};
 use metalith_core::{Error, Progress, Result};
 use metalith_optics::{DeclaredQuantity, blur};
 use metalith_wave::kernels::sum_of_products;
@@ -136,10 +136,10 @@ impl Frame {
 pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit, progress: &dyn Progress) -> Result<Option<Ghost>> {
     let data = problem.data;
     let frames: Vec<Frame> = data
-        .captures()
+        .indices()
         .filter(|&c| problem.used[c])
         .map(|c| {
-            let pixels = problem.image(&fit.theta, c).pixels(fit.nuisances.shift_um[c]);
+            let pixels = problem.prediction(&fit.theta, c).pixels(fit.nuisances.shift_um[c]);
             let residual = fit.nuisances.whitened(data, c, &pixels);
             let dn = (data.scale[c] * fit.nuisances.flux[data.beam[c].led]) as f32;
             Frame::new(pixels.mapv(|v| v * dn), &data.weight[c], &residual)

@@ -10,9 +10,9 @@ mod write_fields;
 
 use crate::diagnosis::FreePattern;
 use crate::effects::DeclaredEffect;
-use crate::search::Evidence;
 use crate::session::Session;
 use crate::smooth_residual::SmoothResidual;
+use crate::statistics::Evidence;
 use metalith_core::{Progress, Result};
 pub use write_fields::{FieldBoundary, boundary_of_fields};
 
@@ -35,7 +35,7 @@ pub struct Proposed {
 pub fn propose(session: &Session<'_>, evidence: &Evidence, progress: &dyn Progress) -> Result<Vec<Proposed>> {
     let problem = evidence.problem(&session.simulator);
     let fit = &evidence.finding.after;
-    let above_noise = fit.chi2 - problem.pixels();
+    let above_noise = fit.chi2 - problem.points();
     let mut found = Vec::new();
     if let Some(ghost) = ghost::strongest(&problem, fit, progress)? {
         let effect = ghost.declared(session.set().camera.pixel_um);
@@ -43,7 +43,7 @@ pub fn propose(session: &Session<'_>, evidence: &Evidence, progress: &dyn Progre
         found.push((ghost.removed, vec![Proposed { effect, reason }]));
     }
     if let Some(smooth) = SmoothResidual::new(&session.simulator, &problem, fit) {
-        let removed = (smooth.chi2.0 - smooth.chi2.1) * problem.pixels();
+        let removed = (smooth.chi2.0 - smooth.chi2.1) * problem.points();
         let of = |effect| Proposed {
             effect,
             reason: "a smooth path that every lens has".into(),
@@ -52,7 +52,7 @@ pub fn propose(session: &Session<'_>, evidence: &Evidence, progress: &dyn Progre
         found.push((removed, both.collect()));
     }
     for pattern in evidence.patterns(&session.simulator) {
-        let removed = (pattern.chi2.1 - pattern.chi2.0) * problem.pixels();
+        let removed = (pattern.chi2.1 - pattern.chi2.0) * problem.points();
         let of = |effect| Proposed {
             effect,
             reason: FreePattern::new(&session.simulator, pattern).sentence(),

@@ -20,8 +20,8 @@ const MOST: usize = 4;
 const ROOM: f64 = 6.0;
 const LEAST_RANGE_NM: f64 = 200.0;
 
-/// The same wavefront twice: a path is more of a wave in blue than in red, a phase is not. The search takes the one that all
-/// colours agree with.
+/// Declarations of one wavefront, two of them: a path is more of a wave in blue than in red, a phase is not. The search
+/// takes the one that all colours agree with.
 pub(super) fn declared(smooth: &SmoothResidual, set: &MeasuredSet) -> Vec<DeclaredEffect> {
     let largest = smooth
         .coefficients_nm

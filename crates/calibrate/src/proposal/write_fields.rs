@@ -1,8 +1,8 @@
 //! Where a boundary of write fields in every lens would explain most of what is left.
 
-use crate::fit::{Fit, FitProblem, minimise};
 use crate::optics::PixelGrid;
 use crate::session::Session;
+use crate::statistics::{Fit, FitProblem, minimise};
 use metalith_core::{Progress, Result};
 use metalith_optics::{Perturbation, Stitching};
 
@@ -45,7 +45,7 @@ pub fn boundary_of_fields(
     };
     let best = [0, 1].map(better);
     let left = best[0].0.min(best[1].0);
-    let above_noise = (fit.chi2 - problem.pixels()).max(LEAST_ERROR);
+    let above_noise = (fit.chi2 - problem.points()).max(LEAST_ERROR);
     Ok(FieldBoundary {
         at_um: best.map(|(_, place)| place * session.set().stack.lens_diameter_um),
         removes: (fit.chi2 - left) / above_noise,

@@ -33,13 +33,13 @@ pub type AppliedEffect = (String, Vec<f64>);
 /// A chip and a bench that sets are made of.
 pub struct SyntheticChip {
     pub truth: String,
-    /// In typical sizes; of two effects that of the first.
+    /// Size in typical sizes; of two effects, the size of the first.
     pub size: f64,
     pub parts: Vec<AppliedEffect>,
 }
 
 impl SyntheticChip {
-    /// Without effect.
+    /// Chip without effect.
     pub fn stated() -> Self {
         Self {
             truth: NOTHING.into(),
@@ -48,7 +48,7 @@ impl SyntheticChip {
         }
     }
 
-    /// With one effect.
+    /// Chip with one effect.
     pub fn single(name: &str, size: f64, numbers: Vec<f64>) -> Self {
         Self {
             truth: name.into(),
@@ -93,7 +93,7 @@ pub fn of_each_effect(effects: &[&dyn Effect]) -> Vec<SyntheticChip> {
 /// # Errors
 /// If the text has another form, an effect is not among these, or a size lies outside of what physics allows.
 pub fn of_text(effects: &[&dyn Effect], text: &str) -> Result<SyntheticChip> {
-    let wrong = |what: String, hint: String| Error::invalid(format!("trial `{text}`: {what}"), hint);
+    let wrong = |what: String, hint: String| Error::refused("calibrate/trial", format!("trial `{text}`: {what}"), hint);
     let mut parts: Vec<AppliedEffect> = Vec::new();
     let mut first = None;
     for part in text.split('+').map(str::trim) {
@@ -152,8 +152,9 @@ pub fn of_text(effects: &[&dyn Effect], text: &str) -> Result<SyntheticChip> {
     Ok(SyntheticChip::of(first.unwrap_or(0.0), parts))
 }
 
-/// So many chips with one or two effects each, of 0.5 to 2 typical sizes and both signs, drawn from a seed. Effects of the
-/// pillar itself take one of [`SIZES`], and no two of them meet: tables of cells would be solved for one chip alone.
+/// Chips, so many, with one or two effects each, of 0.5 to 2 typical sizes and both signs, drawn from a seed. Effects
+/// of the pillar itself take one of [`SIZES`], and no two of them meet: tables of cells would be solved for one chip
+/// alone.
 pub fn at_random(effects: &[&dyn Effect], count: u64, seed: u64) -> Vec<SyntheticChip> {
     let [least, .., most] = SIZES;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

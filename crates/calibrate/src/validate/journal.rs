@@ -1,4 +1,4 @@
-//! What was judged so far, in a file: a validation takes long, and may be stopped.
+//! Journal of what was judged so far, in a file: a validation takes long, and may be stopped.
 
 use std::fs::{self, File};
 use std::io::Write;

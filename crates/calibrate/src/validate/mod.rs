@@ -20,10 +20,10 @@ pub use summary::{DetectionLimit, Validation};
 
 use crate::diagnosis::{Diagnosis, SetVerdict};
 use crate::effects::Effect;
-use crate::search::Evidence;
 use crate::session::{Session, Settings, check_effects};
 use crate::set::{CaptureIndex, MeasuredSet};
 use crate::smooth_residual::SmoothResidual;
+use crate::statistics::{Evidence, Measurements};
 use chips::{AppliedEffect, SyntheticChip};
 use journal::Journal;
 use metalith_core::{Progress, Result};
@@ -336,8 +336,8 @@ impl UnexplainedResidual {
         let (problem, fit) = (evidence.problem(&session.simulator), &evidence.finding.after);
         let smooth = SmoothResidual::new(&session.simulator, &problem, fit)?;
         let error = |c: &CaptureIndex| diagnosis.captures[usize::from(*c)].after.unwrap_or(0.0);
-        let worst = problem.data.captures().max_by(|a, b| error(a).total_cmp(&error(b)))?;
-        let image = problem.image(&fit.theta, worst);
+        let worst = problem.data.indices().max_by(|a, b| error(a).total_cmp(&error(b)))?;
+        let image = problem.prediction(&fit.theta, worst);
         let residual = fit.nuisances.residual(problem.data, &image, worst);
         Some(Self {
             path_nm: smooth.coefficients_nm,

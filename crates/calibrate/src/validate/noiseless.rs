@@ -25,7 +25,7 @@ impl ValidationTrial {
         };
         self.verdict = SetVerdict::Explained;
         self.named = !parts.is_empty();
-        let pixels = session.problem(simulations).pixels().max(1.0);
+        let pixels = session.problem(simulations).points().max(1.0);
         for own in fits {
             let (fit, widths) = session.fitted(simulations, &own, !parts.is_empty(), progress)?;
             self.held_out_after = fit.chi2 / pixels;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::chips::NOTHING;
 use super::{ClaimedNumber, Coverage, ValidationTrial};
 use crate::diagnosis::SetVerdict;
-use crate::search::LEAST_GAIN;
+use crate::statistics::LEAST_GAIN;
 use metalith_report::sig;
 
 /// The column that a set without a claim counts in.

@@ -62,7 +62,7 @@ impl<'a> Synthesizer<'a> {
         Self::with_orders(like, settings, ORDERS)
     }
 
-    /// The same with cells solved with so many orders along an axis.
+    /// Same synthesizer with cells solved with so many orders along an axis.
     ///
     /// # Errors
     /// As [`Synthesizer::new`].
@@ -99,7 +99,7 @@ impl<'a> Synthesizer<'a> {
         Ok(self.with_effects(&[vec![(name, numbers)]], progress)?.remove(0))
     }
 
-    /// The same for many chips at once, each with any number of effects.
+    /// Images of many chips at once, each with any number of effects.
     ///
     /// # Errors
     /// As [`Synthesizer::with_effect`].
@@ -143,7 +143,8 @@ impl<'a> Synthesizer<'a> {
                 let tables = match &self.simulator.cells {
                     CellSource::Rigorous(cells) => cells.anisotropic(nm, progress)?,
                     CellSource::Model(_) => {
-                        return Err(Error::invalid(
+                        return Err(Error::refused(
+                            "calibrate/no-rigorous-cells",
                             "no rigorous cells",
                             "synthetic sets are made with rigorous cells",
                         ));
@@ -193,12 +194,12 @@ impl<'a> Synthesizer<'a> {
         self.drawn(exposed, seed, 1.0)
     }
 
-    /// The same without noise, in captures and in widths by SEM: what a fit to it errs by is the model's own error.
+    /// Set without noise, in captures and in widths by SEM: the error of a fit to it is the model's own error.
     pub fn draw_noiseless(&self, exposed: &SyntheticImages, seed: u64) -> MeasuredSet {
         self.drawn(exposed, seed, 0.0)
     }
 
-    /// With so many times the noise.
+    /// Set with so many times the noise.
     fn drawn(&self, exposed: &SyntheticImages, seed: u64, noise: f64) -> MeasuredSet {
         let like = self.simulator.bench.set();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use metalith_attribution::Measurements;
 use metalith_calibrate::{MeasuredSet, Session};
 use metalith_core::Silent;
 use metalith_gds::extract::GdsPillars;
@@ -87,8 +88,8 @@ fn a_bench_with_exposures_filters_and_a_relay_is_read() {
         "the peak is known by the short exposure alone"
     );
     let session = Session::new(&set, settings()).unwrap();
-    for c in session.data.captures() {
-        assert_eq!(session.data.pixels(c), PIXELS * PIXELS / 2);
+    for c in session.data.indices() {
+        assert_eq!(session.data.points(c), PIXELS * PIXELS / 2);
         assert_eq!(set.seeing_pixels(c), PIXELS * PIXELS / 2);
     }
 }
@@ -107,12 +108,7 @@ fn saturated_peaks_are_masked() {
     set.camera.saturation_dn = f64::from(full);
     set.captures.iter_mut().for_each(|c| c.dn.mapv_inplace(|v| v.min(full)));
     let session = Session::new(&set, settings()).unwrap();
-    assert!(
-        session
-            .data
-            .captures()
-            .any(|c| session.data.pixels(c) < PIXELS * PIXELS)
-    );
+    assert!(session.data.indices().any(|c| session.data.points(c) < PIXELS * PIXELS));
     let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
     assert_eq!(d.left_out.len(), 0);
     assert_eq!(names(&d), ["gap"], "{}", d.sentence());

@@ -48,7 +48,7 @@ impl SensorModel {
     }
 }
 
-/// What every capture shows without noise (DN above black), each with its registration and flux.
+/// Light of every capture without noise (DN above black), each with its registration and flux.
 fn light() -> Vec<(String, Array2<f64>)> {
     let mut quiet = LIKE.clone();
     // A billionth of a DN.

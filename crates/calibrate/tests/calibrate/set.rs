@@ -26,7 +26,7 @@ pub static LIKE: LazyLock<MeasuredSet> = LazyLock::new(|| {
     MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap()
 });
 
-/// With some of the effects whose cells need not be solved again.
+/// Simulations with some of the effects whose cells need not be solved again.
 pub static SIMULATIONS: LazyLock<Simulations> =
     LazyLock::new(|| Session::new(&LIKE, settings()).unwrap().simulate(&Silent).unwrap());
 

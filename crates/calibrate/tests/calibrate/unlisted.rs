@@ -54,8 +54,8 @@ fn proposed(session: &Session<'_>, evidence: &Evidence) -> Vec<DeclaredEffect> {
 /// A second image of 4 % whose spots are blurred by 0.5 um, as a lens behind the relay makes one.
 const BLURRED_GHOST: &str = include_str!("../../../../golden/ghost.toml");
 
-/// What is left leads to the effect that the list lacks: proposed, adopted, and it explains the set. One proposal of a second
-/// image serves sharp and blurred ones.
+/// Residuals lead to the effect that the list lacks: proposed, adopted, and it explains the set. One proposal of a
+/// second image serves sharp and blurred ones.
 #[test]
 fn an_effect_outside_the_list_is_proposed_and_adopted() {
     /// Reduced chi-square per pixel that may be left on captures left out: the aim, and what the coarse spectrum of these

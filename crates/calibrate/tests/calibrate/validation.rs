@@ -1,4 +1,4 @@
-//! What a validation counts, and names that it does not know.
+//! Tests of what a validation counts, and of names that it does not know.
 
 use metalith_calibrate::{Session, Settings, ValidationPlan, calibrate, validate};
 use metalith_core::Silent;

@@ -2,12 +2,11 @@
 
 use rayon::prelude::*;
 
-use metalith_cell::CellStack;
+use metalith_cell::{CellStack, CoarseCell, ElementRow, RealRow, SiteGrid};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_grating::{CoarseCell, ElementRow, RealRow, SiteGrid};
 
-/// Where rows begin, over the radius of the lens.
+/// Radii where rows begin, over the radius of the lens.
 const RADII: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.88];
 
 /// Share of the light in the first order, mean of s and p, of all rows together: those that do not fit into the lens are
@@ -40,7 +39,8 @@ pub(super) fn judge(
         width_nm,
     );
     if rows.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "cells/lens-too-small",
             format!("a lens of {half_um:.1} um radius has no row of pillars to be solved"),
             "choose mappings for a larger one",
         ));

@@ -1,4 +1,4 @@
-//! Mappings for steered elements, chosen by what their pillars do among unlike neighbours.
+//! Mappings for steered elements, chosen by what their pillars do among dissimilar neighbours.
 //!
 //! Where the phase is steep, neighbours differ from one to the next, and the mapping that brings most light into the first
 //! order of equal neighbours is not the best one. Here the pillars of a sample of sites, drawn by a polynomial, transmit by
@@ -15,11 +15,12 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use metalith_cell::{CellStack, InversePolynomial, NeighbourResponse, simplex};
+use metalith_cell::{
+    CellStack, InversePolynomial, Mapping, NeighbourResponse, NeighbourTable, NeighbourTableSpec, simplex,
+};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_design::phase::LensPhase;
 use metalith_design::{Design, Element, SteeringSteps};
-use metalith_grating::{Mapping, NeighbourTable, NeighbourTableSpec};
 
 use judge::judge;
 use sample::SiteSample;
@@ -28,9 +29,9 @@ use sample::SiteSample;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SteeredLight {
     pub wavelength_um: f64,
-    /// By the sum over pairs, mean of s and p, over a sample of the element's sites.
+    /// Light by the sum over pairs, mean of s and p, over a sample of the element's sites.
     pub pairs: [f64; 2],
-    /// By supercells of rows of the element's pillars, all rows together.
+    /// Light by supercells of rows of the element's pillars, all rows together.
     pub supercells: [f64; 2],
 }
 
@@ -40,7 +41,7 @@ pub struct SteeredStudy {
     /// Steps from the middle of the array along the two axes, the larger first.
     pub steps: SteeringSteps,
     pub coefficients: Vec<f64>,
-    /// At each of the wavelengths that the design compares mappings at.
+    /// Light at each of the wavelengths that the design compares mappings at.
     pub light: Vec<SteeredLight>,
 }
 
@@ -51,8 +52,8 @@ impl SteeredStudy {
         sum(1) / sum(0)
     }
 
-    /// Whether supercells find more light with the element's own mapping. The sum over pairs that it was chosen by errs by a few hundredths,
-    /// and may promise what is not there.
+    /// True if supercells find more light with the element's own mapping. The sum over pairs that it was chosen by errs
+    /// by a few hundredths, and may promise what is not there.
     pub fn is_better(&self) -> bool {
         self.gain() > 1.0
     }
@@ -65,7 +66,8 @@ impl SteeredStudy {
 /// one, a cell cannot be solved, or the user stopped it.
 pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Vec<SteeredStudy>> {
     if design.mapping.table.is_some() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "cells/steered-table",
             "mappings of steered elements start from the polynomial of the design, which has a table instead",
             "give `coefficients` in [mapping]",
         ));
@@ -74,7 +76,8 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
     design.one_lens(who)?;
     design.radial_phase(who)?;
     if !design.array.placed.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "cells/steered-places",
             format!("{who} tells elements by their steps on a grid, and those of the design are placed one by one"),
             "use `elements`, `spacing_um` and `steering_deg` of [array] in place of [[element]]",
         ));

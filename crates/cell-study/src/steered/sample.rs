@@ -29,7 +29,7 @@ pub(super) struct SiteSample {
 }
 
 impl SiteSample {
-    /// Those of a lens with a wedge on it that have all their neighbours.
+    /// Sites of a lens with a wedge on it that have all their neighbours.
     pub fn new(lens: &LensPhase, wedge: &Wedge) -> Self {
         let phase = ElementPhase::new(lens, wedge);
         let n = lens.lattice().sites();
@@ -101,7 +101,7 @@ mod tests {
     use metalith_design::phase::RadialPhase;
     use metalith_pillars::Lattice;
 
-    /// What is said of a sample of so many sites.
+    /// Tolerance that is stated for a sample of so many sites.
     const SAMPLED: f64 = 0.005;
 
     /// Sites of a sample give what all sites of the element give.

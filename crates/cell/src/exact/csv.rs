@@ -80,7 +80,7 @@ impl MappingTable {
 mod tests {
     use super::*;
 
-    /// As spreadsheets save a table.
+    /// Mapping as spreadsheets save it.
     #[test]
     fn a_mark_of_the_byte_order_is_no_part_of_a_mapping() {
         let folder = tempfile::tempdir().unwrap();

@@ -28,7 +28,7 @@ const MOST_ROUNDS: usize = 200;
 pub struct RampOrders {
     /// Wavelength (um).
     pub wavelength_um: f64,
-    /// Where the design sends it.
+    /// Power in the order into which the design sends it.
     pub first: f64,
     /// Straight on, unfocused.
     pub zero: f64,
@@ -55,7 +55,8 @@ impl MappingTable {
             .filter(|&i| !avoid.contains(&curve.widths_nm[i]))
             .collect();
         let Some(&first) = allowed.first() else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "mapping/no-width-left",
                 "a mapping that avoids every width",
                 "lower the threshold below which a width is avoided",
             ));

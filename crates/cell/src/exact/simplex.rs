@@ -3,7 +3,7 @@
 /// Steps of the simplex; by then it has shrunk to nothing for degrees up to six.
 const SIMPLEX_STEPS: usize = 1500;
 
-/// Where `loss` is least near `start`.
+/// Place near `start` at which `loss` is least.
 pub fn simplex(start: &[f64], loss: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     let n = start.len();
     let mut corners: Vec<(f64, Vec<f64>)> = (0..=n)

@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 
 use super::fit_forward;
-use crate::{CellModel, CellStack, Fidelity, ForwardPolynomial, PhaseCurve, PointwiseCell};
-use metalith_core::Result;
+use crate::{CellModel, CellResponse, CellStack, Fidelity, ForwardPolynomial, Illumination, PhaseCurve, PointwiseCell};
+use metalith_core::{Progress, Result};
 use metalith_rcwa::Orders;
 
 /// Transmission of modulus one whose phase is a polynomial fitted to the rigorous cell.
@@ -14,7 +14,7 @@ pub struct FittedCell {
     forward: ForwardPolynomial,
 }
 
-/// Where [`FittedCell::of_stack`] looks: ten and more points for every coefficient and resonance.
+/// Step of the widths that [`FittedCell::of_stack`] samples: ten and more points for every coefficient and resonance.
 const FIT_WIDTH_STEP_NM: usize = 4;
 const FIT_BAND_STEP_UM: f64 = 0.010;
 const FIT_ORDERS: usize = 11;
@@ -59,13 +59,15 @@ impl CellModel for FittedCell {
         Fidelity::Fitted
     }
 
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
         let mut table = vec![Complex64::ZERO];
-        table.extend((1..=max_width_nm).map(|width| {
-            let turns = self.forward.turns(f64::from(width) / self.pitch_nm, wavelength_um);
+        table.extend((1..=widest_nm).map(|width| {
+            let turns = self
+                .forward
+                .turns(f64::from(width) / self.pitch_nm, light.wavelength_um);
             Complex64::cis(std::f64::consts::TAU * turns.fract())
         }));
-        Ok(table)
+        Ok(CellResponse::Scalar(table))
     }
 
     fn full_transmission(&self, _wavelength_um: f64) -> Result<f64> {

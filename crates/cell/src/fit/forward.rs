@@ -63,7 +63,8 @@ pub fn fit_forward(curves: &[PhaseCurve], pitch_nm: f64, degree: usize) -> Resul
         .flat_map(|total| (0..=total).map(move |j| (total - j, j)))
         .collect();
     if points.len() < 2 * powers.len() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "fit/too-few-points",
             format!("{} points for a polynomial of {} terms", points.len(), powers.len()),
             "give more wavelengths and widths, or a lower degree",
         ));
@@ -136,7 +137,7 @@ fn settled(
         );
         let next = decomposed
             .solve(&turns, 1e-12)
-            .map_err(|why| Error::invalid(why, "lower the degree"))?;
+            .map_err(|why| Error::refused("fit/singular", why, "lower the degree"))?;
         let settled = (&next - &coefficients).norm() <= 1e-12 * next.norm();
         coefficients = next;
         model = (matrix * &coefficients).iter().copied().collect();
@@ -147,7 +148,7 @@ fn settled(
     Ok(coefficients)
 }
 
-/// Wavelength (nm) and duty cycle brought to about -1..1, where powers are told apart.
+/// Wavelength (nm) and duty cycle brought to about -1..1, where powers are distinguished.
 struct FitScale {
     centre: (f64, f64),
     half: (f64, f64),

@@ -110,7 +110,8 @@ fn rising(curve: &PhaseCurve, threshold: f64) -> Vec<usize> {
 }
 
 fn too_few(curve: &PhaseCurve) -> Error {
-    Error::invalid(
+    Error::refused(
+        "fit/degree-too-high",
         format!(
             "no polynomial of this degree maps a turn to the widths of the cell at {} um",
             curve.wavelength_um

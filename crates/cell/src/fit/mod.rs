@@ -28,8 +28,7 @@ pub struct MappingError {
 }
 
 impl MappingError {
-    /// Of phase errors in turns: what is left when their mean on the circle, which no image shows, is
-    /// taken off.
+    /// Error from phase errors in waves, less their mean on the circle, which no image shows.
     pub fn of_turns(errors: impl Iterator<Item = f64> + Clone) -> Self {
         let tau = std::f64::consts::TAU;
         let mean: Complex64 = errors.clone().map(|e| Complex64::cis(tau * e)).sum();
@@ -53,7 +52,8 @@ fn check_degree(degree: usize) -> Result<()> {
     if (1..=HIGHEST_DEGREE).contains(&degree) {
         return Ok(());
     }
-    Err(Error::invalid(
+    Err(Error::refused(
+        "fit/degree",
         format!("a polynomial of degree {degree}"),
         format!("use a degree from 1 to {HIGHEST_DEGREE}"),
     ))

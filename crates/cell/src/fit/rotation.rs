@@ -6,12 +6,10 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::MappingError;
-use crate::{Handedness, RotatedCell, RotationMapping};
-use metalith_core::Result;
-use metalith_pillars::RotatedRectangles;
+use crate::{Handedness, RotationMapping, RotationResponse};
 
 /// Phases over half a turn, after which what a lattice adds repeats, that a series is fitted to: four times as many as the
-/// fastest term of [`RotatedCell`] has.
+/// fastest term of [`RotatedCell`](crate::RotatedCell) has.
 const PHASES: usize = 48;
 
 /// Rounds of an equation whose error shrinks by what the lattice adds for a radian of phase, some hundredths, in each.
@@ -20,9 +18,8 @@ const ROUNDS: usize = 40;
 /// Phase of converted light over rotation, for light that arrives left circularly polarised: that of the other handedness over
 /// the opposite rotation.
 #[derive(Debug)]
-pub struct RotationCurve<'a> {
-    cell: &'a RotatedCell,
-    wavelength_um: f64,
+pub struct RotationCurve {
+    response: RotationResponse,
     /// Phase of all rotations together (rad): what the lattice adds is counted from it.
     mean: f64,
 }
@@ -35,66 +32,54 @@ pub struct RotationFit {
     pub error: MappingError,
 }
 
-impl<'a> RotationCurve<'a> {
-    /// Solve the cell at a wavelength (um).
-    ///
-    /// # Errors
-    /// As [`RotatedCell::response`].
-    pub fn new(cell: &'a RotatedCell, wavelength_um: f64) -> Result<Self> {
-        let mut curve = Self {
-            cell,
-            wavelength_um,
-            mean: 0.0,
-        };
+impl RotationCurve {
+    /// The curve of a cell at a wavelength.
+    pub fn new(response: RotationResponse) -> Self {
+        let mut curve = Self { response, mean: 0.0 };
         let sum = (0..PHASES).map(|k| curve.beyond(PI / 2.0 * k as f64 / PHASES as f64));
-        let sum = sum.sum::<Result<Complex64>>()?;
-        curve.mean = sum.arg();
-        Ok(curve)
+        curve.mean = sum.sum::<Complex64>().arg();
+        curve
+    }
+
+    /// A rotation (rad) as light of the handedness that arrives has it.
+    fn seen(&self, rotation: f64) -> f64 {
+        match self.response.arriving() {
+            Handedness::Left => rotation,
+            Handedness::Right => -rotation,
+        }
     }
 
     /// Amplitude of converted light with twice the rotation taken off its phase.
-    fn beyond(&self, rotation: f64) -> Result<Complex64> {
-        let own = match self.cell.arriving() {
-            Handedness::Left => rotation,
-            Handedness::Right => -rotation,
-        };
-        let [converted, _] = self.cell.response(own, self.wavelength_um)?;
-        Ok(converted * Complex64::cis(-2.0 * rotation))
+    fn beyond(&self, rotation: f64) -> Complex64 {
+        let [converted, _] = self.response.at(self.seen(rotation));
+        converted * Complex64::cis(-2.0 * rotation)
     }
 
-    /// What the lattice adds to twice a rotation (rad).
-    ///
-    /// # Errors
-    /// As [`RotatedCell::response`].
-    pub fn added(&self, rotation: f64) -> Result<f64> {
-        Ok((self.beyond(rotation)? * Complex64::cis(-self.mean)).arg())
+    /// Phase that the lattice adds to twice a rotation (rad).
+    pub fn added(&self, rotation: f64) -> f64 {
+        (self.beyond(rotation) * Complex64::cis(-self.mean)).arg()
     }
 
     /// Rotation (rad) whose phase is this one (rad) and a constant.
-    fn rotation(&self, phase: f64, constant: f64) -> Result<f64> {
-        (0..ROUNDS).try_fold(0.5 * phase, |rotation, _| {
-            Ok(0.5 * (phase + constant - self.added(rotation)?))
+    fn rotation(&self, phase: f64, constant: f64) -> f64 {
+        (0..ROUNDS).fold(0.5 * phase, |rotation, _| {
+            0.5 * (phase + constant - self.added(rotation))
         })
     }
 
     /// The series of so many terms that takes back what the lattice adds, with what it leaves of the pillars as drawn.
-    ///
-    /// # Errors
-    /// As [`RotatedCell::response`].
-    pub fn fit(&self, terms: usize) -> Result<RotationFit> {
+    pub fn fit(&self, terms: usize) -> RotationFit {
         let phases = (0..PHASES).map(|k| PI * k as f64 / PHASES as f64);
-        let off = |constant: f64| -> Result<Vec<f64>> {
-            let each = phases
-                .clone()
-                .map(|phase| Ok(self.rotation(phase, constant)? - 0.5 * phase));
+        let off = |constant: f64| -> Vec<f64> {
+            let each = phases.clone().map(|phase| self.rotation(phase, constant) - 0.5 * phase);
             each.collect()
         };
         // The constant is free: that which leaves no mean.
         let mut constant = 0.0;
-        let mut left = off(constant)?;
+        let mut left = off(constant);
         for _ in 0..ROUNDS {
             constant -= 2.0 * left.iter().sum::<f64>() / PHASES as f64;
-            left = off(constant)?;
+            left = off(constant);
         }
         let coefficient = |k: usize, wave: fn(f64) -> f64| -> f64 {
             let each = phases.clone().zip(&left);
@@ -105,26 +90,22 @@ impl<'a> RotationCurve<'a> {
             sines: (1..=terms).map(|k| coefficient(k, f64::sin)).collect(),
             cosines: (1..=terms).map(|k| coefficient(k, f64::cos)).collect(),
         };
-        let error = self.error(&mapping, self.cell.pillars())?;
-        Ok(RotationFit { mapping, error })
+        let error = self.error(&mapping);
+        RotationFit { mapping, error }
     }
 
     /// Phase of pillars as drawn, all numbers, against the phase that a mapping has them for; their mean is taken off. What a site
     /// is rounded to a number by is not in it.
-    ///
-    /// # Errors
-    /// As [`RotatedCell::response`].
-    pub fn error(&self, mapping: &RotationMapping, pillars: RotatedRectangles) -> Result<MappingError> {
-        let turns = (1..=pillars.steps).map(|number| {
-            let rotation = match self.cell.arriving() {
-                Handedness::Left => pillars.drawn_rotation(number),
-                Handedness::Right => -pillars.drawn_rotation(number),
-            };
-            let own = 2.0 * rotation + self.added(rotation)?;
-            Ok((own - mapping.phase(rotation)) / TAU)
-        });
-        let turns: Vec<f64> = turns.collect::<Result<_>>()?;
-        Ok(MappingError::of_turns(turns.into_iter()))
+    pub fn error(&self, mapping: &RotationMapping) -> MappingError {
+        let pillars = self.response.pillars();
+        let turns: Vec<f64> = (1..=pillars.steps)
+            .map(|number| {
+                let rotation = self.seen(pillars.drawn_rotation(number));
+                let own = 2.0 * rotation + self.added(rotation);
+                (own - mapping.phase(rotation)) / TAU
+            })
+            .collect();
+        MappingError::of_turns(turns.into_iter())
     }
 }
 
@@ -139,8 +120,10 @@ impl RotationMapping {
 mod tests {
     use super::super::super::rectangle::tests::{PILLARS, titania};
     use super::*;
+    use crate::RotatedCell;
 
-    /// What is left of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is 0.014.
+    /// Residual of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is
+    /// 0.014.
     const LEFT: f64 = 0.005;
 
     #[test]
@@ -162,9 +145,9 @@ mod tests {
     fn a_series_takes_back_what_the_lattice_adds() {
         let fits = [Handedness::Left, Handedness::Right].map(|arriving| {
             let cell = RotatedCell::new(titania(), PILLARS, arriving);
-            let curve = RotationCurve::new(&cell, 0.532).unwrap();
-            let half = curve.error(&RotationMapping::default(), PILLARS).unwrap();
-            let fit = curve.fit(2).unwrap();
+            let curve = RotationCurve::new(cell.at(0.532).unwrap());
+            let half = curve.error(&RotationMapping::default());
+            let fit = curve.fit(2);
             println!("{half:?} {fit:?}");
             assert!(fit.error.worst_rad < LEFT && fit.error.worst_rad < 0.5 * half.worst_rad);
             fit.mapping

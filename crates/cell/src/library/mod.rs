@@ -12,8 +12,8 @@ use super::{Along, MappingError, PolarisationAxis};
 use metalith_core::{Error, Result};
 use metalith_pillars::UprightRectangles;
 
-/// Parts of a turn that phases are told apart by, along either axis: 0.012 rad at most from the middle of one, where neighbouring
-/// pillars of a library are some tenths apart.
+/// Parts of a turn that phases are distinguished by, along either axis: 0.012 rad at most from the middle of one, where
+/// neighbouring pillars of a library are some tenths apart.
 const PARTS: usize = 256;
 
 /// Parts of a turn of each phase that constants are tried by, and phases that each is judged at along an axis.
@@ -43,7 +43,7 @@ pub struct PillarLibrary {
     turns: [Vec<Option<f64>>; 2],
 }
 
-/// What a library leaves of two phases that are asked for, all of them alike often.
+/// Errors of a library for two phases that are asked for, all pairs equally often.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LibraryErrors {
     /// Phase of the pillar that is chosen against that asked for, for light along x and along y.
@@ -69,7 +69,8 @@ impl PillarLibrary {
     /// If there is none.
     pub fn new(pillars: Vec<LibraryPillar>) -> Result<Self> {
         if pillars.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "library/empty",
                 "a library without pillars",
                 "give at least one: `metalith cells` makes one of a design",
             ));
@@ -148,7 +149,7 @@ impl PillarLibrary {
         *self.turns[axis.index()].get(usize::from(number))?
     }
 
-    /// What it leaves, over all pairs of phases.
+    /// Errors over all pairs of phases.
     pub fn errors(&self) -> LibraryErrors {
         let by_number: Vec<Option<[Complex64; 2]>> = {
             let last = self.turns[0].len();
@@ -184,7 +185,7 @@ fn middle(k: usize, parts: usize) -> f64 {
     (k as f64 + 0.5) / parts as f64
 }
 
-/// Which fields are nearest to these, and the square of their distance; of two the first.
+/// Index of the fields nearest to these, and the square of their distance; of two the first.
 fn nearest(fields: &[[Complex64; 2]], wanted: [Complex64; 2]) -> (usize, f64) {
     let off = |f: &[Complex64; 2]| (f[0] - wanted[0]).norm_sqr() + (f[1] - wanted[1]).norm_sqr();
     let each = fields.iter().map(off).enumerate();

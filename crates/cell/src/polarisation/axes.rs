@@ -18,7 +18,7 @@ pub enum PolarisationAxis {
 }
 
 impl PolarisationAxis {
-    /// Both.
+    /// Axes, both of them.
     pub const ALL: [Self; 2] = [Self::X, Self::Y];
 
     /// 0 for x, 1 for y.
@@ -54,7 +54,7 @@ impl PolarisationAxis {
     }
 }
 
-/// Of a share.
+/// Tolerance of a share.
 const ROUNDING: f64 = 1e-9;
 
 impl fmt::Display for PolarisationAxis {
@@ -66,15 +66,15 @@ impl fmt::Display for PolarisationAxis {
     }
 }
 
-/// What pillars whose sides are along the axes do to light along x and along y, which keeps its polarisation: transmissions as
-/// those of [`CellModel::transmissions`], by the number of the pillar.
+/// Tables of pillars whose sides are along the axes, for light along x and along y, which keeps its polarisation:
+/// transmissions as [`CellResponse`] has them, by the number of the pillar.
 ///
-/// [`CellModel::transmissions`]: crate::CellModel::transmissions
+/// [`CellResponse`]: crate::CellResponse
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisTables {
     /// The light whose phase is that of the design.
     pub focused: PolarisationAxis,
-    /// Of light along x, and along y.
+    /// Transmissions of light along x, and along y.
     pub along: [Vec<Complex64>; 2],
 }
 

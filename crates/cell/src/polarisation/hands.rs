@@ -6,20 +6,22 @@ use num_complex::Complex64;
 
 use super::tables::{Part, there};
 use super::{Analyser, FocusedLight, PolarisedLight};
-use crate::Handedness;
+use crate::{Handedness, RotationResponse};
 
-/// What pillars do to light of both hands: transmissions as those of [`CellModel::transmissions`], by the number of the rotation.
-/// The first of each pair is for light that arrives in the hand that is focused, the second for the other.
+/// Tables of pillars for light of both hands: transmissions as [`CellResponse`] has them, by the number of the
+/// rotation. The first of each pair is for light that arrives in the hand that is focused, the second for the other.
 ///
-/// [`CellModel::transmissions`]: crate::CellModel::transmissions
+/// [`CellResponse`]: crate::CellResponse
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandTables {
     /// The hand of the light that is focused.
     pub focused: Handedness,
-    /// What leaves in the other hand than it arrived in.
+    /// Light that leaves in the other hand than it arrived in.
     pub converted: [Vec<Complex64>; 2],
-    /// What leaves in the hand that it arrived in.
+    /// Light that leaves in the hand that it arrived in.
     pub unconverted: [Vec<Complex64>; 2],
+    /// Response at any rotation, of a model of one size of pillars.
+    pub rotation: Option<RotationResponse>,
 }
 
 impl HandTables {

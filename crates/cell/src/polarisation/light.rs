@@ -1,4 +1,4 @@
-//! Which light is simulated at pillars that tell polarisations apart.
+//! Light that is simulated at pillars that distinguish polarisations.
 
 use metalith_pillars::PolarisationBasis;
 use serde::Serialize;
@@ -10,9 +10,9 @@ use crate::{CellStack, Handedness};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FocusedLight {
-    /// Of rotated rectangles: light of this hand, which they convert to the other.
+    /// Light of this hand, which rotated rectangles convert to the other.
     Circular(Handedness),
-    /// Of upright ones: light that is polarised along this axis, and stays so.
+    /// Light that is polarised along this axis, which upright rectangles keep so.
     Linear(PolarisationAxis),
 }
 
@@ -34,23 +34,21 @@ impl FocusedLight {
     }
 }
 
-/// Which light arrives at pillars that tell polarisations apart, and which of it reaches the sensor.
+/// Light that arrives at pillars that distinguish polarisations, and the part of it that reaches the sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PolarisedLight {
-    /// Of the light that arrives; where it is none, that which the pillars focus.
+    /// Polarisation of the light that arrives; where it is `None`, the light which the pillars focus.
     pub arriving: Option<Polarisation>,
-    /// What is before the sensor, if anything.
+    /// Analyser before the sensor, if any.
     pub analyser: Option<Analyser>,
 }
 
-/// Pillars, and the light that they are in.
+/// Pillars, and the light that they focus.
 #[derive(Clone, Debug)]
 pub struct LitStack {
     pub stack: CellStack,
-    /// The light that has the phase of a design behind them, if they tell polarisations apart.
+    /// The light that has the phase of a design behind them, if they distinguish polarisations.
     pub focused: Option<FocusedLight>,
-    /// Which light arrives, and what of it reaches the sensor, of such pillars.
-    pub polarised: PolarisedLight,
 }
 
 impl PolarisedLight {

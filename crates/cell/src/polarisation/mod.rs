@@ -1,4 +1,4 @@
-//! Polarisation of source and detector, before and behind pillars that tell polarisations apart.
+//! Polarisation of source and detector, before and behind pillars that distinguish polarisations.
 
 mod axes;
 mod hands;
@@ -28,7 +28,7 @@ pub enum Polarisation {
     Circular(Handedness),
     /// Electric field at this angle from x towards y (degrees).
     Linear(f64),
-    /// As much of every polarisation, without a fixed phase between any two that are orthogonal.
+    /// Equal shares of every polarisation, without a fixed phase between any two that are orthogonal.
     Unpolarised,
 }
 
@@ -45,7 +45,7 @@ impl Polarisation {
     /// Largest angle of linear polarisation (degrees), either way.
     pub const MOST_DEG: f64 = 180.0;
 
-    /// Of the energy that arrives, what is in the light that pillars focus.
+    /// Share of the energy that arrives that is in the light that pillars focus.
     pub fn share(self, focused: FocusedLight) -> f64 {
         match (self, focused) {
             (Self::Circular(own), FocusedLight::Circular(hand)) => f64::from(u8::from(own == hand)),
@@ -65,7 +65,7 @@ impl Polarisation {
         }
     }
 
-    /// The same by circular polarisations: amplitudes of left and of right.
+    /// Parts by circular polarisations: amplitudes of left and of right.
     fn circular_parts(self) -> Vec<[Complex64; 2]> {
         let (none, all) = (Complex64::ZERO, Complex64::ONE);
         match self {
@@ -94,7 +94,7 @@ fn linear(deg: f64) -> [f64; 2] {
     }
 }
 
-/// In words, as after "light arrives".
+/// Words of the polarisation, as after "light arrives".
 impl fmt::Display for Polarisation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -116,13 +116,13 @@ impl FromStr for Polarisation {
     }
 }
 
-/// What of the light behind the pillars passes to the sensor.
+/// Part of the light behind the pillars that passes to the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Analyser {
     /// The hand that focused light is converted to, whatever arrives.
     Circular,
-    /// What is polarised linearly at this angle from x towards y (degrees).
+    /// Linear polarisation at this angle from x towards y (degrees).
     Linear(f64),
 }
 
@@ -135,7 +135,7 @@ impl Analyser {
     ];
 }
 
-/// In words, as of a thing before the sensor.
+/// Words of the analyser, as of a thing before the sensor.
 impl fmt::Display for Analyser {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -169,7 +169,8 @@ fn named_or_linear<T: Copy>(text: &str, choices: &[(&str, T)], linear: fn(f64) -
 
 fn refusal<T>(what: String, choices: &[(&str, T)]) -> Error {
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-    Error::invalid(
+    Error::refused(
+        "light/unknown-polarisation",
         what,
         format!(
             "use {}, or the angle of linear polarisation from x towards y, from -{most} to {most} degrees",

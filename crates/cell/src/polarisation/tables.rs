@@ -1,10 +1,10 @@
-//! What pillars that tell polarisations apart do to light, and what of it reaches the sensor.
+//! Tables of pillars that distinguish polarisations, and the light that reaches the sensor behind them.
 
 use num_complex::Complex64;
 
 use super::{Analyser, AxisTables, FocusedLight, HandTables, PolarisedLight};
 
-/// What pillars do to light of both polarisations, by their numbers.
+/// Tables of pillars for light of both polarisations, by their numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PolarisedTables {
     /// Rotated rectangles, to both hands.
@@ -17,7 +17,8 @@ pub enum PolarisedTables {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassedTable {
     pub table: Vec<Complex64>,
-    /// How often it has the phase of the element: 1 if focused light is in it; else -1 if diverging light is; else 0.
+    /// Multiple of the phase of the element that it has: 1 if focused light is in it; else -1 if diverging light is;
+    /// else 0.
     pub order: i32,
 }
 
@@ -26,9 +27,9 @@ pub struct PassedTable {
 pub(super) type Part<'a> = (Complex64, &'a [Complex64], i32);
 
 impl PolarisedTables {
-    /// What reaches the sensor of light of unit energy: energies of these add. Light of both hands that arrives with a fixed phase
-    /// between them, as linear polarisation is, interferes where it leaves in one hand: what is converted of one, with what is
-    /// not of the other. Behind a linear analyser all of it does.
+    /// Light that reaches the sensor of light of unit energy: energies of these add. Light of both hands that arrives
+    /// with a fixed phase between them, as linear polarisation is, interferes where it leaves in one hand: what is
+    /// converted of one, with what is not of the other. Behind a linear analyser all of it does.
     pub fn passed(&self, light: PolarisedLight) -> Vec<PassedTable> {
         let leaving = self.leaving(light).into_iter();
         leaving
@@ -43,16 +44,17 @@ impl PolarisedTables {
             .collect()
     }
 
-    /// The same for only the light that has the phase of the element `order` times: focused light for 1, what is not converted for
-    /// 0, what diverges for -1. Over whole turns of that phase these three do not interfere.
+    /// Tables as [`PolarisedTables::passed`] for only the light that has the phase of the element `order` times:
+    /// focused light for 1, what is not converted for 0, what diverges for -1. Over whole turns of that phase these
+    /// three do not interfere.
     pub fn passed_in(&self, order: i32, light: PolarisedLight) -> Vec<Vec<Complex64>> {
         let leaving = self.leaving(light).into_iter();
         let own = leaving.map(|parts| parts.into_iter().filter(|p| p.2 == order).collect::<Vec<_>>());
         own.filter(|parts| !parts.is_empty()).map(|parts| sum(&parts)).collect()
     }
 
-    /// The same for where light goes: behind a linear analyser the light of each order apart, since they leave in other directions
-    /// and interfere only where they meet.
+    /// Tables by the direction in which light leaves: behind a linear analyser the light of each order apart, since
+    /// they leave in other directions and interfere only where they meet.
     pub fn departing(&self, light: PolarisedLight) -> Vec<PassedTable> {
         let Some(Analyser::Linear(_)) = light.analyser else {
             return self.passed(light);
@@ -107,7 +109,7 @@ impl PolarisedTables {
     }
 }
 
-/// Those of some parts that are there.
+/// Parts that are there, of some.
 pub(super) fn there<const N: usize>(parts: [Part<'_>; N]) -> Vec<Part<'_>> {
     parts.into_iter().filter(|part| part.0 != Complex64::ZERO).collect()
 }

@@ -26,6 +26,7 @@ fn hands(focused: Handedness) -> HandTables {
         focused,
         converted: [of(other, own), of(own, other)],
         unconverted: [of(own, own), of(other, other)],
+        rotation: None,
     }
 }
 
@@ -33,7 +34,7 @@ fn tables(focused: Handedness) -> PolarisedTables {
     PolarisedTables::Hands(hands(focused))
 }
 
-/// The same pillars as if they turned no polarisation.
+/// Tables of the same pillars as if they turned no polarisation.
 fn axes(focused: PolarisationAxis) -> PolarisedTables {
     let along = [0, 1].map(|axis| pillars().iter().map(|j| j[axis][axis]).collect::<Vec<_>>());
     PolarisedTables::Axes(AxisTables { focused, along })
@@ -150,6 +151,7 @@ fn what_has_unlike_phases_adds_up_over_whole_turns() {
             focused,
             converted: pillar(&plain.converted, [1.0, -1.0]),
             unconverted: pillar(&plain.unconverted, [0.0, 0.0]),
+            rotation: None,
         });
         let power = |tables: &[Vec<Complex64>]| tables.iter().flatten().map(Complex64::norm_sqr).sum::<f64>();
         for (_, arriving) in Polarisation::CHOICES {

@@ -9,27 +9,31 @@ use std::sync::{Arc, Mutex, PoisonError};
 use num_complex::Complex64;
 use serde::Serialize;
 
-use metalith_core::Result;
+use metalith_core::{Progress, Result};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
 
 pub use self::samples::RotationSamples;
 
 use self::series::{Channels, Series, every};
-use super::{CellModel, CellStack, Fidelity, HandTables, Handedness, ObliqueTables, PolarisedTables};
+use super::{
+    CellModel, CellResponse, CellStack, Fidelity, HandTables, Handedness, Illumination, JonesTables, PolarisedTables,
+    Spectral,
+};
 
 /// Intervals of an eighth of a turn whose ends are solved.
 const INTERVALS: usize = 6;
 
-/// The same where numbers of orders are compared: what more orders change is small, and varies slowly with rotation.
+/// Number of intervals where numbers of orders are compared: what more orders change is small, and varies slowly with
+/// rotation.
 const COMPARED_INTERVALS: usize = 2;
 
-/// How many diffraction orders an axis a cell is solved with.
+/// Numbers of diffraction orders an axis that a cell is solved with.
 #[derive(Clone, Copy, Debug)]
 struct OrderChoice {
-    /// For most cells.
+    /// Number for most cells.
     usual: usize,
-    /// Those that tell whether more are needed.
+    /// Number that shows whether more are needed.
     fewer: usize,
     /// Distance in the complex transmission between these two, at most, where the usual ones will do.
     close: f64,
@@ -37,9 +41,9 @@ struct OrderChoice {
     more: usize,
 }
 
-/// Of fifteen sizes of rectangles of three materials (`examples/shapes.rs`, docs/method/cells.md) ten are close: their 25 orders are
-/// within 0.0018 of 41. Of the others, with thin sides or of a high index, 25 orders are off by up to 0.008, and 41 are within
-/// 0.0023 of 57.
+/// Choice for all cells. Of fifteen sizes of rectangles of three materials (`examples/shapes.rs`, docs/method/cells.md)
+/// ten are close: their 25 orders are within 0.0018 of 41. Of the others, with thin sides or of a high index, 25 orders
+/// are off by up to 0.008, and 41 are within 0.0023 of 57.
 const CHOICE: OrderChoice = OrderChoice {
     usual: 25,
     fewer: 17,
@@ -50,7 +54,7 @@ const CHOICE: OrderChoice = OrderChoice {
 /// Orders for one of many wavelengths of a band.
 const BAND_ORDERS: usize = 9;
 
-/// How many diffraction orders a cell was solved with, and what the last of them changed.
+/// Number of diffraction orders that a cell was solved with, and the change by the last of them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Truncation {
     /// Orders an axis.
@@ -62,17 +66,18 @@ pub struct Truncation {
 }
 
 /// A cell at a wavelength.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 struct Solved {
     series: Series,
-    /// What more orders add to it, where they are needed.
+    /// Series that more orders add to it, where they are needed.
     finer: Option<Series>,
-    /// Of a wavelength of a band not known.
+    /// Truncation; not known for a wavelength of a band.
     truncation: Option<Truncation>,
 }
 
-/// What rectangular pillars do to circularly polarised light, in an infinite lattice of pillars that are all rotated alike. By its
-/// number a pillar is rotated as it is drawn, with its corners on the grid; that these also shear it a little is left out.
+/// Response of rectangular pillars to circularly polarised light, in an infinite lattice of equally rotated pillars. By
+/// its number a pillar is rotated as it is drawn, with its corners on the grid; that these also shear it a little is
+/// left out.
 ///
 /// A pillar that is rotated by an angle converts light to the other circular polarisation with twice that angle as phase, more
 /// or less: the lattice does not turn with it. What the lattice adds repeats every quarter turn, and is solved at a few
@@ -82,7 +87,7 @@ pub struct RotatedCell {
     stack: CellStack,
     pillars: RotatedRectangles,
     arriving: Handedness,
-    /// By wavelength, and whether it is one of a band.
+    /// Solutions by wavelength, and whether it is one of a band.
     solved: Mutex<HashMap<(u64, bool), Arc<Solved>>>,
 }
 
@@ -107,20 +112,20 @@ impl RotatedCell {
         self.arriving
     }
 
-    /// Converted and unconverted light of a pillar of any rotation (rad), as ratios of fields.
+    /// The cell at a single wavelength (um).
     ///
     /// # Errors
     /// As [`CellStack::jones`].
-    pub fn response(&self, rotation: f64, wavelength_um: f64) -> Result<[Complex64; 2]> {
-        Ok(self.solved(wavelength_um, false)?.at(rotation, self.arriving))
+    pub fn at(&self, wavelength_um: f64) -> Result<RotationResponse> {
+        Ok(self.response_of(self.solved(wavelength_um, false)?))
     }
 
-    /// How many orders it takes at a wavelength (um), and how sure they are.
-    ///
-    /// # Errors
-    /// As [`CellStack::jones`].
-    pub fn truncation(&self, wavelength_um: f64) -> Result<Option<Truncation>> {
-        Ok(self.solved(wavelength_um, false)?.truncation)
+    fn response_of(&self, solved: Arc<Solved>) -> RotationResponse {
+        RotationResponse {
+            solved,
+            pillars: self.pillars,
+            arriving: self.arriving,
+        }
     }
 
     fn solved(&self, wavelength_um: f64, of_band: bool) -> Result<Arc<Solved>> {
@@ -145,7 +150,7 @@ impl RotatedCell {
         })
     }
 
-    /// With as many orders as this cell needs.
+    /// Solves with as many orders as this cell needs.
     fn solve(&self, wavelength_um: f64, choice: OrderChoice) -> Result<Solved> {
         Solved::converged(choice, |intervals, orders| {
             self.samples(intervals, wavelength_um, orders)
@@ -160,7 +165,7 @@ impl RotatedCell {
             .map(RotationSamples::channels)
     }
 
-    /// Of converted (0) or unconverted (1) light.
+    /// Table of converted (0) or unconverted (1) light.
     fn table(&self, solved: &Solved, most: u16, hand: Hand, channel: usize) -> Vec<Complex64> {
         let of = |number: u16| {
             let rotation = self.pillars.drawn_rotation(number);
@@ -181,11 +186,42 @@ impl RotatedCell {
             focused: self.arriving,
             converted: of(0),
             unconverted: of(1),
+            rotation: Some(self.response_of(solved)),
         }))
     }
 }
 
-/// Of the light that arrives.
+/// Response of a cell of rotated rectangles at one wavelength, at any rotation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RotationResponse {
+    solved: Arc<Solved>,
+    pillars: RotatedRectangles,
+    arriving: Handedness,
+}
+
+impl RotationResponse {
+    /// The pillars.
+    pub fn pillars(&self) -> RotatedRectangles {
+        self.pillars
+    }
+
+    /// The handedness of the light.
+    pub fn arriving(&self) -> Handedness {
+        self.arriving
+    }
+
+    /// Converted and unconverted light of a pillar of any rotation (rad), as ratios of fields.
+    pub fn at(&self, rotation: f64) -> [Complex64; 2] {
+        self.solved.at(rotation, self.arriving)
+    }
+
+    /// Number of orders that it takes, and how sure they are; `None` for one of many wavelengths of a band.
+    pub fn truncation(&self) -> Option<Truncation> {
+        self.solved.truncation
+    }
+}
+
+/// Hand of the light that arrives.
 #[derive(Clone, Copy)]
 enum Hand {
     Focused,
@@ -193,7 +229,8 @@ enum Hand {
 }
 
 impl Solved {
-    /// With as many orders as are needed, from what `samples` has over a quarter turn of so many intervals with so many orders.
+    /// Solution with as many orders as are needed, from what `samples` has over a quarter turn of so many intervals
+    /// with so many orders.
     fn converged(choice: OrderChoice, samples: impl Fn(usize, usize) -> Result<Vec<Channels>>) -> Result<Self> {
         let own = samples(INTERVALS, choice.usual)?;
         let compared = |orders: usize| -> Result<(Vec<Channels>, f64)> {
@@ -251,35 +288,16 @@ impl CellModel for RotatedCell {
         Fidelity::Rigorous
     }
 
-    /// Of the converted light, with the number of the rotation as index.
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let solved = self.solved(wavelength_um, false)?;
-        Ok(self.table(&solved, max_width_nm, Hand::Focused, 0))
-    }
-
-    fn transmissions_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
-        let solved = self.solved(wavelength_um, true)?;
-        Ok(self.table(&solved, max_width_nm, Hand::Focused, 0))
-    }
-
-    fn polarised(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<PolarisedTables>> {
-        self.both_hands(wavelength_um, false, max_width_nm).map(Some)
-    }
-
-    fn polarised_in_band(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Option<PolarisedTables>> {
-        self.both_hands(wavelength_um, true, max_width_nm).map(Some)
-    }
-
-    fn oblique(&self, _wavelength_um: f64, _sines: [f64; 2], _max_width_nm: u16) -> Result<Option<ObliqueTables>> {
-        Err(super::rectangle::oblique_refused())
+    fn response(&self, light: &Illumination<'_>, last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        if light.cell_sines() != [0.0; 2] {
+            return Err(super::rectangle::oblique_refused());
+        }
+        let tables = self.both_hands(light.wavelength_um, light.spectral == Spectral::InBand, last)?;
+        Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
         self.stack.full_transmission(wavelength_um)
-    }
-
-    fn rotated(&self) -> Option<&RotatedCell> {
-        Some(self)
     }
 }
 
@@ -290,6 +308,7 @@ mod tests {
     use super::super::rectangle::tests::{PILLARS, titania};
     use super::super::{Polarisation, PolarisedLight, RotatedRectangle};
     use super::*;
+    use metalith_core::Silent;
     use metalith_rcwa::circular;
 
     /// Between the solved rotations, of |t| near 1.1: what the series leaves out; ten times more with five rotations.
@@ -324,8 +343,8 @@ mod tests {
     }
 
     fn in_band(cell: &RotatedCell, most: u16) -> HandTables {
-        match cell.polarised_in_band(0.532, most).unwrap() {
-            Some(PolarisedTables::Hands(hands)) => hands,
+        match cell.both_hands(0.532, true, most).unwrap() {
+            PolarisedTables::Hands(hands) => hands,
             other => panic!("{other:?}"),
         }
     }
@@ -343,7 +362,11 @@ mod tests {
     fn tables_have_the_series_at_drawn_rotations() {
         let cell = RotatedCell::new(titania(), PILLARS, Handedness::Left);
         let solved = cell.solved(0.532, true).unwrap();
-        let converted = cell.transmissions_in_band(0.532, 180).unwrap();
+        let light = Illumination::normal(0.532).in_band();
+        let converted = cell
+            .response(&light, 180, &Silent)
+            .and_then(CellResponse::focused)
+            .unwrap();
         let hands = in_band(&cell, 180);
         for number in [1, 37, 180] {
             let at = solved.at(PILLARS.drawn_rotation(number), Handedness::Left);

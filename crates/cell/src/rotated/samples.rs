@@ -13,16 +13,17 @@ use super::series::{Channels, Series, samples, solved_rotations};
 use super::{CHOICE, INTERVALS, Solved};
 use crate::{CellStack, HandTables, Handedness, RotatedRectangle};
 
-/// What a rectangle does to light that arrives left circularly polarised, at rotations evenly over a quarter turn. What it does at any
-/// rotation and to either hand is linear in these numbers, so that they may be interpolated between stacks and edges.
+/// Response of a rectangle to light that arrives left circularly polarised, at rotations evenly over a quarter turn.
+/// Its response at any rotation and to either hand is linear in these numbers, so that they may be interpolated between
+/// stacks and edges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotationSamples(Vec<Channels>);
 
 impl RotationSamples {
-    /// How many numbers there are.
+    /// Count of the numbers.
     pub const NUMBERS: usize = 4 * INTERVALS;
 
-    /// Of a rectangle with these edges (nm).
+    /// Samples of a rectangle with these edges (nm).
     ///
     /// # Errors
     /// As [`CellStack::jones`].
@@ -42,7 +43,7 @@ impl RotationSamples {
         )
     }
 
-    /// The same with as many orders as [`RotatedCell`](super::RotatedCell) takes at single wavelengths.
+    /// Samples with as many orders as [`RotatedCell`](super::RotatedCell) takes at single wavelengths.
     ///
     /// # Errors
     /// As [`CellStack::jones`].
@@ -56,7 +57,7 @@ impl RotationSamples {
         Ok(Self((0..samples).map(|k| solved.channels(rotation(k))).collect()))
     }
 
-    /// The same for light of a hand that arrives, with so many intervals of an eighth of a turn.
+    /// Samples for light of a hand that arrives, with so many intervals of an eighth of a turn.
     pub(super) fn over(
         intervals: usize,
         stack: &CellStack,
@@ -77,12 +78,12 @@ impl RotationSamples {
         Ok(Self(samples(&jones.collect::<Result<Vec<_>>>()?, arriving)))
     }
 
-    /// By rotation.
+    /// Channels by rotation.
     pub(super) fn channels(self) -> Vec<Channels> {
         self.0
     }
 
-    /// Of a site without pillar that transmits this: nothing is converted.
+    /// Samples of a site without pillar that transmits this: nothing is converted.
     pub fn of_bare(t: Complex64) -> Self {
         Self(vec![[Complex64::ZERO, t]; Self::NUMBERS / 2])
     }
@@ -92,13 +93,13 @@ impl RotationSamples {
         self.0.iter().flatten().copied()
     }
 
-    /// From [`RotationSamples::numbers`].
+    /// Samples from [`RotationSamples::numbers`].
     pub fn of_numbers(numbers: &[Complex64]) -> Self {
         Self(numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
     }
 
-    /// What pillars with the rotations of these numbers do to light of both hands, in their order, where light of a hand is focused;
-    /// as those of [`RotatedCell`](super::RotatedCell), at rotations as drawn.
+    /// Tables of pillars with the rotations of these numbers for light of both hands, in their order, where light of a
+    /// hand is focused; as the tables of [`RotatedCell`](super::RotatedCell), at rotations as drawn.
     pub fn hands(&self, pillars: RotatedRectangles, numbers: &[u16], focused: Handedness) -> HandTables {
         let series = Series::of(&self.0);
         let of = |sign: f64, channel: usize| -> Vec<Complex64> {
@@ -119,6 +120,7 @@ impl RotationSamples {
             focused,
             converted: signs.map(|sign| of(sign, 0)),
             unconverted: signs.map(|sign| of(sign, 1)),
+            rotation: None,
         }
     }
 }
@@ -129,7 +131,7 @@ mod tests {
     use super::super::BAND_ORDERS;
     use super::super::RotatedCell;
     use super::*;
-    use crate::{CellModel, PolarisedTables};
+    use crate::PolarisedTables;
 
     /// Sums of two dozen numbers of size one; the solver tells left from right to 1e-9.
     const SAME: f64 = 1e-6;
@@ -144,7 +146,7 @@ mod tests {
         let numbers: Vec<u16> = (0..=PILLARS.steps).collect();
         for focused in [Handedness::Left, Handedness::Right] {
             let cell = RotatedCell::new(titania(), PILLARS, focused);
-            let Some(PolarisedTables::Hands(wanted)) = cell.polarised_in_band(0.532, PILLARS.steps).unwrap() else {
+            let PolarisedTables::Hands(wanted) = cell.both_hands(0.532, true, PILLARS.steps).unwrap() else {
                 panic!("it knows both hands")
             };
             let found = kept.hands(PILLARS, &numbers, focused);

@@ -1,4 +1,4 @@
-//! What a rotated pillar does to light, over its rotation.
+//! Response of a rotated pillar to light, over its rotation.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
@@ -11,7 +11,7 @@ pub(super) type Channels = [Complex64; 2];
 
 /// Fourier series over a quarter turn, after which all repeats: coefficients of `exp(4 i m rotation)`, for m from minus half their
 /// number.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Series {
     coefficients: Vec<Channels>,
 }
@@ -50,7 +50,7 @@ pub(super) fn samples(jones: &[[[Complex64; 2]; 2]], arriving: Handedness) -> Ve
 }
 
 impl Series {
-    /// That of samples evenly spaced over a quarter turn.
+    /// Series of samples evenly spaced over a quarter turn.
     pub(super) fn of(samples: &[Channels]) -> Self {
         let count = samples.len() as f64;
         let coefficient = |m: usize| {
@@ -67,7 +67,7 @@ impl Series {
         }
     }
 
-    /// At a rotation (rad).
+    /// Channels at a rotation (rad).
     pub(super) fn at(&self, rotation: f64) -> Channels {
         let half = self.coefficients.len() as f64 / 2.0;
         let mut sum = [Complex64::ZERO; 2];

@@ -45,7 +45,7 @@ pub(super) fn encode(along: &Along) -> Vec<u8> {
     bytes_of(pairs.flat_map(|(x, y)| [*x, *y]))
 }
 
-/// Those of so many pillars; none if the bytes are not of so many, or not finite.
+/// Tables of so many pillars; `None` if the bytes are not of so many, or not finite.
 pub(super) fn decode(content: &[u8], pillars: usize) -> Option<Along> {
     let numbers = complex_of(content).filter(|numbers| numbers.len() == 2 * pillars)?;
     let of = |axis: usize| {

@@ -14,18 +14,21 @@ use metalith_pillars::UprightRectangles;
 use metalith_rcwa::{Incidence, LayerStack, Orders, Outline, Side, solve_each};
 
 use crate::pointwise::BAND_ORDERS;
-use crate::{AxisTables, CellModel, CellStack, Fidelity, ObliqueTables, PolarisationAxis, PolarisedTables};
+use crate::{
+    AxisTables, CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, PolarisationAxis,
+    PolarisedTables, Spectral,
+};
 
 /// Diffraction orders along an axis of upright rectangles: the longer edge asks for more than squares do.
 pub const UPRIGHT_ORDERS: usize = 25;
 
-/// What upright rectangular pillars do to light along x and along y, in infinite lattices of pillars of one size.
+/// Response of upright rectangular pillars to light along x and along y, in infinite lattices of pillars of one size.
 #[derive(Debug)]
 pub struct UprightCell {
     stack: CellStack,
     pillars: UprightRectangles,
     focused: PolarisationAxis,
-    /// Where what is solved for single wavelengths is kept.
+    /// Folder of the cache of what is solved for single wavelengths.
     folder: Option<PathBuf>,
     /// Along both axes, by wavelength, and whether it is one of a band.
     solved: Mutex<HashMap<(u64, bool), Arc<Along>>>,
@@ -50,7 +53,8 @@ impl CellStack {
     fn birefringent_layers(&self, edges_nm: [f64; 2], wavelength_um: f64) -> Result<LayerStack> {
         let [x, y] = edges_nm;
         if edges_nm.iter().any(|edge| !(edge.is_finite() && *edge > 0.0)) {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "cell/rectangle-does-not-fit",
                 format!("a pillar of {x} x {y} nm"),
                 "give both edges in nm, above zero",
             ));
@@ -128,7 +132,7 @@ impl UprightCell {
         }
     }
 
-    /// The same, whose answers for single wavelengths are kept in a folder from one run to the next.
+    /// Same cell, whose answers for single wavelengths are cached in a folder from one run to the next.
     #[must_use]
     pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
         self.folder = folder.map(Path::to_owned);
@@ -182,7 +186,7 @@ impl UprightCell {
         }))
     }
 
-    /// Of light along one axis, up to a number.
+    /// Table of light along one axis, up to a number.
     fn table(&self, of: &Along, axis: PolarisationAxis, last: u16) -> Vec<Complex64> {
         let own = &of[axis.index()];
         let at = |number: u16| own.get(usize::from(number)).copied().unwrap_or(Complex64::ZERO);
@@ -203,25 +207,12 @@ impl CellModel for UprightCell {
         Fidelity::Rigorous
     }
 
-    /// Of light along the axis that is focused, with the number of the pillar as index.
-    fn transmissions(&self, wavelength_um: f64, last: u16) -> Result<Vec<Complex64>> {
-        Ok(self.table(&*self.solved(wavelength_um, false)?, self.focused, last))
-    }
-
-    fn transmissions_in_band(&self, wavelength_um: f64, last: u16) -> Result<Vec<Complex64>> {
-        Ok(self.table(&*self.solved(wavelength_um, true)?, self.focused, last))
-    }
-
-    fn polarised(&self, wavelength_um: f64, last: u16) -> Result<Option<PolarisedTables>> {
-        self.tables(wavelength_um, false, last).map(Some)
-    }
-
-    fn polarised_in_band(&self, wavelength_um: f64, last: u16) -> Result<Option<PolarisedTables>> {
-        self.tables(wavelength_um, true, last).map(Some)
-    }
-
-    fn oblique(&self, _wavelength_um: f64, _sines: [f64; 2], _last: u16) -> Result<Option<ObliqueTables>> {
-        Err(crate::rectangle::oblique_refused())
+    fn response(&self, light: &Illumination<'_>, last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        if light.cell_sines() != [0.0; 2] {
+            return Err(crate::rectangle::oblique_refused());
+        }
+        let tables = self.tables(light.wavelength_um, light.spectral == Spectral::InBand, last)?;
+        Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
@@ -294,10 +285,13 @@ mod tests {
     fn tables_are_of_the_axis_that_is_focused() {
         for axis in PolarisationAxis::ALL {
             let cell = UprightCell::new(titania(), PILLARS, axis);
-            let table = cell.transmissions_in_band(0.532, 9).unwrap();
-            let Some(PolarisedTables::Axes(tables)) = cell.polarised_in_band(0.532, 9).unwrap() else {
+            let response = cell
+                .response(&Illumination::normal(0.532).in_band(), 9, &Silent)
+                .unwrap();
+            let Some(PolarisedTables::Axes(tables)) = response.polarised().cloned() else {
                 panic!("it has tables of both axes")
             };
+            let table = response.focused().unwrap();
             assert_eq!((table, axis), (tables.along[axis.index()].clone(), tables.focused));
         }
         let error = titania().birefringent([100.0, -1.0], 0.532, Orders::new(3).unwrap());

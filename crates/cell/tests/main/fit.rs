@@ -4,12 +4,11 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use metalith_cell::{
-    Basis, CellModel, CellStack, Fidelity, FittedCell, ForwardPolynomial, InversePolynomial, MappingTable, PhaseCurve,
-    PublishedCell, bad_cells, curves_over, fit_forward, fit_inverse, forward_errors, round_trip,
+    Basis, CellModel, CellResponse, CellStack, Fidelity, FittedCell, ForwardPolynomial, Illumination,
+    InversePolynomial, MappingTable, PhaseCurve, PublishedCell, bad_cells, curves_over, fit_forward, fit_inverse,
+    forward_errors, round_trip,
 };
-use metalith_core::Result;
-use metalith_design::Design;
-use metalith_design::array::PillarRule;
+use metalith_core::{Progress, Result};
 use metalith_rcwa::Orders;
 use num_complex::Complex64;
 
@@ -43,9 +42,7 @@ struct Solved(CellStack, Mutex<HashMap<u64, Vec<Complex64>>>);
 
 impl Solved {
     fn paper() -> Self {
-        let path = metalith_testing::root().join("designs/prototype_3x3.toml");
-        let design = Design::read(&path).unwrap();
-        Self(design.cell_stack().unwrap(), Mutex::default())
+        Self(CellStack::paper(PITCH_NM, 700.0).unwrap(), Mutex::default())
     }
 }
 
@@ -54,7 +51,8 @@ impl CellModel for Solved {
         Fidelity::Rigorous
     }
 
-    fn transmissions(&self, wavelength_um: f64, max_width_nm: u16) -> Result<Vec<Complex64>> {
+    fn response(&self, light: &Illumination<'_>, widest_nm: u16, _progress: &dyn Progress) -> Result<CellResponse> {
+        let wavelength_um = light.wavelength_um;
         // Even widths from 100 to 300 nm; what is narrower or odd is not looked at below.
         let mut known = self.1.lock().unwrap();
         let t = match known.get(&wavelength_um.to_bits()) {
@@ -69,7 +67,7 @@ impl CellModel for Solved {
                 known.entry(wavelength_um.to_bits()).or_insert(t)
             }
         };
-        Ok(t[..=usize::from(max_width_nm)].to_vec())
+        Ok(CellResponse::Scalar(t[..=usize::from(widest_nm)].to_vec()))
     }
 
     fn full_transmission(&self, wavelength_um: f64) -> Result<f64> {
@@ -215,23 +213,4 @@ fn mappings_go_through_files_and_bad_ones_name_the_line() {
         let error = MappingTable::read_csv(&file, &widths).unwrap_err().to_string();
         assert!(error.contains(word), "{error}");
     }
-
-    // A design may take its mapping from such a file; its layout then has just those widths.
-    std::fs::write(&file, exact.to_csv()).unwrap();
-    let shipped = metalith_testing::root().join("designs/mini_3x3.toml");
-    let text = std::fs::read_to_string(shipped).unwrap();
-    let kept: Vec<_> = text.lines().filter(|line| !line.starts_with("coefficients")).collect();
-    let text = kept
-        .join("\n")
-        .replace("[mapping]", "[mapping]\ntable = \"mapping.csv\"");
-    let path = folder.path().join("design.toml");
-    std::fs::write(&path, text).unwrap();
-    let design = Design::read(&path).unwrap();
-    assert_eq!(design.mapping.table.as_ref(), Some(&exact));
-    let rule = PillarRule::new(&design.cell, &design.mapping);
-    assert!(
-        (0..1000)
-            .map(|i| f64::from(i) / 1000.0)
-            .all(|u| rule.width_nm(u) == exact.width_nm(u))
-    );
 }

@@ -10,9 +10,39 @@ use toml::de::DeTable;
 use super::scalar::nearest_span;
 use crate::text::{is_printable, printable};
 
-/// One mistake: what, where in the text (bytes), and what to do.
+/// Cause of a mistake in a text file. With the key it is the identity of the mistake: the text may change, both stay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FaultKind {
+    /// Syntax of TOML that is wrong.
+    Syntax,
+    /// A key that must be there and is not.
+    Missing,
+    /// A key that no reader asked for.
+    Unknown,
+    /// A value of another type than the key has.
+    WrongType,
+    /// A number outside the limits of its key.
+    OutOfRange,
+    /// A word that is not among the choices of its key.
+    UnknownChoice,
+    /// A key or a word of an earlier version, which has another name now.
+    Renamed,
+    /// A list of another length than the key has.
+    WrongLength,
+    /// A text with characters that no line may hold.
+    Unprintable,
+    /// A file that is named and is not there.
+    NoFile,
+    /// A value that is possible alone and not together with other values, or with what it describes.
+    Inconsistent,
+}
+
+/// One mistake: its cause and key, where in the text (bytes), and what to do.
 #[derive(Clone, Debug)]
 pub struct Fault {
+    pub kind: FaultKind,
+    /// Path of the key from the top of the file, as `lens.diameter_um`; empty for the file as a whole.
+    pub key: String,
     pub span: Range<usize>,
     pub what: String,
     pub hint: String,
@@ -72,7 +102,9 @@ impl Faults {
     pub fn at_keys(path: &Path, text: &str, faults: Vec<(String, String, String)>) -> Self {
         let table = DeTable::parse(text).ok();
         let placed = faults.into_iter().map(|(key, what, hint)| Fault {
+            kind: FaultKind::Inconsistent,
             span: table.as_ref().map_or(0..0, |table| nearest_span(table.get_ref(), &key)),
+            key,
             what,
             hint,
         });
@@ -82,7 +114,7 @@ impl Faults {
         Self::new(path, text, placed, total)
     }
 
-    /// How many mistakes there are, listed or not.
+    /// Number of mistakes, listed or not.
     pub fn count(&self) -> usize {
         self.total
     }
@@ -95,6 +127,11 @@ impl Faults {
     /// The first mistakes, in the order of the file: 50 at most.
     pub fn faults(&self) -> &[Fault] {
         &self.faults
+    }
+
+    /// True if there is a mistake of this kind at the key with this path from the top of the file.
+    pub fn has(&self, kind: FaultKind, key: &str) -> bool {
+        self.faults.iter().any(|fault| fault.kind == kind && fault.key == key)
     }
 
     /// Line and column, both from one, of a byte of the text.

@@ -9,7 +9,7 @@ mod fault;
 mod scalar;
 mod section;
 
-pub use fault::{Fault, Faults};
+pub use fault::{Fault, FaultKind, Faults};
 pub use scalar::{NoPlace, Scalar, with_values};
 pub use section::{Limits, Section};
 
@@ -25,7 +25,7 @@ use crate::error::{Error, Result};
 pub struct Document<'t> {
     path: PathBuf,
     text: &'t str,
-    /// None where a fault turned out to be part of another.
+    /// Faults in order; `None` where a fault turned out to be part of another.
     faults: RefCell<Vec<Option<Fault>>>,
     /// Faults found after the list was full.
     more: Cell<usize>,
@@ -46,7 +46,8 @@ const MOST_HELD: usize = 1000;
 /// If it cannot be read, is longer than 4 MiB, or is not UTF-8. Of a file of another kind it is said what it is.
 pub fn load(path: &Path) -> Result<String> {
     load_text(path).map_err(|error| match crate::file::binary_kind(path) {
-        Some(kind) => Error::invalid(
+        Some(kind) => Error::refused(
+            "file/not-text",
             format!("{} is {kind}, and a text is asked for here", path.display()),
             "check which file is given where: `--help` says the order",
         ),
@@ -88,7 +89,13 @@ impl<'t> Document<'t> {
             Ok(table) => table,
             Err(error) => {
                 let span = error.span().unwrap_or(0..0);
-                document.fault(span, error.message().trim(), "mend the TOML syntax here or just before");
+                document.fault(
+                    FaultKind::Syntax,
+                    String::new(),
+                    span,
+                    error.message().trim(),
+                    "mend the TOML syntax here or just before",
+                );
                 return Err(document.into_error());
             }
         };
@@ -102,9 +109,11 @@ impl<'t> Document<'t> {
         }
     }
 
-    /// Record a fault at a byte range of the text. Its number, if it is held and not only counted.
+    /// Record a fault of the value at a key, at a byte range of the text. Its number, if it is held and not only counted.
     pub fn fault(
         &self,
+        kind: FaultKind,
+        key: String,
         span: std::ops::Range<usize>,
         what: impl Into<String>,
         hint: impl Into<String>,
@@ -115,6 +124,8 @@ impl<'t> Document<'t> {
         }
         let mut faults = self.faults.borrow_mut();
         faults.push(Some(Fault {
+            kind,
+            key,
             span,
             what: what.into(),
             hint: hint.into(),
@@ -127,7 +138,7 @@ impl<'t> Document<'t> {
         self.path.parent().map_or_else(PathBuf::new, Path::to_owned)
     }
 
-    /// Whether further faults are counted only.
+    /// True if further faults are only counted.
     fn is_full(&self) -> bool {
         self.faults.borrow().len() >= MOST_HELD
     }
@@ -156,7 +167,7 @@ impl<'t> Document<'t> {
         self.replaced.borrow().contains(path)
     }
 
-    /// Whether neither the value at a path, nor a section that it is in, has a fault.
+    /// True if neither the value at a path nor any section that contains it has a fault.
     fn is_sound(&self, path: &str) -> bool {
         let doubted = self.doubted.borrow();
         let sections = path.match_indices('.').map(|(end, _)| &path[..end]);

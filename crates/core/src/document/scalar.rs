@@ -20,7 +20,7 @@ pub enum Scalar {
 }
 
 impl Scalar {
-    /// As a number, if it is one.
+    /// Number that the value is, if it is one.
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Whole(v) => Some(*v as f64),
@@ -29,7 +29,7 @@ impl Scalar {
         }
     }
 
-    /// None for a date, a list or a table.
+    /// Scalar of a TOML value; `None` for a date, a list or a table.
     pub(super) fn of(value: &DeValue<'_>) -> Option<Self> {
         match value {
             DeValue::Boolean(v) => Some(Self::Switch(*v)),
@@ -40,7 +40,7 @@ impl Scalar {
         }
     }
 
-    /// As TOML writes it.
+    /// Text of the value as TOML writes it.
     fn toml(&self) -> String {
         match self {
             Self::Switch(v) => toml::Value::Boolean(*v),
@@ -52,7 +52,7 @@ impl Scalar {
     }
 }
 
-/// Without quotes.
+/// Text of the value without quotes.
 impl fmt::Display for Scalar {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -64,7 +64,7 @@ impl fmt::Display for Scalar {
     }
 }
 
-/// Why a text cannot have another value at a key.
+/// Reason why a text cannot have another value at a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoPlace {
     /// Number of the change, in the order in which they were given.

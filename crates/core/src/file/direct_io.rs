@@ -10,7 +10,7 @@ use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
 
-/// What addresses, places and lengths must be multiples of: no disk in use has larger sectors.
+/// Bytes of which addresses, places and lengths must be multiples: no disk in use has larger sectors.
 const PAGE: usize = 4096;
 
 /// Bytes that go at once: enough that the disk, not the call, is the cost.
@@ -20,7 +20,7 @@ const BLOCK: usize = 1 << 20;
 #[derive(Default)]
 pub struct Block {
     pub bytes: Vec<u8>,
-    /// Where in `bytes` the stretch begins.
+    /// Index in `bytes` where the stretch begins.
     pub start: usize,
     size: usize,
 }
@@ -51,7 +51,7 @@ fn open(options: &mut OpenOptions, path: &Path) -> Option<File> {
     }
 }
 
-/// How the blocks of an [`Output`] go.
+/// Way in which the blocks of an [`Output`] are written.
 enum Way {
     Untried,
     PastCache(File),
@@ -218,7 +218,7 @@ fn ended() -> io::Error {
     io::Error::other("the thread that reads ahead has ended")
 }
 
-/// As much of the file from `place` on as there is and `out` holds.
+/// Reads the file from `place` on, as much as there is and `out` holds.
 fn fill(file: &mut File, path: &Path, place: u64, out: &mut [u8]) -> io::Result<usize> {
     let mut held = 0;
     file.seek(SeekFrom::Start(place))?;

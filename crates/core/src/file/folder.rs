@@ -29,7 +29,7 @@ pub struct AtomicFolder {
     lock: Option<File>,
 }
 
-/// Where everything lies.
+/// Paths of everything that an unfinished folder consists of.
 struct Places {
     folder: PathBuf,
     archive: PathBuf,
@@ -77,7 +77,8 @@ impl AtomicFolder {
         let places = Places::of(target, archive)?;
         // What lies there is removed in the end: it must be what an earlier run may have left.
         if is_there(target)? && !target.is_dir() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "file/not-a-folder",
                 format!("{} is not a folder", target.display()),
                 "name a folder with --out, or remove what lies there",
             ));
@@ -96,12 +97,12 @@ impl AtomicFolder {
         Ok(this)
     }
 
-    /// Where the folder is to be written: it is there, and empty.
+    /// Path at which the folder is to be written: it is there, and empty.
     pub fn folder(&self) -> PathBuf {
         self.part.join(FOLDER)
     }
 
-    /// Where the archive is to be written.
+    /// Path at which the archive is to be written.
     pub fn archive(&self) -> PathBuf {
         self.part.join(ARCHIVE)
     }
@@ -131,7 +132,7 @@ impl Drop for AtomicFolder {
     }
 }
 
-/// Whether something is there; links are not followed.
+/// True if something is at the path; links are not followed.
 fn is_there(path: &Path) -> Result<bool> {
     match fs::symlink_metadata(path) {
         Ok(_) => Ok(true),
@@ -154,7 +155,8 @@ fn remove_tree(path: &Path) -> Result<()> {
 impl Places {
     fn of(target: &Path, archive: &Path) -> Result<Self> {
         let Some(name) = target.file_name() else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "file/folder-name",
                 format!("{} is not the name of a folder", target.display()),
                 "name a folder with --out",
             ));

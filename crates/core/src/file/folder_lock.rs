@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 
-/// How long a run waits before it asks again.
+/// Time that a run waits before it asks again.
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// The turn of a run to write the files of a folder, which belong together: two runs at once would leave some of the one and

@@ -1,10 +1,10 @@
-//! What a file is, by its first bytes.
+//! Kind of a file, by its first bytes.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// What a file is by its first bytes, if it is none that a person writes.
+/// Kind of a file by its first bytes, if it is not one that a person writes.
 pub(crate) fn binary_kind(path: &Path) -> Option<&'static str> {
     const KINDS: [(&[u8], &str); 6] = [
         (&[0x00, 0x06, 0x00, 0x02], "a layout in GDSII"),

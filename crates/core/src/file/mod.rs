@@ -27,7 +27,11 @@ pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
     let found = fs::metadata(path).map_err(Error::io("read", path))?;
     let refused = |why: String| {
         let hint = format!("{what} of up to {most} bytes is read; is this the right file?");
-        Err(Error::invalid(format!("{} {why}", path.display()), hint))
+        Err(Error::refused(
+            "file/too-large",
+            format!("{} {why}", path.display()),
+            hint,
+        ))
     };
     if !found.is_file() {
         return refused("is not an ordinary file".into());
@@ -81,14 +85,16 @@ impl AtomicFile {
             fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
         }
         let name = target.file_name().ok_or_else(|| {
-            Error::invalid(
+            Error::refused(
+                "file/file-name",
                 format!("{} is not the name of a file", target.display()),
                 "name a file, not a folder",
             )
         })?;
         // Found only when the file is put in its place otherwise, after all the work.
         if target.is_dir() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "file/is-a-folder",
                 format!("{} is a folder", target.display()),
                 "name a file in it, or another file",
             ));
@@ -121,7 +127,8 @@ impl AtomicFile {
         let file = out.finish().map_err(Error::io("write", &self.target))?;
         file.sync_all().map_err(Error::io("write", &self.target))?;
         if !part::is_at(file, &self.part).map_err(Error::io("read", &self.part))? {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "file/replaced-meanwhile",
                 format!("{} was replaced while it was written", self.part.display()),
                 "let one program at a time write into this folder, and try again",
             ));

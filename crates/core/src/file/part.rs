@@ -6,7 +6,8 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// How often another run may put its file in place between opening and locking, before that is an error.
+/// Largest number of times that another run may put its file in place between opening and locking, before that is an
+/// error.
 const MOST_TRIES: u32 = 100;
 
 /// Open the unfinished file `part` of `target`, empty and locked, and make it if it is not there.
@@ -47,8 +48,8 @@ pub(super) fn reach(part: &Path) -> Result<File> {
     }
 }
 
-/// Why nothing could be opened at `part`. A folder that may not be written to is told by its own name: the user knows nothing of the
-/// unfinished file.
+/// Reason why nothing could be opened at `part`. For a folder that may not be written to, the message names the folder,
+/// because the user does not know of the unfinished file.
 fn refused(part: &Path, error: io::Error) -> Error {
     let no_rights = matches!(
         error.kind(),
@@ -72,20 +73,22 @@ pub(super) fn claim(file: &File, part: &Path, target: &Path) -> Result<bool> {
 }
 
 fn busy(target: &Path) -> Error {
-    Error::invalid(
+    Error::refused(
+        "file/busy",
         format!("another process is writing {}", target.display()),
         "wait for it, or write elsewhere with --out",
     )
 }
 
 fn not_ordinary(part: &Path) -> Error {
-    Error::invalid(
+    Error::refused(
+        "file/not-ordinary",
         format!("{} is not an ordinary file", part.display()),
         "remove it: a file of this name is made while a file is being written",
     )
 }
 
-/// Whether `path` itself, no link followed, is the open file.
+/// True if the open file is the one at `path`, no link followed.
 pub(super) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     match fs::symlink_metadata(path) {
         Ok(there) => Ok(same(&file.metadata()?, &there)),
@@ -103,7 +106,7 @@ pub(super) fn remove_own(file: &File, path: &Path) {
     }
 }
 
-/// Whether two open files are one.
+/// True if two open files are one file.
 pub(super) fn is_same(a: &File, b: &File) -> io::Result<bool> {
     Ok(same(&a.metadata()?, &b.metadata()?))
 }

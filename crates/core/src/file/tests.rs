@@ -49,7 +49,7 @@ fn wait_for(child: &mut BufReader<std::process::ChildStdout>, word: &str) {
     }
 }
 
-/// What the other process does; without a role, nothing.
+/// Work of the other process; without a role, nothing.
 #[test]
 #[ignore = "started by other tests"]
 fn other_process() {

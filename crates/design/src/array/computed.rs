@@ -15,7 +15,7 @@ use crate::phase::{ElementPhase, LensPhase};
 #[derive(Clone, Debug)]
 pub struct ComputedWidths {
     lens: Arc<LensPhase>,
-    /// That of light polarised along y, if it is another.
+    /// Phase of light polarised along y, if it is another.
     along_y: Option<Arc<LensPhase>>,
     rule: Arc<PillarRule>,
     element: Element,
@@ -56,10 +56,10 @@ impl ComputedWidths {
         [self.element.wedge.sin_x, self.element.wedge.sin_y]
     }
 
-    /// Whether a symmetry turns this element into another of the same lens and mapping. The phase is a function of the exact radius
-    /// and of the sum of two products with the wedge, so a symmetry that turns one wedge into the other turns one
-    /// element into the other to the last bit. Of phases over the plane nothing is known: each such element is its own copy
-    /// alone.
+    /// True if a symmetry turns this element into another of the same lens and mapping. The phase is a function of the
+    /// exact radius and of the sum of two products with the wedge, so a symmetry that turns one wedge into the other
+    /// turns one element into the other to the last bit. Of phases over the plane nothing is known: each such element
+    /// is its own copy alone.
     pub fn maps(&self, symmetry: Symmetry, to: &Self) -> bool {
         let (own, other) = (self.phase(), to.phase());
         let [along_y, other_along_y] = [self, to].map(Self::phase_along_y);
@@ -130,13 +130,13 @@ impl PillarRows for ComputedWidths {
 #[derive(Clone, Debug)]
 pub enum ClassPillars {
     Held(PillarMap),
-    /// Of an element that all eight symmetries leave as it is.
+    /// Eighth of an element that all eight symmetries leave unchanged.
     Eighth(EighthMap),
     Computed(ComputedWidths),
 }
 
 impl ClassPillars {
-    /// Whether a symmetry turns `known` into these pillars: every site is compared if both are held.
+    /// True if a symmetry turns `known` into these pillars: every site is compared if both are held.
     pub(super) fn is_copy(&self, symmetry: Symmetry, known: &Self) -> bool {
         match (known, self) {
             (Self::Held(from), Self::Held(to)) => symmetry.maps(from, to),

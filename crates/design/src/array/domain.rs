@@ -10,7 +10,7 @@ use super::{Symmetry, SymmetryGroup};
 /// A part of a fundamental domain that the same copies cover the lens with.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DomainPart {
-    /// Which symmetries of the group leave the sites of this part where they are.
+    /// Symmetries of the group that leave the sites of this part where they are.
     stabiliser: Stabiliser,
     /// The symmetries that, applied to the part, give all its copies, each once.
     pub copies: Vec<Symmetry>,
@@ -98,21 +98,21 @@ impl SymmetryGroup {
         ]
     }
 
-    /// Whether a site of a lattice of `n` sites an axis belongs to a part of the domain.
+    /// True if a site of a lattice of `n` sites an axis belongs to a part of the domain.
     #[inline]
     pub fn holds(&self, part: &DomainPart, n: usize, ix: usize, iy: usize) -> bool {
         self.stabiliser(n, ix, iy) == Some(part.stabiliser)
     }
 
-    /// Which of the parts of the domain a site belongs to, if any.
+    /// Part of the domain that a site belongs to, if any.
     #[inline]
     pub fn part_of(&self, parts: &[DomainPart], n: usize, ix: usize, iy: usize) -> Option<usize> {
         let stabiliser = self.stabiliser(n, ix, iy)?;
         parts.iter().position(|part| part.stabiliser == stabiliser)
     }
 
-    /// What leaves a site where it is; none if another copy of the site, the first in reading order,
-    /// stands for it.
+    /// Symmetries that leave a site where it is; `None` if another copy of the site, the first in reading order, stands
+    /// for it.
     #[inline]
     fn stabiliser(&self, n: usize, ix: usize, iy: usize) -> Option<Stabiliser> {
         // Twice the place from the centre: exact for any number of sites.

@@ -1,4 +1,4 @@
-//! From phase to pillars: the widths of every element, and which of them are copies of one another.
+//! Array of pillars made from the phase: the widths of every element, and the elements that are copies of one another.
 
 mod computed;
 mod domain;
@@ -51,7 +51,7 @@ pub struct PlacedElement {
     pub element: Element,
     /// Index into [`PillarArray::classes`].
     pub class: usize,
-    /// What turns the pillars of the class into those of the element.
+    /// Symmetry that turns the pillars of the class into the pillars of the element.
     pub symmetry: Symmetry,
 }
 
@@ -59,11 +59,11 @@ pub struct PlacedElement {
 #[derive(Clone, Debug)]
 pub struct PillarArray {
     pub lattice: Lattice,
-    /// What the pillars are.
+    /// Shape of the pillars.
     pub shape: PillarShape,
     pub classes: Vec<Class>,
     pub placed: Vec<PlacedElement>,
-    /// Whether widths were moved on purpose, for what a process makes of them, from those that the mapping gives.
+    /// True if widths were moved on purpose, for the process, from the widths that the mapping gives.
     pub compensated: bool,
 }
 
@@ -83,7 +83,8 @@ impl PillarArray {
     /// If there is none, they are not of one lattice, a place is farther than 1 m from the middle, or the user stopped it.
     pub fn of_maps(shape: PillarShape, maps: Vec<(PillarMap, (i64, i64))>, progress: &dyn Progress) -> Result<Self> {
         let Some(lattice) = maps.first().map(|(map, _)| map.lattice) else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "array/empty",
                 "an array without elements",
                 "give at least one map of widths",
             ));
@@ -102,7 +103,8 @@ impl PillarArray {
             }
             if map.lattice != lattice {
                 let sites = [map.lattice.sites(), lattice.sites()];
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "array/sizes-differ",
                     format!(
                         "map {k} has {} sites along an axis, the first has {}",
                         sites[0], sites[1]
@@ -111,7 +113,8 @@ impl PillarArray {
                 ));
             }
             if centre_nm.0.abs().max(centre_nm.1.abs()) > FARTHEST_NM {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "array/off-grid",
                     format!("element {k} at ({}, {}) nm", centre_nm.0, centre_nm.1),
                     "place elements within 1 m of the middle",
                 ));
@@ -127,7 +130,8 @@ impl PillarArray {
         Ok(array)
     }
 
-    /// As [`PillarArray::build`]; elements of more than `most_held` sites are not held but made row by row.
+    /// Variant of [`PillarArray::build`] in which elements of more than `most_held` sites are made row by row, not
+    /// held.
     ///
     /// # Errors
     /// As [`PillarArray::build`].
@@ -205,8 +209,8 @@ impl PillarArray {
         }
     }
 
-    /// As [`PillarArray::rows`], for who reads all rows: an element that is not held but has all eight symmetries is made
-    /// once, as an eighth.
+    /// Variant of [`PillarArray::rows`] for a caller that reads all rows: an element that is not held but has all eight
+    /// symmetries is made once, as an eighth.
     pub fn all_rows(&self, placed: &PlacedElement) -> Cow<'_, ClassPillars> {
         let rows = self.rows(placed);
         let eighth = EighthMap::sites(self.lattice);

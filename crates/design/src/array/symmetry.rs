@@ -4,8 +4,8 @@ use metalith_pillars::{Lattice, PillarMap, PillarShape};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
 
-/// One of the eight symmetries of the square, as GDSII writes it: mirrored about the x axis first
-/// (y to -y), then turned counter-clockwise.
+/// Symmetry of the square, one of eight, as GDSII writes it: mirrored about the x axis first (y to -y), then turned
+/// counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct Symmetry {
     pub mirrored: bool,
@@ -33,7 +33,7 @@ impl Symmetry {
         all
     };
 
-    /// Where a point goes.
+    /// Place to which the symmetry takes a point.
     #[inline]
     pub fn point(self, x: i64, y: i64) -> (i64, i64) {
         // Cosine and sine of the turn; no branches, since sites by the million come here.
@@ -43,7 +43,7 @@ impl Symmetry {
         (cos * x - sin * y, sin * x + cos * y)
     }
 
-    /// Where a site of a lattice of `n` sites an axis goes.
+    /// Site to which it takes a site of a lattice of `n` sites an axis.
     pub(super) fn site(self, n: usize, ix: usize, iy: usize) -> (usize, usize) {
         let last = n as i64 - 1;
         let (x, y) = self.point(2 * ix as i64 - last, 2 * iy as i64 - last);
@@ -80,23 +80,23 @@ impl Symmetry {
         seen
     }
 
-    /// Whether every pillar of a kind is the same after it, about its own middle.
+    /// True if it leaves every pillar of a kind unchanged about its own middle.
     pub fn keeps(self, shape: PillarShape) -> bool {
         shape.keeps(self.mirrored, self.quarter_turns)
     }
 
-    /// Whether it takes a lattice into itself: a hexagonal one has the symmetries of a rectangle.
+    /// True if it maps a lattice onto itself: a hexagonal one has the symmetries of a rectangle.
     pub fn keeps_lattice(self, lattice: Lattice) -> bool {
         lattice.is_square() || self.quarter_turns.is_multiple_of(2)
     }
 
-    /// Where a vector that is no whole number of anything goes.
+    /// Image of a vector of any real components.
     pub fn vector(self, [x, y]: [f64; 2]) -> [f64; 2] {
         let ((ax, ay), (bx, by)) = (self.point(1, 0), self.point(0, 1));
         [ax as f64 * x + bx as f64 * y, ay as f64 * x + by as f64 * y]
     }
 
-    /// What undoes this symmetry: a mirror undoes itself, however it is turned.
+    /// Inverse of this symmetry: a mirror undoes itself, however it is turned.
     pub fn inverse(self) -> Self {
         Self {
             quarter_turns: if self.mirrored {
@@ -121,7 +121,7 @@ impl Symmetry {
         }
     }
 
-    /// Whether this symmetry turns the pillars `from` into `to`, every site compared.
+    /// True if this symmetry turns the pillars `from` into `to`, every site compared.
     pub fn maps(self, from: &PillarMap, to: &PillarMap) -> bool {
         let n = from.lattice.sites();
         let seen = self.seen(&from.number);
@@ -151,7 +151,7 @@ impl SymmetryGroup {
         Self::of_those(|s| s.maps(widths, widths))
     }
 
-    /// As [`SymmetryGroup::of`], of those that leave each pillar of this shape as it is.
+    /// Variant of [`SymmetryGroup::of`] for the symmetries that leave each pillar of this shape unchanged.
     pub fn of_shape(widths: &PillarMap, shape: PillarShape) -> Self {
         Self::of_those(|s| s.keeps(shape) && s.maps(widths, widths))
     }

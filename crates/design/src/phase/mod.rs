@@ -1,5 +1,5 @@
-//! From a design to the phase of every site: the radial phase that all elements share, and the wedge
-//! that steers each of them. Phases are kept in turns, so that the modulo is exact.
+//! Phase of every site of a design: the radial phase that all elements share, and the wedge that steers each of them.
+//! Phases are kept in turns, so that the modulo is exact.
 
 mod element;
 mod open;

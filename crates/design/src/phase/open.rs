@@ -1,4 +1,4 @@
-//! How much of a design is open to light.
+//! Area of a design that is open to light.
 
 use super::{ElementPhase, LensPhase};
 use crate::{Design, Element};
@@ -6,14 +6,14 @@ use crate::{Design, Element};
 /// Areas of the sites that are inside lenses (um^2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenAreas {
-    /// Of the lens that elements share.
+    /// Open area of the lens that elements share.
     pub lens_um2: f64,
-    /// Of each element, in the order of [`Design::elements`].
+    /// Open area of each element, in the order of [`Design::elements`].
     pub elements_um2: Vec<f64>,
 }
 
 impl OpenAreas {
-    /// Of a design.
+    /// Open areas of a design.
     pub fn of(design: &Design) -> Self {
         let lens = LensPhase::of(design);
         let elements = design.elements();

@@ -8,7 +8,7 @@ use super::table;
 use metalith_core::document::Section;
 use metalith_core::{Error, Result};
 
-/// How a table is read between its radii.
+/// Interpolation of a table between its radii.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Interpolation {
@@ -30,7 +30,7 @@ pub enum RadialPhase {
         /// The radius R that r is divided by (um).
         normalisation_um: f64,
     },
-    /// None: what is added over the plane is all.
+    /// Flat phase: what is added over the plane is all.
     Flat,
     /// Phase (rad) over radius (um), ascending.
     Table {

@@ -138,7 +138,7 @@ mod tests {
         assert!(phases.windows(2).all(|p| (p[1] - p[0]).abs() <= TAU / 2.0));
     }
 
-    /// As spreadsheets save a table.
+    /// Table as spreadsheets save it.
     #[test]
     fn a_mark_of_the_byte_order_is_no_part_of_a_table() {
         let folder = tempfile::tempdir().unwrap();

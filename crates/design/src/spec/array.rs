@@ -18,7 +18,7 @@ pub struct ArraySpec {
     pub count: (u32, u32),
     /// Distance of neighbouring elements of the grid along x (nm).
     pub spacing_nm: i64,
-    /// The same along y, where it is another.
+    /// Spacing along y, where it is another.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing_y_nm: Option<i64>,
     /// Steering of an element by each step from the middle (degrees).
@@ -30,14 +30,14 @@ pub struct ArraySpec {
     pub placed: Vec<PlacedSpec>,
 }
 
-/// An element that is placed by itself.
+/// An element that is placed individually.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlacedSpec {
     /// Centre on the chip (nm).
     pub centre_nm: (i64, i64),
     /// Steering along x and y (degrees).
     pub steering_deg: (f64, f64),
-    /// What the phase of its lens is rotated by about its middle, from x towards y (degrees); the steering is not.
+    /// Rotation of the phase of its lens about its middle, from x towards y (degrees); the steering is not rotated.
     #[serde(skip_serializing_if = "is_zero")]
     pub rotation_deg: f64,
     /// Its own lens, in place of that all share.
@@ -45,7 +45,7 @@ pub struct PlacedSpec {
     pub lens: Option<LensSpec>,
 }
 
-/// What serde asks for keys that are left out where nothing is rotated.
+/// Test by which serde leaves the key out where nothing is rotated.
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_zero(deg: &f64) -> bool {
     *deg == 0.0
@@ -166,7 +166,7 @@ impl ArraySpec {
         spec
     }
 
-    /// `[[element]]`: each by itself.
+    /// `[[element]]`: each individually.
     fn read_placed(
         s: &Section<'_, '_>,
         lens: &LensSpec,
@@ -219,24 +219,24 @@ impl ArraySpec {
         self.placed(index).and_then(|p| p.lens.as_ref()).unwrap_or(shared)
     }
 
-    /// What an element is, if it was placed by itself.
+    /// Specification of an element that was placed individually.
     pub fn placed(&self, index: (i32, i32)) -> Option<&PlacedSpec> {
         self.placed.get(usize::try_from(index.0).ok()?.checked_sub(1)?)
     }
 
-    /// What the lens of an element is rotated by (degrees).
+    /// Rotation of the lens of an element (degrees).
     pub fn rotation_deg(&self, index: (i32, i32)) -> f64 {
         self.placed(index).map_or(0.0, |p| p.rotation_deg)
     }
 
-    /// Whether lenses that need so much along x and along y (nm) have room beside one another, as far as a grid tells.
+    /// True if lenses that need so much along x and along y (nm) have room next to one another, as far as a grid shows.
     pub(crate) fn has_room_for(&self, sides_nm: [i64; 2]) -> bool {
         let counts = [self.count.0, self.count.1];
         let spacings_nm = [self.spacing_nm, self.spacing_y_nm.unwrap_or(self.spacing_nm)];
         self.placed.is_empty() && (0..2).all(|axis| counts[axis] == 1 || spacings_nm[axis] >= sides_nm[axis])
     }
 
-    /// Whether an element has a lens of its own, or one that is rotated.
+    /// True if an element has an individual lens, or one that is rotated.
     pub fn has_own_lenses(&self) -> bool {
         self.placed.iter().any(|p| p.lens.is_some() || p.rotation_deg != 0.0)
     }

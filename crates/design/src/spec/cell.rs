@@ -13,7 +13,7 @@ use metalith_rcwa::Material;
 pub struct CellSpec {
     /// Distance of neighbouring pillars (nm), even.
     pub pitch_nm: u32,
-    /// How they stand; on a hexagonal lattice they are circles.
+    /// Lattice of the pillars; on a hexagonal one they are circles.
     #[serde(skip_serializing_if = "LatticeKind::is_square")]
     pub lattice: LatticeKind,
     /// Cross-section of the pillars.
@@ -39,7 +39,7 @@ pub struct CellSpec {
     /// Material there, over [`CellSpec::ambient_index`]: a name or the path of a CSV table.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ambient_material: Option<String>,
-    /// What lies between substrate and pillars, from the substrate upwards.
+    /// Layers between substrate and pillars, from the substrate upwards.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub under: Vec<UnderSpec>,
     /// Wavelengths that the cell is tabulated over (um), if the design says so. Decides nothing of the layout.
@@ -143,8 +143,8 @@ impl CellSpec {
         cell
     }
 
-    /// Whether it is the cell of the paper: square pillars of silicon nitride, 700 nm high on a pitch of 350 nm, on glass, in
-    /// air. Published polynomials, and errors that were measured against truth data, are of it.
+    /// True if it is the cell of the paper: square pillars of silicon nitride, 700 nm high on a pitch of 350 nm, on
+    /// glass, in air. Published polynomials, and errors that were measured against truth data, hold for this cell.
     pub fn is_of_the_paper(&self) -> bool {
         self.shape.is_square()
             && self.lattice.is_square()
@@ -157,8 +157,8 @@ impl CellSpec {
             && self.under.is_empty()
     }
 
-    /// Whether it is another than that of the paper, as far as the keys of its section have no fault: what is published does not
-    /// hold of it.
+    /// True if it is another cell than the paper's, as far as the keys of its section have no fault: what is published
+    /// does not hold for it.
     pub(crate) fn is_known_to_be_another(&self, s: &Section<'_, '_>) -> bool {
         let keys = [
             "cell.pitch_nm",
@@ -177,7 +177,7 @@ impl CellSpec {
         !self.is_of_the_paper() && s.sound(&keys)
     }
 
-    /// Whether a mapping asks only for widths that may be written, to within half a step.
+    /// True if a mapping asks only for widths that may be written, to within half a step.
     pub fn fits(&self, mapping: &InversePolynomial) -> bool {
         let (low, high) = mapping.range();
         let pitch = f64::from(self.pitch_nm);
@@ -192,8 +192,8 @@ impl CellSpec {
         last.unwrap_or_else(|| self.lattice.widest_nm(self.pitch_nm) as u16)
     }
 
-    /// The light that pillars give the phase of the design where they tell polarisations apart, in the light that it is verified in:
-    /// of upright rectangles that along the nearer axis.
+    /// The light that pillars give the phase of the design where they distinguish polarisations, in the light that it
+    /// is verified in: of upright rectangles that along the nearer axis.
     pub fn focused(&self, verified: Option<Polarisation>) -> Option<FocusedLight> {
         let axis = || verified.map_or(PolarisationAxis::X, PolarisationAxis::nearest);
         match self.arriving {

@@ -13,7 +13,8 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
-    /// Of a lens whose outline is turned by so many degrees; none where there is no lattice, which is a mistake of its own.
+    /// Footprint of a lens whose outline is turned by so many degrees; `None` where there is no lattice, which is
+    /// another mistake.
     pub fn of(lens: &LensSpec, rotation_deg: f64, cell: &CellSpec) -> Option<Self> {
         let lattice = Lattice::of_kind_covering(cell.lattice, lens.diameter_nm, cell.pitch_nm).ok()?;
         let reach = match &lens.outline {

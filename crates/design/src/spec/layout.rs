@@ -9,7 +9,7 @@ use metalith_core::LayerNumber;
 use metalith_core::document::{Limits, Section};
 use metalith_core::text::quoted;
 
-/// How the geometry is nested in the file. All three hold the same geometry.
+/// Hierarchy: nesting of the geometry in the file. All three hold the same geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Hierarchy {
@@ -26,7 +26,7 @@ pub enum Hierarchy {
 pub struct LayoutLayer {
     pub layer: i16,
     pub datatype: i16,
-    /// For people: shown in the viewer and in the hand-off.
+    /// Purpose for people: shown in the viewer and in the hand-off.
     pub purpose: String,
 }
 
@@ -76,7 +76,7 @@ pub struct ChipSpec {
 /// A set of equal crosses for alignment, in both steps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MarkSpec {
-    /// What the set is for, such as "global".
+    /// Purpose of the set, such as "global".
     pub name: String,
     /// Length of an arm from tip to tip (nm).
     pub length_nm: i64,

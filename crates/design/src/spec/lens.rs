@@ -27,7 +27,7 @@ pub struct LensSpec {
     /// Phases over the plane that are added to it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub terms: Vec<PhaseTerm>,
-    /// Of upright rectangles, the phase of light polarised along y, if it is another than that of light along x.
+    /// Phase of light polarised along y, for upright rectangles, if it is another than the phase of light along x.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub along_y: Option<PhaseAlongY>,
 }
@@ -59,8 +59,8 @@ impl LensSpec {
         it
     }
 
-    /// The lens of an element that is placed by itself, if it says anything of it; the rest is as in the lens that all share,
-    /// whose phase `shared_phase` says.
+    /// The lens of an element that is placed individually, if it says anything of it; the rest is as in the lens that
+    /// all share, whose phase `shared_phase` says.
     pub(super) fn read_own(
         s: &Section<'_, '_>,
         shared: &Self,

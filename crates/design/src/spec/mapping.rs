@@ -15,15 +15,15 @@ use metalith_pillars::PolarisationBasis;
 
 pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
 
-/// Whether the library of upright rectangles must be there already.
+/// State of the library of upright rectangles that a reader requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LibraryFile {
     Needed,
-    /// For who makes it; until then a design has no pillars.
+    /// Library that the caller makes; until then a design has no pillars.
     ToBeMade,
 }
 
-/// How phase becomes width.
+/// Mapping from phase to width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MappingSpec {
     /// Wavelength lambda_0 that the mapping is made for (um).
@@ -33,29 +33,29 @@ pub struct MappingSpec {
     /// File of a table that stands in its place, such as `metalith cells` writes.
     #[serde(skip)]
     pub table_file: Option<PathBuf>,
-    /// What that file holds.
+    /// Contents of that file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<MappingTable>,
-    /// Of upright rectangles: the file of their library, such as `metalith cells` writes.
+    /// File of the library of upright rectangles, such as `metalith cells` writes.
     #[serde(skip)]
     pub pillar_library_file: Option<PathBuf>,
-    /// What that file holds.
+    /// Contents of that file.
     #[serde(
         rename = "library",
         serialize_with = "library_itself",
         skip_serializing_if = "Option::is_none"
     )]
     pub pillar_library: Option<Arc<PillarLibrary>>,
-    /// Why a library that is to be made anew was not read.
+    /// Reason why a library that is to be made anew was not read.
     #[serde(skip)]
     pub pillar_library_refused: Option<String>,
-    /// Of rotated rectangles: what their rotation has beside half of the phase.
+    /// Rotation of rotated rectangles other than half of the phase.
     #[serde(skip_serializing_if = "RotationMapping::is_half")]
     pub rotation: RotationMapping,
     /// Mappings of steered elements, where they have their own.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub steered: Vec<SteeredMapping>,
-    /// What mappings are compared over. Decides nothing of the layout.
+    /// Settings over which mappings are compared. Decides nothing of the layout.
     #[serde(skip)]
     pub comparison: MappingComparison,
 }

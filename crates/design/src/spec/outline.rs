@@ -130,7 +130,7 @@ impl LensOutline {
         })
     }
 
-    /// Whether a place from the middle of the element (nm) is inside or on the rim.
+    /// True if a place from the middle of the element (nm) is inside or on the rim.
     pub fn holds(&self, x: i64, y: i64) -> bool {
         is_inside(sides(&self.corners_nm), x, y)
     }
@@ -171,7 +171,7 @@ impl LensOutline {
         (0..n).map(corner).collect()
     }
 
-    /// Whether no two sides of the outline grown by a margin (nm) meet but at their common corner.
+    /// True if no two sides of the outline grown by a margin (nm) meet but at their common corner.
     pub fn grows(&self, margin_nm: i64) -> bool {
         is_simple(&self.grown(margin_nm))
     }
@@ -221,13 +221,13 @@ impl LensOutline {
 pub(crate) struct OutlineRows(Vec<Vec<Side>>);
 
 impl OutlineRows {
-    /// As [`LensOutline::holds`] of a place in row `iy`.
+    /// Variant of [`LensOutline::holds`] for a place in row `iy`.
     pub(crate) fn holds(&self, iy: usize, x: i64, y: i64) -> bool {
         is_inside(self.0[iy].iter().copied(), x, y)
     }
 }
 
-/// From corner to corner (nm).
+/// Side of an outline, from corner to corner (nm).
 type Side = ((i64, i64), (i64, i64));
 
 /// Sides of a closed polygon.
@@ -235,7 +235,7 @@ fn sides(corners: &[(i64, i64)]) -> impl Iterator<Item = Side> {
     corners.iter().copied().zip(corners.iter().copied().cycle().skip(1))
 }
 
-/// Whether a place is inside a polygon or on its rim, by the sides that its row reaches, if not all.
+/// True if a place is inside a polygon or on its rim, by all its sides or the sides that its row reaches.
 fn is_inside(sides: impl Iterator<Item = Side>, x: i64, y: i64) -> bool {
     let mut inside = false;
     for ((ax, ay), (bx, by)) in sides {
@@ -264,7 +264,7 @@ fn outwards((ax, ay): (i64, i64), (bx, by): (i64, i64)) -> [f64; 2] {
     [y / length, -x / length]
 }
 
-/// Whether a polygon goes around once, counter-clockwise, and no two of its sides meet but at their common corner.
+/// True if a polygon goes around once, counter-clockwise, and no two of its sides meet but at their common corner.
 fn is_simple(corners: &[(i64, i64)]) -> bool {
     let all: Vec<_> = sides(corners).collect();
     let n = all.len();

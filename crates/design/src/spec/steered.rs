@@ -13,10 +13,10 @@ use metalith_core::document::{Limits, Section};
 pub struct SteeringSteps(pub f64, pub f64);
 
 impl SteeringSteps {
-    /// Of an element that looks straight ahead.
+    /// Steering of an element that looks straight ahead.
     pub const NONE: Self = Self(0.0, 0.0);
 
-    /// Of the element of a grid with this index; none where elements are placed one by one.
+    /// Steering of the element of a grid with this index; `None` where elements are placed one by one.
     pub fn of(array: &ArraySpec, index: (i32, i32)) -> Option<Self> {
         let along = |index: i32, count: u32| {
             let steps = f64::from(index.unsigned_abs());

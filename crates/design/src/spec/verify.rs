@@ -14,7 +14,7 @@ use super::lens::WAVELENGTH;
 /// Edge of a sensor pixel where nothing says it (um): that of the camera of the paper.
 pub const USUAL_PIXEL_UM: f64 = 5.86;
 
-/// What is simulated from the layout that was read back, and the limits it is held to.
+/// Simulation of the layout that was read back, and the limits of its figures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerifySpec {
     /// Wavelengths of the PSFs (um).
@@ -23,7 +23,7 @@ pub struct VerifySpec {
     pub field_angles: Vec<FieldAngle>,
     /// The cell that the layout is judged by.
     pub fidelity: Fidelity,
-    /// At which angle light is taken to pass the cells.
+    /// Angle at which light is taken to pass the cells.
     pub incidence: CellIncidence,
     /// Edge of the square window about the chief ray, in samples of one pitch.
     pub window_samples: usize,
@@ -32,7 +32,7 @@ pub struct VerifySpec {
     /// Polarisation of the light that is simulated, where pillars change it and it is not that which they focus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polarisation: Option<Polarisation>,
-    /// What is before the sensor, if anything, where pillars change polarisation.
+    /// Analyser before the sensor, if any, where pillars change polarisation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub analyser: Option<Analyser>,
     /// Camera file that the figures of white light are for; three flat bands where none is named.
@@ -46,8 +46,9 @@ pub struct VerifySpec {
 pub enum CellIncidence {
     /// Along the normal, whatever the field angle; the same cell everywhere.
     Normal,
-    /// As light arrives at each element from each field angle, both polarisations; the cells are solved once
-    /// for each direction and wavelength.
+    /// Oblique incidence: the angle at which light arrives at each element from each field angle, both polarisations; the
+    /// cells are solved once for each direction and wavelength.
+    #[serde(rename = "oblique")]
     AsLit,
 }
 
@@ -133,7 +134,7 @@ impl VerifySpec {
         spec
     }
 
-    /// Source and detector of light at pillars that tell polarisations apart.
+    /// Source and detector of light at pillars that distinguish polarisations.
     pub fn light(&self) -> PolarisedLight {
         PolarisedLight {
             arriving: self.polarisation,
@@ -154,7 +155,7 @@ fn read_polarisation(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Polarisatio
     Some(named).filter(|light| *light != usual)
 }
 
-/// What is before the sensor.
+/// Analyser before the sensor.
 fn read_analyser(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Analyser> {
     const KEY: &str = "analyser";
     let named = Analyser::CHOICES.map(|(name, one)| (name, Some(one)));
@@ -172,7 +173,7 @@ fn read_analyser(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Analyser> {
     cell.shape.basis().map(|_| analyser)
 }
 
-/// A fault at what counts only for pillars that tell polarisations apart.
+/// A fault at what counts only for pillars that distinguish polarisations.
 fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) {
     if cell.shape.basis().is_none() {
         s.fault_given(
@@ -185,8 +186,9 @@ fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) {
 }
 
 fn read_incidence(s: &Section<'_, '_>, cell: &CellSpec) -> CellIncidence {
-    let choices = [("normal", CellIncidence::Normal), ("as_lit", CellIncidence::AsLit)];
-    let incidence = s.choice("incidence", &choices, Some(CellIncidence::Normal));
+    let choices = [("normal", CellIncidence::Normal), ("oblique", CellIncidence::AsLit)];
+    let renamed = [("as_lit", "oblique")];
+    let incidence = s.choice_renamed("incidence", &choices, &renamed, Some(CellIncidence::Normal));
     if incidence == CellIncidence::AsLit && cell.shape.basis().is_some() {
         let [what, hint] = OBLIQUE_RECTANGLES;
         s.fault_given(&["cell.shape"], "incidence", what, hint);
@@ -194,8 +196,8 @@ fn read_incidence(s: &Section<'_, '_>, cell: &CellSpec) -> CellIncidence {
     incidence
 }
 
-/// The cell that judges, if it is left out: unlike neighbours for the cell that they were compared with real rows of, else
-/// equal ones.
+/// The cell that judges, if it is left out: dissimilar neighbours for the cell that they were compared with real rows
+/// of, else equal ones.
 fn read_fidelity(s: &Section<'_, '_>, cell: &CellSpec) -> Fidelity {
     let usual = if cell.is_of_the_paper() {
         Fidelity::Neighbours

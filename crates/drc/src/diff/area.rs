@@ -1,4 +1,5 @@
-//! Whether two sets of outlines expose every place equally often, however they are cut up.
+//! Comparison of the areas of two sets of outlines: whether both expose every place equally often, however they are cut
+//! up.
 //!
 //! How often a set covers a place decides the sides of its outlines, added up along each line, and is decided by
 //! them: where two outlines meet, their sides run in opposite directions and cancel. So two sets are equal if, on
@@ -17,9 +18,9 @@ struct End {
     direction: (i64, i64),
     /// Its distance from the origin times the length of the direction.
     offset: i128,
-    /// Where on the line.
+    /// Place on the line.
     at: Point,
-    /// What begins here in the direction of the line, less what ends.
+    /// Number of sides that begin here in the direction of the line, less the number that end.
     begins: i32,
 }
 
@@ -51,7 +52,7 @@ impl Sides {
         }
     }
 
-    /// Whether both sets cover every place equally often: all that begins at a place of a line ends there.
+    /// True if both sets cover every place equally often: all that begins at a place of a line ends there.
     pub fn cancel(mut self) -> bool {
         self.0.sort_unstable();
         let place = |e: &End| (e.direction, e.offset, e.at);

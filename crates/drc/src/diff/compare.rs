@@ -142,12 +142,12 @@ fn map_over(a: &Content, b: &Content, unit_nm: f64) -> ChangeMap {
     }
 }
 
-/// Whether edges along x and y are exchanged.
+/// True if edges along x and y are exchanged.
 fn is_quarter_turn([a, b]: [u16; 2], to: [u16; 2]) -> bool {
     a != b && to == [b, a]
 }
 
-/// What is wider is larger by this: by area, of equal areas by the longer edge.
+/// Size by which pillars are ordered: by area, of equal areas by the longer edge.
 fn size([x, y]: [u16; 2]) -> (u32, u16) {
     (u32::from(x) * u32::from(y), x.max(y))
 }

@@ -26,7 +26,7 @@ pub(super) struct Outlines {
     pub rings: Vec<Ring>,
 }
 
-/// What is a pillar, and where.
+/// Pillars that are looked for: what is a pillar, and where.
 #[derive(Clone, Copy)]
 pub(super) struct WantedPillars<'a> {
     pub layer: LayerNumber,
@@ -36,7 +36,7 @@ pub(super) struct WantedPillars<'a> {
 
 /// One layout.
 pub(super) struct Content {
-    /// What is a pillar.
+    /// Shape of the pillars.
     pub shape: PillarShape,
     pub elements: Vec<ExtractedElement<StoredPillars>>,
     pub outlines: BTreeMap<LayerNumber, Outlines>,
@@ -51,7 +51,7 @@ pub(super) struct TextCopy {
     pub layer: LayerNumber,
     /// Its string, by its number in [`Strings`].
     pub string: u32,
-    /// In the common unit.
+    /// Place in the common unit.
     pub at: Point,
 }
 
@@ -125,7 +125,7 @@ impl Content {
         }
         let elements = reader.filler.finish().map_err(|cause| {
             let what = format!("{}: {cause}", layout.path().display());
-            Error::invalid(what, cause.remedy())
+            Error::refused("diff/unreadable", what, cause.remedy())
         })?;
         Ok(Self {
             shape: wanted.shape,
@@ -198,7 +198,8 @@ impl ContentReader<'_> {
     fn room(&mut self, count: usize) -> Result<()> {
         self.held += count as u64;
         if self.held > self.most {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "diff/too-many-off-lattice",
                 format!("more than {} rectangles and vertices off every lattice", self.most),
                 "write the layouts with fewer copies, or compare their cells one by one",
             ));
@@ -212,7 +213,8 @@ impl ContentReader<'_> {
             .moved
             .saturating_add((vertices as u64).saturating_mul(copies as u64));
         if self.moved > PLACED * self.most {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "diff/too-many-vertices",
                 format!("more than {} vertices with all references followed", PLACED * self.most),
                 "write the layouts with fewer copies, or compare their cells one by one",
             ));

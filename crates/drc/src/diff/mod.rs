@@ -72,7 +72,8 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     let total: u64 = sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
     let most = Allowance::of([a, b]).sites;
     if total > most {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "diff/too-many-sites",
             format!("{} elements with {total} lattice sites together", sites.len()),
             format!("up to {most} sites are compared; compare the cells of the elements one by one"),
         ));
@@ -97,14 +98,15 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     Ok(report)
 }
 
-/// What the pillars of two layouts are: those of the first, of upright rectangles with the lengths of both.
+/// Shape of the pillars of two layouts: the shape of the first, for upright rectangles with the lengths of both.
 fn both(first: PillarShape, second: PillarShape) -> Result<PillarShape> {
     let (Some(a), Some(b)) = (first.upright(), second.upright()) else {
         return Ok(first);
     };
     let united = UprightRectangles::of_lengths(a.lengths_nm().chain(b.lengths_nm()));
     let united = united.ok_or_else(|| {
-        Error::invalid(
+        Error::refused(
+            "diff/kinds-differ",
             format!(
                 "upright rectangles with edges of {} to {} nm in steps of {} nm, and of {} to {} nm in steps of {} nm",
                 a.shortest_nm,
@@ -127,7 +129,7 @@ fn gcd(a: i64, b: i64) -> i64 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Whether two files are the same, byte by byte.
+/// True if two files are equal, byte by byte.
 fn same_bytes(a: &Layout, b: &Layout) -> Result<bool> {
     if a.bytes() != b.bytes() {
         return Ok(false);

@@ -1,4 +1,4 @@
-//! Where the changes are, as a page to look at.
+//! Page of the places of all changes.
 
 use ndarray::Array2;
 

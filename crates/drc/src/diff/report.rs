@@ -21,7 +21,7 @@ pub struct ElementDiff {
     pub removed: u64,
     pub widened: u64,
     pub narrowed: u64,
-    /// Of rectangles, sites whose pillar is rotated otherwise; their edges are alike.
+    /// Number of sites of rectangles whose pillar is rotated otherwise; their edges are equal.
     #[serde(skip_serializing_if = "is_zero")]
     pub rotated: u64,
     /// Largest change of width where both have a pillar (nm).
@@ -50,7 +50,7 @@ pub struct LayerDiff {
     /// Outlines that only one of the layouts has.
     pub only_in_a: u64,
     pub only_in_b: u64,
-    /// Whether the outlines that differ cover the same area, only cut up differently.
+    /// True if the outlines that differ cover the same area, only cut up differently.
     pub same_area: bool,
 }
 
@@ -83,10 +83,10 @@ pub struct ReferenceChange {
     pub b: u64,
 }
 
-/// How both are nested.
+/// Difference of the nesting of two layouts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TreeDiff {
-    /// Whether both have the same cells and as many references of each to each.
+    /// True if both have the same cells and as many references of each to each.
     pub same: bool,
     pub cells: [usize; 2],
     pub levels: [u32; 2],
@@ -97,7 +97,7 @@ pub struct TreeDiff {
     pub references: Vec<ReferenceChange>,
 }
 
-/// Where changes are: counts in a grid of square tiles.
+/// Map of changes: counts in a grid of square tiles.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChangeMap {
     /// Left, bottom, right, top of all geometry (nm).

@@ -1,4 +1,4 @@
-//! How two layouts are nested.
+//! Comparison of the nesting of two layouts.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! Whether an outline crosses or overlaps itself: a sweep over its sides from left to right, exact in whole units.
+//! Test whether an outline crosses or overlaps itself: a sweep over its sides from left to right, exact in whole units.
 //!
 //! After Shamos and Hoey: sides that cross become neighbours in the order from below before the sweep reaches
 //! the crossing. Places are ordered by x, then y, so that upright sides are steepest of all. On the way the
@@ -14,9 +14,8 @@ use treap::scrambled;
 /// No side.
 const NONE: u32 = u32::MAX;
 
-/// Whether a closed ring of corners crosses itself, goes round some place twice, or goes round one place to the
-/// left and round another to the right. One that only touches itself does not: a hole drawn with a slit is a good
-/// outline.
+/// True if a closed ring of corners crosses itself, goes round some place twice, or goes round one place to the left
+/// and round another to the right. One that only touches itself does not: a hole drawn with a slit is a good outline.
 pub(super) fn crosses_itself(ring: &[Point]) -> bool {
     // Four sides with corners that are none taken out may already cross; three may not.
     ring.len() >= 5 && Sweep::new(ring).finds_a_fault()
@@ -27,7 +26,7 @@ pub(super) fn crosses_itself(ring: &[Point]) -> bool {
 struct SweepEdge {
     left: Point,
     right: Point,
-    /// What it adds to the turns when it is passed upwards: 1 if the outline runs along it to the right.
+    /// Number that it adds to the turns when it is passed upwards: 1 if the outline runs along it to the right.
     turn: i32,
 }
 
@@ -158,7 +157,7 @@ impl Sweep {
         cross(a.left, a.right, b.left, b.right)
     }
 
-    /// Whether side `k`, which begins at the sweep line, runs above side `other` there.
+    /// True if side `k`, which begins at the sweep line, runs above side `other` there.
     fn is_above(&self, k: u32, other: u32) -> bool {
         let (new, old) = (&self.sides[k as usize], &self.sides[other as usize]);
         match side(old.left, old.right, new.left).signum() {
@@ -169,7 +168,7 @@ impl Sweep {
         }
     }
 
-    /// Whether two sides lie on one line where both are.
+    /// True if two sides lie on one line where both are.
     fn coincide(&self, a: u32, b: u32) -> bool {
         let (a, b) = (&self.sides[a as usize], &self.sides[b as usize]);
         side(a.left, a.right, b.left) == 0 && side(a.left, a.right, b.right) == 0

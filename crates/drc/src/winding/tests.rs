@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use super::super::polygon::on_segment;
 use super::*;
 
-/// By comparing all pairs of sides, and then the turns in every level strip between vertices.
+/// Slow test that compares all pairs of sides, and then the turns in every level strip between vertices.
 fn crosses_itself_slowly(ring: &[Point]) -> bool {
     if ring.len() < 5 {
         return false;
@@ -28,9 +28,9 @@ fn crosses_itself_slowly(ring: &[Point]) -> bool {
     touches && winds_twice(ring)
 }
 
-/// Whether a closed ring whose sides meet at vertices alone goes round some place twice, or round one place
-/// to the left and round another to the right. Between two neighbouring heights of vertices its sides keep
-/// their order, and the turns about each place are counted from the left.
+/// True if a closed ring whose sides meet at vertices alone goes round some place twice, or round one place to the left
+/// and round another to the right. Between two neighbouring heights of vertices its sides keep their order, and the
+/// turns about each place are counted from the left.
 fn winds_twice(ring: &[Point]) -> bool {
     let mut heights: Vec<i64> = ring.iter().map(|p| p.y).collect();
     heights.sort_unstable();
@@ -97,7 +97,7 @@ impl PartialEq for Fraction {
 
 impl Eq for Fraction {}
 
-/// Whether two segments share a point.
+/// True if two segments share a point.
 fn meet(a: Point, b: Point, c: Point, d: Point) -> bool {
     cross(a, b, c, d) || on_segment(a, b, c) || on_segment(a, b, d) || on_segment(c, d, a) || on_segment(c, d, b)
 }

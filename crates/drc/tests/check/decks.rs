@@ -1,4 +1,4 @@
-//! What the decks of dose matrix and test structures ask that those of the chip do not.
+//! Tests of what the decks of dose matrix and test structures ask and the deck of the chip does not.
 
 use metalith_core::Silent;
 use metalith_drc::{DrcReport, Status};
@@ -23,7 +23,7 @@ fn judge(deck: &str, changes: &[(&str, &str)], gds: &mut Gds) -> DrcReport {
     metalith_drc::check(&layout, &deck_from(deck, changes), &input(), &Silent).unwrap()
 }
 
-/// What is on the layer of another dose is as near, as doubled and as well known as on one's own.
+/// Shapes on the layer of another dose count as near, doubled and known, as on the same layer.
 #[test]
 fn doses_are_exposed_on_one_wafer() {
     const LAYERS: &[(&str, &str)] = &[(

@@ -1,4 +1,4 @@
-//! What a check says: what did not run, copies, waivers, the forms of the report, exit codes.
+//! Tests of the report of a check: what did not run, copies, waivers, the forms of the report, exit codes.
 
 use metalith_core::Silent;
 use metalith_drc::{CheckInput, DrcReport, Status, Waivers};

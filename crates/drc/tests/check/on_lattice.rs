@@ -1,4 +1,4 @@
-//! What a deck finds on pillars of any shape on a square lattice.
+//! Tests of the findings of a deck on pillars of any shape on a square lattice.
 
 use metalith_drc::Deck;
 use metalith_testing::gds::Gds;

@@ -11,7 +11,7 @@ use metalith_testing::lens::{Chip, cross_on};
 const OPEN: i16 = 2;
 const MARKS: i16 = 4;
 
-/// What of a file can be drawn otherwise.
+/// Parts of a file that can be drawn otherwise.
 struct Draw {
     /// Half the edge of the opening over the lens (nm), and how far it is off along x.
     half: i32,
@@ -189,8 +189,8 @@ fn rules_that_are_broken_together() {
 /// A rule, and what is drawn to break it.
 type Outline = (&'static str, fn(&mut Gds));
 
-/// What else is drawn on the layer of the marks is a mark that no one asked for: each breaks its own rule and
-/// that the marks are those of the deck.
+/// Outlines on the layer of the marks that no one asked for: each breaks its own rule, and the rule that the marks are
+/// the marks of the deck.
 const OUTLINES: &[Outline] = &[
     ("outline.doubled_vertex", |g| {
         mark(g, &[(0, 0), (0, 0), (40, 0), (40, 30), (0, 30), (0, 0)])

@@ -143,7 +143,7 @@ fn outlines_of_many_vertices() {
     assert_eq!(violations(&report, "outline.self_crossing"), 1);
 }
 
-/// One of 8000 vertices placed 10,000 times: vertices count, not shapes.
+/// Outline of 8000 vertices placed 10,000 times: vertices count, not shapes.
 #[test]
 fn copies_of_long_outlines() {
     let bytes = copies(100, 100, (1000, 1000), |gds| {

@@ -145,7 +145,8 @@ fn edges_of_rotated_rectangles_have_their_widths() {
     }
 }
 
-/// Small cells are told by their place in their own file: what a further file has at the place of a sound pillar is looked at.
+/// Small cells are identified by their place in their own file: what a further file has at the place of a sound pillar
+/// is looked at.
 #[test]
 fn cells_of_a_further_file_are_not_those_of_the_first() {
     let file = |outline: &[(i32, i32)], rows: std::ops::Range<i32>| {

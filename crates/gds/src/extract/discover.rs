@@ -1,4 +1,4 @@
-//! Where the elements of a layout from anywhere are, and on which lattice they stand.
+//! Discovery of the elements of any layout, and of the lattice on which they stand.
 
 use super::failed;
 use super::lattices::{Cluster, FEWEST};
@@ -13,22 +13,22 @@ use crate::{
 use metalith_core::Progress;
 use metalith_pillars::{ElementSite, PillarShape};
 
-/// How a layout is looked at.
+/// Settings of one search of a layout.
 #[derive(Clone, Copy)]
 struct Look {
-    /// Of the side of a tile.
+    /// Bits of the side of a tile.
     bits: u32,
     /// Wider shapes are pads or marks (nm).
     widest_nm: i64,
 }
 
-/// As nearly all lenses ask for.
+/// Settings that nearly all lenses need.
 const CLOSE: Look = Look {
     bits: FINE,
     widest_nm: 6000,
 };
-/// For wider pitches, up to the widest of a design. Marks and pads are taken for pillars then too: a second look, where the first
-/// finds no closer lattice.
+/// Settings for wider pitches, up to the widest of a design. Marks and pads are taken for pillars then too: a second
+/// look, where the first finds no closer lattice.
 const WIDE: Look = Look {
     bits: COARSE,
     widest_nm: 20_000,
@@ -38,7 +38,7 @@ const FEWEST_AMONG: u64 = 4;
 /// Elements found at most.
 const MOST_ELEMENTS: usize = 4096;
 
-/// What stands on the layers of pillars of a layout.
+/// Map of what stands on the layers of pillars of a layout.
 struct Map {
     scale: Scale,
     widest_nm: i64,
@@ -46,9 +46,9 @@ struct Map {
     pillars: Places,
     /// Rectangles at any angle, of whatever size.
     tilted: Places,
-    /// How many squares and circles.
+    /// Numbers of squares and of circles.
     shapes: [u64; 2],
-    /// What else may be pillars.
+    /// Other sizes that may be pillars.
     sizes: Sizes,
 }
 
@@ -63,7 +63,7 @@ struct Search {
 #[derive(Clone, Debug)]
 pub struct Discovered {
     pub sites: Vec<ElementSite>,
-    /// What most of its pillars are.
+    /// Shape of most of its pillars.
     pub shape: PillarShape,
 }
 
@@ -111,7 +111,7 @@ pub fn discover(
     Ok(Discovered { sites, shape })
 }
 
-/// What one look at a layout finds.
+/// Findings of one search of a layout.
 struct Seen {
     sites: Vec<ElementSite>,
     shape: PillarShape,
@@ -120,13 +120,14 @@ struct Seen {
 }
 
 impl Seen {
-    /// Whether a look for wider pitches may find more: nothing was found, or no lattice that is closer than such pitches are.
+    /// True if a search for wider pitches may find more: nothing was found, or no lattice that is closer than such
+    /// pitches are.
     fn may_be_wider(&self) -> bool {
         let is_wide = |site: &ElementSite| i64::from(site.lattice.pitch_nm()) > CLOSE.widest_nm;
         self.shapes >= FEWEST && self.sites.iter().all(is_wide)
     }
 
-    /// Whether there are elements, none of a pitch that no design has.
+    /// True if there are elements, none of a pitch that no design has.
     fn holds_a_lens(&self) -> bool {
         let is_known = |site: &ElementSite| i64::from(site.lattice.pitch_nm()) <= WIDE.widest_nm;
         !self.sites.is_empty() && self.sites.iter().all(is_known)

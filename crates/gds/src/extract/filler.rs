@@ -26,7 +26,7 @@ pub struct Filler {
     guesses: Vec<u32>,
     /// Placements of the current cell about the middles of elements, if all of them are.
     orbits: Vec<Orbit>,
-    /// How the placements of the current cell are images of the first one, if they are.
+    /// Images of the first placement that the placements of the current cell are, if they are.
     images: Option<Images>,
     /// The first placement that these were found with.
     first: Transform,
@@ -66,7 +66,7 @@ impl Filler {
         }
     }
 
-    /// The same, of which this many sites may be held.
+    /// Same filler, which may hold this many sites.
     #[must_use]
     pub fn holding(mut self, most: u64) -> Self {
         self.most = most;
@@ -245,7 +245,8 @@ impl Filler {
         }
     }
 
-    /// As [`Filler::put`] of a pillar that may be told by its corners: `takes` is asked of those that their width tells.
+    /// Variant of [`Filler::put`] for a pillar that its corners may identify: `takes` is called for pillars that their
+    /// width identifies.
     pub fn put_drawn(
         &mut self,
         pillar: &DrawnPillar,
@@ -259,7 +260,7 @@ impl Filler {
         self.fill(element, row, column, number)
     }
 
-    /// Element, row and column of a pillar that is told by its corners.
+    /// Element, row and column of a pillar that is identified by its corners.
     #[inline]
     fn site_of_drawn(&mut self, pillar: &DrawnPillar, placement: usize) -> Result<(u32, usize, usize), Why> {
         let r = &pillar.around;
@@ -330,8 +331,8 @@ impl Filler {
         }
     }
 
-    /// Of a pillar that is told by its corners and the one that is on its site already, leave the one of the larger number
-    /// there; the number of the other.
+    /// Keeps the pillar of the larger number, of one that its corners identify and the one that is on its site already;
+    /// returns the number of the other.
     pub fn keep_larger_number(&mut self, pillar: &DrawnPillar, placement: usize) -> u16 {
         let number = pillar.number.unwrap_or(0);
         let Standing::Site(element, row, column) = self.sites.stand(&pillar.around, &mut self.guesses[placement])
@@ -348,8 +349,8 @@ impl Filler {
         there
     }
 
-    /// Of a pillar and the one that is on its site already, leave the wider there; the other, as a
-    /// rectangle about the same site. Both have even widths.
+    /// Keeps the wider of a pillar and the one that is on its site already; returns the other, as a rectangle about the
+    /// same site. Both have even widths.
     pub fn keep_wider(&mut self, r: &Rect, placement: usize) -> Rect {
         let Standing::Site(element, row, column) = self.sites.stand(r, &mut self.guesses[placement]) else {
             return *r;

@@ -24,7 +24,7 @@ impl StoredPillars {
         }
     }
 
-    /// Whether no pillar is without its copies.
+    /// True if no pillar is without its copies.
     pub fn is_folded(&self) -> bool {
         !matches!(self, Self::Whole(_))
     }

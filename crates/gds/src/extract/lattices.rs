@@ -1,4 +1,4 @@
-//! Which lattice the shapes of a group of tiles stand on.
+//! Lattice on which the shapes of a group of tiles stand.
 
 use std::collections::BTreeMap;
 
@@ -98,8 +98,8 @@ impl Cluster<'_> {
         (first, (last - first).max(0) / step + 1)
     }
 
-    /// Whether enough of the last centres of its tiles are in rows between those of its samples, and shifted as those of
-    /// a hexagonal lattice with this half pitch and distance of rows (half nm).
+    /// True if enough of the last centres of its tiles are in rows between the rows of its samples, and shifted as on a
+    /// hexagonal lattice with this half pitch and distance of rows (half nm).
     fn has_rows_between(&self, half_pitch: i64, row: i64) -> bool {
         let between = |&&k: &&usize| {
             let (Some(first), Some(last)) = (self.tiles.samples(k).next(), self.tiles.last(k)) else {
@@ -173,7 +173,7 @@ impl Cluster<'_> {
 /// Coordinates of a place along x and along y.
 const AXES: [fn(Point) -> i64; 2] = [|s| s.x, |s| s.y];
 
-/// Nothing, if so many pillars fill a lattice of so many places an axis well enough to be one.
+/// Succeeds if so many pillars fill a lattice of so many places an axis well enough to be one.
 fn dense_enough(
     pillars: u64,
     sites: i64,
@@ -193,7 +193,7 @@ fn dense_enough(
     })
 }
 
-/// How often the key counted most often was.
+/// Count of the key counted most often.
 fn most_common_count(counts: &BTreeMap<i64, u64>) -> u64 {
     counts.values().copied().max().unwrap_or(0)
 }

@@ -41,7 +41,7 @@ const MOST_SITES: u64 = 1 << 28;
 /// 30 mm 919 million.
 const MOST_GIVEN_SITES: u64 = 1 << 31;
 
-/// Whether the lattices of these elements can be held, known before the layout at `path` is read.
+/// Checks that the lattices of these elements can be held, before the layout at `path` is read.
 ///
 /// # Errors
 /// [`ExtractionError::Sites`] if they have too many sites together.
@@ -49,7 +49,7 @@ pub fn fits(path: &Path, elements: &[ElementSite]) -> Result<()> {
     fits_within(path, elements, &vec![Holding::Whole; elements.len()], MOST_SITES)
 }
 
-/// How an element is held.
+/// Way in which an element is held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Holding {
     /// All sites.
@@ -67,7 +67,7 @@ pub fn held_sites(elements: &[ElementSite], holdings: &[Holding]) -> u64 {
     elements.iter().zip(holdings).map(held).sum()
 }
 
-/// As [`fits`], of elements that a design gives, with how each is held by [`extract_folded`].
+/// Variant of [`fits`] for elements that a design gives, with the way in which [`extract_folded`] holds each.
 ///
 /// # Errors
 /// As [`fits`].
@@ -87,7 +87,7 @@ fn fits_within(path: &Path, elements: &[ElementSite], holdings: &[Holding], most
     }))
 }
 
-/// What is wrong with the layout at `path`, as an error.
+/// Error that says what is wrong with the layout at `path`.
 fn failed(path: &Path) -> impl Fn(ExtractionError) -> Error {
     |cause| Error::Extraction {
         path: path.to_owned(),
@@ -138,7 +138,8 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
     })
 }
 
-/// As [`extract`]; elements that are folded by all symmetries of the square stay so, which makes room for larger ones.
+/// Variant of [`extract`] in which elements that are folded by all symmetries of the square stay folded, which makes
+/// room for larger ones.
 ///
 /// # Errors
 /// As [`extract`].

@@ -1,8 +1,8 @@
-//! What stands on the pillar layer and is not a pillar on its lattice.
+//! Shapes on the pillar layer that are not pillars on their lattice.
 
 use serde::Serialize;
 
-/// Why a shape is not a pillar.
+/// Reason why a shape is not a pillar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Why {
@@ -35,7 +35,7 @@ impl Why {
         Self::OtherShape,
     ];
 
-    /// In words.
+    /// Words for the reason.
     pub fn words(self) -> &'static str {
         match self {
             Self::OffLattice => "off the lattice",

@@ -1,4 +1,4 @@
-//! Where the shapes of one kind stand on a layout, tile by tile.
+//! Places of the shapes of one kind on a layout, tile by tile.
 
 use super::sites::Scale;
 use super::tiles::{MOST_TILES, TileMap};
@@ -7,12 +7,12 @@ use crate::{Point, Rect, Transform};
 /// A shape as it is looked for, in half nanometres.
 pub(super) struct Centre {
     pub at: Point,
-    /// Whether its edges are on the grid of whole nanometres if its centre is on that of half ones.
+    /// True if its edges are on the grid of whole nanometres where its centre is on the grid of half ones.
     pub even: bool,
 }
 
 impl Centre {
-    /// That of the box around a shape, if it is near enough and on the grid.
+    /// Centre of the box around a shape, if it is near enough and on the grid.
     #[inline]
     pub fn of(r: &Rect, scale: Scale) -> Option<Self> {
         if !scale.reaches(r) {
@@ -28,7 +28,7 @@ impl Centre {
 pub(super) struct Places {
     scale: Scale,
     tiles: TileMap,
-    /// Of the current cell in its own coordinates, if it is placed more than once: each shape is looked at once.
+    /// Tiles of the current cell in its own coordinates, if it is placed more than once: each shape is visited once.
     own: TileMap,
     /// Placements of the current cell whose shapes are in `own`.
     placements: Vec<Transform>,
@@ -39,7 +39,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// By tiles whose side is two to the power of `bits` (half nm).
+    /// Places by tiles whose side is two to the power of `bits` (half nm).
     pub fn new(scale: Scale, bits: u32) -> Self {
         Self {
             scale,
@@ -102,7 +102,7 @@ impl Places {
         }
     }
 
-    /// Whether the shapes of a cell with these placements are gathered in its own coordinates.
+    /// True if the shapes of a cell with these placements are gathered in its own coordinates.
     fn gathers(&self, placements: &[Transform]) -> bool {
         let near = |t: &Transform| matches!(*t, Transform::Square { dx, dy, .. } if self.scale.reaches(&Rect::around(&[Point::new(dx, dy)])));
         placements.len() > 1 && self.scale.den == 1 && placements.iter().all(near)

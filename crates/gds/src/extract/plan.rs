@@ -1,4 +1,4 @@
-//! What to read out of a layout, and what was read.
+//! Plan of what to read out of a layout, and result of reading it.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use crate::{LayerNumber, Selection};
 use metalith_core::{Error, Result};
 use metalith_pillars::{ElementSite, PillarMap, PillarShape};
 
-/// Where the elements are.
+/// Places of the elements.
 #[derive(Clone, Debug)]
 pub enum Elements {
-    /// As a design says.
+    /// Elements as a design says.
     Given(Vec<ElementSite>),
     /// Wherever clusters of pillars are: pitch and phase of the lattice from their distances, its centre
     /// from the middle of the outermost. Elements less than 8 um apart count as one; where no pitch is
@@ -19,12 +19,12 @@ pub enum Elements {
     Discover,
 }
 
-/// What to read out of a layout.
+/// Plan of what to read out of a layout.
 #[derive(Clone, Debug)]
 pub struct ExtractionPlan {
     /// Layer that the pillars are on.
     pub pillar_layer: LayerNumber,
-    /// What the pillars are; where it is left out, what most shapes of the elements that are found are.
+    /// Shape of the pillars; where it is left out, the shape of most of the elements that are found.
     pub shape: Option<PillarShape>,
     pub elements: Elements,
     /// Cell to start from; the top cell if there is one only.
@@ -45,7 +45,7 @@ impl ExtractionPlan {
         }
     }
 
-    /// The same for pillars of this shape.
+    /// Same plan for pillars of this shape.
     #[must_use]
     pub fn of_shape(self, shape: PillarShape) -> Self {
         Self {
@@ -54,7 +54,7 @@ impl ExtractionPlan {
         }
     }
 
-    /// What of the layout is visited.
+    /// Selection of the layout that is visited.
     pub(super) fn selection(&self) -> Selection {
         Selection {
             top: self.top.clone(),
@@ -79,13 +79,13 @@ pub struct ExtractedElement<W = PillarMap> {
     pub widths: W,
 }
 
-/// What a layout holds.
+/// Contents of a layout.
 #[derive(Clone, Debug)]
 pub struct Extraction<W = PillarMap> {
     /// Name of the cell that was read.
     pub top: String,
     pub elements: Vec<ExtractedElement<W>>,
-    /// What the pillars are.
+    /// Shape of the pillars.
     pub shape: PillarShape,
     /// Pillars on a lattice, over all elements.
     pub pillars: u64,
@@ -105,7 +105,8 @@ impl<W> Extraction<W> {
         let Some(other) = self.elements.iter().find(|e| of(e) != of(&self.elements[0])) else {
             return Ok(());
         };
-        Err(Error::invalid(
+        Err(Error::refused(
+            "extract/lattices-differ",
             format!(
                 "{}: {} stands on another lattice than the elements before it",
                 file.display(),

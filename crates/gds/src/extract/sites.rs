@@ -1,4 +1,4 @@
-//! From a place in the layout to a site of an element, in whole numbers.
+//! Conversion of a place in the layout to a site of an element, in whole numbers.
 
 use std::collections::HashMap;
 
@@ -45,19 +45,19 @@ impl Scale {
         (scaled % self.den == 0).then_some(scaled / self.den)
     }
 
-    /// Whether a rectangle is near enough for arithmetic.
+    /// True if a rectangle is near enough for arithmetic.
     #[inline]
     pub fn reaches(self, r: &Rect) -> bool {
         r.x0 > -REACH && r.y0 > -REACH && r.x1 < REACH && r.y1 < REACH
     }
 }
 
-/// Where a pillar stands.
+/// Place of a pillar on the sites.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Standing {
-    /// On site (row, column) of an element.
+    /// Site (row, column) of an element.
     Site(u32, usize, usize),
-    /// In this element, between sites.
+    /// Place between sites, in this element.
     Between(u32),
     Outside,
 }
@@ -70,7 +70,7 @@ struct Grid {
     inverse: [f64; 2],
     /// Columns and rows that pillars may be in: the first, and the one after the last.
     reach: [[i64; 2]; 2],
-    /// Whether columns and rows whose sum is odd are no sites.
+    /// True if columns and rows whose sum is odd are no sites.
     staggered: bool,
     pitch_nm: i64,
 }
@@ -154,7 +154,7 @@ impl Sites {
         self.grids[element as usize].pitch_nm
     }
 
-    /// Where a pillar stands. `guess` is the element to try first, and is set to the one found.
+    /// Place of a pillar on the sites. `guess` is the element to try first, and is set to the one found.
     #[inline]
     pub fn stand(&self, pillar: &Rect, guess: &mut u32) -> Standing {
         let x = (pillar.x0 + pillar.x1) * self.scale.num;

@@ -1,4 +1,4 @@
-//! Which rectangles are the pillars of a layout from anywhere.
+//! Choice of the rectangles that are the pillars of any layout.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ use crate::memo::{BoxMemo, OutlineMemo};
 use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
 use metalith_pillars::{PillarShape, RotatedRectangles, UprightRectangles};
 
-/// Sizes that are told apart: a layout has one, and what its corners make of it.
+/// Sizes that are distinguished: a layout has one, and what its corners make of it.
 const MOST_SIZES: usize = 1 << 12;
 
 /// Edges that differ by less are of one size (nm): what rounding of corners to the grid makes of it.
@@ -27,16 +27,16 @@ const PILLARS: f64 = 0.9999;
 /// Edges of the rectangles of a layout, counted.
 #[derive(Default)]
 pub(super) struct Sizes {
-    /// By the shorter and the longer edge, to a nanometre: where in `counted` they are.
+    /// Indices in `counted`, by the shorter and the longer edge, to a nanometre.
     numbers: BTreeMap<(i64, i64), usize>,
     counted: Vec<Size>,
     /// Rectangles, counted or not.
     pub rectangles: u64,
-    /// Those of them whose edges are not along the axes.
+    /// Number of them whose edges are not along the axes.
     tilted: u64,
     /// Squares by their width (nm).
     squares: Vec<u64>,
-    /// What outlines are, if they are rectangles and no squares, and upright boxes.
+    /// Memory of outlines that are rectangles and no squares, and of upright boxes.
     known: OutlineMemo<Option<SeenRectangle>>,
     boxes: BoxMemo<Option<SeenRectangle>>,
 }
@@ -45,7 +45,7 @@ pub(super) struct Sizes {
 #[derive(Default)]
 struct Size {
     count: u64,
-    /// Of both edges (nm).
+    /// Sums of both edges (nm).
     sums: [f64; 2],
 }
 
@@ -54,7 +54,7 @@ struct Size {
 struct SeenRectangle {
     /// The shorter and the longer edge, as drawn (nm).
     edges: [f64; 2],
-    /// Where they are counted; nowhere if there are too many sizes.
+    /// Index of its size in the counts; `None` if there are too many sizes.
     size: Option<usize>,
     /// The box around it, from its first corner.
     around: Rect,
@@ -63,9 +63,9 @@ struct SeenRectangle {
 /// Rectangles that are pillars.
 pub(super) struct FoundRectangles {
     pub shape: PillarShape,
-    /// Whether squares are such pillars too.
+    /// True if squares are such pillars too.
     pub with_squares: bool,
-    /// How many there are that are no squares.
+    /// Number of them that are no squares.
     pub count: u64,
 }
 
@@ -114,13 +114,13 @@ impl Sizes {
         }
     }
 
-    /// What they are, if they are pillars no longer than this (nm): upright ones of several sizes, or those of the size that most
-    /// have, by their rotation.
+    /// Rectangles found, if they are pillars no longer than this (nm): upright ones of several sizes, or rectangles of
+    /// the size that most have, by their rotation.
     pub fn pillars(&self, longest_nm: i64) -> Option<FoundRectangles> {
         self.upright(longest_nm).or_else(|| self.alike(longest_nm))
     }
 
-    /// Whether all rectangles are these pillars, and, where squares are such too, all of so many squares.
+    /// True if all rectangles are these pillars, and, where squares are too, all of so many squares.
     pub fn all_are(&self, found: &FoundRectangles, squares: u64) -> bool {
         let Some(pillars) = found.shape.upright() else {
             return found.count == self.rectangles;

@@ -34,7 +34,7 @@ pub struct TextSummary {
 /// All layers and texts of a layout.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Survey {
-    /// By number.
+    /// Layers by number.
     pub layers: Vec<LayerSummary>,
     /// The first texts, in the order of the file.
     pub texts: Vec<TextSummary>,
@@ -66,7 +66,7 @@ struct Extents {
 }
 
 impl Extents {
-    /// That of a layer; none yet if it is new.
+    /// Extent of a layer; [`Extent::NONE`] if it is new.
     #[inline]
     fn entry(&mut self, layer: LayerNumber) -> &mut Extent {
         if self.of.get(self.last).is_none_or(|(l, _)| *l != layer) {

@@ -7,7 +7,8 @@ use crate::{Point, Rect, Transform};
 /// Side of a tile, two to this power half nanometres, the unit of all places here: 8.2 um. Two elements with an empty tile
 /// between them are two. Wider than pitches are, so that sparse places of a lens hold together.
 pub(super) const FINE: u32 = 14;
-/// The same for pitches up to 20 um: 33 um, the widest whose places are told by the numbers of [`TileMap::samples`].
+/// Bits of the side of a tile for pitches up to 20 um: 33 um, the widest whose places the numbers of
+/// [`TileMap::samples`] can hold.
 pub(super) const COARSE: u32 = 16;
 /// Tiles of a map at most: 5 x 5 lenses of 1 mm occupy 300,000, one of 10 mm 1.2 million.
 pub(super) const MOST_TILES: usize = 1 << 21;
@@ -26,7 +27,7 @@ struct Tile {
     /// Around all centres; beyond the tile if those of a placed cell are counted here together.
     low: (i32, i32),
     high: (i32, i32),
-    /// Which parts are occupied, row by row; not known of what was placed.
+    /// Parts that are occupied, row by row; not known of what was placed.
     parts: u64,
     /// Number of its samples.
     sampled: u8,
@@ -63,7 +64,7 @@ pub(super) struct TileMap {
 }
 
 impl TileMap {
-    /// Of tiles whose side is two to the power of `bits` (half nm).
+    /// Map of tiles whose side is two to the power of `bits` (half nm).
     pub fn new(bits: u32) -> Self {
         Self {
             bits,

@@ -66,7 +66,8 @@ fn file(cells: &Cells<'_>, folded: bool) -> Layout {
     layout(gds.end())
 }
 
-/// Both ways of reading both files agree; returns how the folded one was held and what is odd in it.
+/// Checks that both ways of reading both files agree; returns how the folded one was held and what in it was not
+/// recognised.
 fn held(sites: usize, cells: &Cells<'_>) -> (StoredPillars, UnrecognisedShapes) {
     let plan = ExtractionPlan::given(PILLARS, vec![site(sites)]);
     let flat = extract(&file(cells, false), &plan, &Silent).unwrap();

@@ -1,4 +1,4 @@
-//! The same reader on OASIS: files of records, of other tools, hostile and damaged ones.
+//! Tests of the same reader on OASIS: files of records, of other tools, hostile and damaged ones.
 
 use metalith_core::Silent;
 use metalith_gds::{FileFormat, LayoutError, Limit, Selection, simplified};

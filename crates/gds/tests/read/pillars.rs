@@ -1,4 +1,4 @@
-//! What is taken for a pillar, and where the elements are.
+//! Tests of what is taken for a pillar, and of the places of elements.
 
 use metalith_core::Silent;
 use metalith_gds::Layout;
@@ -203,7 +203,7 @@ fn upright_rectangles_are_found_among_squares_and_marks() {
     }
 }
 
-/// One of each oddity, and each for the right reason, at the right place.
+/// Shapes that are not pillars, one of each kind, each for the right reason, at the right place.
 #[test]
 fn everything_that_is_not_a_pillar_is_listed() {
     let mut gds = Gds::library();

@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use crate::{PILLARS, boxes, layout};
 use metalith_testing::gds::Gds;
 
-/// What a library of gds21 says, every reference followed by the plainest code there is.
+/// Contents of a library of gds21, every reference followed by the plainest code possible.
 fn flattened(library: &gds21::GdsLibrary, name: &str, at: &dyn Fn(i64, i64) -> (i64, i64), out: &mut Vec<[i64; 4]>) {
     use gds21::GdsElement as E;
     let cell = library.structs.iter().find(|s| s.name == name).unwrap();

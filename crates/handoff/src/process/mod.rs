@@ -4,6 +4,7 @@ mod read;
 
 use std::path::{Path, PathBuf};
 
+use include_dir::{Dir, File, include_dir};
 use serde::Serialize;
 
 use metalith_core::Result;
@@ -12,29 +13,10 @@ use metalith_design::Design;
 use metalith_drc::Deck;
 use metalith_pillars::{OutlineForm, PillarShape};
 
-/// The processes that ship with the program, by the names of their files; the first is the standard one.
-const SHIPPED: [(&str, &str); 5] = [
-    (
-        "processes/jbx6300_zep520a.toml",
-        include_str!("../../../../processes/jbx6300_zep520a.toml"),
-    ),
-    (
-        "processes/jbx6300_asi.toml",
-        include_str!("../../../../processes/jbx6300_asi.toml"),
-    ),
-    (
-        "processes/jbx6300_asi_900.toml",
-        include_str!("../../../../processes/jbx6300_asi_900.toml"),
-    ),
-    (
-        "processes/jbx6300_tio2.toml",
-        include_str!("../../../../processes/jbx6300_tio2.toml"),
-    ),
-    (
-        "processes/jbx6300_csi.toml",
-        include_str!("../../../../processes/jbx6300_csi.toml"),
-    ),
-];
+/// The processes that ship with the program.
+static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../processes");
+
+const STANDARD: &str = "jbx6300_zep520a.toml";
 
 /// Doses of a matrix: three by three blocks.
 pub(super) const DOSES: usize = 9;
@@ -59,7 +41,7 @@ pub struct Process {
     path: PathBuf,
     #[serde(skip)]
     text: String,
-    /// Whether it is one of the program's own, and so are its decks.
+    /// True if it is one of the program's own, and so are its decks.
     #[serde(skip)]
     standard: bool,
 }
@@ -89,7 +71,7 @@ pub struct Writer {
     pub job_overhead_s: f64,
 }
 
-/// Whether the exposed resist goes or stays.
+/// Tone: whether the exposed resist goes or stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tone {
@@ -109,7 +91,7 @@ pub struct Resist {
     pub dose_range_uc_cm2: [f64; 2],
 }
 
-/// How the pattern gets from resist to film.
+/// Method of transfer of the pattern from resist to film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
@@ -134,12 +116,12 @@ pub struct PatternTransfer {
 }
 
 impl PatternTransfer {
-    /// Whether it is for a film of this material.
+    /// True if it is for a film of this material.
     pub(super) fn etches(&self, film: &str) -> bool {
         self.films.iter().any(|known| known == film)
     }
 
-    /// Whether it is for films of this thickness (nm).
+    /// True if it is for films of this thickness (nm).
     pub(super) fn reaches(&self, thickness_nm: f64) -> bool {
         let within = |[low, high]: [f64; 2]| (low..=high).contains(&thickness_nm);
         self.film_nm.is_none_or(within)
@@ -195,12 +177,12 @@ pub struct TestSpec {
     pub overlay_vernier_step_nm: f64,
     pub etch_pad_um: f64,
     pub film_witness_um: f64,
-    /// Of the reference lens; that of the mapping of the design where it is left out.
+    /// Wavelength of the reference lens; where it is left out, the wavelength of the mapping of the design.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_wavelength_nm: Option<f64>,
 }
 
-/// Where widths are to be measured, and how well they should fit.
+/// Places where widths are to be measured, and how well they should fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetrologySpec {
     pub sites_per_width: i64,
@@ -211,7 +193,7 @@ pub struct MetrologySpec {
 /// The decks of rules that layouts for this process must keep: their files, or those of the program.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckSpec {
-    /// For designs of squares, of circles and of rectangles.
+    /// Rules for designs of squares, of circles and of rectangles.
     #[serde(skip)]
     pub squares: Option<ShapeRules>,
     #[serde(skip)]
@@ -276,21 +258,24 @@ impl Process {
     /// # Panics
     /// Never: it is tested.
     pub fn standard() -> Self {
-        Self::shipped(0)
+        Self::shipped(SHIPPED.get_file(STANDARD).expect("it is one of them"))
     }
 
     /// The process that ships with the program and etches a film of a material, as designs name it: one for its thickness (nm)
     /// before others; the standard one where none does.
     pub fn of_film(film: &str, thickness_nm: f64) -> Self {
-        let all = (0..SHIPPED.len()).map(Self::shipped);
+        let mut files: Vec<_> = SHIPPED.files().collect();
+        files.sort_by_key(|file| file.path());
+        let all = files.into_iter().map(Self::shipped);
         let mut fitting: Vec<Self> = all.filter(|process| process.transfer.etches(film)).collect();
         fitting.sort_by_key(|process| !process.transfer.reaches(thickness_nm));
         fitting.into_iter().next().unwrap_or_else(Self::standard)
     }
 
-    fn shipped(k: usize) -> Self {
-        let (name, text) = SHIPPED[k];
-        read::process(Path::new(name), text.to_owned(), true).expect("the processes of the program are sound")
+    fn shipped(file: &File<'_>) -> Self {
+        let text = file.contents_utf8().expect("processes are text");
+        let path = Path::new("processes").join(file.path());
+        read::process(&path, text.to_owned(), true).expect("the processes of the program are sound")
     }
 
     /// Wavelength of the hyperbolic reference lens and of the small lenses of the dose matrix (nm).
@@ -331,7 +316,7 @@ impl Process {
         }
     }
 
-    /// Whether the first step exposes the pillars; if not, the tone of the layout is wrong.
+    /// True if the first step exposes the pillars; if not, the tone of the layout is wrong.
     pub fn exposes_pillars(&self) -> bool {
         self.exposed_becomes().ends_with("pillar")
     }
@@ -349,8 +334,7 @@ mod tests {
             steps: 180,
         };
         let rectangles = PillarShape::Rectangle(rectangles.into());
-        for k in 0..SHIPPED.len() {
-            let process = Process::shipped(k);
+        for process in SHIPPED.files().map(Process::shipped) {
             for shape in [PillarShape::Square, PillarShape::Circle, rectangles] {
                 for rules in process.checks.decks(shape) {
                     // The same deck, built in and from its file.
@@ -376,8 +360,10 @@ mod tests {
 
     #[test]
     fn all_mistakes_are_reported_at_once_with_their_places() {
-        let text = SHIPPED[0]
-            .1
+        let standard = SHIPPED.get_file(STANDARD).unwrap();
+        let text = standard
+            .contents_utf8()
+            .unwrap()
             .replace("tone = \"positive\"", "tone = \"possitive\"")
             .replace("field_used_um = 499.8", "field_used_um = 600")
             .replace("dose_uc_cm2 = 280", "dose = 280");

@@ -17,7 +17,8 @@ const APART: i64 = 40_000;
 const NUMERAL: i64 = 15_000;
 /// Space between a pad and its number (nm).
 const BESIDE: i64 = 8_000;
-/// How far from the middle of the reference lens its phase is level (nm): a window of density and its neighbours.
+/// Radius about the middle of the reference lens within which its phase is level (nm): a window of density and its
+/// neighbours.
 const LEVEL_REACH: i64 = 50_000;
 
 /// A test structure and its use.
@@ -26,10 +27,10 @@ pub(super) struct Structure {
     pub id: String,
     /// Description, and what is measured on it.
     pub purpose: String,
-    /// On the chip of the test structures, whose lower left corner is the origin (nm).
+    /// Bounds on the chip of the test structures, whose lower left corner is the origin (nm).
     #[serde(rename = "bounds_nm")]
     pub bounds: RectNm,
-    /// What is drawn, where it is to be measured.
+    /// Size as drawn, where it is to be measured.
     #[serde(flatten)]
     pub drawn: Option<DrawnSize>,
     /// Rules that it breaks by intention, each with the reason.
@@ -41,7 +42,7 @@ pub(super) struct Structures {
     pub list: Vec<Structure>,
     /// The frame, from the origin; fields begin at its lower left corner (nm).
     pub frame: RectNm,
-    /// Where borders of fields are crossed on purpose (nm).
+    /// Place where borders of fields are crossed on purpose (nm).
     pub field_border: (i64, i64),
     /// Pillars that have a cell of their own.
     pillars: Vec<PadPillar>,

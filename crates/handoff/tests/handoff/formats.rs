@@ -1,4 +1,4 @@
-//! The same hand-off in the other format.
+//! Tests of the same hand-off in the other format.
 
 use metalith_core::Silent;
 use metalith_drc::diff::{DiffPlan, diff};

@@ -19,7 +19,7 @@ const HALF_NM_UM: f64 = 5e-4;
 
 type Place = (f64, f64);
 
-/// What a job deck says. Places are on the substrate or from the middle of a chip (um).
+/// Contents of a job deck. Places are on the substrate or from the middle of a chip (um).
 #[derive(Debug, Default)]
 struct Deck {
     name: String,
@@ -236,8 +236,8 @@ fn visit<V: Visitor>(file: &str, layer: LayerNumber, visitor: &mut V) {
     layout.visit(&selection, visitor, &Silent).unwrap();
 }
 
-/// From the job to the glass: a pattern has its middle on the middle of its chip. Where the crosses and the lenses
-/// of the file land is where the alignment table and the design have them.
+/// Places from the job to the glass: a pattern has its middle on the middle of its chip. Where the crosses and the
+/// lenses of the file land is where the alignment table and the design have them.
 #[test]
 fn what_the_job_places_lands_where_the_tables_say() {
     let pillars_file = "layout/mini_3x3_pillars.gds";

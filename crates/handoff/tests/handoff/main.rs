@@ -30,7 +30,7 @@ const SUMMED: f64 = 1e-9;
 const TABLE_S: f64 = 0.06;
 /// Half the widest pillar of the design (um).
 const WIDEST_HALF_UM: f64 = 0.15;
-/// Both halves of a vernier keep 100 nm from the border; their bars differ by less than this in length (um).
+/// Largest difference in length of the bars of a vernier (um), both halves of which keep 100 nm from the border.
 const VERNIER_UM: f64 = 1.0;
 const PROCESS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../processes/jbx6300_zep520a.toml");
 
@@ -382,7 +382,7 @@ fn test_structures_do_not_overlap_and_lie_in_their_frame() {
     }
 }
 
-/// What test structures break on purpose is waived with its reason, and every waiver covers something.
+/// Waivers of what test structures break on purpose have their reasons, and every waiver covers something.
 #[test]
 fn what_is_broken_on_purpose_is_waived_with_its_reason() {
     let report = fs::read(shared().join("checks/tests_pillars.json")).unwrap();

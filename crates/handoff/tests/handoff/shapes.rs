@@ -89,7 +89,7 @@ fn area(points: &[Point]) -> f64 {
     twice.abs() as f64 / 2.0
 }
 
-/// Whether an outline is the pillar that a row of a table says is drawn.
+/// True if an outline is the pillar that a row of a table says is drawn.
 fn is_drawn(outline: &[Point], row: &BTreeMap<String, String>, shape: PillarShape) -> bool {
     match shape {
         PillarShape::Square => unreachable!("other tests look at squares"),
@@ -112,7 +112,8 @@ fn is_drawn(outline: &[Point], row: &BTreeMap<String, String>, shape: PillarShap
     }
 }
 
-/// What the tables of a hand-off say of its pillars is found in its files; areas are those of the shapes, and times follow.
+/// Tables of a hand-off agree with its files: what they say of pillars is found there; areas are those of the shapes,
+/// and times follow.
 fn tables_hold(name: &str, sites: usize, pads: usize) {
     let folder = made(name);
     let design = Design::read(&design(name)).unwrap();

@@ -1,4 +1,4 @@
-//! What comes in and what goes out: inputs as they were read, manifests that say one thing, films that agree.
+//! Tests of inputs and outputs: inputs as they were read, manifests that say one thing, films that agree.
 
 use std::fs;
 use std::path::Path;

@@ -57,7 +57,7 @@ pub fn convert(layout: &Layout, format: LayoutFormat, path: &Path, progress: &dy
 /// Characters of a cell name that every reader of GDSII takes.
 const LONGEST_NAME: usize = 32;
 
-/// What does not fit the format that is written.
+/// Error for content that does not fit the format that is written.
 fn does_not_fit(what: String, hint: &str) -> Error {
-    Error::invalid(what, hint)
+    Error::refused("convert/does-not-fit", what, hint)
 }

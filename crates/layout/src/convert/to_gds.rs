@@ -74,7 +74,7 @@ struct Target<'a> {
     path: &'a Path,
     bytes: u64,
     elements: Vec<GdsElement>,
-    /// Of the cell that is open, and whether its head was written.
+    /// Name of the cell that is open, and whether its head was written.
     name: Option<(String, bool)>,
 }
 

@@ -22,7 +22,7 @@ const SIDE_BY_SIDE: usize = 8;
 /// pieces, half as many.
 const SAMPLE: usize = 6;
 
-/// How the pillars of a cell are encoded.
+/// Encoding of the pillars of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PillarEncoding {
     /// Lists of places in strips.
@@ -33,7 +33,7 @@ pub(super) enum PillarEncoding {
     References,
 }
 
-/// What a strip is made of.
+/// Direction of strips: columns or rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StripsOf {
     /// Columns, gone through row by row.
@@ -43,7 +43,7 @@ pub(super) enum StripsOf {
 }
 
 impl StripsOf {
-    /// Which of the two takes fewer bytes: columns, but where symmetries exchange the axes, and the part that they leave
+    /// Direction that takes fewer bytes: columns, but where symmetries exchange the axes, and the part that they leave
     /// unique is wide at the bottom; rows then save 22 % of an octant and 1 % of a half.
     fn of(group: &SymmetryGroup) -> Self {
         if group.members().iter().any(|s| !s.quarter_turns.is_multiple_of(2)) {
@@ -83,7 +83,7 @@ pub(super) struct ElementPillars<'a> {
     form: PillarForm,
     /// Number of the cell of each width, for references.
     pub width_cells: Vec<u64>,
-    /// Of compression, 1 to 9.
+    /// Level of compression, 1 to 9.
     level: u32,
 }
 
@@ -153,12 +153,12 @@ impl<'a> ElementPillars<'a> {
         PillarEncoding::Lists(StripsOf::of(self.group))
     }
 
-    /// Whether the element is more than a mirror image of itself.
+    /// True if the element is more than a mirror image of itself.
     pub fn has_many_symmetries(&self) -> bool {
         self.group.members().len() > 2
     }
 
-    /// Whether there is no pillar.
+    /// True if there is no pillar.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
@@ -435,7 +435,7 @@ impl Packer {
         self.lists[width].push([ix as i32, iy as i32]);
     }
 
-    /// So many pillars are in the records.
+    /// Counts so many pillars more in the records.
     #[inline]
     fn written(&mut self, pillars: u64) {
         self.encoded.pillars += pillars;

@@ -272,7 +272,7 @@ impl Elements<'_, '_> {
             .collect())
     }
 
-    /// Each element by itself, neither turned nor mirrored.
+    /// Each element individually, neither turned nor mirrored.
     fn apart(&mut self, array: &PillarArray) -> Result<Vec<PlacedCell>> {
         let mut placed = Vec::new();
         for (k, element) in array.placed.iter().enumerate() {

@@ -57,14 +57,14 @@ struct Block {
 pub(super) struct Input<R> {
     raw: R,
     file_bytes: u64,
-    /// What is parsed: the file, or what a CBLOCK unpacks to; the other waits.
+    /// Bytes being parsed: the file, or what a CBLOCK unpacks to; the other waits.
     window: Window,
     waiting: Window,
     block: Option<Block>,
     inflate: Decompress,
     unpacked: u64,
     most_unpacked: u64,
-    /// Where the record that is being read begins.
+    /// Place where the record that is being read begins.
     record: OasisPlace,
 }
 
@@ -115,12 +115,12 @@ impl<R: Read + Seek> Input<R> {
         Ok(())
     }
 
-    /// Where the record that is being read begins.
+    /// Place where the record that is being read begins.
     pub fn record(&self) -> OasisPlace {
         self.record
     }
 
-    /// Whether a CBLOCK is being read.
+    /// True if a CBLOCK is being read.
     pub fn in_block(&self) -> bool {
         self.block.is_some()
     }

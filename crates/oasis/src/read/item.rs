@@ -1,13 +1,13 @@
-//! What reading hands out.
+//! Items that reading returns.
 
 use crate::repetition::Repetition;
 
-/// Where a record begins.
+/// Place where a record begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct OasisPlace {
-    /// From the start of the file; that of the CBLOCK record if it is in one.
+    /// Offset from the start of the file; of the CBLOCK record if the record is in one.
     pub offset: u64,
-    /// In what the CBLOCK unpacks to.
+    /// Offset in what the CBLOCK unpacks to.
     pub inner: Option<u64>,
 }
 
@@ -45,7 +45,7 @@ pub struct OasisElement<'a> {
     pub layer: u32,
     /// Text type of a text.
     pub datatype: u32,
-    /// Of the first copy.
+    /// Place of the first copy.
     pub at: [i64; 2],
     pub repetition: Option<&'a Repetition>,
     /// One, or those of the repetition; at most `u64::MAX`.
@@ -54,7 +54,7 @@ pub struct OasisElement<'a> {
     pub reach: [i64; 4],
 }
 
-/// What an element is. Points are from [`OasisElement::at`].
+/// Shape of an element. Points are from [`OasisElement::at`].
 #[derive(Clone, Copy, Debug)]
 pub enum OasisShape<'a> {
     /// Lower left corner at the place.
@@ -90,7 +90,7 @@ pub enum OasisShape<'a> {
     },
 }
 
-/// Which table of names.
+/// Table of names that an entry is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NameTable {
     Cells,
@@ -112,7 +112,7 @@ impl NameTable {
 #[derive(Clone, Copy, Debug)]
 pub struct NameEntry<'a> {
     pub table: NameTable,
-    /// What records refer to it by; for layers of no meaning.
+    /// Number by which records refer to the name; of layers it has no meaning.
     pub number: u64,
     pub name: &'a [u8],
 }
@@ -128,7 +128,7 @@ pub enum OasisValue {
     TextNumber(u64),
 }
 
-/// What was read, without borrowing it.
+/// Outcome of reading a record, without borrowing it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Step {
     Cell,

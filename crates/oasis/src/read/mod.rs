@@ -32,7 +32,7 @@ pub struct OasisReader<R> {
     input: Input<R>,
     limits: OasisLimits,
     grid_per_um: f64,
-    /// Whether END holds the offsets of the tables, not START.
+    /// True if END, not START, holds the offsets of the tables.
     offsets_in_end: bool,
     tables: Tables,
     modal: Modal,
@@ -55,7 +55,7 @@ impl<R: Read + Seek> OasisReader<R> {
         Ok(reader)
     }
 
-    /// As [`OasisReader::new`] without the checksum: for a file that was verified before.
+    /// Variant of [`OasisReader::new`] without the checksum, for a file that was verified before.
     ///
     /// # Errors
     /// If it is not OASIS 1.0.
@@ -106,7 +106,7 @@ impl<R: Read + Seek> OasisReader<R> {
         self.input.offset()
     }
 
-    /// Where the record read last begins.
+    /// Place where the record read last begins.
     pub fn place(&self) -> OasisPlace {
         self.input.record()
     }

@@ -42,11 +42,11 @@ pub(super) struct Modal {
     pub values: Vec<OasisValue>,
     pub values_known: bool,
     pub repetition: Option<Repetition>,
-    /// Of the repetition.
+    /// Number of copies in the repetition.
     pub copies: u64,
     pub reach: [i64; 4],
 
-    /// Of the cell that begins; not a modal variable.
+    /// Name of the cell that begins; not a modal variable.
     pub begun: Named,
     /// Corners of the trapezoid read last; not a modal variable.
     pub corners: Vec<[i64; 2]>,
@@ -57,7 +57,7 @@ pub(super) struct Modal {
 }
 
 impl Modal {
-    /// What a cell begins with. Memory is kept.
+    /// Resets the variables to the state in which a cell begins. Memory is kept.
     pub fn forget(&mut self) {
         let kept = std::mem::take(self);
         *self = Self {

@@ -11,12 +11,12 @@ use crate::record::kind;
 /// One table.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
-    /// Where its first record is.
+    /// Offset of its first record.
     first: Option<u64>,
-    /// Whether its entries have numbers.
+    /// True if its entries have numbers.
     numbered: Option<bool>,
     next: u64,
-    /// That all of its records stand at this offset, as the table of offsets says.
+    /// Offset at which all of its records stand, as the table of offsets says.
     strict_offset: Option<u64>,
 }
 
@@ -52,7 +52,7 @@ impl Tables {
         Ok(())
     }
 
-    /// Whether the tables stand where their offsets say.
+    /// Checks that the tables stand where their offsets say.
     pub fn check_offsets<R: Read + Seek>(&self, input: &Input<R>) -> Result<(), OasisError> {
         for (table, state) in ALL.into_iter().zip(&self.states) {
             if let (Some(found), Some(said)) = (state.first, state.strict_offset)

@@ -20,7 +20,7 @@ pub enum CellBounds {
     Box([i64; 4]),
 }
 
-/// What a cell is in the tables.
+/// Entry of a cell in the tables.
 struct CellEntry {
     name: String,
     written: Option<(u64, CellBounds)>,

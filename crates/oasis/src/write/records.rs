@@ -4,7 +4,7 @@ use crate::number::{put_real, put_signed, put_step, put_unsigned};
 use crate::record::{info, kind, placed};
 use crate::repetition::Repetition;
 
-/// How a cell is placed: mirrored at the x axis, then magnified, then turned counter-clockwise.
+/// Placement of a cell: mirrored at the x axis, then magnified, then turned counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placing {
     pub mirrored: bool,
@@ -13,7 +13,7 @@ pub struct Placing {
 }
 
 impl Placing {
-    /// As it is drawn.
+    /// Placement without change: as drawn.
     pub const PLAIN: Self = Self {
         mirrored: false,
         magnification: 1.0,
@@ -27,7 +27,7 @@ impl Placing {
     }
 }
 
-/// Which pair of coordinates an element moves.
+/// Pair of coordinates that an element moves.
 #[derive(Clone, Copy)]
 enum Pair {
     Placement = 0,
@@ -58,7 +58,7 @@ struct Known {
 pub struct RecordBuffer {
     bytes: Vec<u8>,
     known: Known,
-    /// Whether places are written as steps from the one before.
+    /// True if places are written as steps from the one before.
     relative: bool,
 }
 
@@ -99,7 +99,7 @@ impl RecordBuffer {
         }
     }
 
-    /// Which coordinates must be written.
+    /// Coordinates that must be written, of the pair.
     #[inline]
     fn moved(&self, pair: Pair, at: [i64; 2]) -> [bool; 2] {
         match self.known.at[pair as usize] {

@@ -73,7 +73,7 @@ impl Axis {
         (0..self.nodes).map(|k| self.node(k)).collect()
     }
 
-    /// Where a value is in steps from the first node; none if it is outside.
+    /// Steps from the first node to a value; `None` if it is outside.
     fn steps_to(&self, value: f64) -> Option<f64> {
         let x = (value - self.first) / self.step;
         // Rounding of sums and products at the ends.
@@ -102,7 +102,7 @@ impl StackGrid {
         Self(std::array::from_fn(|k| Axis::over(least[k], most[k], STEPS[k])))
     }
 
-    /// How many there are.
+    /// Number of stacks.
     pub fn count(&self) -> usize {
         self.0.iter().map(|a| a.nodes).product()
     }
@@ -131,13 +131,13 @@ impl StackGrid {
         Some(stacks)
     }
 
-    /// Whether a change is between the nodes.
+    /// True if a change is between the nodes.
     pub fn holds(&self, change: &CellChange) -> bool {
         let mut axes = self.0.iter().zip(quantities(change));
         axes.all(|(axis, value)| axis.steps_to(value).is_some())
     }
 
-    /// What a change that the grid holds has, by rational functions along every axis, of the values of all stacks.
+    /// Value at a change that the grid holds, by rational functions along every axis, from the values of all stacks.
     pub fn between(&self, change: &CellChange, of_stacks: impl Iterator<Item = Complex64>) -> Complex64 {
         let mut values: Vec<Complex64> = of_stacks.collect();
         for (axis, value) in self.0.iter().zip(quantities(change)) {

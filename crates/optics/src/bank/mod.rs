@@ -41,12 +41,12 @@ const MOST_UPRIGHT_S: f64 = 5400.0;
 const UPRIGHT_S: f64 = 0.1;
 const KNOWN_SHARE: f64 = 0.05;
 
-/// What a bank covers.
+/// Range that a bank covers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BankRange {
-    /// Narrowest and widest pillar as made (nm); of rectangles the least and the most that both edges are off by.
+    /// Narrowest and widest pillar as fabricated (nm); of rectangles the least and the most that both edges are off by.
     pub widths_nm: [f64; 2],
-    /// Of upright rectangles the numbers of the pillars that it holds, rising; of others nothing.
+    /// Numbers of the upright rectangles that it holds, rising; empty for other shapes.
     pub numbers: Vec<u16>,
     /// Changes of the pillar: the least and the most of each number.
     pub changes: [CellChange; 2],
@@ -66,7 +66,7 @@ pub struct CellBank {
 enum Tables {
     /// Over one width.
     Widths(Vec<Colour>),
-    /// Of upright rectangles of many sizes.
+    /// Tables of upright rectangles of many sizes.
     Sizes(Sizes, Vec<SizeTables>),
 }
 
@@ -140,7 +140,8 @@ impl CellBank {
         let mut bank = Self::empty(stated, range)?;
         let bytes = metalith_core::file::read_at_most(path, LONGEST, "a table of cells")?;
         let unusable = |why: String| {
-            Error::invalid(
+            Error::refused(
+                "study/tables-unreadable",
                 format!("the tables of cells in {} cannot be used: {why}", path.display()),
                 "plan the study again into another folder; a shard makes no tables of its own",
             )
@@ -212,7 +213,8 @@ impl CellBank {
             tables,
         };
         if bank.stacks() > MOST_STACKS {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "study/tables-too-many",
                 format!(
                     "tables of {} pillars would have to be solved, for every width and wavelength",
                     bank.stacks()
@@ -227,7 +229,8 @@ impl CellBank {
                 .map(|colour| bank.sizes_s(colour, sizes))
                 .sum();
             if seconds > MOST_UPRIGHT_S {
-                return Err(Error::invalid(
+                return Err(Error::refused(
+                    "study/tables-too-many",
                     format!(
                         "tables of {} upright rectangles, each in {}, would take {:.1} hours of CPU time",
                         sizes.first(),
@@ -321,7 +324,8 @@ impl CellBank {
     }
 
     fn outside(what: String) -> Error {
-        Error::invalid(
+        Error::refused(
+            "study/outside-tables",
             format!("the tables of cells hold no {what}"),
             "plan the study again; a shard makes no tables of its own",
         )
@@ -382,7 +386,7 @@ impl CellBank {
         self.rotated().map_or(1, |pillars| row_length(pillars.into(), 1))
     }
 
-    /// What the numbers follow from.
+    /// Bytes of the inputs that the numbers follow from.
     fn inputs(&self) -> Vec<u8> {
         let known = format!(
             "{} {:?} {:?}",
@@ -394,7 +398,7 @@ impl CellBank {
     }
 }
 
-/// So many stacks, in words.
+/// Words for so many stacks.
 fn counted(stacks: usize) -> String {
     match stacks {
         1 => "one stack".into(),

@@ -1,8 +1,9 @@
 //! Tables of upright rectangles, which are of many sizes.
 //!
-//! A bias makes a pillar of 100 x 120 nm one that is drawn as 110 x 130 nm: pillars whose edges differ by the same are on one line, on which they are
-//! told by the shorter edge. Lines are solved every few nanometres, and between two nodes where rational functions through more and through fewer
-//! nodes do not agree. A pillar that is exchanged with its mirror image about the diagonal exchanges x and y: one of them is solved.
+//! A bias makes a pillar of 100 x 120 nm one that is drawn as 110 x 130 nm: pillars whose edges differ by the same are
+//! on one line, on which they are identified by the shorter edge. Lines are solved every few nanometres, and between
+//! two nodes where rational functions through more and through fewer nodes do not agree. A pillar that is exchanged
+//! with its mirror image about the diagonal exchanges x and y: one of them is solved.
 
 use std::collections::BTreeMap;
 
@@ -20,8 +21,8 @@ const STEP_NM: f64 = 5.0;
 /// Rest of a line between sizes (nm) that is solved with them: nodes there tell the pillars on both sides more than nodes of either alone would.
 const REST_NM: f64 = 2.0 * STEP_NM;
 
-/// Where transmissions by one node more and one fewer are farther apart than this, the place between two nodes is solved too.
-/// What is left is smaller by as much as the node tells: some thousandths beside a resonance, a millionth elsewhere.
+/// Difference of transmissions by one node more and one fewer above which the place between two nodes is solved too.
+/// The residual is smaller by as much as the node shows: some thousandths beside a resonance, a millionth elsewhere.
 const APART: f64 = 5e-3;
 
 /// Nodes nearer than this are near enough for any resonance that an element of many sizes sees (nm).
@@ -33,9 +34,9 @@ pub(super) type Along = [Complex64; 2];
 /// A part of a line.
 #[derive(Clone, Debug, PartialEq)]
 struct Span {
-    /// What the longer edge is longer by (nm).
+    /// Length by which the longer edge is longer (nm).
     longer_nm: u16,
-    /// Shorter edges as made (nm), each from the least to the most, that are asked for: rising.
+    /// Shorter edges as fabricated (nm), each from the least to the most, that are asked for: rising.
     wanted: Vec<[f64; 2]>,
     /// Shorter edges that are solved at first (nm), rising.
     nodes_nm: Vec<f64>,
@@ -55,7 +56,7 @@ impl Span {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sizes {
     pillars: UprightRectangles,
-    /// By what the longer edge is longer by, then by the shorter one.
+    /// Spans by the length by which the longer edge is longer, then by the shorter one.
     spans: Vec<Span>,
 }
 
@@ -108,17 +109,17 @@ impl Sizes {
         Self { pillars, spans }
     }
 
-    /// The pillars themselves.
+    /// Pillars of the table.
     pub fn pillars(&self) -> UprightRectangles {
         self.pillars
     }
 
-    /// How many pillars are solved at first, in each stack.
+    /// Number of pillars that are solved at first, in each stack.
     pub fn first(&self) -> usize {
         self.spans.iter().map(|span| span.nodes_nm.len()).sum()
     }
 
-    /// What to call the pillar of a number whose edges are off by `bias_nm`.
+    /// Words for the pillar of a number whose edges are off by `bias_nm`.
     pub fn words(&self, number: u16, bias_nm: f64) -> String {
         let [x, y] = self.pillars.edges_nm(number);
         format!("pillar of {x} x {y} nm whose edges are off by {bias_nm} nm")
@@ -186,12 +187,12 @@ impl Sizes {
     }
 }
 
-/// What one part of a line transmits.
+/// Transmission of one part of a line.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Curve {
     /// Shorter edges (nm), rising.
     nodes_nm: Vec<f64>,
-    /// By node and stack.
+    /// Transmissions by node and stack.
     t: Vec<Vec<Along>>,
 }
 
@@ -224,7 +225,7 @@ impl Curve {
         doubtful.map(|pair| 0.5 * (pair[0] + pair[1])).collect()
     }
 
-    /// Whether it counts that the farthest node is left out.
+    /// True if leaving out the farthest node makes a difference that counts.
     fn is_doubtful(&self, short_nm: f64) -> bool {
         let all = around(&self.nodes_nm, short_nm);
         let [first, last] = [all.start, all.end - 1].map(|k| (self.nodes_nm[k] - short_nm).abs());
@@ -249,12 +250,12 @@ impl Curve {
 /// Transmissions of all sizes at one wavelength.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SizeTables {
-    /// In the order of the spans.
+    /// Curves in the order of the spans.
     curves: Vec<Curve>,
 }
 
 impl SizeTables {
-    /// What a file keeps.
+    /// Numbers that a file stores.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         self.curves.iter().flat_map(|curve| {
             let count = std::iter::once(curve.nodes_nm.len() as f64);

@@ -3,7 +3,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::grid::change_of;
 use super::*;
 use crate::RealisedCells;
-use metalith_cell::BAND_ORDERS;
+use metalith_cell::{BAND_ORDERS, Illumination};
 use metalith_core::Silent;
 use metalith_pillars::{PillarShape, UprightRectangles};
 use metalith_rcwa::Material;
@@ -40,7 +40,9 @@ fn pillars_between_the_nodes_are_those_solved_exactly_and_none_beyond_them_is_th
     let widths: Vec<f64> = (0..24).map(|k| 150.4 + 2.0 * f64::from(k)).collect();
     let table = bank.transmissions(&change, BAND_ORDERS, &widths, 0.53).unwrap();
     let exact = RealisedCells::new(perturbed(bank.stated(), &change), 0.4);
-    let exact = exact.solve_in_band(&widths, 0.53, [0.0; 2], &Silent).unwrap();
+    let exact = exact
+        .solve(&widths, &Illumination::normal(0.53).in_band(), &Silent)
+        .unwrap();
     let pairs = table.pillars[0].iter().zip(&exact.pillars[0]);
     let rms = (pairs.map(|(a, b)| (a - b).norm_sqr()).sum::<f64>() / widths.len() as f64).sqrt();
     assert!(rms < RMS, "rms {rms}");
@@ -56,7 +58,8 @@ const UPRIGHT: UprightRectangles = UprightRectangles {
     lengths: 8,
 };
 
-/// What a made-up pillar transmits along x and along y: of each axis a phase that grows with its edge, and a resonance 1.5 nm wide (FWHM).
+/// Transmission of a made-up pillar along x and along y: for each axis a phase that grows with its edge, and a
+/// resonance 1.5 nm wide (FWHM).
 fn made_up([x, y]: [f64; 2], stack: usize) -> [Complex64; 2] {
     [(x, y), (y, x)].map(|(along, across)| {
         let resonance = Complex64::new(0.0, 0.75) / Complex64::new(along + 0.5 * across - 190.0 - stack as f64, 0.75);
@@ -79,7 +82,7 @@ fn tables_of(sizes: &Sizes) -> (SizeTables, usize) {
 /// Sizes that a bias turns into one another are solved once, and resonances are met between the nodes in all stacks.
 #[test]
 fn sizes_between_the_nodes_are_those_solved_and_few_are_solved() {
-    /// Of transmissions of modulus one, beside a resonance.
+    /// Tolerance of transmissions of modulus one, beside a resonance.
     const WORST: f64 = 0.01;
     let numbers: Vec<u16> = (1..=UPRIGHT.count()).collect();
     let sizes = Sizes::new(UPRIGHT, &numbers, [-3.0, 4.0]);
@@ -109,7 +112,7 @@ fn sizes_between_the_nodes_are_those_solved_and_few_are_solved() {
     }
 }
 
-/// Where no bias varies each size is solved once, and where little does, sizes far apart have nodes of their own.
+/// Sizes are each solved once where no bias varies, and where little does, sizes far apart have nodes of their own.
 #[test]
 fn sizes_that_no_bias_joins_are_solved_by_themselves() {
     let numbers: Vec<u16> = (1..=UPRIGHT.count()).collect();
@@ -130,7 +133,7 @@ fn sizes_that_no_bias_joins_are_solved_by_themselves() {
 fn real_pillars_between_the_nodes_are_those_solved_exactly() {
     /// Over all pillars, of transmissions of modulus one: 4e-4. Cubics through nodes a nanometre apart leave 0.05.
     const RMS_OF_SIZES: f64 = 2e-3;
-    /// Of one of them, beside a resonance: 0.003.
+    /// Tolerance of one of them, beside a resonance: 0.003.
     const WORST: f64 = 0.015;
     let pillars = UprightRectangles { lengths: 20, ..UPRIGHT };
     let numbers: Vec<u16> = (0..18)
@@ -172,7 +175,7 @@ fn real_pillars_between_the_nodes_are_those_solved_exactly() {
     assert!(rms < RMS_OF_SIZES && worst < WORST, "{rms} {worst}");
 }
 
-/// What would take hours is refused before anything is solved, with the hours.
+/// Tables that would take hours are refused before anything is solved, with the hours.
 #[test]
 fn tables_that_take_too_long_are_refused() {
     let stack = CellStack {

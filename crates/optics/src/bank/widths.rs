@@ -8,7 +8,7 @@ pub(super) const STEP_NM: f64 = 1.0;
 /// Parts that a step is divided into where it is not: guided-mode resonances are a fraction of a nanometre wide.
 const FINE_PARTS: usize = 8;
 
-/// Where a width is farther than this from the cubic through its four neighbours, transmission is not smooth.
+/// Distance of a width from the cubic through its four neighbours above which transmission is not smooth.
 const ROUGH: f64 = 0.01;
 
 /// Steps on either side of such a width that are divided too: a resonance moves with the pillar.
@@ -30,7 +30,7 @@ pub(super) fn coarse([low, high]: [f64; 2]) -> Vec<f64> {
 pub(super) struct Colour {
     /// Widths that are solved (nm), rising.
     pub widths_nm: Vec<f64>,
-    /// By stack, width and number of a pillar; the last of each row is a site without pillar.
+    /// Transmissions by stack, width and number of a pillar; the last of each row is a site without pillar.
     pub t: Vec<Complex64>,
 }
 
@@ -63,7 +63,7 @@ impl Colour {
         row
     }
 
-    /// What a file keeps.
+    /// Numbers that a file stores.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         let count = std::iter::once(self.widths_nm.len() as f64);
         let t = self.t.iter().flat_map(|z| [z.re, z.im]);

@@ -12,9 +12,9 @@ use crate::expression::Input;
 /// exp(-2 (pi 0.8)^2) is then aliased, 3e-6.
 const FINER: usize = 4;
 
-/// What kernels add to each wave of an image, with the image itself: kernels act one after the other.
+/// Factor of kernels on each wave of an image, with the image itself: kernels act one after the other.
 pub struct KernelFilter {
-    /// Of twice as many rows and columns as the image: nothing comes from beyond it.
+    /// Spectrum of twice as many rows and columns as the image: nothing comes from beyond it.
     spectrum: Array2<Complex64>,
 }
 

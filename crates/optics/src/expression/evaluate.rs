@@ -3,10 +3,10 @@
 use super::{Expression, One, Step, Two};
 use crate::zernike;
 
-/// What a variable is along a row.
+/// Values of a variable along a row.
 #[derive(Clone, Copy)]
 pub enum Input<'a> {
-    /// The same for all of it.
+    /// Single value for all of the row.
     Scalar(f64),
     /// One value for each site.
     Row(&'a [f64]),

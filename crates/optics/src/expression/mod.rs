@@ -21,7 +21,7 @@ pub struct Expression {
     steps: Vec<Step>,
 }
 
-/// What is wrong with the text of an expression.
+/// Fault in the text of an expression.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExpressionFault {
     /// Byte of the text at which it is found.
@@ -95,7 +95,7 @@ const OF_TWO: [(&str, Two); 4] = [
 ];
 
 impl Expression {
-    /// Whether the value depends on a variable, by its place among the names that the text was parsed with.
+    /// True if the value depends on a variable, by its place among the names that the text was parsed with.
     pub fn uses(&self, variable: usize) -> bool {
         self.steps.contains(&Step::Variable(variable))
     }

@@ -1,4 +1,4 @@
-//! From text to postfix order, by recursive descent.
+//! Parser from text to postfix order, by recursive descent.
 
 use super::{Expression, ExpressionFault, OF_ONE, OF_TWO, One, Step, Two};
 
@@ -218,7 +218,7 @@ impl Parser<'_> {
         done
     }
 
-    /// Where the next token stands.
+    /// Place of the next token.
     fn at(&self) -> usize {
         self.tokens.get(self.next).map_or(self.end, |t| t.0)
     }

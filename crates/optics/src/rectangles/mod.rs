@@ -1,4 +1,4 @@
-//! Rectangles as made: light of both polarisations that they tell apart, and what of it reaches the sensor.
+//! Rectangles as fabricated: light of both polarisations that they distinguish, and what of it reaches the sensor.
 
 mod kept;
 mod rows;
@@ -18,7 +18,7 @@ use super::cells::SolvedWidths;
 use super::{CalibratedModel, CellBank, CellChange, DeclaredQuantity};
 use metalith_cell::{
     AxisTables, BAND_ORDERS, CellStack, FocusedLight, HandTables, Handedness, ORDERS, PassedTable, PolarisationAxis,
-    PolarisedLight, PolarisedTables, RotationSamples, UPRIGHT_ORDERS,
+    PolarisedTables, RotationSamples, Spectral, UPRIGHT_ORDERS,
 };
 use metalith_core::{Error, Progress, Result};
 use metalith_pillars::{PillarShape, PolarisationBasis, Rectangles, RotatedRectangles};
@@ -28,40 +28,20 @@ use metalith_pillars::{PillarShape, PolarisationBasis, Rectangles, RotatedRectan
 pub struct RectangleClass {
     /// Its number; zero is a site without pillar.
     pub number: u16,
-    /// What both edges are off by (nm).
+    /// Error of both edges (nm).
     pub bias_nm: f64,
 }
 
 impl RectangleClass {
-    /// Of sites whose pillar is missing.
+    /// Class of sites whose pillar is missing.
     pub const WITHOUT_PILLAR: Self = Self {
         number: 0,
         bias_nm: 0.0,
     };
 }
 
-/// A wavelength (um): one of few, or one of many that a band is averaged over.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum RectangleColour {
-    Single(f64),
-    OfBand(f64),
-}
-
-impl RectangleColour {
-    pub fn um(self) -> f64 {
-        match self {
-            Self::Single(um) | Self::OfBand(um) => um,
-        }
-    }
-
-    /// Wavelength and orders that banks of pillars of a shape are solved with.
-    fn of_bank(self, shape: PillarShape) -> (f64, usize) {
-        match self {
-            Self::Single(um) => (um, bank_orders(shape)),
-            Self::OfBand(um) => (um, BAND_ORDERS),
-        }
-    }
-}
+/// A wavelength (um), and how closely it is looked at.
+pub(super) type Colour = (f64, Spectral);
 
 /// Diffraction orders an axis that a bank of pillars of a shape is solved with at single wavelengths. Those of upright rectangles are as many
 /// as of pillars as drawn: with fewer, those of a lens beside a resonance have a Strehl ratio that is off by two in a hundred.
@@ -75,34 +55,29 @@ pub fn bank_orders(shape: PillarShape) -> usize {
 /// A row for each bias, and one for a site without pillar: see [`rows`].
 pub(crate) type RowsOfBiases = (Vec<Vec<Complex64>>, Vec<Complex64>);
 
-/// Where rows are from.
+/// Source of rows.
 enum RowSource {
     Bank(Arc<CellBank>),
     Solved(Box<SolvedRectangles>),
 }
 
-/// The rectangles of a chip, and the light that they are in.
+/// The rectangles of a chip.
 pub(super) struct MadeRectangles {
     pillars: Rectangles,
     focused: FocusedLight,
-    pub polarised: PolarisedLight,
     source: RowSource,
 }
 
 impl MadeRectangles {
-    /// Of a stack of rectangles, which focus `focused`; solved where they are needed.
+    /// Rectangles of a stack, which focus `focused`; solved where they are needed.
     ///
     /// # Errors
     /// If they are no such rectangles, or the model has what they have no meaning for.
-    pub fn new(
-        stated: &CellStack,
-        model: &CalibratedModel,
-        focused: FocusedLight,
-        polarised: PolarisedLight,
-    ) -> Result<Self> {
+    pub fn new(stated: &CellStack, model: &CalibratedModel, focused: FocusedLight) -> Result<Self> {
         let fits = stated.shape.basis() == Some(focused.basis());
         let (true, PillarShape::Rectangle(pillars)) = (fits, stated.shape) else {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "light/not-focused",
                 "light of a polarisation that these pillars do not focus",
                 "say circular light of rotated rectangles, linear light of upright ones, and none of others",
             ));
@@ -111,12 +86,11 @@ impl MadeRectangles {
         Ok(Self {
             pillars,
             focused,
-            polarised,
             source: RowSource::Solved(Box::new(SolvedRectangles::new(stated.clone(), pillars))),
         })
     }
 
-    /// The same, whose solved rows are kept in a folder from one run to the next.
+    /// Same rectangles, whose solved rows are cached in a folder from one run to the next.
     pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
         if let RowSource::Solved(solved) = &mut self.source {
             solved.folder = folder.map(Path::to_owned);
@@ -124,7 +98,7 @@ impl MadeRectangles {
         self
     }
 
-    /// The same with all rows from a bank of the same pillars.
+    /// Same rectangles with all rows from a bank of the same pillars.
     pub fn of_bank(self, bank: &Arc<CellBank>) -> Self {
         Self {
             source: RowSource::Bank(Arc::clone(bank)),
@@ -132,7 +106,8 @@ impl MadeRectangles {
         }
     }
 
-    /// What each class does to light of both polarisations; after them a site without pillar, and one that light passes as it is.
+    /// Tables of each class for light of both polarisations; after them a site without pillar, and one that light
+    /// passes as it is.
     ///
     /// # Errors
     /// If a cell cannot be solved, or is not in the bank; also if the user stopped it.
@@ -140,7 +115,7 @@ impl MadeRectangles {
         &self,
         change: &CellChange,
         classes: &[RectangleClass],
-        colour: RectangleColour,
+        (um, spectral): Colour,
         progress: &dyn Progress,
     ) -> Result<PolarisedTables> {
         let mut places: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
@@ -154,10 +129,10 @@ impl MadeRectangles {
         numbers.dedup();
         let (rows, bare) = match &self.source {
             RowSource::Bank(bank) => {
-                let colour = colour.of_bank(bank.stated().shape);
-                bank.rectangles(change, colour, &biases, &numbers)?
+                let orders = spectral.choose(bank_orders(bank.stated().shape), BAND_ORDERS);
+                bank.rectangles(change, (um, orders), &biases, &numbers)?
             }
-            RowSource::Solved(solved) => solved.rows(change, colour, &biases, &numbers, progress)?,
+            RowSource::Solved(solved) => solved.rows(change, (um, spectral), &biases, &numbers, progress)?,
         };
         let found = Found {
             classes,
@@ -175,7 +150,8 @@ impl MadeRectangles {
         })
     }
 
-    /// Of tables of light that leaves such classes, what [`SolvedWidths`] has: one table for all light that interferes with no other.
+    /// Solved widths from tables of light that leaves such classes: one table for all light that interferes with no
+    /// other.
     pub fn solved(leaving: Vec<PassedTable>) -> SolvedWidths {
         let mut solved = SolvedWidths {
             pillars: Vec::new(),
@@ -194,7 +170,7 @@ impl MadeRectangles {
 }
 
 impl CalibratedModel {
-    /// Nothing, if all that the model says has a meaning for pillars of this shape.
+    /// Succeeds if all that the model says has a meaning for pillars of this shape.
     ///
     /// # Errors
     /// If they are rectangles and it says what counts for one width alone.
@@ -206,17 +182,19 @@ impl CalibratedModel {
     }
 }
 
-/// What rectangles have no meaning for.
+/// Fails for what has no meaning for rectangles.
 fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     let (geometry, cell) = (&model.perturbation.geometry, &model.perturbation.cell);
     if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "model/transmission-of-rectangles",
             "the pillars are rectangles, and the transmission of the model goes by one width",
             "give a model without `transmission` and `transmission_phase_rad`: rectangles are told by no one width",
         ));
     }
     if cell.corner_rounding_nm != 0.0 {
-        return Err(Error::invalid(
+        return Err(Error::refused(
+            "model/rounded-rectangles",
             "the pillars are rectangles, and the model rounds corners",
             "set `corner_rounding_nm = 0` in [perturbation.cell] of the model: rectangles are solved with sharp corners",
         ));
@@ -226,7 +204,8 @@ fn check_rectangles(model: &CalibratedModel) -> Result<()> {
         of_width && term.compiled().is_ok_and(|compiled| compiled.uses("w"))
     });
     match by_width {
-        Some(term) => Err(Error::invalid(
+        Some(term) => Err(Error::refused(
+            "model/declared-width-of-rectangles",
             format!(
                 "the declared width `{}` goes by the drawn width `w`, of rectangles",
                 term.name
@@ -262,6 +241,7 @@ impl Found<'_> {
             focused,
             converted: bare.converted.each_ref().map(|t| self.room(t[0], Complex64::ZERO)),
             unconverted: bare.unconverted.each_ref().map(|t| self.room(t[0], Complex64::ONE)),
+            rotation: None,
         };
         for (row, members) in self.rows.iter().zip(self.members) {
             let numbers: Vec<u16> = members.iter().map(|class| self.classes[*class].number).collect();

@@ -1,4 +1,5 @@
-//! What rectangles whose edges are off by so much do to light, as numbers that may be interpolated between biases and stacks.
+//! Response of rectangles whose edges are off by so much to light, as numbers that may be interpolated between biases
+//! and stacks.
 
 use num_complex::Complex64;
 use serde::Serialize;
@@ -9,12 +10,12 @@ use metalith_core::{Progress, Result};
 use metalith_pillars::{PillarId, PillarKind, PillarShape, Rectangles, RotatedRectangles};
 use metalith_rcwa::Orders;
 
-/// How many diffraction orders an axis rectangles are solved with.
+/// Number of diffraction orders an axis that rectangles are solved with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub(crate) enum RowOrders {
     /// These.
     Given(usize),
-    /// As many as the cell of pillars as drawn takes at single wavelengths.
+    /// Orders as many as the cell of pillars as drawn takes at single wavelengths.
     AsDrawn,
 }
 
@@ -60,8 +61,8 @@ pub(crate) fn solve_row(
     }
 }
 
-/// What rotated rectangles of a stack as etched whose edges are off by `bias_nm` do, with as many orders as the cell of pillars as drawn takes if
-/// none are given.
+/// Response of rotated rectangles of a stack as etched whose edges are off by `bias_nm`, with as many orders as the
+/// cell of pillars as drawn takes if none are given.
 pub(crate) fn solve_rotated(
     etched: &CellStack,
     pillars: RotatedRectangles,
@@ -80,7 +81,8 @@ pub(crate) fn solve_rotated(
     Ok(samples.numbers().collect())
 }
 
-/// What the upright rectangle with these edges along x and along y (nm) transmits along both, in each of these stacks as etched.
+/// Transmission of the upright rectangle with these edges along x and along y (nm) along both, in each of these stacks
+/// as etched.
 pub(crate) fn solve_upright(
     etched: &[CellStack],
     edges_nm: [f64; 2],

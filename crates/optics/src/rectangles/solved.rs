@@ -1,4 +1,4 @@
-//! Rectangles of one chip as made, solved where they are needed.
+//! Rectangles of one chip as fabricated, solved where they are needed.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use super::kept;
 use super::rows::{RowOrders, bare_row, row_length, solve_row};
-use super::{RectangleColour, RowsOfBiases};
+use super::{Colour, RowsOfBiases};
 use crate::bank::Axis;
 use crate::rational::{around, rational};
 use crate::{CellChange, perturbed};
@@ -26,13 +26,13 @@ const STEP_NM: f64 = 2.0;
 /// Pillars of one bias in one light: height of the change, wavelength and bias, bit by bit, and the orders.
 type Place = (u64, u64, u64, RowOrders);
 
-/// What was solved is kept for as long as this lives.
+/// Solutions of rectangles, kept in memory for as long as this lives.
 pub(crate) struct SolvedRectangles {
     stated: CellStack,
     pillars: Rectangles,
-    /// Where what is solved is kept from one run to the next.
+    /// Folder in which solutions are cached from one run to the next.
     pub folder: Option<PathBuf>,
-    /// By the number of the pillar: of rotated ones, which one solution is for all of, zero.
+    /// Solutions by the number of the pillar; zero for rotated ones, which share one solution.
     known: Mutex<BTreeMap<u16, HashMap<Place, Vec<Complex64>>>>,
 }
 
@@ -53,15 +53,12 @@ impl SolvedRectangles {
     pub fn rows(
         &self,
         change: &CellChange,
-        colour: RectangleColour,
+        (um, spectral): Colour,
         biases_nm: &[f64],
         numbers: &[u16],
         progress: &dyn Progress,
     ) -> Result<RowsOfBiases> {
-        let (um, orders) = match colour {
-            RectangleColour::Single(um) => (um, RowOrders::AsDrawn),
-            RectangleColour::OfBand(um) => (um, RowOrders::Given(BAND_ORDERS)),
-        };
+        let orders = spectral.choose(RowOrders::AsDrawn, RowOrders::Given(BAND_ORDERS));
         let etched = perturbed(&self.stated, change);
         let row = |bias: &f64| self.row(&etched, (um, orders), *bias, numbers, progress);
         let bare = bare_row(&etched, self.pillars, numbers.len(), um)?;

@@ -2,12 +2,12 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::{BankRange, DeclaredTerm, perturbed};
-use metalith_cell::{Analyser, Polarisation};
+use metalith_cell::{Analyser, Polarisation, PolarisedLight};
 use metalith_core::Silent;
 use metalith_pillars::{PillarShape, UprightRectangles};
 use metalith_rcwa::{Material, Orders};
 
-/// What cubics leave between the nodes of edges and height, of transmissions near one.
+/// Error of cubics between the nodes of edges and height, for transmissions near one.
 const BETWEEN: f64 = 5e-3;
 
 const UM: f64 = 0.526;
@@ -63,7 +63,7 @@ fn model() -> CalibratedModel {
 }
 
 fn made(pillars: Rectangles, focused: FocusedLight) -> MadeRectangles {
-    MadeRectangles::new(&stack(pillars), &model(), focused, PolarisedLight::default()).unwrap()
+    MadeRectangles::new(&stack(pillars), &model(), focused).unwrap()
 }
 
 fn class(number: u16, bias_nm: f64) -> RectangleClass {
@@ -71,7 +71,7 @@ fn class(number: u16, bias_nm: f64) -> RectangleClass {
 }
 
 fn tables(of: &MadeRectangles, classes: &[RectangleClass]) -> Result<PolarisedTables> {
-    of.tables(&of_height(1.3), classes, RectangleColour::OfBand(UM), &Silent)
+    of.tables(&of_height(1.3), classes, (UM, Spectral::InBand), &Silent)
 }
 
 /// Five biases, the first of no pillar: more than are solved themselves.
@@ -155,8 +155,8 @@ fn upright_rectangles_between_the_nodes_are_those_solved_exactly_along_both_axes
     assert!(said.contains("no pillar of 100 x 100 nm"), "{said}");
 }
 
-/// What was kept is taken in place of what would be solved, to the last bit; what is damaged is made anew, and other pillars, biases and stacks have
-/// files of their own.
+/// Cached rows are taken in place of what would be solved, to the last bit; what is damaged is made anew, and other
+/// pillars, biases and stacks have files of their own.
 #[test]
 fn rows_that_are_kept_are_those_that_were_solved() {
     let folder = tempfile::tempdir().unwrap();
@@ -178,7 +178,7 @@ fn rows_that_are_kept_are_those_that_were_solved() {
         // The number of a rotated one is its rotation, and one solution is for all of them.
         tables(&kept(), &[class(number, 0.4)]).unwrap();
         kept()
-            .tables(&of_height(1.4), &classes, RectangleColour::OfBand(UM), &Silent)
+            .tables(&of_height(1.4), &classes, (UM, Spectral::InBand), &Silent)
             .unwrap();
         expected += 2;
         assert_eq!(files().len(), expected);
@@ -207,7 +207,7 @@ fn what_rectangles_have_no_meaning_for_is_refused_with_a_reason() {
     let refused = |pillars: Rectangles, focused: FocusedLight, change: &dyn Fn(&mut crate::Perturbation)| {
         let mut model = model();
         change(&mut model.perturbation);
-        let made = MadeRectangles::new(&stack(pillars), &model, focused, PolarisedLight::default());
+        let made = MadeRectangles::new(&stack(pillars), &model, focused);
         let error = made.err().expect("it is refused");
         format!("{error} {error:?}")
     };

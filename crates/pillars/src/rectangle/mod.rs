@@ -12,7 +12,7 @@ pub use upright::UprightRectangles;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(untagged)]
 pub enum Rectangles {
-    /// Of one size, by their rotation: geometric phase.
+    /// Rectangles of one size, by their rotation: geometric phase.
     Rotated(RotatedRectangles),
     /// Upright, by their edges along x and y: a phase of its own for light polarised along each.
     Upright(UprightRectangles),

@@ -61,7 +61,8 @@ impl RotatedRectangles {
         2.0 * (squared.unwrap_or(0) as f64).sqrt()
     }
 
-    /// By how much the rounding of its corners to the grid turns a pillar (rad): its axis as drawn less [`RotatedRectangles::rotation`].
+    /// Angle by which the rounding of its corners to the grid turns a pillar (rad): its axis as drawn less
+    /// [`RotatedRectangles::rotation`].
     pub fn turned_by_grid(self, number: u16) -> f64 {
         let [a, b, c, _] = self.on_grid(number).map(|(x, y)| (x as f64, y as f64));
         let (along, across) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));

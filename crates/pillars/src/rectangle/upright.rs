@@ -11,9 +11,9 @@ use crate::kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity
 pub struct UprightRectangles {
     /// The shortest edge (nm), even.
     pub shortest_nm: u16,
-    /// From one length to the next (nm), even.
+    /// Step from one length to the next (nm), even.
     pub step_nm: u16,
-    /// How many lengths an edge may have, at most [`UprightRectangles::MOST_LENGTHS`].
+    /// Number of lengths that an edge may have, at most [`UprightRectangles::MOST_LENGTHS`].
     pub lengths: u16,
 }
 
@@ -21,12 +21,12 @@ impl UprightRectangles {
     /// Lengths of an edge at most: 4096 pillars, which a layout may have a cell for each of.
     pub const MOST_LENGTHS: u16 = 64;
 
-    /// How many lengths count: at least one, and no more than numbers have room for.
+    /// Number of lengths that count: at least one, and no more than numbers have room for.
     fn counted(self) -> u16 {
         self.lengths.clamp(1, Self::MOST_LENGTHS)
     }
 
-    /// How many pillars there are; the last of their numbers.
+    /// Number of pillars; the last of their numbers.
     pub fn count(self) -> u16 {
         self.counted().pow(2)
     }

@@ -16,7 +16,7 @@ pub(crate) enum Family {
 }
 
 impl Family {
-    /// Those of Ex, Ey and Ez for this one of Ex.
+    /// Families of Ex, Ey and Ez for this one of Ex.
     pub fn of_components(self) -> [Self; 3] {
         match self {
             Self::Product(x, y) => {

@@ -1,18 +1,18 @@
-//! Which plane waves of a lattice are kept.
+//! Choice of the plane waves of a lattice that are retained.
 
 use super::Family;
 
 /// A choice of orders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RetainedOrders {
-    /// Of a square lattice, all up to this order along either axis.
+    /// Orders of a square lattice up to this order along either axis.
     Square(usize),
-    /// Of a square lattice, those in a circle, where m^2 + n^2 is at most this: of pillars whose sides face all ways, which are met
-    /// by fewer orders than in a square. A quarter of a turn leaves the choice alike.
+    /// Orders of a square lattice in a circle, where m^2 + n^2 is at most this: for pillars whose sides face all ways,
+    /// which are met by fewer orders than in a square. A quarter of a turn leaves the choice alike.
     Disc(usize),
-    /// Of staggered rows, by the orders (m, n) of two pillars in a rectangle: those whose sum is even, in a circle, where
-    /// 3 m^2 + n^2 is at most this: 4 for the nearest orders of a hexagonal lattice. A sixth of a turn leaves the choice alike, and
-    /// what rows are rounded to does not change it.
+    /// Orders of staggered rows, by the orders (m, n) of two pillars in a rectangle: those whose sum is even, in a
+    /// circle, where 3 m^2 + n^2 is at most this: 4 for the nearest orders of a hexagonal lattice. A sixth of a turn
+    /// leaves the choice alike, and what rows are rounded to does not change it.
     Circle(usize),
 }
 
@@ -67,7 +67,7 @@ impl RetainedOrders {
         }
     }
 
-    /// Whether an order is kept.
+    /// True if an order is retained.
     pub fn has(self, [m, n]: [i32; 2]) -> bool {
         match self {
             Self::Square(highest) => [m, n].iter().all(|order| order.unsigned_abs() as usize <= highest),

@@ -24,7 +24,7 @@ pub(super) enum Space {
 }
 
 impl Space {
-    /// Where the derivative leads to.
+    /// Component that the derivative leads to.
     pub fn derived(self) -> Self {
         match self {
             Self::Full => Self::Full,
@@ -131,7 +131,7 @@ impl Rows {
 #[derive(Clone)]
 pub(super) struct FieldBasis {
     pub kept: RetainedOrders,
-    /// What Ex, Ey and Ez are made of.
+    /// Families that make up Ex, Ey and Ez.
     pub families: [Family; 3],
     /// The orders of their functions.
     pub orders: [Vec<[i32; 2]>; 3],

@@ -10,7 +10,7 @@ pub(super) struct Known {
     pub form: fn() -> Dispersion,
 }
 
-/// What can be named in a design. Each is the published fit, in its published range.
+/// Materials that a design can name. Each is the published fit, in its published range.
 pub(super) const KNOWN: &[Known] = &[
     Known {
         name: "sin_luke_2015",

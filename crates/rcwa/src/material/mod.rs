@@ -65,12 +65,12 @@ impl Material {
         }
     }
 
-    /// Whether a text file that names a material so means a CSV table.
+    /// True if a text in a file that names a material means a CSV table.
     pub fn is_table(text: &str) -> bool {
         text.to_ascii_lowercase().ends_with(".csv")
     }
 
-    /// The same index at all wavelengths.
+    /// Material of one index at all wavelengths.
     ///
     /// # Errors
     /// If `n` is not positive or `k` is negative.
@@ -123,7 +123,7 @@ impl Material {
         })
     }
 
-    /// The same material with `offset` added to n.
+    /// Copy of the material with `offset` added to n.
     #[must_use]
     pub fn shifted(&self, offset: f64) -> Self {
         Self {
@@ -137,7 +137,7 @@ impl Material {
         &self.name
     }
 
-    /// Where its numbers come from, for a report.
+    /// Source of its numbers, for a report.
     pub fn source(&self) -> &str {
         let known = KNOWN.iter().find(|k| k.name == self.name);
         known.map_or(self.name.as_str(), |k| k.source)
@@ -148,7 +148,7 @@ impl Material {
         self.form.range_um()
     }
 
-    /// Where it absorbs most from one wavelength to another (um), as far as it is known there: that wavelength (um) and its k.
+    /// Wavelength (um) of its largest absorption in a range (um), as far as it is known there, and its k.
     pub fn most_absorbing(&self, (from_um, to_um): (f64, f64)) -> (f64, f64) {
         let (low, high) = self.range_um();
         let ends = [from_um, to_um].map(|um| um.max(low).min(high));

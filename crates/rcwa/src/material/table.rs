@@ -83,7 +83,7 @@ mod tests {
         );
     }
 
-    /// As spreadsheets save a table.
+    /// Table as spreadsheets save it.
     #[test]
     fn a_mark_of_the_byte_order_is_no_part_of_a_table() {
         let plain = "wavelength_nm,n\r\n400,2\r\n410,2.1\r\n";

@@ -14,7 +14,7 @@ pub struct Outline(Form);
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Form {
-    /// Both axes mirror it, and its sides are along them.
+    /// Outline that both axes mirror and whose sides are along them.
     Upright(Steps),
     /// Its sides are not along the axes.
     Slanted(SlantedForm),
@@ -66,7 +66,7 @@ impl SlantedForm {
     }
 }
 
-/// What the rules for products of Fourier series go by.
+/// Sides of an outline, which decide the rules for products of Fourier series.
 pub(super) enum Sides {
     /// Along the axes: bands of constant width along x, and along y.
     Upright([Vec<Band>; 2]),
@@ -78,11 +78,11 @@ pub(super) enum Sides {
 /// and by 0.009 rad.
 const CORNER_STEPS: usize = 4;
 
-/// Steps of the staircase that stands for a quarter of a circle among unlike neighbours.
+/// Steps of the staircase that stands for a quarter of a circle among dissimilar neighbours.
 const CIRCLE_STEPS: usize = 16;
 
 impl Outline {
-    /// Nothing: a uniform layer of the surrounding medium.
+    /// Outline of nothing: a uniform layer of the surrounding medium.
     pub fn empty() -> Self {
         Self(Form::Upright(Steps::empty()))
     }
@@ -126,7 +126,7 @@ impl Outline {
         }
     }
 
-    /// Whether nothing is there.
+    /// True if there is no pillar.
     pub fn is_empty(&self) -> bool {
         match &self.0 {
             Form::Upright(steps) => steps.is_empty(),
@@ -134,7 +134,7 @@ impl Outline {
         }
     }
 
-    /// Whether it covers the whole of a square this wide.
+    /// True if it covers the whole of a square this wide.
     pub(super) fn fills(&self, width_nm: f64) -> bool {
         match &self.0 {
             Form::Upright(steps) => steps.fills(width_nm),
@@ -142,7 +142,7 @@ impl Outline {
         }
     }
 
-    /// Whether the diagonal mirrors it as well, so that x and y polarisation see the same.
+    /// True if the diagonal mirrors it as well, so that x and y polarisation respond equally.
     pub fn is_square(&self) -> bool {
         match &self.0 {
             Form::Upright(steps) => steps.is_square(),
@@ -150,17 +150,17 @@ impl Outline {
         }
     }
 
-    /// Whether it is a circle.
+    /// True if it is a circle.
     pub(super) fn is_circle(&self) -> bool {
         matches!(self.0, Form::Slanted(SlantedForm::Circle { .. }))
     }
 
-    /// Whether both axes mirror it.
+    /// True if both axes mirror it.
     pub(super) fn is_mirrored(&self) -> bool {
         !matches!(self.0, Form::Slanted(SlantedForm::Rectangle { .. }))
     }
 
-    /// Whether its sides are along the axes.
+    /// True if its sides are along the axes.
     pub(super) fn is_upright(&self) -> bool {
         matches!(self.0, Form::Upright(_))
     }
@@ -173,7 +173,7 @@ impl Outline {
         }
     }
 
-    /// What the rules for products go by.
+    /// Sides that decide the rules for products.
     pub(super) fn sides(&self) -> Sides {
         match &self.0 {
             Form::Upright(steps) => Sides::Upright([0, 1].map(|axis| steps.bands(axis))),

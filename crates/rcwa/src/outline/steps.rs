@@ -48,7 +48,7 @@ impl Steps {
         self.0.iter().any(|c| c[0] >= 0.5 * width_nm && c[1] >= 0.5 * width_nm)
     }
 
-    /// Whether the diagonal mirrors it.
+    /// True if the diagonal mirrors it.
     pub fn is_square(&self) -> bool {
         let n = self.0.len();
         let same = |a: f64, b: f64| a.to_bits() == b.to_bits();
@@ -79,7 +79,7 @@ impl Steps {
     }
 }
 
-/// Where |across| is between `from` and `to`, the pillar reaches to +-`half_width` (nm).
+/// Band of a pillar: where |across| is between `from` and `to`, it reaches to +-`half_width` (nm).
 pub(crate) struct Band {
     pub half_width: f64,
     pub from: f64,

@@ -20,9 +20,9 @@ use super::outline::{Outline, Sides};
 use super::scalar::Scalar;
 use super::stack::CellLattice;
 
-/// So much more permittivity, relative, has Ey where half a turn is the only symmetry that is used: modes that a quarter of
-/// a turn exchanges would have one constant, and the vectors of such a pair lose their digits. The field changes by about as
-/// much.
+/// Relative excess of the permittivity for Ey where half a turn is the only symmetry that is used: modes that a quarter
+/// of a turn exchanges would have one constant, and the vectors of such a pair lose their digits. The field changes by
+/// about as much.
 const SPLIT: f64 = 1e-9;
 
 /// A layer as the operators see it: optical constants in place of materials.
@@ -49,11 +49,11 @@ impl CrossSection<'_> {
 
 /// The permittivity matrices of a layer.
 pub(super) struct Permittivity<T> {
-    /// For Ex from Ex and for Ey from Ey, each in its own rows.
+    /// Matrices for Ex from Ex and for Ey from Ey, each in its own rows.
     pub transverse: [Mat<T>; 2],
-    /// For Ex from Ey and for Ey from Ex, where sides are not along the axes.
+    /// Matrices for Ex from Ey and for Ey from Ex, where sides are not along the axes.
     pub cross: Option<[Mat<T>; 2]>,
-    /// For Ez.
+    /// Matrix for Ez.
     pub z: Mat<T>,
 }
 

@@ -37,18 +37,19 @@ impl Coefficients {
 
 /// Coefficients of a pillar and of the normal over it.
 pub(super) struct Moments {
-    /// Of the function that is one in the pillar and zero outside.
+    /// Coefficients of the function that is one in the pillar and zero outside.
     pub pillar: Coefficients,
-    /// Of c in the pillar, zero outside.
+    /// Coefficients of c in the pillar, zero outside.
     pub cosine: Coefficients,
-    /// Of s alike.
+    /// Coefficients of s in the pillar, zero outside.
     pub sine: Coefficients,
-    /// Of c c + s s alike.
+    /// Coefficients of c c + s s in the pillar, zero outside.
     pub square: Coefficients,
 }
 
 impl Moments {
-    /// For orders up to `highest` along each axis, equal ones on a square lattice. Staggered rows have circles.
+    /// Moments for orders up to `highest` along each axis, which are equal on a square lattice. Staggered rows have
+    /// circles.
     pub fn of(form: &SlantedForm, pitch_nm: f64, lattice: CellLattice, highest: [usize; 2]) -> Self {
         match (*form, lattice) {
             (SlantedForm::Circle { diameter_nm }, CellLattice::Square) => {
@@ -63,8 +64,9 @@ impl Moments {
         }
     }
 
-    /// Of a circle whose diameter is this share of the pitch. The normal is the radius; c and s are continued by harmonic
-    /// functions, r^2 cos 2a and r^2 sin 2a over the radius squared; the sum of their squares is r^4 over R^4.
+    /// Moments of a circle whose diameter is this share of the pitch. The normal is the radius; c and s are continued
+    /// by harmonic functions, r^2 cos 2a and r^2 sin 2a over the radius squared; the sum of their squares is r^4 over
+    /// R^4.
     fn of_circle(duty: f64, highest: usize) -> Self {
         let [mut pillar, mut cosine, mut sine, mut fourth] = [(); 4].map(|()| Coefficients::new([highest; 2]));
         let area = PI * duty * duty / 4.0;
@@ -93,8 +95,9 @@ impl Moments {
         }
     }
 
-    /// As [`Moments::of_circle`] for two circles in a rectangle of one pitch by two rows, each row this share of the pitch:
-    /// one in the middle, one at the corners. Where the sum of both orders is odd they cancel, and all is zero.
+    /// Variant of [`Moments::of_circle`] for two circles in a rectangle of one pitch by two rows, each row this share
+    /// of the pitch: one in the middle, one at the corners. Where the sum of both orders is odd they cancel, and all is
+    /// zero.
     fn of_staggered_circle(duty: f64, row: f64, highest: [usize; 2]) -> Self {
         let [mut pillar, mut cosine, mut sine, mut fourth] = [(); 4].map(|()| Coefficients::new(highest));
         for m in 0..=highest[0] as i32 {
@@ -178,9 +181,10 @@ fn slab(k: f64, half: f64) -> f64 {
     2.0 * half * if x == 0.0 { 1.0 } else { x.sin() / x }
 }
 
-/// How fast the direction of the normal turns from one side of a rectangle to the next: (b^q - a^q) / (b^q + a^q) at distances
-/// a and b from the nearest sides of the first pair and the second. Of 1.5 to 4 (and of a harmonic function) this one needs
-/// the fewest orders: a slower turn is right at too few places of the sides, a faster one needs more orders itself.
+/// Rate at which the direction of the normal turns from one side of a rectangle to the next: (b^q - a^q) / (b^q + a^q)
+/// at distances a and b from the nearest sides of the first pair and the second. Of 1.5 to 4 (and of a harmonic
+/// function) this one needs the fewest orders: a slower turn is right at too few places of the sides, a faster one
+/// needs more orders itself.
 const TURN: f64 = 2.5;
 
 /// Points along half an edge by which the function is integrated; the step shrinks to nothing at the middle and at the sides, so

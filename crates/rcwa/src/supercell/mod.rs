@@ -33,13 +33,13 @@ use waves::Waves;
 pub struct Supercell {
     /// Pitch of the sites (nm).
     pub pitch_nm: f64,
-    /// Where the sites stand; those of staggered rows have circles.
+    /// Lattice of the sites; staggered rows have circles.
     pub sites: CellLattice,
-    /// How they repeat.
+    /// Lattice on which the sites repeat.
     pub lattice: SiteLattice,
     /// Complex index of the half-space below, where the substrate is.
     pub below: Complex64,
-    /// From the substrate upwards.
+    /// Layers from the substrate upwards.
     pub layers: Vec<SiteLayer>,
     /// Complex index of the half-space above.
     pub above: Complex64,
@@ -138,7 +138,7 @@ impl Supercell {
         })
     }
 
-    /// The same seen from the other side.
+    /// Same supercell seen from the other side.
     fn flipped(&self) -> Self {
         Self {
             below: self.above,

@@ -41,7 +41,7 @@ pub(super) fn permittivity(
     }
 }
 
-/// For the component along an axis: the inverse rule along it.
+/// Matrix for the component along an axis: the inverse rule along it.
 fn along(layer: &SiteLayer, pitch_nm: f64, lattice: &SiteLattice, waves: &Waves, axis: usize) -> Mat<Complex64> {
     let (list, space) = (&waves.of[axis], waves.spaces[axis]);
     let (inside, outside) = (layer.inside * layer.inside, layer.outside * layer.outside);
@@ -150,7 +150,7 @@ fn inverse_rule(
     inverse
 }
 
-/// For Ez: the Laurent rule along both axes.
+/// Matrix for Ez: the Laurent rule along both axes.
 fn laurent(layer: &SiteLayer, pitch_nm: f64, lattice: &SiteLattice, waves: &Waves) -> Mat<Complex64> {
     let (list, space) = (&waves.of[2], waves.spaces[2]);
     let sites = lattice.len() as f64;

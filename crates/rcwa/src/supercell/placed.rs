@@ -1,4 +1,4 @@
-//! Where the sites of a supercell stand, and which way its plane waves go.
+//! Places of the sites of a supercell, and directions of its plane waves.
 
 use super::Supercell;
 use super::sites::SiteLattice;
@@ -50,7 +50,7 @@ impl Placed {
         }
     }
 
-    /// Whether the x axis mirrors it by mirroring each of its sites.
+    /// True if the x axis mirrors it by mirroring each of its sites.
     pub fn is_mirrored_row(&self) -> bool {
         self.staggered.is_none() && self.lattice.is_row()
     }

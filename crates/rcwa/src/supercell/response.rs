@@ -1,4 +1,4 @@
-//! What a supercell sends out: every order with its amplitude and power.
+//! Results of a supercell: every order with its amplitude and power.
 
 use num_complex::Complex64;
 
@@ -8,7 +8,7 @@ use crate::Incidence;
 use crate::error::Result;
 use crate::response::{finite, flux};
 
-/// How a supercell answers a plane wave.
+/// Response of a supercell to a plane wave.
 ///
 /// Polarisations as in [`crate::Response`]: s lies in the plane of the lattice, p has its transverse part
 /// along the transverse wave vector, here with its x, or else its y, above zero; along the normal p is x and

@@ -71,7 +71,7 @@ impl SiteLattice {
         (y % self.rows) * self.row + (x % self.row + self.row - back) % self.row
     }
 
-    /// Whether it is one row along x, which the x axis mirrors.
+    /// True if it is one row along x, which the x axis mirrors.
     pub(super) fn is_row(&self) -> bool {
         self.rows == 1 && self.shift == 0
     }

@@ -20,8 +20,8 @@ pub(super) struct Waves {
 }
 
 impl Waves {
-    /// How many components of the field there are. Of a row, the rows of Ex and Ey in one symmetry about the x axis
-    /// are together as many as there are plane waves.
+    /// Number of components of the field. Of a row, the rows of Ex and Ey in one symmetry about the x axis are together
+    /// as many as there are plane waves.
     pub fn unknowns(placed: &Placed, highest: usize, y: Space) -> usize {
         let waves = placed.waves(highest).len();
         if y == Space::Full { 2 * waves } else { waves }

@@ -14,7 +14,7 @@ pub enum Illuminant {
     D65,
     /// CIE standard illuminant A, an incandescent lamp.
     A,
-    /// The same power at every wavelength.
+    /// Light of the same power at every wavelength.
     EqualEnergy,
     /// A measured spectrum.
     File(Spectrum),

@@ -1,4 +1,4 @@
-//! What tests of studies and of other work have in common.
+//! Helpers that tests of studies and of other work share.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use super::Compensated;
 use super::line::Line;
+use crate::optics::incidence;
 use crate::{PsfResult, open_matched};
-use metalith_cell::{PolarisationAxis, PolarisedLight};
+use metalith_cell::{Illumination, Incidence, PolarisationAxis, PolarisedLight};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_design::{CellIncidence, Design, Element};
+use metalith_design::{Design, Element};
 use metalith_layout::read_pillars;
 use metalith_optics::{AsBuiltChip, AsBuiltElement};
 use metalith_pillars::PillarMap;
@@ -27,7 +28,7 @@ pub(super) const CHIPS: usize = 3;
 pub struct CompensationCase {
     pub element: String,
     pub wavelength_um: f64,
-    /// Of upright rectangles, the axis that the light is polarised along.
+    /// Axis that the light is polarised along, for upright rectangles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<PolarisationAxis>,
     /// `intended` as stated, `made, uncorrected` and `made, corrected`.
@@ -90,7 +91,6 @@ fn of_element(
         .iter()
         .map(|(_, chip, widths)| chip.element(&chip.drawn(widths, opening_um).placed(element.centre_um())))
         .collect::<Result<_>>()?;
-    let as_lit = design.verify.incidence == CellIncidence::AsLit;
     let drawn = PixelFrequencies::of(design.verify.pixel_um).drawn();
     let mut scratch = Scratch::default();
     let mut cases = Vec::new();
@@ -100,15 +100,18 @@ fn of_element(
         }
         let um = colour.wavelength_um;
         let wave = incident(&element.wedge, um, [0.0, 0.0])?;
+        let light = Illumination {
+            polarised: colour.axis.map_or(design.verify.light(), PolarisedLight::along),
+            incidence: colour.axis.map_or(incidence(design), |_| Incidence::Normal),
+            ..Illumination::from_direction(um, [wave.sin_x, wave.sin_y])
+        };
         let chief = landing_um(&element.wedge, &wave, focal_um)?;
         let window = Window::about(chief, plain.lattice.pitch_um(), design.verify.window_samples, focal_um);
         let matched = open_matched(design, element, phase, [chief[0], chief[1], focal_um], um).scaled(colour.full);
         for ((pillars, chip, _), made) in chips.iter().zip(&made) {
-            let view = match colour.axis {
-                None => chip.view(made, &wave, as_lit, progress)?,
-                Some(axis) => chip.view_in(made, &wave, PolarisedLight::along(axis), progress)?,
-            };
-            let psf = view.psf(window, Accuracy::Accurate, &drawn, &mut scratch)?;
+            let psf = chip
+                .view(made, &light, progress)?
+                .psf(window, Accuracy::Accurate, &drawn, &mut scratch)?;
             cases.push(CompensationCase {
                 element: element.label(),
                 wavelength_um: um,

@@ -1,4 +1,4 @@
-//! Which width to draw for which intended one.
+//! Choice of the width to draw for each intended one.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ const START_STEP_UM: f64 = 0.02;
 #[derive(Default)]
 pub struct Kinds(BTreeMap<(u16, i32), u64>);
 
-/// What is drawn for each kind.
+/// Drawn width of each kind.
 pub struct DrawnWidths {
     pub drawn: BTreeMap<(u16, i32), u16>,
     /// Relative rms error if widths stay as they are.
@@ -78,7 +78,7 @@ impl Kinds {
         best
     }
 
-    /// For each kind the pillar that, as made, is nearest to the intended one, at given free phases.
+    /// Pillar of each kind that, as fabricated, is nearest to the intended one, at given free phases.
     fn nearest(&self, line: &Line, pistons: &[Complex64]) -> BTreeMap<(u16, i32), u16> {
         let kinds: Vec<_> = self.0.keys().copied().collect();
         let of = |&(w, step): &(u16, i32)| {
@@ -96,7 +96,7 @@ impl Kinds {
         chosen.into_iter().collect()
     }
 
-    /// How far made pillars miss intended ones, relative, and the free phases at which they miss them least.
+    /// Relative error of fabricated pillars against intended ones, and the free phases at which it is least.
     fn agreement(&self, line: &Line, drawn: &BTreeMap<(u16, i32), u16>) -> (f64, Vec<Complex64>) {
         let (mut miss, mut size) = (0.0, 0.0);
         let mut of = |c: &ColourTransmissions| {

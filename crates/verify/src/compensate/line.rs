@@ -1,8 +1,10 @@
-//! How a line makes pillars: transmission as stated and as made, and what density adds at each site.
+//! Pillars as a line fabricates them: transmission as stated and as fabricated, and what density adds at each site.
 
 use num_complex::Complex64;
 
-use metalith_cell::{CellModel, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder};
+use metalith_cell::{
+    CellModel, CellResponse, JonesTables, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder,
+};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_optics::{AsBuiltChip, CalibratedModel, Perturbation};
@@ -12,13 +14,14 @@ use metalith_pillars::{PillarMap, PillarShape};
 #[derive(Clone, Debug)]
 pub struct ColourTransmissions {
     pub wavelength_um: f64,
-    /// Of upright rectangles, which have a phase for each: the axis that the light is polarised along.
+    /// Axis that the light is polarised along, for upright rectangles, which have a phase for each.
     pub axis: Option<PolarisationAxis>,
     /// |t| of a stated cell that passes everything.
     pub full: f64,
-    /// Of intended pillars as stated, by width (nm) or number.
+    /// Transmission of intended pillars as stated, by width (nm) or number.
     pub stated: Vec<Complex64>,
-    /// Of made pillars, by the place of the drawn pillar in [`Line::drawn`] and then by step of density.
+    /// Transmission of fabricated pillars, by the place of the drawn pillar in [`Line::drawn`] and then by step of
+    /// density.
     made: Vec<Vec<Complex64>>,
 }
 
@@ -45,7 +48,8 @@ impl Line {
         check_shape(design.cell.shape)?;
         let directed = model.perturbation.geometry.directed_widths();
         if !directed.is_empty() {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "compensate/copies-differ",
                 format!(
                     "widths as declared by `{}` differ between copies of an element",
                     directed.join("`, `")
@@ -54,7 +58,8 @@ impl Line {
             ));
         }
         if model.perturbation.cell.rim_height_nm != 0.0 {
-            return Err(Error::invalid(
+            return Err(Error::refused(
+                "compensate/height-varies",
                 "pillars that are higher at the rim of a lens are not compensated: a width is chosen for its cell, not for its place",
                 "take `rim_height_nm` out of the model; `metalith run --model` shows what it does",
             ));
@@ -76,7 +81,7 @@ impl Line {
         Ok(line)
     }
 
-    /// What intended pillars transmit as stated at a wavelength (um).
+    /// Transmission of intended pillars as stated, at a wavelength (um).
     fn stated_colours(
         &self,
         lit: &LitStack,
@@ -91,9 +96,9 @@ impl Line {
             stated,
             made: Vec::new(),
         };
-        let found = self.stated.drawn_rectangles(&self.drawn, 0, wavelength_um, progress)?;
-        if let Some((PolarisedTables::Axes(tables), _)) = found {
-            let both = PolarisationAxis::ALL.into_iter().zip(tables.along);
+        if lit.focused.is_some() {
+            let along = along_axes(&self.stated, &self.drawn, 0, wavelength_um, progress)?;
+            let both = PolarisationAxis::ALL.into_iter().zip(along);
             return Ok(both.map(|(axis, table)| colour(Some(axis), table)).collect());
         }
         let wide = self.drawn.last().copied().unwrap_or(0);
@@ -101,7 +106,7 @@ impl Line {
         Ok(vec![colour(None, cell.transmissions(wavelength_um, wide)?)])
     }
 
-    /// Whether the width of a pillar depends on what is drawn around it.
+    /// True if the width of a pillar depends on what is drawn around it.
     pub fn varies_by_site(&self) -> bool {
         self.chip.perturbation().geometry.varies_by_site()
     }
@@ -114,7 +119,7 @@ impl Line {
         steps.unwrap_or_else(|| vec![0; drawn.number.len()])
     }
 
-    /// Solve all pillars that may be drawn as made, for these steps of density at the least and at the most.
+    /// Solve all pillars that may be drawn as fabricated, for these steps of density at the least and at the most.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
@@ -133,14 +138,14 @@ impl Line {
         Ok(())
     }
 
-    /// What a pillar transmits at one of the colours, drawn at a place of [`Line::drawn`], at a step of density
-    /// that was solved for.
+    /// Transmission of a pillar at one of the colours, drawn at a place of [`Line::drawn`], at a step of density that
+    /// was solved for.
     pub fn made(&self, colour: &ColourTransmissions, place: usize, step: i32) -> Complex64 {
         colour.made[place][(step - self.first_step) as usize]
     }
 }
 
-/// What pillars of a chip transmit at one of the colours where so many steps of density are added.
+/// Transmission of pillars of a chip at one of the colours where so many steps of density are added.
 fn made(
     chip: &AsBuiltChip,
     drawn: &[u16],
@@ -148,23 +153,34 @@ fn made(
     colour: &ColourTransmissions,
     progress: &dyn Progress,
 ) -> Result<Vec<Complex64>> {
-    let Some(axis) = colour.axis else {
-        return chip.drawn_widths(drawn, step, colour.wavelength_um, progress);
+    let um = colour.wavelength_um;
+    let table = match colour.axis {
+        None => chip.pillars(drawn, step, um, progress)?.focused()?,
+        // Those of both axes are solved together, and remembered.
+        Some(axis) => along_axes(chip, drawn, step, um, progress)?.swap_remove(axis.index()),
     };
-    // Those of both axes are solved together, and remembered.
-    match chip.drawn_rectangles(drawn, step, colour.wavelength_um, progress)? {
-        Some((PolarisedTables::Axes(tables), _)) => {
-            let table = &tables.along[axis.index()];
-            Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
-        }
-        _ => unreachable!("pillars that were told apart along this axis"),
+    Ok(drawn.iter().map(|number| table[usize::from(*number)]).collect())
+}
+
+/// Transmission of upright rectangles of a chip for light along x and along y, by their number.
+fn along_axes(
+    chip: &AsBuiltChip,
+    drawn: &[u16],
+    step: i32,
+    wavelength_um: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<Complex64>>> {
+    match chip.pillars(drawn, step, wavelength_um, progress)? {
+        CellResponse::Jones(JonesTables::Polarised(PolarisedTables::Axes(tables))) => Ok(tables.along.into()),
+        other => unreachable!("pillars that were told apart along both axes: {other:?}"),
     }
 }
 
-/// Nothing, if another pillar of a design may come out as the intended one.
+/// Succeeds if another pillar of a design may come out as the intended one.
 fn check_shape(shape: PillarShape) -> Result<()> {
     match shape.has_one_size() {
-        true => Err(Error::invalid(
+        true => Err(Error::refused(
+            "compensate/rotated-rectangles",
             "the pillars are rotated rectangles of one size: no other of them is nearer to what was intended",
             "draw edges that come out as intended: `width_nm` and `length_nm` of [cell], less the bias of the model; `metalith run --model` \
              judges the chip that they give",

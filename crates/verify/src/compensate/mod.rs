@@ -1,8 +1,9 @@
 //! The layout whose pillars, as a measured line makes them, do what was intended.
 //!
-//! Each intended width is exchanged for the drawn one whose pillar, as made, transmits most like the intended
-//! pillar as stated, at the design's wavelengths together; of upright rectangles both widths, in light along both axes together. A
-//! phase common to all pillars of a wavelength and polarisation is free: it moves no light. Bias that follows density is looked up site by site, of the layout as drawn.
+//! Each intended width is exchanged for the drawn one whose pillar, as fabricated, transmits most like the intended
+//! pillar as stated, at the design's wavelengths together; of upright rectangles both widths, in light along both axes
+//! together. A phase common to all pillars of a wavelength and polarisation is free: it moves no light. Bias that
+//! follows density is looked up site by site, of the layout as drawn.
 
 mod cases;
 mod choose;
@@ -25,7 +26,7 @@ pub use page::write_compensation_report;
 /// Passes over the layout: the second sees the density of what the first has drawn.
 const PASSES: usize = 2;
 
-/// What the name of a design ends in when its layout is compensated.
+/// Ending of the name of a design whose layout is compensated.
 const SUFFIX: &str = "_compensated";
 
 /// The name of the compensated layout of a design, and of its folder.
@@ -43,7 +44,7 @@ pub struct Compensated {
 }
 
 impl Compensated {
-    /// What the model says that neither the compensation nor its report applies.
+    /// Parts of the model that neither the compensation nor its report applies.
     pub fn not_applied(&self) -> Vec<NotApplied> {
         self.line.chip.perturbation().not_applied()
     }

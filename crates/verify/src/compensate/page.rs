@@ -1,4 +1,4 @@
-//! What a compensation is worth: intended, as it would be made uncorrected, as it would be made corrected.
+//! Page of the gain by a compensation: as intended, as fabricated without correction, as fabricated with it.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ const DECADES: f64 = 4.0;
 struct CompensationNumbers<'a> {
     model: &'a CalibratedModel,
     summary: &'a CompensationSummary,
-    /// What the model says that was not simulated.
+    /// Parts of the model that were not simulated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     not_applied: Vec<NotApplied>,
     cases: &'a [CompensationCase],
@@ -76,7 +76,7 @@ pub fn write_compensation_report(
     page.write(&folder.join("compensation.html"))
 }
 
-/// The element of a case, and the light that it is seen in where it tells polarisations apart.
+/// The element of a case, and the light that it is seen in where it distinguishes polarisations.
 fn named(case: &CompensationCase) -> String {
     match case.axis {
         None => case.element.clone(),

@@ -5,15 +5,15 @@ mod orders;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::case::{SimulationCases, TransmissionTables, not_held};
+use super::case::SimulationCases;
 use super::copies::{Chosen, CopyAngle};
 use super::psf_metrics::{PsfImages, PsfPair, PsfResult};
-use metalith_cell::Fidelity;
+use metalith_cell::{Illumination, Incidence};
 use metalith_core::Progress;
 use metalith_core::{Error, Result};
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
-use metalith_optics::{AsBuiltElement, AsBuiltOptics, DrawnElement, SimulationCase};
+use metalith_optics::{CaseOptics, ElementOptics, IncoherentFields, Placement, SimulationCase};
 use metalith_pillars::{Lattice, PillarRows};
 use metalith_wave::propagation::{incident, landing_um};
 use metalith_wave::psf::PixelFrequencies;
@@ -22,144 +22,104 @@ use metalith_wave::{
     Window,
 };
 
-/// Where an element looks.
+/// Viewing direction of an element in the middle of its field.
 const MIDDLE: FieldAngle = FieldAngle { x_deg: 0.0, y_deg: 0.0 };
 
-/// One wavelength, with what all elements and angles share.
-struct Colour {
-    wavelength_um: f64,
-    /// Of each case.
-    cases: Vec<CaseAt>,
-}
-
-/// One case at one wavelength.
-struct CaseAt {
-    fidelity: Fidelity,
-    /// |t| of a cell that passes everything.
-    full: f64,
-    /// Of a cell, by drawn width; a chip as made has its own by site.
-    tables: Option<TransmissionTables>,
-}
-
-/// What the elements of a design are simulated with.
+/// Simulator of the elements of a design.
 pub(super) struct ElementSimulator<'a> {
     design: &'a Design,
     lattice: Lattice,
-    cases: Vec<SimulationCase<'a>>,
+    /// The case that judges first.
+    cases: Vec<CaseOptics<'a>>,
     accuracy: Accuracy,
     /// Spectra that a thread may hold at a time, if not all (bytes): see [`FoldedPropagator::within`].
     part_bytes: Option<usize>,
-    colours: Vec<Colour>,
 }
 
-/// An element as read from a layout, and as made in each case that is a made chip.
-pub(super) struct ReadElement<'a> {
-    pub widths: &'a dyn PillarRows,
-    /// What chips are made of, if the pillars are held as a map.
-    drawn: Option<DrawnElement<'a>>,
-    pub made: Vec<Option<AsBuiltElement>>,
+/// An element as read from a layout, in each case.
+pub(super) struct ReadElement<'r> {
+    pub widths: &'r dyn PillarRows,
+    pub cases: Vec<Box<dyn ElementOptics + 'r>>,
 }
 
 impl<'a> ElementSimulator<'a> {
-    /// Look up the cells at all wavelengths.
+    /// Simulator for these cases.
     pub fn new(
         design: &'a Design,
         lattice: Lattice,
         cases: &SimulationCases<'a>,
         accuracy: Accuracy,
         part_bytes: Option<usize>,
-    ) -> Result<Self> {
-        let cases: Vec<_> = cases.iter().collect();
-        let colour = |&wavelength_um: &f64| {
-            let at = |case: &SimulationCase<'_>| {
-                Ok(CaseAt {
-                    fidelity: case.fidelity(),
-                    full: case.full_transmission(wavelength_um)?,
-                    tables: match case {
-                        SimulationCase::Made(_) => None,
-                        SimulationCase::Cell(cell) => {
-                            let (largest_number, light) = (largest_number(design), design.verify.light());
-                            let kind = lattice.kind();
-                            Some(TransmissionTables::new(
-                                *cell,
-                                kind,
-                                wavelength_um,
-                                largest_number,
-                                light,
-                            )?)
-                        }
-                    },
-                })
-            };
-            Ok(Colour {
-                wavelength_um,
-                cases: cases.iter().map(at).collect::<Result<_>>()?,
-            })
-        };
-        Ok(Self {
+    ) -> Self {
+        let optics = |case: SimulationCase<'a>| case.optics(lattice.kind(), design.cell.most()).within(part_bytes);
+        Self {
             design,
             lattice,
+            cases: cases.iter().map(optics).collect(),
             accuracy,
             part_bytes,
-            colours: design.verify.wavelengths_um.iter().map(colour).collect::<Result<_>>()?,
-            cases,
-        })
+        }
     }
 
-    /// Solve the cells for light as it arrives at these elements, if the design asks for it.
+    /// The case that judges.
+    pub fn judge(&self) -> &CaseOptics<'a> {
+        &self.cases[0]
+    }
+
+    /// Solve the cells for light as it arrives at these elements.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
-    pub fn add_directions(&mut self, chosen: &[Chosen], progress: &dyn Progress) -> Result<()> {
-        self.add_neighbours(chosen, progress)?;
-        let cells = self
-            .cases
-            .iter()
-            .filter(|c| matches!(c, SimulationCase::Cell(_)))
-            .count();
-        if !self.as_lit() || cells == 0 {
-            return Ok(());
-        }
+    pub fn solve(&self, chosen: &[Chosen], progress: &dyn Progress) -> Result<()> {
         let lit: Vec<(&Element, FieldAngle)> = chosen.iter().flat_map(all_angles).collect();
-        progress.begin(
-            "solving cells as they are lit",
-            (lit.len() * self.colours.len() * cells) as u64,
-        );
-        for colour in &mut self.colours {
-            let waves = all_arriving(&lit, colour.wavelength_um)?;
-            for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
-                if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
-                    tables.add_directions(*cell, &waves, largest_number(self.design), progress)?;
+        let colours = &self.design.verify.wavelengths_um;
+        if incidence(self.design) == Incidence::Oblique {
+            let all = lit.len() * colours.len() * self.cases.len();
+            progress.begin("solving cells for oblique light", all as u64);
+        }
+        for &um in colours {
+            for (element, field) in &lit {
+                let wave = arriving(element, um, *field)?;
+                for case in &self.cases {
+                    self.in_middle(element, um, |light| case.response(light, progress))?;
+                    self.in_light(element, &wave, |light| case.response(light, progress))?;
+                    progress.advance(1);
                 }
             }
         }
         Ok(())
     }
 
-    /// Obtain what pillars transmit among unlike neighbours, from the cells that know: in light from the middle of an
-    /// element's field, where orders are told, and from each of its field angles if the design asks for cells as they are lit.
-    fn add_neighbours(&mut self, chosen: &[Chosen], progress: &dyn Progress) -> Result<()> {
-        let mut lit: Vec<(&Element, FieldAngle)> = chosen.iter().map(|one| (&one.element, MIDDLE)).collect();
-        if self.as_lit() {
-            lit.extend(chosen.iter().flat_map(all_angles));
+    /// Result of `with` for an element's light from one of its field angles.
+    fn in_light<T>(
+        &self,
+        element: &Element,
+        wave: &PlaneWave,
+        with: impl FnOnce(&Illumination<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let light = Illumination {
+            incidence: incidence(self.design),
+            polarised: self.design.verify.light(),
+            ..Illumination::from_direction(wave.wavelength_um, [wave.sin_x, wave.sin_y])
+        };
+        if light.incidence == Incidence::Oblique {
+            return with(&light);
         }
-        for colour in &mut self.colours {
-            let waves = all_arriving(&lit, colour.wavelength_um)?;
-            for (at, case) in colour.cases.iter_mut().zip(&self.cases) {
-                if let (Some(tables), SimulationCase::Cell(cell)) = (&mut at.tables, case) {
-                    tables.add_neighbours(*cell, &waves, progress)?;
-                }
-            }
-        }
-        Ok(())
+        let middle = arriving(element, wave.wavelength_um, MIDDLE)?;
+        with(&Illumination {
+            viewing: Some(&|_| [middle.sin_x, middle.sin_y]),
+            ..light
+        })
     }
 
-    /// The light that cells with unlike neighbours are solved for where this wave arrives.
-    fn lit(&self, element: &Element, wave: &PlaneWave) -> Result<PlaneWave> {
-        if self.as_lit() {
-            return Ok(*wave);
-        }
-        arriving(element, wave.wavelength_um, MIDDLE)
+    /// Result of `with` for light from the middle of an element's field, on cells that are solved along the normal:
+    /// orders are reported in it.
+    fn in_middle<T>(&self, element: &Element, um: f64, with: impl FnOnce(&Illumination<'_>) -> Result<T>) -> Result<T> {
+        let middle = arriving(element, um, MIDDLE)?;
+        with(&Illumination {
+            polarised: self.design.verify.light(),
+            ..Illumination::from_direction(um, [middle.sin_x, middle.sin_y])
+        })
     }
 
     /// The lens with the perfect phase for the place where a chief ray lands, all sites of modulus one: what Strehl ratios
@@ -172,31 +132,23 @@ impl<'a> ElementSimulator<'a> {
 
     /// Number of wavelengths and angles of one element.
     pub fn psfs(&self, one: &Chosen) -> usize {
-        self.colours.len() * one.angles.len()
+        self.design.verify.wavelengths_um.len() * one.angles.len()
     }
 
-    fn as_lit(&self) -> bool {
-        self.design.verify.incidence == CellIncidence::AsLit
-    }
-
-    /// An element as read, with what each made chip makes of it.
+    /// An element as read, in each case.
     ///
     /// # Errors
-    /// As [`AsBuiltElement::new`]; also if a chip is to be made of pillars that are not held as a map.
-    pub fn read<'w>(&self, element: &Element, widths: &'w dyn PillarRows) -> Result<ReadElement<'w>> {
-        let drawn = widths.held().map(|map| {
-            let drawn = DrawnElement::new(map, self.design.aperture_radius_of_um(element));
-            drawn.of_shape(self.design.cell.shape).placed(element.centre_um())
-        });
-        let made = |case: &SimulationCase<'_>| match (case, &drawn) {
-            (SimulationCase::Cell(_), _) => Ok(None),
-            (SimulationCase::Made(chip), Some(drawn)) => chip.element(drawn).map(Some),
-            (SimulationCase::Made(_), None) => Err(not_held()),
+    /// As [`CaseOptics::element`].
+    pub fn read<'r>(&'r self, element: &Element, widths: &'r dyn PillarRows) -> Result<ReadElement<'r>> {
+        let placement = Placement {
+            radius_um: self.design.lens_of(element).radius_um(),
+            aperture_radius_um: self.design.aperture_radius_of_um(element),
+            centre_um: element.centre_um(),
         };
+        let cases = self.cases.iter().map(|case| case.element(widths, &placement));
         Ok(ReadElement {
             widths,
-            made: self.cases.iter().map(made).collect::<Result<_>>()?,
-            drawn,
+            cases: cases.collect::<Result<_>>()?,
         })
     }
 
@@ -230,16 +182,18 @@ impl<'a> ElementSimulator<'a> {
         };
         let mut tasks = Vec::new();
         for angles in [own, of_copies] {
-            for colour in &self.colours {
+            for &wavelength_um in &self.design.verify.wavelengths_um {
                 for &(field, copy) in angles {
-                    let wave = arriving(element, colour.wavelength_um, field)?;
-                    let views = self.views(read, &wave, progress)?;
+                    let wave = arriving(element, wavelength_um, field)?;
+                    let all = |light: &Illumination<'_>| {
+                        let cases = read.cases.iter().map(|case| case.in_light(light, progress));
+                        cases.collect::<Result<_>>()
+                    };
                     tasks.push(Task {
-                        colour,
                         field,
                         copy,
                         wave,
-                        views,
+                        cases: self.in_light(element, &wave, all)?,
                     });
                 }
             }
@@ -250,25 +204,9 @@ impl<'a> ElementSimulator<'a> {
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
-                let pair = self.pair(&task, (element, phase), designed, read.widths, scratch);
+                let pair = self.pair(&task, (element, phase), designed, scratch);
                 progress.advance(1);
                 pair
-            })
-            .collect()
-    }
-
-    /// A read element as each made chip has it in the light of a wave; nothing for the cells.
-    fn views<'r>(
-        &self,
-        read: &'r ReadElement<'_>,
-        wave: &PlaneWave,
-        progress: &dyn Progress,
-    ) -> Result<Vec<Option<AsBuiltOptics<'r>>>> {
-        let pairs = self.cases.iter().zip(&read.made);
-        pairs
-            .map(|(case, made)| match (case, made) {
-                (SimulationCase::Made(chip), Some(made)) => chip.view(made, wave, self.as_lit(), progress).map(Some),
-                _ => Ok(None),
             })
             .collect()
     }
@@ -278,15 +216,11 @@ impl<'a> ElementSimulator<'a> {
         task: &Task<'_>,
         (element, phase): (&Element, &ElementPhase<'_>),
         designed: &dyn Aperture,
-        widths: &dyn PillarRows,
         scratch: &mut Scratch,
     ) -> Result<PsfPair> {
         let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
-        let Task {
-            colour, field, wave, ..
-        } = task;
-        let wavelength_um = colour.wavelength_um;
-        let lit = self.lit(element, wave)?;
+        let Task { field, wave, .. } = task;
+        let wavelength_um = wave.wavelength_um;
         let chief = landing_um(&element.wedge, wave, lens.focal_length_um)?;
         let window = Window::about(
             chief,
@@ -305,23 +239,20 @@ impl<'a> ElementSimulator<'a> {
         let perfect = self.perfect(element, phase, chief, wavelength_um);
         let mut extracted = Vec::new();
         let mut judged = None;
-        for (at, view) in colour.cases.iter().zip(&task.views) {
+        for (case, fields) in self.cases.iter().map(CaseOptics::case).zip(&task.cases) {
             // Curves are drawn of the case that judges alone.
             let lp_mm: &[f64] = if judged.is_none() { &drawn } else { &reported };
-            let found = match (&at.tables, view) {
-                (_, Some(view)) => view.psf(window, self.accuracy, lp_mm, scratch)?,
-                (Some(tables), None) => tables.psf(widths, wave, &lit, &fold, lp_mm, scratch)?,
-                (None, None) => unreachable!("a case is a cell or a made chip"),
-            };
-            let matched = perfect.scaled(at.full);
-            extracted.push((at.fidelity, PsfResult::of(&found, &matched, spec.pixel_um)));
+            let found = fields.psf(window, self.accuracy, lp_mm, scratch)?;
+            let matched = perfect.scaled(case.full_transmission(wavelength_um)?);
+            extracted.push((case.fidelity(), PsfResult::of(&found, &matched, spec.pixel_um)));
             judged.get_or_insert(found);
         }
         let judged = judged.expect("the case that judges is the first");
+        let full = self.judge().case().full_transmission(wavelength_um)?;
         let images = (field.x_deg == 0.0 && field.y_deg == 0.0).then(|| {
             Box::new(PsfImages {
                 designed: picture(&designed, 1.0),
-                extracted: picture(&judged, colour.cases[0].full),
+                extracted: picture(&judged, full),
                 step_um: window.step_um,
             })
         });
@@ -342,20 +273,19 @@ impl<'a> ElementSimulator<'a> {
 
 /// One wavelength and field angle of one element.
 struct Task<'a> {
-    colour: &'a Colour,
     field: FieldAngle,
     copy: Option<CopyAngle>,
     wave: PlaneWave,
-    /// Of each case that is a made chip.
-    views: Vec<Option<AsBuiltOptics<'a>>>,
+    /// Fields of the element in the light of each case.
+    cases: Vec<IncoherentFields<'a>>,
 }
 
-/// The light of some elements from some field angles.
-fn all_arriving(lit: &[(&Element, FieldAngle)], wavelength_um: f64) -> Result<Vec<PlaneWave>> {
-    let waves = lit.iter();
-    waves
-        .map(|(element, field)| arriving(element, wavelength_um, *field))
-        .collect()
+/// The direction that the cells of a design are solved for.
+pub(super) fn incidence(design: &Design) -> Incidence {
+    match design.verify.incidence {
+        CellIncidence::AsLit => Incidence::Oblique,
+        CellIncidence::Normal => Incidence::Normal,
+    }
 }
 
 /// An element with each of its field angles.
@@ -363,7 +293,7 @@ fn all_angles(one: &Chosen) -> impl Iterator<Item = (&Element, FieldAngle)> {
     one.angles.iter().map(|(field, _)| (&one.element, *field))
 }
 
-/// Where the chief ray of an element lands from one of its field angles, from the element's axis (um).
+/// Place where the chief ray of an element lands from one of its field angles, from the element's axis (um).
 ///
 /// # Errors
 /// If it does not reach the sensor.
@@ -405,11 +335,6 @@ pub fn open_matched(
         phase_rad: |_, _| 0.0,
     };
     IdealPsf::of(&open, focus_um, wavelength_um, 1.0)
-}
-
-/// Widths that tables go to.
-fn largest_number(design: &Design) -> u16 {
-    design.cell.most()
 }
 
 /// A PSF per unit of arriving power, so that cells with and without amplitude share one scale.

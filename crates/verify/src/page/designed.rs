@@ -1,4 +1,4 @@
-//! What was designed: the chip, the pillars in the middle, phase and width along a radius.
+//! Page of the design: the chip, the pillars in the middle, phase and width along a radius.
 
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase, RadialPhase};
@@ -8,7 +8,7 @@ use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, 
 
 /// Pillars that the picture of the middle shows along an axis.
 const ZOOMED_PITCHES: f64 = 34.0;
-/// Sites along a radius that can be told apart in a figure.
+/// Sites along a radius that can be distinguished in a figure.
 const RADIUS_POINTS: usize = 600;
 
 /// The section of the design.
@@ -124,7 +124,7 @@ fn elements(design: &Design) -> String {
     }
 }
 
-/// What the widths or numbers of pillars are in figures, and their axis.
+/// Words of figures for the widths or numbers of pillars, and their axis.
 pub(super) fn numbers(design: &Design) -> (&'static str, Axis) {
     let quantity = design.cell.shape.quantity();
     (quantity.title, Axis::linear(quantity.label, quantity.unit))
@@ -135,7 +135,7 @@ pub(super) fn shown_number(design: &Design, number: u16) -> f64 {
     design.cell.shape.value(PillarId(number))
 }
 
-/// From one of these to the next.
+/// Step from one of these numbers to the next.
 pub(super) fn step(design: &Design) -> f64 {
     let own = design.cell.shape.step();
     own.unwrap_or(f64::from(design.cell.width_step_nm))
@@ -219,7 +219,7 @@ fn phase(lens: &LensSpec) -> String {
     }
 }
 
-/// What each element is that was placed by itself.
+/// Table of the elements that have individual lenses.
 fn own_lenses(design: &Design) -> Table {
     let mut table = Table::new([
         Column::text("Element"),

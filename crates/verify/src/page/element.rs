@@ -1,4 +1,4 @@
-//! What the written file does: one distinct element, its PSFs, contrast and orders.
+//! Page of the written file: one distinct element, its PSFs, contrast and orders.
 
 use ndarray::Array2;
 

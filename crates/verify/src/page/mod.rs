@@ -92,7 +92,7 @@ fn contrast(found: &Verification) -> String {
     range(found, |psf| psf.mtf()[0])
 }
 
-/// The same in the light of each channel of the camera, along both axes.
+/// Contrast in the light of each channel of the camera, along both axes.
 fn white_contrast(found: &Verification) -> String {
     let half = found.camera.as_ref().map(|c| c.frequencies().half_nyquist_lp_mm);
     let channels = found.distinct.iter().flat_map(|d| &d.white);
@@ -112,7 +112,7 @@ fn between(values: impl Iterator<Item = f64>) -> String {
     ends.map_or_else(|| "none".into(), |(least, most)| span(sig(least, 2), sig(most, 2)))
 }
 
-/// From one number to another, or the one that both are.
+/// Span from one number to another, or the one number that both are.
 pub(crate) fn span(least: String, most: String) -> String {
     if least == most {
         least

@@ -1,4 +1,4 @@
-//! What was written: every site compared, the layers of the file, the widths as read back.
+//! Page of what was written: every site compared, the layers of the file, the widths as read back.
 
 use super::designed::{numbers, shown_number, step};
 use crate::Verification;

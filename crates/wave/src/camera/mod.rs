@@ -1,18 +1,15 @@
-//! From light on the sensor's plane to what a camera gives out.
+//! Model of a camera: from light on the sensor's plane to the values that the camera records.
 //!
 //! | question | file |
 //! | --- | --- |
 //! | what source, blur and pixel area do to intensity | `optic` |
 //! | intensity on fine samples, read on pixels | `pixels` |
-//! | a scene through a blur that changes over the field | `blur` |
-//! | photons and reading | `noise` |
+//! | the photons and reading | `noise` |
 
-mod blur;
 mod noise;
 mod optic;
 mod pixels;
 
-pub use blur::{Blur, kernel_of_otf};
 pub use noise::Noise;
 pub use optic::Optic;
 pub use pixels::{PixelGrid, Reading};

@@ -1,8 +1,8 @@
-//! What source, blur and pixel area do to intensity.
+//! Effect of source, blur and pixel area on intensity.
 
 use crate::kernels::{jinc, sinc};
 
-/// What intensity passes on its way to the pixels.
+/// Filters that intensity passes on its way to the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optic {
     /// Edge of a pixel (um).

@@ -1,4 +1,4 @@
-//! From intensity on fine samples to the pixels of a camera.
+//! Sampling of intensity on fine samples by the pixels of a camera.
 //!
 //! Intensity is band-limited, so all of this happens on its spectrum and is exact; the samples that stand
 //! around the window are faded out towards their border, which keeps its far side from coming in.
@@ -19,11 +19,11 @@ pub struct PixelGrid {
     im: Array2<f32>,
     /// Width of a bin (1/um).
     cycle: f64,
-    /// From the first sample to the middle of the window (um).
+    /// Distance from the first sample to the middle of the window (um).
     middle_um: f64,
     shape: [usize; 2],
     pixel_um: f64,
-    /// How far the window followed the image (x, y) (um); of a change, what it changes of that.
+    /// Offset of the window after the image (x, y) (um); of a change, the change of the offset.
     off_um: [f64; 2],
 }
 
@@ -34,13 +34,13 @@ impl PixelGrid {
     /// Share of the samples on each side over which the surroundings are faded out.
     pub const FADED: f64 = 0.06;
 
-    /// What a spectrum takes that has so many bins along each axis, negative frequencies among them (bytes): half of the plane, two
-    /// single-precision numbers each.
+    /// Memory of a spectrum that has so many bins along each axis, negative frequencies among them (bytes): half of the
+    /// plane, two single-precision numbers each.
     pub fn bytes_of(bins: f64) -> f64 {
         0.5 * bins * bins * (2 * size_of::<f32>()) as f64
     }
 
-    /// What this one takes (bytes).
+    /// Memory of this spectrum (bytes).
     pub fn bytes(&self) -> usize {
         (self.re.len() + self.im.len()) * size_of::<f32>()
     }
@@ -106,7 +106,7 @@ impl PixelGrid {
         }
     }
 
-    /// How far the window has [moved](Self::moved) (x, y) (um); of a sum, the sum.
+    /// Offset by which the window has [moved](Self::moved) (x, y) (um); of a sum, the sum.
     pub fn off_um(&self) -> [f64; 2] {
         self.off_um
     }
@@ -143,7 +143,7 @@ impl PixelGrid {
         rows.sum()
     }
 
-    /// The same seen from a window that is off by so much (x, y) (um).
+    /// Same image seen from a window that is off by so much (x, y) (um).
     pub fn moved(mut self, [x, y]: [f64; 2]) -> Self {
         if x == 0.0 && y == 0.0 {
             return self;
@@ -175,7 +175,7 @@ impl PixelGrid {
         }
     }
 
-    /// What a blur changes, for a unit of its covariance between two axes (1/um^2).
+    /// Change by a blur, for a unit of its covariance between two axes (1/um^2).
     pub fn blur(&self, [a, b]: [usize; 2]) -> Self {
         let half = if a == b { 0.5 } else { 1.0 };
         Self::combine(&[(&self.slope(a).slope(b), half)])
@@ -187,7 +187,7 @@ impl PixelGrid {
     }
 }
 
-/// How bins become the pixels of one window at one place: worked out once for all grids of the window.
+/// Transform from bins to the pixels of one window at one place, computed once for all grids of the window.
 pub struct Reading {
     /// Cosines, then sines of each bin at each pixel along x, `[kx, 2 cols]`.
     along_x: Array2<f32>,
@@ -198,7 +198,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// For a window whose middle is off by `shift_um` (x, y), as wide in frequency as the widest of `grids`.
+    /// Transform for a window whose middle is off by `shift_um` (x, y), as wide in frequency as the widest of `grids`.
     pub fn new<'g>(grids: impl IntoIterator<Item = &'g PixelGrid>, shift_um: [f64; 2]) -> Self {
         let mut grids = grids.into_iter().peekable();
         let first = *grids.peek().expect("there is something to read");

@@ -116,7 +116,7 @@ mod tests {
     /// The series and the table, one against the other, to the end of both.
     #[test]
     fn a_disc_blurs_as_j1_says() {
-        /// At q = 20 the largest term of the series is 2e6.
+        /// Tolerance for cancelled terms: at q = 20 the largest term of the series is 2e6.
         const CANCELLED: f64 = 1e-8;
         let bessel = Bessel::up_to(20.0);
         for q in [0.3, 1.0, 2.0, 3.831_705_970_2, 7.7, 19.9] {

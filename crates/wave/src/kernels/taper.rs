@@ -1,7 +1,8 @@
-//! How things end: the fade, and the transform of a sharp edge.
+//! Tapers: the fade, and the transform of a sharp edge.
 
-/// From one at `share` <= 0 to zero at `share` >= 1: the polynomial of seventh degree whose first three derivatives
-/// vanish at both ends. A raised cosine, whose second derivative jumps, lets through 1 % of the noise of a bench more.
+/// Fade from one at `share` <= 0 to zero at `share` >= 1: the polynomial of seventh degree whose first three
+/// derivatives vanish at both ends. A raised cosine, whose second derivative jumps, lets through 1 % of the noise of a
+/// bench more.
 #[inline(always)]
 pub fn fade(share: f32) -> f32 {
     let s = share.clamp(0.0, 1.0);

@@ -12,7 +12,7 @@ use crate::error::{Result, WaveError};
 /// has no site, nor in rows that it does not reach ([`Lattice::has`], [`Lattice::reach`]): nothing in this crate asks for those
 /// rows.
 pub trait Aperture: Sync {
-    /// Where the samples are.
+    /// Lattice of the samples.
     fn lattice(&self) -> Lattice;
 
     /// Radius of a circle about the element's centre outside of which nothing passes (um). Half the

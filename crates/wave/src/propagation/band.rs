@@ -1,4 +1,4 @@
-//! Which frequencies of an element count for a window, and how long a period keeps its images apart.
+//! Frequencies of an element that count for a window, and length of the period that keeps its images apart.
 
 use std::ops::Range;
 
@@ -8,18 +8,18 @@ use super::Window;
 use crate::error::{Result, WaveError};
 use crate::kernels::fft_size;
 
-/// How true a folded field is asked to be.
+/// Accuracy that is asked of a folded field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Accuracy {
     /// All light that can reach the window, and none that cannot: errors of 1e-6 of a matched peak, which
     /// is single precision.
     Accurate,
-    /// For sweeps and optimisers: a shorter period and a steeper fade, through which light of orders other than
+    /// Mode for sweeps and optimisers: a shorter period and a steeper fade, through which light of orders other than
     /// the designed one comes back into the window: errors of 1e-3 of a matched peak.
     Fast,
 }
 
-/// How a field was folded.
+/// Fade with which a field was folded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fade {
     /// Period of the transform along x and along y (um).
@@ -37,20 +37,20 @@ pub struct Fade {
 /// Measured over whole windows of lenses of 1 mm, 140 um and 60 um, steered, at 450 to 660 nm: errors of 1e-6 of
 /// the matched peak for 1 mm, 1e-5 for 60 um.
 const FADE_WIDTHS: f64 = 5.5;
-/// What a fade lets through falls with the cube of its width and counts against the gain of the focus:
-/// below this gain the fade is made wider to match, at most twice.
+/// Gain of the focus below which the fade is wider. What a fade lets through falls with the cube of its width and
+/// counts against the gain: below this gain the fade is made wider to match, at most twice.
 const FADE_GAIN: f64 = 100.0;
-/// How far beyond the last needed ray the fade begins, and how far before the first ray that would come back it
-/// ends, in the same unit.
+/// Distances by which the fade begins beyond the last needed ray, and ends before the first ray that would come back,
+/// in the same unit.
 const FADE_MARGINS: [f64; 2] = [1.0, 0.5];
-/// In fast mode: width of the fade, in the same unit.
+/// Width of the fade in fast mode, in the same unit.
 const FAST_FADE_WIDTHS: f64 = 3.0;
-/// In fast mode: what a period is longer by than lens and window, in the same unit.
+/// Length by which a period exceeds lens and window in fast mode, in the same unit.
 const FAST_MARGIN: f64 = 1.5;
 /// Undiffracted light of an element is a disc of its size, 1 / gain of the focus; where that is less than this, its
 /// coming back into the window is within what fast mode may err by, and the period need not hold it.
 const FAST_STRAY: f64 = 2.5e-3;
-/// In fast mode, with a gain that allows it: period in units of lens radius and half the window.
+/// Period in fast mode with a gain that allows it, in units of lens radius and half the window.
 const FAST_PERIOD: f64 = 1.19;
 /// More bins an axis than any element of this program needs: a lens of 30 mm has 94,000.
 const MOST_BINS: usize = 1 << 17;
@@ -104,7 +104,7 @@ impl FrequencyBand {
         Self::new(lattice, wavelength_um, window, bins, [full, zero])
     }
 
-    /// With a period and a fade of one's own: `fade_um` is where it begins and where it ends.
+    /// Band with a period and a fade of the caller's: `fade_um` is where it begins and where it ends.
     pub fn new(
         lattice: Lattice,
         wavelength_um: f64,

@@ -21,7 +21,7 @@ pub struct Direct {
 }
 
 impl Direct {
-    /// For apertures on `lattice`, square or hexagonal.
+    /// Plan for apertures on `lattice`, square or hexagonal.
     ///
     /// # Errors
     /// If the window is not one.

@@ -10,8 +10,8 @@ use crate::error::{Result, WaveError};
 /// Rings of equal transmission about the axis, in light along the axis: the field depends on the distance
 /// from the axis alone, and is a sum over rings of the azimuthal mean of the Rayleigh-Sommerfeld kernel.
 ///
-/// The mean is a trapezoidal sum over a period, which converges faster than any power; what is left out is
-/// only that a lattice is not round: nothing on the axis, for [`Hankel::of_lattice`].
+/// The mean is a trapezoidal sum over a period, which converges faster than any power; what is omitted is only that a
+/// lattice is not round: nothing on the axis, for [`Hankel::of_lattice`].
 #[derive(Clone, Debug)]
 pub struct Hankel {
     wavelength_um: f64,
@@ -89,7 +89,7 @@ impl Hankel {
         &self.radii_um
     }
 
-    /// What each ring, transmitting 1, brings to a point `rho_um` from the axis.
+    /// Contribution of each ring, transmitting 1, to a point `rho_um` from the axis.
     pub fn kernel(&self, rho_um: f64) -> Vec<Complex64> {
         self.radii_um
             .iter()

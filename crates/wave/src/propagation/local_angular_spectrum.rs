@@ -1,4 +1,5 @@
-//! Which part of an element sends how much light into which direction, once for all directions that light comes from.
+//! Local angular spectrum: the light that each part of an element sends into each direction, computed once for all
+//! directions of arrival.
 //!
 //! Light that arrives obliquely leaves a tile of the aperture in directions that are all shifted by the same sines. So
 //! the power spectra of the tiles are formed once; where the light lands for a direction of arrival follows from them
@@ -26,8 +27,8 @@ pub struct LocalAngularSpectrum {
 }
 
 impl LocalAngularSpectrum {
-    /// Of an element at one wavelength (um), its tiles gathered into `blocks` x `blocks` squares over its lattice, for a plane at
-    /// about this distance from the pillar tops (um).
+    /// Spectrum of an element at one wavelength (um), its tiles gathered into `blocks` x `blocks` squares over its
+    /// lattice, for a plane at about this distance from the pillar tops (um).
     pub fn of(aperture: &dyn Aperture, wavelength_um: f64, distance_um: f64, blocks: usize) -> Self {
         let lattice = aperture.lattice();
         let tiling = Tiling::at(&lattice, wavelength_um, distance_um);
@@ -72,7 +73,7 @@ impl LocalAngularSpectrum {
         self.power_um2
     }
 
-    /// Where the light of a plane wave lands; `towards` as for [`SensorIrradiance::of`].
+    /// Irradiance on the sensor's plane in a plane wave; `towards` as for [`SensorIrradiance::of`].
     ///
     /// # Errors
     /// If the map is none or too large.
@@ -109,7 +110,7 @@ impl LocalAngularSpectrum {
     }
 }
 
-/// How tiles fall into blocks.
+/// Grid that divides tiles into blocks.
 struct BlockGrid {
     lattice: Lattice,
     tiling: Tiling,
@@ -230,9 +231,11 @@ mod tests {
 
     #[test]
     fn lands_where_the_map_of_one_direction_has_it() {
-        /// Of all power, what lands in a neighbouring square: blocks of 18 um move a ray by up to 9 um, squares have 40 um.
+        /// Share of all power that lands in a neighbouring square: blocks of 18 um move a ray by up to 9 um, squares
+        /// have 40 um.
         const BLOCKS: f64 = 0.2;
-        /// Of all power: directions that just travel, whose pair does not, and the other way round. 1.2e-4 is found.
+        /// Share of all power in directions that just travel and whose pair does not, and the other way round. 1.2e-4
+        /// is found.
         const PAIRS: f64 = 5e-4;
         let (z, um, lens) = (DISTANCE_UM, WAVELENGTH_UM, lens());
         let departure = LocalAngularSpectrum::of(&lens, um, z, 8);

@@ -1,4 +1,4 @@
-//! From the transmission of an element to the field, or the intensity, in a window on the sensor.
+//! Propagation from the transmission of an element to the field, or the intensity, in a window on the sensor.
 //!
 //! | question | file |
 //! | --- | --- |

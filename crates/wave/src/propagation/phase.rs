@@ -14,7 +14,7 @@ use crate::kernels::{cis_all, cis_where};
 /// amplitude everywhere inside a circle.
 #[derive(Clone, Copy, Debug)]
 pub struct PhaseFunction<F> {
-    /// Where the samples are.
+    /// Lattice of the samples.
     pub lattice: Lattice,
     /// Radius of the circle (um); sites on it belong to it.
     pub radius_um: f64,
@@ -87,11 +87,11 @@ fn at_site(lattice: &Lattice, turns: &impl Fn(usize, usize) -> Option<f64>, ix: 
     turns.map_or(f32::NAN, |turns| (turns - turns.round()) as f32)
 }
 
-/// As [`PhaseMap`] to the last bit, the phase computed each time that a row is asked for: nothing of the size of the
-/// element is held.
+/// Variant of [`PhaseMap`], equal to the last bit, that computes the phase each time that a row is asked for: nothing
+/// of the size of the element is held.
 #[derive(Clone, Copy, Debug)]
 pub struct PhaseSites<F> {
-    /// Where the samples are.
+    /// Lattice of the samples.
     pub lattice: Lattice,
     /// No site that passes light is farther from the centre (um).
     pub radius_um: f64,

@@ -10,7 +10,7 @@ use crate::error::{Result, WaveError};
 /// The field on a window, and how it was come by.
 #[derive(Clone, Debug)]
 pub struct Field {
-    /// Where the samples are.
+    /// Window of the samples.
     pub window: Window,
     /// The wave that arrived at the element.
     pub wave: PlaneWave,
@@ -45,7 +45,7 @@ pub struct Scratch {
 /// A linear map and its adjoint: with the products <a, b> = sum conj(a) b over sites and over samples,
 /// <g, field(t)> = <adjoint(g), t> for every t and g.
 pub trait Propagator {
-    /// Where the field is formed.
+    /// Window in which the field is formed.
     fn window(&self) -> &Window;
 
     /// The field behind `aperture` in the light of `wave`.

@@ -1,4 +1,4 @@
-//! Where all the light of an element lands on the sensor's plane, coarsely: its veil as well as its image.
+//! Irradiance of all the light of an element on the sensor's plane, coarsely: its stray light as well as its image.
 //!
 //! The aperture is cut into overlapping tiles whose squared windows add up to one everywhere, so that no power is
 //! lost or counted twice. A tile is bent towards the plane before it is transformed: its spectrum then says how much power
@@ -42,9 +42,9 @@ pub struct SensorIrradiance {
 }
 
 impl SensorIrradiance {
-    /// Of an element in a plane wave. Frequencies of a lattice are known but for its orders, on a square one multiples
-    /// of 1 / pitch: each is taken for the one nearest to `towards`, the sines of the direction that the light is meant to
-    /// leave in.
+    /// Irradiance of an element in a plane wave. Frequencies of a lattice are known but for its orders, on a square one
+    /// multiples of 1 / pitch: each is taken for the one nearest to `towards`, the sines of the direction that the
+    /// light is meant to leave in.
     ///
     /// # Errors
     /// If the map is none or too large.
@@ -126,7 +126,8 @@ impl LandingGrid {
     }
 }
 
-/// How far the light of each frequency of a tile lands from the tile, in the order of a transposed transform.
+/// Displacement of the light of each frequency of a tile, from the tile to the plane, in the order of a transposed
+/// transform.
 struct Rays {
     /// Along x and y (um); none for light that does not travel.
     shift_um: Vec<Option<[f64; 2]>>,
@@ -200,7 +201,7 @@ mod tests {
     /// the square of edge 1 / pitch.
     #[test]
     fn what_is_finer_than_the_wavelength_does_not_travel() {
-        /// Of 10^5 independent sites: three standard deviations.
+        /// Tolerance for 10^5 independent sites: three standard deviations.
         const CHANCE: f64 = 0.01;
         let lattice = Lattice::covering(110_000, 350).unwrap();
         let n = lattice.sites();
@@ -222,7 +223,8 @@ mod tests {
     /// A lens of two levels sends its light to several orders; squares of the map hold what wave optics brings there.
     #[test]
     fn squares_hold_what_wave_optics_brings_there() {
-        /// Of the power in the brightest ring of squares: rays leave out interference between tiles.
+        /// Tolerance as a share of the power in the brightest ring of squares: rays leave out interference between
+        /// tiles.
         const RAYS: f64 = 0.1;
         let lattice = Lattice::covering(140_000, 350).unwrap();
         let (z, um) = (336.0, 0.53);

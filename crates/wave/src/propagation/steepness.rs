@@ -1,9 +1,9 @@
-//! Where a phase is too steep for its lattice.
+//! Steepness: places where a phase is too steep for its lattice.
 
 use metalith_pillars::Lattice;
 use serde::Serialize;
 
-/// Where a phase is too steep for its lattice.
+/// Sites at which a phase is too steep for its lattice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Steepness {
     /// Largest step of the phase from a site to a neighbour (rad).
@@ -21,7 +21,7 @@ pub struct Steepness {
 const BESIDE: usize = 2;
 
 impl Steepness {
-    /// Of a phase (turns), not reduced, at sites `(ix, iy)` of a lattice; none where there is no pillar.
+    /// Steepness of a phase (waves), not reduced, at sites `(ix, iy)` of a lattice; `None` where there is no pillar.
     pub fn of(lattice: &Lattice, turns: impl Fn(usize, usize) -> Option<f64>) -> Self {
         let mut found = Self::default();
         let mut nearest2 = i64::MAX;

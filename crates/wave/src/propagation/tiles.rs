@@ -10,7 +10,7 @@ use metalith_pillars::Lattice;
 use num_complex::Complex32;
 use rustfft::FftPlanner;
 
-/// How an element is cut: sine windows that overlap by half add up to one when squared.
+/// Tiling of an element: sine windows that overlap by half add up to one when squared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tiling {
     /// Places of the lattice's grid an axis of a tile, a power of two.
@@ -25,14 +25,14 @@ pub(super) struct Tiling {
 /// elements and three wavelengths) and by 8, 13 and 25 % at 24 degrees where tiles are bent for the axis; bent by [`OBLIQUE`],
 /// those of 125 and 180 um by 3.7 and 2.7 %, and by 7 and 8 %.
 const BEST_EDGE: f64 = 5.0;
-/// Fewer places would not tell directions apart, more would be a block of their own.
+/// Fewer places would not distinguish directions, more would be a block of their own.
 const SIDES: [f64; 2] = [16.0, 512.0];
 /// Over the distance of the plane, the distance that the light of a tile is bent for: the way to the plane of light that leaves at
 /// 17 degrees (cosine to the power of -3), between the axis and the end of the field of a lens of 60 degrees.
 const OBLIQUE: f64 = 1.15;
 
 impl Tiling {
-    /// For light that lands at a distance from the pillars (um).
+    /// Tiling for light that lands at a distance from the pillars (um).
     pub fn at(lattice: &Lattice, wavelength_um: f64, distance_um: f64) -> Self {
         let [x, y] = lattice.steps_um();
         let places = BEST_EDGE * (wavelength_um * distance_um).sqrt() / x.max(y);
@@ -43,12 +43,12 @@ impl Tiling {
         }
     }
 
-    /// From one tile to the next (places).
+    /// Step from one tile to the next (places).
     pub fn hop(self) -> usize {
         self.side / 2
     }
 
-    /// How far from one another two neighbouring directions of a tile land, along each axis (um).
+    /// Distance at which two neighbouring directions of a tile land from one another, along each axis (um).
     pub fn landing_um(self, lattice: &Lattice) -> [f64; 2] {
         lattice
             .steps_um()
@@ -142,12 +142,12 @@ pub(super) struct Leaving {
     towards: [f64; 2],
     /// Sines of the bins along x and along y, each moved by whole periods of the grid.
     whole: [Vec<f64>; 2],
-    /// On a hexagonal lattice, the same half a period away along both axes.
+    /// Sines half a period away along both axes, on a hexagonal lattice.
     half: Option<[Vec<f64>; 2]>,
 }
 
 impl Leaving {
-    /// For light that arrives with these sines.
+    /// Directions for light that arrives with these sines.
     pub fn new(lattice: &Lattice, tiling: Tiling, wavelength_um: f64, arriving: [f64; 2], towards: [f64; 2]) -> Self {
         let steps = lattice.steps_um();
         let moved = |offset: f64| {

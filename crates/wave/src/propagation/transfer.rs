@@ -1,4 +1,4 @@
-//! What a frequency meets between the element and the sensor: the transfer function of free space, faded.
+//! Transfer function of free space between the element and the sensor, faded.
 //!
 //! Columns of frequencies go through two loops: where each ray lands, which says how much of it counts, and the
 //! phase to a distance. Several distances that differ little share the first.
@@ -13,7 +13,7 @@ pub(super) struct Transfer<'a> {
     pub wavelength_um: f64,
     /// Middle of the window from the element's centre (um).
     pub centre_um: [f64; 2],
-    /// From the first site of the lattice to where the inverse transform has its origin (um).
+    /// Shift from the first site of the lattice to the origin of the inverse transform (um).
     pub shift_um: [f64; 2],
     pub fade: &'a Fade,
     /// Edges of the cell of a site (um).
@@ -28,12 +28,12 @@ pub(super) struct FrequencyColumn {
     pub count: usize,
 }
 
-/// Where the rays of a column go. Working memory.
+/// Destinations of the rays of a column. Working memory.
 #[derive(Default)]
 pub(crate) struct FadedColumn {
     /// Cycles along z (1/um).
     axial: Vec<f64>,
-    /// How much each counts, with the weights of both transforms.
+    /// Weight of each frequency, with the weights of both transforms.
     weight: Vec<f32>,
 }
 
@@ -67,7 +67,7 @@ impl Transfer<'_> {
         });
     }
 
-    /// What the transfer function to one distance is multiplied by for one that is `step_um` farther.
+    /// Factor from the transfer function to one distance to the one for a distance that is `step_um` farther.
     pub fn step(&self, step_um: f64, faded: &FadedColumn, out: &mut [Complex32]) {
         pulp::Arch::new().dispatch(|| {
             for (out, fz) in out.iter_mut().zip(&faded.axial) {

@@ -25,7 +25,7 @@ impl PlaneWave {
         }
     }
 
-    /// From the middle of the field of an element with this wedge.
+    /// Wave from the middle of the field of an element with this wedge.
     pub fn looked_at(wedge: &Wedge, wavelength_um: f64) -> Self {
         let (sin_x, sin_y) = wedge.looks_at(wavelength_um);
         Self {
@@ -67,7 +67,7 @@ pub fn leaving(wedge: &Wedge, wave: &PlaneWave) -> [f64; 2] {
     [wave.sin_x - x, wave.sin_y - y]
 }
 
-/// Where the chief ray lands on a plane behind the element, from the element's centre (um).
+/// Place where the chief ray lands on a plane behind the element, from the element's centre (um).
 ///
 /// # Errors
 /// If it does not: its direction sines reach one.
@@ -77,7 +77,7 @@ pub fn landing_um(wedge: &Wedge, wave: &PlaneWave, distance_um: f64) -> Result<[
     if cosine2 > 0.0 {
         return Ok([x, y].map(|s| distance_um * s / cosine2.sqrt()));
     }
-    Err(WaveError::SensorIrradiance { sines: [x, y] })
+    Err(WaveError::MissesSensor { sines: [x, y] })
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Where a field is wanted.
+//! Window in which a field is formed.
 
 use crate::error::{Result, WaveError};
 
@@ -38,7 +38,7 @@ impl Window {
         self.centre_um[axis] + (i as f64 - 0.5 * (self.samples as f64 - 1.0)) * self.step_um
     }
 
-    /// From the middle to the outermost sample of an axis (um).
+    /// Distance from the middle to the outermost sample of an axis (um).
     pub fn half_width_um(&self) -> f64 {
         0.5 * (self.samples as f64 - 1.0) * self.step_um
     }

@@ -1,4 +1,4 @@
-//! How much two PSFs differ.
+//! Difference of two PSFs.
 
 use super::Psf;
 use crate::error::{Result, WaveError};
@@ -12,7 +12,7 @@ impl Psf {
         self.compare(reference, 1.0)
     }
 
-    /// The same with both brought to the same energy: what differs in shape alone.
+    /// Difference in shape alone, with both PSFs brought to the same energy.
     ///
     /// # Errors
     /// If the windows differ in their samples.

@@ -23,31 +23,8 @@ impl Psf {
             .sum()
     }
 
-    /// Energy in a circle (um^2). Each sample stands for its square, of which parts of a sixteenth an edge are
-    /// counted: good to a percent of a sample's width in radius.
-    pub fn energy_in_circle_um2(&self, centre_um: [f64; 2], radius_um: f64) -> f64 {
-        const PARTS: usize = 16;
-        let step = self.window.step_um;
-        let part = |i: usize| ((i as f64 + 0.5) / PARTS as f64 - 0.5) * step;
-        let mut sum = 0.0;
-        for ((iy, ix), &v) in self.values.indexed_iter() {
-            let x = self.window.coordinate_um(0, ix) - centre_um[0];
-            let y = self.window.coordinate_um(1, iy) - centre_um[1];
-            let (r, reach) = (x.hypot(y), 0.75 * step);
-            if r < radius_um - reach {
-                sum += v;
-            } else if r < radius_um + reach {
-                let inside = (0..PARTS * PARTS)
-                    .filter(|i| (x + part(i % PARTS)).hypot(y + part(i / PARTS)) < radius_um)
-                    .count();
-                sum += v * inside as f64 / (PARTS * PARTS) as f64;
-            }
-        }
-        sum * step * step
-    }
-
-    /// What a camera with square, gapless pixels sees of a point: the energy in each of `pixels` x `pixels` (um^2),
-    /// with the middle of the array at `centre_um`.
+    /// Image of a point on square, gapless pixels: the energy in each of `pixels` x `pixels` (um^2), with the middle of
+    /// the array at `centre_um`.
     ///
     /// # Errors
     /// If the pixels have no size or reach beyond the window.
@@ -137,16 +114,11 @@ mod tests {
         assert!((psf.energy_um2() - total).abs() < BAND * total);
         let square = psf.energy_in_square_um2(AT, 5.86);
         assert!((square - interval(SIGMA, 5.86).powi(2)).abs() < BAND * total);
-        // Samples that stand for their squares are a Gaussian wider by step^2 / 12.
-        const WIDER: f64 = 2e-2;
-        let circle = psf.energy_in_circle_um2(AT, 3.0);
-        let want = total * (1.0 - (-4.5 / (SIGMA * SIGMA)).exp());
-        assert!((circle - want).abs() < WIDER * total, "{circle} is not {want}");
     }
 
     #[test]
     fn a_square_holds_nothing_from_beyond_the_window() {
-        /// What a cut Gaussian, 1e-4 of its peak at the border, leaves there of its series.
+        /// Tolerance for the series at the border of a cut Gaussian, which is 1e-4 of its peak there.
         const RIM: f64 = 1e-3;
         let total = std::f64::consts::TAU * SIGMA * SIGMA;
         let psf = gaussian(SIGMA, AT);

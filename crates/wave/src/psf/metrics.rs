@@ -15,7 +15,7 @@ pub struct PsfMetrics {
     pub centroid_um: [f64; 2],
     /// Energy in a square of one pixel about the peak, over what the perfect aperture passes.
     pub energy_1_pixel: f64,
-    /// The same in a square of two pixels an edge.
+    /// Share of the energy in a square of two pixels an edge.
     pub energy_2_pixels: f64,
     /// Energy in the whole window, over the same.
     pub energy_window: f64,

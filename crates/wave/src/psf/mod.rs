@@ -37,7 +37,7 @@ pub use reference::IdealPsf;
 /// beyond half their rate: exact where the step is at most wavelength / (4 NA).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Psf {
-    /// Where the samples are.
+    /// Window of the samples.
     pub window: Window,
     /// Shape `[samples, samples]`, row index along +y, column index along +x.
     pub values: Array2<f64>,
@@ -47,7 +47,7 @@ pub struct Psf {
 }
 
 impl Psf {
-    /// Of a field of a unit wave.
+    /// PSF from the field of a unit wave.
     pub fn of(field: &Field) -> Self {
         Self {
             window: field.window,
@@ -56,8 +56,8 @@ impl Psf {
         }
     }
 
-    /// Of an element in a unit wave, with the transfer of all its light at `lp_mm` (line pairs a millimetre) where the
-    /// propagator knows it.
+    /// PSF of an element in a unit wave, with the transfer of all its light at `lp_mm` (line pairs a millimetre) where
+    /// the propagator knows it.
     ///
     /// # Errors
     /// As [`Propagator::field`].

@@ -5,7 +5,8 @@ use num_complex::Complex64;
 use super::Psf;
 use crate::kernels::sinc;
 
-/// Where contrast is told of the light on pixels of one size. All are to three significant digits, as they are written.
+/// Frequencies at which contrast on pixels of one size is stated. All are to three significant digits, as they are
+/// written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelFrequencies {
     /// Edge of a pixel (um).
@@ -21,7 +22,7 @@ const ROUND_UM: f64 = 5.86;
 const ROUND_LP_MM: [f64; 4] = [5.0, 20.0, 63.0, 110.0];
 
 impl PixelFrequencies {
-    /// Of pixels with this edge (um), which is positive.
+    /// Frequencies of pixels with this edge (um), which is positive.
     pub fn of(pixel_um: f64) -> Self {
         let nyquist = 500.0 / pixel_um;
         Self {
@@ -31,13 +32,14 @@ impl PixelFrequencies {
         }
     }
 
-    /// What is asked for where contrast is reported (line pairs a millimetre): half of the finest frequency, and all of it.
+    /// Frequencies at which contrast is reported (line pairs a millimetre): half of the finest frequency, and all of
+    /// it.
     pub fn reported(&self) -> [f64; 2] {
         [self.half_nyquist_lp_mm, self.nyquist_lp_mm]
     }
 
-    /// What is asked for where contrast is drawn (line pairs a millimetre), rising: few, since each costs two correlations of
-    /// the spectrum along each axis.
+    /// Frequencies at which contrast is drawn (line pairs a millimetre), rising: few, since each costs two correlations
+    /// of the spectrum along each axis.
     pub fn drawn(&self) -> [f64; 6] {
         let [first, second, third, last] = ROUND_LP_MM.map(|f| three_digits(f * ROUND_UM / self.pixel_um));
         let [half, nyquist] = self.reported();

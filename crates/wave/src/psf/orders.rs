@@ -1,4 +1,4 @@
-//! What a mapping makes of light by its own account, before any propagation.
+//! Order efficiencies of a mapping from its own transmission, before any propagation.
 
 use num_complex::Complex64;
 

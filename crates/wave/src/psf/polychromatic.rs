@@ -29,7 +29,7 @@ const MOST_SAMPLES: usize = 2048;
 /// The PSF of one wavelength of a band, on a window about the place where its own chief ray lands.
 #[derive(Clone, Debug)]
 pub struct BandSample {
-    /// Where the chief ray lands, from the element's centre (um).
+    /// Place where the chief ray lands, from the element's centre (um).
     pub landing_um: [f64; 2],
     /// Per unit of arriving power: |E|^2 over that of the incident wave in the same medium.
     pub psf: Psf,
@@ -38,9 +38,9 @@ pub struct BandSample {
 /// A narrow part of a band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BandPart {
-    /// How much the sensor would count of its light if all that arrives at the element passed; of any scale.
+    /// Weight: what the sensor would count of its light if all that arrives at the element passed, in any scale.
     pub weight: f64,
-    /// Where the chief ray lands at its shortest and at its longest wavelength (um).
+    /// Places where the chief ray lands at its shortest and at its longest wavelength (um).
     pub landing_um: [[f64; 2]; 2],
     /// Its place among the samples: at `i + s`, with `s` between 0 and 1, the PSF is that of sample `i` times 1 - s
     /// and that of sample `i + 1` times s. Beyond the ends the first and the last are in force.
@@ -50,11 +50,11 @@ pub struct BandPart {
 /// The PSF of a band.
 #[derive(Clone, Debug)]
 pub struct Polychromatic {
-    /// Of all parts, weighted; weights count in the ratio to their sum. The window is that of the samples, wider by
-    /// the way of the chief ray.
+    /// PSF of all parts, weighted; weights count in the ratio to their sum. The window is the window of the samples,
+    /// wider by the way of the chief ray.
     pub psf: Psf,
-    /// Where the chief ray lands when 10, 50 and 90 % of the light that passes have come, in the order of the parts
-    /// (um).
+    /// Places where the chief ray lands when 10, 50 and 90 % of the light that passes have come, in the order of the
+    /// parts (um).
     pub landing_um: [[f64; 2]; 3],
     /// The shares of the way through the parts at which it does so: `i + s` for share `s` of part `i`.
     pub at_part: [f64; 3],
@@ -122,7 +122,7 @@ struct Moved {
     upper: f64,
     /// Middle of the windows of its samples, where their chief ray is where that of this part is (um).
     middle_um: [f64; 2],
-    /// From one end of the chief ray's line to the other (um).
+    /// Distance from one end of the chief ray's line to the other (um).
     along_um: [f64; 2],
 }
 
@@ -143,7 +143,7 @@ impl Moved {
         }
     }
 
-    /// From the middle of a window to the farthest place of the chief ray, the larger of both axes (um).
+    /// Distance from the middle of a window to the farthest place of the chief ray, the larger of both axes (um).
     fn reach_um(&self, window: &Window) -> f64 {
         let along = |a: usize| (self.middle_um[a] - window.centre_um[a]).abs() + 0.5 * self.along_um[a].abs();
         along(0).max(along(1))

@@ -1,11 +1,11 @@
-//! What the best element of the same shape would do.
+//! Reference: the best possible element of the same shape.
 
 use num_complex::Complex32;
 
 use crate::Aperture;
 
-/// The same aperture passing all its power in the zero order with the perfect phase: what a Strehl ratio and a
-/// share of energy are against.
+/// Ideal PSF: the same aperture passing all its power in the zeroth order with the perfect phase. Strehl ratios and
+/// shares of energy are relative to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdealPsf {
     /// |E|^2 / |E_inc|^2 where all sites arrive in phase.
@@ -15,8 +15,8 @@ pub struct IdealPsf {
 }
 
 impl IdealPsf {
-    /// For the sites of `aperture` that pass anything, each with |t| = `full_transmission`, in focus at `focus_um`,
-    /// x, y and z from the element's centre.
+    /// Ideal PSF for the sites of `aperture` that pass anything, each with |t| = `full_transmission`, in focus at
+    /// `focus_um`, x, y and z from the element's centre.
     ///
     /// In phase, moduli add: the Rayleigh-Sommerfeld sum of A Z / (2 pi R^2) |1/R - i k|, with A the area of the cell of a site.
     pub fn of(aperture: &dyn Aperture, focus_um: [f64; 3], wavelength_um: f64, full_transmission: f64) -> Self {
@@ -47,7 +47,7 @@ impl IdealPsf {
         }
     }
 
-    /// The same with sites of another modulus, in place of one.
+    /// Same PSF with sites of another modulus, in place of one.
     #[must_use]
     pub fn scaled(&self, full_transmission: f64) -> Self {
         let power = full_transmission * full_transmission;

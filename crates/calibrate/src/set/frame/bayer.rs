@@ -11,7 +11,7 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// By their names.
+    /// Channels by their names.
     pub const CHOICES: [(&'static str, Self); 3] = [("red", Self::Red), ("green", Self::Green), ("blue", Self::Blue)];
 }
 
@@ -40,7 +40,7 @@ impl Bayer {
         ),
     ];
 
-    /// Whether the pixel of a row and column has a filter.
+    /// True if the pixel of a row and column has a filter.
     pub fn has(self, (row, col): (usize, usize), channel: Channel) -> bool {
         self.0[2 * (row % 2) + col % 2] == channel
     }

@@ -1,4 +1,4 @@
-//! What a pixel is expected to show, where its own value is too uncertain to say how uncertain it is.
+//! Expected value of a pixel, where its own value is too uncertain to say how uncertain it is.
 
 use ndarray::Array2;
 

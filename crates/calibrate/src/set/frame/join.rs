@@ -10,7 +10,7 @@ use crate::set::RelayCamera;
 
 /// A mean frame of one exposure.
 pub struct Exposure {
-    /// As recorded, black level included (DN).
+    /// Values as recorded, black level included (DN).
     pub dn: Array2<f32>,
     /// DN for |E|^2 / |E_inc|^2 = 1.
     pub scale_dn: f64,
@@ -28,7 +28,7 @@ pub struct Joined {
     pub dn: Array2<f32>,
     /// Variance of each pixel (DN^2), infinite where it tells nothing; none where frames, gain and read noise say it.
     pub noise: Option<Array2<f32>>,
-    /// That of the longest exposure.
+    /// Scale of the longest exposure (DN).
     pub scale_dn: f64,
     pub frames: u32,
 }

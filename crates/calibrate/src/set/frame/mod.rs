@@ -36,7 +36,7 @@ pub struct Recorded {
     pub dn: Array2<f32>,
     /// Frames in the file.
     pub pages: u32,
-    /// Whether the file holds whole numbers alone.
+    /// True if the file holds whole numbers alone.
     whole: bool,
 }
 
@@ -118,7 +118,7 @@ fn mean(frames: &[Vec<f32>], rows: usize, cols: usize, saturation_dn: f64) -> Re
     Array2::from_shape_vec((rows, cols), values.collect()).map_err(|e| e.to_string())
 }
 
-/// What a file of another size says.
+/// Message for a file of another size.
 fn other_size(found: (usize, usize), rows: usize, cols: usize) -> String {
     format!(
         "it is {} x {} pixels, the camera says [{rows}, {cols}]",

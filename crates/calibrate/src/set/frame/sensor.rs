@@ -1,4 +1,4 @@
-//! What the sensor itself adds to frames.
+//! Contributions of the sensor to frames.
 
 use ndarray::{Array2, Zip};
 
@@ -7,7 +7,7 @@ use crate::set::RelayCamera;
 
 /// A mean frame of the sensor by itself.
 pub struct SensorFrame {
-    /// As recorded, black level included (DN).
+    /// Values as recorded, black level included (DN).
     pub dn: Array2<f32>,
     /// Frames that it is the mean of.
     pub frames: u32,
@@ -32,7 +32,7 @@ pub struct DarkPixels {
 }
 
 impl DarkPixels {
-    /// What a dark frame says, and how well.
+    /// Dark pixels by a dark frame, with their uncertainty.
     pub fn new(frame: &SensorFrame, camera: &RelayCamera) -> Self {
         let variance = |v: &f32| frame.variance_dn2(camera, f64::from(v - camera.black_level_dn as f32));
         Self {
@@ -45,16 +45,17 @@ impl DarkPixels {
 /// Frames without light and in even light: what the sensor adds by itself.
 #[derive(Default)]
 pub struct SensorFrames {
-    /// Without light, black level included: of the exposures that have none of their own, and of the flat frame.
+    /// Frame without light, black level included: for the exposures that have no dark frame of their own, and for the
+    /// flat frame.
     pub dark: Option<SensorFrame>,
-    /// In even light, dark frame included.
+    /// Frame in even light, dark frame included.
     pub flat: Option<SensorFrame>,
-    /// Whether the dark frame is that of exposures of any time.
+    /// True if the dark frame holds for exposures of any time.
     pub dark_of_any_exposure: bool,
 }
 
 impl SensorFrames {
-    /// What they make of the pixels of a camera; none without any such frame.
+    /// Pixels of a camera by these frames; `None` without any such frame.
     pub fn pixels(&self, camera: &RelayCamera) -> Option<SensorPixels> {
         let shape = self.dark.as_ref().or(self.flat.as_ref())?.dn.dim();
         let black = camera.black_level_dn as f32;
@@ -99,10 +100,10 @@ fn levels(lit: &Array2<f32>, camera: &RelayCamera) -> Array2<f32> {
     Array2::from_shape_fn(lit.dim(), |at| means[group(at).unwrap_or(0)])
 }
 
-/// What dark and flat frames say of each pixel, and how well.
+/// Pixels by dark and flat frames, with their uncertainty.
 pub struct SensorPixels {
     camera: RelayCamera,
-    /// Without light, black level included (DN).
+    /// Values without light, black level included (DN).
     dark: Array2<f32>,
     /// Variance of that (DN^2); none where the stated black level stands in.
     dark_noise: Option<Array2<f64>>,
@@ -176,10 +177,10 @@ impl SensorPixels {
         (self.camera.variance_dn2(recorded, frames) + rounding_dn2) / (response * response)
     }
 
-    /// By how much a corrected pixel that shows `signal_dn` is off if the dark frame of all exposures, the flat frame, and the dark
-    /// frame of its own are too bright by one standard deviation (DN). A dark frame that is too bright takes too much out of the
-    /// capture, that of all also makes the pixel look less sensitive; a flat frame that is too bright makes it look more so. Exposures
-    /// share the first two.
+    /// Errors of a corrected pixel that shows `signal_dn` if the dark frame of all exposures, the flat frame, and the
+    /// dark frame of its own are too bright by one standard deviation (DN). A dark frame that is too bright takes too
+    /// much out of the capture, that of all also makes the pixel look less sensitive; a flat frame that is too bright
+    /// makes it look more so. Exposures share the first two.
     pub fn shared_errors_dn(&self, at: (usize, usize), signal_dn: f64, own: Option<&DarkPixels>) -> [f64; 3] {
         let response = f64::from(self.response(at));
         let of_level = self.flat.as_ref().map_or(0.0, |f| signal_dn / f64::from(f.level[at]));
@@ -192,7 +193,7 @@ impl SensorPixels {
         ]
     }
 
-    /// What the pixels show without light in an exposure.
+    /// Values of the pixels without light in an exposure.
     fn dark_of<'a>(&'a self, own: Option<&'a DarkPixels>) -> &'a Array2<f32> {
         own.map_or(&self.dark, |d| &d.dn)
     }

@@ -78,9 +78,9 @@ const UNLIKE: f64 = 1.25;
 /// Dark frames of single exposures, and what that of the camera has served so far.
 struct DarkFrames<'a> {
     camera: &'a RelayCamera,
-    /// Those that were read: one that several exposures name is one object.
+    /// Frames that were read: one that several exposures name is one object.
     known: Vec<Arc<DarkPixels>>,
-    /// Whether there is one of the camera that is of one exposure.
+    /// True if there is one of the camera that is of one exposure.
     is_of_one: bool,
     /// The scale of the first exposure of each LED that it is taken out of.
     served: Vec<(LedIndex, f64)>,
@@ -160,7 +160,7 @@ fn exposures(s: &Section<'_, '_>, led: LedIndex, darks: &mut DarkFrames<'_>) -> 
     (name.unwrap_or_default(), all)
 }
 
-/// What stands in for an exposure that is missing.
+/// Placeholder for an exposure that is missing.
 fn nothing(camera: &RelayCamera) -> Exposure {
     Exposure {
         dn: Array2::zeros((camera.rows, camera.cols)),
@@ -237,7 +237,7 @@ pub(super) fn widths(root: &Section<'_, '_>, elements: &PerElement<MeasuredEleme
 /// Largest difference of a width as designed by the table and by the layout (nm): both may be rounded.
 const ROUNDED_NM: f64 = 1.0;
 
-/// What is wrong with a width by SEM, and what to do: no such element, no pillar there, or another one by the layout.
+/// Fault of a width by SEM, and what to do: no such element, no pillar there, or another one by the layout.
 fn misplaced(site: &SemSite, elements: &PerElement<MeasuredElement>) -> Option<(String, &'static str)> {
     let Some(element) = elements.iter().find(|e| e.index == site.element) else {
         let what = format!("it names element {:?}, which is not described", site.element);

@@ -10,7 +10,7 @@ use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Document;
+use super::{Document, FaultKind};
 use crate::text::quoted;
 pub(super) use values::number as float_of;
 use words::{article, describe, nearest};
@@ -70,36 +70,42 @@ impl<'d, 't> Section<'d, 't> {
     /// Record a fault at a key of this section, or at the section itself if the key is absent. Silent where the
     /// value of the key has a fault already and was replaced.
     pub fn fault(&self, key: &str, what: impl Into<String>, hint: impl Into<String>) {
+        self.fault_of(FaultKind::Inconsistent, key, what, hint);
+    }
+
+    /// Variant of [`Section::fault`] for another kind than an inconsistent value.
+    pub(super) fn fault_of(&self, kind: FaultKind, key: &str, what: impl Into<String>, hint: impl Into<String>) {
         let path = self.place_of(key);
         if !self.vacant && !self.document.is_replaced(&path) {
-            self.document.fault(self.span_of(key), what, hint);
+            self.document.fault(kind, path.clone(), self.span_of(key), what, hint);
             self.document.doubt(path);
         }
     }
 
-    /// As [`Section::fault`], at a byte within the text that stands at a key.
+    /// Variant of [`Section::fault`] for a byte within the text that stands at a key.
     pub fn fault_in_text(&self, key: &str, byte: usize, what: impl Into<String>, hint: impl Into<String>) {
         let path = self.place_of(key);
         if !self.vacant && !self.document.is_replaced(&path) {
             let span = self.span_of(key);
             // After the quotation mark.
             let at = (span.start + 1 + byte).min(span.end.saturating_sub(1));
-            self.document.fault(at..at + 1, what, hint);
+            self.document
+                .fault(FaultKind::Inconsistent, path.clone(), at..at + 1, what, hint);
             self.document.doubt(path);
         }
     }
 
-    /// As [`Section::fault`], for a check that depends on other values too: their paths from the top of the file,
-    /// such as `"cell.pitch_nm"`; a path into sections of the name of this one means this one. Silent if one of
-    /// them has a fault.
+    /// Variant of [`Section::fault`] for a check that depends on other values too. `others` are their paths from the
+    /// top of the file, such as `"cell.pitch_nm"`; a path into sections of the name of this one means this one. Silent
+    /// if one of them has a fault.
     pub fn fault_given(&self, others: &[&str], key: &str, what: impl Into<String>, hint: impl Into<String>) {
         if self.sound(others) {
             self.fault(key, what, hint);
         }
     }
 
-    /// Whether none of these values, by their paths from the top of the file, has a fault so far: what was read
-    /// is what the file says, or a default.
+    /// True if none of these values, given by their paths from the top of the file, has a fault so far: each is then
+    /// what the file says, or a default.
     pub fn sound(&self, paths: &[&str]) -> bool {
         let in_here = |path: &str| {
             let key = path.strip_prefix(&self.name)?.strip_prefix('.')?;
@@ -111,7 +117,7 @@ impl<'d, 't> Section<'d, 't> {
         })
     }
 
-    /// Whether the key is there.
+    /// True if the key is there.
     pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
     }
@@ -132,7 +138,7 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
-    /// Whether the key holds a list.
+    /// True if the key holds a list.
     pub fn is_list(&self, key: &str) -> bool {
         matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Array(_)))
     }
@@ -220,8 +226,14 @@ impl<'d, 't> Section<'d, 't> {
                 format!("known here: {known}{meant}")
             };
             let what = format!("unknown key `{}` {place}", quoted(name));
-            self.document.fault(key.span(), what, hint);
+            self.document
+                .fault(FaultKind::Unknown, self.place_of(name), key.span(), what, hint);
         }
+    }
+
+    /// Accept all keys that nobody asked for: they are for other readers of the file.
+    pub fn accept_others(&self) {
+        self.asked.borrow_mut().extend(self.keys());
     }
 
     fn get(&self, key: &str) -> Option<&'d Spanned<DeValue<'t>>> {
@@ -248,6 +260,8 @@ impl<'d, 't> Section<'d, 't> {
             format!("[{}]", self.name)
         };
         let number = self.document.fault(
+            FaultKind::Missing,
+            self.place_of(key),
             self.span.clone(),
             format!("{place} lacks `{key}`"),
             format!("add `{key}`: {expected}"),
@@ -260,6 +274,8 @@ impl<'d, 't> Section<'d, 't> {
     fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'t>>, expected: &str) {
         self.document.replace(self.place_of(key));
         self.document.fault(
+            FaultKind::WrongType,
+            self.place_of(key),
             value.span(),
             format!("`{key}` is {}", article(value.get_ref().type_str())),
             format!("it must be {expected}"),
@@ -269,6 +285,8 @@ impl<'d, 't> Section<'d, 't> {
     fn out_of_range(&self, span: Range<usize>, key: &str, value: &str, limits: &Limits) {
         self.document.replace(self.place_of(key));
         self.document.fault(
+            FaultKind::OutOfRange,
+            self.place_of(key),
             span,
             format!("`{key}` cannot be {}", quoted(value)),
             format!("it must be a number{}", describe(limits)),

@@ -8,7 +8,7 @@ use toml::de::DeValue;
 
 use super::words::{describe, did_you_mean};
 use super::{Limits, Section};
-use crate::document::Scalar;
+use crate::document::{FaultKind, Scalar};
 use crate::text::{first_unprintable, quoted};
 
 impl<'t> Section<'_, 't> {
@@ -92,6 +92,8 @@ impl<'t> Section<'_, 't> {
         };
         self.document.replace(self.place_of(key));
         self.document.fault(
+            FaultKind::Unprintable,
+            self.place_of(key),
             span,
             format!("`{key}` contains the character U+{:04X}", u32::from(c)),
             "write it in one line of printable characters",
@@ -128,6 +130,32 @@ impl<'t> Section<'_, 't> {
         self.word(key, value, choices, "")
     }
 
+    /// One of a few words, as [`Section::choice`]. Words of earlier versions, each with the one that stands for it now, are refused
+    /// by name.
+    pub fn choice_renamed<T: Copy>(
+        &self,
+        key: &str,
+        choices: &[(&str, T)],
+        renamed: &[(&str, &str)],
+        default: Option<T>,
+    ) -> T {
+        if let Some(value) = self.get(key)
+            && let DeValue::String(word) = value.get_ref()
+            && let Some((old, new)) = renamed.iter().find(|(old, _)| *old == word.as_ref())
+        {
+            self.document.replace(self.place_of(key));
+            self.document.fault(
+                FaultKind::Renamed,
+                self.place_of(key),
+                value.span(),
+                format!("`{key}` cannot be \"{old}\""),
+                format!("it is now called \"{new}\""),
+            );
+            return choices.iter().find(|(w, _)| w == new).map_or(choices[0].1, |(_, v)| *v);
+        }
+        self.choice(key, choices, default)
+    }
+
     /// One of a few words; `or` says what else a value may be.
     fn word<T: Copy>(&self, key: &str, value: &Spanned<DeValue<'t>>, choices: &[(&str, T)], or: &str) -> T {
         let words = choices.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ");
@@ -139,6 +167,8 @@ impl<'t> Section<'_, 't> {
             || {
                 self.document.replace(self.place_of(key));
                 self.document.fault(
+                    FaultKind::UnknownChoice,
+                    self.place_of(key),
                     value.span(),
                     format!("`{key}` cannot be \"{}\"", quoted(word)),
                     format!(
@@ -222,7 +252,8 @@ impl<'t> Section<'_, 't> {
         let values = self.floats(key, limits.clone());
         let count = values.len();
         Some(values.try_into().unwrap_or_else(|_| {
-            self.fault(
+            self.fault_of(
+                FaultKind::WrongLength,
                 key,
                 format!("`{key}` has {count} entries"),
                 format!("give exactly {N} numbers"),
@@ -237,12 +268,17 @@ impl<'t> Section<'_, 't> {
         self.file_else(key, "relative paths count from the folder of this file")
     }
 
-    /// The same of a file that is made by what `hint` says.
+    /// Variant of the path of a file for a file that is made by what `hint` says.
     pub fn file_else(&self, key: &str, hint: &str) -> PathBuf {
         let text = self.text(key);
         let path = self.document.folder().join(&text);
         if !text.is_empty() && !path.is_file() {
-            self.fault(key, format!("there is no file {}", path.display()), hint);
+            self.fault_of(
+                FaultKind::NoFile,
+                key,
+                format!("there is no file {}", path.display()),
+                hint,
+            );
         }
         path
     }
@@ -261,7 +297,7 @@ impl<'t> Section<'_, 't> {
     }
 }
 
-/// As a number, if it is one.
+/// Number that a TOML value is, if it is one.
 pub(in crate::document) fn number(value: &DeValue<'_>) -> Option<f64> {
     match value {
         DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok().map(|v| v as f64),

@@ -37,7 +37,7 @@ fn replace(parent: &Path, version: &str) {
     new.publish().unwrap();
 }
 
-/// As a killed process leaves it: nothing is removed, and the lock is no longer held.
+/// Leaves the folder as a killed process does: nothing is removed, and the lock is no longer held.
 fn kill(mut new: AtomicFolder) {
     new.part = PathBuf::new();
     // Closing alone would not do: a process that another test is starting shares the open file until it executes.

@@ -28,7 +28,7 @@ pub struct LensPhase {
     /// Entries are this power of two apart in squared half pitches: a shift, since this is done for each pillar.
     stride_log2: u32,
     offset: i64,
-    /// Where pillars stand within that, if the lens is not round.
+    /// Rows where pillars stand within that radius, if the lens is not round.
     outline: Option<OutlineRows>,
     /// Phases over the plane that elements have besides.
     terms: Vec<PhaseTerm>,
@@ -36,7 +36,7 @@ pub struct LensPhase {
     own: BTreeMap<(i32, i32), OwnPhase>,
 }
 
-/// What an element has in place of the lens that all share.
+/// Phase that an element has in place of the lens that all share.
 #[derive(Clone, Debug)]
 struct OwnPhase {
     lens: Arc<LensPhase>,
@@ -50,7 +50,7 @@ pub(crate) struct Rotation(f64, f64);
 impl Rotation {
     const NONE: Self = Self(1.0, 0.0);
 
-    /// By so many degrees, from x towards y; exact where it is quarter turns.
+    /// Rotation by so many degrees, from x towards y; exact where it is quarter turns.
     pub fn of_deg(deg: f64) -> Self {
         let quarters = (deg / 90.0).round();
         let (sin, cos) = (deg - 90.0 * quarters).to_radians().sin_cos();
@@ -62,13 +62,13 @@ impl Rotation {
         }
     }
 
-    /// Where a place goes.
+    /// Place to which the rotation takes a place.
     pub fn after(self, x: f64, y: f64) -> (f64, f64) {
         let Self(cos, sin) = self;
         (cos * x - sin * y, cos * y + sin * x)
     }
 
-    /// Where the place of a rotated element was before.
+    /// Place of a rotated element before the rotation.
     fn before(self, x: f64, y: f64) -> (f64, f64) {
         let Self(cos, sin) = self;
         (cos * x + sin * y, cos * y - sin * x)
@@ -171,7 +171,7 @@ impl LensPhase {
         })
     }
 
-    /// Whether a site is inside the lens.
+    /// True if a site is inside the lens.
     pub fn holds(&self, ix: usize, iy: usize) -> bool {
         let place = |axis, i| self.lattice.place_nm(axis, i);
         self.lattice.units2(ix, iy) <= self.limit
@@ -203,7 +203,7 @@ pub struct ElementPhase<'a> {
     lens: &'a LensPhase,
     /// Phases over the plane that it has.
     terms: Vec<&'a PhaseTerm>,
-    /// What phases over the plane are rotated by.
+    /// Rotation of phases over the plane.
     rotation: Rotation,
     /// Turns a half step of the lattice along x and y.
     step: (f64, f64),
@@ -242,29 +242,30 @@ impl<'a> ElementPhase<'a> {
         self.lens.lattice
     }
 
-    /// Whether no wedge is on a round lens: its phase is the same at sites of one radius.
+    /// True if the lens is round and has no wedge: its phase is equal at sites of one radius.
     pub fn is_radial(&self) -> bool {
         self.step == (0.0, 0.0) && self.is_steered_alone()
     }
 
-    /// Whether nothing is on a round lens but a wedge: a symmetry that turns the wedge into that of another element of the lens
-    /// turns the element into that.
+    /// True if the lens is round and has nothing but a wedge: a symmetry that turns the wedge into that of another
+    /// element of the lens turns the element into that.
     pub fn is_steered_alone(&self) -> bool {
         self.terms.is_empty() && self.lens.outline.is_none()
     }
 
-    /// Whether sites on both sides of the x axis have the same phase, to the last bit. Not every such phase is known to be one.
+    /// True if sites on both sides of the x axis have equal phases, to the last bit. Not every such phase is known to
+    /// be one.
     pub fn is_mirrored(&self) -> bool {
         let is_round = self.lens.outline.is_none() && self.rotation == Rotation::NONE;
         is_round && self.step.1 == 0.0 && self.terms.iter().all(|term| term.is_mirrored())
     }
 
-    /// Whether another element is of the same lens.
+    /// True if another element has the same lens.
     pub fn is_of_lens(&self, other: &ElementPhase<'_>) -> bool {
         std::ptr::eq(self.lens, other.lens)
     }
 
-    /// Whether a site is inside the lens.
+    /// True if a site is inside the lens.
     pub fn holds(&self, ix: usize, iy: usize) -> bool {
         self.lens.holds(ix, iy)
     }
@@ -283,8 +284,9 @@ impl<'a> ElementPhase<'a> {
         )
     }
 
-    /// The same in two parts (turns) whose sum it is, but for rounding: all that is known as it is, and the sum of maps that are
-    /// known up to whole turns. From site to site the second may jump by turns that the map does not mean.
+    /// Phase in two parts (waves) whose sum it is, but for rounding: the part that is known exactly, and the sum of
+    /// maps that are known up to whole waves. From site to site the second may jump by whole waves that the map does
+    /// not mean.
     pub fn parts(&self, ix: usize, iy: usize) -> Option<[f64; 2]> {
         let mut parts = [self.steered(ix, iy)?, 0.0];
         if !self.terms.is_empty() {
@@ -307,7 +309,8 @@ impl<'a> ElementPhase<'a> {
         Some(radial + (x * self.step.0 + y * self.step.1))
     }
 
-    /// Where phases over the plane are asked for at a site, from the middle of the element before it was rotated (um).
+    /// Place at which phases over the plane are evaluated for a site, from the middle of the element before it was
+    /// rotated (um).
     fn place_of_terms(&self, ix: usize, iy: usize) -> (f64, f64) {
         let lattice = self.lens.lattice;
         self.rotation.before(lattice.place_um(0, ix), lattice.place_um(1, iy))

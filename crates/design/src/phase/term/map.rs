@@ -57,7 +57,7 @@ impl MapTable {
         &self.file
     }
 
-    /// Whether its phases are known up to whole turns.
+    /// True if its phases are known up to whole turns.
     pub fn is_wrapped(&self) -> bool {
         self.wrapped
     }

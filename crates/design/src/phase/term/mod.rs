@@ -16,7 +16,7 @@ pub use map::MapTable;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseTerm {
     pub form: TermForm,
-    /// What the phase is multiplied by.
+    /// Factor of the phase.
     pub scale: f64,
     /// Middle of the phase, from that of the element (um).
     pub centre_um: [f64; 2],
@@ -27,7 +27,7 @@ pub struct PhaseTerm {
     pub file: Option<PathBuf>,
 }
 
-/// Where a phase comes from.
+/// Source of a phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TermForm {
@@ -38,7 +38,7 @@ pub enum TermForm {
     /// Sum of Zernike polynomials.
     Zernike {
         order: ZernikeOrder,
-        /// Of the first polynomials of that order (turns).
+        /// Coefficients of the first polynomials of that order (waves).
         coefficients: Vec<f64>,
         /// Radius of the disc that they are orthogonal over (um).
         radius_um: f64,
@@ -47,7 +47,7 @@ pub enum TermForm {
     Polynomial {
         /// Powers of x and y, and the coefficient (rad).
         terms: Vec<(u32, u32, f64)>,
-        /// What lengths are divided by (um).
+        /// Length by which lengths are divided (um).
         radius_um: f64,
     },
     /// A surface of a lens file of OpticStudio, still to be read.
@@ -90,17 +90,18 @@ impl PhaseTerm {
         }
     }
 
-    /// Whether an element has it.
+    /// True if an element has it.
     pub fn is_of(&self, element: (i32, i32)) -> bool {
         self.elements.is_empty() || self.elements.contains(&element)
     }
 
-    /// Whether its phase is known up to whole turns: it jumps by them between places, and nothing is seen of that behind a lens.
+    /// True if its phase is known up to whole waves: it jumps by them between places, which has no effect behind a
+    /// lens.
     pub fn is_wrapped(&self) -> bool {
         matches!(&self.form, TermForm::Map(map) if map.is_wrapped())
     }
 
-    /// Whether places on both sides of the x axis have the same phase, to the last bit.
+    /// True if places on both sides of the x axis have equal phases, to the last bit.
     pub fn is_mirrored(&self) -> bool {
         matches!(self.form, TermForm::Radial(_)) && self.centre_um[1] == 0.0
     }

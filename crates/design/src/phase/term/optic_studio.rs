@@ -16,7 +16,7 @@ use metalith_core::{Error, Result};
 /// Longest file that is read (bytes).
 const LONGEST: u64 = 16 << 20;
 
-/// What is known of one surface.
+/// Surface of the file, as far as it was read.
 #[derive(Default)]
 struct Surface<'t> {
     number: u32,
@@ -99,7 +99,7 @@ impl Surface<'_> {
         }
     }
 
-    /// What its lines say.
+    /// Reads the lines of a surface.
     fn read(&mut self, fault: &Fault<'_>) -> Result<()> {
         for (line, text) in std::mem::take(&mut self.lines) {
             let mut words = text.split_ascii_whitespace();
@@ -218,7 +218,7 @@ fn unit(name: Option<&str>) -> Option<f64> {
     })
 }
 
-/// Which surfaces have a phase, or what they are if none has.
+/// Words for the surfaces that have a phase, or for what the surfaces are if none has.
 fn list(known: &[Surface<'_>], others: &[Surface<'_>]) -> String {
     if !known.is_empty() {
         let numbers: Vec<String> = known.iter().map(|s| s.number.to_string()).collect();
@@ -270,7 +270,7 @@ impl Fault<'_> {
     }
 }
 
-/// What to do with a file that does not say it.
+/// Remedy for a file that does not say it.
 const SAVE: &str = "save the lens as .zmx, and name the surface with `surface` if several have a phase";
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::VISIBLE_UM;
 use metalith_cell::Fidelity;
 use metalith_core::document::{Limits, Section};
 
-/// How the radial phase is optimised. Every key has a default: an empty section asks for the largest mean
+/// Settings for optimising the radial phase. Every key has a default: an empty section asks for the largest mean
 /// logarithm of the Strehl ratio from 400 to 700 nm with the rigorous cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OptimiseSpec {
@@ -21,7 +21,7 @@ pub struct OptimiseSpec {
     /// First and last wavelength (um): those of the design's band where the section does not say them. And their distance.
     pub band_um: (f64, f64),
     pub step_um: f64,
-    /// Whether the section says its band, the distance, and that of the views.
+    /// True for each key that the section gives: its band, the distance, and the distance of the views.
     #[serde(skip)]
     said: [bool; 3],
     /// Largest wrapped phase step from ring to ring (turns); 0.5 is no limit.
@@ -46,7 +46,7 @@ impl OptimiseSpec {
     }
 }
 
-/// Which solver, and for how long.
+/// Solver, and how long it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverSpec {
@@ -76,7 +76,7 @@ pub enum StartSpec {
     Random,
     /// The `[phase]` of the design.
     Previous,
-    /// What exchange makes of a logarithmic asphere for the merit `log`.
+    /// Result of exchange from a logarithmic asphere for the merit `log`.
     Log,
 }
 
@@ -102,7 +102,7 @@ pub struct RobustSpec {
     pub draws: u32,
 }
 
-/// What image errors are expected over.
+/// Views over which image errors are expected.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ViewSpec {
     pub angles_deg: Vec<f64>,

@@ -1,4 +1,4 @@
-//! What a search does not know of a cell, each thing with its place.
+//! Refusals: what a search cannot do for a cell, each with its place in the file.
 
 use super::{MeritSpec, OptimiseSpec, SolverSpec};
 use crate::spec::CellSpec;
@@ -7,7 +7,7 @@ use metalith_core::document::Section;
 use metalith_pillars::PolarisationBasis;
 
 impl OptimiseSpec {
-    /// Unlike neighbours are known to the exchange of rings for the field on the axis, of pillars as drawn.
+    /// Dissimilar neighbours are known to the exchange of rings for the field on the axis, of pillars as drawn.
     pub(super) fn check_neighbours(&self, s: &Section<'_, '_>, cell: &CellSpec) {
         if self.fidelity != Fidelity::Neighbours {
             return;
@@ -97,7 +97,7 @@ mod tests {
 
     use crate::Design;
 
-    /// On a lattice that no tables are made for.
+    /// Case of a lattice that no tables are made for.
     #[test]
     fn unlike_neighbours_on_a_hexagonal_lattice_are_refused() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/hexagonal_1550.toml");
@@ -110,7 +110,7 @@ mod tests {
         );
     }
 
-    /// What the exchange of rings does not know among unlike neighbours is refused, each thing in a fault of its own.
+    /// Refusals of what the exchange of rings cannot do with the coupled model, each in a fault of its own.
     #[test]
     fn what_unlike_neighbours_are_not_known_to_is_refused() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/broadband_3x3.toml");

@@ -1,4 +1,4 @@
-//! Copies of a pillar that is told by its corners, onto the sites of elements.
+//! Copies of a pillar that is identified by its corners, onto the sites of elements.
 
 use super::Filler;
 use crate::transform::turned;
@@ -12,7 +12,7 @@ const KEPT: [(u8, [bool; 2]); 3] = [(2, [true, true]), (4, [false, true]), (6, [
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Images {
     element: u32,
-    /// Which of [`KEPT`] each placement after the first is by.
+    /// Entry of [`KEPT`] that each placement after the first is by.
     by: [usize; KEPT.len()],
     count: usize,
 }
@@ -24,8 +24,9 @@ impl Images {
 }
 
 impl Filler {
-    /// Put a pillar that is told by its corners on its sites, in one placement of the current cell after the other: how many were put
-    /// before one that is another shape, has other corners than those of its number, or has no free site.
+    /// Put a pillar that is identified by its corners on its sites, in one placement of the current cell after the
+    /// other: how many were put before one that is another shape, has other corners than those of its number, or has no
+    /// free site.
     ///
     /// Millions of pillars come here, one for each reference: nothing is worked out for one of them that another has told.
     pub fn put_copies(&mut self, finder: &mut PillarFinder, shape: &Shape<'_>, placements: &[Transform]) -> usize {

@@ -17,7 +17,7 @@ use crate::record::{info, kind};
 
 type Result<T> = std::result::Result<T, OasisError>;
 
-/// Which of the three pairs of coordinates.
+/// Pair of coordinates, one of three.
 #[derive(Clone, Copy, PartialEq)]
 enum Pair {
     Placement,

@@ -1,4 +1,4 @@
-//! What is placed or named: placements of cells, texts, and elements of private use.
+//! Records that place or name: placements of cells, texts, and elements of private use.
 
 use std::io::{Read, Seek};
 

@@ -1,4 +1,4 @@
-//! What was read, borrowed from the modal variables.
+//! Items read, borrowed from the modal variables.
 
 use std::io::{Read, Seek};
 
@@ -7,7 +7,7 @@ use crate::read::item::{CellReference, Kind, NameEntry, OasisElement, OasisItem,
 use crate::read::modal::Named;
 
 impl<R: Read + Seek> OasisReader<R> {
-    /// What was read, borrowed.
+    /// Item read by a step, borrowed.
     #[inline]
     pub(in crate::read) fn view(&self, step: Step) -> OasisItem<'_> {
         let modal = &self.modal;

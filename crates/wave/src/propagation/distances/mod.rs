@@ -29,10 +29,10 @@ const FADE_ROOM_UM: f64 = 70.0;
 /// The fade begins within this share of where it ends, however far the distances are apart.
 const LATEST_FADE: f64 = 0.9;
 
-/// Where intensity is wanted, for one element and one direction of light.
+/// Request for intensity at several distances, for one element and one direction of light.
 #[derive(Clone, Copy, Debug)]
 pub struct Distances {
-    /// Where the samples of the element are.
+    /// Lattice of the samples of the element.
     pub lattice: Lattice,
     /// Radius outside of which the element is opaque (um).
     pub radius_um: f64,
@@ -71,7 +71,7 @@ pub struct DistancesScratch {
     column: FadedColumn,
     /// Transfer function to each distance, `[distance][kx][ky]`.
     transfer: Vec<Complex32>,
-    /// From one distance to the next, `[ky]`.
+    /// Factors from one distance to the next, `[ky]`.
     step: Vec<Complex32>,
 }
 
@@ -146,7 +146,7 @@ impl DistancesPlan {
         }
     }
 
-    /// What forms the samples along y where a period holds no whole number of them.
+    /// Chirp transform that forms the samples along y where a period holds no whole number of them.
     fn along_y(&self, kept: &KeptFrequencies) -> Option<Zoom> {
         let cycles = self.step_um() / self.period_um[1];
         let zoom = || {
@@ -188,12 +188,12 @@ impl DistancesPlan {
         kept
     }
 
-    /// From the window's middle to the outermost rays that it needs (um).
+    /// Distance from the window's middle to the outermost rays that it needs (um).
     fn reach_um(&self) -> f64 {
         self.wanted.radius_um + self.wanted.half_width_um
     }
 
-    /// From the window's middle to the nearest rays that would come back into it as aliases (um).
+    /// Distance from the window's middle to the nearest rays that would come back into it as aliases (um).
     fn fade_end_um(&self) -> f64 {
         self.period_um[0] - self.reach_um()
     }

@@ -158,7 +158,7 @@ impl DistancesPlan {
         }
     }
 
-    /// The same by chirps.
+    /// Variant of the propagation by chirps.
     fn propagate_by(&self, zoom: &Zoom, distances: usize, kept: &KeptFrequencies, scratch: &mut DistancesScratch) {
         let [kx, ky] = kept.count;
         let DistancesScratch {

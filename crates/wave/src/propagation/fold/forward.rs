@@ -1,4 +1,4 @@
-//! From the lattice to the window.
+//! Transform from the lattice to the window.
 
 use std::ops::Range;
 

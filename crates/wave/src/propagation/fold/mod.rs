@@ -50,8 +50,8 @@ pub struct FoldedPropagator {
 }
 
 impl FoldedPropagator {
-    /// For apertures on `lattice` that pass nothing outside `radius_um` of their centre. Period and fade
-    /// follow from lens, window, distance and the accuracy asked for.
+    /// Plan for apertures on `lattice` that pass nothing outside `radius_um` of their centre. Period and fade follow
+    /// from lens, window, distance and the accuracy asked for.
     ///
     /// # Errors
     /// If the window is not one, or so large that the transform would not fit into memory.
@@ -67,8 +67,8 @@ impl FoldedPropagator {
         Ok(Self::with_band(lattice, wavelength_um, window, accuracy, band))
     }
 
-    /// With a period of `bins` places of the lattice's grid along x and y and a fade of one's own, from `fade_um[0]` to `fade_um[1]`: for those
-    /// who study the method.
+    /// Plan with a period of `bins` places of the lattice's grid along x and y and a fade of the caller's, from
+    /// `fade_um[0]` to `fade_um[1]`: for those who study the method.
     ///
     /// # Errors
     /// As [`FoldedPropagator::plan`], and if the fade does not end after it begins.
@@ -119,7 +119,7 @@ impl FoldedPropagator {
         &self.band.fade
     }
 
-    /// The same plan, holding spectra of columns of at most so many bytes at a time, but at least of a few columns. The
+    /// Same plan, holding spectra of columns of at most so many bytes at a time, but at least of a few columns. The
     /// field is the same to the last bit; the rows of the aperture are transformed once for each part.
     #[must_use]
     pub fn within(mut self, bytes: usize) -> Self {
@@ -141,7 +141,7 @@ impl FoldedPropagator {
         LANES * self.residues() * size_of::<Complex32>()
     }
 
-    /// As [`Propagator::field`], into memory of the caller's. Shape `[samples, samples]`.
+    /// Variant of [`Propagator::field`] that writes into the caller's memory. Shape `[samples, samples]`.
     ///
     /// # Errors
     /// As [`Propagator::field`], and if `values` has not the window's shape or its rows are not contiguous.
@@ -156,8 +156,8 @@ impl FoldedPropagator {
         Ok(())
     }
 
-    /// The same, where `observe` sees the spectrum of the field at the sensor, column by column: all rows of the band,
-    /// the phase counted from the window's middle. Gives the power that the aperture passes (um^2).
+    /// Variant of the field in which `observe` sees the spectrum of the field at the sensor, column by column: all rows
+    /// of the band, the phase counted from the window's middle. Gives the power that the aperture passes (um^2).
     fn field_observed(
         &self,
         aperture: &dyn Aperture,
@@ -222,7 +222,7 @@ impl FoldedPropagator {
         self.band.count[0].div_ceil(LANES)
     }
 
-    /// What multiplies the kept frequencies of column `k` of the band.
+    /// Factors of the retained frequencies of column `k` of the band.
     fn transfer(&self, k: usize, faded: &mut FadedColumn, out: &mut [Complex32]) {
         let z = self.window.distance_um;
         let first = [0, self.rows().start];

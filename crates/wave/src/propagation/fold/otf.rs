@@ -3,7 +3,7 @@
 //! The optical transfer function at a frequency is the transform of the intensity over the whole plane, which is the
 //! sum over the spectrum of the field of each amplitude times the conjugate of the one a frequency below it
 //! (Goodman, Introduction to Fourier Optics, ch. 6). The spectrum is at hand before the window is formed, with all
-//! rays that land within the fade; light beyond it is a veil without contrast, and counts in the power alone.
+//! rays that land within the fade; light beyond it is stray light without contrast, and counts in the power alone.
 
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
@@ -174,7 +174,7 @@ mod tests {
         FoldedPropagator::plan(lattice, RADIUS_UM, WAVELENGTH_UM, window, Accuracy::Accurate).unwrap()
     }
 
-    /// A lens with the phase times a factor: one for a perfect lens, less for one that leaves a veil round its image.
+    /// A lens with the phase times a factor: one for a perfect lens, less for one that leaves stray light round its image.
     fn lens(strength: f64) -> PhaseFunction<impl Fn(f64, f64) -> f64 + Sync> {
         PhaseFunction {
             lattice: Lattice::covering(80_000, 350).unwrap(),
@@ -234,7 +234,8 @@ mod tests {
 
     #[test]
     fn a_veil_outside_of_the_window_takes_contrast() {
-        /// Of the power that passes: light that a window of 210 um does not hold either, and interpolation of bins.
+        /// Tolerance as a share of the power that passes: light that a window of 210 um does not hold either, and
+        /// interpolation of bins.
         const WIDE_WINDOW: f64 = 3e-3;
         let wave = PlaneWave::normal(WAVELENGTH_UM);
         let blurred = lens(0.8);

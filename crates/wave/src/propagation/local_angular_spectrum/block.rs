@@ -11,7 +11,7 @@ pub(super) struct Block {
     pub strong: Vec<Bin>,
     /// The others, gathered more coarsely.
     pub weak: Vec<Bin>,
-    /// What was left out (um^2): it is taken to be spread as the rest.
+    /// Power that was left out (um^2), taken to be distributed as the rest.
     pub rest_um2: f64,
 }
 
@@ -36,12 +36,12 @@ const GROUP: usize = 4;
 /// Share of the power of a block that may be left out with its weakest groups.
 const LEFT_OUT: f64 = 2e-3;
 
-/// Directions of tiles in pairs along both axes: squares of the plane tell no finer ones apart.
+/// Directions of tiles in pairs along both axes: squares of the plane distinguish no finer ones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pairs {
     /// Along an axis.
     pub across: usize,
-    /// How far neighbouring directions land apart (um).
+    /// Distance at which neighbouring directions land from one another (um).
     landing_um: [f64; 2],
 }
 
@@ -114,7 +114,7 @@ impl Moments {
         }
     }
 
-    /// As light in the direction of a pair, of a block about a place.
+    /// Light of a block about a place, as light in the direction of a pair.
     fn bin(&self, pair: usize, middle_um: [f64; 2], pairs: Pairs) -> Bin {
         let mean = self.first.map(|v| v / self.power_um2);
         let edge = |a: usize| {
@@ -132,7 +132,7 @@ impl Moments {
 }
 
 impl Block {
-    /// From the power of each pair of directions, columns first; none of a block without light.
+    /// Block from the power of each pair of directions, columns first; `None` for a block without light.
     pub fn of(sums: &[Moments], pairs: Pairs, middle_um: [f64; 2]) -> Option<Self> {
         let power = |i: usize| sums[i].power_um2;
         let total: f64 = (0..sums.len()).map(|i| f64::from(power(i))).sum();

@@ -1,0 +1,53 @@
+//! Ways of giving a quantity a value for each group of captures: by element, colour, distance or angle.
+
+use metalith_attribution::{LinearTrend, Pattern};
+
+use crate::set::{CaptureIndex, MeasuredSet};
+
+/// What captures have in common that share a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grouping {
+    Element,
+    Colour,
+    Distance,
+    Angle,
+}
+
+impl Grouping {
+    /// All of them, in the order of the groupings of [`Data`](crate::data::Data).
+    pub const ALL: [Self; 4] = [Self::Element, Self::Colour, Self::Distance, Self::Angle];
+
+    /// The grouping of a pattern.
+    pub fn of(pattern: &Pattern) -> Self {
+        Self::ALL[pattern.by]
+    }
+
+    /// As a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Element => "element",
+            Self::Colour => "colour",
+            Self::Distance => "distance",
+            Self::Angle => "angle",
+        }
+    }
+
+    /// What captures of one group have in common: the place of the element (um), the centre of the LED (nm), the distance (um),
+    /// or the angle of incidence (degrees).
+    pub fn coordinates(self, set: &MeasuredSet, capture: CaptureIndex) -> [f64; 2] {
+        let own = &set.captures[capture];
+        match self {
+            Self::Element => set.elements[own.element].centre_um,
+            Self::Colour => [set.leds[own.led].centre_nm, 0.0],
+            Self::Distance => [own.distance_um, 0.0],
+            Self::Angle => own.aoi_rad.map(f64::to_degrees),
+        }
+    }
+}
+
+/// What the values of a pattern are like over what its groups differ in; none where that is a single place.
+pub fn linear_trend(pattern: &Pattern, set: &MeasuredSet) -> Option<LinearTrend> {
+    let by = Grouping::of(pattern);
+    let at: Vec<[f64; 2]> = pattern.groups.iter().map(|&c| by.coordinates(set, c)).collect();
+    LinearTrend::new(&at, &pattern.values)
+}

@@ -1,0 +1,14 @@
+//! Images of a point: for each element, channel of the camera and spectrum of the scene, over the field.
+//!
+//! | question | file |
+//! | --- | --- |
+//! | what a bank holds, and where copies by symmetry are found | `bank` |
+//! | how it is simulated | `build` |
+//! | how single wavelengths become a channel | `spectrum` |
+
+mod bank;
+mod build;
+mod spectrum;
+
+pub(crate) use bank::SMALL_UM;
+pub use bank::{BankSpec, DistinctKernels, KernelBank, MOST_BYTES, TurnedKernel};

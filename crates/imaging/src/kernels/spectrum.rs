@@ -1,0 +1,291 @@
+//! Images of a point in a channel, from those of single wavelengths.
+//!
+//! The PSF of a wavelength about its chief ray, summed over squares of a quarter of a pixel, is transformed. Between two
+//! wavelengths it is the mean of both with weights that change linearly, and moves with its chief ray, as in
+//! [`metalith_wave::psf::polychromatic`]; in light of narrow bands it follows a cubic through four
+//! ([`metalith_sensor::Blend`]). Here the band is a sum over points 1 nm apart, which a pixel cannot tell from a line.
+
+use std::ops::Range;
+
+use metalith_sensor::ChannelPart;
+use num_complex::Complex32;
+
+use crate::spectra::SceneSpectrum;
+use metalith_wave::kernels::{FftScratch, SquareFft};
+
+/// Squares an axis of a pixel.
+pub const QUARTERS: usize = 4;
+
+/// Plan that kernels are made with: transforms of one window size.
+pub struct SpectrumPlan {
+    /// Pixels an axis of a kernel, even.
+    pub window: usize,
+    fft: SquareFft,
+}
+
+/// The spectrum of the PSF of one wavelength on quarters of pixels, the chief ray in the middle.
+pub struct PsfSpectrum(Vec<Complex32>);
+
+/// A part of a channel, as it acts in one direction.
+#[derive(Clone, Debug)]
+pub struct MovedPart {
+    /// Share of the channel's light.
+    pub weight: f64,
+    /// Wavelength (nm).
+    pub nm: f64,
+    /// Wavelengths whose PSFs it is a sum of, with their weights: [`metalith_sensor::Sampling::blended`].
+    pub blended: Vec<(usize, f64)>,
+    /// Offset from the chief ray of the channel to the chief ray of the part (pixels).
+    pub offset: [f64; 2],
+}
+
+impl MovedPart {
+    /// Part whose chief ray lands there, made of these wavelengths.
+    pub fn new(part: &ChannelPart, total: f64, blended: Vec<(usize, f64)>, offset: [f64; 2]) -> Self {
+        Self {
+            weight: part.weight / total,
+            nm: 0.5 * (part.nm[0] + part.nm[1]),
+            blended,
+            offset,
+        }
+    }
+
+    /// True if its PSF is in a kernel of so many pixels: parts that land farther off belong to the stray light.
+    pub fn inside(&self, window: usize) -> bool {
+        self.offset.iter().all(|o| o.abs() <= 0.5 * window as f64)
+    }
+}
+
+impl SpectrumPlan {
+    /// Plan for kernels of `window` pixels an axis, an even number.
+    pub fn new(window: usize) -> Self {
+        // Half a window more than the kernel: what parts that have moved put beyond it comes back outside of it.
+        Self {
+            window,
+            fft: SquareFft::new(window * QUARTERS * 3 / 2),
+        }
+    }
+
+    /// Spectrum of the energies in quarters of the pixels of a window, row by row, its chief ray in the middle.
+    pub fn spectrum(&self, quarters: &[f32], scratch: &mut FftScratch) -> PsfSpectrum {
+        let (inner, size) = (self.window * QUARTERS, self.fft.size());
+        let from = (size - inner) / 2;
+        let mut square = vec![0.0; size * size];
+        for (iy, row) in quarters.chunks_exact(inner).enumerate() {
+            square[(iy + from) * size + from..][..inner].copy_from_slice(row);
+        }
+        let mut spectrum = vec![Complex32::ZERO; self.fft.entries()];
+        self.fft.forward(&mut square, size, &mut spectrum, scratch);
+        PsfSpectrum(spectrum)
+    }
+
+    /// Kernels of a channel for each spectrum of the scene: energy in a pixel whose middle is at
+    /// `(i - window + 1/2) / 2` pixels from the chief ray, i from 0 to 2 window - 1 along x and along y, as it counts in a
+    /// sum over points half a pixel apart; see [`PlacedPixel`].
+    pub fn kernels(
+        &self,
+        spectra: &[PsfSpectrum],
+        parts: &[MovedPart],
+        basis: &[SceneSpectrum],
+        scratch: &mut FftScratch,
+    ) -> Vec<Vec<f32>> {
+        let (size, half) = (self.fft.size(), self.fft.size() / 2 + 1);
+        let mut sums = vec![vec![Complex32::ZERO; self.fft.entries()]; basis.len()];
+        let weakest = WEAKEST * parts.iter().map(|p| p.weight).fold(0.0, f64::max);
+        let mut mixed = vec![Complex32::ZERO; size];
+        for part in parts.iter().filter(|p| p.weight > weakest && p.inside(self.window)) {
+            let terms: Vec<(&[Complex32], f32)> = part
+                .blended
+                .iter()
+                .map(|(i, weight)| (&spectra[*i].0[..], *weight as f32))
+                .collect();
+            let turn = |axis: usize, k: usize| {
+                let signed = if 2 * k > size { k as f64 - size as f64 } else { k as f64 };
+                let turns = signed / size as f64 * part.offset[axis] * QUARTERS as f64;
+                let turn = num_complex::Complex64::cis(-std::f64::consts::TAU * turns);
+                Complex32::new(turn.re as f32, turn.im as f32)
+            };
+            let along_y: Vec<Complex32> = (0..size).map(|k| turn(1, k)).collect();
+            let weights: Vec<f32> = basis.iter().map(|b| (part.weight * b.at(part.nm)) as f32).collect();
+            for kx in 0..half {
+                let x = turn(0, kx);
+                let at = kx * size..(kx + 1) * size;
+                blend(&terms, at.clone(), &mut mixed);
+                mixed.iter_mut().zip(&along_y).for_each(|(m, y)| *m *= x * y);
+                for (sum, weight) in sums.iter_mut().zip(&weights) {
+                    for (s, m) in sum[at.clone()].iter_mut().zip(&mixed) {
+                        *s += m * weight;
+                    }
+                }
+            }
+        }
+        let mut square = vec![0.0; size * size];
+        let finished = sums.iter_mut().map(|sum| {
+            self.fft.inverse(sum, &mut square, size, scratch);
+            self.pixels(&square)
+        });
+        finished.collect()
+    }
+
+    /// Sums over pixels of what lies in quarters.
+    fn pixels(&self, square: &[f32]) -> Vec<f32> {
+        let (window, size) = (self.window, self.fft.size());
+        let side = 2 * window;
+        let PlacedPixel { taps, first } = PlacedPixel::new();
+        // Pixel i begins two quarters before its middle.
+        let first = |i: usize| window + 2 * i - 1 - first;
+        let mut lines = vec![0.0f32; size * side];
+        for (row, line) in square.chunks_exact(size).zip(lines.chunks_exact_mut(side)) {
+            for (i, v) in line.iter_mut().enumerate() {
+                *v = row[first(i)..].iter().zip(&taps).map(|(r, t)| r * t).sum();
+            }
+        }
+        let mut kernel = vec![0.0f32; side * side];
+        for (i, out) in kernel.chunks_exact_mut(side).enumerate() {
+            for (k, tap) in taps.iter().enumerate() {
+                let line = &lines[(first(i) + k) * side..][..side];
+                out.iter_mut().zip(line).for_each(|(o, v)| *o += tap * v);
+            }
+        }
+        kernel
+    }
+}
+
+/// Weights of quarters of pixels, along one axis, of a pixel that looks at points half a pixel apart.
+///
+/// A frame is an integral over the scene. A sum over points takes detail that is finer than they can tell for coarse
+/// detail, unless what is summed is smooth: so each point stands for the light of half a pixel about it. What that blurs
+/// is undone by the differences of neighbouring points: of a wave of frequency f, cos^2 is left, cos^2 (1 + u / 4 + u^2 / 8)
+/// = 1 - 5 sin^6 + ... with sin, cos of pi f / 4 and u = sin^2(pi f / 2).
+struct PlacedPixel {
+    taps: Vec<f32>,
+    /// Quarters before the first one of the pixel itself.
+    first: usize,
+}
+
+impl PlacedPixel {
+    fn new() -> Self {
+        let pixel = vec![1.0; QUARTERS];
+        let spread = [0.25, 0.5, 0.25];
+        // 1 + u / 4 + u^2 / 8, with u = -(second difference) / 4, two quarters from point to point.
+        let fourth = 1.0 / 128.0;
+        let second = -1.0 / 16.0 - 4.0 * fourth;
+        let sharpen = [
+            fourth,
+            0.0,
+            second,
+            0.0,
+            1.0 - 2.0 * (second + fourth),
+            0.0,
+            second,
+            0.0,
+            fourth,
+        ];
+        let taps = convolved(&convolved(&pixel, &spread), &sharpen);
+        let first = (taps.len() - QUARTERS) / 2;
+        Self { taps, first }
+    }
+}
+
+fn convolved(a: &[f32], b: &[f32]) -> Vec<f32> {
+    let mut out = vec![0.0; a.len() + b.len() - 1];
+    for (i, x) in a.iter().enumerate() {
+        for (k, y) in b.iter().enumerate() {
+            out[i + k] += x * y;
+        }
+    }
+    out
+}
+
+/// The weighted sum of spectra in a range of their frequencies.
+fn blend(terms: &[(&[Complex32], f32)], at: Range<usize>, out: &mut [Complex32]) {
+    let row = |k: usize| (&terms[k].0[at.clone()], terms[k].1);
+    match terms.len() {
+        2 => {
+            let ((from, _), (to, upper)) = (row(0), row(1));
+            let pairs = from.iter().zip(to);
+            out.iter_mut()
+                .zip(pairs)
+                .for_each(|(o, (a, b))| *o = a + (b - a) * upper);
+        }
+        4 => {
+            let [(a, p), (b, q), (c, r), (d, s)] = [0, 1, 2, 3].map(row);
+            let all = a.iter().zip(b).zip(c.iter().zip(d));
+            out.iter_mut()
+                .zip(all)
+                .for_each(|(o, ((a, b), (c, d)))| *o = a * p + b * q + c * r + d * s);
+        }
+        n => {
+            out.fill(Complex32::ZERO);
+            for (spectrum, weight) in (0..n).map(row) {
+                out.iter_mut().zip(spectrum).for_each(|(o, v)| *o += v * weight);
+            }
+        }
+    }
+}
+
+/// Parts with a smaller share of the strongest are left out.
+const WEAKEST: f64 = 1e-5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A Gaussian that the light of two wavelengths moves: closed form on pixels by a fine sum.
+    #[test]
+    fn kernels_are_pixels_of_the_moved_psf() {
+        /// Tolerance as a share of the peak: single precision, and a Gaussian of 3 quarters that is summed over them.
+        const SHARE: f32 = 2e-3;
+        let window = 16;
+        let plan = SpectrumPlan::new(window);
+        let mut scratch = FftScratch::default();
+        let sigma = 0.8;
+        let n = window * QUARTERS;
+        let gauss = |x: f64, y: f64| (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
+        // Energy of each quarter of a pixel, by points within it.
+        let quarter = |ix: usize, iy: usize| {
+            let at = |i: usize, k: usize| (i as f64 - 0.5 * n as f64 + (k as f64 + 0.5) / 4.0) / QUARTERS as f64;
+            (0..16).map(|k| gauss(at(ix, k % 4), at(iy, k / 4))).sum::<f64>() / 256.0
+        };
+        let quarters: Vec<f32> = (0..n * n).map(|i| quarter(i % n, i / n) as f32).collect();
+        let spectra = [
+            plan.spectrum(&quarters, &mut scratch),
+            plan.spectrum(&quarters, &mut scratch),
+        ];
+        let flat = SceneSpectrum {
+            nm: vec![400.0, 700.0],
+            values: vec![1.0, 1.0],
+        };
+        let part = |weight: f64, offset: [f64; 2]| MovedPart {
+            weight,
+            nm: 500.0,
+            blended: vec![(0, 0.7), (1, 0.3)],
+            offset,
+        };
+        let parts = [part(0.75, [1.3, -0.4]), part(0.25, [-2.1, 0.9]), part(9.0, [20.0, 0.0])];
+        let kernel = plan
+            .kernels(&spectra, &parts, std::slice::from_ref(&flat), &mut scratch)
+            .remove(0);
+        let side = 2 * window;
+        let mut worst = 0.0f32;
+        for (i, got) in kernel.iter().enumerate() {
+            let middle = |i: usize| (i as f64 - window as f64 + 0.5) / 2.0;
+            let (x, y) = (middle(i % side), middle(i / side));
+            let want: f64 = parts[..2]
+                .iter()
+                .map(|p| {
+                    let points = (0..400).map(|k| {
+                        let (a, b) = ((k % 20) as f64, (k / 20) as f64);
+                        gauss(
+                            x + (a + 0.5) / 20.0 - 0.5 - p.offset[0],
+                            y + (b + 0.5) / 20.0 - 0.5 - p.offset[1],
+                        )
+                    });
+                    p.weight * points.sum::<f64>() / 400.0
+                })
+                .sum();
+            worst = worst.max((got - want as f32).abs());
+        }
+        assert!(worst < SHARE, "{worst}");
+    }
+}

@@ -1,0 +1,360 @@
+//! The page of a picture.
+
+use std::path::Path;
+
+use metalith_core::{Result, part, srgb};
+use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table, fixed, write_json};
+use metalith_sensor::{Camera, ColourFilter};
+use ndarray::{Array2, Array3};
+
+use crate::approximation_scores::AssumedScore;
+use crate::exposure::Frame;
+use crate::files::write_restored;
+use crate::point_image;
+use crate::report::{Assumption, PictureReport};
+use crate::resolution::ContrastCurve;
+use crate::score::Zone;
+use crate::uncertainty::{Uncertainty, UncertaintyReport, root_mean_square};
+
+/// Pictures beside the numbers.
+pub struct PicturePages<'a> {
+    pub report: &'a PictureReport,
+    /// Linear sRGB.
+    pub scene: &'a Array3<f64>,
+    pub frame: &'a Frame,
+    /// Restored pictures by each method, linear sRGB, in the order of the report; the page shows the first.
+    pub restored: &'a [Array3<f64>],
+    pub camera: &'a Camera,
+    /// Uncertainty from samples, if any were drawn.
+    pub uncertainty: Option<&'a Uncertainty>,
+}
+
+/// Edge of a zoom (pixels of the scene).
+const ZOOM: usize = 96;
+
+/// Write `picture.html` and `picture.json` into a folder, and the frame and all pictures beside them.
+///
+/// # Errors
+/// If they cannot be written.
+pub fn write_pages(pages: &PicturePages<'_>, folder: &Path) -> Result<()> {
+    pages.report.frame.write(pages.frame, folder)?;
+    for (restoration, picture) in pages.report.restorations.iter().zip(pages.restored) {
+        write_restored(&folder.join(&restoration.picture), picture)?;
+    }
+    write_json(&folder.join("picture.json"), "picture", pages.report)?;
+    page(pages).write(&folder.join("picture.html"))
+}
+
+/// Scene and picture in linear sRGB, and the frame between them.
+pub fn pictures_side_by_side(
+    scene: &Array3<f64>,
+    frame: &Frame,
+    restored: &Array3<f64>,
+    channel_names: &[String],
+) -> PhotoRow {
+    let mut row = PhotoRow::new("Scene, frame, picture", 250.0);
+    row.photo("scene", &scene.mapv(srgb::encoded));
+    row.photo("frame as recorded", &shown(frame, channel_names));
+    row.photo("picture restored", &restored.mapv(srgb::encoded));
+    row
+}
+
+/// A frame as a person would look at it: colours of its mosaic, brightness of sRGB.
+pub fn shown(frame: &Frame, names: &[String]) -> Array3<f64> {
+    let (rows, columns) = frame.planes[0].dim();
+    let at = |y: usize, x: usize, c: usize| -> f64 {
+        let v = match frame.filter {
+            ColourFilter::None => {
+                let wanted = ["red", "green", "blue"][c];
+                let plane = names.iter().position(|n| n == wanted).unwrap_or(0);
+                f64::from(frame.planes[plane.min(frame.planes.len() - 1)][[y, x]]) * frame.gain[0] / frame.gain[plane]
+            }
+            filter => {
+                // The mean of those of the square of two by two pixels that count this colour.
+                let (y0, x0) = (y & !1, x & !1);
+                let (mut sum, mut count, mut gain) = (0.0, 0.0, 1.0);
+                for k in 0..4 {
+                    let (py, px) = ((y0 + k / 2).min(rows - 1), (x0 + k % 2).min(columns - 1));
+                    let channel = crate::exposure::channel_at(filter, names, py, px);
+                    if channel.is_some_and(|c2| names[c2] == ["red", "green", "blue"][c]) {
+                        sum += f64::from(frame.planes[0][[py, px]]);
+                        count += 1.0;
+                        gain = frame.gain[channel.unwrap_or(0)];
+                    }
+                }
+                let most = frame.gain.iter().copied().fold(0.0, f64::max);
+                sum / f64::max(count, 1.0) * most / gain
+            }
+        };
+        srgb::encoded(v)
+    };
+    Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| at(y, x, c))
+}
+
+fn page(pages: &PicturePages<'_>) -> Page {
+    let report = pages.report;
+    let mut page = Page::new(
+        format!("The picture that {} will take", report.of_frame.design),
+        format!(
+            "{} through {}, behind the bytes of {}",
+            report.scene, report.of_frame.camera, report.of_frame.layout
+        ),
+    );
+    for note in &report.of_frame.notes {
+        page.note(note);
+    }
+    let names = pages.camera.channel_names();
+    let head = pictures_side_by_side(pages.scene, pages.frame, &pages.restored[0], &names);
+    page.figure(head.caption(
+        "The frame is what the sensor records, neighbours' light and stray light included; its mosaic is shown as colours. The picture is restored from this frame alone.",
+    ));
+    let first = &report.restorations[0];
+    let whole = &first.scores[0];
+    // Of a frame that is all white the picture is white, as the scene seems to be.
+    let score = |words: String| match pages.frame.is_lost() {
+        true => "says nothing: the frame is lost".into(),
+        false => words,
+    };
+    let linear = fixed(whole.psnr_linear_db, 1);
+    let of_linear_light = match first.forecast_db.first() {
+        Some(forecast) => (
+            "PSNR of linear light, forecast for natural scenes",
+            format!("{linear} dB, {} dB", fixed(*forecast, 1)),
+        ),
+        None => ("PSNR of linear light", format!("{linear} dB")),
+    };
+    page.facts(&[
+        ("Method of the picture", first.method.clone()),
+        ("PSNR", score(format!("{} dB", fixed(whole.psnr_db, 1)))),
+        ("SSIM", score(fixed(whole.ssim, 3))),
+        of_linear_light,
+        (
+            "Light in images, of all that arrives",
+            report
+                .budget
+                .iter()
+                .map(|b| format!("{} %", fixed(100.0 * b.shares.in_kernels / b.shares.arrives, 0)))
+                .collect::<Vec<_>>()
+                .join(", "),
+        ),
+        ("Pixels at full scale", report.of_frame.saturated_words()),
+    ]);
+    zooms(&mut page, pages);
+    errors(&mut page, pages);
+    if let (Some(found), Some(numbers)) = (pages.uncertainty, &report.uncertainty) {
+        uncertainty(&mut page, found, numbers);
+    }
+    contrast(&mut page, &report.contrast);
+    scores(&mut page, report);
+    point_image::section(&mut page, &report.points, pages.camera.sensor.pixel_um);
+    budget(&mut page, report);
+    geometry(&mut page, report);
+    worth(&mut page, &report.worth);
+    list_assumptions(&mut page, &report.of_frame.assumptions);
+    page
+}
+
+fn zooms(page: &mut Page, pages: &PicturePages<'_>) {
+    page.section("Centre, edge and corner");
+    let (rows, columns, _) = pages.scene.dim();
+    let side = ZOOM.min(rows / 3).min(columns / 3);
+    for (name, row, column) in [
+        ("Centre", (rows - side) / 2, (columns - side) / 2),
+        ("Edge", (rows - side) / 2, columns - side),
+        ("Corner", rows - side, columns - side),
+    ] {
+        let cut = |picture: &Array3<f64>| {
+            let zoom = part(picture.view(), row..row + side, column..column + side);
+            zoom.mapv(srgb::encoded)
+        };
+        let mut zoom = PhotoRow::new(name, 240.0);
+        zoom.photo("scene", &cut(pages.scene))
+            .photo("picture", &cut(&pages.restored[0]));
+        page.figure(zoom.caption(format!("{side} x {side} pixels of the scene.")));
+    }
+}
+
+fn errors(page: &mut Page, pages: &PicturePages<'_>) {
+    let error = root_mean_square(&pages.restored[0].mapv(srgb::encoded), &pages.scene.mapv(srgb::encoded));
+    page.section("Errors");
+    let map = map("Error of the picture", &error, "error");
+    page.figure(map.caption("Root mean square over the colours, of sRGB values from 0 to 1."));
+}
+
+/// A map of a picture's pixels.
+fn map(title: &str, values: &Array2<f64>, what: &str) -> HeatMap {
+    let (rows, columns) = values.dim();
+    // The first row of a map is at the bottom, that of a picture at the top.
+    let upwards = Array2::from_shape_fn((rows, columns), |(y, x)| values[[rows - 1 - y, x]]);
+    let axis = |name: &str, n: usize| (Axis::linear(name, ""), 0.0, n as f64);
+    HeatMap::new(title, upwards, axis("column", columns), axis("row from below", rows)).values(what, "")
+}
+
+/// Section of the samples: where they differ, detail is invented.
+fn uncertainty(page: &mut Page, uncertainty: &Uncertainty, report: &UncertaintyReport) {
+    page.section("How sure the picture is");
+    let mut row = PhotoRow::new("Mean of samples", 250.0);
+    row.photo("mean", &uncertainty.mean.mapv(srgb::encoded));
+    page.figure(row.caption(format!(
+        "{} pictures that the frame may be of were drawn by the learnt prior; their mean has {} dB.",
+        uncertainty.samples,
+        fixed(report.scores[0].psnr_db, 2)
+    )));
+    let map = map("Uncertainty", &uncertainty.spread, "deviation");
+    page.figure(map.caption(format!(
+        "Deviation of the samples from their mean, of sRGB values: where it is large, detail is invented. The order of the pixels by uncertainty and that by true error have a rank correlation of {}. It says where, not how much: samples deviate by {} on average, their mean errs by {}.",
+        fixed(report.rank_correlation, 2),
+        fixed(report.spread, 3),
+        fixed(report.error, 3)
+    )));
+}
+
+fn scores(page: &mut Page, report: &PictureReport) {
+    page.section("Scores");
+    let zones = |what: &str, unit: &str| Zone::ALL.map(|z| Column::number(format!("{what}, {}", z.name()), unit));
+    let way = |joint: bool| Cell::from(if joint { "joint" } else { "each alone" });
+    let mut columns = vec![Column::text("Method"), Column::text("Elements")];
+    columns.extend(zones("PSNR", "dB"));
+    columns.extend(zones("SSIM", ""));
+    let mut table = Table::new(columns);
+    for found in &report.restorations {
+        let mut row = vec![Cell::from(found.method.as_str()), way(found.joint)];
+        row.extend(found.scores.iter().map(|s| Cell::fixed(s.psnr_db, 2)));
+        row.extend(found.scores.iter().map(|s| Cell::fixed(s.ssim, 3)));
+        table.row(row);
+    }
+    page.table(table.caption(
+        "Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values against what an ideal camera of these channels gives.",
+    ));
+    let mut columns = vec![Column::text("Linear light"), Column::text("Elements")];
+    columns.extend(zones("PSNR", "dB"));
+    let mut table = Table::new(columns);
+    for found in &report.restorations {
+        let mut row = vec![Cell::from(found.method.as_str()), way(found.joint)];
+        row.extend(found.scores.iter().map(|s| Cell::fixed(s.psnr_linear_db, 2)));
+        table.row(row);
+        let forecasts = [
+            ("forecast from the spectrum of this scene", &found.forecast_of_scene_db),
+            ("forecast for natural scenes", &found.forecast_db),
+        ];
+        for (of, db) in forecasts.into_iter().filter(|(_, db)| !db.is_empty()) {
+            let mut row = vec![Cell::from(format!("{}, {of}", found.method)), way(found.joint)];
+            row.extend(db.iter().map(|db| Cell::fixed(*db, 2)));
+            table.row(row);
+        }
+    }
+    let forecasts = match report.restorations.iter().any(|r| !r.forecast_db.is_empty()) {
+        true => {
+            "The forecasts are made on a random scene, which says what share of the detail of each size is lost where: one is for the mean over photographs (GB82), the other for the detail that this scene has in each zone. Whole photographs differ from that mean by some 3 dB. "
+        }
+        false => "",
+    };
+    page.table(table.caption(format!(
+        "{forecasts}The restoration knows less than the simulation: on a random scene its operator errs by {} of the light of a pixel (root mean square), channel by channel, which is taken for noise.",
+        report.of_frame.error_words()
+    )));
+}
+
+fn budget(page: &mut Page, report: &PictureReport) {
+    page.section("Where the light goes");
+    let mut table = Table::new([
+        Column::text("Channel"),
+        Column::number("Images", "%"),
+        Column::number("StrayLight on the sensor", "%"),
+        Column::number("Beside the sensor", "%"),
+        Column::number("Not passed", "%"),
+        Column::number("Not travelling", "%"),
+        Column::number("Sum", "%"),
+        Column::number("Undiffracted", "%"),
+    ]);
+    for channel in &report.budget {
+        let s = &channel.shares;
+        let share = |v: f64| 100.0 * v / s.arrives;
+        let sum = s.in_kernels + s.stray_light + s.beyond + s.evanescent + s.not_passed;
+        table.row([
+            Cell::from(channel.channel.as_str()),
+            Cell::fixed(share(s.in_kernels), 2),
+            Cell::fixed(share(s.stray_light), 2),
+            Cell::fixed(share(s.beyond), 2),
+            Cell::fixed(share(s.not_passed), 2),
+            Cell::fixed(share(s.evanescent), 2),
+            Cell::fixed(share(sum), 2),
+            Cell::fixed(share(s.zero_order), 2),
+        ]);
+    }
+    page.table(table.caption(
+        "Of the light that arrives at the openings of all elements from a white scene. Images are what lands within the kernels' windows; undiffracted light is a part of stray light and of what lands beside the sensor. What is not passed is reflected, absorbed, left in the glass, or leaves more steeply than half a wavelength over the pitch.",
+    ));
+}
+
+fn geometry(page: &mut Page, report: &PictureReport) {
+    if report.homographies.is_empty() {
+        return;
+    }
+    page.section("What a homography would miss");
+    let channels: Vec<&str> = report.budget.iter().map(|b| b.channel.as_str()).collect();
+    let mut columns = vec![Column::text("Element")];
+    for channel in &channels {
+        columns.push(Column::number(format!("{channel}, rms"), "pixels"));
+        columns.push(Column::number(format!("{channel}, largest"), "pixels"));
+    }
+    let mut table = Table::new(columns);
+    for own in report.homographies.chunk_by(|a, b| a.element == b.element) {
+        let mut row = vec![Cell::from(own[0].element.as_str())];
+        for channel in &channels {
+            let found = own.iter().find(|h| h.channel == *channel);
+            row.push(found.map_or_else(Cell::none, |h| Cell::sig(h.rms_pixels, 2)));
+            row.push(found.map_or_else(Cell::none, |h| Cell::sig(h.largest_pixels, 2)));
+        }
+        table.row(row);
+    }
+    page.table(table.caption("Distance of the chief rays from the best homography of scene and sub-image."));
+}
+
+/// List what was assumed.
+pub(crate) fn list_assumptions(page: &mut Page, all: &[Assumption]) {
+    page.section("What was assumed");
+    page.list(all.iter().map(|a| format!("{}: {}", a.what, a.value)));
+}
+
+fn worth(page: &mut Page, cases: &[AssumedScore]) {
+    let Some(physics) = cases.first() else { return };
+    page.section("What the assumptions of others are worth");
+    let mut columns = vec![Column::text("Approximation")];
+    for zone in Zone::ALL {
+        columns.push(Column::number(format!("PSNR, {}", zone.name()), "dB"));
+    }
+    columns.push(Column::number("Worth, whole", "dB"));
+    columns.push(Column::number("SSIM, whole", ""));
+    columns.push(Column::number("Linear light, whole", "dB"));
+    let mut table = Table::new(columns);
+    for case in cases {
+        let mut row = vec![Cell::from(case.assumption)];
+        row.extend(case.scores.iter().map(|s| Cell::fixed(s.psnr_db, 2)));
+        row.push(Cell::fixed(case.scores[0].psnr_db - physics.scores[0].psnr_db, 2));
+        row.push(Cell::fixed(case.scores[0].ssim, 3));
+        row.push(Cell::fixed(case.scores[0].psnr_linear_db, 2));
+        table.row(row);
+    }
+    page.table(table.caption(
+        "The same scene, recorded and restored as if something simpler were so (Chakravarthula et al. 2023): by Tikhonov and all elements. A picture that is better than the first has it from the assumption, not from the chip.",
+    ));
+}
+
+fn contrast(page: &mut Page, curves: &[ContrastCurve]) {
+    if curves.is_empty() {
+        return;
+    }
+    page.section("Contrast of fine detail");
+    let mut chart = Chart::new(
+        "Contrast over that of the scene",
+        Axis::linear("frequency", "cycles a degree"),
+        Axis::linear("contrast", ""),
+    );
+    for curve in curves {
+        chart.line(curve.of.as_str(), curve.points.iter().copied());
+    }
+    page.figure(chart.caption(
+        "In the middle of the field. The frame is read behind the element that looks ahead, by the pixels that count a channel, as it was recorded, noise included; the picture is the mean of its colours in linear light. A restoration may raise contrast beyond one, and what it adds by itself counts here as if it were seen.",
+    ));
+}

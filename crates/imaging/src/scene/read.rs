@@ -1,0 +1,459 @@
+//! Files of scenes.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use metalith_core::file::read_at_most;
+use metalith_core::{Error, Result, npy, srgb};
+use ndarray::{Array3, Axis};
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use super::sides::{SIDES, sides_words};
+use super::{SceneImage, cube};
+use crate::geometry::SceneView;
+
+/// Longest file (bytes): a cube of 1024 x 1024 with 31 bands in double precision, and some more.
+pub(super) const LONGEST: u64 = 512 << 20;
+
+/// A file, and what it does not say of its scene.
+#[derive(Clone, Debug)]
+pub struct SceneFile {
+    pub path: PathBuf,
+    /// Wavelengths of the bands of a spectral cube (nm); none for pictures in colour.
+    pub wavelengths_nm: Option<Vec<f64>>,
+    /// Angle from the left to the right edge (degrees).
+    pub field_deg: f64,
+    /// Distance of the scene (um).
+    pub distance_um: f64,
+}
+
+/// Read a scene that is far away and no spectral cube; `field_deg` from its left to its right edge.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_far_scene(path: &Path, field_deg: f64) -> Result<SceneImage> {
+    read_scene(&SceneFile {
+        path: path.to_owned(),
+        wavelengths_nm: None,
+        field_deg,
+        distance_um: f64::INFINITY,
+    })
+}
+
+/// Read a scene: PNG of 8 or 16 bits or JPEG in sRGB; NPY of linear light, `[row, column]` or `[row, column, colour]`;
+/// NPY `[row, column, band]` of reflectance with the wavelengths of its bands.
+///
+/// # Errors
+/// If the file cannot be read or holds something else; the text says what is wrong and what to give.
+pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
+    let path = &file.path;
+    let name = path
+        .file_stem()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let bytes = read_at_most(path, LONGEST, "a picture of a scene")?;
+    let is_npy = is_npy(&bytes);
+    match (&file.wavelengths_nm, is_npy) {
+        (Some(_), false) => Err(fault(path, "wavelengths are given, but this is no NPY file")),
+        (Some(nm), true) => {
+            let array = light(path, &bytes)?;
+            let bands = array.dim().2;
+            if nm.len() != bands || nm.len() < 2 || !nm.is_sorted_by(|a, b| a < b) || nm[0] <= 0.0 {
+                return Err(fault(
+                    path,
+                    format!(
+                        "{} wavelengths are given for {bands} bands, or they do not rise",
+                        nm.len()
+                    ),
+                ));
+            }
+            let (basis, planes, left_out) = cube::planes(&array, nm);
+            let (rows, columns, _) = array.dim();
+            Ok(SceneImage {
+                name,
+                view: SceneView {
+                    rows,
+                    columns,
+                    field_deg: file.field_deg,
+                    distance_um: file.distance_um,
+                },
+                basis,
+                planes,
+                left_out,
+                depth_um: None,
+            })
+        }
+        (None, _) => {
+            let rgb = match is_npy {
+                true => grey_or_colour(path, light(path, &bytes)?)?,
+                false => values(path, &bytes)?.mapv(srgb::linear),
+            };
+            Ok(SceneImage::of_rgb(&name, &rgb, file.field_deg, file.distance_um))
+        }
+    }
+}
+
+/// Read a picture, `[row, column, colour]` in sRGB values from 0 to 1: the same files as [`read_scene`], but for cubes.
+///
+/// # Errors
+/// If the file cannot be read or holds something else.
+pub fn read_picture(path: &Path) -> Result<Array3<f64>> {
+    let bytes = read_at_most(path, LONGEST, "a picture")?;
+    if is_npy(&bytes) {
+        return Ok(grey_or_colour(path, light(path, &bytes)?)?.mapv(srgb::encoded));
+    }
+    values(path, &bytes)
+}
+
+fn is_npy(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"\x93NUMPY")
+}
+
+/// Values of an image file as they are stored, full scale being one.
+fn values(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+    if bytes.starts_with(b"\x89PNG") {
+        Ok(png_values(path, bytes)?.0)
+    } else if bytes.starts_with(&[0xff, 0xd8]) {
+        jpeg(path, bytes)
+    } else {
+        Err(fault(path, "it is neither PNG, JPEG nor NPY"))
+    }
+}
+
+fn fault(path: &Path, what: impl Into<String>) -> Error {
+    Error::Table {
+        path: path.to_owned(),
+        line: None,
+        what: what.into(),
+        hint: format!(
+            "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
+            sides_words()
+        ),
+    }
+}
+
+fn check_sides(path: &Path, rows: usize, columns: usize) -> Result<()> {
+    if SIDES.contains(&rows) && SIDES.contains(&columns) {
+        return Ok(());
+    }
+    Err(fault(path, format!("it has {columns} x {rows} pixels")))
+}
+
+/// An array of two or three axes, and whether it has whole numbers; one of two axes gets a third of one entry.
+pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
+    let sides = |shape: &[u64]| (2..=3).contains(&shape.len()) && shape.iter().all(|n| *n <= *SIDES.end() as u64);
+    let found = npy::read_from(Cursor::new(bytes), sides).map_err(|e| fault(path, e.to_string()))?;
+    let shape: Vec<usize> = found.shape.iter().map(|n| *n as usize).collect();
+    check_sides(path, shape[0], shape[1])?;
+    let bands = shape.get(2).copied().unwrap_or(1);
+    if bands == 0 {
+        return Err(fault(path, "it has no colours"));
+    }
+    let array = Array3::from_shape_vec((shape[0], shape[1], bands), found.values);
+    Ok((array.map_err(|e| fault(path, e.to_string()))?, found.whole))
+}
+
+/// An array of linear light, white being one.
+fn light(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+    let (array, whole) = array(path, bytes)?;
+    if whole {
+        return Err(Error::Table {
+            path: path.to_owned(),
+            line: None,
+            what: "it has whole numbers (uint8 or uint16), and linear light of which white is 1 has fractions".into(),
+            hint: "divide it by its white and save it as float32 or float64: `numpy.save(file, values / white)`; of values in sRGB make a PNG"
+                .into(),
+        });
+    }
+    if array.iter().any(|v| !v.is_finite() || *v < 0.0) {
+        return Err(fault(path, "it holds light that is negative or no number"));
+    }
+    Ok(array)
+}
+
+fn grey_or_colour(path: &Path, array: Array3<f64>) -> Result<Array3<f64>> {
+    let (rows, columns, bands) = array.dim();
+    match bands {
+        3 => Ok(array),
+        1 => Ok(Array3::from_shape_fn((rows, columns, 3), |(y, x, _)| array[[y, x, 0]])),
+        _ => Err(fault(
+            path,
+            format!("it has {bands} bands and no wavelengths: give --wavelengths-nm"),
+        )),
+    }
+}
+
+/// Red, green and blue of an opaque PNG as they are stored, full scale being one; and whether values have 16 bits.
+pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
+    let wrong = |e: png::DecodingError| fault(path, e.to_string());
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(wrong)?;
+    let (columns, rows) = (reader.info().width as usize, reader.info().height as usize);
+    check_sides(path, rows, columns)?;
+    let size = reader
+        .output_buffer_size()
+        .ok_or_else(|| fault(path, "it is too large"))?;
+    let mut data = vec![0; size];
+    let info = reader.next_frame(&mut data).map_err(wrong)?;
+    let samples = info.color_type.samples();
+    let deep = info.bit_depth == png::BitDepth::Sixteen;
+    let value = |y: usize, x: usize, c: usize| {
+        let at = y * info.line_size + (x * samples + c) * if deep { 2 } else { 1 };
+        if deep {
+            f64::from(u16::from_be_bytes([data[at], data[at + 1]])) / 65535.0
+        } else {
+            f64::from(data[at]) / 255.0
+        }
+    };
+    if samples % 2 == 0 && (0..rows).any(|y| (0..columns).any(|x| value(y, x, samples - 1) < 1.0)) {
+        return Err(fault(path, "parts of it are transparent"));
+    }
+    let colours = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
+        value(y, x, if samples < 3 { 0 } else { c })
+    });
+    Ok((colours, deep))
+}
+
+fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+    let options = DecoderOptions::default()
+        .jpeg_set_out_colorspace(ColorSpace::RGB)
+        .set_max_width(*SIDES.end())
+        .set_max_height(*SIDES.end());
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let data = decoder.decode().map_err(|e| fault(path, e.to_string()))?;
+    let (columns, rows) = decoder.dimensions().ok_or_else(|| fault(path, "it has no size"))?;
+    check_sides(path, rows, columns)?;
+    if data.len() != rows * columns * 3 {
+        return Err(fault(path, "its colours are not those of a picture"));
+    }
+    let stored = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
+        f64::from(data[(y * columns + x) * 3 + c]) / 255.0
+    });
+    Ok(upright(stored, decoder.exif().map_or(1, |exif| orientation(exif))))
+}
+
+/// Orientation in which a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if the file does not
+/// say.
+fn orientation(exif: &[u8]) -> u16 {
+    const TAG: u16 = 274;
+    /// Bytes of an entry, and those before its value.
+    const ENTRY: [usize; 2] = [12, 8];
+    let little = exif.starts_with(b"II");
+    let word = |at: usize| {
+        let bytes = exif.get(at..at.checked_add(2)?)?.try_into().ok()?;
+        Some(match little {
+            true => u16::from_le_bytes(bytes),
+            false => u16::from_be_bytes(bytes),
+        })
+    };
+    let said = || {
+        let halves = [word(4)?, word(6)?].map(usize::from);
+        let first = match little {
+            true => halves[0] | halves[1] << 16,
+            false => halves[0] << 16 | halves[1],
+        };
+        let mut entries = (0..usize::from(word(first)?)).map(|k| first + 2 + k * ENTRY[0]);
+        word(entries.find(|at| word(*at) == Some(TAG))? + ENTRY[1])
+    };
+    said().filter(|o| (1..=8).contains(o)).unwrap_or(1)
+}
+
+/// A picture as it was seen by a camera that was held so.
+fn upright(mut stored: Array3<f64>, orientation: u16) -> Array3<f64> {
+    if orientation >= 5 {
+        stored.swap_axes(0, 1);
+    }
+    if matches!(orientation, 3 | 4 | 7 | 8) {
+        stored.invert_axis(Axis(0));
+    }
+    if matches!(orientation, 2 | 3 | 6 | 7) {
+        stored.invert_axis(Axis(1));
+    }
+    stored.as_standard_layout().into_owned()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    fn file(path: &Path, nm: Option<Vec<f64>>) -> SceneFile {
+        SceneFile {
+            path: path.to_owned(),
+            wavelengths_nm: nm,
+            field_deg: 60.0,
+            distance_um: f64::INFINITY,
+        }
+    }
+
+    fn png_bytes(colour: png::ColorType, depth: png::BitDepth, data: &[u8], side: u32) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, side, side);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(data).unwrap();
+        writer.finish().unwrap();
+        bytes
+    }
+
+    /// An NPY file of doubles in rows; `shape` as Python writes it.
+    pub fn npy_bytes(shape: &str, values: &[f64]) -> Vec<u8> {
+        npy_of("<f8", shape, values.iter().flat_map(|v| v.to_le_bytes()))
+    }
+
+    fn npy_of(kind: &str, shape: &str, values: impl Iterator<Item = u8>) -> Vec<u8> {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.as_bytes());
+        bytes.extend(values);
+        bytes
+    }
+
+    #[test]
+    fn every_format_gives_its_light() {
+        // Single precision of the planes.
+        const SINGLE: f64 = 1e-6;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.bin");
+        let half = srgb::linear(188.0 / 255.0);
+        let deep: Vec<u8> = (0..16 * 16).flat_map(|_| 48316u16.to_be_bytes()).collect();
+        let cases = [
+            (
+                png_bytes(png::ColorType::Rgb, png::BitDepth::Eight, &[188; 16 * 16 * 3], 16),
+                half,
+            ),
+            (
+                png_bytes(png::ColorType::Grayscale, png::BitDepth::Sixteen, &deep, 16),
+                half,
+            ),
+            (npy_bytes("(16, 16)", &[half; 256]), half),
+            (npy_bytes("(16, 16, 3)", &[half; 768]), half),
+        ];
+        for (bytes, want) in cases {
+            std::fs::write(&path, bytes).unwrap();
+            let scene = read_scene(&file(&path, None)).unwrap();
+            assert!(
+                scene.rgb().iter().all(|v| (v - want).abs() < 10.0 * SINGLE),
+                "{}",
+                scene.rgb()[[0, 0, 0]]
+            );
+        }
+        let cube: Vec<f64> = (0..16 * 16).flat_map(|_| [0.2, 0.4, 0.6, 0.8]).collect();
+        std::fs::write(&path, npy_bytes("(16, 16, 4)", &cube)).unwrap();
+        let nm = vec![400.0, 500.0, 600.0, 700.0];
+        let scene = read_scene(&file(&path, Some(nm))).unwrap();
+        let at = |nm: f64| -> f64 {
+            let planes = scene.basis.iter().zip(&scene.planes);
+            planes.map(|(b, p)| b.at(nm) * f64::from(p[[3, 5]])).sum()
+        };
+        assert!((at(550.0) - 0.5).abs() < SINGLE);
+    }
+
+    /// A JPEG of a camera that was held otherwise is turned upright, whatever the order of its bytes.
+    #[test]
+    fn photographs_stand_upright() {
+        let plain = std::fs::read("../../tests/mutants/small.jpg").unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.jpg");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            read_picture(&path).unwrap()
+        };
+        let stored = read(&plain);
+        let (rows, columns, _) = stored.dim();
+        assert_ne!(rows, columns);
+        let held = |orientation: u8, little: bool| {
+            let entry = |tag: u16, value: u16| {
+                let words = [tag, 3, 1, value];
+                let bytes = words.map(|w| if little { w.to_le_bytes() } else { w.to_be_bytes() });
+                // The number of values has four bytes, the value two of its four.
+                let count = if little { [bytes[2], [0; 2]] } else { [[0; 2], bytes[2]] };
+                [bytes[0], bytes[1], count[0], count[1], bytes[3], [0; 2]].concat()
+            };
+            let head: &[u8] = if little {
+                b"II*\0\x08\0\0\0\x02\0"
+            } else {
+                b"MM\0*\0\0\0\x08\0\x02"
+            };
+            let exif = [
+                &b"Exif\0\0"[..],
+                head,
+                &entry(256, 7),
+                &entry(274, orientation.into()),
+                &[0; 4],
+            ]
+            .concat();
+            let length = (exif.len() as u16 + 2).to_be_bytes();
+            [&plain[..2], &[0xff, 0xe1], &length, &exif, &plain[2..]].concat()
+        };
+        assert!(read(&held(1, true)) == stored);
+        // Places of the stored picture, by row and column of what was seen.
+        let (last_row, last_column) = (rows - 1, columns - 1);
+        let at = |orientation: u8, y: usize, x: usize| match orientation {
+            2 => [y, last_column - x],
+            3 => [last_row - y, last_column - x],
+            5 => [x, y],
+            6 => [last_row - x, y],
+            _ => [x, last_column - y],
+        };
+        for orientation in [2, 3, 5, 6, 8] {
+            for little in [true, false] {
+                let turned = read(&held(orientation, little));
+                assert_eq!(turned.dim().0, if orientation < 5 { rows } else { columns });
+                for ((y, x, c), v) in turned.indexed_iter() {
+                    let [row, column] = at(orientation, y, x);
+                    assert!(*v == stored[[row, column, c]], "{orientation} {y} {x}");
+                }
+            }
+        }
+        assert!(
+            [&b"II*\0\xff\xff\xff\xff"[..], b"MM", b""]
+                .iter()
+                .all(|exif| orientation(exif) == 1)
+        );
+    }
+
+    #[test]
+    fn odd_files_are_refused_with_a_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.bin");
+        let refused = |bytes: &[u8], nm: Option<Vec<f64>>, word: &str| {
+            std::fs::write(&path, bytes).unwrap();
+            let error = read_scene(&file(&path, nm)).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        };
+        refused(b"GIF89a", None, "neither");
+        refused(&npy_bytes("(16, 16, 4)", &[0.1; 1024]), None, "bands");
+        refused(
+            &npy_bytes("(16, 16, 4)", &[0.1; 1024]),
+            Some(vec![500.0, 400.0]),
+            "wavelengths",
+        );
+        refused(&npy_bytes("(16, 16)", &[-0.1; 256]), None, "negative");
+        refused(&npy_bytes("(16, 16)", &[f64::INFINITY; 256]), None, "no number");
+        refused(
+            &npy_of("|u1", "(16, 16)", [128; 256].into_iter()),
+            None,
+            "divide it by its white",
+        );
+        refused(
+            &npy_of("<u2", "(16, 16)", [117; 512].into_iter()),
+            None,
+            "divide it by its white",
+        );
+        assert!(read_picture(&path).is_err());
+        refused(&npy_bytes("(8, 16)", &[0.1; 128]), None, "pixels");
+        refused(
+            &png_bytes(png::ColorType::Rgba, png::BitDepth::Eight, &[7; 1024], 16),
+            None,
+            "transparent",
+        );
+        refused(&[0xff, 0xd8, 0xff, 0x00, 1, 2, 3], None, "help");
+        let whole = png_bytes(png::ColorType::Rgb, png::BitDepth::Eight, &[188; 768], 16);
+        refused(&whole[..whole.len() / 2], None, "help");
+    }
+}

@@ -1,0 +1,178 @@
+//! An element in one light: fields that do not interfere, and all that is between them and the sensor.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use super::{ArrivingLight, AsBuiltElement, CameraChange, ClassTable, Perturbation, SolvedWidths};
+use crate::NeighbourPillars;
+use metalith_cell::{CellResponse, NeighbourTables};
+use metalith_core::Result;
+use metalith_pillars::{Lattice, PillarMap, PillarRows};
+use metalith_wave::{Accuracy, Aperture, FoldedPropagator, Pillars, Propagator, Psf, Scratch, Window};
+
+/// Fields of an element in light that arrives: the sum of the intensities of its fields, each times the weight.
+pub struct IncoherentFields<'e> {
+    pub fields: Vec<Field<'e>>,
+    /// Share of the light that arrives that is in the polarisation of each field.
+    pub weight: f64,
+    pub light: ArrivingLight,
+    /// Added to the distance of the sensor (um).
+    pub gap_um: f64,
+    pub camera: CameraChange,
+    pub(crate) lattice: Lattice,
+    /// Radius of the circle that light passes (um).
+    pub(crate) radius_um: f64,
+    /// Spectra that a thread may hold at a time, if not all (bytes): see [`FoldedPropagator::within`].
+    pub(crate) part_bytes: Option<usize>,
+}
+
+/// Light behind an element that interferes with itself alone.
+pub enum Field<'e> {
+    /// Sites transmit by the width or number of their pillar.
+    Drawn {
+        pillars: &'e dyn PillarRows,
+        table: Vec<Complex64>,
+    },
+    /// Sites transmit by their pillar and its neighbours, from the direction with these sines; `polarisation` is 0 for s and 1 for p.
+    Coupled {
+        pillars: &'e PillarMap,
+        response: Arc<CellResponse>,
+        sines: [f64; 2],
+        polarisation: usize,
+    },
+    /// Sites transmit by their class.
+    AsBuilt {
+        element: &'e AsBuiltElement,
+        table: ClassTable,
+    },
+}
+
+impl Field<'_> {
+    /// The field behind the element, without the plane wave that arrives. Rows are formed when they are asked for.
+    ///
+    /// # Errors
+    /// If a pillar is in no table, or pillars among neighbours have too many widths.
+    pub fn aperture(&self, light: &ArrivingLight) -> Result<Box<dyn Aperture + '_>> {
+        Ok(match self {
+            Self::Drawn { pillars, table } => Box::new(Pillars::new(*pillars, table)?),
+            Self::Coupled {
+                pillars,
+                response,
+                sines,
+                polarisation,
+            } => Box::new(match response.as_ref() {
+                CellResponse::Neighbours(NeighbourTables::Fitted(fitted)) => {
+                    NeighbourPillars::polarised(pillars, &fitted.responses, *sines, *polarisation)?
+                }
+                CellResponse::Neighbours(NeighbourTables::Band(band)) => NeighbourPillars::new(pillars, band, *sines)?,
+                CellResponse::Scalar(_) | CellResponse::Jones(_) => unreachable!("made of neighbours alone"),
+            }),
+            Self::AsBuilt { element, table } => Box::new(element.lit_aperture(table, light)),
+        })
+    }
+
+    /// |t|^2 summed over sites of what missing pillars scatter, each on its own.
+    fn scattered(&self) -> f64 {
+        match self {
+            Self::AsBuilt { table, .. } => table.scattered,
+            Self::Drawn { .. } | Self::Coupled { .. } => 0.0,
+        }
+    }
+}
+
+impl<'e> IncoherentFields<'e> {
+    /// A made element in a light, behind the path and before the camera of a chip; `solved`: transmission of its widths.
+    pub fn as_built(
+        element: &'e AsBuiltElement,
+        light: ArrivingLight,
+        perturbation: &Perturbation,
+        solved: &SolvedWidths,
+    ) -> Self {
+        Self::of_classes(
+            element,
+            element.tables_of(solved),
+            solved.share,
+            light,
+            perturbation.path.added_distance_um(element.centre_um()),
+            perturbation.camera.clone(),
+        )
+    }
+
+    /// A made element by tables of its classes.
+    pub(crate) fn of_classes(
+        element: &'e AsBuiltElement,
+        tables: Vec<ClassTable>,
+        weight: f64,
+        light: ArrivingLight,
+        gap_um: f64,
+        camera: CameraChange,
+    ) -> Self {
+        let tables = tables.into_iter();
+        Self {
+            fields: tables.map(|table| Field::AsBuilt { element, table }).collect(),
+            weight,
+            light,
+            gap_um,
+            camera,
+            lattice: element.lattice(),
+            radius_um: element.radius_um(),
+            part_bytes: None,
+        }
+    }
+
+    /// Radius of the circle that light passes (um).
+    pub fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    /// The PSF on a window at the stated distance of the sensor; where the sensor stands farther off, the window
+    /// keeps its place in it; with the transfer of all light at `lp_mm` (line pairs a millimetre). Missing pillars scatter evenly over the window, blur and veil of the camera follow.
+    ///
+    /// # Errors
+    /// If the window is none, or the light arrives too steeply.
+    pub fn psf(&self, stated: Window, accuracy: Accuracy, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
+        let window = Window {
+            distance_um: stated.distance_um + self.gap_um,
+            ..stated
+        };
+        let wavelength_um = self.light.plane.wavelength_um;
+        let fold = FoldedPropagator::plan(self.lattice, self.radius_um, wavelength_um, window, accuracy)?;
+        let fold = match self.part_bytes {
+            Some(bytes) => fold.within(bytes),
+            None => fold,
+        };
+        self.psf_by(&fold, lp_mm, scratch)
+            .map(|psf| Psf { window: stated, ..psf })
+    }
+
+    /// PSF by a propagator of the caller's, whose window is at the distance as fabricated.
+    ///
+    /// # Errors
+    /// As [`Propagator::field`].
+    pub fn psf_by(&self, propagator: &dyn Propagator, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
+        let (plane, cell_um2) = (&self.light.plane, self.lattice.cell_um2());
+        let of = |field: &Field<'_>| {
+            let aperture = field.aperture(&self.light)?;
+            let mut psf = Psf::formed(propagator, aperture.as_ref(), plane, lp_mm, scratch)?;
+            let (scattered, window) = (field.scattered(), psf.window);
+            psf.values += scattered * spread(cell_um2, window.centre_um, window.distance_um, plane.wavelength_um);
+            if let Some(otf) = &mut psf.otf {
+                otf.power_um2 += scattered * cell_um2;
+            }
+            Ok(psf)
+        };
+        let psfs = self.fields.iter().map(of).collect::<Result<Vec<_>>>()?;
+        let mut psf = Psf::sum(psfs, self.weight);
+        self.camera.apply(&mut psf);
+        Ok(psf)
+    }
+}
+
+/// Intensity at a place on the sensor for a unit of |t|^2 that one site scatters on its own: the square of a term
+/// of the Rayleigh-Sommerfeld sum, far from the site, that of the element's centre for all. `cell_um2` is the area of the cell of a site; lengths in um.
+pub fn spread(cell_um2: f64, at_um: [f64; 2], distance_um: f64, wavelength_um: f64) -> f64 {
+    let [x, y] = at_um;
+    let r2 = x * x + y * y + distance_um * distance_um;
+    (cell_um2 / (wavelength_um * r2) * distance_um).powi(2)
+}

@@ -1,0 +1,88 @@
+//! Restoration of a picture from a frame, in linear light, for any linear model of the frame ([`FrameModel`]).
+//!
+//! ```text
+//! FrameModel, light of a frame, inverse variance of each pixel  ->  Recorded
+//! Recorded, RestorationMethod                                   ->  planes of the picture
+//! ```
+//!
+//! | question | file |
+//! | --- | --- |
+//! | what a restoration knows of a camera | `frame_model` |
+//! | what is known of pictures beforehand | `scene_statistics` |
+//! | which methods there are | `method` |
+//! | Tikhonov: the most likely picture where light is normal, as a Wiener filter has it | `tikhonov` |
+//! | total variation, by the alternating direction method of multipliers | `total_variation`, `slopes` |
+//! | Richardson and Lucy | `richardson_lucy` |
+//! | half-quadratic splitting with any denoiser | `half_quadratic`, `denoiser` |
+//! | denoisers for it: least total variation, and the learnt prior | `slope_denoiser`, `learned` |
+//! | each element alone, blended | `separate` |
+//! | how near one picture is to another | `quality` |
+//!
+//! Pixels beyond the sensor have no weight, and no light is made up for them. The linear systems of all methods are one, in
+//! `normal_system`, and `precondition` makes them easier.
+
+mod denoiser;
+mod frame_model;
+mod half_quadratic;
+mod learned;
+mod method;
+mod normal_system;
+mod precondition;
+mod quality;
+mod recorded;
+mod richardson_lucy;
+mod scene_statistics;
+mod separate;
+mod slope_denoiser;
+mod slopes;
+mod tikhonov;
+mod total_variation;
+
+use metalith_core::{Progress, Result};
+
+use method::restore_elements;
+use normal_system::NormalSystem;
+
+pub use denoiser::{Denoiser, Schedule};
+pub use frame_model::{FrameModel, Planes};
+pub use learned::LearnedDenoiser;
+pub use method::RestorationMethod;
+pub use quality::{psnr_db, ssim, ssim_colour};
+pub use recorded::Recorded;
+pub use scene_statistics::{SceneStatistics, squared_frequencies};
+pub use separate::{Blend, restore_each, without_stray_light};
+pub use slope_denoiser::SlopeDenoiser;
+pub use slopes::{ExponentialSlopes, SlopeBorder, SlopeLength, SlopeSplit};
+
+/// Restore by all elements at once: one scene that explains the whole frame. Planes as those that go into the operator, white
+/// being one.
+///
+/// # Errors
+/// If the user stopped it.
+pub fn restore_joint(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dyn Progress) -> Result<Planes> {
+    let all = recorded.operator.all_elements();
+    restore_elements(recorded, method, &all, true, progress)
+}
+
+/// Restore by each element alone, then blend.
+///
+/// # Errors
+/// If the user stopped it.
+pub fn restore_separate(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dyn Progress) -> Result<Planes> {
+    separate::restore(recorded, method, progress)
+}
+
+/// Pictures that a frame may be of, one for each seed, by the learnt prior and all elements at once.
+///
+/// # Errors
+/// If the user stopped it.
+pub fn restore_samples(
+    recorded: &Recorded<'_>,
+    seeds: std::ops::Range<u64>,
+    progress: &dyn Progress,
+) -> Result<Vec<Planes>> {
+    let all = recorded.operator.all_elements();
+    let system = NormalSystem::new(recorded, &all, true);
+    let drawn = half_quadratic::samples(&system, recorded.prior, seeds, progress)?;
+    Ok(drawn.iter().map(|planes| system.statistics().picture(planes)).collect())
+}

@@ -1,0 +1,197 @@
+//! The linear systems of restoration: A* W A x + a D* D x + b (D* D)^2 x + m x = r, with D the slopes along rows and columns,
+//! for planes that vary independently ([`SceneStatistics`]).
+//!
+//! They are solved by conjugate gradients, preconditioned by what `precondition` says.
+
+use metalith_core::{Error, Progress, Result};
+use metalith_wave::kernels::sum_of_products;
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::frame_model::{FrameModel, Planes};
+use crate::precondition::Preconditioner;
+use crate::recorded::Recorded;
+use crate::scene_statistics::{SceneStatistics, Terms};
+use crate::slopes::bends;
+
+/// A* W A of a frame, for independent planes.
+struct DataTerm<'a> {
+    operator: &'a dyn FrameModel,
+    elements: Vec<usize>,
+    stray_light: bool,
+    /// Weights of the pixels, scaled.
+    weight: Planes,
+    statistics: SceneStatistics,
+}
+
+impl DataTerm<'_> {
+    fn apply(&self, x: &[Array2<f32>]) -> Planes {
+        let picture = self.statistics.picture(x);
+        let mut seen = self.operator.apply_elements(&picture, &self.elements, self.stray_light);
+        seen.iter_mut().zip(&self.weight).for_each(|(s, w)| *s *= w);
+        let back = self.operator.adjoint_elements(&seen, &self.elements, self.stray_light);
+        self.statistics.adjoint(&back)
+    }
+}
+
+/// The systems of a frame.
+pub struct NormalSystem<'a> {
+    term: DataTerm<'a>,
+    /// A* W S.
+    pub data: Planes,
+    /// Unit of the data term, in units of the inverse variance of the picture.
+    pub scale: f64,
+    preconditioner: Preconditioner,
+}
+
+/// A place that sends less light than this share of the best is preconditioned as if it sent so much.
+const LEAST_SHARE: f32 = 0.02;
+
+impl<'a> NormalSystem<'a> {
+    /// System of some of the elements, with or without the stray light.
+    pub fn new(recorded: &Recorded<'a>, elements: &[usize], stray_light: bool) -> Self {
+        let operator = recorded.operator;
+        let sums = operator.row_sums(recorded.inverse_variance, elements, stray_light);
+        let mut light = Array2::<f32>::zeros(operator.picture_shape());
+        sums.iter().for_each(|p| light.scaled_add(1.0 / sums.len() as f32, p));
+        let most = light.iter().copied().fold(0.0f32, f32::max).max(f32::MIN_POSITIVE);
+        let weight: Planes = recorded.inverse_variance.iter().map(|t| t.mapv(|v| v / most)).collect();
+        let products: Planes = weight.iter().zip(recorded.light).map(|(w, s)| w * s).collect();
+        let statistics = match operator.sees_colours() {
+            true => SceneStatistics::colours(),
+            false => SceneStatistics::grey(operator.inputs()),
+        };
+        let share = light.mapv(|v| (v / most).max(LEAST_SHARE));
+        let term = DataTerm {
+            operator,
+            elements: elements.to_vec(),
+            stray_light,
+            weight,
+            statistics,
+        };
+        Self {
+            data: term
+                .statistics
+                .adjoint(&operator.adjoint_elements(&products, elements, stray_light)),
+            scale: f64::from(most),
+            preconditioner: Preconditioner::new(&share, operator.inputs(), |x| term.apply(x)),
+            term,
+        }
+    }
+
+    /// Rows and columns of the picture.
+    pub fn shape(&self) -> (usize, usize) {
+        self.term.operator.picture_shape()
+    }
+
+    /// A black picture.
+    pub fn black(&self) -> Planes {
+        vec![Array2::zeros(self.shape()); self.data.len()]
+    }
+
+    /// Statistics of the planes.
+    pub fn statistics(&self) -> &SceneStatistics {
+        &self.term.statistics
+    }
+
+    /// The left side of the system.
+    pub fn apply(&self, x: &[Array2<f32>], terms: Terms) -> Planes {
+        let mut out = self.term.apply(x);
+        for ((to, x), size) in out.iter_mut().zip(x).zip(self.statistics().sizes()) {
+            add_prior(to, x, terms);
+            to.scaled_add((size * terms.identity) as f32, x);
+        }
+        out
+    }
+
+    /// Conjugate gradients from a picture towards the solution of the system with this right side.
+    ///
+    /// # Errors
+    /// If the user stopped it.
+    pub fn solve(
+        &self,
+        mut x: Planes,
+        right: &[Array2<f32>],
+        terms: Terms,
+        iterations: usize,
+        progress: &dyn Progress,
+    ) -> Result<Planes> {
+        let mut residual: Planes = self.apply(&x, terms);
+        residual.iter_mut().zip(right).for_each(|(r, b)| *r = b - &*r);
+        let of_plane = |size: f64| Terms {
+            identity: size * terms.identity,
+            ..terms
+        };
+        let sizes = self.statistics().sizes();
+        let planes = sizes.iter().enumerate();
+        let filters: Vec<Vec<f32>> = planes
+            .map(|(plane, size)| self.preconditioner.filter(plane, of_plane(*size)))
+            .collect();
+        let mut z = self.preconditioner.apply(&residual, &filters);
+        let mut direction = z.clone();
+        let mut old = dot(&residual, &z);
+        for _ in 0..iterations {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            progress.advance(1);
+            let image = self.apply(&direction, terms);
+            let curvature = dot(&direction, &image);
+            if curvature <= 0.0 || old <= 0.0 {
+                break;
+            }
+            let step = (old / curvature) as f32;
+            for c in 0..x.len() {
+                x[c].scaled_add(step, &direction[c]);
+                residual[c].scaled_add(-step, &image[c]);
+            }
+            let before = z;
+            z = self.preconditioner.apply(&residual, &filters);
+            let new = dot(&residual, &z);
+            // Polak and Ribiere: the preconditioner is not exactly the same for both signs of rounding.
+            let turn = ((new - dot(&residual, &before)) / old).max(0.0) as f32;
+            old = new;
+            for c in 0..x.len() {
+                direction[c].zip_mut_with(&z[c], |d, z| *d = z + turn * *d);
+            }
+        }
+        Ok(x)
+    }
+}
+
+/// Sum of products in double precision, in an order that depends on no thread and no machine.
+fn dot(a: &[Array2<f32>], b: &[Array2<f32>]) -> f64 {
+    let of_plane = |(a, b): (&Array2<f32>, &Array2<f32>)| {
+        let [a, b] = [a.as_standard_layout(), b.as_standard_layout()];
+        let values = a.as_slice().zip(b.as_slice());
+        values.map(|(a, b)| sum_of_products(a, b)).expect("planes are whole")
+    };
+    let of_planes: Vec<f64> = a.par_iter().zip(b).map(of_plane).collect();
+    of_planes.iter().sum()
+}
+
+fn add_prior(to: &mut Array2<f32>, x: &Array2<f32>, terms: Terms) {
+    if terms.slopes == 0.0 && terms.bends == 0.0 {
+        return;
+    }
+    let bent = bends(x);
+    to.scaled_add(terms.slopes as f32, &bent);
+    if terms.bends != 0.0 {
+        to.scaled_add(terms.bends as f32, &bends(&bent));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_summed_in_any_layout() {
+        let value = |(i, j): (usize, usize)| ((i * 5 + j * 3) % 7) as f32;
+        let rows = Array2::from_shape_fn((7, 9), value);
+        let columns = Array2::from_shape_fn((9, 7), |(j, i)| value((i, j))).reversed_axes();
+        let sum: f64 = rows.iter().map(|v| f64::from(v * v)).sum();
+        // Sums of whole numbers.
+        assert_eq!(dot(&[rows.clone(), columns.clone()], &[columns, rows]), 2.0 * sum);
+    }
+}

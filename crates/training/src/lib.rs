@@ -1,0 +1,27 @@
+//! The training of the networks of `metalith-prior`.
+//!
+//! ```text
+//! photographs -> pieces with noise -> gradients -> weights           (`train`)
+//! pictures of frames, their scenes -> gradients -> weights           (`train_post_processor`)
+//! ```
+//!
+//! | question | file |
+//! | --- | --- |
+//! | pieces of photographs, and noise on them | `examples` |
+//! | pictures of frames, and the scenes that they are of | `stacks` |
+//! | the steps down the gradient, and their state on the disk | `learning`, `adam`, `checkpoint` |
+//! | what each of the two networks learns | `denoiser`, `post_processor`, `stacks` |
+
+mod adam;
+mod checkpoint;
+mod denoiser;
+mod examples;
+mod learning;
+mod post_processor;
+mod stacks;
+
+pub use denoiser::{JUDGED, train};
+pub use examples::Photographs;
+pub use learning::{TrainingReport, TrainingSpec};
+pub use post_processor::train_post_processor;
+pub use stacks::{Stack, Stacks};
