@@ -15,7 +15,7 @@ fn calibration(c: &mut Criterion) {
             spectrum: 0.34,
             ..Sampling::default()
         },
-        only: ["cd_bias", "gap", "zero_order"].map(String::from).to_vec(),
+        only: ["cd_bias", "defocus", "zero_order"].map(String::from).to_vec(),
         compare_fidelities: false,
         refine: false,
         ..Settings::default()
@@ -23,11 +23,13 @@ fn calibration(c: &mut Criterion) {
     let synthesizer = Synthesizer::new(&like, &settings).expect("a synthesizer");
     let mut group = c.benchmark_group("calibrate");
     group.sample_size(10);
-    // Cells are solved once and kept: the time is that of light through pillars to eight captures.
+    // Cells are solved once and kept: the time is that of light through pillars to eight measurements.
     group.bench_function("images of a chip", |b| {
-        b.iter(|| black_box(synthesizer.with_effect("cd_bias", &[-8.0], &Silent)).expect("captures"));
+        b.iter(|| black_box(synthesizer.with_effect("cd_bias", &[-8.0], &Silent)).expect("measurements"));
     });
-    let exposed = synthesizer.with_effect("gap", &[5.0], &Silent).expect("captures");
+    let exposed = synthesizer
+        .with_effect("defocus", &[5.0], &Silent)
+        .expect("measurements");
     let set = synthesizer.draw(&exposed, 1);
     let session = Session::new(&set, settings).expect("a session");
     let simulations = session.simulate(&Silent).expect("simulations");

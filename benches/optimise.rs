@@ -15,7 +15,7 @@ fn optimise(c: &mut Criterion) {
     let rings = || Rings::new(Lattice::covering(1_000_000, 350).unwrap(), 1_000_000).unwrap();
     let lens = Lens {
         rings: rings(),
-        gap_um: 2400.0,
+        distance_um: 2400.0,
     };
     let cell = PublishedCell::new(350);
     let cells: [&dyn CellModel; 1] = [&cell];
@@ -23,7 +23,7 @@ fn optimise(c: &mut Criterion) {
     let band = wavelengths(400.0, 700.0, 1.0);
     let rows = || lens.focal_rows(&band, FabricationError::default(), &cells).unwrap();
     let problem = FieldProblem::new(vec![(MeritKind::Log, 1.0, rows())], &cells, mapping, 1 << 30).unwrap();
-    let turns = Start::LogAsphere { band_um: (0.4, 0.7) }.turns(&lens, 0);
+    let waves = Start::LogAsphere { band_um: (0.4, 0.7) }.waves(&lens, 0);
     let mut group = c.benchmark_group("optimise");
     group.sample_size(10);
     group.bench_function("rings of 6.4 million sites", |b| b.iter(rings));
@@ -34,12 +34,12 @@ fn optimise(c: &mut Criterion) {
             cold_sweeps: 0,
             temperature: (1e-3, 1e-3),
         };
-        let mut exchange = Exchange::new(&problem, StepLimit::new(0.2).unwrap(), schedule, 1, &turns);
+        let mut exchange = Exchange::new(&problem, StepLimit::new(0.2).unwrap(), schedule, 1, &waves);
         b.iter(|| exchange.sweep_once());
     });
     group.bench_function("gradient, 301 wavelengths", |b| {
         let mut gradient = vec![0.0; problem.rings()];
-        b.iter(|| problem.climb(&turns, 1, 0, &mut gradient));
+        b.iter(|| problem.climb(&waves, 1, 0, &mut gradient));
     });
     group.bench_function("kernel of one view, 160 pixels", |b| {
         let window = PixelWindow {

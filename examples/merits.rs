@@ -34,7 +34,7 @@ fn main() -> Result<()> {
                 let mut design = shipped.clone();
                 design.lens.focal_length_um = focal_length_um;
                 design.optimise.fidelity = fidelity;
-                design.optimise.step_limit_turns = limit;
+                design.optimise.step_limit_waves = limit;
                 if mapping == "published" {
                     design.mapping.polynomial = published.clone();
                 }
@@ -56,7 +56,7 @@ fn main() -> Result<()> {
                 let start = Instant::now();
                 let task = OptimiseTask::of(&design)?;
                 let found = task.solve(&[cell.as_ref()], Checkpoint::begin(&design), &Silent)?;
-                let judged = task.judge_rings(&found.turns, cell.as_ref())?;
+                let judged = task.judge_rings(&found.waves, cell.as_ref())?;
                 println!(
                     "{focal_length_um:9} um  {:9}  {mapping:9}  {limit:5}  {:.5} ({:.4})     {:6.1}",
                     fidelity.name(),

@@ -13,12 +13,12 @@ use metalith::{Layout, Silent};
 use metalith_testing::session::{full_size_set, small_set, write_npy};
 
 /// What the chip has, beside noise, where nothing is named.
-const EFFECTS: [&str; 2] = ["cd_bias=-8", "gap=5"];
+const EFFECTS: [&str; 2] = ["cd_bias=-8", "defocus=5"];
 
 /// Seed of noise, registration, flux and black level.
 const SEED: u64 = 7;
 
-/// Orders of the cells of full-size lenses: fewer than a fit has err by more than noise there, 0.1 um in the gap of two lenses.
+/// Orders of the cells of full-size lenses: fewer than a fit has err by more than noise there, 0.1 um in the defocus of two lenses.
 const FULL_SIZE_ORDERS: usize = 15;
 
 /// An effect and its numbers, as `NAME=VALUE,VALUE`.
@@ -76,8 +76,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .collect();
     let images = synthesizer.with_effects(&[chip], &Silent)?.remove(0);
     let set = synthesizer.draw(&images, seed);
-    for capture in &set.captures.raw {
-        write_npy(&folder.join(format!("{}.npy", capture.name)), &capture.dn);
+    for measurement in &set.measurements.raw {
+        write_npy(&folder.join(format!("{}.npy", measurement.name)), &measurement.dn);
     }
     std::fs::remove_file(written)?;
     Ok(())

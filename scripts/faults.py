@@ -52,7 +52,7 @@ CASES = [
     Case("handoff", ["--fast", "--fidelity", "published"], together=True),
     Case("cells", ["--orders", "5", "--tolerance", "0.1"]),
     Case("optimize", ["--no-report"]),
-    Case("calibrate", ["--effects", "gap,pixel_blur"]),
+    Case("calibrate", ["--effects", "defocus,pixel_blur"]),
 ]
 
 

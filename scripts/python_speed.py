@@ -20,7 +20,7 @@ from cpu_time import children
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DESIGN = ROOT / "designs/prototype_3x3.toml"
 SET = ROOT / "golden/session"
-EFFECTS = ["cd_bias", "gap", "pixel_blur", "zero_order"]
+EFFECTS = ["cd_bias", "defocus", "pixel_blur", "zero_order"]
 
 
 def main() -> int:

@@ -87,6 +87,7 @@ mod session;
 pub use metalith_attribution as attribution;
 #[cfg(feature = "baselines")]
 pub use metalith_baselines as baselines;
+pub use metalith_bench_plan as bench_plan;
 pub use metalith_calibrate as calibrate;
 pub use metalith_cell as cell;
 pub use metalith_cell_study as cell_study;

@@ -1,8 +1,8 @@
-//! A bench session planned from a design: its layout, then its captures.
+//! A bench session planned from a design: its layout, then its measurements.
 
 use std::path::Path;
 
-use metalith_calibrate::{BenchFile, CapturePlan, PlanRequest, check_not_begun, check_plannable, plan};
+use metalith_bench_plan::{BenchFile, MeasurementPlan, PlanRequest, check_not_begun, check_plannable, plan};
 use metalith_cell::cache_folder;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, PillarArray};
@@ -12,7 +12,7 @@ use metalith_layout::write_pillars;
 /// Name of the layout in the folder of the session.
 const LAYOUT: &str = "layout.gds";
 
-/// Plan a bench session into a folder: the fewest captures that find every effect at a wanted size and tell it from the
+/// Plan a bench session into a folder: the fewest measurements that find every effect at a wanted size and tell it from the
 /// others. `layout` is the one that was written; without it the pillars of the design are written into the folder. `only`:
 /// names of the effects that it is planned for; all if empty.
 ///
@@ -26,7 +26,7 @@ pub fn plan_session(
     folder: &Path,
     only: Vec<String>,
     progress: &dyn Progress,
-) -> Result<CapturePlan> {
+) -> Result<MeasurementPlan> {
     check_plannable(design, bench)?;
     check_not_begun(folder)?;
     let (layout, layout_in_set) = match layout {

@@ -22,7 +22,7 @@ distribution = "normal"
 sd = 3.0
 
 [[vary]]
-effect = "gap"              # um
+effect = "defocus"              # um
 distribution = "uniform"
 low = -6.0
 high = 6.0

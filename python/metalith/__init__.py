@@ -24,13 +24,13 @@ from ._layouts import (
 from ._light import Psf, PsfSet, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
 from ._pictures import Frame, ImagingSystem, denoise
-from ._checks import CapturePlan, CheckReport, Marker, Verification, check, plan, verify
+from ._checks import MeasurementPlan, CheckReport, Marker, Verification, check, plan, verify
 from ._diagnosis import Diagnosis, FoundEffect, RankedEffect, calibrate
 from ._studies import Study, StudyResult
 
 __all__ = [
     "Array",
-    "CapturePlan",
+    "MeasurementPlan",
     "CheckReport",
     "Design",
     "Diagnosis",

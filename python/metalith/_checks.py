@@ -90,8 +90,8 @@ def verify(
 
 
 @dataclass(frozen=True)
-class CapturePlan:
-    """The captures that a bench should take of a design."""
+class MeasurementPlan:
+    """The measurements that a bench should take of a design."""
 
     folder: Path
     """Folder of the measured set, its frames still to be taken."""
@@ -101,13 +101,13 @@ class CapturePlan:
     """One line for a person."""
     finds_all: bool
     """Whether every effect is found at its wanted size."""
-    captures: list[Json] = field(repr=False)
+    measurements: list[Json] = field(repr=False)
     """What to take: ``file``, ``element``, ``led_nm``, ``aoi_deg``, ``distance_um``, ``window_centre_um``, ``frames`` and
     exposure."""
     effects: list[Json] = field(repr=False)
     """What is expected of each effect: ``name``, ``wanted``, ``detected`` and more."""
     confusions: list[Json] = field(repr=False)
-    """Pairs of effects that the captures cannot tell apart, with the measurement that would."""
+    """Pairs of effects that the measurements cannot distinguish, with the measurement that would."""
     numbers: Json = field(repr=False)
     """All of it, as in ``plan.json`` of ``metalith plan``."""
 
@@ -120,8 +120,8 @@ def plan(
     layout: PathLike | None = None,
     effects: Sequence[str] = (),
     progress: Progress | None = None,
-) -> CapturePlan:
-    """Plan a bench session into the folder ``out``: the fewest captures that find every effect of a chip at a wanted size
+) -> MeasurementPlan:
+    """Plan a bench session into the folder ``out``: the fewest measurements that find every effect of a chip at a wanted size
     and tell it from the others.
 
     ``bench``: a file of what the bench can do and what is wanted. ``layout``: the one that was written; left out, the pillars
@@ -129,12 +129,12 @@ def plan(
     takes minutes."""
     text, finds_all, sentence = _native.plan(design._native, bench, out, layout, list(effects), progress)
     found = json.loads(text)
-    return CapturePlan(
+    return MeasurementPlan(
         folder=Path(found["folder"]),
         page=Path(found["page"]),
         sentence=sentence,
         finds_all=finds_all,
-        captures=found["captures"],
+        measurements=found["measurements"],
         effects=found["effects"],
         confusions=found["confusions"],
         numbers=found,

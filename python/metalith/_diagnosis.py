@@ -51,7 +51,7 @@ class RankedEffect:
     score: float
     """Share of the residual that it alone explains."""
     gain: float | None
-    """By how much it lowers the reduced chi-square of captures held out."""
+    """By how much it lowers the reduced chi-square of measurements held out."""
     gain_interval: tuple[float, float] | None
     """95 % interval of the gain."""
     rejected: str | None
@@ -68,7 +68,7 @@ class Diagnosis:
     ranking: tuple[RankedEffect, ...] = field(repr=False)
     """Candidates of the first step, the best first."""
     held_out: tuple[float, float]
-    """Reduced chi-square per pixel of captures held out, before and after."""
+    """Reduced chi-square per pixel of measurements held out, before and after."""
     fitted: tuple[float, float] = field(repr=False)
     """The same of those that the effects were fitted to."""
     page: Path = field(repr=False)

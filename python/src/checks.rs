@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use metalith::calibrate::{BenchFile, Settings};
+use metalith::bench_plan::BenchFile;
+use metalith::calibrate::Settings;
 use metalith::cell::cache_folder;
 use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
 use metalith::extract::GdsPillars;

@@ -154,7 +154,7 @@ fn simulate_together(
             let lighting = Lighting {
                 wavelengths_um: vec![um],
                 incidence_sin: [wave.sin_x, wave.sin_y],
-                cells_as_lit: false,
+                oblique_cells: false,
                 distance_um,
                 at_um: landing_um(&wedge, &wave, distance_um)?,
                 samples: light.samples,

@@ -8,9 +8,9 @@ from metalith._diagnosis import Diagnosis, _found, _ranked
 
 
 def test_effects_have_values_and_intervals() -> None:
-    told = {"name": "gap", "value": 5.0, "unit": "um", "interval": [4.5, 5.5], "confounded_with": ["tilt"], "separate_by": None}
-    gap = _found(told)
-    assert (gap.value, gap.interval) == (5.0, (4.5, 5.5))
+    told = {"name": "defocus", "value": 5.0, "unit": "um", "interval": [4.5, 5.5], "confounded_with": ["tilt"], "separate_by": None}
+    defocus = _found(told)
+    assert (defocus.value, defocus.interval) == (5.0, (4.5, 5.5))
     tilt = _found(told | {"name": "tilt", "value": [1.0, -2.0], "interval": [[0.5, 1.5], [-3.0, -1.0]], "unit": "mrad"})
     assert (tilt.values, tilt.intervals) == ((1.0, -2.0), ((0.5, 1.5), (-3.0, -1.0)))
     assert str(tilt) == "tilt = 1 (0.5 to 1.5), -2 (-3 to -1) mrad"
@@ -18,7 +18,7 @@ def test_effects_have_values_and_intervals() -> None:
 
 def test_a_diagnosis_shows_itself() -> None:
     told = {"name": "a<b", "value": 5.0, "unit": "um", "interval": [4.5, 5.5], "confounded_with": [], "separate_by": None}
-    ranked = {"name": "gap", "score": 0.5, "held_out_gain": None, "held_out_gain_interval": None, "rejected": "no gain"}
+    ranked = {"name": "defocus", "score": 0.5, "held_out_gain": None, "held_out_gain_interval": None, "rejected": "no gain"}
     diagnosis = Diagnosis(
         verdict="explained",
         effects=(_found(told),),
@@ -31,5 +31,5 @@ def test_a_diagnosis_shows_itself() -> None:
     )
     assert str(diagnosis).splitlines()[0] == "explained: held-out error 150 before, 0.977 after"
     assert "a&lt;b" in diagnosis._repr_html_() and "a<b" not in diagnosis._repr_html_()
-    assert diagnosis.effect("a<b") is diagnosis.effects[0] and diagnosis.effect("gap") is None
+    assert diagnosis.effect("a<b") is diagnosis.effects[0] and diagnosis.effect("defocus") is None
     assert diagnosis.ranking[0].gain is None

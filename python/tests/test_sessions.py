@@ -41,13 +41,13 @@ elements = [0, 0]
 distance_um = [139.0, 144.0, 149.0]
 frames = [16]
 [wanted]
-gap = 2.0
+defocus = 2.0
 """
 
 
 def test_a_session_is_planned_as_the_program_plans_it(tmp_path: Path) -> None:
     (tmp_path / "bench.toml").write_text(BENCH)
-    effects = ["gap", "pixel_blur"]
+    effects = ["defocus", "pixel_blur"]
     told: list[str] = []
     planned = ml.plan(
         ml.Design.read(MINI),
@@ -59,15 +59,15 @@ def test_a_session_is_planned_as_the_program_plans_it(tmp_path: Path) -> None:
     assert planned.folder == tmp_path / "session" and planned.page.is_file()
     assert {e["name"] for e in planned.effects} == set(effects)
     assert planned.finds_all == all(e["detected"] for e in planned.effects)
-    # The gap is found by a capture out of focus.
-    distances = {c["distance_um"] for c in planned.captures}
+    # The defocus is found by a capture out of focus.
+    distances = {c["distance_um"] for c in planned.measurements}
     assert distances <= {139.0, 144.0, 149.0} and distances != {144.0}, planned.sentence
     assert told
     arguments: list[str | Path] = ["plan", MINI, "--bench", tmp_path / "bench.toml", "--out", tmp_path / "again"]
     arguments += ["--effects", ",".join(effects), "--json", "--quiet"]
     run = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True)
     theirs = json.loads(run.stdout)
-    for key in ("captures", "effects", "confusions", "candidates"):
+    for key in ("measurements", "effects", "confusions", "candidates"):
         assert theirs[key] == planned.numbers[key], key
     for file in ("measurement.toml", "layout.gds"):
         assert (tmp_path / "again" / file).read_bytes() == (tmp_path / "session" / file).read_bytes()
@@ -82,7 +82,7 @@ def test_a_session_that_was_begun_is_not_overwritten(tmp_path: Path) -> None:
 
 
 def test_exceptions_have_the_text_of_the_program(tmp_path: Path) -> None:
-    (tmp_path / "bench.toml").write_text(BENCH.replace("gap = 2.0", "gap = -2.0"))
+    (tmp_path / "bench.toml").write_text(BENCH.replace("defocus = 2.0", "defocus = -2.0"))
     (tmp_path / "wrong.toml").write_text(MINI.read_text().replace("pitch_nm = 350", "pitch_nm = 3"))
     design = ml.Design.read(MINI)
     cases: list[tuple[list[str | Path], Callable[[], object]]] = [

@@ -27,7 +27,7 @@ schema = 1
 design = "design.toml"
 draws = 2
 [[vary]]
-effect = "gap"
+effect = "defocus"
 distribution = "uniform"
 low = -4.0
 high = 4.0
@@ -54,7 +54,7 @@ def test_designs_of_a_grid_are_told_by_their_values(tmp_path: Path) -> None:
     assert [d["design"]["lens.focal_length_um"] for d in result.draws] == [48, 48, 40, 40]
     rows = result.table()
     assert [row["lens.focal_length_um"] for row in rows] == [48, 48, 40, 40]
-    assert len({row["gap"] for row in rows}) == 4
+    assert len({row["defocus"] for row in rows}) == 4
     assert [point["at"] for point in result.grid] == [[["lens.focal_length_um", f]] for f in (48, 40)]
     mean = result.grid[1]["figures"]["strehl_660nm_0deg"]["mean"]
     assert mean == pytest.approx(sum(row["strehl_660nm_0deg"] for row in rows[2:]) / 2)

@@ -175,7 +175,7 @@ fn describe(done: &Calibration) {
     let error = &done.diagnosis.error;
     print_line!("{}: {}", done.diagnosis.set, done.diagnosis.sentence());
     print_line!(
-        "{} on captures left out: {:.4} before, {:.4} after; noise alone gives 1",
+        "{} on measurements left out: {:.4} before, {:.4} after; noise alone gives 1",
         error.measure,
         error.before.held_out,
         error.after.held_out

@@ -96,9 +96,9 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         Origin::Computed(None) => print_line!("library: {} cells solved, not kept", study.points),
     }
     print_line!(
-        "at {} nm the widths span {} turns; the mapping of the design errs by {} rad rms",
+        "at {} nm the widths span {} waves; the mapping of the design errs by {} rad rms",
         sig(study.mapping_um * 1e3, 4),
-        fixed(study.span_turns, 2),
+        fixed(study.span_waves, 2),
         fixed(study.design_round_trip.rms_rad, 3)
     );
     let wavelengths = study

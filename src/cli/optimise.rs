@@ -95,7 +95,7 @@ pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let found = task.solve(&cells.all(), checkpoint, terminal)?;
     terminal.clear();
-    write_phase_table(&phase, &task.lens.rings, &found.turns, &remarks(args, &design))?;
+    write_phase_table(&phase, &task.lens.rings, &found.waves, &remarks(args, &design))?;
     if let Some(checkpoint) = &found.interrupted {
         checkpoint.save(&kept)?;
         terminal.say(&format!("interrupted; the best so far is in {}", phase.display()));
@@ -155,17 +155,17 @@ fn findings(
     folder: &Path,
     terminal: &Terminal,
 ) -> Result<OptimiseReport> {
-    let judge = |turns: &[f64]| -> Result<Vec<Judged>> {
-        let mut judged = vec![task.judge_rings(turns, cells.own())?];
+    let judge = |waves: &[f64]| -> Result<Vec<Judged>> {
+        let mut judged = vec![task.judge_rings(waves, cells.own())?];
         if cells.own().fidelity() != cells.rigorous().fidelity() {
-            judged.push(task.judge_rings(turns, cells.rigorous())?);
+            judged.push(task.judge_rings(waves, cells.rigorous())?);
         }
         Ok(judged)
     };
-    let (before, mut after) = (judge(&task.reference_turns)?, judge(&found.turns)?);
-    let own = match task.own_turns == task.reference_turns {
+    let (before, mut after) = (judge(&task.reference_waves)?, judge(&found.waves)?);
+    let own = match task.own_waves == task.reference_waves {
         true => Vec::new(),
-        false => judge(&task.own_turns)?,
+        false => judge(&task.own_waves)?,
     };
     let alone = lens_alone(design, phase)?;
     let array = PillarArray::build(&alone, terminal)?;
@@ -182,8 +182,8 @@ fn findings(
         None => Vec::new(),
     };
     let limits = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
-    let over_limit = task.merit_over_limit(&cells.all(), &found.turns, &limits, terminal)?;
-    let reference_widths = task.widths_nm(&task.reference_turns);
+    let over_limit = task.merit_over_limit(&cells.all(), &found.waves, &limits, terminal)?;
+    let reference_widths = task.widths_nm(&task.reference_waves);
     let spectrum = OverWavelength {
         lens: &task.lens,
         cell: cells.judge(),
@@ -202,10 +202,8 @@ fn findings(
         command: command(args),
         start: found.start.into(),
         merit: found.merit,
-        rotation_step_deg: (design.cell.shape.has_one_size())
-            .then(|| design.cell.shape.step())
-            .flatten(),
-        step_limit_turns: task.limit().turns(),
+        rotation_step_deg: design.cell.shape.rotated().map(metalith::RotatedRectangles::step_deg),
+        step_limit_waves: task.limit().waves(),
         before,
         own,
         after,
@@ -218,8 +216,8 @@ fn findings(
             .map(|k| {
                 (
                     task.lens.rings.middle_um(k),
-                    task.reference_turns[k],
-                    found.turns[k],
+                    task.reference_waves[k],
+                    found.waves[k],
                     found.widths_nm[k],
                 )
             })
@@ -244,12 +242,12 @@ fn with_errors(
         .regardless_of_errors()
         .solve(&[cells.own()], Checkpoint::default(), terminal)?;
     [
-        ("before", &task.reference_turns),
-        ("plain optimum", &plain.turns),
-        ("after", &found.turns),
+        ("before", &task.reference_waves),
+        ("plain optimum", &plain.waves),
+        ("after", &found.waves),
     ]
     .into_iter()
-    .map(|(name, turns)| Ok((name, task.judge_errors(turns, robust, &cells.all(), DRAWS)?)))
+    .map(|(name, waves)| Ok((name, task.judge_errors(waves, robust, &cells.all(), DRAWS)?)))
     .collect()
 }
 
@@ -292,12 +290,12 @@ fn summary(findings: &OptimiseReport) {
     for (name, list) in findings.phases() {
         for judged in list {
             print_line!(
-                "{name}, {} with the {} cell: Strehl {} (geometric mean), {} smallest, step {:.3} turns",
+                "{name}, {} with the {} cell: Strehl {} (geometric mean), {} smallest, step {:.3} waves",
                 judged.source,
                 judged.fidelity,
                 sig(judged.geometric_mean, 3),
                 sig(judged.smallest, 3),
-                judged.largest_step_turns,
+                judged.largest_step_waves,
             );
         }
     }

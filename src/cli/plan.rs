@@ -1,9 +1,9 @@
-//! `metalith plan`: from a design and a bench to the captures that tell effects apart.
+//! `metalith plan`: from a design and a bench to the measurements that tell effects apart.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::calibrate::{BenchFile, CapturePlan};
+use metalith::bench_plan::{BenchFile, MeasurementPlan};
 use metalith::{Result, plan_session};
 
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
@@ -62,7 +62,7 @@ pub fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     })
 }
 
-fn describe(planned: &CapturePlan) {
+fn describe(planned: &MeasurementPlan) {
     print_line!("{}", planned.sentence());
     for c in &planned.confusions {
         print_line!("not told apart: {} and {}; {}", c.effect, c.looks_like, c.remedy());

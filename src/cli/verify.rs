@@ -172,7 +172,7 @@ impl Judging {
     ) -> Result<Outcome> {
         let mut design = design.clone();
         if self.oblique {
-            design.verify.incidence = CellIncidence::AsLit;
+            design.verify.incidence = CellIncidence::Oblique;
         }
         // One cell judges, in the picture too.
         design.verify.fidelity = self.fidelity(&design);

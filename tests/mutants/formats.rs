@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use metalith::calibrate::{BenchFile, DeclaredEffect, MeasuredSet};
+use metalith::bench_plan::BenchFile;
+use metalith::calibrate::{DeclaredEffect, MeasuredSet};
 use metalith::cell::{MappingTable, Material, PillarLibrary};
 use metalith::drc::{Deck, Waivers};
 use metalith::gds::extract::GdsPillars;

@@ -178,7 +178,7 @@ fn a_chip_as_made_loses_as_much_as_on_a_square_lattice() {
         "stitching = [{ axis = 0, at_um = 5.0, by_nm = [180.0, 90.0] }, { axis = 1, at_um = -10.0, by_nm = [-60.0, 240.0] }]",
         "missing_pillars = 0.05\naperture_offset_um = [8.0, -5.0]",
     ];
-    let paths = ["source_per_m = 150.0", "tilt_mrad = [40.0, 25.0]", "gap_um = 5.0"];
+    let paths = ["source_per_m = 150.0", "tilt_mrad = [40.0, 25.0]", "defocus_um = 5.0"];
     let strehl = |changes: &[(&str, &str)], geometry: &str, path: &str| {
         let design = changed(&folder, changes);
         let layout = folder.path().join("hexagonal_1550_pillars.gds");
@@ -356,7 +356,7 @@ fn a_hexagonal_design_is_studied() {
     );
     let study = folder.path().join("tolerance.toml");
     let text = format!(
-        "schema = 1\ndesign = {path:?}\ndraws = 2\n[[vary]]\neffect = \"gap\"\ndistribution = \"uniform\"\nlow = -2.0\nhigh = 2.0\n\
+        "schema = 1\ndesign = {path:?}\ndraws = 2\n[[vary]]\neffect = \"defocus\"\ndistribution = \"uniform\"\nlow = -2.0\nhigh = 2.0\n\
          [[limit]]\nfigure = \"strehl_1550nm_0deg\"\nat_least = 0.5\n"
     );
     fs::write(&study, text).unwrap();
@@ -415,13 +415,13 @@ fn a_hexagonal_lens_is_optimised() {
     let alone = lens_alone(&design, &phase).unwrap();
     let (task, before) = (OptimiseTask::of(&alone).unwrap(), OptimiseTask::of(&design).unwrap());
     let cell = cell_models(&design, &[Fidelity::Fitted]).unwrap().remove(0);
-    let rings = task.judge_rings(&task.own_turns, cell.as_ref()).unwrap();
+    let rings = task.judge_rings(&task.own_waves, cell.as_ref()).unwrap();
     let array = PillarArray::build(&alone, &Silent).unwrap();
     let found = task
         .judge_layout(&array.widths(array.central()), cell.as_ref())
         .unwrap();
     assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
-    let hyperbola = before.judge_rings(&before.own_turns, cell.as_ref()).unwrap();
+    let hyperbola = before.judge_rings(&before.own_waves, cell.as_ref()).unwrap();
     assert!(
         rings.geometric_mean > hyperbola.geometric_mean,
         "{} {}",

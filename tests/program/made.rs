@@ -122,7 +122,7 @@ impl Files {
             polarised: Default::default(),
             wavelengths_um: vec![UM],
             incidence_sin: [0.0; 2],
-            cells_as_lit: self.design.verify.incidence == CellIncidence::AsLit,
+            oblique_cells: self.design.verify.incidence == CellIncidence::Oblique,
             distance_um: self.design.lens.focal_length_um,
             at_um: [0.0; 2],
             samples: self.design.verify.window_samples,
@@ -159,7 +159,7 @@ impl Files {
         let sines = metalith::optics::cell_direction([plane.sin_x, plane.sin_y], metalith::LatticeKind::Square);
         let cells = metalith::cell::Illumination::from_direction(UM, sines);
         let cells = match self.design.verify.incidence {
-            CellIncidence::AsLit => cells.oblique(),
+            CellIncidence::Oblique => cells.oblique(),
             CellIncidence::Normal => cells,
         };
         let solved = chip.cells().solve(element.widths_nm(), &cells, &Silent).unwrap();
@@ -223,14 +223,14 @@ fn every_effect_is_the_same_in_every_command() {
 
 #[test]
 #[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
-fn cells_as_lit_are_the_same_in_every_command() {
+fn oblique_cells_are_the_same_in_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let mut files = Files::write(folder.path());
     let mut perturbation = Perturbation::default();
     perturbation.path.tilt_mrad = [20.0, -5.0];
     perturbation.geometry.missing_pillars = 0.05;
     let normal = files.agree("along the normal", &perturbation);
-    files.design.verify.incidence = CellIncidence::AsLit;
+    files.design.verify.incidence = CellIncidence::Oblique;
     let lit = files.agree("as lit", &perturbation);
     let peak = normal.iter().copied().fold(0.0, f64::max);
     assert!(largest_difference(&lit, &normal) > APPLIED * peak);

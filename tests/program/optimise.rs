@@ -52,7 +52,7 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     fs::write(&path, text).unwrap();
     let design = Design::read(&path).unwrap();
     let (task, cell) = (OptimiseTask::of(&design).unwrap(), PublishedCell::new(350));
-    let rings = task.judge_rings(&task.own_turns, &cell).unwrap();
+    let rings = task.judge_rings(&task.own_waves, &cell).unwrap();
     let layout = folder.path().join("lens.gds");
     let alone = lens_alone(&design, &phases[0]).unwrap();
     let array = PillarArray::build(&alone, &Silent).unwrap();
@@ -61,7 +61,7 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     let found = task.judge_layout(&read.elements[0].widths, &cell).unwrap();
     // The limit of the design, and the rounding of phases to the text of their table.
     const STEP_TURNS: f64 = 0.2 + 1e-6;
-    assert!(found.largest_step_turns <= STEP_TURNS, "{}", found.largest_step_turns);
+    assert!(found.largest_step_waves <= STEP_TURNS, "{}", found.largest_step_waves);
     assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < SAME);
 }
 
@@ -105,14 +105,14 @@ fn a_lens_is_optimised_among_unlike_neighbours() {
     let alone = lens_alone(&design, &phase).unwrap();
     let cell = cell_models(&design, &[Fidelity::Neighbours]).unwrap().remove(0);
     let (task, before) = (OptimiseTask::of(&alone).unwrap(), OptimiseTask::of(&design).unwrap());
-    let rings = task.judge_rings(&task.own_turns, cell.as_ref()).unwrap();
+    let rings = task.judge_rings(&task.own_waves, cell.as_ref()).unwrap();
     let array = PillarArray::build(&alone, &Silent).unwrap();
     let found = task
         .judge_layout(&array.widths(array.central()), cell.as_ref())
         .unwrap();
     assert_eq!(found.fidelity, Fidelity::Neighbours);
     assert!((found.geometric_mean / rings.geometric_mean - 1.0).abs() < OF_RINGS);
-    let hyperbola = before.judge_rings(&before.own_turns, cell.as_ref()).unwrap();
+    let hyperbola = before.judge_rings(&before.own_waves, cell.as_ref()).unwrap();
     assert!(
         found.geometric_mean > 1.05 * hyperbola.geometric_mean,
         "{} {}",

@@ -71,7 +71,7 @@ fn what_cannot_be_undone_is_made_less() {
     let array = PillarArray::build(&design, &Silent).unwrap();
     let nothing = compensate(&design, &array, &model(|_| ()), &Silent).unwrap();
     assert!(nothing.summary.error[1] < ROUNDING && nothing.summary.moved_rms_nm == 0.0);
-    // A film 25 nm too high turns resonances and phases together: widths mend the phases alone.
+    // A film 25 nm too high waves resonances and phases together: widths mend the phases alone.
     const MENDED: f64 = 0.9;
     let high = compensate(&design, &array, &model(|d| d.cell.height_nm = 25.0), &Silent).unwrap();
     let [before, after] = high.summary.error;
@@ -109,7 +109,7 @@ fn the_program_predicts_and_compensates() {
     let path = folder.path().join("model.toml");
     model(|d| {
         d.geometry.cd_bias_nm = -10.0;
-        d.path.gap_um = 2.0;
+        d.path.defocus_um = 2.0;
     })
     .write(&path)
     .unwrap();

@@ -186,7 +186,7 @@ fn limits_on_white_light_decide_and_name_the_channel() {
     let camera = metalith_testing::root().join("cameras/gt1930_mono.toml");
     let text = fs::read_to_string(design("mini_3x3")).unwrap();
     let text = text.replace("pixel_um = 5.86", &format!("pixel_um = 5.86\ncamera = {camera:?}"))
-        + "white_mtf_min = 0.9\nwhite_mtf_lp_mm = 30\nwhite_energy_2_pixels_min = 0.05\n";
+        + "polychromatic_mtf_min = 0.9\npolychromatic_mtf_lp_mm = 30\npolychromatic_energy_2_pixels_min = 0.05\n";
     let path = folder.path().join("white.toml");
     fs::write(&path, &text).unwrap();
     let fast = ["run", "--fast", "--fidelity", "published", "--out"];

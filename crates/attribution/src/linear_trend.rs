@@ -1,4 +1,4 @@
-//! A linear trend: whether values are linear in a place, a wavelength or whatever groups of measurements differ in.
+//! A linear trend: whether values are linear in a place or whatever groups of measurements differ in.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::bench::{Bench, Sampling};
 use crate::cells::CellSource;
-use crate::set::{MeasuredSet, PerCapture};
+use crate::set::{MeasuredSet, PerMeasurement};
 use crate::simulator::Simulator;
 use crate::statistics::{FitProblem, Measurements, Surrogate, held_out, mean_error};
 use metalith_optics::Perturbation;
@@ -18,11 +18,11 @@ pub struct Rung {
     pub fidelity: String,
     /// Reduced chi-square per pixel of the fit.
     pub fit: f64,
-    /// The same on captures left out.
+    /// The same on measurements left out.
     pub held_out: f64,
-    /// Residual of each capture (sigma), nuisances fitted; for pictures.
+    /// Residual of each measurement (sigma), nuisances fitted; for pictures.
     #[serde(skip)]
-    pub residuals: PerCapture<Array2<f32>>,
+    pub residuals: PerMeasurement<Array2<f32>>,
 }
 
 /// The error of each fidelity: of the published and the fitted polynomials where the cell is that of the paper, and of

@@ -1,10 +1,10 @@
-//! Ways of giving a quantity a value for each group of captures: by element, colour, distance or angle.
+//! Ways of giving a quantity a value for each group of measurements: by element, colour, distance or angle.
 
 use metalith_attribution::{LinearTrend, Pattern};
 
-use crate::set::{CaptureIndex, MeasuredSet};
+use crate::set::{MeasuredSet, MeasurementIndex};
 
-/// What captures have in common that share a value.
+/// What measurements have in common that share a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grouping {
     Element,
@@ -32,10 +32,10 @@ impl Grouping {
         }
     }
 
-    /// What captures of one group have in common: the place of the element (um), the centre of the LED (nm), the distance (um),
+    /// What measurements of one group have in common: the place of the element (um), the centre of the LED (nm), the distance (um),
     /// or the angle of incidence (degrees).
-    pub fn coordinates(self, set: &MeasuredSet, capture: CaptureIndex) -> [f64; 2] {
-        let own = &set.captures[capture];
+    pub fn coordinates(self, set: &MeasuredSet, measurement: MeasurementIndex) -> [f64; 2] {
+        let own = &set.measurements[measurement];
         match self {
             Self::Element => set.elements[own.element].centre_um,
             Self::Colour => [set.leds[own.led].centre_nm, 0.0],

@@ -1,20 +1,19 @@
 //! Calibration: from what the bench recorded to what the model lacks.
 //!
-//! A [`MeasuredSet`] is read and checked, and its layout extracted. A simulated bench predicts each capture from
+//! A [`MeasuredSet`] is read and checked, and its layout extracted. A simulated bench predicts each measurement from
 //! the pillars as written; nuisances of the bench are fitted; the residual is compared with what each effect in
-//! `effects/` would leave, and an effect is named if it predicts captures that were not fitted.
+//! `effects/` would leave, and an effect is named if it predicts measurements that were not fitted.
 //!
 //! | folder | holds | may use |
 //! | --- | --- | --- |
 //! | `set` | the measured set and its files | |
-//! | `effects` | what chips and benches are known to do to light, one file each | `set` |
+//! | `effects` | what chips and benches are known to do to light | `set` |
 //! | `bench`, `cells`, `optics`, `simulator` | the simulated bench | `set`, `effects` |
-//! | `data`, `screening`, `speckle`, `grouping` | captures, nuisances and noise as `metalith-attribution` needs them | `bench` |
+//! | `data`, `screening`, `speckle`, `grouping` | measurements, nuisances and noise as `metalith-attribution` needs them | `bench` |
 //! | `simulator_model`, `smooth_shape`, `cell_error` | the simulated bench as its forward model | `data` |
-//! | `statistics` | the types of `metalith-attribution` for these captures | `data` |
+//! | `statistics` | the types of `metalith-attribution` for these measurements | `data` |
 //! | `proposal` | effects for what is left | `statistics`, `session` |
 //! | `session`, `diagnosis`, `boundary_search`, `page`, `run` | a set from its files to its answer | all above |
-//! | `planning` | which captures to take of a design before it is measured | all above |
 //! | `validate` | the calibration judged on synthetic sets | all above |
 
 mod bench;
@@ -29,7 +28,6 @@ mod grouping;
 mod names;
 mod optics;
 mod page;
-mod planning;
 mod proposal;
 mod run;
 mod screening;
@@ -45,22 +43,25 @@ mod validate;
 mod width_parts;
 
 pub use bench::{Bench, Sampling};
+pub use cells::{CellSource, RigorousCells};
+pub use data::{Data, Nuisances};
 pub use diagnosis::{
-    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, PatternCourse, Proposal, Ranked,
+    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, PatternTrend, Proposal, Ranked,
     SetVerdict, Slope,
 };
 pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects, of_any_chip};
 pub use fidelity::Rung;
-pub use planning::{
-    BenchFile, CapturePlan, Confusion, PlanRequest, PlannedCapture, PlannedEffect, SemOffer, check_not_begun,
-    check_plannable, plan,
-};
+pub use names::RENAMED as RENAMED_EFFECTS;
 pub use proposal::{FieldBoundary, Proposed, boundary_of_fields, propose};
 pub use run::{Calibration, calibrate};
-pub use session::{Screening, Session, Settings, Simulations};
-pub use set::{Bayer, Capture, Channel, Led, MeasuredElement, MeasuredSet, RelayCamera, SemSite, Stack};
-pub use set::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
-pub use statistics::Evidence;
+pub use session::{Screening, Session, Settings, Simulations, check_effects};
+pub use set::SEM_COLUMNS;
+pub use set::read as set_format;
+pub use set::{Bayer, Channel, Led, MeasuredElement, MeasuredSet, Measurement, RelayCamera, SemSite, Stack};
+pub use set::{ElementIndex, LedIndex, MeasurementIndex, PerElement, PerLed, PerMeasurement};
+pub use simulator::{Simulator, WIDTH_ROOM_NM};
+pub use simulator_model::separating_measurement;
+pub use statistics::{Evidence, Fit, FitProblem, Surrogate, check_calibration_fits};
 pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 pub use validate::{
     ClaimedNumber, Coverage, DetectionLimit, Validation, ValidationPlan, ValidationTrial, validate, write_validation,

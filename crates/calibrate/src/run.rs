@@ -28,7 +28,7 @@ pub struct Calibration {
     pub answer: PathBuf,
     /// `report.html`.
     pub report: PathBuf,
-    /// `model.toml`; none where the residual is unexplained or the captures cannot be used.
+    /// `model.toml`; none where the residual is unexplained or the measurements cannot be used.
     pub model: Option<PathBuf>,
 }
 

@@ -1,5 +1,5 @@
-//! One set from its captures to its diagnosis, in stages. Each is a function of the former's result:
-//! simulate, screen the captures, compare the fidelities of the cell, attribute the residual, diagnose.
+//! One set from its measurements to its diagnosis, in stages. Each is a function of the former's result:
+//! simulate, screen the measurements, compare the fidelities of the cell, attribute the residual, diagnose.
 
 use std::path::PathBuf;
 
@@ -13,8 +13,8 @@ use crate::diagnosis::Diagnosis;
 use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
 use crate::names::unknown_names;
-use crate::screening::{UnusableCapture, unusable_captures};
-use crate::set::{MeasuredSet, PerCapture};
+use crate::screening::{UnusableMeasurement, unusable_measurements};
+use crate::set::{MeasuredSet, PerMeasurement};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::speckle::DefectNoise;
 use crate::statistics::{EndsSearch, Evidence, Fit, FitProblem, Surrogate, attribute_set, fit_of, half_widths};
@@ -63,16 +63,16 @@ pub struct Simulations {
     pub defects: Option<(usize, DefectNoise)>,
 }
 
-/// Which captures can be used.
+/// Which measurements can be used.
 pub struct Screening {
-    pub used: PerCapture<bool>,
-    pub unusable: Vec<UnusableCapture>,
-    /// The nuisances fitted to all captures, nothing else.
+    pub used: PerMeasurement<bool>,
+    pub unusable: Vec<UnusableMeasurement>,
+    /// The nuisances fitted to all measurements, nothing else.
     pub fit: Fit,
 }
 
 impl Screening {
-    /// Whether more than half of the captures cannot be used, or one alone can: what is fitted to it has nothing to be judged by.
+    /// Whether more than half of the measurements cannot be used, or one alone can: what is fitted to it has nothing to be judged by.
     pub fn is_data_unfit(&self) -> bool {
         2 * self.unusable.len() > self.used.len() || self.used.iter().filter(|used| **used).count() < 2
     }
@@ -173,24 +173,24 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// The set as stated, all captures counted.
+    /// The set as stated, all measurements counted.
     pub fn problem(&self, simulations: &Simulations) -> FitProblem<'_> {
         FitProblem::new(&self.simulator, simulations.surrogate.clone(), &self.data)
     }
 
-    /// Find the captures that cannot be used.
+    /// Find the measurements that cannot be used.
     pub fn screen(&self, simulations: &Simulations) -> Screening {
         let problem = self.problem(simulations);
         let fit = problem.nuisance_fit();
-        let unusable = unusable_captures(self.set(), &problem, &fit.nuisances);
+        let unusable = unusable_measurements(self.set(), &problem, &fit.nuisances);
         let mut used = problem.used;
         for u in &unusable {
-            used[u.capture] = false;
+            used[u.measurement] = false;
         }
         Screening { used, unusable, fit }
     }
 
-    /// Attribute the residual of the captures that can be used; `ends` may end the search before all is tried.
+    /// Attribute the residual of the measurements that can be used; `ends` may end the search before all is tried.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.

@@ -73,7 +73,7 @@ impl<'a> Simulator<'a> {
         perturbation
     }
 
-    /// What each capture should show under each of `perturbations`; those that differ in lamps and camera alone
+    /// What each measurement should show under each of `perturbations`; those that differ in lamps and camera alone
     /// share their light.
     ///
     /// # Errors
@@ -129,7 +129,7 @@ impl<'a> Simulator<'a> {
             };
             work.push((step, cells, rim));
         }
-        progress.begin("captures as they should be", work.len() as u64);
+        progress.begin("measurements as they should be", work.len() as u64);
         let most = TOGETHER.min(self.bench.chips_at_once());
         while !work.is_empty() {
             // Those on one path go together, as many as memory likes.

@@ -5,7 +5,7 @@ use metalith_core::{Progress, Result};
 use crate::cell_error::CellError;
 use crate::effects::{Stage, ValueError, separate_by};
 use crate::optics::PixelGrid;
-use crate::set::PerCapture;
+use crate::set::PerMeasurement;
 use crate::simulator::Simulator;
 use crate::smooth_shape::{SmoothShape, TRANSMISSION_TERMS};
 use crate::statistics::{ForwardModel, ModelError, ParameterPoint, Slot, SmoothGroups, SmoothTerm};
@@ -15,7 +15,7 @@ use metalith_optics::{Perturbation, zernike};
 const CELL_STEP: f64 = 1.0 / 16.0;
 
 /// Relative errors of what effects change, by the stage that they act on. Sets by a program that shares nothing with
-/// this one leave 3.4 % of the amplitude of a change of height, 1 % of a bias and 0.1 to 0.2 % of a gap.
+/// this one leave 3.4 % of the amplitude of a change of height, 1 % of a bias and 0.1 to 0.2 % of a defocus.
 const ERROR_OF_STACK: f64 = 0.03;
 const ERROR_OF_GEOMETRY: f64 = 0.01;
 const ERROR_OF_LIGHT: f64 = 0.002;
@@ -104,7 +104,7 @@ impl ForwardModel for Simulator<'_> {
     }
 
     fn memory_hint(&self) -> String {
-        "give smaller windows (`rows` and `cols` of [camera]) or fewer captures, or try fewer effects (`--effects NAMES`): memory goes \
+        "give smaller windows (`rows` and `cols` of [camera]) or fewer measurements, or try fewer effects (`--effects NAMES`): memory goes \
          with the area of a window on the sensor, whatever its pixels"
             .into()
     }
@@ -116,7 +116,7 @@ impl ForwardModel for Simulator<'_> {
     fn smooth_groups(&self) -> SmoothGroups {
         let set = self.bench.set();
         SmoothGroups {
-            of: set.captures.iter().map(|c| c.led.into()).collect(),
+            of: set.measurements.iter().map(|c| c.led.into()).collect(),
             count: set.leds.len(),
         }
     }
@@ -129,10 +129,14 @@ impl ForwardModel for Simulator<'_> {
         CellError::CAUTIOUS.of_model()
     }
 
-    fn predictions(&self, points: &[ParameterPoint], progress: &dyn Progress) -> Result<Vec<PerCapture<PixelGrid>>> {
+    fn predictions(
+        &self,
+        points: &[ParameterPoint],
+        progress: &dyn Progress,
+    ) -> Result<Vec<PerMeasurement<PixelGrid>>> {
         let perturbations: Vec<_> = points.iter().map(|p| self.perturbation_at(p)).collect();
         let exposed = self.expose(&perturbations, progress)?;
-        Ok(exposed.into_iter().map(PerCapture::from).collect())
+        Ok(exposed.into_iter().map(PerMeasurement::from).collect())
     }
 
     fn reference_values(&self, theta: &[f64]) -> Vec<Option<f64>> {
@@ -206,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn captures_that_would_not_fit_into_memory_are_refused_with_what_to_do() {
+    fn measurements_that_would_not_fit_into_memory_are_refused_with_what_to_do() {
         let mut set = small_set();
         assert!(check_calibration_fits(&simulator(&set)).is_ok());
         (set.camera.rows, set.camera.cols, set.camera.pixel_um) = (512, 512, 5.86);

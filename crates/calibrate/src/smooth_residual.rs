@@ -28,7 +28,7 @@ pub struct SmoothResidual {
     pub radius_um: f64,
     /// Relative change of amplitude over width (nm), for each LED.
     pub transmission: Vec<Vec<(f64, f64)>>,
-    /// Covariance of a blur common to all captures, xx, xy and yy, with standard deviations (um^2).
+    /// Covariance of a blur common to all measurements, xx, xy and yy, with standard deviations (um^2).
     pub blur_um2: [(f64, f64); 3],
     /// Reduced chi-square per pixel without and with the shapes.
     pub chi2: (f64, f64),

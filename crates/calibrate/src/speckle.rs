@@ -2,7 +2,7 @@
 //!
 //! The mean of missing pillars is an effect like any other. The scatter of single ones is no function of a few
 //! parameters: no fit finds their places. Its variance is known, though. It grows with the light that it
-//! interferes with, by a factor that depends on the coherence of each capture and is estimated from a few draws
+//! interferes with, by a factor that depends on the coherence of each measurement and is estimated from a few draws
 //! of the places. Treated as noise, it lets everything else be judged as before, and it gives a second estimate
 //! of the share of missing pillars.
 
@@ -12,11 +12,11 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::data::Data;
-use crate::set::{CaptureIndex, PerCapture};
+use crate::set::{MeasurementIndex, PerMeasurement};
 use crate::simulator::Simulator;
 use crate::statistics::{Fit, FitProblem, Measurements};
 
-/// Draws of the places: each has thousands of speckles in every capture.
+/// Draws of the places: each has thousands of speckles in every measurement.
 const DRAWS: u64 = 4;
 
 /// First seed of the draws and distance of their seeds; elements take the numbers after each.
@@ -34,10 +34,10 @@ struct Speckle {
     floor: f64,
 }
 
-/// The variance of the speckle of each capture.
+/// The variance of the speckle of each measurement.
 #[derive(Clone)]
 pub struct DefectNoise {
-    captures: PerCapture<Speckle>,
+    measurements: PerMeasurement<Speckle>,
 }
 
 impl DefectNoise {
@@ -57,7 +57,7 @@ impl DefectNoise {
         for k in 0..DRAWS {
             drawn.push(simulator.expose_drawn(&perturbation, SEED + k * SEEDS_APART, progress)?);
         }
-        let captures: Vec<Speckle> = (0..mean.len())
+        let measurements: Vec<Speckle> = (0..mean.len())
             .into_par_iter()
             .map(|c| {
                 let light = mean[c].pixels([0.0; 2]);
@@ -66,19 +66,19 @@ impl DefectNoise {
             })
             .collect();
         Ok(Self {
-            captures: captures.into(),
+            measurements: measurements.into(),
         })
     }
 
     /// Of each pixel that counts: the square of the residual, the variance of the camera, that of a unit of
     /// speckle (DN^2).
-    fn spread(&self, problem: &FitProblem<'_>, fit: &Fit, c: CaptureIndex) -> Vec<[f32; 3]> {
+    fn spread(&self, problem: &FitProblem<'_>, fit: &Fit, c: MeasurementIndex) -> Vec<[f32; 3]> {
         let data = problem.data;
         let grid = problem.prediction(&fit.theta, c);
         let light = grid.pixels(fit.nuisances.shift_um[c]);
         let residual = fit.nuisances.residual(data, &grid, c);
         let scale = (data.scale[c] * fit.nuisances.flux[data.beam[c].led]) as f32;
-        let Speckle { by_light, floor } = self.captures[c];
+        let Speckle { by_light, floor } = self.measurements[c];
         let pixels = light.iter().zip(&residual).zip(&data.weight[c]);
         pixels
             .filter(|(_, w)| **w > 0.0)
@@ -93,11 +93,11 @@ impl DefectNoise {
 impl RandomNoise<Data> for DefectNoise {
     /// Maximum-likelihood estimate of the share of missing pillars from the residual of a fit.
     fn amount(&self, problem: &FitProblem<'_>, fit: &Fit) -> f64 {
-        let used: Vec<CaptureIndex> = problem.data.indices().filter(|&c| problem.used[c]).collect();
-        let captures: Vec<Vec<[f32; 3]>> = used.par_iter().map(|&c| self.spread(problem, fit, c)).collect();
+        let used: Vec<MeasurementIndex> = problem.data.indices().filter(|&c| problem.used[c]).collect();
+        let measurements: Vec<Vec<[f32; 3]>> = used.par_iter().map(|&c| self.spread(problem, fit, c)).collect();
         let minus_log_likelihood = |share: f64| {
             let p = (share * (1.0 - share)) as f32;
-            let sums: Vec<f64> = captures
+            let sums: Vec<f64> = measurements
                 .par_iter()
                 .map(|pixels| {
                     let one = |[square, noise, speckle]: &[f32; 3]| {

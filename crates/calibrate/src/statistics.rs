@@ -1,10 +1,10 @@
-//! The statistics of attribution, of the captures of a set.
+//! The statistics of attribution, of the measurements of a set.
 
 pub use metalith_attribution::{
     EXPLAINED, ForwardModel, HeldOutErrors, IntervalParts, LEAST_GAIN, LinearTrend, Measurements, ModelError,
-    ParameterPoint, Pattern, REFERENCES_DECIDE, Rejection, SIGMAS_95, Slot, SmoothGroups, SmoothTerm, TriedEffect,
-    attribute_set, cluster_groups, cosines, covariance, error_of_measurement, fit_of, half_widths, held_out, may_leave,
-    mean_error, minimise, projected,
+    ParameterPoint, Pattern, Rejection, SIGMAS_95, Slot, SmoothGroups, SmoothTerm, TriedEffect, attribute_set,
+    cluster_groups, cosines, covariance, error_of_measurement, fit_of, half_widths, held_out, may_leave, mean_error,
+    minimise,
 };
 
 use crate::data::Data;
@@ -19,7 +19,7 @@ pub type SearchState<'a> = metalith_attribution::SearchState<'a, Data>;
 pub type EndsSearch<'f> = metalith_attribution::EndsSearch<'f, Data>;
 pub type Model<'a> = dyn ForwardModel<Prediction = PixelGrid> + 'a;
 
-/// Refuse captures whose images a calibration could not hold, before any work is spent on them.
+/// Refuse measurements whose images a calibration could not hold, before any work is spent on them.
 ///
 /// # Errors
 /// With what they would take, and what takes less.

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// What a 95 % half-width is made of: what it would be by each cause alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WidthParts {
-    /// Noise, and that groups of captures do not agree.
+    /// Noise, and that groups of measurements do not agree.
     pub noise: f64,
     /// The transmission of the stated cell: its amplitude, and its phase.
     pub cell_amplitude: f64,
@@ -20,7 +20,7 @@ pub struct WidthParts {
 }
 
 impl WidthParts {
-    /// All of them together; no number where captures tell nothing.
+    /// All of them together; no number where measurements tell nothing.
     pub fn half_width(&self) -> f64 {
         self.parts().half_width()
     }

@@ -98,7 +98,7 @@ fn page(study: &LibraryStudy) -> Page {
     let map = |title: &str, of: &[f64]| HeatMap::new(title, over_sizes(of), axis("x"), axis("y")).size(420.0, 330.0);
     page.row([
         map("Phase", &study.turns_x)
-            .values("phase", "turns")
+            .values("phase", "waves")
             .range(-0.5, 0.5)
             .cyclic()
             .caption("Phase of light along x, but for a constant."),
@@ -117,8 +117,8 @@ fn page(study: &LibraryStudy) -> Page {
     ));
     let mut phases = Chart::new(
         "Phases that pillars have",
-        Axis::linear("phase along x", "turns"),
-        Axis::linear("phase along y", "turns"),
+        Axis::linear("phase along x", "waves"),
+        Axis::linear("phase along y", "waves"),
     )
     .size(420.0, 330.0);
     phases.points(

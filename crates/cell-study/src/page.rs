@@ -119,7 +119,7 @@ fn page(study: &CellStudy) -> Page {
         ),
         (
             "Phase between the ends there",
-            format!("{} turns", fixed(study.span_turns, 2)),
+            format!("{} turns", fixed(study.span_waves, 2)),
         ),
     ]);
     maps(&mut page, study);
@@ -167,7 +167,7 @@ fn maps(page: &mut Page, study: &CellStudy) {
     ));
     page.figure(
         HeatMap::new("Phase", turns, x(), y())
-            .values("phase", "turns")
+            .values("phase", "waves")
             .range(0.0, 1.0)
             .cyclic()
             .caption("Phase of the zero order from the foot of the pillar to its top, modulo one turn."),

@@ -106,7 +106,7 @@ pub struct CellStudy {
     pub compared_um: Vec<f64>,
     pub best_band_um: (f64, f64),
     /// Turns between the narrowest and the widest pillar at that wavelength.
-    pub span_turns: f64,
+    pub span_waves: f64,
     pub options: StudyOptions,
     /// The mapping of the design, polynomial or table, by rigorous theory.
     pub design_round_trip: MappingError,
@@ -169,7 +169,7 @@ impl CellStudy {
             mapping_um,
             compared_um: design.compared_um().to_vec(),
             best_band_um: design.mapping_band_um()?,
-            span_turns: fine.turns[fine.turns.len() - 1] - fine.turns[0],
+            span_waves: fine.turns[fine.turns.len() - 1] - fine.turns[0],
             options,
             design_round_trip: error_of_design(design, &fine),
             inverse,

@@ -25,8 +25,8 @@ fn main() {
     println!("mean, which is given beside it.");
     println!();
     println!(
-        "| row | wavelength (nm) | turned by (deg) | truth | local cell, normal | local cell, as lit | supercell \
-              | difference: normal | as lit | supercell | zero order | phase (rad) | mean phase (rad) |"
+        "| row | wavelength (nm) | turned by (deg) | truth | local cell, normal | local cell, oblique | supercell \
+              | difference: normal | oblique | supercell | zero order | phase (rad) | mean phase (rad) |"
     );
     println!("|{}", " ---: |".repeat(13));
     for ((cells, turns, nm), summary) in &groups {

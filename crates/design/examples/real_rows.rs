@@ -16,8 +16,8 @@ use prototype_rows::{Prototype, RADII_UM};
 fn main() {
     let prototype = Prototype::new();
     println!(
-        "| element | nm | equal neighbours along the normal | as lit | neighbours | of supercells left out | neighbours by \
-         radius, {RADII_UM:?} um | worst row: as lit, neighbours | first order: as lit, neighbours, supercells |"
+        "| element | nm | equal neighbours along the normal | oblique | neighbours | of supercells left out | neighbours by \
+         radius, {RADII_UM:?} um | worst row: oblique, neighbours | first order: oblique, neighbours, supercells |"
     );
     println!("| --- |{}", " ---: |".repeat(8));
     let asked = std::env::args().skip(1).map(|angles| {
@@ -29,7 +29,7 @@ fn main() {
     for steered_deg in asked {
         for nm in [455.0, 530.0, 660.0] {
             let found = prototype.misfits(nm, steered_deg);
-            let [normal, as_lit, neighbours] = found.means();
+            let [normal, oblique, neighbours] = found.means();
             let by_radius = RADII_UM.map(|radius| {
                 let own = found.rows.iter().filter(|r| r.radius_um == radius);
                 format!(
@@ -37,20 +37,20 @@ fn main() {
                     own.clone().map(|r| r.neighbours).sum::<f64>() / own.count() as f64
                 )
             });
-            let gain = |r: &&prototype_rows::RowMisfit| r.neighbours / r.as_lit;
+            let gain = |r: &&prototype_rows::RowMisfit| r.neighbours / r.oblique;
             let worst = found
                 .rows
                 .iter()
                 .max_by(|a, b| gain(a).total_cmp(&gain(b)))
                 .expect("rows");
             println!(
-                "| {steered_deg:?} deg | {nm} | {normal:.3} | {as_lit:.3} | {neighbours:.3} | {:.3} | {} | {:?} at {} um: \
+                "| {steered_deg:?} deg | {nm} | {normal:.3} | {oblique:.3} | {neighbours:.3} | {:.3} | {} | {:?} at {} um: \
                  {:.3}, {:.3} | {} |",
                 found.left_out,
                 by_radius.join(" "),
                 worst.direction,
                 worst.radius_um,
-                worst.as_lit,
+                worst.oblique,
                 worst.neighbours,
                 found.first.map(|share| format!("{share:.3}")).join(" "),
             );

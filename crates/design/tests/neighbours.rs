@@ -62,10 +62,10 @@ fn real_rows_are_met_better_than_by_equal_neighbours() {
         (530.0, [15.0, 15.0]),
     ] {
         let found = prototype.misfits(nm, steered_deg);
-        let [normal, as_lit, neighbours] = found.means();
-        println!("{nm} nm, {steered_deg:?} deg: {normal:.4}, as lit {as_lit:.4}, neighbours {neighbours:.4}");
+        let [normal, oblique, neighbours] = found.means();
+        println!("{nm} nm, {steered_deg:?} deg: {normal:.4}, oblique {oblique:.4}, neighbours {neighbours:.4}");
         let [equal, sum, supercells] = found.first;
-        println!("  first order as lit {equal:.4}, neighbours {sum:.4}, supercells {supercells:.4}");
+        println!("  first order oblique {equal:.4}, neighbours {sum:.4}, supercells {supercells:.4}");
         assert!(
             (sum - supercells).abs() < FIRST_OF_ROWS,
             "{nm}, {steered_deg:?}: {sum} {supercells}"
@@ -73,16 +73,16 @@ fn real_rows_are_met_better_than_by_equal_neighbours() {
         assert!(neighbours < MISFIT, "{nm}, {steered_deg:?}: {neighbours}");
         assert!(found.left_out < LEFT_OUT, "{}", found.left_out);
         if nm == 530.0 {
-            assert!(neighbours < OF_EQUAL * as_lit, "{neighbours} {as_lit}");
+            assert!(neighbours < OF_EQUAL * oblique, "{neighbours} {oblique}");
         }
         for row in found.rows.iter().filter(|_| steered_deg == [0.0; 2]) {
             assert!(
-                row.neighbours < row.as_lit + WORSE,
+                row.neighbours < row.oblique + WORSE,
                 "{nm}, {:?} at {} um: {} {}",
                 row.direction,
                 row.radius_um,
                 row.neighbours,
-                row.as_lit
+                row.oblique
             );
         }
     }

@@ -26,7 +26,7 @@ fn blazed_rows_send_the_light_where_the_truth_says() {
         assert!(found.first[2] < FIRST_OF_A_GRATING, "{grating:?}: {}", found.first[2]);
     }
     let all = total(groups.values());
-    let [normal, as_lit, blaze] = all.first;
+    let [normal, oblique, blaze] = all.first;
     println!(
         "first order {blaze:.4}, zero order {:.4}, phase {:.4}",
         all.zero, all.phase
@@ -36,7 +36,7 @@ fn blazed_rows_send_the_light_where_the_truth_says() {
     assert!(all.zero < ZERO, "{}", all.zero);
     assert!(all.phase < PHASE, "{}", all.phase);
     assert!(
-        normal > GAIN * blaze && as_lit > GAIN * blaze,
-        "{normal} {as_lit} {blaze}"
+        normal > GAIN * blaze && oblique > GAIN * blaze,
+        "{normal} {oblique} {blaze}"
     );
 }

@@ -53,7 +53,7 @@ pub fn drawn_corners(shape: PillarShape, number: u16, unit_nm: f64) -> Vec<Point
 /// recognised once each.
 pub struct PillarFinder {
     shape: PillarShape,
-    /// Whether pillars are recognised by their corners, and those are the corners of upright boxes.
+    /// True if pillars are recognised by their corners, and those are the corners of upright boxes.
     boxed: bool,
     unit_nm: f64,
     /// Answers for outlines as they are placed; boxes from the first corner.

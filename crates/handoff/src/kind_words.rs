@@ -2,17 +2,17 @@
 
 use metalith_pillars::{PillarShape, Rectangles};
 
-/// What a hand-off says of pillars of a kind, and what a lab is asked to measure of them.
+/// Words of a hand-off for pillars of a kind, and columns for what a lab measures of them.
 pub(super) struct KindWords {
-    /// What is measured of the pillars.
+    /// Quantities of the pillars that are measured.
     pub measured: &'static str,
-    /// What is measured of a pad.
+    /// Quantities of a pad that are measured.
     pub sizes: &'static str,
-    /// What the neighbours of a good site have in common.
+    /// Property that the neighbours of a good site share.
     pub similar: &'static str,
-    /// What a measurement at a site should give.
+    /// Value that a measurement at a site should give.
     pub expected: &'static str,
-    /// What the shots of the writer snap, and how the change is counted.
+    /// Quantity that the shots of the writer snap, and the measure of its change.
     pub snapped: &'static str,
     pub changed: &'static str,
     /// Columns to fill in for each dose.

@@ -72,7 +72,7 @@ impl Perturbation {
             ("cell.taper_deg", c.taper_deg, -30.0..=30.0),
             ("cell.corner_rounding_nm", c.corner_rounding_nm, 0.0..=1e4),
             ("cell.residual_mask_nm", c.residual_mask_nm, 0.0..=1e4),
-            ("path.gap_um", p.gap_um, -1e5..=1e5),
+            ("path.defocus_um", p.defocus_um, -1e5..=1e5),
             ("path.source_per_m", p.source_per_m, -1e4..=1e4),
             ("light.led_width", l.led_width, -1.0..=100.0),
             ("light.source_size", l.source_size, -1.0..=100.0),

@@ -282,7 +282,7 @@ pub struct ClassFields {
     tables: Vec<ClassTable>,
     departing: Option<Vec<(ClassTable, i32)>>,
     weight: f64,
-    gap_um: f64,
+    defocus_um: f64,
     camera: CameraChange,
 }
 
@@ -340,7 +340,7 @@ impl CaseOptics<'_> {
             departing: departing.map(|departing| scaled_to(&tables, departing, element.classes())),
             tables,
             weight,
-            gap_um: perturbation.path.added_distance_um(element.centre_um()),
+            defocus_um: perturbation.path.added_distance_um(element.centre_um()),
             camera: perturbation.camera,
         })
     }
@@ -350,7 +350,7 @@ impl ClassFields {
     /// The element in light from a direction.
     pub fn lit<'e>(&self, element: &'e AsBuiltElement, light: ArrivingLight) -> IncoherentFields<'e> {
         let (tables, camera) = (self.tables.clone(), self.camera.clone());
-        IncoherentFields::of_classes(element, tables, self.weight, light, self.gap_um, camera)
+        IncoherentFields::of_classes(element, tables, self.weight, light, self.defocus_um, camera)
     }
 
     /// Tables of light whose direction is asked for, each with how often it has the phase of the element: as those of

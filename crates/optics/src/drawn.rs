@@ -106,7 +106,7 @@ impl ElementOptics for DrawnOptics<'_> {
             fields,
             weight,
             light: ArrivingLight::new(&wave_of(light), &PathChange::default()),
-            gap_um: 0.0,
+            defocus_um: 0.0,
             camera: CameraChange::default(),
             lattice: self.pillars.lattice(),
             radius_um: self.radius_um,

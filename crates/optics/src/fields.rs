@@ -18,7 +18,7 @@ pub struct IncoherentFields<'e> {
     pub weight: f64,
     pub light: ArrivingLight,
     /// Added to the distance of the sensor (um).
-    pub gap_um: f64,
+    pub defocus_um: f64,
     pub camera: CameraChange,
     pub(crate) lattice: Lattice,
     /// Radius of the circle that light passes (um).
@@ -105,7 +105,7 @@ impl<'e> IncoherentFields<'e> {
         tables: Vec<ClassTable>,
         weight: f64,
         light: ArrivingLight,
-        gap_um: f64,
+        defocus_um: f64,
         camera: CameraChange,
     ) -> Self {
         let tables = tables.into_iter();
@@ -113,7 +113,7 @@ impl<'e> IncoherentFields<'e> {
             fields: tables.map(|table| Field::AsBuilt { element, table }).collect(),
             weight,
             light,
-            gap_um,
+            defocus_um,
             camera,
             lattice: element.lattice(),
             radius_um: element.radius_um(),
@@ -133,7 +133,7 @@ impl<'e> IncoherentFields<'e> {
     /// If the window is none, or the light arrives too steeply.
     pub fn psf(&self, stated: Window, accuracy: Accuracy, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
         let window = Window {
-            distance_um: stated.distance_um + self.gap_um,
+            distance_um: stated.distance_um + self.defocus_um,
             ..stated
         };
         let wavelength_um = self.light.plane.wavelength_um;

@@ -14,6 +14,30 @@ use metalith_pillars::PillarId;
 /// Version of the format that is written. The first called its perturbation `departure`; it is still read.
 const SCHEMA: u32 = 2;
 
+/// Keys of a perturbation that have another name now: section, old key, new key.
+const RENAMED: [(&str, &str, &str); 1] = [("path", "gap_um", "defocus_um")];
+
+/// The old keys of a model, each with what is wrong and what to write.
+fn old_keys(text: &str) -> Vec<(String, String, String)> {
+    let Ok(model) = text.parse::<toml::Table>() else {
+        return Vec::new();
+    };
+    let mut found = Vec::new();
+    for perturbation in ["perturbation", "departure"] {
+        for (section, old, new) in RENAMED {
+            let own = model
+                .get(perturbation)
+                .and_then(|p| p.get(section))
+                .and_then(|s| s.get(old));
+            if own.is_some() {
+                let (what, hint) = document::renamed(old, new);
+                found.push((format!("{perturbation}.{section}.{old}"), what, hint));
+            }
+        }
+    }
+    found
+}
+
 /// Model that a session has calibrated, in a file that later designs are simulated and compensated with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -92,6 +116,10 @@ impl CalibratedModel {
     /// If it is not such a file; all numbers that cannot be at once.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
         let written = "give the `model.toml` that `metalith calibrate` has written";
+        let old = old_keys(text);
+        if !old.is_empty() {
+            return Err(Error::Text(Box::new(Faults::at_keys(path, text, old))));
+        }
         let model: Self = toml::from_str(text).map_err(|e| {
             let fault = Fault {
                 kind: FaultKind::Inconsistent,
@@ -145,6 +173,24 @@ mod tests {
         perturbation.geometry.cd_bias_nm = -9.75;
         *perturbation.light.shift_mut(1) = 0.5;
         CalibratedModel::new("chip".into(), "explained by cd_bias".into(), perturbation)
+    }
+
+    #[test]
+    fn an_old_key_is_refused_with_the_new_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.toml");
+        model().write(&path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let old = text.replace("defocus_um", "gap_um");
+        let Err(Error::Text(faults)) = CalibratedModel::parse(&path, &old) else {
+            panic!("the old key is read")
+        };
+        let [fault] = faults.faults() else { panic!("{faults}") };
+        assert_eq!(fault.hint, "write `defocus_um`");
+        assert!(
+            old[fault.span.clone()].contains("0.0") || old[fault.span.clone()].contains("gap_um"),
+            "{faults}"
+        );
     }
 
     #[test]

@@ -133,7 +133,7 @@ mod tests {
     fn lamps_are_named_and_nothing_else_is() {
         let mut p = Perturbation::default();
         p.camera.pixel_blur_um = 1.0;
-        p.path.gap_um = 3.0;
+        p.path.defocus_um = 3.0;
         assert_eq!(p.not_applied(), []);
         *p.light.shift_mut(2) = 1.5;
         p.light.source_size = 0.5;
@@ -149,7 +149,7 @@ mod tests {
     fn what_is_applied_is_named_with_its_value() {
         let mut p = Perturbation::default();
         assert_eq!(p.applied(), []);
-        p.path.gap_um = 2.0;
+        p.path.defocus_um = 2.0;
         p.path.tilt_mrad = [0.0, -1.25];
         p.geometry.cd_bias_nm = -8.123_456;
         p.light.source_size = 0.5;
@@ -158,7 +158,7 @@ mod tests {
             text,
             [
                 "`geometry.cd_bias_nm` = -8.1235",
-                "`path.gap_um` = 2",
+                "`path.defocus_um` = 2",
                 "`path.tilt_mrad` = [0, -1.25]"
             ]
         );

@@ -100,7 +100,7 @@ impl CellChange {
 #[serde(default, deny_unknown_fields)]
 pub struct PathChange {
     /// Added to every distance of chip and sensor (um).
-    pub gap_um: f64,
+    pub defocus_um: f64,
     /// Added to every angle of incidence along x and y (mrad).
     pub tilt_mrad: [f64; 2],
     /// One over the distance of the source (1/m); zero for collimated light.
@@ -121,7 +121,7 @@ impl PathChange {
         let lean = |axis: usize| 1e-3 * self.sensor_tilt_mrad[axis] * (centre_um[axis] - self.sensor_pivot_um[axis]);
         let declared = compiled(&self.declared, |_| true);
         let declared: f64 = declared.iter().map(|t| t.value(&centre_um)).sum();
-        self.gap_um + lean(0) + lean(1) + declared
+        self.defocus_um + lean(0) + lean(1) + declared
     }
 }
 

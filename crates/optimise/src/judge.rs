@@ -27,21 +27,21 @@ pub struct Judged {
     pub mean: f64,
     /// Smallest.
     pub smallest: f64,
-    /// Largest wrapped phase step between neighbours (turns).
-    pub largest_step_turns: f64,
+    /// Largest wrapped phase step between neighbours (waves).
+    pub largest_step_waves: f64,
     #[serde(skip)]
     pub strehl: Strehl,
 }
 
 impl Judged {
-    fn new(source: &'static str, fidelity: Fidelity, strehl: Strehl, largest_step_turns: f64) -> Self {
+    fn new(source: &'static str, fidelity: Fidelity, strehl: Strehl, largest_step_waves: f64) -> Self {
         Self {
             source,
             fidelity,
             geometric_mean: strehl.geometric_mean(),
             mean: strehl.mean(),
             smallest: strehl.smallest(),
-            largest_step_turns,
+            largest_step_waves,
             strehl,
         }
     }
@@ -68,10 +68,10 @@ impl OptimiseTask {
     ///
     /// # Errors
     /// If the cell does not cover the band.
-    pub fn judge_rings(&self, turns: &[f64], cell: &dyn CellModel) -> Result<Judged> {
-        let widths = self.widths_nm(turns);
+    pub fn judge_rings(&self, waves: &[f64], cell: &dyn CellModel) -> Result<Judged> {
+        let widths = self.widths_nm(waves);
         let strehl = self.lens.strehl_of_rings(&widths, cell, &self.judging_wavelengths())?;
-        Ok(Judged::new("rings", cell.fidelity(), strehl, largest_step(turns)))
+        Ok(Judged::new("rings", cell.fidelity(), strehl, largest_step(waves)))
     }
 
     /// Strehl ratios from the pillars of a layout of the lens alone, summed over every pillar.
@@ -84,14 +84,14 @@ impl OptimiseTask {
         Ok(Judged::new("layout", cell.fidelity(), strehl, step))
     }
 
-    /// Geometric-mean Strehl ratio of phases (turns) for errors of fabrication drawn afresh: one for each
+    /// Geometric-mean Strehl ratio of phases (waves) for errors of fabrication drawn afresh: one for each
     /// draw. `cells` as in [`OptimiseTask::solve`].
     ///
     /// # Errors
     /// If a cell does not cover the band, or is coupled.
     pub fn judge_errors(
         &self,
-        turns: &[f64],
+        waves: &[f64],
         robust: &metalith_design::RobustSpec,
         cells: &[&dyn CellModel],
         draws: usize,
@@ -103,7 +103,7 @@ impl OptimiseTask {
                 "judge them with the cell `rigorous`",
             ));
         }
-        let widths = self.widths_nm(turns);
+        let widths = self.widths_nm(waves);
         let band = self.judging_wavelengths().into_iter().step_by(4).collect::<Vec<_>>();
         robust::draw(robust, draws, cells.len(), self.spec.seed ^ 0x0dd)
             .into_iter()

@@ -38,8 +38,8 @@ pub struct OptimiseReport {
     /// Steps of the rotation (degrees), of rotated rectangles: what is told of widths is then told of rotations, by their number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_step_deg: Option<f64>,
-    /// Limit on the step (turns).
-    pub step_limit_turns: f64,
+    /// Limit on the step (waves).
+    pub step_limit_waves: f64,
     /// Reference of gains, judged in each way: the design's own phase, or where that is a table, a hyperbolic one.
     pub before: Vec<Judged>,
     /// The table that the design has.
@@ -51,7 +51,7 @@ pub struct OptimiseReport {
     /// of a band is solved with fewer orders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub at_single_wavelengths: Vec<(f64, f64)>,
-    /// Geometric-mean Strehl ratio that exchange reaches for other limits (turns).
+    /// Geometric-mean Strehl ratio that exchange reaches for other limits (waves).
     pub merit_over_limit: Vec<(f64, f64)>,
     /// Expected PSNR of restored images (dB) at each field angle (degrees), before and after.
     pub expected_psnr_db: Vec<(f64, f64, f64)>,
@@ -60,7 +60,7 @@ pub struct OptimiseReport {
     /// Merit along the way.
     #[serde(skip)]
     pub history: Vec<(u32, f64)>,
-    /// Radius (um), phase before and after (turns), width after (nm) of each ring.
+    /// Radius (um), phase before and after (waves), width after (nm) of each ring.
     #[serde(skip)]
     pub rings: Vec<(f64, f64, f64, u16)>,
     /// Wavelengths of the pictures (um), their greatest radius (um), and PSFs before and after.
@@ -76,7 +76,7 @@ impl OptimiseReport {
     pub fn limit_kept(&self) -> bool {
         self.after
             .iter()
-            .all(|j| j.largest_step_turns <= self.step_limit_turns + 1e-6)
+            .all(|j| j.largest_step_waves <= self.step_limit_waves + 1e-6)
     }
 
     /// Cost of the limit on the step, in words, where the result is worse than its reference and the reference has
@@ -84,8 +84,8 @@ impl OptimiseReport {
     pub fn limit_costs(&self) -> Option<String> {
         let (before, after) = (self.before.first()?, self.after.first()?);
         limit_costs(
-            (before.largest_step_turns, before.geometric_mean),
-            (self.step_limit_turns, after.geometric_mean),
+            (before.largest_step_waves, before.geometric_mean),
+            (self.step_limit_waves, after.geometric_mean),
             &self.merit_over_limit,
         )
     }
@@ -127,11 +127,11 @@ impl OptimiseReport {
         let kept = self.limit_kept();
         let words = if kept {
             format!(
-                "Every phase step, of the rings and of the layout, is within {} turns.",
-                self.step_limit_turns
+                "Every phase step, of the rings and of the layout, is within {} waves.",
+                self.step_limit_waves
             )
         } else {
-            format!("A phase step is beyond the limit of {} turns.", self.step_limit_turns)
+            format!("A phase step is beyond the limit of {} waves.", self.step_limit_waves)
         };
         page.verdict(Verdict::of(kept), words);
         if let (Some(before), Some(after)) = (self.before.first(), self.after.first()) {
@@ -183,11 +183,11 @@ impl OptimiseReport {
         if !self.merit_over_limit.is_empty() {
             let mut chart = Chart::new(
                 "What the limit costs",
-                Axis::linear("limit on the phase step", "turns").range(0.0, 0.5),
+                Axis::linear("limit on the phase step", "waves").range(0.0, 0.5),
                 Axis::linear("geometric-mean Strehl ratio", ""),
             );
             chart.line("reached by exchange", self.merit_over_limit.iter().copied());
-            chart.marker(self.step_limit_turns, "this design");
+            chart.marker(self.step_limit_waves, "this design");
             page.section("Merit against limit");
             page.figure(
                 chart.caption("Exchange at temperature zero from the optimised phase; on the grid optimised on."),
@@ -250,7 +250,7 @@ impl OptimiseReport {
             Column::number("Geometric mean", ""),
             Column::number("Mean", ""),
             Column::number("Smallest", ""),
-            Column::number("Largest step", "turns"),
+            Column::number("Largest step", "waves"),
         ]);
         for (name, list) in self.phases() {
             for judged in list {
@@ -261,7 +261,7 @@ impl OptimiseReport {
                     Cell::sig(judged.geometric_mean, 3),
                     Cell::sig(judged.mean, 3),
                     Cell::sig(judged.smallest, 3),
-                    Cell::fixed(judged.largest_step_turns, 3),
+                    Cell::fixed(judged.largest_step_waves, 3),
                 ]);
             }
         }
@@ -332,7 +332,7 @@ impl OptimiseReport {
     }
 
     fn phase(&self) -> metalith_report::Figure {
-        let mut chart = Chart::new("Phase", Axis::linear("radius", "um"), Axis::linear("phase", "turns"));
+        let mut chart = Chart::new("Phase", Axis::linear("radius", "um"), Axis::linear("phase", "waves"));
         for (name, pick) in [("before", 0), ("after", 1)] {
             let (mut sum, mut last) = (0.0, None);
             let points = self.rings.iter().map(|&(r, a, b, _)| {
@@ -386,12 +386,12 @@ fn limit_costs(before: (f64, f64), after: (f64, f64), over_limit: &[(f64, f64)])
     let wider = over_limit.iter().find(|(wider, merit)| *wider >= step && *merit > is);
     let hint = wider.map_or_else(String::new, |(wider, merit)| {
         format!(
-            "; with `step_limit_turns = {wider}` in [optimise] {} is reached",
+            "; with `step_limit_waves = {wider}` in [optimise] {} is reached",
             sig(*merit, 3)
         )
     });
     Some(format!(
-        "The phase before has steps of {step:.3} turns from ring to ring, those of a phase that is found are limited to {limit}, and this costs more than was gained{hint}."
+        "The phase before has steps of {step:.3} waves from ring to ring, those of a phase that is found are limited to {limit}, and this costs more than was gained{hint}."
     ))
 }
 
@@ -404,12 +404,12 @@ mod tests {
         let over = [(0.1, 0.2), (0.2, 0.36), (0.3, 0.54), (0.4, 0.55)];
         let words = limit_costs((0.295, 0.525), (0.2, 0.36), &over).unwrap();
         assert!(
-            words.contains("0.295 turns") && words.contains("`step_limit_turns = 0.3`") && words.contains("0.540"),
+            words.contains("0.295 waves") && words.contains("`step_limit_waves = 0.3`") && words.contains("0.540"),
             "{words}"
         );
         // No limit that was tried is as wide.
         let words = limit_costs((0.45, 0.525), (0.2, 0.36), &over).unwrap();
-        assert!(!words.contains("step_limit_turns"), "{words}");
+        assert!(!words.contains("step_limit_waves"), "{words}");
         // Better than before, or before within the limit.
         assert!(limit_costs((0.295, 0.3), (0.2, 0.36), &over).is_none());
         assert!(limit_costs((0.2, 0.525), (0.2, 0.36), &over).is_none());

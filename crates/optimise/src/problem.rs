@@ -88,8 +88,8 @@ fn side_lobe_rows(
     let lengths = wavelengths(spec.band_um.0 * 1e3, spec.band_um.1 * 1e3, SIDE_LOBE_STEP_NM);
     let area = lens.rings.sites() as f64 * lens.rings.lattice().cell_um2();
     let width = 3.0 * radius_um / SIDE_LOBE_POINTS as f64;
-    let gap_um = lens.gap_um + error.gap_error_um;
-    let bessel = RingField::new(&lens.rings, spec.band_um.0, gap_um).bessel(4.0 * radius_um);
+    let distance_um = lens.distance_um + error.defocus_um;
+    let bessel = RingField::new(&lens.rings, spec.band_um.0, distance_um).bessel(4.0 * radius_um);
     let points = lengths
         .iter()
         .flat_map(|&l| (0..SIDE_LOBE_POINTS).map(move |i| (l, radius_um + (i as f64 + 0.5) * width)))
@@ -98,7 +98,7 @@ fn side_lobe_rows(
         .into_par_iter()
         .map(|(wavelength_um, rho)| {
             let full = cells[error.cell].full_transmission(wavelength_um)?;
-            let field = RingField::new(&lens.rings, wavelength_um, gap_um);
+            let field = RingField::new(&lens.rings, wavelength_um, distance_um);
             // Each ring around the axis with its power, so that all rows are of like size.
             let scale = (std::f64::consts::TAU * rho * width / area).sqrt() / full;
             let weight = 1.0 / lengths.len() as f32;

@@ -18,8 +18,8 @@ use metalith_design::{Design, MeritSpec, OptimiseSpec, StartSpec};
 /// Result of an optimisation.
 #[derive(Clone, Debug)]
 pub struct Optimised {
-    /// Phase of each ring (turns), in [0, 1).
-    pub turns: Vec<f64>,
+    /// Phase of each ring (waves), in [0, 1).
+    pub waves: Vec<f64>,
     /// Width of the pillars of each ring (nm).
     pub widths_nm: Vec<u16>,
     /// The merit, as it was optimised.
@@ -41,11 +41,11 @@ pub struct OptimiseTask {
     pub mapping: Mapping,
     /// Settings of the optimisation.
     pub spec: OptimiseSpec,
-    /// The design's own phase (turns).
-    pub own_turns: Vec<f64>,
+    /// The design's own phase (waves).
+    pub own_waves: Vec<f64>,
     /// Reference phase (waves) of gains: the design's own phase, or where that is a table, which may well be an
     /// optimised one, a hyperbolic lens for the middle of the band.
-    pub reference_turns: Vec<f64>,
+    pub reference_waves: Vec<f64>,
     pub(crate) limit: StepLimit,
 }
 
@@ -59,26 +59,26 @@ impl OptimiseTask {
         design.one_lens("the optimiser")?;
         design.radial_phase("the optimiser")?;
         let rings = Rings::new(design.lattice(), design.lens.diameter_nm)?;
-        let own_turns = turns_of(&rings, &design.lens.phase);
+        let own_waves = turns_of(&rings, &design.lens.phase);
         let lens = Lens {
             rings,
-            gap_um: design.lens.focal_length_um,
+            distance_um: design.lens.focal_length_um,
         };
         let band_um = design.optimise.band_um;
         let hyperbolic = Start::Hyperbolic {
             wavelength_um: 0.5 * (band_um.0 + band_um.1),
         };
-        let reference_turns = match design.lens.phase {
-            RadialPhase::Table { .. } => hyperbolic.turns(&lens, 0),
-            _ => own_turns.clone(),
+        let reference_waves = match design.lens.phase {
+            RadialPhase::Table { .. } => hyperbolic.waves(&lens, 0),
+            _ => own_waves.clone(),
         };
         Ok(Self {
             lens,
-            reference_turns,
+            reference_waves,
             mapping: Mapping::new(&PillarRule::new(&design.cell, &design.mapping)),
             spec: design.optimise.clone(),
-            own_turns,
-            limit: StepLimit::new(design.optimise.step_limit_turns)?,
+            own_waves,
+            limit: StepLimit::new(design.optimise.step_limit_waves)?,
         })
     }
 
@@ -95,9 +95,9 @@ impl OptimiseTask {
     }
 
     /// Widths that are made of phases, without any limit on their steps (nm).
-    pub fn widths_nm(&self, turns: &[f64]) -> Vec<u16> {
+    pub fn widths_nm(&self, waves: &[f64]) -> Vec<u16> {
         let choices = self.mapping.choices();
-        turns
+        waves
             .iter()
             .map(|&t| choices[self.mapping.nearest(t)].width_nm)
             .collect()
@@ -117,14 +117,14 @@ impl OptimiseTask {
         Ok(match self.spec.start {
             StartSpec::All => match chain % 4 {
                 0 => log_asphere,
-                1 => Start::Previous(self.own_turns.clone()),
+                1 => Start::Previous(self.own_waves.clone()),
                 2 => Start::Random,
                 _ => hyperbolic,
             },
             StartSpec::LogAsphere => log_asphere,
             StartSpec::Hyperbolic => hyperbolic,
             StartSpec::Random => Start::Random,
-            StartSpec::Previous => Start::Previous(self.own_turns.clone()),
+            StartSpec::Previous => Start::Previous(self.own_waves.clone()),
             StartSpec::Log => {
                 return Err(Error::refused(
                     "optimise/log-from-itself",
@@ -136,7 +136,7 @@ impl OptimiseTask {
     }
 }
 
-/// Phase in the middle of each ring (turns).
+/// Phase in the middle of each ring (waves).
 pub fn turns_of(rings: &Rings, phase: &RadialPhase) -> Vec<f64> {
     (0..rings.len())
         .map(|ring| phase.turns(rings.middle_um(ring).powi(2)))

@@ -22,27 +22,30 @@ fn the_kernel_agrees_with_direct_sum_and_fold() {
     const FOLD: f64 = 1e-5;
     let lattice = Lattice::covering(1_000_000, 350).unwrap();
     let rings = Rings::new(lattice, 1_000_000).unwrap();
-    let lens = Lens { rings, gap_um: 2400.0 };
-    let turns = Start::LogAsphere { band_um: (0.4, 0.7) }.turns(&lens, 0);
-    let widths = turns
+    let lens = Lens {
+        rings,
+        distance_um: 2400.0,
+    };
+    let waves = Start::LogAsphere { band_um: (0.4, 0.7) }.waves(&lens, 0);
+    let widths = waves
         .iter()
         .map(|t| 2 * (51.0 + 93.0 * t.rem_euclid(1.0)) as u16)
         .collect::<Vec<_>>();
     let map = lens.rings.width_map(&widths);
     let wavelength = 0.52;
     let t = PublishedCell::new(350).transmissions(wavelength, 300).unwrap();
-    let field = RingField::new(&lens.rings, wavelength, lens.gap_um);
+    let field = RingField::new(&lens.rings, wavelength, lens.distance_um);
     let quick = (0..lens.rings.len())
         .map(|k| field.on_axis(k) * t[usize::from(widths[k])])
         .sum::<Complex64>();
     let pillars = Pillars::new(&map, &t).unwrap();
     let wave = PlaneWave::normal(wavelength);
     // The kernel leaves out the phase common to all.
-    let common = Complex64::cis(std::f64::consts::TAU * (lens.gap_um / wavelength).fract());
-    let direct = Direct::at(&pillars, &wave, &[[0.0, 0.0, lens.gap_um]])[0];
+    let common = Complex64::cis(std::f64::consts::TAU * (lens.distance_um / wavelength).fract());
+    let direct = Direct::at(&pillars, &wave, &[[0.0, 0.0, lens.distance_um]])[0];
     let error = (quick * common - direct).norm() / field.matched();
     assert!(error < DIRECT, "{error:e}");
-    let window = Window::about([0.0, 0.0], 0.35, 16, lens.gap_um);
+    let window = Window::about([0.0, 0.0], 0.35, 16, lens.distance_um);
     let fold = FoldedPropagator::plan(lattice, 500.0, wavelength, window, Accuracy::Accurate).unwrap();
     let found = fold.field(&pillars, &wave, &mut Scratch::default()).unwrap().values[[8, 8]];
     let found = Complex64::new(found.re.into(), found.im.into());
@@ -96,7 +99,7 @@ const IMAGES: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nstart = \"h
     [optimise.merit]\ndeconvolution = 1\nlog = 0.01\n\
     [optimise.views]\nangles_deg = [0, 15]\nstep_nm = 30\npixels = 16\n";
 
-/// Limit on the step of phase in the designs of this file (turns), and the rounding of a difference of phases.
+/// Limit on the step of phase in the designs of this file (waves), and the rounding of a difference of phases.
 const STEP_TURNS: f64 = 0.2 + 1e-9;
 
 #[test]
@@ -109,14 +112,14 @@ fn an_interrupted_run_goes_on_to_the_same_end() {
         let begin = || Checkpoint::begin(&design);
         let whole = task.solve(&cells, begin(), &Silent).unwrap();
         assert!(whole.interrupted.is_none());
-        assert!(largest_step(&whole.turns) <= STEP_TURNS);
+        assert!(largest_step(&whole.waves) <= STEP_TURNS);
 
         // Over and over, in every stage.
         let kept = folder.path().join("checkpoint.bin");
         let (mut checkpoint, mut interruptions) = (begin(), 0);
         let rest = loop {
             let part = task.solve(&cells, checkpoint, &StopAfter::new(14)).unwrap();
-            assert!(largest_step(&part.turns) <= STEP_TURNS);
+            assert!(largest_step(&part.waves) <= STEP_TURNS);
             let Some(interrupted) = part.interrupted else {
                 break part;
             };
@@ -156,8 +159,8 @@ fn both_solvers_beat_what_they_begin_from_and_exchange_beats_adam() {
         let design = Design::read(&design(folder.path(), section)).unwrap();
         let task = OptimiseTask::of(&design).unwrap();
         let found = task.solve(&[&cell], Checkpoint::begin(&design), &Silent).unwrap();
-        let before = task.judge_rings(&task.own_turns, &cell).unwrap();
-        let after = task.judge_rings(&found.turns, &cell).unwrap();
+        let before = task.judge_rings(&task.own_waves, &cell).unwrap();
+        let after = task.judge_rings(&found.waves, &cell).unwrap();
         assert!(after.geometric_mean > GAIN * before.geometric_mean);
         after.geometric_mean
     });
@@ -175,13 +178,13 @@ fn phases_over_the_plane_are_refused() {
 #[test]
 fn mistakes_of_the_section_are_found_together() {
     let folder = tempfile::tempdir().unwrap();
-    let section = "[optimise]\nsolver = \"exchange\"\nstep_limit_turns = 0.7\nseeed = 1\nblocks = -1\n[optimise.merit]\nlog = 0\n";
+    let section = "[optimise]\nsolver = \"exchange\"\nstep_limit_waves = 0.7\nseeed = 1\nblocks = -1\n[optimise.merit]\nlog = 0\n";
     let error = Design::read(&design(folder.path(), section)).unwrap_err();
     let metalith_core::Error::Text(faults) = error else {
         panic!("{error}")
     };
     let all = format!("{faults:?}");
-    for part in ["step_limit_turns", "seeed", "blocks", "weight of zero"] {
+    for part in ["step_limit_waves", "seeed", "blocks", "weight of zero"] {
         assert!(all.contains(part), "{part} in {all}");
     }
 }

@@ -163,7 +163,7 @@ impl Bench {
         progress: &dyn Progress,
     ) -> Result<Subject> {
         let design = self.tolerance.design(number)?;
-        if design.verify.incidence == CellIncidence::AsLit {
+        if design.verify.incidence == CellIncidence::Oblique {
             return Err(Error::refused(
                 "study/oblique",
                 "a study takes the cells along the normal, and the design asks for them as they are lit",

@@ -254,7 +254,7 @@ mod tests {
                 normal("corner_rounding", 10.0),
             ],
             grids: vec![Grid {
-                effect: "gap".into(),
+                effect: "defocus".into(),
                 values: vec![-5.0, 0.0, 5.0],
             }],
             design_grids: vec![DesignGrid {
@@ -273,7 +273,14 @@ mod tests {
         let names: Vec<String> = drawer.names().into_iter().map(|n| n.0).collect();
         assert_eq!(
             names,
-            ["gap", "mapping.basis", "cd_bias", "tilt_1", "tilt_2", "corner_rounding"]
+            [
+                "defocus",
+                "mapping.basis",
+                "cd_bias",
+                "tilt_1",
+                "tilt_2",
+                "corner_rounding"
+            ]
         );
         assert_eq!(drawer.count(), 6000);
         let draw = |k| drawer.draw([7; 32], k).unwrap().amounts;
@@ -313,7 +320,7 @@ mod tests {
     fn amounts_become_a_perturbation_in_the_unit_of_their_effect() {
         let amounts = vec![5.0, 1.0, -3.0, 1.0, 2.0, 20.0];
         let p = drawer(2.0).perturbation(&Drawn { amounts });
-        assert_eq!(p.path.gap_um, 5.0);
+        assert_eq!(p.path.defocus_um, 5.0);
         assert_eq!(p.geometry.cd_bias_nm, -3.0);
         assert_eq!(p.path.tilt_mrad, [1.0, 2.0]);
         // The square is what is fitted; its root comes back to rounding.

@@ -106,12 +106,12 @@ pub(crate) fn figures(found: &Verification) -> BTreeMap<String, Option<f64>> {
             for contrast in &white.contrast {
                 // Curves are sampled finely; these two are what is looked at.
                 if reported.is_some_and(|two| two.contains(&contrast.lp_mm)) {
-                    let key = format!("white_mtf_{}lpmm_{}", contrast.lp_mm, white.channel);
+                    let key = format!("polychromatic_mtf_{}lpmm_{}", contrast.lp_mm, white.channel);
                     worst(key, contrast.mtf[0].min(contrast.mtf[1]), false);
                 }
             }
             worst(
-                format!("white_energy_2_pixels_{}", white.channel),
+                format!("polychromatic_energy_2_pixels_{}", white.channel),
                 white.energy_2_pixels,
                 false,
             );

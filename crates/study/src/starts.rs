@@ -48,8 +48,8 @@ pub struct StartRecord {
     pub from: String,
     /// Merit as it was optimised; larger is better.
     pub merit: f64,
-    /// Phase of each ring (turns), in [0, 1).
-    pub turns: Vec<f64>,
+    /// Phase of each ring (waves), in [0, 1).
+    pub waves: Vec<f64>,
 }
 
 /// All starts.
@@ -131,7 +131,7 @@ impl StartsPlan {
                     seed: task.spec.seed,
                     from: found.start.to_owned(),
                     merit: found.merit,
-                    turns: found.turns,
+                    waves: found.waves,
                 }),
             }
         };
@@ -168,7 +168,7 @@ impl StartsPlan {
                 found.merit
             ),
         ];
-        write_phase_table(&phase, &task.lens.rings, &found.turns, &remarks)?;
+        write_phase_table(&phase, &task.lens.rings, &found.waves, &remarks)?;
         let mut table = String::from("start,seed,from,merit\n");
         for s in &starts {
             table.push_str(&format!("{},{},{},{}\n", s.start, s.seed, s.from, s.merit));

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_calibrate::{Effect, Stage, of_any_chip};
+use metalith_calibrate::{Effect, RENAMED_EFFECTS, Stage, of_any_chip};
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_verify::Sense;
@@ -174,6 +174,9 @@ impl Tolerance {
 fn effect<'e>(s: &Section<'_, '_>, known: &'e [Box<dyn Effect>]) -> &'e dyn Effect {
     let names: Vec<String> = known.iter().map(|e| e.name()).collect();
     let choices: Vec<(&str, usize)> = names.iter().enumerate().map(|(k, n)| (n.as_str(), k)).collect();
+    for (old, new) in RENAMED_EFFECTS {
+        s.renamed(old, new);
+    }
     known[s.choice("effect", &choices, None)].as_ref()
 }
 
@@ -290,7 +293,7 @@ distribution = "uniform"
 low = -2.0
 high = 2.0
 [[grid]]
-effect = "gap"
+effect = "defocus"
 values = [-5, 0, 5]
 [[limit]]
 figure = "strehl_530nm_0deg"
@@ -324,7 +327,7 @@ at_least = 0.6
         for part in [
             "did you mean",
             "not above the lowest",
-            "`gap` cannot be -500 um",
+            "`defocus` cannot be -500 um",
             "one side",
         ] {
             assert!(error.contains(part), "{part} is not in {error}");
@@ -354,7 +357,7 @@ at_least = 0.6
             .concat();
         let text = GOOD.replace("draws = 10", "draws = 10000000") + &grids;
         let error = read(&text).unwrap_err().to_string();
-        // 200^4, and three values of the gap.
+        // 200^4, and three values of the defocus.
         assert!(error.contains("10000000 draws at each of 4800000000 points"), "{error}");
     }
 

@@ -144,7 +144,7 @@ fn draws_of_upright_rectangles_have_the_figures_of_their_models() {
 fn what_rectangles_have_no_meaning_for_is_told() {
     let camera = metalith_testing::design("../cameras/gt1930");
     let picture = format!(
-        "[[grid]]\neffect = \"gap\"\nvalues = [0]\n[picture]\ncamera = \"{}\"\nscene = \"star\"\n",
+        "[[grid]]\neffect = \"defocus\"\nvalues = [0]\n[picture]\ncamera = \"{}\"\nscene = \"star\"\n",
         camera.display()
     );
     let corners = "[[grid]]\neffect = \"corner_rounding\"\nvalues = [0, 10]\n";

@@ -49,7 +49,7 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     assert!(page.contains("Worst draws"));
     b.write(&folder.path().join("result.csv")).unwrap();
     let csv = fs::read_to_string(folder.path().join("result.csv")).unwrap();
-    assert!(csv.starts_with("draw,cd_bias_nm,gap_um,"), "{csv}");
+    assert!(csv.starts_with("draw,cd_bias_nm,defocus_um,"), "{csv}");
     assert_eq!(csv.lines().count(), 8);
     assert!(b.write(&folder.path().join("result.xls")).is_err());
     let table = folder.path().join("result.parquet");
@@ -174,7 +174,7 @@ fn designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables() {
     a.write(&folder.path().join("result.csv")).unwrap();
     let csv = fs::read_to_string(folder.path().join("result.csv")).unwrap();
     assert!(
-        csv.starts_with("draw,stray_light,lens.focal_length_um,cell.pillar_height_nm,cd_bias_nm,gap_um,"),
+        csv.starts_with("draw,stray_light,lens.focal_length_um,cell.pillar_height_nm,cd_bias_nm,defocus_um,"),
         "{csv}"
     );
     assert!(csv.contains("\n23,0.2,40,640,"), "{csv}");
@@ -274,7 +274,7 @@ fn pictures_are_figures_of_a_draw() {
     let text = fs::read_to_string(&path).unwrap();
     let head = &text[..text.find("[[vary]]").unwrap()];
     let psnr = |kernels: &str| {
-        let grid = "[[grid]]\neffect = \"gap\"\nvalues = [0.0, 14.0]\n";
+        let grid = "[[grid]]\neffect = \"defocus\"\nvalues = [0.0, 14.0]\n";
         let picture = format!(
             "[picture]\ncamera = \"camera.toml\"\nscene = \"star\"\npixels = 64\nfield_deg = 50\nnodes = 5\nkernels = \"{kernels}\"\n"
         );

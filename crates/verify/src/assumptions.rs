@@ -169,8 +169,7 @@ fn in_degrees(apart_deg: f64) -> String {
 
 /// Effect of the angle on the corner element of `designs/prototype_3x3.toml`, at 455, 530 and 660 nm:
 /// docs/method/verify.md, "Angle of incidence".
-const OF_ANGLE: &str =
-    "57 to 83 % along the normal, 48 to 85 % as lit in the middle of its field and 21 to 77 % at 15° from there";
+const OF_ANGLE: &str = "57 to 83 % along the normal, 48 to 85 % at oblique incidence in the middle of its field and 21 to 77 % at 15° from there";
 
 /// Largest angle between where an element looks at a wavelength (um) and where it looks at that of its wedge (degrees).
 fn white_apart_deg(design: &Design, wavelength_um: f64) -> f64 {

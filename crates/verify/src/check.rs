@@ -128,7 +128,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
         });
     }
     let told = found.camera.as_ref().map(|c| c.frequencies().half_nyquist_lp_mm);
-    let contrast_lp_mm = limits.white_mtf_lp_mm.or(told).unwrap_or(f64::NAN);
+    let contrast_lp_mm = limits.polychromatic_mtf_lp_mm.or(told).unwrap_or(f64::NAN);
     let white = |of: &dyn Fn(&WhiteChannel) -> f64| {
         let mut all = Vec::new();
         for d in &found.distinct {
@@ -140,13 +140,16 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
         worst(all.into_iter())
     };
     let whites: [White<'_>; 2] = [
-        ("contrast in white light", "white_mtf_min", limits.white_mtf_min, &|w| {
-            w.least_contrast(contrast_lp_mm)
-        }),
+        (
+            "contrast in white light",
+            "polychromatic_mtf_min",
+            limits.polychromatic_mtf_min,
+            &|w| w.least_contrast(contrast_lp_mm),
+        ),
         (
             "share of white light in a square of 2 pixels",
-            "white_energy_2_pixels_min",
-            limits.white_energy_2_pixels_min,
+            "polychromatic_energy_2_pixels_min",
+            limits.polychromatic_energy_2_pixels_min,
             &|w| w.energy_2_pixels,
         ),
     ];
@@ -176,8 +179,11 @@ fn not_simulated(limits: &LimitSpec, why: &str) -> Vec<Check> {
     ];
     let least = [
         ("strehl_ratio_min", limits.strehl_ratio_min),
-        ("white_mtf_min", limits.white_mtf_min),
-        ("white_energy_2_pixels_min", limits.white_energy_2_pixels_min),
+        ("polychromatic_mtf_min", limits.polychromatic_mtf_min),
+        (
+            "polychromatic_energy_2_pixels_min",
+            limits.polychromatic_energy_2_pixels_min,
+        ),
     ];
     let set = most
         .into_iter()

@@ -29,7 +29,7 @@ pub struct Lighting {
     /// Direction sines of the incident light, in air.
     pub incidence_sin: [f64; 2],
     /// True if cells are solved at that angle, for both polarisations; false for along the normal.
-    pub cells_as_lit: bool,
+    pub oblique_cells: bool,
     /// Distance from the pillar tops to the sensor (um).
     pub distance_um: f64,
     /// Middle of the window, from the axis of an element (um).
@@ -130,7 +130,7 @@ impl Lighting {
             polarised: self.polarised,
             ..Illumination::from_direction(wavelength_um, self.incidence_sin)
         };
-        if self.cells_as_lit { light.oblique() } else { light }
+        if self.oblique_cells { light.oblique() } else { light }
     }
 
     /// An element as read.

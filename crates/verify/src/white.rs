@@ -114,7 +114,7 @@ impl<'a> WhiteSimulator<'a> {
         };
         let colour = |nm: &f64| Ok((nm * 1e-3, judge.full_transmission(nm * 1e-3)?));
         let mut lp_mm = PixelFrequencies::of(camera.sensor.pixel_um).drawn().to_vec();
-        lp_mm.extend(design.verify.limits.white_mtf_lp_mm);
+        lp_mm.extend(design.verify.limits.polychromatic_mtf_lp_mm);
         lp_mm.sort_by(f64::total_cmp);
         lp_mm.dedup();
         Ok(Some(Self {

@@ -66,7 +66,7 @@ fn image((design, _, folder): &Lens, arriving: Polarisation, analyser: Option<An
     let light = Lighting {
         wavelengths_um: vec![WAVELENGTH_UM],
         incidence_sin: [0.0; 2],
-        cells_as_lit: false,
+        oblique_cells: false,
         distance_um: design.lens.focal_length_um,
         at_um: [0.0; 2],
         samples: 96,

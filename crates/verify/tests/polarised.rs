@@ -78,7 +78,7 @@ fn of_ideal_plates(arriving: Polarisation, analyser: Option<Analyser>) -> Single
     let light = Lighting {
         wavelengths_um: vec![0.532],
         incidence_sin: [0.0; 2],
-        cells_as_lit: false,
+        oblique_cells: false,
         distance_um: design.lens.focal_length_um,
         at_um: [0.0; 2],
         samples: 64,

@@ -239,7 +239,7 @@ impl PsfArgs {
         Lighting {
             wavelengths_um: light.wavelengths_um.clone(),
             incidence_sin: [self.angle_x_deg, self.angle_y_deg].map(|deg| deg.to_radians().sin()),
-            cells_as_lit: self.oblique,
+            oblique_cells: self.oblique,
             distance_um: self.distance_um,
             at_um: [self.at_x_um, self.at_y_um],
             samples: self.samples,

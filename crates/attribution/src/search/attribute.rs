@@ -1,4 +1,4 @@
-//! From a residual to names: score every effect, fit the leaders, keep what predicts captures that were not
+//! From a residual to names: score every effect, fit the leaders, keep what predicts measurements that were not
 //! fitted, and say which effects cannot be distinguished.
 
 use metalith_core::{Progress, Result};
@@ -31,7 +31,7 @@ pub struct Finding<M: Measurements> {
     pub after: Fit<M>,
     pub held_before: HeldOutErrors,
     pub held_after: HeldOutErrors,
-    /// The error that random smooth terms would leave on captures left out.
+    /// The error that random smooth terms would leave on measurements left out.
     pub null_held_out: f64,
     pub ranking: Vec<TriedEffect>,
     /// What was tried on top of each effect that was taken.

@@ -1,7 +1,7 @@
 //! Pair search: two effects at once, where no single one helps.
 //!
 //! Two effects that change the same phase, each with its own dependence on colour, can leave a residual that
-//! neither predicts alone: a fit of one absorbs part of the other and fails on captures left out. A pair is
+//! neither predicts alone: a fit of one absorbs part of the other and fails on measurements left out. A pair is
 //! taken only if both together leave next to nothing.
 
 use metalith_core::{Progress, Result};
@@ -25,7 +25,7 @@ const PROMISING: f64 = 0.25;
 /// Share of the error above noise that it may leave in the end.
 const MAY_LEAVE: f64 = 0.05;
 
-/// And the reduced chi-square per pixel that it may leave where the error is small.
+/// And the reduced chi-square per point that it may leave where the error is small.
 pub const LEAST_LEFT: f64 = 0.05;
 
 /// Effects that explain a residual together, or one that only a surrogate about its own fit shows.

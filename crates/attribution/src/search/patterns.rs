@@ -38,7 +38,7 @@ pub struct Pattern {
 pub fn patterns<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>) -> Vec<Pattern> {
     let slots: Vec<usize> = (0..problem.model.slots().len()).collect();
     let wide = problem.at(&slots, fit.theta.clone(), fit.nuisances.clone());
-    let pixels = problem.points();
+    let points = problem.points();
     let shared = problem.shared();
     let mut found: Vec<(f64, usize, usize)> = Vec::new();
     let groupings = problem.data.groupings();
@@ -74,11 +74,11 @@ pub fn patterns<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>) -> V
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let above = |chi2: f64| (chi2 / pixels - 1.0).max(0.0);
+    let above = |chi2: f64| (chi2 / points - 1.0).max(0.0);
     let mut out: Vec<Pattern> = Vec::new();
     for (_, slot, by) in found.into_iter().take(REPORTED) {
         let pattern = fitted(problem, fit, slot, (by, &groupings[by]));
-        if above(pattern.chi2.0 * pixels) <= (1.0 - WORTH_SAYING) * above(fit.chi2) {
+        if above(pattern.chi2.0 * points) <= (1.0 - WORTH_SAYING) * above(fit.chi2) {
             out.push(pattern);
         }
     }
@@ -117,7 +117,7 @@ fn fitted<M: Measurements>(
 ) -> Pattern {
     let group = groups(problem, grouping);
     let count = group.iter().flatten().max().map_or(0, |m| m + 1);
-    let (shared, pixels) = (problem.shared(), problem.points());
+    let (shared, points) = (problem.shared(), problem.points());
     let (low, high) = problem.surrogate.search_range(slot);
     let mut values = vec![fit.theta[slot]; count];
     let mut nuisances = fit.nuisances.clone();
@@ -147,7 +147,7 @@ fn fitted<M: Measurements>(
             best.clone_from(&values);
             let all: Vec<usize> = (0..size - 1).collect();
             let covariance = covariance(&form, &all);
-            let excess = (here / pixels).max(1.0);
+            let excess = (here / points).max(1.0);
             for (k, s) in sigmas.iter_mut().enumerate() {
                 *s = (covariance[(shared + k, shared + k)] * excess).sqrt();
             }
@@ -166,7 +166,7 @@ fn fitted<M: Measurements>(
         by,
         groups: firsts.collect(),
         values: best.into_iter().zip(sigmas).collect(),
-        chi2: (chi2 / pixels, fit.chi2 / pixels),
+        chi2: (chi2 / points, fit.chi2 / points),
     }
 }
 

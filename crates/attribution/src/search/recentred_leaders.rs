@@ -16,7 +16,7 @@ use crate::measurements::Measurements;
 /// Leaders that are simulated anew.
 const FOLLOWED: usize = 2;
 
-/// Share of the chi-square above noise, of captures that are fitted, that such an effect explains at least: an aperture 2.6 and 2.2 um off beside a
+/// Share of the chi-square above noise, of measurements that are fitted, that such an effect explains at least: an aperture 2.6 and 2.2 um off beside a
 /// blurred image explains 0.51. What is taken must explain nearly all.
 const EXPLAINS: f64 = 0.3;
 

@@ -3,12 +3,12 @@
 use crate::fit::{Fit, FitProblem, change_energy};
 use crate::measurements::Measurements;
 
-/// Smaller gains of reduced chi-square per pixel are within the error of the forward model itself: two
-/// independent programs differ by 0.005 on a chip without effects.
+/// Smaller gains of reduced chi-square per point are within the error of the forward model itself: two
+/// independent programs differ by 0.005 on an object without effects.
 pub const LEAST_GAIN: f64 = 0.006;
 
-/// Nothing is left unexplained if the reduced chi-square per pixel is this, or less: chips with nothing undeclared have up to
-/// 1.01, and a weak effect, such as a half of every lens displaced by 30 nm, has little more.
+/// Nothing is left unexplained if the reduced chi-square per point is this, or less: objects with nothing undeclared have up to
+/// 1.01, and a weak effect, such as a half of every object displaced by a little, leaves little more.
 pub const EXPLAINED: f64 = 1.05;
 
 /// Or what the model may err by in what it found: so many standard deviations of what the effects change, and no more than the other
@@ -16,7 +16,7 @@ pub const EXPLAINED: f64 = 1.05;
 const SIGMAS: f64 = 2.5;
 const MOST: f64 = 1.1;
 
-/// The reduced chi-square per pixel up to which a fit leaves nothing unexplained.
+/// The reduced chi-square per point up to which a fit leaves nothing unexplained.
 pub fn may_leave<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>) -> f64 {
     with_error(change_energy(problem, fit) / problem.points().max(1.0))
 }

@@ -6,10 +6,10 @@ use super::residual::{LEAST_GAIN, may_leave};
 use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, held_out, mean_error};
 use crate::measurements::Measurements;
 
-/// What noise alone leaves varies so much: by this many standard deviations of the mean square of so many pixels.
+/// What noise alone leaves varies so much: by this many standard deviations of the mean square of so many points.
 const CHANCE_SIGMAS: f64 = 2.0;
 
-/// Reduced chi-square per pixel beyond noise above which the search continues about what was found: what is found in full leaves
+/// Reduced chi-square per point beyond noise above which the search continues about what was found: what is found in full leaves
 /// 0.002 to 0.006. A residual of 1.1 can hide an effect of its typical size, which looks small and unsure on a surrogate
 /// that is centred elsewhere.
 pub const MORE_IS_LEFT: f64 = 0.01;
@@ -28,7 +28,7 @@ pub type EndsSearch<'f, M> = dyn Fn(&SearchState<'_, M>) -> Result<bool> + 'f;
 pub struct SearchState<'a, M: Measurements> {
     pub problem: FitProblem<'a, M>,
     pub fit: Fit<M>,
-    /// The error of the fit on captures left out.
+    /// The error of the fit on measurements left out.
     pub held_out: HeldOutErrors,
 }
 
@@ -39,12 +39,12 @@ impl<'a, M: Measurements> SearchState<'a, M> {
         Self { problem, fit, held_out }
     }
 
-    /// Reduced chi-square per pixel on captures left out; noise alone gives 1.
+    /// Reduced chi-square per point on measurements left out; noise alone gives 1.
     pub fn error(&self) -> f64 {
         mean_error(&self.held_out)
     }
 
-    /// Whether more is left on captures left out than `share` of the noise, and than that noise varies by.
+    /// Whether more is left on measurements left out than `share` of the noise, and than that noise varies by.
     pub fn leaves_more_than(&self, share: f64) -> bool {
         self.error() > 1.0 + share.max(CHANCE_SIGMAS * (2.0 / self.problem.points().max(1.0)).sqrt())
     }
@@ -54,7 +54,7 @@ impl<'a, M: Measurements> SearchState<'a, M> {
         self.error() > may_leave(&self.problem, &self.fit)
     }
 
-    /// Whether less is left on captures left out than by `other`: by more than the model errs by, and the 95 % confidence interval
+    /// Whether less is left on measurements left out than by `other`: by more than the model errs by, and the 95 % confidence interval
     /// excludes none.
     pub fn surely_leaves_less_than(&self, other: &Self) -> bool {
         let Gain {

@@ -30,7 +30,7 @@ pub struct TriedEffect {
     pub effect: usize,
     /// Share of the residual that its signature alone explains, nuisances projected out.
     pub score: f64,
-    /// What a full fit gains on captures left out; none where it was not fitted.
+    /// What a full fit gains on measurements left out; none where it was not fitted.
     pub gain: Option<Gain>,
     /// Its parameters.
     pub values: Vec<f64>,
@@ -80,10 +80,10 @@ impl Rejection {
             Self::Screened => "explains less of the residual than others".into(),
             Self::Little(gain) => {
                 format!(
-                    "its gain of {gain:.4} in reduced chi-square per pixel is within the error of the forward model"
+                    "its gain of {gain:.4} in reduced chi-square per point is within the error of the forward model"
                 )
             }
-            Self::Unsure => "the 95 % confidence interval of its gain on captures left out includes zero".into(),
+            Self::Unsure => "the 95 % confidence interval of its gain on measurements left out includes zero".into(),
             Self::Part(share) => format!("explains only {:.0} % of the error above noise", 100.0 * share),
             Self::Unphysical => "its fitted value is at the end of its physical range".into(),
             Self::Nothing => "the 95 % confidence interval of its value includes zero".into(),
@@ -330,7 +330,7 @@ impl<M: Measurements> Candidate<M> {
         }
     }
 
-    /// By a fit that it is part of, and the error of this fit on captures left out.
+    /// By a fit that it is part of, and the error of this fit on measurements left out.
     pub fn judge(&mut self, problem: &FitProblem<'_, M>, fit: Fit<M>, held: HeldOutErrors, errors_now: &HeldOutErrors) {
         self.tried.gain = Some(gain(problem, errors_now, &held));
         let slots = problem.model.slots_of(self.tried.effect);

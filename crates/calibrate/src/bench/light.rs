@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{Bench, FocusSeries};
 use crate::cells::PillarTable;
-use crate::set::{ElementIndex, PerCapture};
+use crate::set::{ElementIndex, PerMeasurement};
 use metalith_core::{Error, Progress, Result};
 use metalith_optics::{
     ArrivingLight, AsBuiltElement, ClassTable, GeometryChange, LightChange, MadeAperture, PathChange, spread,
@@ -37,7 +37,7 @@ pub struct Lit<'a> {
 }
 
 impl Bench<'_> {
-    /// Intensity around the window of each capture, `[chip][light][capture]`, each a square of samples. Chips with the
+    /// Intensity around the window of each measurement, `[chip][light][measurement]`, each a square of samples. Chips with the
     /// same light path share the cost of propagation.
     ///
     /// # Errors
@@ -47,10 +47,10 @@ impl Bench<'_> {
         chips: &[Lit<'_>],
         path: &PathChange,
         progress: &dyn Progress,
-    ) -> Result<Vec<Vec<PerCapture<Vec<f32>>>>> {
+    ) -> Result<Vec<Vec<PerMeasurement<Vec<f32>>>>> {
         let mut out: Vec<_> = chips
             .iter()
-            .map(|chip| vec![PerCapture::from(vec![Vec::new(); self.set.captures.len()]); chip.lights.len()])
+            .map(|chip| vec![PerMeasurement::from(vec![Vec::new(); self.set.measurements.len()]); chip.lights.len()])
             .collect();
         for batch in self.batches(chips.len()) {
             let elements: Vec<Vec<AsBuiltElement>> = batch
@@ -81,8 +81,8 @@ impl Bench<'_> {
             for (group, of_chips) in groups.into_iter().zip(tasks) {
                 for (out, of_lights) in out.iter_mut().zip(of_chips) {
                     for (out, planes) in out.iter_mut().zip(of_lights) {
-                        for (plane, &capture) in planes.into_iter().zip(&group.captures) {
-                            out[capture] = plane;
+                        for (plane, &measurement) in planes.into_iter().zip(&group.measurements) {
+                            out[measurement] = plane;
                         }
                     }
                 }
@@ -137,9 +137,9 @@ impl Bench<'_> {
         let lattice = self.set.elements[group.element].pillars.lattice;
         let farther_um = path.added_distance_um(self.set.elements[group.element].centre_um);
         let distances: Vec<f64> = group
-            .captures
+            .measurements
             .iter()
-            .map(|&c| self.set.captures[c].distance_um + farther_um)
+            .map(|&c| self.set.measurements[c].distance_um + farther_um)
             .collect();
         let quadrature = &self.quadratures[group.led];
         let weights: Vec<Vec<Vec<f64>>> = chips
@@ -226,13 +226,13 @@ mod tests {
     use metalith_gds::extract::GdsPillars;
     use metalith_layout::write_pillars;
     use metalith_optics::Stitching;
+    use metalith_pillars::PillarReader;
     use metalith_wave::Direct;
     use num_complex::Complex64;
 
     use super::*;
     use crate::bench::Sampling;
-    use crate::planning::{BenchFile, candidates};
-    use crate::set::{Led, MeasuredSet};
+    use crate::set::{ElementIndex, Led, LedIndex, MeasuredElement, MeasuredSet, Measurement, Stack};
 
     /// A small lens of the shipped hexagonal design, as a session of one line of 1550 nm that looks at it from the side, on the
     /// axis and beside it.
@@ -247,21 +247,55 @@ mod tests {
         let layout = folder.path().join("layout.gds");
         let array = PillarArray::build(&design, &Silent).unwrap();
         write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
-        let file = folder.path().join("bench.toml");
-        let text = metalith_testing::session::bench();
-        let captures = "distance_um = [43.0, 46.0]\nfield_deg = [0.0, 0.0, 6.0, -3.0]\n";
-        std::fs::write(&file, format!("schema = 1\n{text}\n[captures]\n{captures}")).unwrap();
-        let mut bench = BenchFile::read(&file).unwrap();
-        bench.leds = vec![Led {
+        let sites = design.sites_of(&design.elements());
+        let layer = design.layout.layers.pillars.number();
+        let maps = GdsPillars
+            .pillars(&layout, layer, design.cell.shape, &sites, &Silent)
+            .unwrap();
+        let mut set = MeasuredSet::read(
+            &metalith_testing::session::small_set(folder.path()),
+            &GdsPillars,
+            &Silent,
+        )
+        .unwrap();
+        set.stack = Stack {
+            cell: design.cell_stack().unwrap(),
+            lens_diameter_um: 30.0,
+            focal_length_um: 45.0,
+        };
+        set.leds = vec![Led {
             centre_nm: 1550.0,
             fwhm_nm: 0.5,
             channel: None,
         }]
         .into();
-        let found = candidates(&design, &bench, &layout, &GdsPillars, &Silent).unwrap();
-        let mut set = found.set;
+        let elements = design.elements().into_iter().zip(maps);
+        set.elements = elements
+            .map(|(element, pillars)| MeasuredElement {
+                index: [element.index.0.into(), element.index.1.into()],
+                centre_um: element.centre_um(),
+                aperture_diameter_um: 2.0 * design.aperture_radius_of_um(&element),
+                pillars,
+            })
+            .collect();
         assert!(!set.elements.raw[0].pillars.lattice.is_square());
-        set.captures = found.captures.into();
+        let like = set.measurements.raw[0].clone();
+        let seen = |aoi_deg: [f64; 2], distance_um: f64| {
+            let aoi_rad = aoi_deg.map(f64::to_radians);
+            let sines = aoi_rad.map(f64::sin);
+            let along = (1.0 - sines[0].powi(2) - sines[1].powi(2)).sqrt();
+            Measurement {
+                name: format!("{aoi_deg:?} {distance_um}"),
+                element: ElementIndex::from(0),
+                led: LedIndex::from(0),
+                aoi_rad,
+                distance_um,
+                window_centre_um: sines.map(|s| set.stack.focal_length_um * s / along),
+                ..like.clone()
+            }
+        };
+        let measurements = [[0.0, 0.0], [6.0, -3.0]].map(|aoi| [43.0, 46.0].map(|distance| seen(aoi, distance)));
+        set.measurements = measurements.concat().into();
         set
     }
 
@@ -271,7 +305,7 @@ mod tests {
         /// Share of the peak: transforms in single precision; 9e-6 is found.
         const OF_THE_PEAK: f64 = 1e-4;
         let set = hexagonal_set();
-        assert_eq!(set.captures.len(), 4);
+        assert_eq!(set.measurements.len(), 4);
         let bench = Bench::new(&set, Sampling::default());
         let wavelengths = bench.wavelengths_nm().len();
         let cells = Arc::new(PillarTable {
@@ -298,7 +332,7 @@ mod tests {
             ..GeometryChange::default()
         };
         let path = PathChange {
-            gap_um: 1.5,
+            defocus_um: 1.5,
             tilt_mrad: [4.0, -2.0],
             ..PathChange::default()
         };
@@ -317,12 +351,12 @@ mod tests {
             let weights = quadrature.weights(group.led.into(), &light);
             let (n, step) = (group.plan.window(), group.plan.step_um());
             let at = |i: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * step;
-            for &capture in &group.captures {
-                let plane = &found[0][0][capture];
+            for &measurement in &group.measurements {
+                let plane = &found[0][0][measurement];
                 let peak = plane.iter().copied().fold(0.0, f32::max);
                 let brightest = plane.iter().position(|v| *v == peak).unwrap();
                 let places: Vec<usize> = (0..30).map(|k| (k * 7919) % (n * n)).chain([brightest]).collect();
-                let z = set.captures[capture].distance_um + path.gap_um;
+                let z = set.measurements[measurement].distance_um + path.defocus_um;
                 let [cx, cy] = group.centre_um;
                 let points: Vec<[f64; 3]> = places.iter().map(|&i| [cx + at(i % n), cy + at(i / n), z]).collect();
                 let mut sums = vec![0.0; places.len()];
@@ -340,7 +374,7 @@ mod tests {
                     .zip(&sums)
                     .map(|(i, sum)| (f64::from(plane[*i]) - sum).abs());
                 let worst = worst.fold(0.0, f64::max) / f64::from(peak);
-                println!("{}: {worst:.1e} of the peak", set.captures[capture].name);
+                println!("{}: {worst:.1e} of the peak", set.measurements[measurement].name);
                 assert!(worst < OF_THE_PEAK, "{worst}");
             }
         }

@@ -1,4 +1,4 @@
-//! The simulated bench: from pillars to the expected pixels of each capture, under any perturbation.
+//! The simulated bench: from pillars to the expected pixels of each measurement, under any perturbation.
 
 mod light;
 #[cfg(test)]
@@ -14,7 +14,7 @@ pub use light::Lit;
 
 use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{
-    Capture, CaptureIndex, ElementIndex, LedIndex, MeasuredSet, PerCapture, PerElement, PerLed, RelayCamera,
+    ElementIndex, LedIndex, MeasuredSet, Measurement, MeasurementIndex, PerElement, PerLed, PerMeasurement, RelayCamera,
 };
 use metalith_optics::{DrawnElement, GeometryChange, KernelFilter, Perturbation, veiled};
 use metalith_wave::propagation::{Distances, DistancesPlan};
@@ -60,17 +60,17 @@ pub struct Bench<'a> {
 /// Step over the half of the finest period of an image.
 const OF_NYQUIST: f64 = 0.95;
 
-/// Step that the intensity of an element in the colour of a capture is resolved by, at the nearest distance that it was taken at (um):
+/// Step that the intensity of an element in the colour of a measurement is resolved by, at the nearest distance that it was taken at (um):
 /// light from both sides of the aperture interferes with a period of half a wavelength over the sine of its half-angle.
-fn resolved_um(set: &MeasuredSet, capture: &Capture) -> f64 {
+fn resolved_um(set: &MeasuredSet, measurement: &Measurement) -> f64 {
     let alike = set
-        .captures
+        .measurements
         .iter()
-        .filter(|c| (c.element, c.led) == (capture.element, capture.led));
+        .filter(|c| (c.element, c.led) == (measurement.element, measurement.led));
     let nearest_um = alike.map(|c| c.distance_um).fold(f64::INFINITY, f64::min);
-    let radius_um = 0.5 * set.elements[capture.element].aperture_diameter_um;
+    let radius_um = 0.5 * set.elements[measurement.element].aperture_diameter_um;
     let sine = radius_um / radius_um.hypot(nearest_um);
-    OF_NYQUIST * 0.25e-3 * set.leds[capture.led].centre_nm / sine
+    OF_NYQUIST * 0.25e-3 * set.leds[measurement.led].centre_nm / sine
 }
 
 /// Standard deviations of its place by which a window can be moved before its surroundings end.
@@ -83,13 +83,13 @@ fn margin_um(half_um: f64, camera: &RelayCamera) -> f64 {
     (2.0 * PixelGrid::FADED * half_um + moved) / (1.0 - 2.0 * PixelGrid::FADED)
 }
 
-/// Captures that differ only in their distance.
+/// Measurements that differ only in their distance.
 struct FocusSeries {
     element: ElementIndex,
     led: LedIndex,
     aoi_rad: [f64; 2],
     centre_um: [f64; 2],
-    captures: Vec<CaptureIndex>,
+    measurements: Vec<MeasurementIndex>,
     plan: DistancesPlan,
 }
 
@@ -114,12 +114,12 @@ impl<'a> Bench<'a> {
             })
             .collect();
         let mut groups: Vec<FocusSeries> = Vec::new();
-        for (i, c) in set.captures.iter_enumerated() {
+        for (i, c) in set.measurements.iter_enumerated() {
             let same = groups.iter_mut().find(|g| {
                 (g.element, g.led, g.aoi_rad, g.centre_um) == (c.element, c.led, c.aoi_rad, c.window_centre_um)
             });
             if let Some(group) = same {
-                group.captures.push(i);
+                group.measurements.push(i);
                 continue;
             }
             let half_um = 0.5 * set.camera.rows.max(set.camera.cols) as f64 * set.camera.pixel_um;
@@ -138,7 +138,7 @@ impl<'a> Bench<'a> {
                 led: c.led,
                 aoi_rad: c.aoi_rad,
                 centre_um: c.window_centre_um,
-                captures: vec![i],
+                measurements: vec![i],
                 plan: DistancesPlan::new(planes, margin),
             });
         }
@@ -168,9 +168,9 @@ impl<'a> Bench<'a> {
     /// Memory of the pixel grids of all captures, about (bytes): the bins that the light of each lens reaches.
     pub fn grid_bytes(&self) -> f64 {
         let of_group = |g: &FocusSeries| {
-            let first = &self.set.captures[g.captures[0]];
+            let first = &self.set.measurements[g.measurements[0]];
             let lit = OF_NYQUIST * g.plan.step_um() / resolved_um(self.set, first);
-            g.captures.len() as f64 * PixelGrid::bytes_of(g.plan.window() as f64 * lit.min(1.0))
+            g.measurements.len() as f64 * PixelGrid::bytes_of(g.plan.window() as f64 * lit.min(1.0))
         };
         self.groups.iter().map(of_group).sum()
     }
@@ -198,14 +198,14 @@ impl<'a> Bench<'a> {
         self.drawn[element].bias_nm(site, geometry)
     }
 
-    /// Pixel values of each capture, before registration, flux and black level are applied.
-    pub fn grids(&self, intensities: &PerCapture<Vec<f32>>, perturbation: &Perturbation) -> Vec<PixelGrid> {
+    /// Pixel values of each measurement, before registration, flux and black level are applied.
+    pub fn grids(&self, intensities: &PerMeasurement<Vec<f32>>, perturbation: &Perturbation) -> Vec<PixelGrid> {
         let camera = &self.set.camera;
-        let work: Vec<(&FocusSeries, CaptureIndex)> = {
+        let work: Vec<(&FocusSeries, MeasurementIndex)> = {
             let mut work: Vec<_> = self
                 .groups
                 .iter()
-                .flat_map(|g| g.captures.iter().map(move |&c| (g, c)))
+                .flat_map(|g| g.measurements.iter().map(move |&c| (g, c)))
                 .collect();
             work.sort_by_key(|w| w.1);
             work
@@ -219,9 +219,9 @@ impl<'a> Bench<'a> {
             }
         }
         work.par_iter()
-            .map(|(group, capture)| {
+            .map(|(group, measurement)| {
                 let centre = self.set.elements[group.element].centre_um;
-                let z = self.set.captures[*capture].distance_um + perturbation.path.added_distance_um(centre);
+                let z = self.set.measurements[*measurement].distance_um + perturbation.path.added_distance_um(centre);
                 let optic = Optic {
                     pixel_um: camera.pixel_um,
                     disc_um: self.disc_um(group, z, perturbation),
@@ -230,7 +230,7 @@ impl<'a> Bench<'a> {
                 let stray = perturbation.camera.stray_light;
                 let (step, n) = (group.plan.step_um(), group.plan.window());
                 let off = self.off_um(group, z, perturbation);
-                let mut light = Cow::Borrowed(intensities[*capture].as_slice());
+                let mut light = Cow::Borrowed(intensities[*measurement].as_slice());
                 let own = kernels.iter().find(|k| (k.0, k.1) == (n, step));
                 if let Some(kernels) = own.and_then(|k| k.2.as_ref()) {
                     light = Cow::Owned(filtered(kernels, &light, n));

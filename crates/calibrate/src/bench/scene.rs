@@ -77,16 +77,16 @@ impl Lenses {
         for (led, [centre_nm, fwhm_nm]) in set.leds.iter_mut().zip(LAMPS) {
             (led.centre_nm, led.fwhm_nm) = (centre_nm, fwhm_nm);
         }
-        for capture in set.captures.iter_mut() {
-            let nm = LAMPS[usize::from(capture.led)][0];
-            let arriving = capture.aoi_rad[0].sin();
+        for measurement in set.measurements.iter_mut() {
+            let nm = LAMPS[usize::from(measurement.led)][0];
+            let arriving = measurement.aoi_rad[0].sin();
             let sine = if arriving == 0.0 {
                 0.0
             } else {
                 arriving - arriving * nm / 550.0
             };
-            capture.distance_um = focal_um;
-            capture.window_centre_um = [focal_um * sine / (1.0 - sine * sine).sqrt(), 0.0];
+            measurement.distance_um = focal_um;
+            measurement.window_centre_um = [focal_um * sine / (1.0 - sine * sine).sqrt(), 0.0];
         }
         set.elements
             .iter_mut()
@@ -100,16 +100,16 @@ impl Lenses {
         let recorded = simulator.expose(&[perturbation], &Silent).unwrap().remove(0);
 
         let extraction = read_pillars(&self.design, &folder.join("layout.gds"), &Silent).unwrap();
-        for (grid, capture) in recorded.iter().zip(&set.captures).step_by(2) {
-            let [centre_nm, width_nm] = LAMPS[usize::from(capture.led)];
+        for (grid, measurement) in recorded.iter().zip(&set.measurements).step_by(2) {
+            let [centre_nm, width_nm] = LAMPS[usize::from(measurement.led)];
             let want = grid.pixels([0.0; 2]).mapv(f64::from);
-            let element = &set.elements[capture.element];
-            let window = [0, 1].map(|a| element.centre_um[a] + capture.window_centre_um[a]);
+            let element = &set.elements[measurement.element];
+            let window = [0, 1].map(|a| element.centre_um[a] + measurement.window_centre_um[a]);
             let camera = lamp(centre_nm, width_nm, window);
             let cell = published();
             let case = SimulationCase::from(&cell as &dyn metalith_cell::CellModel);
             let chip = ChipInLight::new(&self.design, &extraction, case, &camera, f64::INFINITY, &Silent).unwrap();
-            let scene = spot(capture.aoi_rad[0].sin(), focal_um);
+            let scene = spot(measurement.aoi_rad[0].sin(), focal_um);
             let views = element_views(&self.design, &camera);
             let veil = StrayLight::none(&camera.sensor, 1, 3);
             let space = SceneSpace::flat(&scene.view);
@@ -146,7 +146,7 @@ impl Lenses {
                 let off = difference(&got, &want);
                 println!(
                     "{centre_nm} nm, {:.1} degrees, {between:?}: {off:.2e} of the peak",
-                    capture.aoi_rad[0].to_degrees()
+                    measurement.aoi_rad[0].to_degrees()
                 );
                 assert!(off < OF_THE_PEAK, "{centre_nm} nm, {between:?}: {off}");
             }
@@ -162,7 +162,7 @@ fn difference(got: &Array2<f64>, want: &Array2<f64>) -> f64 {
     off.fold(0.0, f64::max) / peak
 }
 
-/// The pixels of a capture as a camera, in the light of one lamp.
+/// The pixels of a measurement as a camera, in the light of one lamp.
 fn lamp(centre_nm: f64, width_nm: f64, window_um: [f64; 2]) -> Camera {
     let plain = Camera::three_bands(0.5 / FINER as f64);
     // A bench weighs light by power, a channel counts photons.

@@ -2,46 +2,46 @@
 
 use super::light::light;
 use super::{Bench, FocusSeries};
-use crate::set::CaptureIndex;
+use crate::set::MeasurementIndex;
 use metalith_core::Result;
 use metalith_optics::{ArrivingLight, AsBuiltElement, DrawnElement, IncoherentFields, Perturbation, SolvedWidths};
 
 impl Bench<'_> {
-    /// The element of a capture with a perturbation applied.
+    /// The element of a measurement with a perturbation applied.
     ///
     /// # Errors
     /// As [`AsBuiltElement::new`].
-    pub fn element_of(&self, capture: CaptureIndex, perturbation: &Perturbation) -> Result<AsBuiltElement> {
-        let drawn: &DrawnElement<'_> = &self.drawn[self.set.captures[capture].element];
+    pub fn element_of(&self, measurement: MeasurementIndex, perturbation: &Perturbation) -> Result<AsBuiltElement> {
+        let drawn: &DrawnElement<'_> = &self.drawn[self.set.measurements[measurement].element];
         AsBuiltElement::new(drawn, &perturbation.geometry)
     }
 
-    /// Element under the light of the capture, at one wavelength (um). `solved`: transmission of its widths.
+    /// Element under the light of the measurement, at one wavelength (um). `solved`: transmission of its widths.
     pub fn view<'a>(
         &self,
-        capture: CaptureIndex,
+        measurement: MeasurementIndex,
         element: &'a AsBuiltElement,
         perturbation: &Perturbation,
         wavelength_um: f64,
         solved: &SolvedWidths,
     ) -> IncoherentFields<'a> {
-        let light = self.direction_of(capture, perturbation, wavelength_um);
+        let light = self.direction_of(measurement, perturbation, wavelength_um);
         IncoherentFields::as_built(element, light, perturbation, solved)
     }
 
-    /// The incident wave at the element of a capture, at one wavelength (um).
+    /// The incident wave at the element of a measurement, at one wavelength (um).
     pub fn direction_of(
         &self,
-        capture: CaptureIndex,
+        measurement: MeasurementIndex,
         perturbation: &Perturbation,
         wavelength_um: f64,
     ) -> ArrivingLight {
-        light(self.group_of(capture), &perturbation.path, wavelength_um)
+        light(self.group_of(measurement), &perturbation.path, wavelength_um)
     }
 
-    fn group_of(&self, capture: CaptureIndex) -> &FocusSeries {
-        let group = self.groups.iter().find(|g| g.captures.contains(&capture));
-        group.expect("every capture is in a group")
+    fn group_of(&self, measurement: MeasurementIndex) -> &FocusSeries {
+        let group = self.groups.iter().find(|g| g.measurements.contains(&measurement));
+        group.expect("every measurement is in a group")
     }
 }
 
@@ -74,7 +74,7 @@ mod tests {
     ];
 
     #[test]
-    fn captures_show_what_the_made_chip_makes_of_every_effect() {
+    fn measurements_show_what_the_made_chip_makes_of_every_effect() {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
         let mut set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
@@ -107,10 +107,10 @@ mod tests {
                 .iter()
                 .enumerate()
                 .step_by(3)
-                .map(|(c, grid)| (CaptureIndex::from(c), grid))
+                .map(|(c, grid)| (MeasurementIndex::from(c), grid))
             {
-                let capture = &set.captures[c];
-                let um = set.leds[capture.led].centre_nm * 1e-3;
+                let measurement = &set.measurements[c];
+                let um = set.leds[measurement.led].centre_nm * 1e-3;
                 let element = simulator.bench.element_of(c, &perturbation).unwrap();
                 let table = published().transmissions(um, 400).unwrap();
                 let solved = SolvedWidths {
@@ -121,10 +121,10 @@ mod tests {
                     rim: None,
                 };
                 let window = Window {
-                    centre_um: capture.window_centre_um,
+                    centre_um: measurement.window_centre_um,
                     step_um: 0.25,
                     samples: 160,
-                    distance_um: capture.distance_um,
+                    distance_um: measurement.distance_um,
                 };
                 let view = simulator.bench.view(c, &element, &perturbation, um, &solved);
                 let mut view = view;
@@ -134,7 +134,7 @@ mod tests {
                     .psf(window, Accuracy::Accurate, &[], &mut Scratch::default())
                     .unwrap();
                 let mut want = psf
-                    .on_pixels(capture.window_centre_um, pixel, set.camera.rows)
+                    .on_pixels(measurement.window_centre_um, pixel, set.camera.rows)
                     .unwrap()
                     .mapv(|energy| energy / (pixel * pixel));
                 let mean = want.mean().unwrap();
@@ -144,8 +144,8 @@ mod tests {
                 assert!(got.iter().all(|v| v.is_finite()), "{}", effect.name());
                 let worst = got.iter().zip(&want).map(|(a, b)| (f64::from(*a) - b).abs());
                 let worst = worst.fold(0.0, f64::max) / peak;
-                println!("{}, {}: {worst:.1e}", effect.name(), capture.name);
-                assert!(worst < OF_THE_PEAK, "{}, {}: {worst}", effect.name(), capture.name);
+                println!("{}, {}: {worst:.1e}", effect.name(), measurement.name);
+                assert!(worst < OF_THE_PEAK, "{}, {}: {worst}", effect.name(), measurement.name);
             }
         }
     }

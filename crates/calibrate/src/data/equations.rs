@@ -1,4 +1,4 @@
-//! The normal equations of one capture, its registration eliminated.
+//! The normal equations of one measurement, its registration eliminated.
 
 use metalith_attribution::{MeasurementEquations, eliminate, own_step};
 use nalgebra::{DMatrix, DVector};
@@ -7,26 +7,26 @@ use ndarray::Array2;
 use super::Data;
 use super::nuisances::Nuisances;
 use crate::optics::{PixelGrid, Reading};
-use crate::set::CaptureIndex;
+use crate::set::MeasurementIndex;
 use metalith_wave::kernels::sum_of_products;
 
 /// Axes along which a window is registered: its columns stand first.
 const AXES: usize = 2;
 
-/// Inner products of the whitened columns of one capture, in this order: registration along x and y, flux of
+/// Inner products of the whitened columns of one measurement, in this order: registration along x and y, flux of
 /// every LED, black level, further parameters, and the residual last.
 #[derive(Clone)]
-pub struct CaptureEquations {
+pub struct FrameEquations {
     gram: DMatrix<f64>,
     /// How far further parameters make the window follow the image, for a unit of each (um).
     follows_um: Vec<[f64; 2]>,
 }
 
-impl CaptureEquations {
-    /// For a capture whose predicted image is `grid`; `more` are the derivatives of the image by further
+impl FrameEquations {
+    /// For a measurement whose predicted image is `grid`; `more` are the derivatives of the image by further
     /// parameters. Where the window of a prediction follows the image, the window of the bench, which stands still, is expected to be
     /// as much off the other way.
-    pub fn new(data: &Data, c: CaptureIndex, now: &Nuisances, grid: &PixelGrid, more: &[PixelGrid]) -> Self {
+    pub fn new(data: &Data, c: MeasurementIndex, now: &Nuisances, grid: &PixelGrid, more: &[PixelGrid]) -> Self {
         let reading = Reading::new(more.iter().chain([grid]), now.shift_um[c]);
         let lines = reading.with_slopes(grid);
         let follows_um: Vec<[f64; 2]> = more.iter().map(PixelGrid::off_um).collect();
@@ -43,7 +43,7 @@ impl CaptureEquations {
         columns.push(weight.iter().copied().collect());
         columns.extend(more.iter().map(|m| column(m, scaled)));
         columns.push(residual.iter().copied().collect());
-        // Where each column goes: only this capture's own LED has a flux column.
+        // Where each column goes: only this measurement's own LED has a flux column.
         let size = 2 + data.leds + 1 + more.len() + 1;
         let place: Vec<usize> = [0, 1, 2 + usize::from(led)]
             .into_iter()
@@ -92,7 +92,7 @@ impl CaptureEquations {
     }
 }
 
-impl MeasurementEquations for CaptureEquations {
+impl MeasurementEquations for FrameEquations {
     /// The products after registration has been eliminated: flux, black level, further parameters, residual.
     fn reduced(&self) -> DMatrix<f64> {
         eliminate(&self.gram, AXES)

@@ -1,4 +1,4 @@
-//! The captures of a set as the statistics see them: whitened frames and widths, with what the lab states of them.
+//! The measurements of a set as the statistics see them: whitened frames and widths, with what the lab states of them.
 
 mod equations;
 mod nuisance_fit;
@@ -10,17 +10,17 @@ use nalgebra::{DMatrix, DVector};
 
 use ndarray::{Array2, Zip};
 
-pub use equations::CaptureEquations;
+pub use equations::FrameEquations;
 pub use nuisances::Nuisances;
 
 use crate::grouping::Grouping;
 use crate::optics::PixelGrid;
 
-use crate::set::{ElementIndex, LedIndex, MeasuredSet, PerCapture, PerLed, expected, saturated};
+use crate::set::{ElementIndex, LedIndex, MeasuredSet, PerLed, expected, saturated};
 
-/// How a capture was lit and where it was taken: captures are grouped by this.
+/// How a measurement was lit and where it was taken: measurements are grouped by this.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CaptureSetup {
+pub struct MeasurementSetup {
     pub element: ElementIndex,
     pub led: LedIndex,
     /// Angle of incidence along x and y (rad).
@@ -32,12 +32,12 @@ pub struct CaptureSetup {
 #[derive(Clone)]
 pub struct Data {
     /// One over the standard deviation of each pixel (1 / DN), zero where a pixel does not count.
-    pub weight: PerCapture<Array2<f32>>,
+    pub weight: PerMeasurement<Array2<f32>>,
     /// DN less the stated black level.
-    pub signal: PerCapture<Array2<f32>>,
-    pub beam: PerCapture<CaptureSetup>,
+    pub signal: PerMeasurement<Array2<f32>>,
+    pub beam: PerMeasurement<MeasurementSetup>,
     /// DN for unit intensity.
-    pub scale: PerCapture<f64>,
+    pub scale: PerMeasurement<f64>,
     /// Number of LEDs.
     pub leds: usize,
     pub pixel_um: f64,
@@ -56,9 +56,9 @@ impl Data {
     pub fn new(set: &MeasuredSet) -> Self {
         let camera = &set.camera;
         let black = camera.black_level_dn as f32;
-        let signal: PerCapture<Array2<f32>> = set.captures.iter().map(|c| c.dn.mapv(|v| v - black)).collect();
+        let signal: PerMeasurement<Array2<f32>> = set.measurements.iter().map(|c| c.dn.mapv(|v| v - black)).collect();
         let weight = set
-            .captures
+            .measurements
             .iter()
             .zip(&signal)
             .map(|(c, signal)| {
@@ -77,7 +77,7 @@ impl Data {
                 })
             })
             .collect();
-        let beam = set.captures.iter().map(|c| CaptureSetup {
+        let beam = set.measurements.iter().map(|c| MeasurementSetup {
             element: c.element,
             led: c.led,
             aoi_rad: c.aoi_rad,
@@ -91,7 +91,7 @@ impl Data {
             weight,
             signal,
             beam: beam.collect(),
-            scale: set.captures.iter().map(|c| c.scale_dn).collect(),
+            scale: set.measurements.iter().map(|c| c.scale_dn).collect(),
             leds: set.leds.len(),
             pixel_um: camera.pixel_um,
             registration_um: camera.registration_sigma_px * camera.pixel_um,
@@ -108,8 +108,8 @@ impl Data {
         vec![1.0; self.leds].into()
     }
 
-    /// The group of each capture by a key; groups are numbered as they appear.
-    fn groups<K: PartialEq>(&self, key: impl Fn(&CaptureSetup) -> K) -> PerMeasurement<usize> {
+    /// The group of each measurement by a key; groups are numbered as they appear.
+    fn groups<K: PartialEq>(&self, key: impl Fn(&MeasurementSetup) -> K) -> PerMeasurement<usize> {
         let mut known: Vec<K> = Vec::new();
         let group = |setup| {
             let own = key(setup);
@@ -121,12 +121,12 @@ impl Data {
         self.beam.iter().map(group).collect()
     }
 
-    /// Captures by distance, the nearest first.
+    /// Measurements by distance, the nearest first.
     fn by_distance(&self) -> PerMeasurement<usize> {
         let mut distances: Vec<f64> = self.beam.iter().map(|b| b.distance_um).collect();
         distances.sort_by(f64::total_cmp);
         distances.dedup();
-        let place = |b: &CaptureSetup| distances.iter().position(|d| *d == b.distance_um).unwrap_or(0);
+        let place = |b: &MeasurementSetup| distances.iter().position(|d| *d == b.distance_um).unwrap_or(0);
         self.beam.iter().map(place).collect()
     }
 }
@@ -134,7 +134,7 @@ impl Data {
 impl Measurements for Data {
     type Prediction = PixelGrid;
     type Nuisances = Nuisances;
-    type Equations = CaptureEquations;
+    type Equations = FrameEquations;
 
     fn combine(parts: &[(&PixelGrid, f32)]) -> PixelGrid {
         PixelGrid::combine(parts)
@@ -157,7 +157,7 @@ impl Measurements for Data {
         self.leds + 1
     }
 
-    /// Captures are left out by colour, by element and by distance.
+    /// Measurements are left out by colour, by element and by distance.
     fn folds(&self) -> Vec<PerMeasurement<usize>> {
         vec![
             self.beam.iter().map(|b| b.led.into()).collect(),
@@ -166,7 +166,7 @@ impl Measurements for Data {
         ]
     }
 
-    /// Captures of one element, in one direction and colour, are not independent.
+    /// Measurements of one element, in one direction and colour, are not independent.
     fn clusters(&self) -> PerMeasurement<usize> {
         self.groups(|b| (b.element, b.led, b.aoi_rad))
     }
@@ -195,11 +195,11 @@ impl Measurements for Data {
         nuisances: &Nuisances,
         prediction: &PixelGrid,
         derivatives: &[PixelGrid],
-    ) -> CaptureEquations {
-        CaptureEquations::new(self, measurement, nuisances, prediction, derivatives)
+    ) -> FrameEquations {
+        FrameEquations::new(self, measurement, nuisances, prediction, derivatives)
     }
 
-    fn advance(&self, nuisances: &mut Nuisances, equations: &PerMeasurement<CaptureEquations>, step: &DVector<f64>) {
+    fn advance(&self, nuisances: &mut Nuisances, equations: &PerMeasurement<FrameEquations>, step: &DVector<f64>) {
         nuisances.advance(self, equations, step);
     }
 
@@ -236,22 +236,22 @@ mod tests {
         PixelGrid::new(&samples, STEP_UM, &optic, PIXELS, PIXELS)
     }
 
-    /// Two captures in each of two colours: windows that are off, lamps that are brighter, and a black level.
+    /// Two measurements in each of two colours: windows that are off, lamps that are brighter, and a black level.
     #[test]
     fn nuisances_are_fitted_as_they_were() {
         /// Relative to the noise: priors hold flux and black level back a little.
         const TOLERANCE: f64 = 2e-3;
         let shifts = [[0.3, -0.2], [2.2, 1.1], [-1.4, 0.6], [0.0, -3.1]];
         let (flux, black_dn): (PerLed<f64>, f64) = (vec![1.004, 0.993].into(), 0.2);
-        let beam = (0..4).map(|c| CaptureSetup {
+        let beam = (0..4).map(|c| MeasurementSetup {
             element: ElementIndex::from(c / 2),
             led: LedIndex::from(c % 2),
             aoi_rad: [0.0; 2],
             distance_um: 100.0,
         });
-        let beam: PerCapture<CaptureSetup> = beam.collect();
+        let beam: PerMeasurement<MeasurementSetup> = beam.collect();
         let image = spot();
-        let signal: PerCapture<Array2<f32>> = beam
+        let signal: PerMeasurement<Array2<f32>> = beam
             .iter()
             .zip(shifts)
             .map(|(b, shift)| {
@@ -276,7 +276,7 @@ mod tests {
         };
         assert_eq!(data.folds()[2].raw, [0; 4]);
         assert_eq!(data.clusters().raw, [0, 1, 2, 3]);
-        let images: PerCapture<PixelGrid> = vec![image; 4].into();
+        let images: PerMeasurement<PixelGrid> = vec![image; 4].into();
         let found = data.fitted_nuisances(&images, &vec![true; 4].into());
         for (found, shift) in found.shift_um.iter().zip(shifts) {
             for axis in [0, 1] {

@@ -1,14 +1,14 @@
-//! Fits of the nuisances by the normal equations of each capture.
+//! Fits of the nuisances by the normal equations of each measurement.
 
 use metalith_attribution::{MeasurementEquations, Measurements};
 use nalgebra::{DMatrix, DVector};
 
 use super::Data;
-use super::equations::CaptureEquations;
+use super::equations::FrameEquations;
 use super::nuisances::{BLACK_SIGMA_DN, Nuisances};
 use super::registration::whole_pixel_shift;
 use crate::optics::PixelGrid;
-use crate::set::{LedIndex, PerCapture};
+use crate::set::{LedIndex, PerMeasurement};
 
 /// Gauss-Newton steps; within a pixel, three bring registration to a thousandth.
 const STEPS: usize = 6;
@@ -18,7 +18,7 @@ const LARGEST_SHIFT: f64 = 2.0;
 
 impl Nuisances {
     /// Everything as stated, but each window to within a pixel where its image is.
-    pub fn registered(data: &Data, images: &PerCapture<PixelGrid>) -> Self {
+    pub fn registered(data: &Data, images: &PerMeasurement<PixelGrid>) -> Self {
         let mut now = Self::stated(data);
         now.shift_um = data.for_each(|c| {
             let shift = whole_pixel_shift(&data.signal[c], &images[c].pixels([0.0; 2]));
@@ -27,17 +27,17 @@ impl Nuisances {
         now
     }
 
-    /// Fit to the captures in `used`, starting from here. The registration of other captures is fitted too, but
+    /// Fit to the measurements in `used`, starting from here. The registration of other measurements is fitted too, but
     /// they do not affect what is shared.
-    pub fn fit(&self, data: &Data, images: &PerCapture<PixelGrid>, used: &PerCapture<bool>) -> Self {
+    pub fn fit(&self, data: &Data, images: &PerMeasurement<PixelGrid>, used: &PerMeasurement<bool>) -> Self {
         let mut now = self.clone();
         let shared = data.leds + 1;
         for _ in 0..STEPS {
-            let equations = data.for_each(|c| CaptureEquations::new(data, c, &now, &images[c], &[]));
+            let equations = data.for_each(|c| FrameEquations::new(data, c, &now, &images[c], &[]));
             let mut normal = DMatrix::<f64>::zeros(shared, shared);
             let mut rhs = DVector::<f64>::zeros(shared);
-            for (capture, _) in equations.iter().zip(used).filter(|(_, used)| **used) {
-                let reduced = capture.reduced();
+            for (measurement, _) in equations.iter().zip(used).filter(|(_, used)| **used) {
+                let reduced = measurement.reduced();
                 for i in 0..shared {
                     rhs[i] += reduced[(i, shared)];
                     for j in 0..shared {
@@ -60,10 +60,10 @@ impl Nuisances {
     }
 
     /// Move by a step of the shared nuisances and further parameters; registration follows it.
-    pub fn advance(&mut self, data: &Data, equations: &PerCapture<CaptureEquations>, step: &DVector<f64>) {
+    pub fn advance(&mut self, data: &Data, equations: &PerMeasurement<FrameEquations>, step: &DVector<f64>) {
         let most = LARGEST_SHIFT * data.registration_um;
-        for (shift, capture) in self.shift_um.iter_mut().zip(equations) {
-            let (by, following) = (capture.registration(step), capture.following(step));
+        for (shift, measurement) in self.shift_um.iter_mut().zip(equations) {
+            let (by, following) = (measurement.registration(step), measurement.following(step));
             for axis in [0, 1] {
                 // Slopes hold as far as the image moves in the window.
                 shift[axis] += (by[axis] + following[axis]).clamp(-most, most) - following[axis];

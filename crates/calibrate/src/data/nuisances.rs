@@ -1,14 +1,14 @@
 //! Nuisance parameters: the registration of each window, the flux of each LED, the black level.
 //!
 //! They are fitted together with everything else, within what the lab states of them, and are never a finding.
-//! Registration belongs to one capture alone and is eliminated there; flux and black level are shared.
+//! Registration belongs to one measurement alone and is eliminated there; flux and black level are shared.
 
 use nalgebra::DMatrix;
 use ndarray::Array2;
 
 use super::Data;
 use crate::optics::PixelGrid;
-use crate::set::{CaptureIndex, PerCapture, PerLed};
+use crate::set::{MeasurementIndex, PerLed, PerMeasurement};
 
 /// How far the black level may be off (DN), one standard deviation: sensors drift by less over a session.
 pub const BLACK_SIGMA_DN: f64 = 0.5;
@@ -17,7 +17,7 @@ pub const BLACK_SIGMA_DN: f64 = 0.5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisances {
     /// Position of each window, relative to its stated position, along x and y (um).
-    pub shift_um: PerCapture<[f64; 2]>,
+    pub shift_um: PerMeasurement<[f64; 2]>,
     /// Flux of each LED over what is stated.
     pub flux: PerLed<f64>,
     /// Black level less what is stated (DN).
@@ -52,14 +52,14 @@ impl Nuisances {
         form
     }
 
-    /// Residual of a capture in units of its noise.
-    pub fn residual(&self, data: &Data, image: &PixelGrid, capture: CaptureIndex) -> Array2<f32> {
-        let model = image.pixels(self.shift_um[capture]);
-        self.whitened(data, capture, &model)
+    /// Residual of a measurement in units of its noise.
+    pub fn residual(&self, data: &Data, image: &PixelGrid, measurement: MeasurementIndex) -> Array2<f32> {
+        let model = image.pixels(self.shift_um[measurement]);
+        self.whitened(data, measurement, &model)
     }
 
     /// The same against the pixels of a model.
-    pub fn whitened(&self, data: &Data, c: CaptureIndex, model: &Array2<f32>) -> Array2<f32> {
+    pub fn whitened(&self, data: &Data, c: MeasurementIndex, model: &Array2<f32>) -> Array2<f32> {
         let factor = (data.scale[c] * self.flux[data.beam[c].led]) as f32;
         let black = self.black_dn as f32;
         let mut out = data.signal[c].clone();

@@ -6,10 +6,12 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::pattern::{untold_colours, untold_tilt};
-use super::{CaptureError, Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, Ranked, SetVerdict};
+use super::{
+    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, MeasurementError, Ranked, SetVerdict,
+};
 use crate::effects::Effect;
 use crate::fidelity::Rung;
-use crate::screening::UnusableCapture;
+use crate::screening::UnusableMeasurement;
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
 use crate::simulator_model::separating_measurement;
@@ -33,7 +35,7 @@ impl Diagnosis {
     pub fn new(
         simulator: &Simulator<'_>,
         evidence: &Evidence,
-        unusable: &[UnusableCapture],
+        unusable: &[UnusableMeasurement],
         ladder: Vec<Rung>,
     ) -> Self {
         let (set, finding) = (simulator.bench.set(), &evidence.finding);
@@ -47,7 +49,7 @@ impl Diagnosis {
             before: pair(&finding.before, &finding.held_before),
             after: pair(&finding.after, &finding.held_after),
             noise_floor: 1.0,
-            placebo_held_out: finding.null_held_out,
+            null_test_held_out: finding.null_held_out,
         };
         let unexplained_share = unexplained_share(&error, finding);
         let may_be_left = may_leave(&evidence.problem(simulator), &finding.after);
@@ -61,11 +63,14 @@ impl Diagnosis {
             of_step.collect()
         };
         let later = finding.later.iter().enumerate();
-        let captures = set.captures.iter_enumerated().map(|(c, capture)| CaptureError {
-            capture: capture.name.clone(),
-            before: error_of_measurement(&finding.held_before[c]),
-            after: error_of_measurement(&finding.held_after[c]),
-        });
+        let measurements = set
+            .measurements
+            .iter_enumerated()
+            .map(|(c, measurement)| MeasurementError {
+                measurement: measurement.name.clone(),
+                before: error_of_measurement(&finding.held_before[c]),
+                after: error_of_measurement(&finding.held_after[c]),
+            });
         Self {
             set: set.title.clone(),
             verdict,
@@ -77,15 +82,15 @@ impl Diagnosis {
             patterns: patterns.iter().map(|p| FreePattern::new(simulator, p)).collect(),
             proposal: None,
             unexplained_share,
-            missing_by_grain: evidence.amount_by_noise,
+            missing_by_speckle: evidence.amount_by_noise,
             left_out: left_out(set, unusable),
-            captures: captures.collect(),
+            measurements: measurements.collect(),
             ladder,
         }
     }
 
-    /// Of a set most of whose captures cannot be used; `error` is that of the nuisances alone.
-    pub fn data_unfit(set: &MeasuredSet, error: f64, unusable: &[UnusableCapture]) -> Self {
+    /// Of a set most of whose measurements cannot be used; `error` is that of the nuisances alone.
+    pub fn data_unfit(set: &MeasuredSet, error: f64, unusable: &[UnusableMeasurement]) -> Self {
         let pair = ErrorPair {
             fit: error,
             held_out: error,
@@ -100,16 +105,16 @@ impl Diagnosis {
                 before: pair,
                 after: pair,
                 noise_floor: 1.0,
-                placebo_held_out: error,
+                null_test_held_out: error,
             },
             ranking: Vec::new(),
             later_rankings: Vec::new(),
             patterns: Vec::new(),
             proposal: None,
             unexplained_share: 1.0,
-            missing_by_grain: None,
+            missing_by_speckle: None,
             left_out: left_out(set, unusable),
-            captures: Vec::new(),
+            measurements: Vec::new(),
             ladder: Vec::new(),
         }
     }
@@ -178,23 +183,25 @@ fn reported_widths(parts: &[IntervalParts]) -> Vec<WidthParts> {
     parts.iter().map(WidthParts::from).collect()
 }
 
-/// What captures of few elements or of one colour leave open: distances of their own would do as well as a tilt of the sensor, and
+/// What measurements of few elements or of one colour leave open: distances of their own would do as well as a tilt of the sensor, and
 /// effects that differ by colour alone may be taken for one another.
 fn remarks(simulator: &Simulator<'_>, evidence: &Evidence, verdict: SetVerdict) -> Vec<String> {
     let (set, finding) = (simulator.bench.set(), &evidence.finding);
     if verdict == SetVerdict::Unexplained || finding.chosen.is_empty() {
         return Vec::new();
     }
-    let used = || set.captures.iter_enumerated().filter(|(c, _)| evidence.used[*c]);
-    let elements: BTreeSet<usize> = used().map(|(_, capture)| usize::from(capture.element)).collect();
-    let colours: BTreeSet<usize> = used().map(|(_, capture)| usize::from(capture.led)).collect();
+    let used = || set.measurements.iter_enumerated().filter(|(c, _)| evidence.used[*c]);
+    let elements: BTreeSet<usize> = used()
+        .map(|(_, measurement)| usize::from(measurement.element))
+        .collect();
+    let colours: BTreeSet<usize> = used().map(|(_, measurement)| usize::from(measurement.led)).collect();
     let is_found = |is: fn(&dyn Effect) -> bool| finding.chosen.iter().any(|&e| is(simulator.effects[e].as_ref()));
-    let (gap, tilt) = (
-        is_found(|e| e.name() == "gap"),
-        is_found(|e| e.gradient_of() == Some("gap")),
+    let (defocus, tilt) = (
+        is_found(|e| e.name() == "defocus"),
+        is_found(|e| e.gradient_of() == Some("defocus")),
     );
     let is_tilt_open = match elements.len() {
-        1 => gap,
+        1 => defocus,
         2 | 3 => tilt,
         _ => false,
     };
@@ -205,9 +212,9 @@ fn remarks(simulator: &Simulator<'_>, evidence: &Evidence, verdict: SetVerdict) 
         .collect()
 }
 
-fn left_out(set: &MeasuredSet, unusable: &[UnusableCapture]) -> Vec<LeftOut> {
+fn left_out(set: &MeasuredSet, unusable: &[UnusableMeasurement]) -> Vec<LeftOut> {
     let named = unusable.iter().map(|u| LeftOut {
-        capture: set.captures[u.capture].name.clone(),
+        measurement: set.measurements[u.measurement].name.clone(),
         reason: u.reason.clone(),
     });
     named.collect()

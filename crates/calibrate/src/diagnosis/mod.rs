@@ -9,7 +9,7 @@ use metalith_core::{AtomicFile, Result};
 use serde::Serialize;
 use serde_json::Value;
 
-pub use pattern::{FreePattern, GroupValue, PatternCourse, Slope};
+pub use pattern::{FreePattern, GroupValue, PatternTrend, Slope};
 
 use crate::fidelity::Rung;
 use crate::width_parts::WidthParts;
@@ -18,7 +18,7 @@ use crate::width_parts::WidthParts;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SetVerdict {
-    /// The captures agree with what was stated, to within their noise.
+    /// The measurements agree with what was stated, to within their noise.
     NoResidual,
     /// The effects that were found explain the residual.
     Explained,
@@ -28,7 +28,7 @@ pub enum SetVerdict {
     Partly,
     /// There is a residual that no known effect explains.
     Unexplained,
-    /// More than half of the captures cannot be used, or there is one alone.
+    /// More than half of the measurements cannot be used, or there is one alone.
     DataUnfit,
 }
 
@@ -88,7 +88,7 @@ pub struct ErrorReport {
     pub before: ErrorPair,
     pub after: ErrorPair,
     pub noise_floor: f64,
-    pub placebo_held_out: f64,
+    pub null_test_held_out: f64,
 }
 
 /// A candidate that was tried.
@@ -106,10 +106,10 @@ pub struct Ranked {
     pub remark: String,
 }
 
-/// A capture that was left out.
+/// A measurement that was left out.
 #[derive(Clone, Debug, Serialize)]
 pub struct LeftOut {
-    pub capture: String,
+    pub measurement: String,
     pub reason: String,
 }
 
@@ -119,7 +119,7 @@ pub struct Diagnosis {
     pub set: String,
     pub verdict: SetVerdict,
     pub effects: Vec<FoundEffect>,
-    /// What these captures cannot tell of them, beside other effects.
+    /// What these measurements cannot tell of them, beside other effects.
     pub remarks: Vec<String>,
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
@@ -133,10 +133,10 @@ pub struct Diagnosis {
     /// Share of the error above noise that is left.
     pub unexplained_share: f64,
     /// Share of missing pillars by their speckle, where the speckle counts as noise in the error after.
-    pub missing_by_grain: Option<f64>,
+    pub missing_by_speckle: Option<f64>,
     pub left_out: Vec<LeftOut>,
-    /// Held-out error of each capture before and after.
-    pub captures: Vec<CaptureError>,
+    /// Held-out error of each measurement before and after.
+    pub measurements: Vec<MeasurementError>,
     /// The three fidelities of the cell, nuisances fitted.
     pub ladder: Vec<Rung>,
 }
@@ -150,7 +150,7 @@ pub struct Proposal {
     pub effects: Vec<String>,
     /// What each was seen by, with its name.
     pub reasons: Vec<String>,
-    /// The error on captures left out without them, where they were tried.
+    /// The error on measurements left out without them, where they were tried.
     pub held_out_without: Option<f64>,
 }
 
@@ -175,17 +175,17 @@ impl Proposal {
             format!("proposed for what is left, tried and not taken: {names}")
         } else {
             format!(
-                "adopted: {}; error on captures left out {without} without, {with} with",
+                "adopted: {}; error on measurements left out {without} without, {with} with",
                 taken.join(", ")
             )
         }
     }
 }
 
-/// The error of one capture when it was left out.
+/// The error of one measurement when it was left out.
 #[derive(Clone, Debug, Serialize)]
-pub struct CaptureError {
-    pub capture: String,
+pub struct MeasurementError {
+    pub measurement: String,
     pub before: Option<f64>,
     pub after: Option<f64>,
 }
@@ -219,7 +219,7 @@ impl Diagnosis {
         let list: Vec<String> = self.effects.iter().map(one).collect();
         match self.verdict {
             SetVerdict::NoResidual => {
-                "no residual: the captures agree with what was stated, to within their noise".into()
+                "no residual: the measurements agree with what was stated, to within their noise".into()
             }
             SetVerdict::Explained => format!("explained by {}", list.join("; ")),
             SetVerdict::OneOf => format!("one of these, which this set cannot distinguish: {}", list.join("; ")),
@@ -230,9 +230,9 @@ impl Diagnosis {
             ),
             SetVerdict::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
             SetVerdict::DataUnfit if self.left_out.is_empty() => {
-                "data unfit: one capture alone leaves nothing to judge a finding by; take others, of another colour, element or distance".into()
+                "data unfit: one measurement alone leaves nothing to judge a finding by; take others, of another colour, element or distance".into()
             }
-            SetVerdict::DataUnfit => format!("data unfit: {} captures cannot be used", self.left_out.len()),
+            SetVerdict::DataUnfit => format!("data unfit: {} measurements cannot be used", self.left_out.len()),
         }
     }
 }

@@ -4,7 +4,7 @@ use metalith_report::sig;
 use serde::Serialize;
 
 use crate::grouping::{Grouping, linear_trend};
-use crate::set::{CaptureIndex, MeasuredSet};
+use crate::set::{MeasuredSet, MeasurementIndex};
 use crate::simulator::Simulator;
 use crate::statistics::{LinearTrend, Pattern};
 
@@ -22,10 +22,10 @@ pub struct FreePattern {
     pub before: f64,
     pub after: f64,
     /// What the values are like over the place of the element, the wavelength, the distance or the angle.
-    pub course: Option<PatternCourse>,
+    pub linear_trend: Option<PatternTrend>,
 }
 
-/// The value of a quantity in one group of captures.
+/// The value of a quantity in one group of measurements.
 #[derive(Clone, Debug, Serialize)]
 pub struct GroupValue {
     pub group: String,
@@ -36,7 +36,7 @@ pub struct GroupValue {
 
 /// Values put as linear in what the groups differ in.
 #[derive(Clone, Debug, Serialize)]
-pub struct PatternCourse {
+pub struct PatternTrend {
     /// In words: the place of the element, the wavelength, the distance, the angle of incidence.
     pub of: String,
     /// Whether they are linear in it, to what they are known to.
@@ -48,8 +48,8 @@ pub struct PatternCourse {
     pub slopes: Vec<Slope>,
     /// How far the farthest value is from that.
     pub off: f64,
-    /// Values beyond as many as determine it: of none, any values would do.
-    pub spare: usize,
+    /// Values beyond as many as determine the trend: with none, any values are linear.
+    pub degrees_of_freedom: usize,
     /// What it comes from if they are linear.
     pub means: Option<String>,
     /// What these groups cannot tell apart.
@@ -68,7 +68,7 @@ pub struct Slope {
 }
 
 /// What groups differ in: in words, the unit that slopes are given per, and how many of the unit of the coordinates that is.
-fn course_of(by: Grouping) -> (&'static str, &'static str, f64) {
+fn trend_of(by: Grouping) -> (&'static str, &'static str, f64) {
     match by {
         Grouping::Element => ("place of the element", "mm", 1e3),
         Grouping::Colour => ("wavelength", "100 nm", 100.0),
@@ -105,34 +105,36 @@ impl FreePattern {
                 .collect(),
             before: pattern.chi2.1,
             after: pattern.chi2.0,
-            course: None,
+            linear_trend: None,
         };
         let gradient = effect.as_gradient().filter(|_| by == Grouping::Element);
-        out.course = linear_trend(pattern, set).map(|c| out.course_from(&c, by, gradient));
+        out.linear_trend = linear_trend(pattern, set).map(|c| out.trend_from(&c, by, gradient));
         out
     }
 
-    fn course_from(&self, course: &LinearTrend, by: Grouping, gradient: Option<&str>) -> PatternCourse {
-        let (of, per, factor) = course_of(by);
-        let slopes = course.extent.directions.iter().zip(&course.slopes);
+    fn trend_from(&self, trend: &LinearTrend, by: Grouping, gradient: Option<&str>) -> PatternTrend {
+        let (of, per, factor) = trend_of(by);
+        let slopes = trend.extent.directions.iter().zip(&trend.slopes);
         let slopes = slopes.map(|(along, (value, sigma))| Slope {
             along: *along,
             value: factor * value,
             sigma: factor * sigma,
             unit: format!("{} per {per}", self.unit),
         });
-        PatternCourse {
+        PatternTrend {
             of: of.into(),
-            is_linear: course.is_linear,
-            middle: course.extent.middle,
-            at_middle: [course.at_middle.0, course.at_middle.1],
+            is_linear: trend.is_linear,
+            middle: trend.extent.middle,
+            at_middle: [trend.at_middle.0, trend.at_middle.1],
             slopes: slopes.collect(),
-            off: course.off,
-            spare: course.degrees_of_freedom,
-            means: gradient.filter(|_| course.is_linear).map(str::to_owned),
-            remark: (course.degrees_of_freedom == 0).then(|| match by == Grouping::Element && self.quantity == "gap" {
-                true => untold_tilt(self.values.len()),
-                false => untold(self.values.len(), &self.by, "a slope", "a value of its own"),
+            off: trend.off,
+            degrees_of_freedom: trend.degrees_of_freedom,
+            means: gradient.filter(|_| trend.is_linear).map(str::to_owned),
+            remark: (trend.degrees_of_freedom == 0).then(|| {
+                match by == Grouping::Element && self.quantity == "defocus" {
+                    true => untold_tilt(self.values.len()),
+                    false => untold(self.values.len(), &self.by, "a slope", "a value of its own"),
+                }
             }),
         }
     }
@@ -141,12 +143,12 @@ impl FreePattern {
     pub fn sentence(&self) -> String {
         let one = |v: &GroupValue| format!("{}: {} +- {}", v.group, sig(v.value, 3), sig(v.sigma, 1));
         let values: Vec<String> = self.values.iter().map(one).collect();
-        let course = self
-            .course
+        let trend = self
+            .linear_trend
             .as_ref()
             .map_or_else(String::new, |c| c.sentence(&self.unit));
         format!(
-            "`{}` by {} ({}): reduced chi-square {} to {}.{course}",
+            "`{}` by {} ({}): reduced chi-square {} to {}.{trend}",
             self.quantity,
             self.by,
             values.join(", "),
@@ -156,7 +158,7 @@ impl FreePattern {
     }
 }
 
-impl PatternCourse {
+impl PatternTrend {
     fn sentence(&self, unit: &str) -> String {
         let slope = |s: &Slope| {
             let along = match s.along {
@@ -197,12 +199,12 @@ impl PatternCourse {
 /// or angle.
 fn untold(count: usize, by: &str, slope: &str, own: &str) -> String {
     match count {
-        1 => format!("Of one {by}, {slope} and {own} cannot be told apart; captures of another {by} would tell."),
+        1 => format!("Of one {by}, {slope} and {own} cannot be told apart; measurements of another {by} would tell."),
         2 => format!(
-            "Of two, {slope} and {own} for each {by} cannot be told apart: two values are always on a line; captures of a third {by} would tell."
+            "Of two, {slope} and {own} for each {by} cannot be told apart: two values are always on a line; measurements of a third {by} would tell."
         ),
         _ => format!(
-            "Of three that are not in line, {slope} with another value in the middle and {own} for each {by} cannot be told apart: three values are always on a plane; captures of a fourth {by} would tell."
+            "Of three that are not in line, {slope} with another value in the middle and {own} for each {by} cannot be told apart: three values are always on a plane; measurements of a fourth {by} would tell."
         ),
     }
 }
@@ -215,15 +217,15 @@ pub(super) fn untold_tilt(elements: usize) -> String {
 /// That one colour does not tell effects apart that differ by colour alone.
 pub(super) fn untold_colours() -> String {
     let widths = untold(1, "colour", "an index or a height of the film", "a bias of widths");
-    widths + " So it is with the centre of a lamp and a gap."
+    widths + " So it is with the centre of a lamp and a defocus."
 }
 
-fn label(set: &MeasuredSet, by: Grouping, c: CaptureIndex) -> String {
-    let capture = &set.captures[c];
+fn label(set: &MeasuredSet, by: Grouping, c: MeasurementIndex) -> String {
+    let measurement = &set.measurements[c];
     match by {
-        Grouping::Element => format!("{:?}", set.elements[capture.element].index),
-        Grouping::Colour => format!("{} nm", set.leds[capture.led].name()),
-        Grouping::Distance => format!("{} um", capture.distance_um),
-        Grouping::Angle => format!("{:.1?} deg", capture.aoi_rad.map(f64::to_degrees)),
+        Grouping::Element => format!("{:?}", set.elements[measurement.element].index),
+        Grouping::Colour => format!("{} nm", set.leds[measurement.led].name()),
+        Grouping::Distance => format!("{} um", measurement.distance_um),
+        Grouping::Angle => format!("{:.1?} deg", measurement.aoi_rad.map(f64::to_degrees)),
     }
 }

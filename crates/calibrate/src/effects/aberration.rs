@@ -11,7 +11,7 @@ pub struct Aberration {
     pub value_error: ValueError,
 }
 
-/// Aberrations through third order; tilts are registration, defocus is a gap.
+/// Aberrations through third order; tilts are registration, defocus is an effect of its own.
 pub const ABERRATIONS: [Aberration; 4] = [
     Aberration {
         name: "astigmatism",
@@ -69,9 +69,9 @@ impl Effect for Aberration {
 
     fn confusions(&self) -> &'static [(&'static str, &'static str)] {
         &[
-            ("gap", "captures at more distances"),
-            ("source_distance", "captures at two distances of the source"),
-            ("tilt", "captures at more angles"),
+            ("defocus", "measurements at more distances"),
+            ("source_distance", "measurements at two distances of the source"),
+            ("tilt", "measurements at more angles"),
         ]
     }
 }

@@ -360,7 +360,7 @@ impl Effect for DeclaredEffect {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{gap::Gap, value_error_of};
+    use super::super::{table::TABLE, value_error_of};
     use super::*;
 
     const SOUND: &str = r#"
@@ -409,9 +409,10 @@ start = 5.0
     #[test]
     fn a_declared_effect_has_the_error_of_its_stage() {
         let mut effect = read(SOUND).unwrap().remove(0);
-        effect.name = "gap_of_the_lid".into();
+        effect.name = "defocus_of_the_lid".into();
         assert_eq!(effect.value_error(), value_error_of(effect.stage()));
-        assert_ne!(effect.value_error(), Gap.value_error());
+        let defocus = TABLE.iter().find(|e| e.name == "defocus").unwrap();
+        assert_ne!(effect.value_error(), defocus.value_error());
     }
 
     /// Changes are counted from the start of the parameters: what is there already would come with the first of them.

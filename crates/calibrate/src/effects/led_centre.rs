@@ -37,6 +37,6 @@ impl Effect for LedCentre {
     }
 
     fn confusions(&self) -> &'static [(&'static str, &'static str)] {
-        &[("gap", "the spectrum of the LED")]
+        &[("defocus", "the spectrum of the LED")]
     }
 }

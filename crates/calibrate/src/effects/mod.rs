@@ -1,32 +1,16 @@
-//! Known errors of chips and benches, one file each.
+//! Known errors of chips and benches.
 //!
-//! An effect has a name, a unit, a range that physics allows, and sets one or two numbers of a
-//! [`Perturbation`]. Adding one touches its file and the list in this one.
+//! An effect has a name, a unit, a range that physics allows, and sets one or two numbers of a [`Perturbation`]. Most are
+//! records of one table, in `table`; those that depend on the set (its lamps, the places of its elements), that make several
+//! of one kind, or that a user declares have a file each.
 
 mod aberration;
-mod aperture_offset;
-mod cd_bias;
-mod cd_bias_density;
-mod corner_rounding;
 mod declared;
-mod film_height;
-mod film_index;
-mod gap;
 mod led_centre;
-mod led_width;
-mod missing_pillars;
-mod pixel_blur;
-mod residual_mask;
-mod rim_height;
 mod sensor_tilt;
-mod sidewall_taper;
-mod source_distance;
-mod source_size;
 mod stitching;
-mod stray_light;
-mod tilt;
+mod table;
 mod value_error;
-mod zero_order;
 
 pub use declared::{DeclaredEffect, DeclaredParameter, MOST_PARAMETERS};
 pub use metalith_attribution::{Parameter, ValueError};
@@ -76,7 +60,7 @@ pub trait Effect: Send + Sync {
         false
     }
 
-    /// Whether it acts on single pillars at random, so that its parameters do not determine the capture.
+    /// Whether it acts on single pillars at random, so that its parameters do not determine the measurement.
     fn random(&self) -> bool {
         false
     }
@@ -119,6 +103,11 @@ pub trait Effect: Send + Sync {
     /// The reported values with their confidence intervals: one value for each parameter, unless several parameters
     /// make one value. `half_widths` are those of the parameters.
     fn reported(&self, numbers: &[f64], half_widths: &[f64], set: &MeasuredSet) -> Vec<(f64, [f64; 2])> {
+        self.reported_each(numbers, half_widths, set)
+    }
+
+    /// One reported value for each parameter, with its confidence interval.
+    fn reported_each(&self, numbers: &[f64], half_widths: &[f64], set: &MeasuredSet) -> Vec<(f64, [f64; 2])> {
         let ranges = self.parameters();
         numbers
             .iter()
@@ -156,7 +145,7 @@ pub fn separate_by(a: &dyn Effect, b: &str) -> Option<&'static str> {
 /// Effects that any chip and bench may have, whatever was measured: all but those of the lamps and of the distances
 /// between the elements of a set.
 pub fn of_any_chip() -> Vec<Box<dyn Effect>> {
-    let mut effects = single();
+    let mut effects = table();
     effects.extend(aberrations());
     effects
 }
@@ -167,36 +156,18 @@ fn aberrations() -> impl Iterator<Item = Box<dyn Effect>> {
         .map(|e| Box::new(e) as Box<dyn Effect>)
 }
 
-/// Those that have one file each.
-fn single() -> Vec<Box<dyn Effect>> {
-    vec![
-        Box::new(cd_bias::CdBias),
-        Box::new(cd_bias_density::CdBiasDensity),
-        Box::new(film_height::FilmHeight),
-        Box::new(rim_height::RimHeight),
-        Box::new(film_index::FilmIndex),
-        Box::new(sidewall_taper::SidewallTaper),
-        Box::new(corner_rounding::CornerRounding),
-        Box::new(residual_mask::ResidualMask),
-        Box::new(missing_pillars::MissingPillars),
-        Box::new(gap::Gap),
-        Box::new(tilt::Tilt),
-        Box::new(source_distance::SourceDistance),
-        Box::new(led_width::LedWidth),
-        Box::new(source_size::SourceSize),
-        Box::new(pixel_blur::PixelBlur),
-        Box::new(zero_order::ZeroOrder),
-        Box::new(stray_light::StrayLight),
-        Box::new(aperture_offset::ApertureOffset),
-    ]
+/// The effects of the table.
+fn table() -> Vec<Box<dyn Effect>> {
+    let all = table::TABLE.iter();
+    all.map(|own| Box::new(*own) as Box<dyn Effect>).collect()
 }
 
 /// All effects that are tried on a set.
 pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
-    let mut effects = single();
+    let mut effects = table();
     // Circles have no corners: an effect without an effect is never found.
     let has_corners = set.stack.cell.shape.is_square();
-    effects.retain(|e| has_corners || e.name() != corner_rounding::CornerRounding.name());
+    effects.retain(|e| has_corners || e.name() != table::CORNER_ROUNDING);
     effects.extend(sensor_tilt::SensorTilt::of(set).map(|e| Box::new(e) as Box<dyn Effect>));
     effects.extend(aberrations());
     effects.extend(stitching::StitchedFields::of(set).map(|e| Box::new(e) as Box<dyn Effect>));
@@ -251,7 +222,7 @@ mod tests {
             with_declared(&set, &DeclaredEffect::read(&file).unwrap()).map(|all| all.len())
         };
         assert_eq!(declared("own").unwrap(), all(&set).len() + 1);
-        for name in ["stitching_x", "stitching_y", "gap"] {
+        for name in ["stitching_x", "stitching_y", "defocus"] {
             let error = declared(name).unwrap_err().to_string();
             assert!(error.contains(&format!("`{name}` already")), "{error}");
         }

@@ -9,7 +9,7 @@ use metalith_optics::Perturbation;
 const TYPICAL_UM: f64 = 2.0;
 const MOST_UM: f64 = 60.0;
 
-/// The tilt along x and y, about the middle of all elements, or along the one line that they are in: captures of elements side by
+/// The tilt along x and y, about the middle of all elements, or along the one line that they are in: measurements of elements side by
 /// side tell nothing of a tilt about this line.
 pub struct SensorTilt {
     extent: Extent,
@@ -50,7 +50,7 @@ impl Effect for SensorTilt {
     }
 
     fn gradient_of(&self) -> Option<&'static str> {
-        Some("gap")
+        Some("defocus")
     }
 
     fn value_error(&self) -> ValueError {
@@ -67,7 +67,7 @@ impl Effect for SensorTilt {
     }
 
     fn confusions(&self) -> &'static [(&'static str, &'static str)] {
-        &[("gap", "captures of elements farther apart")]
+        &[("defocus", "measurements of elements farther apart")]
     }
 }
 

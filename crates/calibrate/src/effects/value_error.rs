@@ -2,7 +2,7 @@
 //!
 //! Those of effects are root mean square errors in sets without noise whose cells are solved with 15 orders and whose spectra,
 //! layouts and planes are sampled otherwise than in fits, of no effect and of one of 0.8 and 1.5 typical sizes: `metalith calibrate
-//! SET --validate --noiseless --orders 15 --nulls 1 --trial gap=0.8 --trial gap=-1.5 ...`. What the cell explains is left out.
+//! SET --validate --noiseless --orders 15 --nulls 1 --trial defocus=0.8 --trial defocus=-1.5 ...`. What the cell explains is left out.
 
 use metalith_attribution::ValueError;
 
@@ -32,7 +32,7 @@ mod tests {
             let effects = of_any_chip();
             effects.iter().find(|e| e.name() == name).map(|e| e.value_error())
         };
-        assert_eq!(own("gap"), Some(ValueError::of_value(1e-4)));
+        assert_eq!(own("defocus"), Some(ValueError::of_value(1e-4)));
         assert_eq!(own("film_index"), Some(ValueError::of_value(OF_STACK)));
         assert_eq!(own("cd_bias_density"), Some(ValueError::of_value(OF_OTHERS)));
     }

@@ -1,11 +1,11 @@
 //! The report of a session for people.
 
-mod captures;
+mod measurements;
 mod residual;
 
 use std::path::Path;
 
-use captures::{SIGMAS, captures, widths};
+use measurements::{SIGMAS, measurements, widths};
 use ndarray::Array2;
 use residual::{confusable, nuisances, smooth_residual};
 
@@ -31,7 +31,7 @@ pub fn write_page(
         format!("Calibration: {}", diagnosis.set),
         format!(
             "{} of `{}`",
-            counted(session.set().captures.len(), "capture"),
+            counted(session.set().measurements.len(), "measurement"),
             session.set().path.display()
         ),
     );
@@ -45,16 +45,16 @@ pub fn write_page(
         ("Held out, before", sig(error.before.held_out, 4)),
         ("Held out, after", sig(error.after.held_out, 4)),
         ("Noise floor", sig(error.noise_floor, 3)),
-        ("Held out, null test", sig(error.placebo_held_out, 4)),
+        ("Held out, null test", sig(error.null_test_held_out, 4)),
         (
             "Unexplained",
             format!("{} %", fixed(100.0 * diagnosis.unexplained_share, 1)),
         ),
     ]);
     page.paragraph(
-        "Errors are reduced chi-square per pixel: noise alone gives 1. Held out: predicted by a fit to captures of other colours, elements or distances; only registration, flux and black level are adjusted. Null test: the error that random smooth terms leave.",
+        "Errors are reduced chi-square per pixel: noise alone gives 1. Held out: predicted by a fit to measurements of other colours, elements or distances; only registration, flux and black level are adjusted. Null test: the error that random smooth terms leave.",
     );
-    if let Some(share) = diagnosis.missing_by_grain {
+    if let Some(share) = diagnosis.missing_by_speckle {
         page.paragraph(format!(
             "Pillars that are missing at random places make a speckle that no fit can predict; its variance is known and counts as noise in the errors after. By the speckle alone, {} % of the pillars are missing.",
             sig(100.0 * share, 3)
@@ -76,19 +76,19 @@ pub fn write_page(
     ladder(&mut page, session, diagnosis);
     if let Some(evidence) = evidence {
         ranking(&mut page, diagnosis);
-        captures(&mut page, session, simulations, evidence);
+        measurements(&mut page, session, simulations, evidence);
         widths(&mut page, session, &evidence.finding);
         smooth_residual(&mut page, session, evidence);
         confusable(&mut page, session, simulations, evidence);
         nuisances(&mut page, session, &evidence.finding.after.nuisances);
     }
     if !diagnosis.left_out.is_empty() {
-        page.section("Captures left out");
+        page.section("Measurements left out");
         page.list(
             diagnosis
                 .left_out
                 .iter()
-                .map(|l| format!("`{}`: {}", l.capture, l.reason)),
+                .map(|l| format!("`{}`: {}", l.measurement, l.reason)),
         );
     }
     page.write(path)
@@ -157,7 +157,7 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
         ]);
     }
     page.table(table);
-    // The capture with the largest residual under the first fidelity.
+    // The measurement with the largest residual under the first fidelity.
     let power = |a: &Array2<f32>| a.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
     let first = &diagnosis.ladder[0].residuals;
     let Some(worst) = first
@@ -176,19 +176,19 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
         pictures.image(rung.fidelity.as_str(), rung.residuals[worst].mapv(f64::from));
     }
     page.figure(pictures.caption(format!(
-        "Residual of capture `{}`, in standard deviations of the noise.",
-        session.set().captures[worst].name
+        "Residual of measurement `{}`, in standard deviations of the noise.",
+        session.set().measurements[worst].name
     )));
 }
 
 fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
     page.section("Candidates");
     page.paragraph(
-        "Every effect is scored by the share of the residual that its signature explains; the leaders are fitted, and judged by what they gain on captures left out.",
+        "Every effect is scored by the share of the residual that its signature explains; the leaders are fitted, and judged by what they gain on measurements left out.",
     );
     let mut chart = Ranking::new(
         "Candidates",
-        Axis::linear("gain on captures left out", "reduced chi-square per pixel"),
+        Axis::linear("gain on measurements left out", "reduced chi-square per pixel"),
     );
     for r in diagnosis.ranking.iter().filter(|r| r.held_out_gain.is_some()) {
         let interval = r.held_out_gain_interval.map(|[a, b]| (a, b));
@@ -201,7 +201,7 @@ fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
         );
     }
     page.figure(chart.caption(
-        "Gain of each leader, with its 95 % confidence interval over groups of captures. An effect that was taken in a later step has its gain beyond the effects that were taken before it.",
+        "Gain of each leader, with its 95 % confidence interval over groups of measurements. An effect that was taken in a later step has its gain beyond the effects that were taken before it.",
     ));
     page.details("All candidates", |inner| {
         inner.table(candidates(&diagnosis.ranking));

@@ -66,7 +66,7 @@ pub(super) fn smooth_residual(page: &mut Page, session: &Session<'_>, evidence: 
     ]);
 }
 
-/// Pairs of effects that these captures can hardly distinguish.
+/// Pairs of effects that these measurements can hardly distinguish.
 pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &Simulations, evidence: &Evidence) {
     page.section("Effects that are hard to distinguish");
     let problem = FitProblem {
@@ -93,7 +93,7 @@ pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &S
         Column::text("Measurement that would distinguish them"),
     ])
     .caption(
-        "Cosines between the signatures of this layout in these captures, nuisances projected out, weighted by noise.",
+        "Cosines between the signatures of this layout in these measurements, nuisances projected out, weighted by noise.",
     );
     for (i, j) in pairs {
         let [a, b] = [i, j].map(|k| session.simulator.slots[k].effect);
@@ -112,14 +112,14 @@ pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &S
 pub(super) fn nuisances(page: &mut Page, session: &Session<'_>, found: &Nuisances) {
     page.details("Nuisances: registration, flux, black level", |inner| {
         let mut table = Table::new([
-            Column::text("Capture"),
+            Column::text("Measurement"),
             Column::number("Off in x", "pixels"),
             Column::number("Off in y", "pixels"),
         ]);
         let pixel = session.set().camera.pixel_um;
-        for (capture, shift) in session.set().captures.iter().zip(&found.shift_um) {
+        for (measurement, shift) in session.set().measurements.iter().zip(&found.shift_um) {
             table.row([
-                Cell::code(&capture.name),
+                Cell::code(&measurement.name),
                 Cell::fixed(shift[0] / pixel, 3),
                 Cell::fixed(shift[1] / pixel, 3),
             ]);

@@ -86,7 +86,7 @@ impl Quantity<'_> {
     /// A value for each of some elements.
     fn of_elements(&self, simulator: &Simulator<'_>, groups: &[usize]) -> DeclaredEffect {
         let set = simulator.bench.set();
-        let element = |group: &usize| &set.elements[set.captures[self.pattern.groups[*group]].element];
+        let element = |group: &usize| &set.elements[set.measurements[self.pattern.groups[*group]].element];
         let word = |index: [i64; 2]| index.map(|i| i.to_string().replace('-', "m")).join("_");
         let names: Vec<String> = groups
             .iter()
@@ -127,12 +127,12 @@ impl Quantity<'_> {
         if simulator.effects.iter().any(|e| is_tried(e.as_ref())) {
             return None;
         }
-        let course = linear_trend(self.pattern, simulator.bench.set()).filter(|c| c.is_linear)?;
-        let names: &[&str] = match course.extent.directions.as_slice() {
+        let trend = linear_trend(self.pattern, simulator.bench.set()).filter(|c| c.is_linear)?;
+        let names: &[&str] = match trend.extent.directions.as_slice() {
             [_] => &["slope"],
             _ => &["slope_x", "slope_y"],
         };
-        let [x, y] = course.extent.middle;
+        let [x, y] = trend.extent.middle;
         let along = |direction: &[f64; 2]| match direction {
             [1.0, 0.0] => from("X", x),
             [0.0, 1.0] => from("Y", y),
@@ -140,10 +140,10 @@ impl Quantity<'_> {
         };
         let terms: Vec<String> = names
             .iter()
-            .zip(&course.extent.directions)
+            .zip(&trend.extent.directions)
             .map(|(name, d)| format!("{name} * {}", along(d)))
             .collect();
-        let parameters = course.slopes.iter().zip(&course.extent.half_spans).zip(names);
+        let parameters = trend.slopes.iter().zip(&trend.extent.half_spans).zip(names);
         Some(DeclaredEffect {
             name: format!("{}_gradient", self.name),
             unit: format!("{} per mm", self.effect.unit()),

@@ -1,4 +1,4 @@
-//! A second image: a share of all light again, displaced by the same distance and blurred alike in every capture.
+//! A second image: a share of all light again, displaced by the same distance and blurred alike in every measurement.
 
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use metalith_wave::kernels::sum_of_products;
 /// Part of a frame's edge that displacements go to: light from farther is not in the frame.
 const REACH: f64 = 0.25;
 
-/// Farthest displacement along an axis (pixels): work goes with its square times the pixels of all captures.
+/// Farthest displacement along an axis (pixels): work goes with its square times the pixels of all measurements.
 const MOST_REACH: i32 = 32;
 
 /// Largest typical size of a proposed ghost's share, so that some multiples of it lie within its range.
@@ -53,7 +53,7 @@ pub(super) struct Ghost {
     pub removed: f64,
 }
 
-/// Whitened pixels of one capture, with what nuisances explain taken out of the residual.
+/// Whitened pixels of one measurement, with what nuisances explain taken out of the residual.
 #[derive(Clone)]
 struct Frame {
     /// The image as predicted, in DN, with the blur that is tried.

@@ -39,7 +39,7 @@ pub fn propose(session: &Session<'_>, evidence: &Evidence, progress: &dyn Progre
     let mut found = Vec::new();
     if let Some(ghost) = ghost::strongest(&problem, fit, progress)? {
         let effect = ghost.declared(session.set().camera.pixel_um);
-        let reason = "a displaced copy of the image in every capture".to_owned();
+        let reason = "a displaced copy of the image in every measurement".to_owned();
         found.push((ghost.removed, vec![Proposed { effect, reason }]));
     }
     if let Some(smooth) = SmoothResidual::new(&session.simulator, &problem, fit) {

@@ -29,8 +29,8 @@ struct Placed {
 
 /// How far each window is off by itself, along the worse axis (pixels).
 pub(super) fn window_offsets(set: &MeasuredSet, nuisances: &Nuisances) -> Vec<f64> {
-    let captures = set.captures.iter().zip(&nuisances.shift_um);
-    let placed: Vec<Placed> = captures
+    let measurements = set.measurements.iter().zip(&nuisances.shift_um);
+    let placed: Vec<Placed> = measurements
         .map(|(c, shift)| Placed {
             element: c.element.into(),
             shift_um: *shift,

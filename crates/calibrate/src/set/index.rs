@@ -1,9 +1,9 @@
-//! Index types: a capture, an LED and an element cannot be taken for one another.
+//! Index types: an LED and an element cannot be taken for one another.
 
 use metalith_attribution::index_types;
 use typed_index_collections::TiVec;
 
-pub use metalith_attribution::{MeasurementIndex as CaptureIndex, PerMeasurement as PerCapture};
+pub use metalith_attribution::{MeasurementIndex, PerMeasurement};
 
 index_types! {
     /// An LED of a set: an index into [`crate::MeasuredSet::leds`].

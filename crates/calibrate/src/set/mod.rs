@@ -2,7 +2,7 @@
 
 mod frame;
 mod index;
-pub(crate) mod read;
+pub mod read;
 mod sem;
 
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use ndarray::Array2;
 
 pub use frame::{Bayer, Channel};
 pub(crate) use frame::{expected, saturated};
-pub use index::{CaptureIndex, ElementIndex, LedIndex, PerCapture, PerElement, PerLed};
+pub use index::{ElementIndex, LedIndex, MeasurementIndex, PerElement, PerLed, PerMeasurement};
 pub use sem::{COLUMNS as SEM_COLUMNS, SemSite};
 
 use metalith_cell::CellStack;
@@ -35,7 +35,7 @@ pub struct MeasuredSet {
     pub camera: RelayCamera,
     pub leds: PerLed<Led>,
     pub elements: PerElement<MeasuredElement>,
-    pub captures: PerCapture<Capture>,
+    pub measurements: PerMeasurement<Measurement>,
     /// Where a boundary of write fields runs across x and across y, from the middle of every lens (um), if the lab says so.
     pub field_boundary_um: Option<[f64; 2]>,
     /// Widths seen from above; empty where none were taken.
@@ -51,9 +51,9 @@ impl MeasuredSet {
         Some((index, element.site_at(site.at_um)?))
     }
 
-    /// Pixels of a capture that its colour can be seen by: those of its filter, where the sensor has filters.
-    pub fn seeing_pixels(&self, capture: CaptureIndex) -> usize {
-        let (camera, channel) = (&self.camera, self.leds[self.captures[capture].led].channel);
+    /// Pixels of a measurement that its colour can be seen by: those of its filter, where the sensor has filters.
+    pub fn seeing_pixels(&self, measurement: MeasurementIndex) -> usize {
+        let (camera, channel) = (&self.camera, self.leds[self.measurements[measurement].led].channel);
         let all = camera.rows * camera.cols;
         camera.bayer.zip(channel).map_or(all, |(bayer, channel)| {
             let pixels = (0..camera.rows).flat_map(|y| (0..camera.cols).map(move |x| (y, x)));
@@ -64,9 +64,9 @@ impl MeasuredSet {
     /// Whether two sessions have one plan: all is equal but light levels, noise and frames.
     pub fn same_plan(&self, other: &Self) -> bool {
         let camera = |c: &RelayCamera| (c.pixel_um, c.rows, c.cols, c.relay_blur_um);
-        let captures = |set: &Self| -> Vec<_> {
-            let of = |c: &Capture| (c.element, c.led, c.aoi_rad, c.distance_um, c.window_centre_um);
-            set.captures.iter().map(of).collect()
+        let measurements = |set: &Self| -> Vec<_> {
+            let of = |c: &Measurement| (c.element, c.led, c.aoi_rad, c.distance_um, c.window_centre_um);
+            set.measurements.iter().map(of).collect()
         };
         let elements = |set: &Self| -> Vec<_> {
             set.elements
@@ -79,7 +79,7 @@ impl MeasuredSet {
             && camera(&self.camera) == camera(&other.camera)
             && self.leds == other.leds
             && self.field_boundary_um == other.field_boundary_um
-            && captures(self) == captures(other)
+            && measurements(self) == measurements(other)
             && elements(self) == elements(other)
     }
 }
@@ -180,7 +180,7 @@ impl MeasuredElement {
 
 /// A window of the camera's mean frame.
 #[derive(Clone, Debug)]
-pub struct Capture {
+pub struct Measurement {
     /// File name without folder and ending.
     pub name: String,
     pub element: ElementIndex,
@@ -213,7 +213,7 @@ mod tests {
         metalith_testing::session::small_set(folder.path());
         let read = || MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
         let (set, mut brighter, mut stitched, mut moved) = (read(), read(), read(), read());
-        brighter.captures.iter_mut().for_each(|c| c.scale_dn *= 2.0);
+        brighter.measurements.iter_mut().for_each(|c| c.scale_dn *= 2.0);
         assert!(set.same_plan(&brighter));
         stitched.field_boundary_um = Some([0.0, 3.0]);
         assert!(!set.same_plan(&stitched));

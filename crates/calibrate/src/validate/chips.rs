@@ -14,7 +14,7 @@ pub const SIZES: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// Effects that are tried together, each at its typical size: of one stage and of several, alike and unlike.
 const PAIRS: [(&str, &str); 8] = [
-    ("cd_bias", "gap"),
+    ("cd_bias", "defocus"),
     ("cd_bias", "film_index"),
     ("film_height", "zero_order"),
     ("sidewall_taper", "pixel_blur"),

@@ -21,7 +21,7 @@ pub use summary::{DetectionLimit, Validation};
 use crate::diagnosis::{Diagnosis, SetVerdict};
 use crate::effects::Effect;
 use crate::session::{Session, Settings, check_effects};
-use crate::set::{CaptureIndex, MeasuredSet};
+use crate::set::{MeasuredSet, MeasurementIndex};
 use crate::smooth_residual::SmoothResidual;
 use crate::statistics::{Evidence, Measurements};
 use chips::{AppliedEffect, SyntheticChip};
@@ -67,7 +67,7 @@ pub struct ValidationTrial {
     pub numbers: Vec<ClaimedNumber>,
     /// Unit of the effect; empty for two.
     pub unit: String,
-    /// Largest gain of any single effect on captures left out.
+    /// Largest gain of any single effect on measurements left out.
     pub largest_gain: f64,
     pub held_out_before: f64,
     pub held_out_after: f64,
@@ -82,13 +82,13 @@ pub struct UnexplainedResidual {
     pub path_nm: Vec<(u32, f64, f64)>,
     /// Covariance of the smooth blur, xx, xy, yy, with standard deviations (um^2).
     pub blur_um2: [(f64, f64); 3],
-    /// Capture whose residual is shown.
-    pub capture: String,
+    /// Measurement whose residual is shown.
+    pub measurement: String,
     #[serde(skip)]
     pub path: Array2<f64>,
     #[serde(skip)]
     pub radius_um: f64,
-    /// Residual of that capture (sigma).
+    /// Residual of that measurement (sigma).
     #[serde(skip)]
     pub residual: Array2<f64>,
 }
@@ -335,14 +335,14 @@ impl UnexplainedResidual {
     fn new(session: &Session<'_>, diagnosis: &Diagnosis, evidence: &Evidence) -> Option<Self> {
         let (problem, fit) = (evidence.problem(&session.simulator), &evidence.finding.after);
         let smooth = SmoothResidual::new(&session.simulator, &problem, fit)?;
-        let error = |c: &CaptureIndex| diagnosis.captures[usize::from(*c)].after.unwrap_or(0.0);
+        let error = |c: &MeasurementIndex| diagnosis.measurements[usize::from(*c)].after.unwrap_or(0.0);
         let worst = problem.data.indices().max_by(|a, b| error(a).total_cmp(&error(b)))?;
         let image = problem.prediction(&fit.theta, worst);
         let residual = fit.nuisances.residual(problem.data, &image, worst);
         Some(Self {
             path_nm: smooth.coefficients_nm,
             blur_um2: smooth.blur_um2,
-            capture: diagnosis.captures[usize::from(worst)].capture.clone(),
+            measurement: diagnosis.measurements[usize::from(worst)].measurement.clone(),
             path: smooth.path_nm,
             radius_um: smooth.radius_um,
             residual: residual.mapv(f64::from),

@@ -56,7 +56,7 @@ pub fn write_validation(folder: &Path, validation: &Validation) -> Result<()> {
         ("Intervals", validation.coverage.sentence()),
     ]);
     page.paragraph(
-        "Each synthetic set has its own registration, flux, black level and noise. Its wavelengths, samples and diffraction orders differ from those of the fits, and single pillars are missing. Which effects can be distinguished depends on these captures and their noise.",
+        "Each synthetic set has its own registration, flux, black level and noise. Its wavelengths, samples and diffraction orders differ from those of the fits, and single pillars are missing. Which effects can be distinguished depends on these measurements and their noise.",
     );
     page.section("Confusion matrix");
     let mut matrix = Matrix::new("Confusion matrix", validation.claimed.iter().cloned()).axes("claimed", "true");
@@ -187,10 +187,10 @@ fn off_list(page: &mut Page, validation: &Validation) {
             .range(-SIGMAS, SIGMAS)
             .diverging()
             .side(280.0);
-        picture.image(left.capture.as_str(), left.residual.clone());
+        picture.image(left.measurement.as_str(), left.residual.clone());
         page.row([
             map.caption("Smooth optical path over the lens, fitted to the residual."),
-            picture.caption("Residual of the capture with the largest error."),
+            picture.caption("Residual of the measurement with the largest error."),
         ]);
     }
 }

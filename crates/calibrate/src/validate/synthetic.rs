@@ -13,7 +13,7 @@ use crate::cells::{CellSource, RigorousCells};
 use crate::effects;
 use crate::optics::PixelGrid;
 use crate::session::{Settings, check_effects};
-use crate::set::{MeasuredSet, PerCapture, PerLed};
+use crate::set::{MeasuredSet, PerLed, PerMeasurement};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use metalith_core::{Error, Progress, Result};
 use metalith_optics::Perturbation;
@@ -54,7 +54,7 @@ pub struct SyntheticImages {
 }
 
 impl<'a> Synthesizer<'a> {
-    /// Synthesizer of `like`: its layout, captures and noise.
+    /// Synthesizer of `like`: its layout, measurements and noise.
     ///
     /// # Errors
     /// If a material is not known.
@@ -158,7 +158,7 @@ impl<'a> Synthesizer<'a> {
                     scatter: None,
                 });
                 let planes = self.simulator.bench.intensities(&chips, &perturbation.path, progress)?;
-                let both: PerCapture<Vec<f32>> = planes[0][0]
+                let both: PerMeasurement<Vec<f32>> = planes[0][0]
                     .iter()
                     .zip(&planes[1][0])
                     .map(|(x, y)| x.iter().zip(y).map(|(a, b)| 0.5 * (a + b)).collect())
@@ -212,16 +212,16 @@ impl<'a> Synthesizer<'a> {
             .collect();
         let black = camera.black_level_dn + BLACK_DN * normal(&mut rng);
         let reach = camera.registration_sigma_px * camera.pixel_um;
-        for (capture, grid) in set.captures.iter_mut().zip(&exposed.images) {
+        for (measurement, grid) in set.measurements.iter_mut().zip(&exposed.images) {
             let shift = [reach * normal(&mut rng), reach * normal(&mut rng)];
             let mut light: Array2<f32> = grid.pixels(shift);
             if let Some((share, at)) = exposed.ghost {
                 // A window that is off by the negative shows what is displaced.
                 light.scaled_add(share as f32, &grid.pixels([shift[0] - at[0], shift[1] - at[1]]));
             }
-            let factor = capture.scale_dn * flux[capture.led];
-            let (frames, own) = (capture.frames, &capture.noise);
-            capture.dn = Array2::from_shape_fn(light.dim(), |at| {
+            let factor = measurement.scale_dn * flux[measurement.led];
+            let (frames, own) = (measurement.frames, &measurement.noise);
+            measurement.dn = Array2::from_shape_fn(light.dim(), |at| {
                 let signal = (f64::from(light[at]) * factor).max(0.0);
                 let variance = match own {
                     Some(own) if own[at].is_finite() => f64::from(own[at]),

@@ -50,7 +50,7 @@ fn every_fault_of_a_set_is_named_in_one_go() {
     }
 }
 
-/// A session as a colour sensor behind a relay takes it: two exposures of each capture, the longer one saturated, one of the
+/// A session as a colour sensor behind a relay takes it: two exposures of each measurement, the longer one saturated, one of the
 /// two as a stack; only the pixels of a channel count.
 #[test]
 fn a_bench_with_exposures_filters_and_a_relay_is_read() {
@@ -77,7 +77,7 @@ fn a_bench_with_exposures_filters_and_a_relay_is_read() {
     fs::write(&path, text).unwrap();
     let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
     assert_eq!((set.camera.pixel_um, set.camera.relay_blur_um), (0.5, 0.3));
-    let first = &set.captures.raw[0];
+    let first = &set.measurements.raw[0];
     assert_eq!((first.scale_dn, first.frames), (1.0, 64));
     // Single precision.
     assert!((first.dn[[20, 21]] - 540.0).abs() < 0.01, "{}", first.dn[[20, 21]]);
@@ -94,25 +94,27 @@ fn a_bench_with_exposures_filters_and_a_relay_is_read() {
     }
 }
 
-/// What surrounds a saturated peak still tells of the distance: pixels are masked, and no capture is lost.
+/// What surrounds a saturated peak still tells of the distance: pixels are masked, and no measurement is lost.
 #[test]
 fn saturated_peaks_are_masked() {
-    const GAP_UM: f64 = 5.0;
-    let mut set = synthetic(&[("gap", &[GAP_UM])], 26);
+    const DEFOCUS_UM: f64 = 5.0;
+    let mut set = synthetic(&[("defocus", &[DEFOCUS_UM])], 26);
     let peak = set
-        .captures
+        .measurements
         .iter()
         .map(|c| c.dn.fold(0.0f32, |a, b| a.max(*b)))
         .fold(0.0, f32::max);
     let full = 0.8 * peak;
     set.camera.saturation_dn = f64::from(full);
-    set.captures.iter_mut().for_each(|c| c.dn.mapv_inplace(|v| v.min(full)));
+    set.measurements
+        .iter_mut()
+        .for_each(|c| c.dn.mapv_inplace(|v| v.min(full)));
     let session = Session::new(&set, settings()).unwrap();
     assert!(session.data.indices().any(|c| session.data.points(c) < PIXELS * PIXELS));
     let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
     assert_eq!(d.left_out.len(), 0);
-    assert_eq!(names(&d), ["gap"], "{}", d.sentence());
-    assert_eq!(d.effects[0].holds(GAP_UM), Some(true), "{}", d.sentence());
+    assert_eq!(names(&d), ["defocus"], "{}", d.sentence());
+    assert_eq!(d.effects[0].holds(DEFOCUS_UM), Some(true), "{}", d.sentence());
 }
 
 /// Dark current of a long exposure is not that of a short one: one dark frame of both is refused, unless the lab says that it holds.
@@ -144,7 +146,7 @@ fn exposures_of_unlike_time_have_dark_frames_of_their_own() {
     let own = "dark_frame = \"long_dark.npy\"\ndark_frames = 16\n";
     for (of_camera, of_exposure, first) in [("", own, 440.0), ("dark_holds_for = \"any_exposure\"\n", "", 539.0)] {
         let set = read(of_camera, of_exposure).unwrap();
-        let at = |capture: usize| set.captures.raw[capture].dn[[20, 21]];
+        let at = |measurement: usize| set.measurements.raw[measurement].dn[[20, 21]];
         assert!((at(0) - first).abs() < ROUNDING, "{}", at(0));
         // The others have that of the camera: 1 DN of dark current.
         assert!((at(1) - 39.0).abs() < ROUNDING, "{}", at(1));

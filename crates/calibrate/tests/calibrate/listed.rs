@@ -21,7 +21,7 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
         assert_eq!(d.verdict, SetVerdict::NoResidual, "{}: {:?}", d.sentence(), d.error);
         assert!(d.effects.is_empty());
     }
-    for (name, number) in [("cd_bias", -8.0), ("gap", 5.0)] {
+    for (name, number) in [("cd_bias", -8.0), ("defocus", 5.0)] {
         let images = synthesizer.with_effect(name, &[number], &Silent).unwrap();
         let d = diagnose(&synthesizer.draw(&images, 11));
         let found = d.effects.iter().find(|e| e.name == name);
@@ -40,10 +40,10 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
         "{}",
         d.sentence()
     );
-    // Lost frames: the verdict is `data_unfit`, and the captures are named.
+    // Lost frames: the verdict is `data_unfit`, and the measurements are named.
     let mut dark = synthesizer.draw(&nothing, 13);
-    for capture in dark.captures.iter_mut().take(5) {
-        capture.dn.fill(40.0);
+    for measurement in dark.measurements.iter_mut().take(5) {
+        measurement.dn.fill(40.0);
     }
     let d = diagnose(&dark);
     assert_eq!(d.verdict, SetVerdict::DataUnfit);
@@ -52,10 +52,10 @@ fn effects_are_found_and_nothing_is_found_where_nothing_is() {
 
 #[test]
 fn two_effects_at_once_are_both_found() {
-    let set = synthetic(&[("cd_bias", &[6.0]), ("gap", &[-4.0])], 21);
+    let set = synthetic(&[("cd_bias", &[6.0]), ("defocus", &[-4.0])], 21);
     let session = Session::new(&set, settings()).unwrap();
     let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
-    assert_eq!(names(&d), ["cd_bias", "gap"], "{}", d.sentence());
+    assert_eq!(names(&d), ["cd_bias", "defocus"], "{}", d.sentence());
     assert_eq!(d.verdict, SetVerdict::Explained);
 }
 
@@ -64,14 +64,14 @@ fn two_effects_at_once_are_both_found() {
 fn a_bias_beside_a_large_gap_is_found() {
     /// Relative: two colours of a coarse spectrum, and synthetic sets have another sampling.
     const TOLERANCE: f64 = 0.08;
-    let truth = [("cd_bias", -8.0), ("gap", 9.0)];
+    let truth = [("cd_bias", -8.0), ("defocus", 9.0)];
     let parts = truth.each_ref().map(|(n, v)| (*n, std::slice::from_ref(v)));
     let set = synthetic(&parts, 23);
     let session = Session::new(&set, settings()).unwrap();
     let d = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
     assert_eq!(
         names(&d),
-        ["cd_bias", "gap"],
+        ["cd_bias", "defocus"],
         "{} {:?} {:#?}",
         d.sentence(),
         d.error,
@@ -88,18 +88,18 @@ fn a_bias_beside_a_large_gap_is_found() {
     }
 }
 
-/// Captures of one colour are read, and the answer says what they leave open.
+/// Measurements of one colour are read, and the answer says what they leave open.
 #[test]
-fn captures_of_one_colour_leave_something_open() {
-    let mut set = synthetic(&[("gap", &[5.0])], 25);
-    let first = set.captures.iter().next().unwrap().led;
-    set.captures = set.captures.into_iter().filter(|c| c.led == first).collect();
-    let session = Session::new(&set, with_effects(&["gap", "cd_bias"])).unwrap();
+fn measurements_of_one_colour_leave_something_open() {
+    let mut set = synthetic(&[("defocus", &[5.0])], 25);
+    let first = set.measurements.iter().next().unwrap().led;
+    set.measurements = set.measurements.into_iter().filter(|c| c.led == first).collect();
+    let session = Session::new(&set, with_effects(&["defocus", "cd_bias"])).unwrap();
     let d = session
         .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
         .unwrap()
         .0;
-    assert!(names(&d).contains(&"gap"), "{}", d.sentence());
+    assert!(names(&d).contains(&"defocus"), "{}", d.sentence());
     assert!(d.remarks.iter().any(|r| r.contains("Of one colour")), "{:?}", d.remarks);
 }
 
@@ -108,17 +108,17 @@ fn captures_of_one_colour_leave_something_open() {
 fn a_tilt_of_the_sensor_is_found() {
     const TILT_MRAD: f64 = 40.0;
     let set = synthetic(&[("sensor_tilt_x", &[TILT_MRAD])], 24);
-    let session = Session::new(&set, with_effects(&["sensor_tilt_x", "gap", "tilt", "cd_bias"])).unwrap();
+    let session = Session::new(&set, with_effects(&["sensor_tilt_x", "defocus", "tilt", "cd_bias"])).unwrap();
     let simulations = session.simulate(&Silent).unwrap();
     let d = session.diagnose(&simulations, &Silent).unwrap().0;
     assert_eq!(names(&d), ["sensor_tilt_x"], "{}", d.sentence());
     assert_eq!(d.effects[0].holds(TILT_MRAD), Some(true), "{}", d.sentence());
     assert!(d.remarks[0].contains("cannot be told apart"), "{:?}", d.remarks);
-    // Without the tilt in the list, the page says that the gap differs by element.
-    let session = Session::new(&set, with_effects(&["gap", "tilt", "cd_bias"])).unwrap();
+    // Without the tilt in the list, the page says that the defocus differs by element.
+    let session = Session::new(&set, with_effects(&["defocus", "tilt", "cd_bias"])).unwrap();
     let (d, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
     let pattern = d.patterns.first().unwrap_or_else(|| panic!("{}", d.sentence()));
-    assert_eq!((pattern.quantity.as_str(), pattern.by.as_str()), ("gap", "element"));
+    assert_eq!((pattern.quantity.as_str(), pattern.by.as_str()), ("defocus", "element"));
     let apart_um = pattern.values[1].value - pattern.values[0].value;
     // 40 mrad over the 150 um between the elements.
     assert!((apart_um / 6.0 - 1.0).abs() < 0.05, "{}", pattern.sentence());
@@ -129,7 +129,10 @@ fn a_tilt_of_the_sensor_is_found() {
         pattern.sentence()
     );
     let proposed = propose(&session, &evidence.unwrap(), &Silent).unwrap();
-    assert!(proposed.iter().all(|p| p.effect.name != "gap_gradient"), "{proposed:?}");
+    assert!(
+        proposed.iter().all(|p| p.effect.name != "defocus_gradient"),
+        "{proposed:?}"
+    );
 }
 
 /// The half of each lens beyond a boundary stands off its place.
@@ -145,7 +148,7 @@ fn a_displaced_part_of_every_lens_is_found() {
         .with_effect("stitching_x", &[BY_NM, 0.0, 1.0], &Silent)
         .unwrap();
     let set = synthesizer.draw(&images, 28);
-    let session = Session::new(&set, with_effects(&["stitching_x", "coma", "gap", "tilt"])).unwrap();
+    let session = Session::new(&set, with_effects(&["stitching_x", "coma", "defocus", "tilt"])).unwrap();
     let d = session
         .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
         .unwrap()
@@ -178,7 +181,7 @@ fn a_displaced_part_is_found_where_nobody_says_where_fields_meet() {
         .unwrap();
     let mut set = synthesizer.draw(&images, 29);
     set.field_boundary_um = None;
-    let others = ["coma", "gap", "tilt"];
+    let others = ["coma", "defocus", "tilt"];
     let place = {
         let session = Session::new(&set, with_effects(&others)).unwrap();
         let simulations = session.simulate(&Silent).unwrap();
@@ -209,7 +212,7 @@ fn a_displaced_part_is_found_where_nobody_says_where_fields_meet() {
     );
 }
 
-/// A bias and another index change the phase of blue and green differently: a fit of either alone fails on captures
+/// A bias and another index change the phase of blue and green differently: a fit of either alone fails on measurements
 /// left out.
 #[test]
 fn a_pair_is_found_where_neither_of_the_two_helps() {
@@ -218,7 +221,7 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
     let truth = [("cd_bias", -12.0), ("film_index", 0.06)];
     let parts = truth.each_ref().map(|(n, v)| (*n, std::slice::from_ref(v)));
     let set = synthetic(&parts, 24);
-    let session = Session::new(&set, with_effects(&["cd_bias", "film_index", "zero_order", "gap"])).unwrap();
+    let session = Session::new(&set, with_effects(&["cd_bias", "film_index", "zero_order", "defocus"])).unwrap();
     let simulations = session.simulate(&Silent).unwrap();
     let d = session.diagnose(&simulations, &Silent).unwrap().0;
     assert_eq!(names(&d), ["cd_bias", "film_index"], "{}", d.sentence());
@@ -234,13 +237,13 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
     assert_eq!(gains[0], gains[1]);
 }
 
-/// Pillars that are higher at the rim of every lens: much of it is a defocus, which the gap does not hold for all colours and
+/// Pillars that are higher at the rim of every lens: much of it is a defocus, which one number does not hold for all colours and
 /// widths.
 #[test]
 fn heights_that_differ_over_the_lens_are_found() {
     const HIGHER_NM: f64 = 20.0;
     let set = synthetic(&[("rim_height", &[HIGHER_NM])], 32);
-    let session = Session::new(&set, with_effects(&["rim_height", "gap", "cd_bias", "tilt"])).unwrap();
+    let session = Session::new(&set, with_effects(&["rim_height", "defocus", "cd_bias", "tilt"])).unwrap();
     let (d, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
     assert_eq!(names(&d), ["rim_height"], "{} {:?}", d.sentence(), d.error);
     assert_eq!(d.verdict, SetVerdict::Explained);
@@ -254,17 +257,17 @@ fn heights_that_differ_over_the_lens_are_found() {
 #[test]
 fn missing_pillars_are_found_by_their_mean_and_by_their_speckle() {
     const SHARE: f64 = 0.04;
-    /// Relative: a lens of 60 um in eight captures has few speckles, and its mean is seen through them.
+    /// Relative: a lens of 60 um in eight measurements has few speckles, and its mean is seen through them.
     const TOLERANCE: f64 = 0.25;
     let set = synthetic(&[("missing_pillars", &[SHARE])], 31);
-    let settings = with_effects(&["missing_pillars", "zero_order", "stray_light", "gap"]);
+    let settings = with_effects(&["missing_pillars", "zero_order", "stray_light", "defocus"]);
     let session = Session::new(&set, settings).unwrap();
     let simulations = session.simulate(&Silent).unwrap();
     let d = session.diagnose(&simulations, &Silent).unwrap().0;
     assert_eq!(names(&d), ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
     assert_eq!(d.verdict, SetVerdict::Explained);
     let by_mean = d.effects[0].value.as_f64().unwrap();
-    let by_speckle = d.missing_by_grain.unwrap();
+    let by_speckle = d.missing_by_speckle.unwrap();
     assert_eq!(d.effects[0].holds(SHARE), Some(true), "{}", d.sentence());
     for found in [by_mean, by_speckle] {
         assert!((found / SHARE - 1.0).abs() < TOLERANCE, "{by_mean} {by_speckle}");

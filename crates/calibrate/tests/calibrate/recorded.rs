@@ -59,8 +59,8 @@ fn light() -> Vec<(String, Array2<f64>)> {
         .remove(0);
     let set = Synthesizer::new(&quiet, &settings()).unwrap().draw(&images, 41);
     let black = LIKE.camera.black_level_dn;
-    let of = |c: &metalith_calibrate::Capture| (c.name.clone(), c.dn.mapv(|v| f64::from(v) - black));
-    set.captures.iter().map(of).collect()
+    let of = |c: &metalith_calibrate::Measurement| (c.name.clone(), c.dn.mapv(|v| f64::from(v) - black));
+    set.measurements.iter().map(of).collect()
 }
 
 /// The answer for the set in a folder, and the set.
@@ -93,12 +93,12 @@ fn a_bias_is_found_in_a_mosaic() {
     let bayer = Bayer::CHOICES.iter().find(|c| c.0 == "grbg").unwrap().1;
     let mut camera = SensorModel::new(1);
     let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
-    for ((name, light), capture) in light().iter().zip(&set.captures) {
-        let channel = set.leds[capture.led].channel.unwrap();
+    for ((name, light), measurement) in light().iter().zip(&set.measurements) {
+        let channel = set.leds[measurement.led].channel.unwrap();
         let frame = Array2::from_shape_fn(light.dim(), |at| {
             // Through another filter comes a tenth.
             let share = if bayer.has(at, channel) { 1.0 } else { 0.1 };
-            camera.recorded(share * light[at], capture.frames)
+            camera.recorded(share * light[at], measurement.frames)
         });
         write_npy(&folder.path().join(format!("{name}.npy")), &frame);
     }
@@ -106,7 +106,7 @@ fn a_bias_is_found_in_a_mosaic() {
     is_the_bias(&d);
     // Half of the pixels are green, a quarter is red.
     let seen: Vec<usize> = set
-        .captures
+        .measurements
         .iter_enumerated()
         .map(|(c, _)| set.seeing_pixels(c))
         .collect();
@@ -114,7 +114,7 @@ fn a_bias_is_found_in_a_mosaic() {
     assert!(seen.contains(&(all / 2)) && seen.contains(&(all / 4)));
 }
 
-/// The long exposure of half of the captures is saturated at its peak, which the short one tells of; the rest is known by the long one.
+/// The long exposure of half of the measurements is saturated at its peak, which the short one tells of; the rest is known by the long one.
 #[test]
 fn a_bias_is_found_in_joined_exposures() {
     const LONG: f64 = 8.0;
@@ -125,7 +125,7 @@ fn a_bias_is_found_in_joined_exposures() {
     let mut text = fs::read_to_string(&path).unwrap();
     let mut camera = SensorModel::new(2);
     let full = LIKE.camera.saturation_dn as f32;
-    let (mut saturated, mut captures) = (0, 0);
+    let (mut saturated, mut measurements) = (0, 0);
     for (name, light) in light() {
         let mut exposures = String::new();
         for (kind, scale) in [("long", LONG), ("short", SHORT)] {
@@ -141,22 +141,25 @@ fn a_bias_is_found_in_joined_exposures() {
                 "[[capture.exposure]]\nfile = \"{name}_{kind}.npy\"\nscale_dn = {scale:?}\nframes = {FRAMES}\n"
             ));
         }
-        // The keys of a capture come before its exposures.
+        // The keys of a measurement come before its exposures.
         let own = text.find(&format!("file = \"{name}.npy\"\n")).unwrap();
         let end = text[own..].find("scale_dn = 1.0\nframes = 64\n").unwrap() + own;
         text.replace_range(end..end + "scale_dn = 1.0\nframes = 64\n".len(), &exposures);
         text = text.replace(&format!("file = \"{name}.npy\"\n"), "");
-        captures += 1;
+        measurements += 1;
     }
     fs::write(&path, text).unwrap();
-    assert!(2 * saturated >= captures, "{saturated} of {captures} are saturated");
+    assert!(
+        2 * saturated >= measurements,
+        "{saturated} of {measurements} are saturated"
+    );
     let (d, set) = diagnosed(folder.path());
     is_the_bias(&d);
-    assert!(set.captures.iter().all(|c| c.noise.is_some() && c.scale_dn == LONG));
+    assert!(set.measurements.iter().all(|c| c.noise.is_some() && c.scale_dn == LONG));
 }
 
 /// Pixels of unlike response and dark current, and dark and flat frames of few frames, whose noise is larger than that of the
-/// captures: it is counted.
+/// measurements: it is counted.
 #[test]
 fn a_bias_is_found_behind_noisy_dark_and_flat_frames() {
     const FLAT_DN: f64 = 3000.0;
@@ -206,7 +209,7 @@ fn a_bias_is_found_behind_noisy_dark_and_flat_frames() {
 #[test]
 fn a_gap_is_found_on_a_bare_sensor() {
     const EDGE: usize = 16;
-    const GAP_UM: f64 = 15.0;
+    const DEFOCUS_UM: f64 = 15.0;
     let folder = tempfile::tempdir().unwrap();
     let path = small_set(folder.path());
     let text = fs::read_to_string(&path).unwrap();
@@ -216,20 +219,27 @@ fn a_gap_is_found_on_a_bare_sensor() {
         .replace(&format!("cols = {PIXELS}"), &format!("cols = {EDGE}"))
         .replace("scale_dn = 1.0", "scale_dn = 12.0");
     fs::write(&path, text).unwrap();
-    for capture in &LIKE.captures {
+    for measurement in &LIKE.measurements {
         let dark = Array2::from_elem((EDGE, EDGE), LIKE.camera.black_level_dn as f32);
-        write_npy(&folder.path().join(format!("{}.npy", capture.name)), &dark);
+        write_npy(&folder.path().join(format!("{}.npy", measurement.name)), &dark);
     }
     let like = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
     let synthesizer = Synthesizer::new(&like, &settings()).unwrap();
-    let images = synthesizer.with_effect("gap", &[GAP_UM], &Silent).unwrap();
+    let images = synthesizer.with_effect("defocus", &[DEFOCUS_UM], &Silent).unwrap();
     let set = synthesizer.draw(&images, 43);
     let session = Session::new(&set, settings()).unwrap();
     let d = session
         .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
         .unwrap()
         .0;
-    assert_eq!(names(&d), ["gap"], "{} {:?} {:?}", d.sentence(), d.error, d.left_out);
-    assert_eq!(d.effects[0].holds(GAP_UM), Some(true), "{}", d.sentence());
+    assert_eq!(
+        names(&d),
+        ["defocus"],
+        "{} {:?} {:?}",
+        d.sentence(),
+        d.error,
+        d.left_out
+    );
+    assert_eq!(d.effects[0].holds(DEFOCUS_UM), Some(true), "{}", d.sentence());
     assert!(d.error.after.held_out < EXPLAINED, "{:?}", d.error);
 }

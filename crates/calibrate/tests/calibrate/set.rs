@@ -34,7 +34,7 @@ pub static SYNTHESIZER: LazyLock<Synthesizer<'static>> =
     LazyLock::new(|| Synthesizer::new(&LIKE, &settings()).unwrap());
 
 pub fn settings() -> Settings {
-    with_effects(&["cd_bias", "gap", "tilt", "led_width", "zero_order", "pixel_blur"])
+    with_effects(&["cd_bias", "defocus", "tilt", "led_width", "zero_order", "pixel_blur"])
 }
 
 pub fn with_effects(names: &[&str]) -> Settings {

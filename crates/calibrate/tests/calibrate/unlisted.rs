@@ -26,7 +26,7 @@ fn a_declared_effect_is_found_and_kept_in_the_model() {
     .unwrap();
     let settings = Settings {
         declared: DeclaredEffect::read(&file).unwrap(),
-        ..with_effects(&["bow", "gap", "cd_bias"])
+        ..with_effects(&["bow", "defocus", "cd_bias"])
     };
     let synthesizer = Synthesizer::new(&LIKE, &settings).unwrap();
     let images = synthesizer.with_effect("bow", &[BOW_NM], &Silent).unwrap();
@@ -58,12 +58,12 @@ const BLURRED_GHOST: &str = include_str!("../../../../golden/ghost.toml");
 /// second image serves sharp and blurred ones.
 #[test]
 fn an_effect_outside_the_list_is_proposed_and_adopted() {
-    /// Reduced chi-square per pixel that may be left on captures left out: the aim, and what the coarse spectrum of these
+    /// Reduced chi-square per pixel that may be left on measurements left out: the aim, and what the coarse spectrum of these
     /// tests leaves.
     const EXPLAINED: f64 = 1.1 + 0.1;
     /// Relative: synthetic sets have another sampling.
     const TOLERANCE: f64 = 0.1;
-    let tried = ["gap", "cd_bias"];
+    let tried = ["defocus", "cd_bias"];
     let file = FOLDERS[0].join("ghost.toml");
     fs::write(&file, BLURRED_GHOST).unwrap();
     let declaring = Settings {
@@ -119,7 +119,7 @@ fn an_effect_outside_the_list_is_proposed_and_adopted() {
 /// both, and they are adopted with their slopes.
 #[test]
 fn what_is_linear_in_the_place_of_the_element_is_proposed_and_adopted() {
-    /// Reduced chi-square per pixel that may be left on captures left out, as above.
+    /// Reduced chi-square per pixel that may be left on measurements left out, as above.
     const EXPLAINED: f64 = 1.1 + 0.1;
     /// Relative to the steeper slope: synthetic sets have another sampling.
     const TOLERANCE: f64 = 0.05;
@@ -140,18 +140,18 @@ fn what_is_linear_in_the_place_of_the_element_is_proposed_and_adopted() {
     };
     let synthesizer = Synthesizer::new(&like, &declaring).unwrap();
     for (name, truth, proposal, slopes) in [
-        ("sensor_tilt", vec![60.0, -35.0], "gap_gradient", [60.0, -35.0]),
+        ("sensor_tilt", vec![60.0, -35.0], "defocus_gradient", [60.0, -35.0]),
         ("rising", vec![0.08], "cd_bias_gradient", [80.0, -40.0]),
     ] {
         let images = synthesizer.with_effect(name, &truth, &Silent).unwrap();
         let set = synthesizer.draw(&images, 33);
-        let session = Session::new(&set, with_effects(&["gap", "cd_bias"])).unwrap();
+        let session = Session::new(&set, with_effects(&["defocus", "cd_bias"])).unwrap();
         let (before, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
         assert!(before.verdict.leaves_a_residual(), "{}", before.sentence());
-        let course = before.patterns[0].course.as_ref().unwrap();
+        let trend = before.patterns[0].linear_trend.as_ref().unwrap();
         assert!(
-            course.is_linear && course.spare == 0 && course.remark.is_some(),
-            "{course:?}"
+            trend.is_linear && trend.degrees_of_freedom == 0 && trend.remark.is_some(),
+            "{trend:?}"
         );
         let effects = proposed(&session, &evidence.unwrap());
         assert!(effects.iter().any(|e| e.name == proposal), "{effects:?}");

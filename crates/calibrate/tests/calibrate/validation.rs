@@ -11,7 +11,7 @@ fn a_validation_counts_claims() {
     let plan = ValidationPlan {
         nulls: 3,
         threshold_nulls: 1,
-        effects: vec!["gap".into()],
+        effects: vec!["defocus".into()],
         off_list: false,
         ..ValidationPlan::default()
     };
@@ -31,7 +31,7 @@ fn a_validation_counts_claims() {
 
 #[test]
 fn unknown_effects_are_refused_all_at_once() {
-    let wrong = ["cd_bais", "gap", "wavefront"].map(String::from).to_vec();
+    let wrong = ["cd_bais", "defocus", "wavefront"].map(String::from).to_vec();
     let settings = Settings {
         only: wrong.clone(),
         ..settings()
@@ -57,7 +57,7 @@ fn unknown_effects_are_refused_all_at_once() {
         for part in ["`cd_bais` (did you mean `cd_bias`?)", "`wavefront`", known] {
             assert!(text.contains(part), "{part} is not in:\n{text}");
         }
-        assert!(!text.contains("`gap`"), "{text}");
+        assert!(!text.contains("`defocus`"), "{text}");
     }
     assert!(!outs[0].exists());
 }

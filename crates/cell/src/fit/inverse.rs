@@ -16,7 +16,7 @@ pub struct InverseFit {
     /// Duty cycle over phase.
     pub polynomial: InversePolynomial,
     /// Turns that the widths of the cell span at this wavelength; below 1 no mapping reaches all phases.
-    pub span_turns: f64,
+    pub span_waves: f64,
     /// Rigorous phase of the width that the polynomial gives, against the phase asked for.
     pub round_trip: MappingError,
 }
@@ -47,7 +47,7 @@ pub fn fit_inverse(
     let (Some(&first), Some(&last)) = (good.first(), good.last()) else {
         return Err(too_few(curve));
     };
-    let span_turns = curve.turns[last] - curve.turns[first];
+    let span_waves = curve.turns[last] - curve.turns[first];
     // One start if the widths do not reach a turn, else all that leave a whole turn.
     let starts = good
         .iter()
@@ -86,7 +86,7 @@ pub fn fit_inverse(
         if best.as_ref().is_none_or(|b| round_trip.rms_rad < b.round_trip.rms_rad) {
             best = Some(InverseFit {
                 polynomial,
-                span_turns,
+                span_waves,
                 round_trip,
             });
         }

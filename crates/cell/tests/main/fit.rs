@@ -98,7 +98,7 @@ fn what_the_published_polynomials_miss_and_a_fit_does_not() {
         all.round_trip.rms_rad < CUBIC_RMS_RAD && all.round_trip.worst_rad < CUBIC_WORST_RAD,
         "{all:?}"
     );
-    assert!(all.span_turns > 1.0);
+    assert!(all.span_waves > 1.0);
     // As printed in the paper, in even powers, the form is the worse one.
     let even = fit_inverse(&curve, PITCH_NM, Basis::EvenPowers, 2, 0.2).unwrap();
     assert!(even.round_trip.rms_rad > 2.0 * all.round_trip.rms_rad, "{even:?}");

@@ -6,10 +6,12 @@
 //! it would be a second fault for one mistake, and its advice would be wrong.
 
 mod fault;
+mod renamed;
 mod scalar;
 mod section;
 
 pub use fault::{Fault, FaultKind, Faults};
+pub use renamed::renamed;
 pub use scalar::{NoPlace, Scalar, with_values};
 pub use section::{Limits, Section};
 

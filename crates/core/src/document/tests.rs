@@ -57,6 +57,31 @@ fn a_misspelt_key_is_one_mistake() {
     );
 }
 
+/// An old name, of a key or of a word, is one mistake, and the new one is named.
+#[test]
+fn an_old_name_is_refused_with_the_new_one() {
+    let faults = faults_of("[cell]\nspan_nm = 350\nform = \"round\"", |root| {
+        let s = root.section("cell");
+        s.renamed("span_nm", "pitch_nm");
+        s.renamed("round", "circle");
+        s.float("pitch_nm", Limits::new(100.0..=2000.0, "nm"));
+        s.choice("form", &[("circle", 0), ("square", 1)], None);
+        s.finish();
+    });
+    let found: Vec<[&str; 2]> = faults
+        .faults()
+        .iter()
+        .map(|f| [f.what.as_str(), f.hint.as_str()])
+        .collect();
+    assert_eq!(
+        found,
+        [
+            ["`span_nm` is called `pitch_nm` now in [cell]", "write `pitch_nm`"],
+            ["`round` is called `circle` now", "write `circle`"]
+        ]
+    );
+}
+
 #[test]
 fn one_missing_bracket_is_one_mistake() {
     let text = format!("[cell]\nsizes = [1, 2\n{}", "[[mark]]\nx = [1, 2]\n".repeat(50));

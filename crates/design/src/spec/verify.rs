@@ -49,7 +49,7 @@ pub enum CellIncidence {
     /// Oblique incidence: the angle at which light arrives at each element from each field angle, both polarisations; the
     /// cells are solved once for each direction and wavelength.
     #[serde(rename = "oblique")]
-    AsLit,
+    Oblique,
 }
 
 /// A direction of light as an element sees it, from the middle of its field.
@@ -78,11 +78,11 @@ pub struct LimitSpec {
     pub psf_difference_max: f64,
     /// Least contrast of a point of the scene in white light in any channel of the camera, pixel included, along the
     /// worse of x and y.
-    pub white_mtf_min: f64,
+    pub polychromatic_mtf_min: f64,
     /// Frequency that it counts at (line pairs a millimetre), where it is not half of the finest that the pixels of the camera tell.
-    pub white_mtf_lp_mm: Option<f64>,
+    pub polychromatic_mtf_lp_mm: Option<f64>,
     /// Least share of the light of a point, of what arrives in any channel of the camera, in a square of two pixels.
-    pub white_energy_2_pixels_min: f64,
+    pub polychromatic_energy_2_pixels_min: f64,
 }
 
 impl VerifySpec {
@@ -186,10 +186,10 @@ fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) {
 }
 
 fn read_incidence(s: &Section<'_, '_>, cell: &CellSpec) -> CellIncidence {
-    let choices = [("normal", CellIncidence::Normal), ("oblique", CellIncidence::AsLit)];
-    let renamed = [("as_lit", "oblique")];
-    let incidence = s.choice_renamed("incidence", &choices, &renamed, Some(CellIncidence::Normal));
-    if incidence == CellIncidence::AsLit && cell.shape.basis().is_some() {
+    let choices = [("normal", CellIncidence::Normal), ("oblique", CellIncidence::Oblique)];
+    s.renamed("as_lit", "oblique");
+    let incidence = s.choice("incidence", &choices, Some(CellIncidence::Normal));
+    if incidence == CellIncidence::Oblique && cell.shape.basis().is_some() {
         let [what, hint] = OBLIQUE_RECTANGLES;
         s.fault_given(&["cell.shape"], "incidence", what, hint);
     }
@@ -229,11 +229,14 @@ impl LimitSpec {
             centroid_shift_max_um: f64::MAX,
             mtf_difference_max: f64::MAX,
             psf_difference_max: f64::MAX,
-            white_mtf_min: 0.0,
-            white_mtf_lp_mm: None,
-            white_energy_2_pixels_min: 0.0,
+            polychromatic_mtf_min: 0.0,
+            polychromatic_mtf_lp_mm: None,
+            polychromatic_energy_2_pixels_min: 0.0,
         };
         let Some(s) = section else { return limits };
+        for name in ["mtf_min", "mtf_lp_mm", "energy_2_pixels_min"] {
+            s.renamed(&format!("white_{name}"), &format!("polychromatic_{name}"));
+        }
         let count = |key, default: u64| s.optional_integer(key, 0..=i64::MAX, "").map_or(default, |v| v as u64);
         let real = |key, unit, default: f64| {
             s.optional_float(key, Limits::new(0.0..=f64::MAX, unit))
@@ -248,10 +251,12 @@ impl LimitSpec {
         limits.mtf_difference_max = real("mtf_difference_max", "", limits.mtf_difference_max);
         limits.psf_difference_max = real("psf_difference_max", "", limits.psf_difference_max);
         let share = |key| s.optional_float(key, Limits::new(0.0..=1.0, "")).unwrap_or(0.0);
-        limits.white_mtf_min = share("white_mtf_min");
-        limits.white_energy_2_pixels_min = share("white_energy_2_pixels_min");
-        limits.white_mtf_lp_mm =
-            s.optional_float("white_mtf_lp_mm", Limits::new(1.0..=1000.0, "line pairs a millimetre"));
+        limits.polychromatic_mtf_min = share("polychromatic_mtf_min");
+        limits.polychromatic_energy_2_pixels_min = share("polychromatic_energy_2_pixels_min");
+        limits.polychromatic_mtf_lp_mm = s.optional_float(
+            "polychromatic_mtf_lp_mm",
+            Limits::new(1.0..=1000.0, "line pairs a millimetre"),
+        );
         s.finish();
         limits
     }

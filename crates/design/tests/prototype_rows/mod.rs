@@ -22,7 +22,7 @@ pub struct RowMisfit {
     /// Equal neighbours, lit along the normal.
     pub normal: f64,
     /// Equal neighbours, lit as the row is.
-    pub as_lit: f64,
+    pub oblique: f64,
     /// The neighbours that there are.
     pub neighbours: f64,
 }
@@ -40,7 +40,7 @@ impl Misfits {
     /// Mean over the rows: equal neighbours lit along the normal and as the rows are, and those that there are.
     pub fn means(&self) -> [f64; 3] {
         let mean = |of: fn(&RowMisfit) -> f64| self.rows.iter().map(of).sum::<f64>() / self.rows.len() as f64;
-        [mean(|r| r.normal), mean(|r| r.as_lit), mean(|r| r.neighbours)]
+        [mean(|r| r.normal), mean(|r| r.oblique), mean(|r| r.neighbours)]
     }
 }
 
@@ -87,7 +87,7 @@ impl Prototype {
         let equal = PointwiseCell::new(stack.clone(), self.design.cell.widths_nm());
         let widest = self.design.cell.pitch_nm as u16;
         let normal = equal.transmissions(um, widest).unwrap();
-        let as_lit = if along_normal {
+        let oblique = if along_normal {
             [normal.clone(), normal.clone()]
         } else {
             let light = Illumination::from_direction(um, sines).oblique();
@@ -121,15 +121,15 @@ impl Prototype {
                 t.clone()
                     .map(|t| row.widths_nm.iter().map(|w| t[*w as usize]).collect())
             };
-            let (as_lit, neighbours) = (single(&as_lit), table.sites(&row.lattice, &row.widths_nm, full));
-            for (amplitudes, found) in first.iter_mut().zip([&as_lit, &neighbours, row.transmitted()]) {
+            let (oblique, neighbours) = (single(&oblique), table.sites(&row.lattice, &row.widths_nm, full));
+            for (amplitudes, found) in first.iter_mut().zip([&oblique, &neighbours, row.transmitted()]) {
                 amplitudes.push(row.first_order(found, &turns));
             }
             rows.push(RowMisfit {
                 radius_um,
                 direction,
                 normal: row.misfit(&single(&normal)),
-                as_lit: row.misfit(&as_lit),
+                oblique: row.misfit(&oblique),
                 neighbours: row.misfit(&neighbours),
             });
         }

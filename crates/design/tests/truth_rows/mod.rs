@@ -27,7 +27,7 @@ pub struct Row {
     pub share_first: f64,
     pub first: Complex64,
     pub local_normal: f64,
-    local_as_lit: f64,
+    local_oblique: f64,
 }
 
 /// Rows of one grating and one wavelength. Differences are root mean squares over offsets, incidences and
@@ -70,7 +70,7 @@ pub fn read() -> Vec<Row> {
                 share_first: number(11),
                 first: Complex64::new(number(14), number(15)),
                 local_normal: number(16),
-                local_as_lit: number(17),
+                local_oblique: number(17),
             }
         })
         .collect()
@@ -102,7 +102,7 @@ fn summary(rows: &[&Row], design: &Design, cell: &CoarseCell<'_>) -> Summary {
         let shares = [
             row.share_first,
             row.local_normal,
-            row.local_as_lit,
+            row.local_oblique,
             first.share[row.polarisation],
         ];
         for (sum, share) in summary.shares.iter_mut().zip(shares) {

@@ -222,7 +222,10 @@ pub mod tests {
 
     pub fn small() -> (Lens, Deconvolution) {
         let rings = Rings::new(Lattice::covering(60_000, 350).unwrap(), 60_000).unwrap();
-        let lens = Lens { rings, gap_um: 144.0 };
+        let lens = Lens {
+            rings,
+            distance_um: 144.0,
+        };
         let views = Views {
             wavelengths_um: vec![0.45, 0.5, 0.6, 0.65],
             angles_rad: vec![0.0, 0.26],
@@ -243,8 +246,8 @@ pub mod tests {
     fn a_lens_is_better_than_a_diffuser() {
         let (lens, problem) = small();
         let psnr = |start: Start| {
-            let turns = start.turns(&lens, 1);
-            let widths = turns.iter().map(|&t| problem.mapping.width_nm(t).0).collect::<Vec<_>>();
+            let waves = start.waves(&lens, 1);
+            let widths = waves.iter().map(|&t| problem.mapping.width_nm(t).0).collect::<Vec<_>>();
             problem.expected_psnr(&widths).0
         };
         assert!(psnr(Start::Hyperbolic { wavelength_um: 0.55 }) > psnr(Start::Random) + 1.0);

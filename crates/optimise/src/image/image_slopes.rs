@@ -12,8 +12,8 @@ use crate::image::imaging::Imaging;
 
 impl Deconvolution {
     /// Merit over the given channels at phases, widths not rounded; its gradient (1/turn) is added.
-    fn climb_channels(&self, turns: &[f64], channels: &[Channel], gradient: &mut [f64]) -> f64 {
-        let (widths_nm, rises): (Vec<_>, Vec<_>) = turns.iter().map(|&t| self.mapping.width_nm(t)).unzip();
+    fn climb_channels(&self, waves: &[f64], channels: &[Channel], gradient: &mut [f64]) -> f64 {
+        let (widths_nm, rises): (Vec<_>, Vec<_>) = waves.iter().map(|&t| self.mapping.width_nm(t)).unzip();
         let (merit, slopes) = self.evaluate(&widths_nm, channels, true);
         // View after view: the same on any number of threads.
         for slope in slopes {
@@ -106,7 +106,7 @@ impl Objective for Deconvolution {
     }
 
     /// Over some wavelengths of each channel, drawn afresh for each angle and step.
-    fn climb(&self, turns: &[f64], seed: u64, step: u32, gradient: &mut [f64]) -> f64 {
+    fn climb(&self, waves: &[f64], seed: u64, step: u32, gradient: &mut [f64]) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::from(step));
         let drawn = self.channels(|all| {
@@ -115,7 +115,7 @@ impl Objective for Deconvolution {
             some.truncate(self.views.drawn);
             some
         });
-        self.climb_channels(turns, &drawn, gradient)
+        self.climb_channels(waves, &drawn, gradient)
     }
 
     fn expand(&self, widths_nm: &[u16], gains: &mut [f64]) -> f64 {
@@ -153,11 +153,11 @@ mod tests {
 
     #[test]
     fn the_gradient_is_that_of_differences() {
-        /// Single precision of the transforms, over steps of 4e-3 turns.
+        /// Single precision of the transforms, over steps of 4e-3 waves.
         const TOLERANCE: f64 = 2e-2;
         let (lens, problem) = small();
-        let turns = Start::LogAsphere { band_um: (0.4, 0.7) }
-            .turns(&lens, 0)
+        let waves = Start::LogAsphere { band_um: (0.4, 0.7) }
+            .waves(&lens, 0)
             .into_iter()
             .map(|t| {
                 // Half way between whole widths, where transmission is a straight line.
@@ -166,15 +166,15 @@ mod tests {
             })
             .collect::<Vec<_>>();
         let all = problem.channels(|all| all.collect());
-        let mut gradient = vec![0.0; turns.len()];
-        problem.climb_channels(&turns, &all, &mut gradient);
+        let mut gradient = vec![0.0; waves.len()];
+        problem.climb_channels(&waves, &all, &mut gradient);
         let largest = gradient.iter().map(|g| g.abs()).fold(0.0, f64::max);
         let h = 1.5e-3;
         // Away from the end of a turn, where the width jumps.
-        let smooth = |&ring: &usize| (0.05..0.95).contains(&turns[ring].rem_euclid(1.0));
-        for ring in (0..turns.len()).step_by(9).filter(smooth) {
+        let smooth = |&ring: &usize| (0.05..0.95).contains(&waves[ring].rem_euclid(1.0));
+        for ring in (0..waves.len()).step_by(9).filter(smooth) {
             let at = |h: f64| {
-                let mut moved = turns.clone();
+                let mut moved = waves.clone();
                 moved[ring] += h;
                 problem.climb_channels(&moved, &all, &mut vec![0.0; moved.len()])
             };
@@ -192,7 +192,7 @@ mod tests {
         const TOLERANCE: f64 = 2e-2;
         let (lens, problem) = small();
         let choices = problem.mapping.choices();
-        let start = Start::LogAsphere { band_um: (0.4, 0.7) }.turns(&lens, 0);
+        let start = Start::LogAsphere { band_um: (0.4, 0.7) }.waves(&lens, 0);
         let chosen = start
             .iter()
             .map(|&t| problem.mapping.nearest(t).clamp(1, choices.len() - 2))

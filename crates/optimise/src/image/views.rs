@@ -52,10 +52,10 @@ impl Default for Views {
 pub fn window_offset_um(lens: &Lens, angle_rad: f64, side_um: f64) -> f64 {
     let radius = 0.5e-3 * f64::from(lens.rings.diameter_nm());
     let landing = |x: f64| {
-        let sine = (angle_rad.sin() - x / x.hypot(lens.gap_um)).clamp(-0.999, 0.999);
-        x + lens.gap_um * sine / (1.0 - sine * sine).sqrt()
+        let sine = (angle_rad.sin() - x / x.hypot(lens.distance_um)).clamp(-0.999, 0.999);
+        x + lens.distance_um * sine / (1.0 - sine * sine).sqrt()
     };
-    let middle = 0.5 * (landing(radius) + landing(-radius)) - lens.gap_um * angle_rad.tan();
+    let middle = 0.5 * (landing(radius) + landing(-radius)) - lens.distance_um * angle_rad.tan();
     // No further than leaves the chief ray well within the window's part that is used.
     let most = 0.25 * USED * side_um;
     middle.clamp(-most, most)

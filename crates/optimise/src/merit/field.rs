@@ -250,7 +250,10 @@ pub mod tests {
 
     pub fn lens() -> Lens {
         let rings = Rings::new(Lattice::covering(60_000, 350).unwrap(), 60_000).unwrap();
-        Lens { rings, gap_um: 144.0 }
+        Lens {
+            rings,
+            distance_um: 144.0,
+        }
     }
 
     /// Two blocks of each kind, one of them made 5 nm too wide.
@@ -276,8 +279,8 @@ pub mod tests {
     /// Phases whose widths are half way between whole ones: transmission is a straight line between those.
     pub fn start() -> Vec<f64> {
         let mapping = published();
-        let turns = Start::Hyperbolic { wavelength_um: 0.55 }.turns(&lens(), 0);
-        let uneven = turns.iter().enumerate().map(|(i, t)| t + 0.1 * (i as f64 * 1.7).sin());
+        let waves = Start::Hyperbolic { wavelength_um: 0.55 }.waves(&lens(), 0);
+        let uneven = waves.iter().enumerate().map(|(i, t)| t + 0.1 * (i as f64 * 1.7).sin());
         uneven
             .map(|t| {
                 let (width, slope) = mapping.width_nm(t);

@@ -22,14 +22,14 @@ impl FieldProblem {
         fields
     }
 
-    /// Merit at continuous phases (turns), widths not rounded. Its gradient (1/turn) is added to
+    /// Merit at continuous phases (waves), widths not rounded. Its gradient (1/turn) is added to
     /// `gradient`.
     ///
     /// # Panics
     /// Among dissimilar neighbours, whose widths are whole: designs with them and a solver that needs this are refused.
-    pub fn merit_of_phases(&self, turns: &[f64], gradient: Option<&mut [f64]>) -> f64 {
+    pub fn merit_of_phases(&self, waves: &[f64], gradient: Option<&mut [f64]>) -> f64 {
         assert!(self.surroundings.is_none(), "no slopes among unlike neighbours");
-        let widths = turns.iter().map(|&t| self.mapping.width_nm(t)).collect::<Vec<_>>();
+        let widths = waves.iter().map(|&t| self.mapping.width_nm(t)).collect::<Vec<_>>();
         let fields = self.fields(|ring| widths[ring]);
         let merit = self.merit_of_fields(&fields);
         if let Some(gradient) = gradient {
@@ -145,8 +145,8 @@ impl Objective for FieldProblem {
         self.merit_of_widths(widths_nm)
     }
 
-    fn climb(&self, turns: &[f64], _seed: u64, _step: u32, gradient: &mut [f64]) -> f64 {
-        self.merit_of_phases(turns, Some(gradient))
+    fn climb(&self, waves: &[f64], _seed: u64, _step: u32, gradient: &mut [f64]) -> f64 {
+        self.merit_of_phases(waves, Some(gradient))
     }
 
     fn expand(&self, widths_nm: &[u16], gains: &mut [f64]) -> f64 {
@@ -197,13 +197,13 @@ mod tests {
     fn the_gradient_is_that_of_differences() {
         /// Single precision of the kernel, and the square of the difference, against the largest slope.
         const TOLERANCE: f64 = 2e-3;
-        let (problem, turns, h) = (problem(), start(), 1e-3);
+        let (problem, waves, h) = (problem(), start(), 1e-3);
         let mut gradient = vec![0.0; problem.rings()];
-        problem.merit_of_phases(&turns, Some(&mut gradient));
+        problem.merit_of_phases(&waves, Some(&mut gradient));
         let largest = gradient.iter().map(|g| g.abs()).fold(0.0, f64::max);
         for ring in (0..problem.rings()).step_by(7) {
             let at = |h: f64| {
-                let mut moved = turns.clone();
+                let mut moved = waves.clone();
                 moved[ring] += h;
                 problem.merit_of_phases(&moved, None)
             };

@@ -21,7 +21,7 @@ pub struct Lens {
     /// The rings of its lattice.
     pub rings: Rings,
     /// Distance from the tops of the pillars to the sensor (um).
-    pub gap_um: f64,
+    pub distance_um: f64,
 }
 
 /// One draw of what the cleanroom and the assembly get wrong.
@@ -32,7 +32,7 @@ pub struct FabricationError {
     /// Index of the cell among the cells given, by their film height.
     pub cell: usize,
     /// Distance to the sensor less the designed one (um).
-    pub gap_error_um: f64,
+    pub defocus_um: f64,
 }
 
 impl FabricationError {
@@ -76,7 +76,7 @@ impl Lens {
             .par_iter()
             .map(|&wavelength_um| {
                 let full = cells[error.cell].full_transmission(wavelength_um)?;
-                let field = RingField::new(&self.rings, wavelength_um, self.gap_um + error.gap_error_um);
+                let field = RingField::new(&self.rings, wavelength_um, self.distance_um + error.defocus_um);
                 let scale = 1.0 / (full * field.matched());
                 let weight = 1.0 / wavelengths_um.len() as f32;
                 Ok(self.field_point(error.at(wavelength_um), weight, |ring| field.on_axis(ring) * scale))
@@ -109,7 +109,7 @@ impl Lens {
         let ratio = wavelengths_um
             .par_iter()
             .map(|&wavelength_um| {
-                let field = RingField::new(&self.rings, wavelength_um, self.gap_um);
+                let field = RingField::new(&self.rings, wavelength_um, self.distance_um);
                 let sum = match PairResponse::of(cell, wavelength_um, widths_nm.iter().copied())? {
                     Some(unlike) => unlike.on_axis(&self.rings, &field, widths_nm),
                     None => {
@@ -165,7 +165,7 @@ impl Lens {
                     Some(unlike) => unlike.own.clone(),
                     None => cell.transmissions(wavelength_um, widest)?,
                 };
-                let field = RingField::new(&self.rings, wavelength_um, self.gap_um);
+                let field = RingField::new(&self.rings, wavelength_um, self.distance_um);
                 let of = |&((r2, width), ref alike): &((i64, u16), AlikeSites)| {
                     let width = usize::from(width);
                     let mut t = f64::from(alike.count) * table[width];

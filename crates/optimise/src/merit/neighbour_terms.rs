@@ -97,7 +97,7 @@ impl NeighbourTerms {
                     "optimise with the cell `neighbours`",
                 )
             })?;
-            let field = RingField::new(&lens.rings, wavelength_um, lens.gap_um);
+            let field = RingField::new(&lens.rings, wavelength_um, lens.distance_um);
             let scale = 1.0 / (cell.full_transmission(wavelength_um)? * field.matched());
             let kernel = (0..lens.rings.len()).flat_map(|ring| field.on_axis_by_link(ring).map(|e| e * scale));
             Ok(Some((unlike, kernel.collect())))
@@ -256,7 +256,7 @@ mod tests {
                 cell: cell_models(&design, &[Fidelity::Neighbours]).unwrap().remove(0),
                 lens: Lens {
                     rings,
-                    gap_um: 2.4e-3 * f64::from(diameter_nm),
+                    distance_um: 2.4e-3 * f64::from(diameter_nm),
                 },
                 mapping: Mapping::new(&PillarRule::new(&design.cell, &design.mapping)),
                 wavelengths_um: wavelengths(460.0, 660.0, 20.0),
@@ -287,7 +287,7 @@ mod tests {
             let CellResponse::Neighbours(NeighbourTables::Band(response)) = response else {
                 panic!("it knows its neighbours")
             };
-            let field = RingField::new(&self.lens.rings, wavelength_um, self.lens.gap_um);
+            let field = RingField::new(&self.lens.rings, wavelength_um, self.lens.distance_um);
             let n = widths.lattice.sites() as i32;
             let width = |x: i32, y: i32| {
                 let inside = (0..n).contains(&x) && (0..n).contains(&y);

@@ -61,7 +61,7 @@ pub fn draw(robust: &RobustSpec, count: usize, cells: usize, seed: u64) -> Vec<F
             FabricationError {
                 width_bias_nm: robust.width_bias_nm * bias,
                 cell: if robust.height > 0.0 { cell } else { 0 },
-                gap_error_um: robust.gap_um * gap,
+                defocus_um: robust.defocus_um * gap,
             }
         })
         .collect()
@@ -79,7 +79,7 @@ mod tests {
         let robust = RobustSpec {
             width_bias_nm: 6.0,
             height: 0.02,
-            gap_um: 10.0,
+            defocus_um: 10.0,
             draws: 1,
         };
         let drawn = draw(&robust, 4000, 5, 7);
@@ -87,7 +87,7 @@ mod tests {
             (drawn.iter().map(|e| value(e).powi(2)).sum::<f64>() / drawn.len() as f64).sqrt()
         };
         assert!((deviation(&|e| e.width_bias_nm) / 6.0 - 1.0).abs() < TOLERANCE);
-        assert!((deviation(&|e| e.gap_error_um) / 10.0 - 1.0).abs() < TOLERANCE);
+        assert!((deviation(&|e| e.defocus_um) / 10.0 - 1.0).abs() < TOLERANCE);
         assert!((deviation(&|e| HEIGHTS[e.cell]) - 1.0).abs() < TOLERANCE);
         assert!(draw(&robust, 100, 1, 7).iter().all(|e| e.cell == 0));
         assert_eq!(drawn, draw(&robust, 4000, 5, 7));

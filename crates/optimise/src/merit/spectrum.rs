@@ -32,13 +32,13 @@ impl OverWavelength<'_> {
     pub fn psf(&self, radii_um: &[f64], wavelengths_um: &[f64]) -> Result<Vec<Array2<f64>>> {
         let shortest = wavelengths_um.iter().copied().fold(f64::MAX, f64::min);
         let farthest = radii_um.iter().copied().fold(0.0, f64::max);
-        let bessel = RingField::new(&self.lens.rings, shortest, self.lens.gap_um).bessel(farthest);
+        let bessel = RingField::new(&self.lens.rings, shortest, self.lens.distance_um).bessel(farthest);
         let columns = wavelengths_um
             .par_iter()
             .map(|&wavelength| {
                 let of = |widths: &&[u16]| self.lens.transmissions_of_rings(widths, self.cell, wavelength);
                 let t = self.widths_nm.iter().map(of).collect::<Result<Vec<_>>>()?;
-                let field = RingField::new(&self.lens.rings, wavelength, self.lens.gap_um);
+                let field = RingField::new(&self.lens.rings, wavelength, self.lens.distance_um);
                 let column = radii_um
                     .iter()
                     .map(|&rho| {
@@ -66,7 +66,7 @@ impl OverWavelength<'_> {
     /// # Errors
     /// If the cell does not cover a wavelength.
     pub fn mtf(&self, pixel_um: f64, wavelengths_um: &[f64]) -> Result<Vec<Vec<(f64, f64)>>> {
-        let (rings, focus_um) = (&self.lens.rings, self.lens.gap_um);
+        let (rings, focus_um) = (&self.lens.rings, self.lens.distance_um);
         let lattice = rings.lattice();
         let radius_um = 0.5e-3 * f64::from(rings.diameter_nm());
         // By the number of the ring, from one: sites of a ring are taken to transmit alike. A map of more rings could not be held.

@@ -16,16 +16,16 @@ use metalith_wave::kernels::Bessel;
 pub struct RingField<'r> {
     rings: &'r Rings,
     wavenumber: f64,
-    gap_um: f64,
+    distance_um: f64,
 }
 
 impl<'r> RingField<'r> {
-    /// The field at a distance `gap_um` behind the lens.
-    pub fn new(rings: &'r Rings, wavelength_um: f64, gap_um: f64) -> Self {
+    /// The field at a distance `distance_um` behind the lens.
+    pub fn new(rings: &'r Rings, wavelength_um: f64, distance_um: f64) -> Self {
         Self {
             rings,
             wavenumber: TAU / wavelength_um,
-            gap_um,
+            distance_um,
         }
     }
 
@@ -65,11 +65,11 @@ impl<'r> RingField<'r> {
     /// (Jacobi, Anger), of which two terms are kept; 1 / R^2 changes by 2 r rho cos a / Q^2. What is left out is below 0.01 rad for rho < 40 um at
     /// NA 0.2, and below 0.1 rad for rho < 80 um.
     pub fn at_radius(&self, ring: usize, rho_um: f64, bessel: &Bessel) -> Complex64 {
-        let (rho2, gap2) = (rho_um * rho_um, self.gap_um * self.gap_um);
+        let (rho2, distance2) = (rho_um * rho_um, self.distance_um * self.distance_um);
         let mut sum = Complex64::ZERO;
         for node in self.rings.nodes(ring) {
             let r2 = node.radius_um * node.radius_um;
-            let q = (r2 + rho2 + gap2).sqrt();
+            let q = (r2 + rho2 + distance2).sqrt();
             let linear = self.wavenumber * node.radius_um * rho_um / q;
             let quadratic = self.wavenumber * r2 * rho2 / (4.0 * q * q * q);
             let (j0, j1) = bessel.j0_j1(linear);
@@ -95,17 +95,17 @@ impl<'r> RingField<'r> {
     /// beyond the edge of the lens. The argument of the other term is at most an eighth of it.
     fn largest_argument(&self, farthest_um: f64) -> f64 {
         let edge_um = self.rings.len() as f64 * self.rings.lattice().pitch_um();
-        let q = (edge_um * edge_um + farthest_um * farthest_um + self.gap_um * self.gap_um).sqrt();
+        let q = (edge_um * edge_um + farthest_um * farthest_um + self.distance_um * self.distance_um).sqrt();
         self.wavenumber * edge_um * farthest_um / q
     }
 
     /// Field of a single site at a squared lateral distance (um^2).
     pub fn point(&self, lateral2_um2: f64) -> Complex64 {
-        let r2 = lateral2_um2 + self.gap_um * self.gap_um;
+        let r2 = lateral2_um2 + self.distance_um * self.distance_um;
         let r = r2.sqrt();
-        let path = lateral2_um2 / (r + self.gap_um);
+        let path = lateral2_um2 / (r + self.distance_um);
         let area = self.rings.lattice().cell_um2();
-        area * self.gap_um / (TAU * r2)
+        area * self.distance_um / (TAU * r2)
             * Complex64::new(1.0 / r, -self.wavenumber)
             * Complex64::cis(self.wavenumber * path)
     }

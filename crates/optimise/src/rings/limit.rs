@@ -4,63 +4,63 @@ use crate::rings::mapping::{Mapping, step};
 use metalith_core::{Error, Result};
 use metalith_pillars::PillarMap;
 
-/// Steps are held to the limit but for rounding (turns).
+/// Steps are held to the limit but for rounding (waves).
 const ROUNDING: f64 = 1e-9;
 
-/// Largest wrapped step between neighbouring rings (turns).
+/// Largest wrapped step between neighbouring rings (waves).
 ///
 /// The transmission of a ring is that of an endless lattice of its own pillars; it holds only while the
 /// neighbours are alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepLimit {
-    turns: f64,
+    waves: f64,
 }
 
 impl StepLimit {
     /// No limit: half a turn is the largest step there is.
-    pub const NONE: Self = Self { turns: 0.5 };
+    pub const NONE: Self = Self { waves: 0.5 };
 
-    /// A limit in turns, above 0 and up to 0.5.
+    /// A limit in waves, above 0 and up to 0.5.
     ///
     /// # Errors
     /// If it is outside.
-    pub fn new(turns: f64) -> Result<Self> {
-        if turns > 0.0 && turns <= 0.5 {
-            return Ok(Self { turns });
+    pub fn new(waves: f64) -> Result<Self> {
+        if waves > 0.0 && waves <= 0.5 {
+            return Ok(Self { waves });
         }
         Err(Error::refused(
             "optimise/phase-step",
-            format!("a limit of {turns} turns on the phase step"),
-            "give more than 0 and at most 0.5 turns; 0.5 is no limit",
+            format!("a limit of {waves} waves on the phase step"),
+            "give more than 0 and at most 0.5 waves; 0.5 is no limit",
         ))
     }
 
-    /// The limit (turns).
-    pub fn turns(self) -> f64 {
-        self.turns
+    /// The limit (waves).
+    pub fn waves(self) -> f64 {
+        self.waves
     }
 
     /// True if a step keeps the limit.
-    pub fn allows(self, from_turns: f64, to_turns: f64) -> bool {
-        step(from_turns, to_turns).abs() <= self.turns + ROUNDING
+    pub fn allows(self, from_waves: f64, to_waves: f64) -> bool {
+        step(from_waves, to_waves).abs() <= self.waves + ROUNDING
     }
 
     /// Move phases as little as is simple until every step keeps the limit: neighbours too far apart come
     /// closer by half the excess each, over and over; what is left after that is cut from the centre out.
-    pub fn enforce(self, turns: &mut [f64]) {
+    pub fn enforce(self, waves: &mut [f64]) {
         const ROUNDS: usize = 20;
-        if self.turns >= 0.5 {
+        if self.waves >= 0.5 {
             return;
         }
         for round in 0..ROUNDS {
             let mut kept = true;
-            for i in 0..turns.len().saturating_sub(1) {
-                let i = if round % 2 == 0 { i } else { turns.len() - 2 - i };
-                let d = step(turns[i], turns[i + 1]);
-                if d.abs() > self.turns {
-                    let excess = 0.5 * (d - self.turns.copysign(d));
-                    turns[i] += excess;
-                    turns[i + 1] -= excess;
+            for i in 0..waves.len().saturating_sub(1) {
+                let i = if round % 2 == 0 { i } else { waves.len() - 2 - i };
+                let d = step(waves[i], waves[i + 1]);
+                if d.abs() > self.waves {
+                    let excess = 0.5 * (d - self.waves.copysign(d));
+                    waves[i] += excess;
+                    waves[i + 1] -= excess;
                     kept = false;
                 }
             }
@@ -68,18 +68,18 @@ impl StepLimit {
                 return;
             }
         }
-        for i in 1..turns.len() {
-            let d = step(turns[i - 1], turns[i]);
-            turns[i] = turns[i - 1] + d.clamp(-self.turns, self.turns);
+        for i in 1..waves.len() {
+            let d = step(waves[i - 1], waves[i]);
+            waves[i] = waves[i - 1] + d.clamp(-self.waves, self.waves);
         }
     }
 
     /// The choices nearest to given phases, in the sum of squares, whose steps keep the limit.
     ///
     /// Dynamic programming from the centre out: for each ring and choice, the least sum so far.
-    pub fn nearest_choices(self, mapping: &Mapping, turns: &[f64]) -> Vec<usize> {
-        self.best_choices(mapping, turns.len(), |ring, choice| {
-            -step(mapping.choices()[choice].turns, turns[ring]).powi(2)
+    pub fn nearest_choices(self, mapping: &Mapping, waves: &[f64]) -> Vec<usize> {
+        self.best_choices(mapping, waves.len(), |ring, choice| {
+            -step(mapping.choices()[choice].waves, waves[ring]).powi(2)
         })
     }
 
@@ -123,19 +123,19 @@ impl StepLimit {
             .iter()
             .map(|a| {
                 (0..choices.len() as u16)
-                    .filter(|&b| self.allows(a.turns, choices[usize::from(b)].turns))
+                    .filter(|&b| self.allows(a.waves, choices[usize::from(b)].waves))
                     .collect()
             })
             .collect()
     }
 }
 
-/// Largest wrapped step between neighbouring rings (turns).
-pub fn largest_step(turns: &[f64]) -> f64 {
-    turns.windows(2).map(|w| step(w[0], w[1]).abs()).fold(0.0, f64::max)
+/// Largest wrapped step between neighbouring rings (waves).
+pub fn largest_step(waves: &[f64]) -> f64 {
+    waves.windows(2).map(|w| step(w[0], w[1]).abs()).fold(0.0, f64::max)
 }
 
-/// Largest wrapped phase step between neighbouring pillars of a layout (turns), by the phase that each
+/// Largest wrapped phase step between neighbouring pillars of a layout (waves), by the phase that each
 /// width stands for. Sites without pillar are passed over.
 ///
 /// # Errors
@@ -143,11 +143,11 @@ pub fn largest_step(turns: &[f64]) -> f64 {
 pub fn largest_step_in_layout(widths: &PillarMap, mapping: &Mapping) -> Result<f64> {
     let mut turns_of = vec![f64::NAN; usize::from(mapping.max_width_nm()) + 1];
     for choice in mapping.choices() {
-        turns_of[usize::from(choice.width_nm)] = choice.turns;
+        turns_of[usize::from(choice.width_nm)] = choice.waves;
     }
     let map = &widths.number;
-    let turns = |w: u16| turns_of.get(usize::from(w)).copied().unwrap_or(f64::NAN);
-    if let Some(stray) = map.iter().find(|&&w| w != 0 && turns(w).is_nan()) {
+    let waves = |w: u16| turns_of.get(usize::from(w)).copied().unwrap_or(f64::NAN);
+    if let Some(stray) = map.iter().find(|&&w| w != 0 && waves(w).is_nan()) {
         return Err(Error::refused(
             "optimise/unmapped-width",
             format!("the layout holds pillars of {stray} nm, which no phase is mapped to"),
@@ -165,7 +165,7 @@ pub fn largest_step_in_layout(widths: &PillarMap, mapping: &Mapping) -> Result<f
             ];
             for near in next.into_iter().flatten() {
                 if here != near && here != 0 && near != 0 {
-                    largest = largest.max(step(turns(here), turns(near)).abs());
+                    largest = largest.max(step(waves(here), waves(near)).abs());
                 }
             }
         }
@@ -182,23 +182,23 @@ mod tests {
     proptest! {
         #[test]
         fn enforced_steps_keep_the_limit(
-            mut turns in prop::collection::vec(-3.0..3.0, 2..60),
+            mut waves in prop::collection::vec(-3.0..3.0, 2..60),
             limit in 0.02..0.5,
         ) {
             let limit = StepLimit::new(limit).unwrap();
-            limit.enforce(&mut turns);
-            prop_assert!(turns.windows(2).all(|w| limit.allows(w[0], w[1])));
+            limit.enforce(&mut waves);
+            prop_assert!(waves.windows(2).all(|w| limit.allows(w[0], w[1])));
         }
 
         #[test]
         fn chosen_steps_keep_the_limit(
-            turns in prop::collection::vec(-3.0..3.0, 2..40),
+            waves in prop::collection::vec(-3.0..3.0, 2..40),
             limit in 0.02..0.5,
         ) {
             let (mapping, limit) = (published(), StepLimit::new(limit).unwrap());
-            let chosen = limit.nearest_choices(&mapping, &turns);
-            let turns = mapping.turns_of(&chosen);
-            prop_assert!(largest_step(&turns) <= limit.turns() + ROUNDING);
+            let chosen = limit.nearest_choices(&mapping, &waves);
+            let waves = mapping.turns_of(&chosen);
+            prop_assert!(largest_step(&waves) <= limit.waves() + ROUNDING);
         }
     }
 
@@ -206,9 +206,9 @@ mod tests {
     fn phases_within_the_limit_are_left_alone() {
         let limit = StepLimit::new(0.2).unwrap();
         let smooth = (0..50).map(|i| 0.13 * f64::from(i)).collect::<Vec<_>>();
-        let mut turns = smooth.clone();
-        limit.enforce(&mut turns);
-        assert_eq!(turns, smooth);
+        let mut waves = smooth.clone();
+        limit.enforce(&mut waves);
+        assert_eq!(waves, smooth);
         let mapping = published();
         for (&c, &t) in limit.nearest_choices(&mapping, &smooth).iter().zip(&smooth) {
             assert_eq!(c, mapping.nearest(t));
@@ -225,12 +225,12 @@ mod tests {
         let score = |ring: usize, c: usize| ((ring * 7 + c * 13) % 11) as f64;
         let found = limit.best_choices(&mapping, 3, score);
         let sum = |path: &[usize]| path.iter().enumerate().map(|(r, &c)| score(r, c)).sum::<f64>();
-        let turns = |c: usize| mapping.choices()[c].turns;
+        let waves = |c: usize| mapping.choices()[c].waves;
         let mut best = f64::MIN;
         for a in 0..count {
             for b in 0..count {
                 for c in 0..count {
-                    if limit.allows(turns(a), turns(b)) && limit.allows(turns(b), turns(c)) {
+                    if limit.allows(waves(a), waves(b)) && limit.allows(waves(b), waves(c)) {
                         best = best.max(sum(&[a, b, c]));
                     }
                 }
@@ -241,8 +241,8 @@ mod tests {
 
     #[test]
     fn limits_that_cannot_be_are_refused() {
-        for turns in [0.0, -0.1, 0.6, f64::NAN] {
-            assert!(StepLimit::new(turns).is_err());
+        for waves in [0.0, -0.1, 0.6, f64::NAN] {
+            assert!(StepLimit::new(waves).is_err());
         }
     }
 }

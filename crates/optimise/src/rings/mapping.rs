@@ -8,7 +8,7 @@ const SAMPLES: usize = 4096;
 /// Phase to pillar width, as the array stage of a design maps it.
 #[derive(Clone, Debug)]
 pub struct Mapping {
-    /// Width at `i / SAMPLES` turns, the last entry at the end of the turn (nm).
+    /// Width at `i / SAMPLES` waves, the last entry at the end of the turn (nm).
     width_nm: Vec<f64>,
     choices: Vec<WidthChoice>,
 }
@@ -16,9 +16,9 @@ pub struct Mapping {
 /// A width that a ring can have, and the phase to ask for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WidthChoice {
-    /// Phase (turns), in [0, 1): the middle of the phases that are mapped to this width, so that
+    /// Phase (waves), in [0, 1): the middle of the phases that are mapped to this width, so that
     /// rounding a phase to a text file and back cannot change the width.
-    pub turns: f64,
+    pub waves: f64,
     /// Width of the pillars (nm).
     pub width_nm: u16,
 }
@@ -26,9 +26,9 @@ pub struct WidthChoice {
 impl Mapping {
     /// The mapping of a design.
     pub fn new(rule: &PillarRule) -> Self {
-        let turns = |i: usize| (i as f64 / SAMPLES as f64).min(1.0 - f64::EPSILON);
-        let width_nm = (0..=SAMPLES).map(|i| rule.unrounded_nm(turns(i))).collect();
-        let made = (0..SAMPLES).map(|i| rule.width_nm(turns(i))).collect::<Vec<_>>();
+        let waves = |i: usize| (i as f64 / SAMPLES as f64).min(1.0 - f64::EPSILON);
+        let width_nm = (0..=SAMPLES).map(|i| rule.unrounded_nm(waves(i))).collect();
+        let made = (0..SAMPLES).map(|i| rule.width_nm(waves(i))).collect::<Vec<_>>();
         Self {
             width_nm,
             choices: choices_of(&made),
@@ -36,8 +36,8 @@ impl Mapping {
     }
 
     /// Width before rounding (nm), and its derivative (nm per turn). Any phase; it is taken modulo one turn.
-    pub fn width_nm(&self, turns: f64) -> (f64, f64) {
-        let at = turns.rem_euclid(1.0) * SAMPLES as f64;
+    pub fn width_nm(&self, waves: f64) -> (f64, f64) {
+        let at = waves.rem_euclid(1.0) * SAMPLES as f64;
         let i = (at as usize).min(SAMPLES - 1);
         let slope = self.width_nm[i + 1] - self.width_nm[i];
         (self.width_nm[i] + (at - i as f64) * slope, slope * SAMPLES as f64)
@@ -48,9 +48,9 @@ impl Mapping {
         &self.choices
     }
 
-    /// Phases of given choices (turns).
+    /// Phases of given choices (waves).
     pub fn turns_of(&self, choices: &[usize]) -> Vec<f64> {
-        choices.iter().map(|&c| self.choices[c].turns).collect()
+        choices.iter().map(|&c| self.choices[c].waves).collect()
     }
 
     /// Widths of given choices (nm).
@@ -64,10 +64,10 @@ impl Mapping {
     }
 
     /// The choice whose phase is nearest on the circle.
-    pub fn nearest(&self, turns: f64) -> usize {
+    pub fn nearest(&self, waves: f64) -> usize {
         (0..self.choices.len())
             .min_by(|&a, &b| {
-                let distance = |i: usize| step(self.choices[i].turns, turns).abs();
+                let distance = |i: usize| step(self.choices[i].waves, waves).abs();
                 distance(a).total_cmp(&distance(b))
             })
             .unwrap_or(0)
@@ -75,8 +75,8 @@ impl Mapping {
 }
 
 /// Phase step from one ring to the next, wrapped to [-1/2, 1/2) turn.
-pub fn step(from_turns: f64, to_turns: f64) -> f64 {
-    (to_turns - from_turns + 0.5).rem_euclid(1.0) - 0.5
+pub fn step(from_waves: f64, to_waves: f64) -> f64 {
+    (to_waves - from_waves + 0.5).rem_euclid(1.0) - 0.5
 }
 
 /// The longest run of samples of each width; its middle is the phase of that width.
@@ -95,11 +95,11 @@ fn choices_of(widths: &[u16]) -> Vec<WidthChoice> {
     let mut choices = runs
         .into_iter()
         .map(|(width_nm, (start, end))| WidthChoice {
-            turns: 0.5 * (start + end - 1) as f64 / SAMPLES as f64,
+            waves: 0.5 * (start + end - 1) as f64 / SAMPLES as f64,
             width_nm,
         })
         .collect::<Vec<_>>();
-    choices.sort_by(|a, b| a.turns.total_cmp(&b.turns));
+    choices.sort_by(|a, b| a.waves.total_cmp(&b.waves));
     choices
 }
 
@@ -159,8 +159,8 @@ pub mod tests {
         assert_eq!(mapping.max_width_nm(), 288);
         assert_eq!(mapping.choices().len(), 94);
         for (i, choice) in mapping.choices().iter().enumerate() {
-            assert_eq!(rule.width_nm(choice.turns), choice.width_nm);
-            assert_eq!(mapping.nearest(choice.turns), i);
+            assert_eq!(rule.width_nm(choice.waves), choice.width_nm);
+            assert_eq!(mapping.nearest(choice.waves), i);
         }
     }
 
@@ -174,15 +174,15 @@ pub mod tests {
 
     #[test]
     fn the_slope_is_that_of_the_width() {
-        /// Rounding of widths of hundreds of nm, 1e-13, over steps of 1e-6 turns, and a margin.
+        /// Rounding of widths of hundreds of nm, 1e-13, over steps of 1e-6 waves, and a margin.
         const DIFFERENCE: f64 = 1e-5;
         let mapping = published();
-        for turns in [0.01, 0.3, 0.77, 0.99] {
-            let (h, slope) = (1e-6, mapping.width_nm(turns).1);
-            let difference = (mapping.width_nm(turns + h).0 - mapping.width_nm(turns - h).0) / (2.0 * h);
+        for waves in [0.01, 0.3, 0.77, 0.99] {
+            let (h, slope) = (1e-6, mapping.width_nm(waves).1);
+            let difference = (mapping.width_nm(waves + h).0 - mapping.width_nm(waves - h).0) / (2.0 * h);
             assert!(
                 (slope - difference).abs() < DIFFERENCE * slope.abs(),
-                "{turns}: {slope} {difference}"
+                "{waves}: {slope} {difference}"
             );
         }
     }

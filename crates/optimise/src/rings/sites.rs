@@ -314,15 +314,15 @@ mod tests {
             let lattice = Lattice::of_kind_covering(kind, diameter_nm, pitch_nm).unwrap();
             let rings = Rings::new(lattice, diameter_nm).unwrap();
             let count = rings.len() as f64;
-            let turns: Vec<f64> = (0..rings.len()).map(|k| k as f64 / count).collect();
-            write_phase_table(&file, &rings, &turns, &[]).unwrap();
+            let waves: Vec<f64> = (0..rings.len()).map(|k| k as f64 / count).collect();
+            write_phase_table(&file, &rings, &waves, &[]).unwrap();
             let radius_um = 0.5e-3 * f64::from(diameter_nm);
             let table = RadialPhase::read_table(&file, Interpolation::Nearest, radius_um).unwrap();
             let written = LensPhase::new(lattice, diameter_nm, &table);
             let n = lattice.sites();
             let mut borders = 0;
             for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
-                let ring = written.turns(ix, iy).map(|turns| (turns * count).round() as usize);
+                let ring = written.turns(ix, iy).map(|waves| (waves * count).round() as usize);
                 assert_eq!(rings.ring_at(ix, iy), ring, "{kind:?}, {pitch_nm} nm: {ix} {iy}");
                 let units = lattice.units_of_pitch() * ring.unwrap_or(0) as i64;
                 borders += usize::from(units > 0 && lattice.units2(ix, iy) == units.pow(2));

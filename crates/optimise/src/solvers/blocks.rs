@@ -44,16 +44,16 @@ pub struct BlockExchange<'p> {
 }
 
 impl<'p> BlockExchange<'p> {
-    /// Begin at the choices nearest to `turns` that keep the limit, for `blocks` blocks.
+    /// Begin at the choices nearest to `waves` that keep the limit, for `blocks` blocks.
     pub fn new(
         objective: &'p dyn Objective,
         mapping: &'p Mapping,
         limit: StepLimit,
         blocks: u32,
         seed: u64,
-        turns: &[f64],
+        waves: &[f64],
     ) -> Self {
-        let choices = limit.nearest_choices(mapping, turns);
+        let choices = limit.nearest_choices(mapping, waves);
         let mut gains = vec![0.0; choices.len() * mapping.choices().len()];
         let merit = objective.expand(&mapping.widths_of(&choices), &mut gains);
         Self {
@@ -101,8 +101,8 @@ impl<'p> BlockExchange<'p> {
         self.merit
     }
 
-    /// Phase of each ring (turns); every step keeps the limit.
-    pub fn turns(&self) -> Vec<f64> {
+    /// Phase of each ring (waves); every step keeps the limit.
+    pub fn waves(&self) -> Vec<f64> {
         self.mapping.turns_of(&self.choices)
     }
 
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn a_block_takes_the_best_of_the_expansion() {
         let (lens, images) = small();
-        let start = Start::LogAsphere { band_um: (0.4, 0.7) }.turns(&lens, 0);
+        let start = Start::LogAsphere { band_um: (0.4, 0.7) }.waves(&lens, 0);
         let exchange = BlockExchange::new(&images, &images.mapping, limit(), 1, 3, &start);
         let choices = images.mapping.choices();
         let mut free = vec![false; start.len()];
@@ -198,15 +198,15 @@ mod tests {
         assert!((0..start.len()).all(|ring| free[ring] || moved[ring] == exchange.choices[ring]));
         let gain = |ring: usize, choice: usize| exchange.gains[ring * choices.len() + choice];
         let (at, allows) = (
-            |ring: usize| choices[exchange.choices[ring]].turns,
+            |ring: usize| choices[exchange.choices[ring]].waves,
             |a: f64, b: f64| limit().allows(a, b),
         );
         let (mut pair, mut single) = (f64::MIN, f64::MIN);
-        for (a, t) in choices.iter().map(|c| c.turns).enumerate() {
+        for (a, t) in choices.iter().map(|c| c.waves).enumerate() {
             if allows(at(39), t) && allows(t, at(41)) {
                 single = single.max(gain(40, a));
             }
-            for (b, u) in choices.iter().map(|c| c.turns).enumerate() {
+            for (b, u) in choices.iter().map(|c| c.waves).enumerate() {
                 if allows(at(10), t) && allows(t, u) && allows(u, at(13)) {
                     pair = pair.max(gain(11, a) + gain(12, b));
                 }
@@ -221,7 +221,7 @@ mod tests {
         );
     }
 
-    /// A difference of phases (turns) that are below one.
+    /// A difference of phases (waves) that are below one.
     const ROUNDING_TURNS: f64 = 1e-9;
 
     #[test]
@@ -230,7 +230,7 @@ mod tests {
         let field = problem();
         // Either alone, and both together.
         let both = || Sum(vec![(1.0, &images as &dyn Objective), (0.01, &field)]);
-        let start = Start::Hyperbolic { wavelength_um: 0.55 }.turns(&lens, 0);
+        let start = Start::Hyperbolic { wavelength_um: 0.55 }.waves(&lens, 0);
         for objective in [&images as &dyn Objective, &field, &both()] {
             let mut exchange = BlockExchange::new(objective, &images.mapping, limit(), 40, 3, &start);
             let before = exchange.merit();
@@ -240,7 +240,7 @@ mod tests {
                 exchange.exchange_once();
                 assert!(exchange.merit() >= last);
                 assert_eq!(exchange.merit(), objective.merit(&exchange.widths_nm()));
-                assert!(largest_step(&exchange.turns()) <= limit().turns() + ROUNDING_TURNS);
+                assert!(largest_step(&exchange.waves()) <= limit().waves() + ROUNDING_TURNS);
             }
             assert!(exchange.merit() > before);
         }
@@ -249,11 +249,11 @@ mod tests {
     #[test]
     fn resumed_is_as_if_never_interrupted() {
         let (lens, images) = small();
-        let start = Start::Hyperbolic { wavelength_um: 0.55 }.turns(&lens, 0);
-        let begin = |turns: &[f64]| BlockExchange::new(&images, &images.mapping, limit(), 30, 7, turns);
+        let start = Start::Hyperbolic { wavelength_um: 0.55 }.waves(&lens, 0);
+        let begin = |waves: &[f64]| BlockExchange::new(&images, &images.mapping, limit(), 30, 7, waves);
         let mut whole = begin(&start);
         (0..9).for_each(|_| whole.exchange_once());
-        let mut rest = begin(&whole.turns()).resume(whole.block(), whole.shares());
+        let mut rest = begin(&whole.waves()).resume(whole.block(), whole.shares());
         for _ in 0..9 {
             whole.exchange_once();
             rest.exchange_once();

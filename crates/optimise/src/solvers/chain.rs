@@ -38,7 +38,7 @@ impl Course {
 
 /// Result of one chain.
 pub(crate) struct Found {
-    pub turns: Vec<f64>,
+    pub waves: Vec<f64>,
     widths_nm: Vec<u16>,
     pub merit: f64,
     history: Vec<(u32, f64)>,
@@ -73,7 +73,7 @@ impl<'p> Best<'p> {
 impl Found {
     pub fn optimised(self, start: &'static str, interrupted: Option<Checkpoint>) -> Optimised {
         Optimised {
-            turns: self.turns,
+            waves: self.waves,
             widths_nm: self.widths_nm,
             merit: self.merit,
             start,
@@ -99,7 +99,7 @@ impl OptimiseTask {
         }
         let (progress, schedule) = (best.progress, course.schedule);
         let mut exchange =
-            Exchange::new(problem, self.limit, schedule, seed, &chain.turns.values()).resume(chain.sweep);
+            Exchange::new(problem, self.limit, schedule, seed, &chain.waves.values()).resume(chain.sweep);
         let mut history = Vec::new();
         let every = (schedule.hot_sweeps / 50).max(1);
         while !exchange.finished() && !progress.stopped() {
@@ -114,7 +114,7 @@ impl OptimiseTask {
         let finished = exchange.finished();
         let chain = Chain {
             sweep: exchange.sweep(),
-            turns: ExactNumbers::of(&exchange.turns()),
+            waves: ExactNumbers::of(&exchange.waves()),
             blocks: finished.then(BlockState::default),
         };
         if finished && course.blocks > 0 && !progress.stopped() {
@@ -122,7 +122,7 @@ impl OptimiseTask {
             return self.blocks(problem, course.blocks, seed, chain, history, best);
         }
         Found {
-            turns: exchange.turns(),
+            waves: exchange.waves(),
             merit: problem.merit_of_widths(&exchange.widths_nm()),
             widths_nm: exchange.widths_nm(),
             history,
@@ -142,8 +142,8 @@ impl OptimiseTask {
         best: &Best<'_>,
     ) -> Found {
         let state = chain.blocks.unwrap_or_default();
-        let turns = chain.turns.values();
-        let mut exchange = BlockExchange::new(objective, &self.mapping, self.limit, blocks, seed, &turns)
+        let waves = chain.waves.values();
+        let mut exchange = BlockExchange::new(objective, &self.mapping, self.limit, blocks, seed, &waves)
             .resume(state.block, &state.shares.values());
         best.progress.advance(u64::from(exchange.block()));
         best.show(exchange.merit());
@@ -159,14 +159,14 @@ impl OptimiseTask {
         best.progress
             .advance(u64::from(blocks.saturating_sub(exchange.block())));
         Found {
-            turns: exchange.turns(),
+            waves: exchange.waves(),
             widths_nm: exchange.widths_nm(),
             merit: exchange.merit(),
             history,
             finished: exchange.finished(),
             chain: Chain {
                 sweep: chain.sweep,
-                turns: ExactNumbers::of(&exchange.turns()),
+                waves: ExactNumbers::of(&exchange.waves()),
                 blocks: Some(BlockState {
                     block: exchange.block(),
                     shares: ExactNumbers::of(exchange.shares()),

@@ -40,7 +40,7 @@ pub struct Checkpoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Chain {
     pub sweep: u32,
-    pub turns: ExactNumbers,
+    pub waves: ExactNumbers,
     /// Its blocks, if its sweeps are done.
     pub blocks: Option<BlockState>,
 }
@@ -71,7 +71,7 @@ impl ExactNumbers {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AdamState {
     pub step: u32,
-    pub turns: ExactNumbers,
+    pub waves: ExactNumbers,
     pub mean: ExactNumbers,
     pub square: ExactNumbers,
 }
@@ -81,7 +81,7 @@ impl AdamState {
         let (mean, square) = adam.means();
         Self {
             step: adam.step(),
-            turns: ExactNumbers::of(adam.turns()),
+            waves: ExactNumbers::of(adam.waves()),
             mean: ExactNumbers::of(mean),
             square: ExactNumbers::of(square),
         }
@@ -89,12 +89,12 @@ impl AdamState {
 
     /// Take Adam to this state, if it is of as many rings.
     pub fn resume(&self, adam: Adam) -> Adam {
-        let (turns, mean, square) = (self.turns.values(), self.mean.values(), self.square.values());
-        let rings = adam.turns().len();
-        if [turns.len(), mean.len(), square.len()] != [rings; 3] {
+        let (waves, mean, square) = (self.waves.values(), self.mean.values(), self.square.values());
+        let rings = adam.waves().len();
+        if [waves.len(), mean.len(), square.len()] != [rings; 3] {
             return adam;
         }
-        adam.resume(self.step, turns, mean, square)
+        adam.resume(self.step, waves, mean, square)
     }
 }
 
@@ -145,8 +145,8 @@ impl Checkpoint {
     /// True if every chain and Adam have a finite number for each of so many rings.
     fn is_of(&self, rings: usize) -> bool {
         let fits = |numbers: &ExactNumbers| numbers.0.len() == rings && numbers.values().iter().all(|v| v.is_finite());
-        let adam = self.adam.iter().flat_map(|a| [&a.turns, &a.mean, &a.square]);
-        self.chains.iter().map(|chain| &chain.turns).chain(adam).all(fits)
+        let adam = self.adam.iter().flat_map(|a| [&a.waves, &a.mean, &a.square]);
+        self.chains.iter().map(|chain| &chain.waves).chain(adam).all(fits)
     }
 
     /// True if anything was done.
@@ -197,10 +197,10 @@ mod tests {
         let kept = folder.path().join("checkpoint");
         let design = Design::read(&metalith_testing::design("mini_3x3")).unwrap();
         let rings = Rings::new(design.lattice(), design.lens.diameter_nm).unwrap().len();
-        let with = |turns: &[f64]| {
+        let with = |waves: &[f64]| {
             let chain = Chain {
                 sweep: 1,
-                turns: ExactNumbers::of(turns),
+                waves: ExactNumbers::of(waves),
                 blocks: None,
             };
             let checkpoint = Checkpoint {

@@ -54,9 +54,9 @@ pub struct Exchange<'p> {
 }
 
 impl<'p> Exchange<'p> {
-    /// Begin at the choices nearest to `turns` that keep the limit.
-    pub fn new(problem: &'p FieldProblem, limit: StepLimit, schedule: Schedule, seed: u64, turns: &[f64]) -> Self {
-        let choices = limit.nearest_choices(problem.mapping(), turns);
+    /// Begin at the choices nearest to `waves` that keep the limit.
+    pub fn new(problem: &'p FieldProblem, limit: StepLimit, schedule: Schedule, seed: u64, waves: &[f64]) -> Self {
+        let choices = limit.nearest_choices(problem.mapping(), waves);
         Self {
             problem,
             limit,
@@ -85,8 +85,8 @@ impl<'p> Exchange<'p> {
         self.finished || self.sweep >= self.schedule.sweeps()
     }
 
-    /// Phase of each ring (turns).
-    pub fn turns(&self) -> Vec<f64> {
+    /// Phase of each ring (waves).
+    pub fn waves(&self) -> Vec<f64> {
         self.problem.mapping().turns_of(&self.choices)
     }
 
@@ -148,7 +148,7 @@ impl<'p> Exchange<'p> {
     /// Choices that keep the limit on both sides of a ring.
     fn candidates(&self, ring: usize, out: &mut Vec<usize>) {
         out.clear();
-        let turns = |c: usize| self.problem.mapping().choices()[c].turns;
+        let waves = |c: usize| self.problem.mapping().choices()[c].waves;
         let inner = ring.checked_sub(1).map(|r| self.choices[r]);
         let outer = self.choices.get(ring + 1).copied();
         let (from, other) = match (inner, outer) {
@@ -160,7 +160,7 @@ impl<'p> Exchange<'p> {
             self.neighbours[from]
                 .iter()
                 .map(|&c| usize::from(c))
-                .filter(|&c| other.is_none_or(|o| self.limit.allows(turns(c), turns(o)))),
+                .filter(|&c| other.is_none_or(|o| self.limit.allows(waves(c), waves(o)))),
         );
     }
 
@@ -212,7 +212,7 @@ mod tests {
         temperature: (1e-2, 1e-3),
     };
 
-    /// A difference of phases (turns) that are below one.
+    /// A difference of phases (waves) that are below one.
     const ROUNDING_TURNS: f64 = 1e-9;
 
     /// Scores sum thousands of numbers in single precision, so a gain may be a loss of this size; the losses
@@ -221,7 +221,13 @@ mod tests {
 
     fn with_problem(test: impl FnOnce(&Lens, &FieldProblem)) {
         let rings = Rings::new(Lattice::covering(40_000, 350).unwrap(), 40_000).unwrap();
-        let (lens, cell) = (Lens { rings, gap_um: 96.0 }, PublishedCell::new(350));
+        let (lens, cell) = (
+            Lens {
+                rings,
+                distance_um: 96.0,
+            },
+            PublishedCell::new(350),
+        );
         let cells: [&dyn CellModel; 1] = [&cell];
         let rows = lens
             .focal_rows(&wavelengths(400.0, 700.0, 10.0), FabricationError::default(), &cells)
@@ -234,18 +240,18 @@ mod tests {
     fn every_sweep_keeps_the_limit_and_cold_ones_gain() {
         with_problem(|lens, problem| {
             let limit = StepLimit::new(0.2).unwrap();
-            let start = Start::Random.turns(lens, 3);
+            let start = Start::Random.waves(lens, 3);
             let mut exchange = Exchange::new(problem, limit, SCHEDULE, 5, &start);
             let mut last = f64::MIN;
             while !exchange.finished() {
                 let cold = SCHEDULE.temperature_of(exchange.sweep()) == 0.0;
                 exchange.sweep_once();
-                assert!(largest_step(&exchange.turns()) <= limit.turns() + ROUNDING_TURNS);
+                assert!(largest_step(&exchange.waves()) <= limit.waves() + ROUNDING_TURNS);
                 let merit = problem.merit_of_widths(&exchange.widths_nm());
                 assert!(!cold || merit > last - 10.0 * SCORE, "{merit} after {last}");
                 last = merit;
             }
-            let before = problem.merit_of_phases(&Start::Hyperbolic { wavelength_um: 0.55 }.turns(lens, 0), None);
+            let before = problem.merit_of_phases(&Start::Hyperbolic { wavelength_um: 0.55 }.waves(lens, 0), None);
             assert!(last > before, "{last} from {before}");
         });
     }
@@ -255,18 +261,18 @@ mod tests {
     fn it_ends_where_no_ring_gains() {
         with_problem(|lens, problem| {
             let limit = StepLimit::new(0.25).unwrap();
-            let start = Start::LogAsphere { band_um: (0.4, 0.7) }.turns(lens, 0);
+            let start = Start::LogAsphere { band_um: (0.4, 0.7) }.waves(lens, 0);
             let mut exchange = Exchange::new(problem, limit, SCHEDULE, 5, &start);
             while !exchange.finished() {
                 exchange.sweep_once();
             }
-            let (mut widths, turns) = (exchange.widths_nm(), exchange.turns());
+            let (mut widths, waves) = (exchange.widths_nm(), exchange.waves());
             let best = problem.merit_of_widths(&widths);
             for ring in [0, 1, 20, problem.rings() - 1] {
                 let kept = widths[ring];
                 for choice in problem.mapping().choices() {
-                    let inner = ring.checked_sub(1).is_none_or(|i| limit.allows(turns[i], choice.turns));
-                    let outer = turns.get(ring + 1).is_none_or(|&t| limit.allows(t, choice.turns));
+                    let inner = ring.checked_sub(1).is_none_or(|i| limit.allows(waves[i], choice.waves));
+                    let outer = waves.get(ring + 1).is_none_or(|&t| limit.allows(t, choice.waves));
                     if inner && outer {
                         widths[ring] = choice.width_nm;
                         assert!(problem.merit_of_widths(&widths) <= best + SCORE);
@@ -281,12 +287,12 @@ mod tests {
     fn resumed_is_as_if_never_interrupted() {
         with_problem(|lens, problem| {
             let limit = StepLimit::new(0.2).unwrap();
-            let start = Start::Hyperbolic { wavelength_um: 0.5 }.turns(lens, 0);
+            let start = Start::Hyperbolic { wavelength_um: 0.5 }.waves(lens, 0);
             let mut whole = Exchange::new(problem, limit, SCHEDULE, 9, &start);
             for _ in 0..3 {
                 whole.sweep_once();
             }
-            let mut parts = Exchange::new(problem, limit, SCHEDULE, 9, &whole.turns()).resume(3);
+            let mut parts = Exchange::new(problem, limit, SCHEDULE, 9, &whole.waves()).resume(3);
             for _ in 0..4 {
                 whole.sweep_once();
                 parts.sweep_once();

@@ -57,7 +57,7 @@ impl OptimiseTask {
                 let course = Course::new(annealing, blocks);
                 self.exchange(&problem, course, &starts, checkpoint, progress)
             }
-            SolverSpec::Adam { steps, rate_turns } => self.adam(steps, rate_turns, cells, checkpoint, progress),
+            SolverSpec::Adam { steps, rate_waves } => self.adam(steps, rate_waves, cells, checkpoint, progress),
         }
     }
 
@@ -79,7 +79,7 @@ impl OptimiseTask {
                 let seed = self.spec.seed.wrapping_add(i as u64);
                 let chain = checkpoint.chains.get(i).cloned().unwrap_or_else(|| Chain {
                     sweep: 0,
-                    turns: ExactNumbers::of(&start.turns(&self.lens, seed)),
+                    waves: ExactNumbers::of(&start.waves(&self.lens, seed)),
                     blocks: None,
                 });
                 self.chain(problem, course, seed, chain, &best)
@@ -113,10 +113,10 @@ impl OptimiseTask {
         progress: &dyn Progress,
     ) -> Result<Optimised> {
         let kept = checkpoint.chains.first().cloned();
-        let (turns, name) = self.start_of_images(course, kept.is_some(), cells, progress)?;
+        let (waves, name) = self.start_of_images(course, kept.is_some(), cells, progress)?;
         let chain = kept.unwrap_or_else(|| Chain {
             sweep: 0,
-            turns: ExactNumbers::of(&turns),
+            waves: ExactNumbers::of(&waves),
             blocks: Some(BlockState::default()),
         });
         let parts = Parts::new(self, cells, progress)?;
@@ -130,7 +130,7 @@ impl OptimiseTask {
         Ok(found.optimised(name, interrupted))
     }
 
-    /// Phases (turns) that Adam, or an exchange of blocks alone, begins from, and their name. What exchange
+    /// Phases (waves) that Adam, or an exchange of blocks alone, begins from, and their name. What exchange
     /// makes of a logarithmic asphere for the merit `log` costs some seconds; it is not made again for a run
     /// that goes on from a checkpoint.
     fn start_of_images(
@@ -142,10 +142,10 @@ impl OptimiseTask {
     ) -> Result<(Vec<f64>, &'static str)> {
         if self.spec.start != StartSpec::Log {
             let start = self.start(0)?;
-            return Ok((start.turns(&self.lens, self.spec.seed), start.name()));
+            return Ok((start.waves(&self.lens, self.spec.seed), start.name()));
         }
         if goes_on {
-            return Ok((self.own_turns.clone(), "log"));
+            return Ok((self.own_waves.clone(), "log"));
         }
         let problem = self
             .field_problem(&MeritSpec::LOG, cells)?
@@ -156,22 +156,22 @@ impl OptimiseTask {
         let starts = vec![start; log.chains as usize];
         let log = Course { blocks: 0, ..log };
         let found = self.exchange(&problem, log, &starts, Checkpoint::default(), progress)?;
-        Ok((found.turns, "log"))
+        Ok((found.waves, "log"))
     }
 
     fn adam(
         &self,
         steps: u32,
-        rate_turns: f64,
+        rate_waves: f64,
         cells: &[&dyn CellModel],
         checkpoint: Checkpoint,
         progress: &dyn Progress,
     ) -> Result<Optimised> {
         let log = Course::new(SolverSpec::ANNEALED, 0);
-        let (turns, name) = self.start_of_images(log, checkpoint.adam.is_some(), cells, progress)?;
+        let (waves, name) = self.start_of_images(log, checkpoint.adam.is_some(), cells, progress)?;
         let parts = Parts::new(self, cells, progress)?;
         let merit = parts.merit();
-        let mut adam = Adam::new(turns, self.limit, steps, rate_turns);
+        let mut adam = Adam::new(waves, self.limit, steps, rate_waves);
         if let Some(state) = &checkpoint.adam {
             adam = state.resume(adam);
         }
@@ -181,7 +181,7 @@ impl OptimiseTask {
         let mut gradient = vec![0.0; self.lens.rings.len()];
         while !adam.finished() && !progress.stopped() {
             gradient.fill(0.0);
-            let value = merit.climb(adam.turns(), self.spec.seed, adam.step(), &mut gradient);
+            let value = merit.climb(adam.waves(), self.spec.seed, adam.step(), &mut gradient);
             adam.climb(&gradient);
             // Merits of steps that draw afresh scatter; their running mean is shown.
             let mean = smooth.map_or(value, |s| 0.9 * s + 0.1 * value);
@@ -196,7 +196,7 @@ impl OptimiseTask {
             adam: Some(AdamState::of(&adam)),
             ..checkpoint
         });
-        let chosen = self.limit.nearest_choices(&self.mapping, adam.turns());
+        let chosen = self.limit.nearest_choices(&self.mapping, adam.waves());
         let widths_nm = self.mapping.widths_of(&chosen);
         let merit = if interrupted.is_some() {
             smooth.unwrap_or(f64::NAN)
@@ -206,7 +206,7 @@ impl OptimiseTask {
         Ok(Optimised {
             merit,
             widths_nm,
-            turns: self.mapping.turns_of(&chosen),
+            waves: self.mapping.turns_of(&chosen),
             start: name,
             history,
             interrupted,
@@ -221,7 +221,7 @@ impl OptimiseTask {
     pub fn merit_over_limit(
         &self,
         cells: &[&dyn CellModel],
-        turns: &[f64],
+        waves: &[f64],
         limits: &[f64],
         progress: &dyn Progress,
     ) -> Result<Vec<(f64, f64)>> {
@@ -238,7 +238,7 @@ impl OptimiseTask {
             .par_iter()
             .map(|&turns_limit| {
                 let limit = StepLimit::new(turns_limit)?;
-                let mut exchange = Exchange::new(&problem, limit, schedule, self.spec.seed, turns);
+                let mut exchange = Exchange::new(&problem, limit, schedule, self.spec.seed, waves);
                 while !exchange.finished() {
                     if progress.stopped() {
                         return Err(Error::Interrupted);

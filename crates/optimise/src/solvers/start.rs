@@ -19,7 +19,7 @@ pub enum Start {
         /// First and last wavelength in focus, at the centre and at the edge (um).
         band_um: (f64, f64),
     },
-    /// Phases of an earlier result (turns).
+    /// Phases of an earlier result (waves).
     Previous(Vec<f64>),
     /// Every phase at random.
     Random,
@@ -36,10 +36,10 @@ impl Start {
         }
     }
 
-    /// Phase of each ring (turns), before any limit on the step. A previous result of another number of
+    /// Phase of each ring (waves), before any limit on the step. A previous result of another number of
     /// rings is cut, or goes on with its last phase.
-    pub fn turns(&self, lens: &Lens, seed: u64) -> Vec<f64> {
-        let (count, f) = (lens.rings.len(), lens.gap_um);
+    pub fn waves(&self, lens: &Lens, seed: u64) -> Vec<f64> {
+        let (count, f) = (lens.rings.len(), lens.distance_um);
         match self {
             Self::Hyperbolic { wavelength_um } => (0..count)
                 .map(|ring| {
@@ -48,10 +48,10 @@ impl Start {
                 })
                 .collect(),
             Self::LogAsphere { band_um } => log_asphere(lens, *band_um),
-            Self::Previous(turns) => {
-                let last = turns.last().copied().unwrap_or(0.0);
+            Self::Previous(waves) => {
+                let last = waves.last().copied().unwrap_or(0.0);
                 (0..count)
-                    .map(|ring| turns.get(ring).copied().unwrap_or(last))
+                    .map(|ring| waves.get(ring).copied().unwrap_or(last))
                     .collect()
             }
             Self::Random => {
@@ -62,10 +62,10 @@ impl Start {
     }
 }
 
-/// Logarithmic asphere. At wavelength w the lens of phase slope -s (in turns a length) has rays sin = w s; the zone at
+/// Logarithmic asphere. At wavelength w the lens of phase slope -s (in waves a length) has rays sin = w s; the zone at
 /// r^2 = q R^2 is to focus w(q) at f, so s = r / (w(q) sqrt(r^2 + f^2)). Summed ring by ring.
 fn log_asphere(lens: &Lens, band_um: (f64, f64)) -> Vec<f64> {
-    let (edge, f) = (lens.rings.middle_um(lens.rings.len() - 1), lens.gap_um);
+    let (edge, f) = (lens.rings.middle_um(lens.rings.len() - 1), lens.distance_um);
     let mut phase = 0.0;
     (0..lens.rings.len())
         .map(|ring| {

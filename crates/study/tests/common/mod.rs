@@ -31,7 +31,7 @@ effect = "cd_bias"
 distribution = "normal"
 sd = 3.0
 [[vary]]
-effect = "gap"
+effect = "defocus"
 distribution = "uniform"
 low = -4.0
 high = 4.0

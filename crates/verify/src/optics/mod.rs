@@ -283,7 +283,7 @@ struct Task<'a> {
 /// The direction that the cells of a design are solved for.
 pub(super) fn incidence(design: &Design) -> Incidence {
     match design.verify.incidence {
-        CellIncidence::AsLit => Incidence::Oblique,
+        CellIncidence::Oblique => Incidence::Oblique,
         CellIncidence::Normal => Incidence::Normal,
     }
 }

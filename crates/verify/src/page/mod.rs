@@ -170,7 +170,7 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
                 "from the middle of each element's field"
             }
             CellIncidence::Normal => "along the normal at all field angles",
-            CellIncidence::AsLit => "at the angle that light arrives at, both polarisations",
+            CellIncidence::Oblique => "at the angle that light arrives at, both polarisations",
         },
         design.verify.wavelengths_um.iter().map(|w| exact(w * 1e3)).collect::<Vec<_>>().join(", "),
         design.verify.window_samples,

@@ -1,4 +1,4 @@
-//! Exposures of one capture as one frame, with the noise of each pixel.
+//! Exposures of one measurement as one frame, with the noise of each pixel.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub struct Exposure {
     pub dark: Option<Arc<DarkPixels>>,
 }
 
-/// A capture as it is used.
+/// A measurement as it is used.
 pub struct Joined {
     /// DN of the longest exposure, black level included.
     pub dn: Array2<f32>,

@@ -130,7 +130,7 @@ impl SensorPixels {
         }
     }
 
-    /// Take both frames out of a capture: every pixel has the stated black level and the mean response after. Pixels that tell
+    /// Take both frames out of a measurement: every pixel has the stated black level and the mean response after. Pixels that tell
     /// nothing: those that were saturated or beside one that was, and dead ones with those beside them. They stay saturated. With
     /// `filter` pixels under others are not dead: light of a flat frame may be of one colour. `own`: the dark frame of this exposure,
     /// here and below, in the place of that of all.
@@ -339,9 +339,9 @@ pub(super) mod tests {
         const EDGE: usize = 10;
         let camera = camera();
         let (lit, dark_current, signal) = (120.0, 150.0, 60.0);
-        let (of_sensor, of_capture) = (4, 8);
+        let (of_sensor, of_measurement) = (4, 8);
         let even = |dn: f32| Array2::from_elem((EDGE, EDGE), dn);
-        let (mut dark, mut flat, mut capture) = (even(40.0), even(240.0), even(100.0));
+        let (mut dark, mut flat, mut measurement) = (even(40.0), even(240.0), even(100.0));
         let black = camera.black_level_dn;
         dark[(0, 0)] = (black + dark_current) as f32;
         flat[(0, 0)] = (black + dark_current + lit) as f32;
@@ -356,8 +356,8 @@ pub(super) mod tests {
         for _ in 0..DRAWS {
             dark[(0, 0)] = recorded(dark_current, of_sensor);
             flat[(0, 0)] = recorded(dark_current + lit, of_sensor);
-            capture[(0, 0)] = recorded(dark_current + signal, of_capture);
-            let mut dn = capture.clone();
+            measurement[(0, 0)] = recorded(dark_current + signal, of_measurement);
+            let mut dn = measurement.clone();
             frames(dark.clone(), flat.clone(), of_sensor)
                 .pixels(&camera)
                 .unwrap()
@@ -366,7 +366,7 @@ pub(super) mod tests {
         }
         let mean = values.iter().sum::<f64>() / DRAWS as f64;
         let scatter = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / DRAWS as f64;
-        let own = expected.own_variance_dn2((0, 0), mean, (of_capture, 0.0), None);
+        let own = expected.own_variance_dn2((0, 0), mean, (of_measurement, 0.0), None);
         let [of_dark, of_flat, _] = expected.shared_errors_dn((0, 0), mean, None).map(|e| e * e);
         let stated = own + of_dark + of_flat;
         assert!((scatter / stated - 1.0).abs() < TOLERANCE, "{scatter} {stated}");

@@ -1,14 +1,14 @@
 //! `measurement.toml` and the files that it names, with every fault found in one go.
 
-mod captures;
 mod elements;
+mod measurements;
 
 use std::path::Path;
 
 use super::frame::{self, Bayer, Channel, Recorded, SensorFrame, SensorFrames};
 use super::{Led, MeasuredSet, PerElement, PerLed, RelayCamera, Stack};
-use captures::{captures, widths};
 use elements::elements;
+use measurements::{measurements, widths};
 use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{LayerNumber, Progress, Result};
@@ -19,25 +19,25 @@ use ndarray::Array2;
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
 
-/// What a set may say of its cells and lenses, and of where captures were taken.
-pub(crate) const PITCH_NM: Limits = Limits::new(50.0..=20_000.0, "nm");
-pub(crate) const HEIGHT_NM: Limits = Limits::new(10.0..=TALLEST_NM, "nm");
-pub(crate) const AMBIENT_INDEX: Limits = Limits::new(1.0..=3.0, "");
-pub(crate) const LENS_DIAMETER_UM: Limits = Limits::new(5.0..=2000.0, "um");
-pub(crate) const FOCAL_LENGTH_UM: Limits = Limits::new(1.0..=100_000.0, "um");
-pub(crate) const APERTURE_DIAMETER_UM: Limits = Limits::new(1.0..=2000.0, "um");
-pub(crate) const DISTANCE_UM: Limits = Limits::new(1.0..=100_000.0, "um");
-pub(crate) const WINDOW_CENTRE_UM: Limits = Limits::new(-10_000.0..=10_000.0, "um");
+/// What a set may say of its cells and lenses, and of where measurements were taken.
+pub const PITCH_NM: Limits = Limits::new(50.0..=20_000.0, "nm");
+pub const HEIGHT_NM: Limits = Limits::new(10.0..=TALLEST_NM, "nm");
+pub const AMBIENT_INDEX: Limits = Limits::new(1.0..=3.0, "");
+pub const LENS_DIAMETER_UM: Limits = Limits::new(5.0..=2000.0, "um");
+pub const FOCAL_LENGTH_UM: Limits = Limits::new(1.0..=100_000.0, "um");
+pub const APERTURE_DIAMETER_UM: Limits = Limits::new(1.0..=2000.0, "um");
+pub const DISTANCE_UM: Limits = Limits::new(1.0..=100_000.0, "um");
+pub const WINDOW_CENTRE_UM: Limits = Limits::new(-10_000.0..=10_000.0, "um");
 
 /// Half-width of the spectrum that the film's table must cover, in standard deviations: what lies outside
 /// is 1e-3 of the light.
-pub(crate) const SPECTRUM_SIGMAS: f64 = 3.2;
+pub const SPECTRUM_SIGMAS: f64 = 3.2;
 
 impl MeasuredSet {
     /// Read the set in `folder`, or the `measurement.toml` given; `layouts` reads the layout that it names.
     ///
     /// # Errors
-    /// [`metalith_core::Error::Text`] with every fault of the text, the captures, the tables and the layout, each at
+    /// [`metalith_core::Error::Text`] with every fault of the text, the measurements, the tables and the layout, each at
     /// the line that names it.
     pub fn read(folder: &Path, layouts: &dyn PillarReader, progress: &dyn Progress) -> Result<Self> {
         let path = if folder.is_dir() {
@@ -74,7 +74,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, stack.cell.shape, sites, progress);
         elements(root, &stack, &layout, &read).into()
     };
-    let captures = captures(root, &camera, &frames, &leds, &elements);
+    let measurements = measurements(root, &camera, &frames, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
     let field_boundary_um = field_boundary(root);
     MeasuredSet {
@@ -86,7 +86,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         camera,
         leds,
         elements,
-        captures: captures.into(),
+        measurements: measurements.into(),
         field_boundary_um,
         sem,
         sem_offset_sigma_nm,
@@ -206,14 +206,14 @@ fn resolved(text: &str, folder: &Path) -> Result<Material> {
 }
 
 /// Where write fields meet in every lens, if that is stated.
-pub(crate) fn field_boundary(root: &Section<'_, '_>) -> Option<[f64; 2]> {
+pub fn field_boundary(root: &Section<'_, '_>) -> Option<[f64; 2]> {
     let s = root.optional_section("writer")?;
     let place = s.array("field_boundary_um", Limits::new(-1000.0..=1000.0, "um"));
     s.finish();
     Some(place)
 }
 
-pub(crate) fn source(s: &Section<'_, '_>) -> f64 {
+pub fn source(s: &Section<'_, '_>) -> f64 {
     s.choice("kind", &[("collimated", ())], None);
     s.choice("divergence_axes", &[("uniform disc", ())], None);
     let mrad = s.float("divergence_mrad", Limits::new(0.0..=50.0, "mrad"));
@@ -278,7 +278,7 @@ fn sensor_frame(s: &Section<'_, '_>, camera: &RelayCamera, key: &str, count: &st
     })
 }
 
-pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
+pub fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
     let positive = |key, high, unit| s.float(key, Limits::new(f64::MIN_POSITIVE..=high, unit));
     let camera = RelayCamera {
         pixel_um: pixel_um(s),
@@ -306,7 +306,7 @@ pub(crate) fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
 }
 
 /// What is wrong with a lamp whose spectrum reaches beyond what is known of the materials of a cell, and what to do.
-pub(crate) fn beyond_tables(led: &Led, cell: &CellStack) -> Option<(String, &'static str)> {
+pub fn beyond_tables(led: &Led, cell: &CellStack) -> Option<(String, &'static str)> {
     let (film, all) = (cell.film.range_um(), cell.range_um());
     let half = SPECTRUM_SIGMAS * led.sigma_nm();
     let (from, to) = (led.centre_nm - half, led.centre_nm + half);
@@ -329,7 +329,7 @@ pub(crate) fn beyond_tables(led: &Led, cell: &CellStack) -> Option<(String, &'st
     })
 }
 
-pub(crate) fn leds(root: &Section<'_, '_>, bayer: Option<Bayer>, cell: Option<&CellStack>) -> Vec<Led> {
+pub fn leds(root: &Section<'_, '_>, bayer: Option<Bayer>, cell: Option<&CellStack>) -> Vec<Led> {
     let mut leds: Vec<Led> = Vec::new();
     for s in root.sections("led") {
         let led = Led {

@@ -10,7 +10,7 @@ use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{Document, FaultKind};
+use super::{Document, FaultKind, renamed};
 use crate::text::quoted;
 pub(super) use values::number as float_of;
 use words::{article, describe, nearest};
@@ -45,6 +45,8 @@ pub struct Section<'d, 't> {
     asked: RefCell<BTreeSet<String>>,
     /// Keys that were asked for and are not there, with the number of the fault that says so.
     missing: RefCell<BTreeMap<String, usize>>,
+    /// Old names of keys and words, each with the new one.
+    renamed: RefCell<BTreeMap<String, String>>,
     /// Stands in for a section that is missing: its absence is one fault, not one for each key.
     vacant: bool,
 }
@@ -63,6 +65,7 @@ impl<'d, 't> Section<'d, 't> {
             span,
             asked: RefCell::default(),
             missing: RefCell::default(),
+            renamed: RefCell::default(),
             vacant: false,
         }
     }
@@ -196,6 +199,11 @@ impl<'d, 't> Section<'d, 't> {
         self.table.keys().map(|k| k.get_ref().to_string()).collect()
     }
 
+    /// Refuse an old key or word of this section by name of the new one. Called before the words are read.
+    pub fn renamed(&self, old: &str, new: &str) {
+        self.renamed.borrow_mut().insert(old.to_owned(), new.to_owned());
+    }
+
     /// Report the keys that nobody asked for. Called when all known keys have been read.
     pub fn finish(&self) {
         let asked = self.asked.borrow();
@@ -214,8 +222,22 @@ impl<'d, 't> Section<'d, 't> {
                 self.document.count_one_more();
                 continue;
             }
-            // A key that is missing and one that nobody knows, much alike, are one mistake.
             let mut missing = self.missing.borrow_mut();
+            if let Some(new) = self.renamed.borrow().get(name) {
+                if let Some(number) = missing.remove(new) {
+                    self.document.withdraw(number);
+                }
+                let (what, hint) = renamed(name, new);
+                self.document.fault(
+                    FaultKind::Renamed,
+                    self.place_of(name),
+                    key.span(),
+                    format!("{what} {place}"),
+                    hint,
+                );
+                continue;
+            }
+            // A key that is missing and one that nobody knows, much alike, are one mistake.
             let hint = if let Some(meant) = nearest(name, missing.keys().map(String::as_str)).map(str::to_owned) {
                 if let Some(number) = missing.remove(&meant) {
                     self.document.withdraw(number);

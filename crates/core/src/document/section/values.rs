@@ -8,7 +8,7 @@ use toml::de::DeValue;
 
 use super::words::{describe, did_you_mean};
 use super::{Limits, Section};
-use crate::document::{FaultKind, Scalar};
+use crate::document::{FaultKind, Scalar, renamed};
 use crate::text::{first_unprintable, quoted};
 
 impl<'t> Section<'_, 't> {
@@ -130,32 +130,6 @@ impl<'t> Section<'_, 't> {
         self.word(key, value, choices, "")
     }
 
-    /// One of a few words, as [`Section::choice`]. Words of earlier versions, each with the one that stands for it now, are refused
-    /// by name.
-    pub fn choice_renamed<T: Copy>(
-        &self,
-        key: &str,
-        choices: &[(&str, T)],
-        renamed: &[(&str, &str)],
-        default: Option<T>,
-    ) -> T {
-        if let Some(value) = self.get(key)
-            && let DeValue::String(word) = value.get_ref()
-            && let Some((old, new)) = renamed.iter().find(|(old, _)| *old == word.as_ref())
-        {
-            self.document.replace(self.place_of(key));
-            self.document.fault(
-                FaultKind::Renamed,
-                self.place_of(key),
-                value.span(),
-                format!("`{key}` cannot be \"{old}\""),
-                format!("it is now called \"{new}\""),
-            );
-            return choices.iter().find(|(w, _)| w == new).map_or(choices[0].1, |(_, v)| *v);
-        }
-        self.choice(key, choices, default)
-    }
-
     /// One of a few words; `or` says what else a value may be.
     fn word<T: Copy>(&self, key: &str, value: &Spanned<DeValue<'t>>, choices: &[(&str, T)], or: &str) -> T {
         let words = choices.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ");
@@ -166,6 +140,12 @@ impl<'t> Section<'_, 't> {
         choices.iter().find(|(w, _)| *w == word.as_ref()).map_or_else(
             || {
                 self.document.replace(self.place_of(key));
+                if let Some(new) = self.renamed.borrow().get(word.as_ref()) {
+                    let (what, hint) = renamed(word, new);
+                    self.document
+                        .fault(FaultKind::Renamed, self.place_of(key), value.span(), what, hint);
+                    return choices[0].1;
+                }
                 self.document.fault(
                     FaultKind::UnknownChoice,
                     self.place_of(key),

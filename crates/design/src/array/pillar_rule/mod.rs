@@ -65,7 +65,7 @@ impl PillarRule {
         }
     }
 
-    /// The same rule, asked about the phase of light along an axis; of upright rectangles alone there is a difference.
+    /// Same rule for the phase of light along an axis; only upright rectangles have a difference.
     #[must_use]
     pub fn along(self, axis: PolarisationAxis) -> Self {
         match self {
@@ -74,7 +74,7 @@ impl PillarRule {
         }
     }
 
-    /// What the pillars are, as far as symmetry is asked: rectangles, or what a mirror leaves as it is.
+    /// Shape of the pillars, as far as symmetry is concerned: rectangles, or shapes that a mirror leaves unchanged.
     pub(super) fn shape(&self) -> PillarShape {
         match self {
             Self::Width(_) => PillarShape::default(),

@@ -9,10 +9,10 @@ use metalith_pillars::RotatedRectangles;
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotationRule {
     pub(super) pillars: RotatedRectangles,
-    /// Hand of the light that arrives.
+    /// Handedness of the light that arrives.
     arriving: Handedness,
     mapping: RotationMapping,
-    /// What the grid adds to the rotation of each number, in steps; the first stands for no pillar.
+    /// Change of the rotation of each number by the grid, in steps; the first stands for no pillar.
     turned: Vec<f64>,
     /// The number over each of [`PARTS`] of a turn of phase, zero where it is not the same all over: sums of waves for millions of
     /// sites take longer than to write them.

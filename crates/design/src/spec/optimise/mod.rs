@@ -25,7 +25,7 @@ pub struct OptimiseSpec {
     #[serde(skip)]
     said: [bool; 3],
     /// Largest wrapped phase step from ring to ring (turns); 0.5 is no limit.
-    pub step_limit_turns: f64,
+    pub step_limit_waves: f64,
     pub start: StartSpec,
     /// Decides all that is random.
     pub seed: u64,
@@ -62,7 +62,7 @@ pub enum SolverSpec {
         blocks: u32,
     },
     /// Up the gradient.
-    Adam { steps: u32, rate_turns: f64 },
+    Adam { steps: u32, rate_waves: f64 },
 }
 
 /// Phases to begin from.
@@ -97,7 +97,7 @@ pub struct RobustSpec {
     pub width_bias_nm: f64,
     /// Film height, of itself.
     pub height: f64,
-    pub gap_um: f64,
+    pub defocus_um: f64,
     /// Errors drawn to optimise over.
     pub draws: u32,
 }
@@ -138,6 +138,7 @@ impl OptimiseSpec {
                 }
                 (b[0] * 1e-3, b[1] * 1e-3)
             });
+        s.renamed("step_limit_turns", "step_limit_waves");
         let solver = SolverSpec::read(s, images);
         let views = s.optional_section("views");
         let says_step = |s: &Section<'_, '_>| s.has("step_nm");
@@ -159,9 +160,9 @@ impl OptimiseSpec {
                 .optional_float("step_nm", Limits::new(0.1..=50.0, "nm"))
                 .unwrap_or(1.0)
                 * 1e-3,
-            step_limit_turns: s
-                .optional_float("step_limit_turns", Limits::new(0.01..=0.5, "turns; 0.5 is no limit"))
-                .unwrap_or(default.step_limit_turns),
+            step_limit_waves: s
+                .optional_float("step_limit_waves", Limits::new(0.01..=0.5, "waves; 0.5 is no limit"))
+                .unwrap_or(default.step_limit_waves),
             start: s.choice(
                 "start",
                 &[
@@ -227,7 +228,7 @@ impl Default for OptimiseSpec {
             band_um: VISIBLE_UM,
             said: [false; 3],
             step_um: 1e-3,
-            step_limit_turns: 0.2,
+            step_limit_waves: 0.2,
             start: StartSpec::All,
             seed: 1,
             merit: MeritSpec::LOG,
@@ -263,13 +264,14 @@ impl SolverSpec {
     };
 
     fn read(s: &Section<'_, '_>, images: bool) -> Self {
+        s.renamed("rate_turns", "rate_waves");
         let words = [("exchange", false), ("adam", true)];
         let (chains, hot_sweeps, temperature) = Self::ANNEALED;
         if s.choice("solver", &words, Some(false)) {
             Self::Adam {
                 steps: s.optional_integer("steps", 1..=1_000_000, "").unwrap_or(400) as u32,
-                rate_turns: s
-                    .optional_float("rate_turns", Limits::new(1e-6..=0.5, "turns"))
+                rate_waves: s
+                    .optional_float("rate_waves", Limits::new(1e-6..=0.5, "waves"))
                     .unwrap_or(0.01),
             }
         } else {
@@ -330,11 +332,12 @@ impl MeritSpec {
 
 impl RobustSpec {
     fn read(s: &Section<'_, '_>) -> Self {
+        s.renamed("gap_um", "defocus_um");
         let float = |key, most, unit, default| s.optional_float(key, Limits::new(0.0..=most, unit)).unwrap_or(default);
         let spec = Self {
             width_bias_nm: float("width_bias_nm", 50.0, "nm", 6.0),
             height: float("height_percent", 20.0, "%", 2.0) * 1e-2,
-            gap_um: float("gap_um", 1000.0, "um", 10.0),
+            defocus_um: float("defocus_um", 1000.0, "um", 10.0),
             draws: s.optional_integer("draws", 1..=256, "").unwrap_or(16) as u32,
         };
         s.finish();

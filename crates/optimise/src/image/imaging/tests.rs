@@ -32,7 +32,10 @@ fn lens() -> Lens {
 fn lens_on(kind: LatticeKind) -> Lens {
     let lattice = Lattice::of_kind_covering(kind, 100_000, 350).unwrap();
     let rings = Rings::new(lattice, 100_000).unwrap();
-    Lens { rings, gap_um: 240.0 }
+    Lens {
+        rings,
+        distance_um: 240.0,
+    }
 }
 
 fn phases(lens: &Lens) -> Vec<f64> {
@@ -46,7 +49,7 @@ fn planes(phases: &[f64]) -> (Vec<f32>, Vec<f32>) {
 
 /// Rayleigh-Sommerfeld over all sites, at places x along the plane of incidence.
 fn brute_force(lens: &Lens, phases: &[f64], wavelength: f64, angle: f64, places: &[(f64, f64)]) -> Vec<f64> {
-    let (lattice, k, z) = (lens.rings.lattice(), TAU / wavelength, lens.gap_um);
+    let (lattice, k, z) = (lens.rings.lattice(), TAU / wavelength, lens.distance_um);
     let mut sums = vec![Complex64::ZERO; places.len()];
     for ix in 0..lattice.sites() {
         for iy in 0..lattice.sites() {

@@ -35,8 +35,8 @@ impl<'l> Geometry<'l> {
             lens,
             wavelength_um,
             sine: angle_rad.sin(),
-            landing_um: lens.gap_um * angle_rad.tan(),
-            distance_um: lens.gap_um / angle_rad.cos(),
+            landing_um: lens.distance_um * angle_rad.tan(),
+            distance_um: lens.distance_um / angle_rad.cos(),
             side_um: window.side_um(),
             offset_um,
             // Root of the area of a sample over that of the lens; the number of samples comes later.
@@ -57,7 +57,7 @@ impl<'l> Geometry<'l> {
     }
 
     fn site(&self, x: f64, y: f64, ring: u32, with_value: bool) -> SitePair {
-        let (z, x0) = (self.lens.gap_um, self.landing_um);
+        let (z, x0) = (self.lens.distance_um, self.landing_um);
         let dx = x0 - x;
         let r2 = dx * dx + y * y + z * z;
         let r = r2.sqrt();
@@ -73,11 +73,11 @@ impl<'l> Geometry<'l> {
         }
         // R - R0 without cancellation, and the incident wave.
         let path = (x * x - 2.0 * x * x0 + y * y) / (r + self.distance_um) + x * self.sine;
-        let turns = path / self.wavelength_um + q_x * self.offset_um;
+        let waves = path / self.wavelength_um + q_x * self.offset_um;
         let k = TAU / self.wavelength_um;
         let area = self.lens.rings.lattice().cell_um2();
         let amplitude = self.scale * area * z / (TAU * r2);
-        let value = amplitude * Complex64::new(1.0 / r, -k) * Complex64::cis(TAU * (turns - turns.round()));
+        let value = amplitude * Complex64::new(1.0 / r, -k) * Complex64::cis(TAU * (waves - waves.round()));
         SitePair { ring, q, value }
     }
 

@@ -3,8 +3,8 @@
 use metalith_core::Result;
 use metalith_report::{Cell, Column, ImageGrid, Page, Table, Verdict, count, exact, sig};
 
-use super::CapturePlan;
-use crate::set::MeasuredSet;
+use crate::MeasurementPlan;
+use metalith_calibrate::MeasuredSet;
 
 /// Pictures of a row.
 const COLUMNS: usize = 6;
@@ -19,7 +19,7 @@ const SAME: f64 = 1e-6;
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_page(plan: &CapturePlan, set: &MeasuredSet, unseen: usize) -> Result<()> {
+pub fn write_page(plan: &MeasurementPlan, set: &MeasuredSet, unseen: usize) -> Result<()> {
     let mut page = Page::new(
         format!("Check list: {}", set.title),
         "what to measure, and what it will tell",
@@ -27,42 +27,45 @@ pub fn write_page(plan: &CapturePlan, set: &MeasuredSet, unseen: usize) -> Resul
     let verdict = if plan.finds_all() { Verdict::Pass } else { Verdict::Fail };
     page.verdict(verdict, format!("{}.", plan.sentence()));
     page.facts(&[
-        ("Captures", count(plan.captures.len() as u64)),
-        ("Frames", count(plan.captures.iter().map(|c| u64::from(c.frames)).sum())),
+        ("Measurements", count(plan.measurements.len() as u64)),
+        (
+            "Frames",
+            count(plan.measurements.iter().map(|c| u64::from(c.frames)).sum()),
+        ),
         ("Widths by SEM", count(set.sem.len() as u64)),
         ("Pairs not told apart", count(plan.confusions.len() as u64)),
     ]);
     instructions(&mut page, plan, set);
-    captures(&mut page, plan, set);
+    measurements(&mut page, plan, set);
     effects(&mut page, plan);
     confusions(&mut page, plan);
     pictures(&mut page, set);
     page.section("How it was planned");
     page.paragraph(format!(
-        "{} captures were considered: every element, colour, angle and distance of the bench{}. Each was simulated with every effect at two sizes; what it tells is its Fisher information at the noise of the camera, with registration, flux and black level free. Captures were added one by one, each time the one that helps the worst detection most, until every effect is found and told from every other where any captures of the bench can do so; then captures that had become needless were taken out, and frames were lowered as far as they can be. Needed is twice the gain that a calibration takes for more than the error of its own model.",
+        "{} measurements were considered: every element, colour, angle and distance of the bench{}. Each was simulated with every effect at two sizes; what it tells is its Fisher information at the noise of the camera, with registration, flux and black level free. Measurements were added one by one, each time the one that helps the worst detection most, until every effect is found and told from every other where any measurements of the bench can do so; then measurements that had become needless were taken out, and frames were lowered as far as they can be. Needed is twice the gain that a calibration takes for more than the error of its own model.",
         count(plan.candidates as u64),
         if unseen > 0 { format!(" ({unseen} more leave the element too steeply, or land too far from its axis)") } else { String::new() }
     ));
-    page.paragraph("This rests on a simulation of the design as drawn, with effects one at a time and one beside another: a chip that differs by much more than the wanted sizes may need other captures.");
+    page.paragraph("This rests on a simulation of the design as drawn, with effects one at a time and one beside another: a chip that differs by much more than the wanted sizes may need other measurements.");
     page.write(&plan.page)
 }
 
-fn instructions(page: &mut Page, plan: &CapturePlan, set: &MeasuredSet) {
+fn instructions(page: &mut Page, plan: &MeasurementPlan, set: &MeasuredSet) {
     let camera = &set.camera;
     page.section("At the bench");
     page.list([
         format!(
-            "Save each capture as the mean of its frames, with its fractions, or as the stack of all: raw digital numbers with the black level ({} DN) in, {} rows of {} pixels, the first row at the lowest y.",
+            "Save each measurement as the mean of its frames, with its fractions, or as the stack of all: raw digital numbers with the black level ({} DN) in, {} rows of {} pixels, the first row at the lowest y.",
             exact(camera.black_level_dn), camera.rows, camera.cols
         ),
         format!(
             "Place the middle of the window at the stated place from the axis of the element, to {} pixels ({} um a pixel in the plane of the sensor).",
             exact(camera.registration_sigma_px), exact(camera.pixel_um)
         ),
-        "Set the exposure by an opening without pillars, or without the chip, as the column “open” says. If the exposure has to be another one, correct `scale_dn` of the capture in measurement.toml by the same factor.".to_owned(),
-        "If dark frames are taken, take one for each exposure time, and name it by `dark_frame` and `dark_frames` beside `file` of the captures that were exposed so long.".to_owned(),
+        "Set the exposure by an opening without pillars, or without the chip, as the column “open” says. If the exposure has to be another one, correct `scale_dn` of the measurement in measurement.toml by the same factor.".to_owned(),
+        "If dark frames are taken, take one for each exposure time, and name it by `dark_frame` and `dark_frames` beside `file` of the measurements that were exposed so long.".to_owned(),
         format!(
-            "Put the frames into `{}`, under their names. A capture that fails is left out by deleting its section in measurement.toml.",
+            "Put the frames into `{}`, under their names. A measurement that fails is left out by deleting its section in measurement.toml.",
             plan.folder.join("captures").display()
         ),
         if set.sem.is_empty() {
@@ -74,8 +77,8 @@ fn instructions(page: &mut Page, plan: &CapturePlan, set: &MeasuredSet) {
     ]);
 }
 
-fn captures(page: &mut Page, plan: &CapturePlan, set: &MeasuredSet) {
-    page.section("Captures");
+fn measurements(page: &mut Page, plan: &MeasurementPlan, set: &MeasuredSet) {
+    page.section("Measurements");
     let mut table = Table::new([
         Column::text("Done"),
         Column::text("File"),
@@ -89,7 +92,7 @@ fn captures(page: &mut Page, plan: &CapturePlan, set: &MeasuredSet) {
         Column::number("Brightest", "DN"),
     ])
     .caption("Angles of incidence in air. Distances are from the pillar tops. Open: what light through an opening without pillars adds to the black level, far from its rim. Brightest: the brightest pixel to expect, black level included.");
-    for c in &plan.captures {
+    for c in &plan.measurements {
         let pair = |v: [f64; 2]| format!("{}, {}", exact(v[0]), exact(v[1]));
         let glass = set.stack.cell.substrate.index(c.led_nm * 1e-3).map_or(1.0, |n| n.re);
         let around = set.stack.cell.ambient.index(c.led_nm * 1e-3).map_or(1.0, |n| n.re);
@@ -110,7 +113,7 @@ fn captures(page: &mut Page, plan: &CapturePlan, set: &MeasuredSet) {
     page.table(table);
 }
 
-fn effects(page: &mut Page, plan: &CapturePlan) {
+fn effects(page: &mut Page, plan: &MeasurementPlan) {
     page.section("What it will find");
     let mut table = Table::new([
         Column::text("Effect"),
@@ -129,9 +132,9 @@ fn effects(page: &mut Page, plan: &CapturePlan) {
         let words = match (e.detected, e.reachable, e.gain >= e.needed) {
             (true, _, _) => "yes".to_owned(),
             (_, _, true) => "no: its interval includes zero".to_owned(),
-            (_, true, _) => format!("no: {} is needed, more captures would do", sig(e.needed, 2)),
+            (_, true, _) => format!("no: {} is needed, more measurements would do", sig(e.needed, 2)),
             (_, false, _) => format!(
-                "no: {} is needed, no capture of this bench shows as much",
+                "no: {} is needed, no measurement of this bench shows as much",
                 sig(e.needed, 2)
             ),
         };
@@ -146,7 +149,7 @@ fn effects(page: &mut Page, plan: &CapturePlan) {
     page.table(table);
 }
 
-fn confusions(page: &mut Page, plan: &CapturePlan) {
+fn confusions(page: &mut Page, plan: &MeasurementPlan) {
     page.section("What it cannot tell apart");
     if plan.confusions.is_empty() {
         page.paragraph("Every effect that is found is told from every other.");
@@ -176,11 +179,11 @@ fn confusions(page: &mut Page, plan: &CapturePlan) {
 
 fn pictures(page: &mut Page, set: &MeasuredSet) {
     page.section("What to expect");
-    let mut grid = ImageGrid::new("Expected captures", COLUMNS)
+    let mut grid = ImageGrid::new("Expected measurements", COLUMNS)
         .pixel_um(set.camera.pixel_um)
         .values("digital number", "DN")
         .log(2.0);
-    for c in set.captures.iter().take(MOST_PICTURES) {
+    for c in set.measurements.iter().take(MOST_PICTURES) {
         grid.image(&c.name, c.dn.mapv(|v| f64::from(v) - set.camera.black_level_dn));
     }
     page.figure(grid.caption("Of the chip as drawn, without noise, black level taken out, on one logarithmic scale."));

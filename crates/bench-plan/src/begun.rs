@@ -36,9 +36,9 @@ pub fn check_not_begun(folder: &Path) -> Result<()> {
             "give another folder with --out, or move what is there away",
         ))
     };
-    let captures = folder.join("captures");
-    if std::fs::read_dir(&captures).is_ok_and(|mut files| files.next().is_some()) {
-        return refuse(format!("there are frames in {}", captures.display()));
+    let frames = folder.join("captures");
+    if std::fs::read_dir(&frames).is_ok_and(|mut files| files.next().is_some()) {
+        return refuse(format!("there are frames in {}", frames.display()));
     }
     let planned = read_at_most(&folder.join("plan.json"), LONGEST, "a plan").unwrap_or_default();
     let planned: serde_json::Value = serde_json::from_slice(&planned).unwrap_or_default();

@@ -3,12 +3,13 @@
 use metalith_core::{Error, Result};
 use metalith_report::{exact, sig};
 
-use super::bench_file::BenchFile;
-use super::choice::{Choice, Requirement};
-use super::judgement::amount;
-use crate::effects::{self, Effect, Parameter};
-use crate::session::check_effects;
-use crate::set::MeasuredSet;
+use crate::bench_file::BenchFile;
+use crate::choice::{Choice, Requirement};
+use crate::judgement::amount;
+use metalith_attribution::Parameter;
+use metalith_calibrate::MeasuredSet;
+use metalith_calibrate::check_effects;
+use metalith_calibrate::{Effect, all_effects};
 
 /// The parameters of an effect that are asked for, with their places: all but those that change nothing by themselves.
 fn asked(effect: &dyn Effect) -> impl Iterator<Item = (usize, Parameter)> + use<> {
@@ -22,7 +23,7 @@ fn asked(effect: &dyn Effect) -> impl Iterator<Item = (usize, Parameter)> + use<
 /// # Errors
 /// If a name is not known; if a size is beyond, with what sizes are counted from.
 pub fn check_wanted(set: &MeasuredSet, bench: &BenchFile) -> Result<()> {
-    let known = effects::all(set);
+    let known = all_effects(set);
     let names: Vec<String> = bench.wanted.keys().cloned().collect();
     check_effects(&known, &names)?;
     for effect in &known {
@@ -107,8 +108,8 @@ pub fn only_of_what_is_found(choice: &Choice<'_>, reachable: &mut [bool]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::bench_file::tests::small_bench;
     use super::*;
+    use crate::bench_file::tests::small_bench;
     use metalith_core::Silent;
     use metalith_gds::extract::GdsPillars;
 
@@ -122,7 +123,7 @@ mod tests {
             "film_height = 10",
             "led_width = 0.3",
             "source_distance = 20000.0",
-            "gap = 2",
+            "defocus = 2",
         ] {
             assert!(checked(sound).is_ok(), "{sound}");
         }
@@ -133,8 +134,8 @@ mod tests {
             ),
             ("led_width = 2.6", ["0 to 1.50", "what is stated, 1"]),
             ("source_distance = 2000.0", ["source_distance = 2000", "5,000 to"]),
-            ("gap = 100", ["0 to 60.0 um", "may have"]),
-            ("gaap = 1", ["gaap", "did you mean"]),
+            ("defocus = 100", ["0 to 60.0 um", "may have"]),
+            ("defokus = 1", ["gaap", "did you mean"]),
         ] {
             let error = checked(wanted).unwrap_err().to_string();
             for part in parts {

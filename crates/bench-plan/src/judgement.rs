@@ -4,13 +4,14 @@
 use metalith_core::{Progress, Result};
 use serde::Serialize;
 
-use super::choice::{Choice, NEEDED, Picked, Requirement, energy, lookalike};
-use crate::data::{Data, Nuisances};
-use crate::effects::Effect;
-use crate::set::MeasuredSet;
-use crate::simulator::Simulator;
-use crate::simulator_model::separating_measurement;
-use crate::statistics::{FitProblem, ForwardModel, Measurements, REFERENCES_DECIDE, Surrogate, half_widths};
+use crate::choice::{Choice, NEEDED, Picked, Requirement, energy, lookalike};
+use metalith_attribution::{ForwardModel, Measurements, REFERENCES_DECIDE, half_widths};
+use metalith_calibrate::Effect;
+use metalith_calibrate::MeasuredSet;
+use metalith_calibrate::Simulator;
+use metalith_calibrate::separating_measurement;
+use metalith_calibrate::{Data, Nuisances};
+use metalith_calibrate::{FitProblem, Surrogate};
 
 /// Margin that is enough: the choice stops at one, and its sums round.
 const ENOUGH: f64 = 1.0 - 1e-6;
@@ -32,7 +33,7 @@ pub struct PlannedEffect {
     pub half_interval: f64,
     /// Whether it is found: gain enough, and an interval without zero.
     pub detected: bool,
-    /// Whether any captures of this bench could find it.
+    /// Whether any measurements of this bench could find it.
     pub reachable: bool,
 }
 
@@ -48,11 +49,11 @@ pub struct Confusion {
     /// At this size of each of its parameters, in its own unit.
     pub at: Vec<f64>,
     pub looks_like_unit: String,
-    /// Gain in reduced chi-square per pixel by which captures tell them apart, and what is asked for.
+    /// Gain in reduced chi-square per pixel by which measurements tell them apart, and what is asked for.
     pub gain: f64,
     pub needed: f64,
-    /// Whether other captures of this bench would tell them apart.
-    pub captures_could: bool,
+    /// Whether other measurements of this bench would tell them apart.
+    pub measurements_could: bool,
     /// By how much the widths by SEM raise chi-square, where the bench offers them.
     pub sem_chi2: Option<f64>,
     /// Whether that decides.
@@ -123,7 +124,7 @@ pub fn effects(
     Ok(out)
 }
 
-/// What the chosen captures cannot tell apart: pairs of effects that are both found, by the worst direction of each pair.
+/// What the chosen measurements cannot tell apart: pairs of effects that are both found, by the worst direction of each pair.
 pub fn confusions(
     simulator: &Simulator<'_>,
     set: &MeasuredSet,
@@ -161,7 +162,7 @@ pub fn confusions(
             looks_like_unit: beside.unit().into(),
             gain: energy(&products, r) / pixels.max(1.0),
             needed: NEEDED,
-            captures_could: *reachable,
+            measurements_could: *reachable,
             sem_chi2,
             sem_decides: sem_chi2.is_some_and(|chi2| chi2 >= REFERENCES_DECIDE),
             separate_by: separating_measurement(simulator, own, &[other]),
@@ -185,7 +186,9 @@ impl Confusion {
             )),
             _ => None,
         };
-        let more = self.captures_could.then(|| "more captures of this bench".to_owned());
+        let more = self
+            .measurements_could
+            .then(|| "more measurements of this bench".to_owned());
         let known = self.separate_by.clone().filter(|_| sem.is_none());
         let all: Vec<String> = [more, sem, known].into_iter().flatten().collect();
         if all.is_empty() {

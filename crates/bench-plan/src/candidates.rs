@@ -1,4 +1,4 @@
-//! Captures that a bench could take of a design: every element, colour, angle and distance that it names.
+//! Measurements that a bench could take of a design: every element, colour, angle and distance that it names.
 
 use std::path::Path;
 
@@ -7,10 +7,10 @@ use metalith_design::{Design, Element};
 use metalith_pillars::{PillarMap, PillarReader};
 use ndarray::Array2;
 
-use super::bench_file::{BenchFile, SemOffer};
-use crate::set::read::WINDOW_CENTRE_UM;
-use crate::set::{
-    Capture, ElementIndex, LedIndex, MeasuredElement, MeasuredSet, PerCapture, PerElement, SemSite, Stack,
+use crate::bench_file::{BenchFile, SemOffer};
+use metalith_calibrate::set_format::WINDOW_CENTRE_UM;
+use metalith_calibrate::{
+    ElementIndex, LedIndex, MeasuredElement, MeasuredSet, Measurement, PerElement, PerMeasurement, SemSite, Stack,
 };
 
 /// Steepest direction of light behind an element that a camera sees (sine).
@@ -22,11 +22,11 @@ const DEFOCUS: f64 = 0.035;
 /// Part of the radius of a lens that holds the sites of a SEM: pillars at the rim are cut by nothing.
 const SEM_REACH: f64 = 0.97;
 
-/// The design as a session without captures, and all captures that the bench could take of it.
+/// The design as a session without measurements, and all measurements that the bench could take of it.
 pub struct Candidates {
     pub set: MeasuredSet,
-    pub captures: Vec<Capture>,
-    /// Captures that were left out because no camera could see their light, or it lands farther off than a set may say.
+    pub measurements: Vec<Measurement>,
+    /// Measurements that were left out because no camera could see their light, or it lands farther off than a set may say.
     pub unseen: usize,
 }
 
@@ -53,15 +53,19 @@ pub fn candidates(
         ));
     }
     let set = session(design, bench, layout, &chosen, maps)?;
-    let (captures, unseen) = captures(design, bench, &set, &chosen);
-    if captures.is_empty() {
+    let (measurements, unseen) = measurements(design, bench, &set, &chosen);
+    if measurements.is_empty() {
         return Err(Error::refused(
             "plan/no-light",
-            "no capture of this bench would see light",
+            "no measurement of this bench would see light",
             "name angles in `field_deg` that the elements look at",
         ));
     }
-    Ok(Candidates { set, captures, unseen })
+    Ok(Candidates {
+        set,
+        measurements,
+        unseen,
+    })
 }
 
 /// The elements that the bench names; else, of those that are round, the central one, the one farthest along x, and the farthest of
@@ -76,7 +80,7 @@ pub fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element
         Error::refused(
             "plan/element-not-round",
             what,
-            "name round elements by `elements` of the bench: captures are predicted through round openings",
+            "name round elements by `elements` of the bench: measurements are predicted through round openings",
         )
     };
     let mut picked: Vec<Element> = Vec::new();
@@ -167,12 +171,17 @@ fn session(
         sem: Vec::new(),
         sem_offset_sigma_nm: bench.sem.map_or(1.0, |s| s.offset_sigma_nm),
         elements,
-        captures: PerCapture::default(),
+        measurements: PerMeasurement::default(),
         field_boundary_um: bench.field_boundary_um,
     })
 }
 
-fn captures(design: &Design, bench: &BenchFile, set: &MeasuredSet, chosen: &[Element]) -> (Vec<Capture>, usize) {
+fn measurements(
+    design: &Design,
+    bench: &BenchFile,
+    set: &MeasuredSet,
+    chosen: &[Element],
+) -> (Vec<Measurement>, usize) {
     let most = bench.frames.last().copied().unwrap_or(1);
     let dark = Array2::zeros((bench.camera.rows, bench.camera.cols));
     let (mut out, mut unseen) = (Vec::new(), 0);
@@ -193,7 +202,7 @@ fn captures(design: &Design, bench: &BenchFile, set: &MeasuredSet, chosen: &[Ele
                     continue;
                 };
                 for (z, distance_um) in distances.iter().enumerate() {
-                    out.push(Capture {
+                    out.push(Measurement {
                         name: format!("e{}_{}_{}_a{a}_z{z}", index[0], index[1], lamp.name()),
                         element: ElementIndex::from(e),
                         led: LedIndex::from(led),
@@ -254,8 +263,8 @@ pub fn sem_sites(set: &MeasuredSet, offer: SemOffer) -> Vec<SemSite> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::bench_file::tests::small_bench;
     use super::*;
+    use crate::bench_file::tests::small_bench;
     use metalith_core::Silent;
     use metalith_design::PillarArray;
     use metalith_gds::extract::GdsPillars;
@@ -304,7 +313,7 @@ mod tests {
         assert_eq!(set.stack.lens_diameter_um, 80.0);
         for (e, element) in set.elements.iter_enumerated() {
             let own: Vec<f64> = found
-                .captures
+                .measurements
                 .iter()
                 .filter(|c| c.element == e)
                 .map(|c| c.distance_um)

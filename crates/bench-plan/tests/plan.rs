@@ -4,9 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use metalith_calibrate::{
-    BenchFile, CapturePlan, MeasuredSet, PlanRequest, Sampling, Session, Settings, Synthesizer, plan,
-};
+use metalith_bench_plan::{BenchFile, MeasurementPlan, PlanRequest, plan};
+use metalith_calibrate::{MeasuredSet, Sampling, Session, Settings, Synthesizer};
 use metalith_core::Silent;
 use metalith_design::{Design, PillarArray};
 use metalith_gds::extract::GdsPillars;
@@ -32,14 +31,14 @@ sigma_nm = 1.5
 edge_offset_nm = 1.0
 
 [wanted]
-gap = 2.0
+defocus = 2.0
 cd_bias = 6.0
 "#
     )
 }
 
 /// Plan a session for a design.
-fn planned(folder: &Path, design: &Design, bench: &str, only: &[&str]) -> CapturePlan {
+fn planned(folder: &Path, design: &Design, bench: &str, only: &[&str]) -> MeasurementPlan {
     let array = PillarArray::build(design, &Silent).unwrap();
     let layout = folder.join("layout.gds");
     write_pillars(design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
@@ -62,11 +61,11 @@ fn mini() -> Design {
 }
 
 /// Fill the folder with frames; dark ones where none are given.
-fn fill(folder: &Path, plan: &CapturePlan, set: Option<&MeasuredSet>) {
-    for (k, capture) in plan.captures.iter().enumerate() {
+fn fill(folder: &Path, plan: &MeasurementPlan, set: Option<&MeasuredSet>) {
+    for (k, measurement) in plan.measurements.iter().enumerate() {
         let dark = Array2::from_elem((PIXELS, PIXELS), 40.0);
-        let frame = set.map_or(dark, |set| set.captures.raw[k].dn.clone());
-        write_npy(&folder.join(&capture.file), &frame);
+        let frame = set.map_or(dark, |set| set.measurements.raw[k].dn.clone());
+        write_npy(&folder.join(&measurement.file), &frame);
     }
 }
 
@@ -87,10 +86,10 @@ fn settings(cache: PathBuf, only: &[&str]) -> Settings {
     }
 }
 
-/// Effects on the chip of a session come back in its captures, and are found with their sizes.
-fn each_is_found(folder: &Path, plan: &CapturePlan, like: &MeasuredSet, settings: &Settings) {
+/// Effects on the chip of a session come back in its measurements, and are found with their sizes.
+fn each_is_found(folder: &Path, plan: &MeasurementPlan, like: &MeasuredSet, settings: &Settings) {
     let synthesizer = Synthesizer::new(like, settings).unwrap();
-    for (name, size) in [("cd_bias", 6.0), ("gap", 2.0)] {
+    for (name, size) in [("cd_bias", 6.0), ("defocus", 2.0)] {
         let images = synthesizer.with_effect(name, &[size], &Silent).unwrap();
         fill(folder, plan, Some(&synthesizer.draw(&images, 41)));
         let came_back = read(folder);
@@ -109,19 +108,19 @@ fn each_is_found(folder: &Path, plan: &CapturePlan, like: &MeasuredSet, settings
 #[ignore = "second tier: CPU time, run by .ci/run"]
 fn what_is_planned_for_is_found_in_what_comes_back() {
     let folder = tempfile::tempdir().unwrap();
-    let tried = ["cd_bias", "gap", "pixel_blur"];
+    let tried = ["cd_bias", "defocus", "pixel_blur"];
     let plan = planned(folder.path(), &mini(), &small_bench(), &tried);
     assert!(plan.finds_all(), "{}", plan.sentence());
     assert!(
-        plan.captures.len() >= 4 && plan.captures.len() < plan.candidates / 2,
+        plan.measurements.len() >= 4 && plan.measurements.len() < plan.candidates / 2,
         "{}",
         plan.sentence()
     );
     assert_eq!(plan.confusions.len(), 0, "{:?}", plan.confusions);
     let page = fs::read_to_string(&plan.page).unwrap();
-    assert!(plan.captures.iter().all(|c| page.contains(&c.file)));
+    assert!(plan.measurements.iter().all(|c| page.contains(&c.file)));
     // The brightest pixel is where the bench asked for it: three digits of the exposure.
-    for c in &plan.captures {
+    for c in &plan.measurements {
         assert!(
             (c.brightest_dn / (0.7 * 4095.0) - 1.0).abs() < 0.01,
             "{}",
@@ -140,27 +139,27 @@ fn what_is_planned_for_is_found_in_what_comes_back() {
     );
 }
 
-/// One distance in focus cannot tell a gap from a source that is near; three distances do.
+/// One distance in focus cannot distinguish a defocus from a source that is near; three distances do.
 #[test]
 #[ignore = "second tier: CPU time, run by .ci/run"]
-fn what_captures_cannot_split_is_named_with_what_can() {
+fn what_measurements_cannot_split_is_named_with_what_can() {
     let folder = tempfile::tempdir().unwrap();
     let bench = small_bench()
         .replace("[139.0, 144.0, 149.0]", "[144.0]")
         .replace("elements = [0, 0, 1, 0]", "elements = [0, 0]")
-        .replace("gap = 2.0", "gap = 0.06");
+        .replace("defocus = 2.0", "defocus = 0.06");
     let plan = planned(
         folder.path(),
         &mini(),
         &bench,
-        &["gap", "source_distance", "cd_bias", "corner_rounding"],
+        &["defocus", "source_distance", "cd_bias", "corner_rounding"],
     );
     let pair = plan.confusions.iter().find(|c| {
         let both = [c.effect.as_str(), c.looks_like.as_str()];
-        both.contains(&"gap") && both.contains(&"source_distance")
+        both.contains(&"defocus") && both.contains(&"source_distance")
     });
     let pair = pair.unwrap_or_else(|| panic!("{:#?} {:#?}", plan.confusions, plan.effects));
-    assert!(pair.gain < pair.needed && !pair.captures_could);
+    assert!(pair.gain < pair.needed && !pair.measurements_could);
     assert!(pair.separate_by.is_some() && !pair.sem_decides);
 }
 
@@ -180,7 +179,7 @@ fn a_session_of_a_hexagonal_lens_is_planned_and_diagnosed() {
         .replace("elements = [0, 0, 1, 0]", "elements = [0, 0]")
         .replace("[139.0, 144.0, 149.0]", "[39.0, 45.0, 51.0]");
     let folder = tempfile::tempdir().unwrap();
-    let tried = ["cd_bias", "gap"];
+    let tried = ["cd_bias", "defocus"];
     let plan = planned(folder.path(), &design, &bench, &tried);
     assert!(plan.finds_all(), "{}", plan.sentence());
     let said = fs::read_to_string(folder.path().join("measurement.toml")).unwrap();

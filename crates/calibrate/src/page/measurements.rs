@@ -1,4 +1,4 @@
-//! Captures beside their predictions and residuals; widths by SEM.
+//! Measurements beside their predictions and residuals; widths by SEM.
 
 use ndarray::Array2;
 
@@ -9,9 +9,9 @@ use metalith_report::{Axis, Chart, ImageGrid, Page, fixed, sig};
 /// Range of the colours of residuals [standard deviations of the noise].
 pub(super) const SIGMAS: f64 = 6.0;
 
-/// Every capture that counts: measured, predicted, and the residual before and after.
-pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Simulations, evidence: &Evidence) {
-    page.section("Captures");
+/// Every measurement that counts: measured, predicted, and the residual before and after.
+pub(super) fn measurements(page: &mut Page, session: &Session<'_>, simulations: &Simulations, evidence: &Evidence) {
+    page.section("Measurements");
     page.paragraph(
         "Each row: the camera, the model, and the residual in standard deviations of the noise, before and after.",
     );
@@ -22,7 +22,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Sim
     let plain = session.problem(simulations);
     let wide = |a: &Array2<f32>| a.mapv(f64::from);
     for (place, group) in cluster_groups(&problem).iter().enumerate() {
-        let first = &set.captures[group[0]];
+        let first = &set.measurements[group[0]];
         let words = format!(
             "Element ({}, {}), {} nm, light at {} degrees",
             set.elements[first.element].index[0],
@@ -43,7 +43,7 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Sim
                 .diverging()
                 .side(180.0);
             for &c in group {
-                let name = format!("{} um", fixed(set.captures[c].distance_um, 0));
+                let name = format!("{} um", fixed(set.measurements[c].distance_um, 0));
                 let factor = data.scale[c] * finding.after.nuisances.flux[data.beam[c].led];
                 let model = problem
                     .prediction(&finding.after.theta, c)
@@ -71,7 +71,9 @@ pub(super) fn captures(page: &mut Page, session: &Session<'_>, simulations: &Sim
             }
             page.row([
                 seen.caption("Camera and model on one logarithmic scale."),
-                left.caption("Residual; the number is the reduced chi-square per pixel when the capture was left out."),
+                left.caption(
+                    "Residual; the number is the reduced chi-square per pixel when the measurement was left out.",
+                ),
             ]);
         };
         if place == 0 {

@@ -1,17 +1,17 @@
-//! Which captures to take: the fewest that detect every effect at its wanted size and tell it from every other.
+//! Which measurements to take: the fewest that detect every effect at its wanted size and tell it from every other.
 //!
 //! What a set tells of a parameter is the Schur complement of its normal equations: the chi-square that an effect of the
 //! wanted size adds and that nuisances, and one other effect, cannot take up. Per pixel this is the gain by which a
 //! calibration judges, so an effect counts as detected or told apart if it is [`NEEDED`].
 //!
-//! The choice is greedy by the worst detection: at each step the capture that raises the sum of the logarithms of all
-//! margins that are still below one. Then captures without which all margins stay are taken out again, and the rest gets
+//! The choice is greedy by the worst detection: at each step the measurement that raises the sum of the logarithms of all
+//! margins that are still below one. Then measurements without which all margins stay are taken out again, and the rest gets
 //! the fewest frames that do.
 
 use nalgebra::DMatrix;
 
-use super::information::Information;
-use crate::statistics::{LEAST_GAIN, covariance, projected};
+use crate::information::Information;
+use metalith_attribution::{LEAST_GAIN, covariance, projected};
 
 /// Gain in reduced chi-square per pixel that is asked for: twice what a calibration takes for more than the error of its
 /// own model, because what comes back is noisy.
@@ -55,11 +55,11 @@ pub struct Choice<'a> {
     pub information: &'a Information,
     pub places: Vec<Place>,
     pub requirements: Vec<Requirement>,
-    /// Frames that a capture may have, fewest first; forms are those of the most.
+    /// Frames that a measurement may have, fewest first; forms are those of the most.
     pub frames: Vec<u32>,
 }
 
-/// A capture that was chosen, with its frames.
+/// A measurement that was chosen, with its frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picked {
     pub candidate: usize,
@@ -136,8 +136,8 @@ impl Choice<'_> {
             )
     }
 
-    /// Whether any captures of the bench meet each requirement: all of them, those of one colour, element, distance or angle,
-    /// or one alone. Captures that show nothing of an effect dilute its gain, so that all are not always the best.
+    /// Whether any measurements of the bench meet each requirement: all of them, those of one colour, element, distance or angle,
+    /// or one alone. Measurements that show nothing of an effect dilute its gain, so that all are not always the best.
     pub fn reachable(&self) -> Vec<bool> {
         let all: Vec<usize> = (0..self.places.len()).collect();
         let mut sets: Vec<Vec<usize>> = vec![all.clone()];
@@ -167,8 +167,8 @@ impl Choice<'_> {
         reached
     }
 
-    /// The captures to take, at most so many, in the order of the candidates.
-    pub fn captures(&self, reachable: &[bool], most: usize) -> Vec<Picked> {
+    /// The measurements to take, at most so many, in the order of the candidates.
+    pub fn measurements(&self, reachable: &[bool], most: usize) -> Vec<Picked> {
         let mut picked: Vec<Picked> = Vec::new();
         let mut now = self.score(&picked, reachable);
         while now < -SAME && picked.len() < most {
@@ -249,15 +249,15 @@ pub fn lookalike(products: &DMatrix<f64>, r: &Requirement) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::information::Told;
     use super::*;
-    use crate::set::{Capture, ElementIndex, LedIndex};
+    use crate::information::Told;
+    use metalith_calibrate::{ElementIndex, LedIndex, Measurement};
 
-    /// Pixels of every test capture.
+    /// Pixels of every test measurement.
     const PIXELS: f64 = 1000.0;
 
     fn told(form: DMatrix<f64>) -> Told {
-        let capture = Capture {
+        let measurement = Measurement {
             name: String::new(),
             element: ElementIndex::from(0),
             led: LedIndex::from(0),
@@ -270,13 +270,13 @@ mod tests {
             noise: None,
         };
         Told {
-            capture,
+            measurement,
             form,
             pixels: PIXELS,
         }
     }
 
-    /// Captures by what they tell of two parameters, no nuisance worth the name.
+    /// Measurements by what they tell of two parameters, no nuisance worth the name.
     fn information(of: &[[f64; 2]]) -> Information {
         let mut prior = DMatrix::zeros(4, 4);
         prior[(0, 0)] = 1.0;
@@ -318,9 +318,9 @@ mod tests {
         }
     }
 
-    /// Captures that see the sum alone cannot split two effects; those that see the difference can.
+    /// Measurements that see the sum alone cannot split two effects; those that see the difference can.
     #[test]
-    fn a_confusion_is_split_by_the_captures_that_can() {
+    fn a_confusion_is_split_by_the_measurements_that_can() {
         let strong = (100.0 * NEEDED * PIXELS).sqrt();
         let alike = information(&[[strong, strong]; 5]);
         let same = choice(&alike);
@@ -330,7 +330,7 @@ mod tests {
         let unlike = information(&seen);
         let two = choice(&unlike);
         assert_eq!(two.reachable(), [true; 4]);
-        let picked = two.captures(&[true; 4], 6);
+        let picked = two.measurements(&[true; 4], 6);
         assert!(picked.iter().any(|p| p.candidate == 5), "{picked:?}");
         assert!(two.margins(&picked).iter().all(|m| *m >= 1.0 - SAME), "{picked:?}");
         // Four beams are asked for, and no more is needed; what is strong needs few frames.

@@ -1,4 +1,4 @@
-//! Before measuring: which captures tell which effects apart, and the session that takes them.
+//! Before measuring: which measurements tell which effects apart, and the session that takes them.
 //!
 //! ```text
 //! design, layout, bench -> candidates -> what each tells -> the fewest that do -> set folder, check list
@@ -8,10 +8,10 @@
 //! | --- | --- |
 //! | `bench_file` | what the bench can do and what is asked of it |
 //! | `limits` | whether a set of the design can be planned |
-//! | `candidates` | every capture that it could take |
+//! | `candidates` | every measurement that it could take |
 //! | `wanted` | what is asked of them |
 //! | `information` | normal equations of each, by the simulator and the noise |
-//! | `choice` | the fewest captures |
+//! | `choice` | the fewest measurements |
 //! | `judgement` | what they find, and what they cannot tell apart |
 //! | `begun` | a folder whose plan is not to be overwritten |
 //! | `files`, `page` | the set folder, and the check list |
@@ -37,20 +37,18 @@ use serde::Serialize;
 
 pub use begun::check_not_begun;
 pub use bench_file::{BenchFile, SemOffer};
-#[cfg(test)]
-pub(crate) use candidates::candidates;
 pub use judgement::{Confusion, PlannedEffect};
 pub use limits::check_plannable;
 
-use crate::bench::{Bench, Sampling};
-use crate::effects::{self, Effect};
-use crate::session::check_effects;
-use crate::set::MeasuredSet;
-use crate::simulator::Simulator;
-use crate::statistics::{Surrogate, check_calibration_fits};
 use candidates::{Candidates, sem_sites};
 use choice::{Choice, Picked, Place, Requirement};
 use information::{Information, cells_of, exposed};
+use metalith_calibrate::MeasuredSet;
+use metalith_calibrate::Simulator;
+use metalith_calibrate::check_effects;
+use metalith_calibrate::{Bench, Sampling};
+use metalith_calibrate::{Effect, all_effects};
+use metalith_calibrate::{Surrogate, check_calibration_fits};
 use wanted::{check_wanted, only_of_what_is_found, requirements};
 
 /// Spectra of a plan: steps in wavelength are coarser than those of a calibration, since nothing is fitted.
@@ -63,24 +61,24 @@ const SAMPLING: Sampling = Sampling {
 
 /// A session that was planned, with what it is expected to find.
 #[derive(Clone, Debug, Serialize)]
-pub struct CapturePlan {
+pub struct MeasurementPlan {
     /// Folder of the set.
     pub folder: PathBuf,
     /// The check list.
     pub page: PathBuf,
-    /// Captures that the bench could take, and those among them that are to be taken.
+    /// Measurements that the bench could take, and those among them that are to be taken.
     pub candidates: usize,
-    pub captures: Vec<PlannedCapture>,
+    pub measurements: Vec<PlannedMeasurement>,
     pub effects: Vec<PlannedEffect>,
-    /// Pairs that the captures cannot tell apart.
+    /// Pairs that the measurements cannot tell apart.
     pub confusions: Vec<Confusion>,
     /// SHA-256 in hexadecimal of the files that a person fills in, as they were written.
     pub written: BTreeMap<String, String>,
 }
 
-/// A capture to take.
+/// A measurement to take.
 #[derive(Clone, Debug, Serialize)]
-pub struct PlannedCapture {
+pub struct PlannedMeasurement {
     pub file: String,
     pub element: [i64; 2],
     pub led_nm: f64,
@@ -109,7 +107,7 @@ pub struct PlanRequest<'a> {
     pub cache: Option<PathBuf>,
 }
 
-impl CapturePlan {
+impl MeasurementPlan {
     /// Whether every effect that this bench can see at all is found at its wanted size.
     pub fn finds_all(&self) -> bool {
         self.effects.iter().all(|e| e.detected)
@@ -124,8 +122,8 @@ impl CapturePlan {
             .map(|e| e.name.as_str())
             .collect();
         let found = format!(
-            "{} of {} captures find {} of {} effects at their wanted size",
-            self.captures.len(),
+            "{} of {} measurements find {} of {} effects at their wanted size",
+            self.measurements.len(),
             self.candidates,
             self.effects.len() - missed.len(),
             self.effects.len()
@@ -142,7 +140,7 @@ impl CapturePlan {
 /// # Errors
 /// As [`check_plannable`]; if a name is not known, a wanted size is beyond what physics allows, the layout cannot be read, a cell
 /// cannot be solved, a calibration of the set would not fit into memory, a file cannot be written, or the user stopped it.
-pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn Progress) -> Result<CapturePlan> {
+pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn Progress) -> Result<MeasurementPlan> {
     let (design, bench) = (request.design, request.bench);
     check_plannable(design, bench)?;
     let candidates = candidates::candidates(design, bench, request.layout, reader, progress)?;
@@ -152,14 +150,14 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
     check_wanted(&candidates.set, bench)?;
     let (information, cells) = information::information(&candidates, bench, SAMPLING, &effects, cells, progress)?;
     let choice = Choice {
-        places: information.told.iter().map(|t| place(&t.capture)).collect(),
+        places: information.told.iter().map(|t| place(&t.measurement)).collect(),
         requirements: requirements(&known, bench),
         frames: bench.frames.clone(),
         information: &information,
     };
     let mut reachable = choice.reachable();
     only_of_what_is_found(&choice, &mut reachable);
-    let picked = choice.captures(&reachable, bench.most_captures);
+    let picked = choice.measurements(&reachable, bench.most_measurements);
     let set = chosen_set(&candidates, bench, &information, &picked);
 
     let simulator = Simulator::new(Bench::new(&set, SAMPLING), cells, known);
@@ -179,11 +177,11 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
     let effects = judgement::effects(&simulator, &surrogate, &shown, &detections, progress)?;
     let confusions = judgement::confusions(&simulator, &shown, &choice, &picked, &reachable);
     files::write_set(request.folder, design, bench, &shown, &request.layout_in_set)?;
-    let plan = CapturePlan {
+    let plan = MeasurementPlan {
         folder: request.folder.to_owned(),
         page: request.folder.join("plan.html"),
-        candidates: candidates.captures.len(),
-        captures: shown.captures.iter().map(|c| planned(c, &shown, bench)).collect(),
+        candidates: candidates.measurements.len(),
+        measurements: shown.measurements.iter().map(|c| planned(c, &shown, bench)).collect(),
         effects,
         confusions,
         written: begun::digests(request.folder)?,
@@ -194,7 +192,7 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
 }
 
 fn wanted_effects(set: &MeasuredSet, request: &PlanRequest<'_>) -> Result<Vec<Box<dyn Effect>>> {
-    let mut effects = effects::all(set);
+    let mut effects = all_effects(set);
     check_effects(&effects, &request.only)?;
     if !request.only.is_empty() {
         effects.retain(|e| request.only.contains(&e.name()));
@@ -202,24 +200,24 @@ fn wanted_effects(set: &MeasuredSet, request: &PlanRequest<'_>) -> Result<Vec<Bo
     Ok(effects)
 }
 
-fn place(capture: &crate::set::Capture) -> Place {
+fn place(measurement: &metalith_calibrate::Measurement) -> Place {
     Place {
-        element: capture.element.into(),
-        led: capture.led.into(),
-        aoi_rad: capture.aoi_rad,
-        distance_um: capture.distance_um,
+        element: measurement.element.into(),
+        led: measurement.led.into(),
+        aoi_rad: measurement.aoi_rad,
+        distance_um: measurement.distance_um,
     }
 }
 
-/// The session of the captures that were chosen, and the widths by SEM that are offered.
+/// The session of the measurements that were chosen, and the widths by SEM that are offered.
 fn chosen_set(candidates: &Candidates, bench: &BenchFile, information: &Information, picked: &[Picked]) -> MeasuredSet {
     let mut set = candidates.set.clone();
-    set.captures = picked
+    set.measurements = picked
         .iter()
         .map(|p| {
-            let mut capture = information.told[p.candidate].capture.clone();
-            capture.frames = p.frames;
-            capture
+            let mut measurement = information.told[p.candidate].measurement.clone();
+            measurement.frames = p.frames;
+            measurement
         })
         .collect();
     if let Some(offer) = bench.sem {
@@ -228,16 +226,16 @@ fn chosen_set(candidates: &Candidates, bench: &BenchFile, information: &Informat
     set
 }
 
-fn planned(capture: &crate::set::Capture, set: &MeasuredSet, bench: &BenchFile) -> PlannedCapture {
-    PlannedCapture {
-        file: files::frame_file(&capture.name, bench),
-        element: set.elements[capture.element].index,
-        led_nm: set.leds[capture.led].centre_nm,
-        aoi_deg: capture.aoi_rad.map(|a| (a.to_degrees() * 1e4).round() / 1e4),
-        distance_um: capture.distance_um,
-        window_centre_um: capture.window_centre_um,
-        frames: capture.frames,
-        scale_dn: capture.scale_dn,
-        brightest_dn: f64::from(capture.dn.iter().copied().fold(0.0, f32::max)),
+fn planned(measurement: &metalith_calibrate::Measurement, set: &MeasuredSet, bench: &BenchFile) -> PlannedMeasurement {
+    PlannedMeasurement {
+        file: files::frame_file(&measurement.name, bench),
+        element: set.elements[measurement.element].index,
+        led_nm: set.leds[measurement.led].centre_nm,
+        aoi_deg: measurement.aoi_rad.map(|a| (a.to_degrees() * 1e4).round() / 1e4),
+        distance_um: measurement.distance_um,
+        window_centre_um: measurement.window_centre_um,
+        frames: measurement.frames,
+        scale_dn: measurement.scale_dn,
+        brightest_dn: f64::from(measurement.dn.iter().copied().fold(0.0, f32::max)),
     }
 }

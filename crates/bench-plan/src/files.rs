@@ -8,10 +8,10 @@ use metalith_core::{AtomicFile, Error, Result};
 use metalith_design::Design;
 use metalith_pillars::PillarShape;
 
-use super::bench_file::BenchFile;
-use crate::set::MeasuredSet;
-use crate::set::read::SPECTRUM_SIGMAS;
-use crate::set::{Bayer, Channel};
+use crate::bench_file::BenchFile;
+use metalith_calibrate::MeasuredSet;
+use metalith_calibrate::set_format::SPECTRUM_SIGMAS;
+use metalith_calibrate::{Bayer, Channel};
 
 /// Step of the tables of materials (nm).
 const TABLE_STEP_NM: f64 = 2.0;
@@ -46,13 +46,13 @@ pub fn write_set(folder: &Path, design: &Design, bench: &BenchFile, set: &Measur
     if !set.sem.is_empty() {
         AtomicFile::write(&folder.join("cd_sem.csv"), sem_table(set).as_bytes())?;
     }
-    let captures = folder.join("captures");
-    std::fs::create_dir_all(&captures).map_err(Error::io("make", &captures))?;
+    let frames = folder.join("captures");
+    std::fs::create_dir_all(&frames).map_err(Error::io("make", &frames))?;
     let text = text(design, bench, set, layout, &substrate, spacer);
     AtomicFile::write(&folder.join("measurement.toml"), text.as_bytes())
 }
 
-/// The file of a capture, from the folder of the set.
+/// The file of a measurement, from the folder of the set.
 pub fn frame_file(name: &str, bench: &BenchFile) -> String {
     format!("captures/{name}.{}", bench.ending)
 }
@@ -146,7 +146,7 @@ fn text(
         line("centre_um", format!("{:?}", e.centre_um));
         line("aperture_diameter_um", format!("{}", rounded(e.aperture_diameter_um)));
     }
-    for c in &set.captures {
+    for c in &set.measurements {
         line("[[capture]]", none());
         line("file", quoted(&frame_file(&c.name, bench)));
         line("element", format!("{:?}", set.elements[c.element].index));
@@ -183,7 +183,7 @@ fn rounded(v: f64) -> f64 {
 /// The index of a material over the spectra of all LEDs.
 fn write_table(path: &Path, material: &Material, set: &MeasuredSet) -> Result<()> {
     let (known_low, known_high) = material.range_um();
-    let reach = |l: &crate::set::Led| SPECTRUM_SIGMAS * l.sigma_nm() * 1.2 + TABLE_MARGIN_NM;
+    let reach = |l: &metalith_calibrate::Led| SPECTRUM_SIGMAS * l.sigma_nm() * 1.2 + TABLE_MARGIN_NM;
     let ends = set.leds.iter().fold((f64::MAX, 0.0f64), |(low, high), l| {
         (low.min(l.centre_nm - reach(l)), high.max(l.centre_nm + reach(l)))
     });
@@ -201,7 +201,7 @@ fn write_table(path: &Path, material: &Material, set: &MeasuredSet) -> Result<()
 /// The sites that a SEM is to measure, `measured_nm` left empty.
 fn sem_table(set: &MeasuredSet) -> String {
     let mut text = String::from("# Fill in measured_nm; lines without it count as not measured.\n");
-    text.push_str(crate::set::SEM_COLUMNS);
+    text.push_str(metalith_calibrate::SEM_COLUMNS);
     text.push('\n');
     for s in &set.sem {
         let [m, n] = s.element;

@@ -1,4 +1,4 @@
-//! The measurements of a set: captures, and widths by SEM.
+//! The measurements of a set: measurements, and widths by SEM.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -8,20 +8,20 @@ use ndarray::Array2;
 use super::{DISTANCE_UM, WINDOW_CENTRE_UM, holds_its_pages, sensor_frame, whole};
 use crate::set::frame::{DarkPixels, Exposure, SensorFrames};
 use crate::set::{
-    Capture, ElementIndex, Led, LedIndex, MeasuredElement, PerElement, PerLed, RelayCamera, SemSite, frame, sem,
+    ElementIndex, Led, LedIndex, MeasuredElement, Measurement, PerElement, PerLed, RelayCamera, SemSite, frame, sem,
 };
 use metalith_core::document::{Limits, Section};
 
-pub(super) fn captures(
+pub(super) fn measurements(
     root: &Section<'_, '_>,
     camera: &RelayCamera,
     frames: &SensorFrames,
     leds: &PerLed<Led>,
     elements: &PerElement<MeasuredElement>,
-) -> Vec<Capture> {
+) -> Vec<Measurement> {
     let sensor = frames.pixels(camera);
     let mut darks = DarkFrames::new(camera, frames);
-    let mut captures = Vec::new();
+    let mut measurements = Vec::new();
     for s in root.sections("capture") {
         let index = whole(&s, "element", Limits::new(-1000.0..=1000.0, ""));
         let known = elements.iter_enumerated().find(|(_, e)| e.index == index);
@@ -50,7 +50,7 @@ pub(super) fn captures(
         let (path, exposures) = exposures(&s, led, &mut darks);
         s.finish();
         let joined = frame::joined(exposures, sensor.as_ref(), camera, filter);
-        captures.push(Capture {
+        measurements.push(Measurement {
             name: path
                 .file_stem()
                 .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
@@ -65,10 +65,10 @@ pub(super) fn captures(
             noise: joined.noise,
         });
     }
-    if captures.is_empty() {
+    if measurements.is_empty() {
         root.fault("capture", "no capture", "add one [[capture]] for each frame");
     }
-    captures
+    measurements
 }
 
 /// Exposures of one LED whose scales differ by more than this factor had unlike times, or unlike light: a dark current that is taken
@@ -132,18 +132,18 @@ impl<'a> DarkFrames<'a> {
     }
 }
 
-/// The exposures of a capture, at least one, and the file of the first: those of its `[[capture.exposure]]`, or its own. A dark frame
-/// of the capture is that of its exposures which name none.
+/// The exposures of a measurement, at least one, and the file of the first: those of its `[[capture.exposure]]`, or its own. A dark frame
+/// of the measurement is that of its exposures which name none.
 fn exposures(s: &Section<'_, '_>, led: LedIndex, darks: &mut DarkFrames<'_>) -> (PathBuf, Vec<Exposure>) {
-    let (of_capture, is_named) = (darks.of(s), s.has("dark_frame"));
+    let (of_measurement, is_named) = (darks.of(s), s.has("dark_frame"));
     if !s.has("exposure") {
-        let (path, only) = exposure(s, led, (of_capture, is_named), darks);
+        let (path, only) = exposure(s, led, (of_measurement, is_named), darks);
         return (path, vec![only]);
     }
     let mut name = None;
     let mut all = Vec::new();
     for own in s.sections("exposure") {
-        let dark = darks.of(&own).or_else(|| of_capture.clone());
+        let dark = darks.of(&own).or_else(|| of_measurement.clone());
         let (path, exposure) = exposure(&own, led, (dark, is_named || own.has("dark_frame")), darks);
         own.finish();
         name.get_or_insert(path);

@@ -6,8 +6,8 @@ use std::path::Path;
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 
-use crate::set::read;
-use crate::set::{Led, PerLed, RelayCamera};
+use metalith_calibrate::set_format as read;
+use metalith_calibrate::{Led, PerLed, RelayCamera};
 
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
@@ -27,12 +27,12 @@ pub struct BenchFile {
     pub fields_deg: Vec<[f64; 2]>,
     /// Distances from the pillar tops (um); three about the focus if empty.
     pub distances_um: Vec<f64>,
-    /// Frames that a capture may be the mean of, fewest first.
+    /// Frames that a measurement may be the mean of, fewest first.
     pub frames: Vec<u32>,
-    /// The brightest pixel of a capture is exposed to this share of saturation.
+    /// The brightest pixel of a measurement is exposed to this share of saturation.
     pub peak: f64,
-    /// Captures that a session may have.
-    pub most_captures: usize,
+    /// Measurements that a session may have.
+    pub most_measurements: usize,
     /// Place where a boundary of write fields runs through every lens (um), if it is known.
     pub field_boundary_um: Option<[f64; 2]>,
     /// Widths by SEM that could be taken.
@@ -52,14 +52,14 @@ pub struct SemOffer {
     pub offset_sigma_nm: f64,
 }
 
-/// Part of saturation that captures are exposed to where the bench says nothing: 30 % of room for what is brighter than
+/// Part of saturation that measurements are exposed to where the bench says nothing: 30 % of room for what is brighter than
 /// planned.
 const PEAK: f64 = 0.7;
 
-/// Frames of a capture where the bench says nothing.
+/// Frames of a measurement where the bench says nothing.
 const FRAMES: [u32; 2] = [16, 64];
 
-/// Captures of a session where the bench says nothing.
+/// Measurements of a session where the bench says nothing.
 const MOST_CAPTURES: i64 = 48;
 
 impl BenchFile {
@@ -124,7 +124,7 @@ fn sections(root: &Section<'_, '_>) -> BenchFile {
     frames.dedup();
     let peak = s.optional_float("peak", Limits::new(0.05..=0.9, "")).unwrap_or(PEAK);
     let most = s
-        .optional_integer("most", 1..=1000, "captures")
+        .optional_integer("most", 1..=1000, "measurements")
         .unwrap_or(MOST_CAPTURES);
     s.finish();
     BenchFile {
@@ -137,7 +137,7 @@ fn sections(root: &Section<'_, '_>) -> BenchFile {
         distances_um,
         frames,
         peak,
-        most_captures: most as usize,
+        most_measurements: most as usize,
         field_boundary_um: read::field_boundary(root),
         sem: root.optional_section("sem").map(|s| sem(&s)),
         wanted: root

@@ -5,9 +5,9 @@ use metalith_core::document::Limits;
 use metalith_core::{Error, Result};
 use metalith_design::Design;
 
-use super::bench_file::BenchFile;
-use super::candidates::{chosen_elements, distances_um, lens_diameter_um};
-use crate::set::read;
+use crate::bench_file::BenchFile;
+use crate::candidates::{chosen_elements, distances_um, lens_diameter_um};
+use metalith_calibrate::set_format as read;
 
 /// Succeeds if a set of the design can be planned and read: pillars that are squares or circles, elements that are
 /// round, and all within what a set may say.
@@ -39,7 +39,7 @@ pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
         of_lenses.push(("the diameter of an opening", opening_um, read::APERTURE_DIAMETER_UM));
         of_lenses.push(("the focal length", focal_um, read::FOCAL_LENGTH_UM));
         let distances = distances_um(bench, focal_um).into_iter();
-        of_lenses.extend(distances.map(|d| ("the distance of a capture", d, read::DISTANCE_UM)));
+        of_lenses.extend(distances.map(|d| ("the distance of a measurement", d, read::DISTANCE_UM)));
     }
     check(
         design,
@@ -76,8 +76,8 @@ fn check(design: &Design, numbers: Vec<(&str, f64, Limits)>, hint: &str) -> Resu
 
 #[cfg(test)]
 mod tests {
-    use super::super::bench_file::tests::small_bench;
     use super::*;
+    use crate::bench_file::tests::small_bench;
 
     fn checked(name: &str) -> Result<()> {
         let path = metalith_testing::root().join(format!("designs/{name}.toml"));

@@ -1,26 +1,27 @@
-//! What each candidate capture tells of each parameter: its normal equations by the simulator and the noise of the bench.
+//! What each candidate measurement tells of each parameter: its normal equations by the simulator and the noise of the bench.
 
 use metalith_core::{Progress, Result};
 use nalgebra::DMatrix;
 use ndarray::Array2;
 
-use super::bench_file::BenchFile;
-use super::candidates::{Candidates, sem_sites};
-use crate::bench::{Bench, Sampling};
-use crate::cells::{CellSource, RigorousCells};
-use crate::data::{Data, Nuisances};
-use crate::effects::Effect;
-use crate::set::{Capture, MeasuredSet, PerCapture};
-use crate::simulator::{Simulator, WIDTH_ROOM_NM};
-use crate::statistics::{FitProblem, Measurements, Surrogate};
+use crate::bench_file::BenchFile;
+use crate::candidates::{Candidates, sem_sites};
+use metalith_attribution::Measurements;
+use metalith_calibrate::Effect;
+use metalith_calibrate::{Bench, Sampling};
+use metalith_calibrate::{CellSource, RigorousCells};
+use metalith_calibrate::{Data, Nuisances};
+use metalith_calibrate::{FitProblem, Surrogate};
+use metalith_calibrate::{MeasuredSet, Measurement, PerMeasurement};
+use metalith_calibrate::{Simulator, WIDTH_ROOM_NM};
 
-/// Captures that are simulated at once: each holds an image for two sizes of every parameter.
+/// Measurements that are simulated at once: each holds an image for two sizes of every parameter.
 const TOGETHER: usize = 12;
 
-/// A capture, exposed as it would be, and what it tells.
+/// A measurement, exposed as it would be, and what it tells.
 pub struct Told {
     /// With its scale set to the exposure, and what it would show.
-    pub capture: Capture,
+    pub measurement: Measurement,
     /// Inner products of flux of each LED, black level, every parameter, and the residual, as
     /// [`metalith_attribution::NormalEquations`] has them.
     pub form: DMatrix<f64>,
@@ -73,9 +74,9 @@ pub fn information(
         widths: None,
         shared: bench.leds.len() + 1,
     };
-    for batch in candidates.captures.chunks(TOGETHER) {
+    for batch in candidates.measurements.chunks(TOGETHER) {
         let mut set = candidates.set.clone();
-        set.captures = PerCapture::from(batch.to_vec());
+        set.measurements = PerMeasurement::from(batch.to_vec());
         if let Some(offer) = bench.sem.filter(|_| out.told.is_empty()) {
             set.sem = sem_sites(&set, offer);
         }
@@ -91,9 +92,9 @@ pub fn information(
             out.prior = fit.nuisances.prior(&data, fit.equations.size());
             out.widths = bench.sem.map(|_| fit.equations.references.clone());
         }
-        for ((c, capture), form) in exposed.captures.iter_enumerated().zip(&fit.equations.measurements) {
+        for ((c, measurement), form) in exposed.measurements.iter_enumerated().zip(&fit.equations.measurements) {
             out.told.push(Told {
-                capture: capture.clone(),
+                measurement: measurement.clone(),
                 form: form.clone(),
                 pixels: data.points(c) as f64,
             });
@@ -103,23 +104,23 @@ pub fn information(
     Ok((out, cells))
 }
 
-/// The set with each capture exposed so that its brightest pixel reaches a share of saturation, and showing what it would.
+/// The set with each measurement exposed so that its brightest pixel reaches a share of saturation, and showing what it would.
 pub fn exposed(set: &MeasuredSet, surrogate: &Surrogate, peak: f64) -> MeasuredSet {
     let camera = set.camera;
     let room = (peak * camera.saturation_dn - camera.black_level_dn).max(1.0);
     let mut out = set.clone();
-    for (capture, grid) in out.captures.iter_mut().zip(surrogate.base.iter()) {
+    for (measurement, grid) in out.measurements.iter_mut().zip(surrogate.base.iter()) {
         let light: Array2<f32> = grid.pixels([0.0; 2]);
         let brightest = light.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         // To three digits, as a person would note it.
-        capture.scale_dn = three_digits(room / f64::from(brightest));
-        let filter = camera.bayer.zip(set.leds[capture.led].channel);
-        capture.dn = light.mapv(|v| (camera.black_level_dn + capture.scale_dn * f64::from(v).max(0.0)) as f32);
-        capture.noise = filter.map(|(bayer, channel)| {
+        measurement.scale_dn = three_digits(room / f64::from(brightest));
+        let filter = camera.bayer.zip(set.leds[measurement.led].channel);
+        measurement.dn = light.mapv(|v| (camera.black_level_dn + measurement.scale_dn * f64::from(v).max(0.0)) as f32);
+        measurement.noise = filter.map(|(bayer, channel)| {
             let signal = |v: f32| f64::from(v) - camera.black_level_dn;
-            Array2::from_shape_fn(capture.dn.dim(), |at| {
+            Array2::from_shape_fn(measurement.dn.dim(), |at| {
                 if bayer.has(at, channel) {
-                    camera.variance_dn2(signal(capture.dn[at]), capture.frames) as f32
+                    camera.variance_dn2(signal(measurement.dn[at]), measurement.frames) as f32
                 } else {
                     f32::INFINITY
                 }
