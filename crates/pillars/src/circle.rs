@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
-use crate::kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity, WIDTH};
+use crate::kind::{OutlineForm, PillarId, PillarKind};
 
 /// Fewest and most steps of an eighth of the circle.
 const STEPS: [f64; 2] = [2.0, 512.0];
@@ -78,93 +78,22 @@ impl PillarKind for Circle {
         "circles"
     }
 
-    fn design_name(&self) -> &'static str {
-        "circle"
-    }
-
     #[inline]
     fn outline(&self) -> OutlineForm {
         OutlineForm::Circle
-    }
-
-    fn basis(&self) -> Option<PolarisationBasis> {
-        None
-    }
-
-    #[inline]
-    fn has_width(&self) -> bool {
-        true
-    }
-
-    fn last(&self) -> Option<PillarId> {
-        None
-    }
-
-    fn edge_range_nm(&self) -> Option<(u16, u16)> {
-        None
-    }
-
-    #[inline]
-    fn edges_nm(&self, PillarId(width): PillarId) -> [u16; 2] {
-        [width; 2]
-    }
-
-    fn axis_edges_nm(&self, PillarId(width): PillarId) -> Vec<u16> {
-        vec![width]
     }
 
     fn corners(&self, PillarId(width): PillarId, chord_error_nm: f64) -> Vec<(i64, i64)> {
         circle_corners(width.into(), chord_error_nm)
     }
 
-    fn reach(&self, PillarId(width): PillarId) -> (i64, i64) {
-        (i64::from(width) / 2, i64::from(width) / 2)
-    }
-
-    #[inline]
-    fn half_nm(&self, PillarId(width): PillarId) -> [f64; 2] {
-        [f64::from(width) / 2.0; 2]
-    }
-
     fn area_share(&self) -> f64 {
         FRAC_PI_4
-    }
-
-    fn widest_nm(&self, PillarId(width): PillarId) -> f64 {
-        f64::from(width)
     }
 
     #[inline]
     fn gap(&self, pair: [PillarId; 2], apart: [f64; 2]) -> f64 {
         Self::gap_of_widths(pair.map(|PillarId(width)| f64::from(width)), apart)
-    }
-
-    fn least_gap(&self, last: PillarId, apart: [f64; 2]) -> f64 {
-        self.gap([last; 2], apart)
-    }
-
-    fn keeps(&self, _mirrored: bool, _quarter_turns: u8) -> bool {
-        true
-    }
-
-    fn words(&self, PillarId(width): PillarId) -> String {
-        format!("{width} nm wide")
-    }
-
-    fn cell_name(&self, PillarId(width): PillarId) -> String {
-        format!("W{width}")
-    }
-
-    fn quantity(&self) -> Quantity {
-        WIDTH
-    }
-
-    fn value(&self, PillarId(width): PillarId) -> f64 {
-        f64::from(width)
-    }
-
-    fn step(&self) -> Option<f64> {
-        None
     }
 
     fn solver_revision(&self) -> u32 {

@@ -22,7 +22,7 @@ impl From<u16> for PillarId {
     }
 }
 
-/// How formats, rules and drawings take the outline of a pillar.
+/// Outline of a pillar, as formats, rules and drawings take it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutlineForm {
     /// An upright square: both formats have a short record for it.
@@ -42,7 +42,7 @@ pub enum PolarisationBasis {
     Linear,
 }
 
-/// What pillars of a kind differ by, as reports show it.
+/// Quantity by which pillars of a kind differ, as reports show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quantity {
     /// Word in a sentence: what a pillar of a kind has that another has not.
@@ -56,6 +56,8 @@ pub struct Quantity {
 }
 
 /// A kind of pillar: cross-sections that differ by one number.
+///
+/// Answers that stand here are those of upright boxes, of which the number is the width; a kind has its own where it differs.
 pub trait PillarKind {
     /// The word for one pillar.
     fn name(&self) -> &'static str;
@@ -64,38 +66,54 @@ pub trait PillarKind {
     fn plural(&self) -> &'static str;
 
     /// Value of the key `shape` in design files.
-    fn design_name(&self) -> &'static str;
+    fn design_name(&self) -> &'static str {
+        self.name()
+    }
 
     /// Name of all pillars with their sizes, in words.
     fn description(&self) -> String {
         self.plural().to_owned()
     }
 
-    /// How formats, rules and drawings take the outline.
+    /// Outline, as formats, rules and drawings take it.
     fn outline(&self) -> OutlineForm;
 
     /// Polarisations that have a phase of their own; none if all light has one phase.
-    fn basis(&self) -> Option<PolarisationBasis>;
+    fn basis(&self) -> Option<PolarisationBasis> {
+        None
+    }
 
-    /// Whether the number of a pillar is its width (nm).
-    fn has_width(&self) -> bool;
+    /// True if the number of a pillar is its width (nm).
+    #[inline]
+    fn has_width(&self) -> bool {
+        true
+    }
 
-    /// Whether all pillars have one size and differ by their rotation.
+    /// True if all pillars have one size and differ by their rotation.
     fn has_one_size(&self) -> bool {
         false
     }
 
     /// The last number; none where the lattice alone bounds it.
-    fn last(&self) -> Option<PillarId>;
+    fn last(&self) -> Option<PillarId> {
+        None
+    }
 
     /// Shortest and longest edge of all pillars (nm); none where the lattice alone bounds them.
-    fn edge_range_nm(&self) -> Option<(u16, u16)>;
+    fn edge_range_nm(&self) -> Option<(u16, u16)> {
+        None
+    }
 
     /// Both edges of a pillar as drawn (nm), before a rotation; the width twice where there is one.
-    fn edges_nm(&self, id: PillarId) -> [u16; 2];
+    #[inline]
+    fn edges_nm(&self, PillarId(width): PillarId) -> [u16; 2] {
+        [width; 2]
+    }
 
     /// Lengths that a writer fills along x and y with whole steps of its beam (nm), each once; empty if no edge is along an axis.
-    fn axis_edges_nm(&self, id: PillarId) -> Vec<u16>;
+    fn axis_edges_nm(&self, PillarId(width): PillarId) -> Vec<u16> {
+        vec![width]
+    }
 
     /// Both edges of a pillar that a process widens by a bias (nm).
     fn biased_edges_nm(&self, id: PillarId, bias_nm: f64) -> [f64; 2] {
@@ -104,20 +122,25 @@ pub trait PillarKind {
 
     /// Corners of a pillar about its middle (nm), counter-clockwise, the first not repeated; chords of a curve are at most
     /// `chord_error_nm` from it.
-    fn corners(&self, id: PillarId, chord_error_nm: f64) -> Vec<(i64, i64)>;
+    fn corners(&self, id: PillarId, _chord_error_nm: f64) -> Vec<(i64, i64)> {
+        self.four_corners(id).map_or_else(Vec::new, Vec::from)
+    }
 
     /// [`PillarKind::corners`] of a polygon of four, without an allocation: rules ask for those of millions of pillars.
     fn four_corners(&self, _id: PillarId) -> Option<[(i64, i64); 4]> {
         None
     }
 
-    /// How far the corners reach from the middle along x and y (nm), of an odd width rounded down.
-    fn reach(&self, id: PillarId) -> (i64, i64);
+    /// Reach of the corners from the middle along x and y (nm), of an odd width rounded down.
+    fn reach(&self, id: PillarId) -> (i64, i64) {
+        let [x, y] = self.edges_nm(id).map(|edge| i64::from(edge) / 2);
+        (x, y)
+    }
 
     /// Half of what a pillar takes along x and y (nm).
+    #[inline]
     fn half_nm(&self, id: PillarId) -> [f64; 2] {
-        let (x, y) = self.reach(id);
-        [x as f64, y as f64]
+        self.edges_nm(id).map(|edge| f64::from(edge) / 2.0)
     }
 
     /// Area of a pillar over the product of its edges.
@@ -139,17 +162,27 @@ pub trait PillarKind {
     }
 
     /// Width (nm) that no pillar up to a number exceeds in any direction.
-    fn widest_nm(&self, last: PillarId) -> f64;
+    fn widest_nm(&self, PillarId(last): PillarId) -> f64 {
+        f64::from(last)
+    }
 
     /// Distance of two pillars whose centres are (dx, dy) apart (nm); negative where they overlap.
-    fn gap(&self, pair: [PillarId; 2], apart: [f64; 2]) -> f64;
+    #[inline]
+    fn gap(&self, pair: [PillarId; 2], apart: [f64; 2]) -> f64 {
+        let [a, b] = pair.map(|id| self.edges_nm(id).map(f64::from));
+        gap_of_boxes([a, b], apart)
+    }
 
     /// Lower bound of the distance of any two pillars up to a number whose centres are (dx, dy) apart (nm).
-    fn least_gap(&self, last: PillarId, apart: [f64; 2]) -> f64;
+    fn least_gap(&self, last: PillarId, apart: [f64; 2]) -> f64 {
+        self.gap([last; 2], apart)
+    }
 
-    /// Whether every pillar is the same after a mirror about the x axis, if there is one, and then so many quarter turns about
+    /// True if every pillar is the same after a mirror about the x axis, if there is one, and then so many quarter turns about
     /// its middle.
-    fn keeps(&self, mirrored: bool, quarter_turns: u8) -> bool;
+    fn keeps(&self, _mirrored: bool, _quarter_turns: u8) -> bool {
+        true
+    }
 
     /// The pillar with these corners about its middle (nm), in any order, if each is within `slack_nm` of one of its own. Kinds
     /// that are recognised by the box around them have none.
@@ -158,28 +191,45 @@ pub trait PillarKind {
     }
 
     /// Size or rotation of a pillar in words.
-    fn words(&self, id: PillarId) -> String;
+    fn words(&self, PillarId(width): PillarId) -> String {
+        format!("{width} nm wide")
+    }
 
     /// Name of the cell of a pillar in a layout.
-    fn cell_name(&self, id: PillarId) -> String;
+    fn cell_name(&self, PillarId(width): PillarId) -> String {
+        format!("W{width}")
+    }
 
-    /// What pillars differ by.
-    fn quantity(&self) -> Quantity;
+    /// Quantity by which pillars differ.
+    fn quantity(&self) -> Quantity {
+        Quantity {
+            word: "width",
+            title: "Width",
+            label: "width",
+            unit: "nm",
+        }
+    }
 
     /// The quantity of a pillar, in the unit of its axis.
-    fn value(&self, id: PillarId) -> f64;
+    fn value(&self, id: PillarId) -> f64 {
+        f64::from(self.edges_nm(id)[0])
+    }
 
     /// Difference of the quantity of neighbouring numbers; none where the design says it.
-    fn step(&self) -> Option<f64>;
+    fn step(&self) -> Option<f64> {
+        None
+    }
 
-    /// How often the solver has changed what it answers for this kind alone: cached results of it are then of no use.
-    fn solver_revision(&self) -> u32;
+    /// Number of times that the solver has changed its answers for this kind alone; each makes its cached results invalid.
+    fn solver_revision(&self) -> u32 {
+        0
+    }
 }
 
-/// The quantity of kinds whose number is their width.
-pub(crate) const WIDTH: Quantity = Quantity {
-    word: "width",
-    title: "Width",
-    label: "width",
-    unit: "nm",
-};
+/// Distance of two upright boxes with these edges whose centres are (dx, dy) apart, all in one unit; negative where they overlap.
+#[inline]
+pub(crate) fn gap_of_boxes([a, b]: [[f64; 2]; 2], [dx, dy]: [f64; 2]) -> f64 {
+    let reach = |axis: usize| 0.5 * (a[axis] + b[axis]);
+    let (x, y) = (dx.abs() - reach(0), dy.abs() - reach(1));
+    if x > 0.0 && y > 0.0 { x.hypot(y) } else { x.max(y) }
+}

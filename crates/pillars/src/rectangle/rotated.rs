@@ -88,10 +88,6 @@ impl PillarKind for RotatedRectangles {
         "rectangles"
     }
 
-    fn design_name(&self) -> &'static str {
-        "rectangle"
-    }
-
     fn description(&self) -> String {
         format!(
             "rectangles of {} x {} nm rotated in steps of {}°",
@@ -136,10 +132,6 @@ impl PillarKind for RotatedRectangles {
         Vec::new()
     }
 
-    fn corners(&self, PillarId(number): PillarId, _chord_error_nm: f64) -> Vec<(i64, i64)> {
-        self.on_grid(number).to_vec()
-    }
-
     fn four_corners(&self, PillarId(number): PillarId) -> Option<[(i64, i64); 4]> {
         Some(self.on_grid(number))
     }
@@ -147,6 +139,11 @@ impl PillarKind for RotatedRectangles {
     fn reach(&self, PillarId(number): PillarId) -> (i64, i64) {
         let [a, b, ..] = self.on_grid(number);
         (a.0.abs().max(b.0.abs()), a.1.abs().max(b.1.abs()))
+    }
+
+    fn half_nm(&self, id: PillarId) -> [f64; 2] {
+        let (x, y) = self.reach(id);
+        [x as f64, y as f64]
     }
 
     fn widest_nm(&self, _last: PillarId) -> f64 {

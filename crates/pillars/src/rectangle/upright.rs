@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-use crate::Square;
-use crate::kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity};
+use crate::kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity, gap_of_boxes};
 
 /// Upright rectangular pillars on a layout. Edges along x and along y are each one of a row of lengths in equal steps. What tells one
 /// pillar from another is its number, from 1 on: first by the edge along x, then by that along y.
@@ -144,33 +143,16 @@ impl PillarKind for UprightRectangles {
         (*self).edges_nm(number).to_vec()
     }
 
-    fn corners(&self, PillarId(number): PillarId, _chord_error_nm: f64) -> Vec<(i64, i64)> {
-        self.on_grid(number).to_vec()
-    }
-
     fn four_corners(&self, PillarId(number): PillarId) -> Option<[(i64, i64); 4]> {
         Some(self.on_grid(number))
-    }
-
-    fn reach(&self, PillarId(number): PillarId) -> (i64, i64) {
-        let [x, y] = (*self).edges_nm(number).map(|nm| i64::from(nm) / 2);
-        (x, y)
     }
 
     fn widest_nm(&self, PillarId(last): PillarId) -> f64 {
         self.longest_diagonal_nm(last)
     }
 
-    #[inline]
-    fn gap(&self, pair: [PillarId; 2], [dx, dy]: [f64; 2]) -> f64 {
-        let [a, b] = pair.map(|id| PillarKind::edges_nm(self, id));
-        let reach = |axis: usize| 0.5 * (f64::from(a[axis]) + f64::from(b[axis]));
-        let (x, y) = (dx.abs() - reach(0), dy.abs() - reach(1));
-        if x > 0.0 && y > 0.0 { x.hypot(y) } else { x.max(y) }
-    }
-
     fn least_gap(&self, _last: PillarId, apart: [f64; 2]) -> f64 {
-        Square::gap_of_widths([f64::from(self.longest_nm()); 2], apart)
+        gap_of_boxes([[f64::from(self.longest_nm()); 2]; 2], apart)
     }
 
     fn keeps(&self, _mirrored: bool, quarter_turns: u8) -> bool {
@@ -211,10 +193,6 @@ impl PillarKind for UprightRectangles {
             label: "width along x",
             unit: "nm",
         }
-    }
-
-    fn value(&self, PillarId(number): PillarId) -> f64 {
-        f64::from((*self).edges_nm(number)[0])
     }
 
     fn step(&self) -> Option<f64> {
