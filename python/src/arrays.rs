@@ -6,8 +6,8 @@ use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
 use metalith::{
-    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarMap, PillarShape, Wedge,
-    extract,
+    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarId, PillarMap, PillarShape,
+    Wedge, extract,
 };
 use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyReadonlyArray2};
@@ -270,8 +270,7 @@ pub fn width_map(
     check_shape(kind, shape)?;
     let lattice = lattice_of(kind, pitch_nm, width_nm.dim(), "map")?;
     let widest_nm = kind.widest_nm(pitch_nm);
-    if let Some(pillars) = shape.rectangles() {
-        let longer = pillars.edges_nm(pillars.last()).into_iter().max().unwrap_or(0);
+    if let (Some(PillarId(last)), Some((_, longer))) = (shape.last(), shape.edge_range_nm()) {
         if u32::from(longer) > pitch_nm {
             return Err(Error::refused(
                 "array/pillar-too-wide",
@@ -279,14 +278,11 @@ pub fn width_map(
                 "give edges of at most the pitch",
             ));
         }
-        if let Some(wrong) = width_nm.iter().find(|n| **n > pillars.last()) {
+        if let Some(wrong) = width_nm.iter().find(|n| **n > last) {
             return Err(Error::refused(
                 "array/unknown-pillar",
                 format!("a rectangle of number {wrong}"),
-                format!(
-                    "numbers go from 1 to {}: the steps of half a turn, or the pairs of widths",
-                    pillars.last()
-                ),
+                format!("numbers go from 1 to {last}: the steps of half a turn, or the pairs of widths"),
             ));
         }
     } else if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > widest_nm) {

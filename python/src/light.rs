@@ -146,7 +146,7 @@ pub fn cell<'py>(
     let (widths, wavelengths) = (widths_nm.as_array().to_vec(), wavelengths_nm.as_array().to_vec());
     drop((widths_nm, wavelengths_nm));
     let shape = shape_of(shape).map_err(error)?;
-    if shape.rectangles().is_some() {
+    if !shape.has_width() {
         return Err(error(Error::refused(
             "cell/rectangle-by-width",
             "the transmission of rectangles by their width",

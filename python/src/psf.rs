@@ -345,7 +345,7 @@ pub fn psf_of_widths<'py>(
             Wanted::Cell(fidelity) => (Some(cell_of(*fidelity, stack, &maps, light, &wavelengths_nm)?), None),
             Wanted::Model(model) => {
                 let stated = LitStack {
-                    focused: shape.rectangles().map(|_| focused(light, shape)),
+                    focused: shape.basis().map(|_| focused(light, shape)),
                     stack,
                 };
                 let chip = AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());

@@ -18,11 +18,12 @@ const MOST_STEPS: u16 = 3600;
 
 /// A shape as Python has it.
 pub fn told(shape: PillarShape) -> ToldShape {
-    match shape.rectangles() {
-        None => (shape.to_string(), 0, 0, 0),
-        Some(Rectangles::Rotated(p)) => (ROTATED.into(), p.width_nm, p.length_nm, p.steps),
-        Some(Rectangles::Upright(p)) => (UPRIGHT.into(), p.shortest_nm, p.step_nm, p.lengths),
-    }
+    let [a, b, c] = match shape {
+        PillarShape::Rectangle(Rectangles::Rotated(p)) => [p.width_nm, p.length_nm, p.steps],
+        PillarShape::Rectangle(Rectangles::Upright(p)) => [p.shortest_nm, p.step_nm, p.lengths],
+        PillarShape::Square | PillarShape::Circle => [0; 3],
+    };
+    (shape.design_name().into(), a, b, c)
 }
 
 /// A shape that Python named.
@@ -31,8 +32,8 @@ pub fn told(shape: PillarShape) -> ToldShape {
 /// If there is none of this name, or rectangles cannot be drawn.
 pub fn shape_of((word, width_nm, length_nm, steps): ToldShape) -> Result<PillarShape> {
     match word.as_str() {
-        ROTATED => return Ok(PillarShape::Rectangle(rectangles(width_nm, length_nm, steps)?.into())),
-        UPRIGHT => return Ok(PillarShape::Rectangle(upright(width_nm, length_nm, steps)?.into())),
+        ROTATED => return Ok(rectangles(width_nm, length_nm, steps)?.into()),
+        UPRIGHT => return Ok(upright(width_nm, length_nm, steps)?.into()),
         _ => {}
     }
     let known = PillarShape::CHOICES.iter().find(|(name, _)| *name == word);

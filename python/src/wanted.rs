@@ -4,10 +4,13 @@ use std::path::Path;
 
 use metalith::cell::{
     Analyser, CellStack, FittedCell, FocusedLight, Handedness, Mapping, NeighbourCell, PointwiseCell, Polarisation,
-    PolarisationAxis, PolarisedLight, PublishedCell, RotatedCell, UprightCell, cache_folder,
+    PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
 };
 use metalith::design::band_about;
-use metalith::{CalibratedModel, CellModel, Error, Fidelity, LatticeKind, PillarMap, PillarShape, Rectangles, Result};
+use metalith::{
+    CalibratedModel, CellModel, Error, Fidelity, LatticeKind, OutlineForm, PillarMap, PillarShape, PolarisationBasis,
+    Result,
+};
 
 /// Simulation that the caller asks for.
 pub enum Wanted {
@@ -49,21 +52,21 @@ fn fidelity(word: &str) -> Result<Fidelity> {
 
 /// The light that words or angles name, at pillars of a shape.
 pub fn polarised(arriving: Option<&str>, analyser: Option<&str>, shape: PillarShape) -> Result<PolarisedLight> {
-    let own = match shape.upright() {
-        Some(_) => PolarisationAxis::X.polarisation(),
-        None => Polarisation::Circular(Handedness::default()),
+    let own = match shape.basis() {
+        Some(PolarisationBasis::Linear) => PolarisationAxis::X.polarisation(),
+        _ => Polarisation::Circular(Handedness::default()),
     };
     let arriving: Polarisation = arriving.map_or(Ok(own), str::parse)?;
     let analyser: Option<Analyser> = analyser.map(str::parse).transpose()?;
     let usual = arriving == own && analyser.is_none();
-    if shape.upright().is_some() && analyser == Some(Analyser::Circular) {
+    if shape.basis() == Some(PolarisationBasis::Linear) && analyser == Some(Analyser::Circular) {
         return Err(Error::refused(
             "light/analyser",
             "a circular analyser behind upright rectangles, which focus no hand",
             "give `analyser` x, y or an angle",
         ));
     }
-    if shape.rectangles().is_none() && !usual {
+    if shape.basis().is_none() && !usual {
         return Err(Error::refused(
             "light/polarisation-of-pillars",
             format!("light of a polarisation for {}", shape.plural()),
@@ -85,7 +88,7 @@ pub fn polarised(arriving: Option<&str>, analyser: Option<&str>, shape: PillarSh
 
 /// The light that pillars of a shape are taken to focus.
 pub fn focused(light: PolarisedLight, shape: PillarShape) -> FocusedLight {
-    if shape.upright().is_some() {
+    if shape.basis() == Some(PolarisationBasis::Linear) {
         return FocusedLight::Linear(light.arriving.map_or(PolarisationAxis::X, PolarisationAxis::nearest));
     }
     FocusedLight::Circular(match light.arriving {
@@ -97,7 +100,7 @@ pub fn focused(light: PolarisedLight, shape: PillarShape) -> FocusedLight {
 /// Cells that pillars of a shape on such a lattice do not have.
 pub fn refuse(wanted: Fidelity, shape: PillarShape, kind: LatticeKind) -> Result<()> {
     // Its polynomials are of squares.
-    if shape == PillarShape::Circle && wanted == Fidelity::Published {
+    if shape.outline() == OutlineForm::Circle && wanted == Fidelity::Published {
         return Err(Error::refused(
             "cell/model-not-for-pillar",
             format!("{} by the `{wanted}` cell", shape.plural()),
@@ -116,20 +119,17 @@ pub fn cell_of(
     wavelengths_nm: &[f64],
 ) -> Result<Box<dyn CellModel>> {
     let shape = stack.shape;
+    if let Some(cell) = polarising_cell(&stack, focused(light, shape), cache_folder().as_deref()) {
+        return Ok(cell);
+    }
     let drawn = drawn(maps);
-    Ok(match (wanted, shape.rectangles(), focused(light, shape)) {
-        (_, Some(Rectangles::Rotated(pillars)), FocusedLight::Circular(hand)) => {
-            Box::new(RotatedCell::new(stack, pillars, hand))
-        }
-        (_, Some(Rectangles::Upright(pillars)), FocusedLight::Linear(axis)) => {
-            Box::new(UprightCell::new(stack, pillars, axis).kept_in(cache_folder().as_deref()))
-        }
-        (Fidelity::Published, ..) => Box::new(PublishedCell::new(stack.pitch_nm as u32)),
-        (Fidelity::Neighbours, ..) => {
+    Ok(match wanted {
+        Fidelity::Published => Box::new(PublishedCell::new(stack.pitch_nm as u32)),
+        Fidelity::Neighbours => {
             let mapping = Mapping::of_widths(maps.iter().map(PillarMap::histogram))?;
             Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder()))
         }
-        (Fidelity::Fitted, ..) => {
+        Fidelity::Fitted => {
             let band = band_about(wavelengths_nm.iter().map(|nm| nm * 1e-3), stack.range_um());
             let range = (*drawn.first().unwrap_or(&100), *drawn.last().unwrap_or(&300));
             Box::new(FittedCell::of_stack(&stack, band, range)?)

@@ -9,7 +9,7 @@ use metalith::cell_study::{
     write_cell_report, write_library_report, write_rotation_report,
 };
 use metalith::report::{counted, fixed, sig};
-use metalith::{AtomicFile, Design, Error, Progress, Rectangles, Result};
+use metalith::{AtomicFile, Design, Error, PolarisationBasis, Progress, Result};
 
 use super::section_text::with_keys;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
@@ -73,7 +73,7 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from("out").join(&design.name));
-    match design.cell.shape.rectangles() {
+    match design.cell.shape.basis() {
         Some(_) if args.steered => {
             return Err(Error::refused(
                 "cells/steered-rectangles",
@@ -81,8 +81,8 @@ pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
                 "leave out --steered: unlike neighbours are known of squares alone",
             ));
         }
-        Some(Rectangles::Rotated(_)) => return rotations(args, &design, &folder, terminal),
-        Some(Rectangles::Upright(_)) => return library(args, &design, &folder, terminal),
+        Some(PolarisationBasis::Circular) => return rotations(args, &design, &folder, terminal),
+        Some(PolarisationBasis::Linear) => return library(args, &design, &folder, terminal),
         None => {}
     }
     let options = StudyOptions { threshold: args.avoid };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::ReadLimits;
-use metalith::{AtomicFile, Error, Layout, PillarShape, Result};
+use metalith::{AtomicFile, Error, Layout, Result};
 
 use super::compensated::CompensatedFor;
 use super::output::is_standard_output;
@@ -125,7 +125,7 @@ pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let report = drc::check(&layout, &deck, &input, terminal)?;
     terminal.clear();
-    if unnamed && report.shape != PillarShape::Square {
+    if unnamed && !report.shape.is_square() {
         let own = Deck::for_shape(report.shape);
         terminal.say(&format!(
             "the pillars are {}, and the rules in force are those of squares: give `--design DESIGN.toml`, or `--rules {}`",

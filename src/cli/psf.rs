@@ -14,7 +14,9 @@ use metalith::report::{count, exact, sig};
 use metalith::verify::{
     STREHL_AGAINST, SimulationCase, SinglePsfReport, single_psfs, single_white, write_single_psf_report,
 };
-use metalith::{AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, LatticeKind, Layout, Result, extract};
+use metalith::{
+    AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, Layout, PolarisationBasis, Result, extract,
+};
 
 use self::light::PsfLight;
 use super::standard_input::InputFile;
@@ -240,19 +242,15 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if let (Some(stated), Some(element)) = (&args.stated, found.elements.first()) {
         let (own, lattice) = (&stated.cell, element.site.lattice);
         if (own.pitch_nm, own.lattice) != (lattice.pitch_nm(), lattice.kind()) {
-            let named = |kind: LatticeKind| match kind {
-                LatticeKind::Square => "square",
-                LatticeKind::Hexagonal => "hexagonal",
-            };
             return Err(Error::refused(
                 "psf/lattices-differ",
                 format!(
                     "{}: pillars on a {} lattice of {} nm, and {} is of a {} lattice of {} nm",
                     args.layout.display(),
-                    named(lattice.kind()),
+                    lattice.kind(),
                     lattice.pitch_nm(),
                     stated.path.display(),
-                    named(own.lattice),
+                    own.lattice,
                     own.pitch_nm
                 ),
                 "give by --cell the cell of the design that the layout is of",
@@ -275,7 +273,7 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
 /// Light of a polarisation is simulated where pillars tell polarisations apart, and a circular analyser for light of both hands must be
 /// told which it passes.
 fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
-    if found.shape.rectangles().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
+    if found.shape.basis().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
         return Err(Error::refused(
             "light/polarisation-of-pillars",
             format!(
@@ -287,7 +285,9 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
              polarised",
         ));
     }
-    if found.shape.upright().is_some() && (args.analyser == Some(Analyser::Circular) || args.focused.is_some()) {
+    if found.shape.basis() == Some(PolarisationBasis::Linear)
+        && (args.analyser == Some(Analyser::Circular) || args.focused.is_some())
+    {
         return Err(Error::refused(
             "light/not-focused",
             format!(
@@ -405,9 +405,9 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             sig(site.centre_nm[0] as f64 * 1e-3, 8),
             sig(site.centre_nm[1] as f64 * 1e-3, 8),
             count(element.widths.pillars()),
-            match lattice.kind() {
-                LatticeKind::Square => format!("{0} x {0} sites of {1} nm", lattice.sites(), lattice.pitch_nm()),
-                LatticeKind::Hexagonal => format!("a hexagonal lattice of {} nm", lattice.pitch_nm()),
+            match lattice.is_square() {
+                true => format!("{0} x {0} sites of {1} nm", lattice.sites(), lattice.pitch_nm()),
+                false => format!("a {} lattice of {} nm", lattice.kind(), lattice.pitch_nm()),
             },
         );
     }

@@ -114,7 +114,7 @@ impl Judging {
     pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
         let fidelity = self.fidelity(design);
         design.check_fidelity(fidelity)?;
-        if self.oblique && design.cell.shape.rectangles().is_some() {
+        if self.oblique && design.cell.shape.basis().is_some() {
             return Err(oblique_refused());
         }
         if let Some(model) = self.model()? {

@@ -15,7 +15,7 @@ use metalith_calibrate::set_format as read;
 /// # Errors
 /// What stands against it, with the limit and what to do.
 pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
-    if design.cell.shape.rectangles().is_some() {
+    if !design.cell.shape.has_width() {
         return Err(Error::refused(
             "plan/rectangles",
             format!("{} is a design of rectangles", design.path.display()),

@@ -19,19 +19,9 @@ use metalith_pillars::PillarShape;
 /// Raised whenever the solver or the sampling changes what it answers: kept results are then of no use.
 pub const SOLVER: u32 = 1;
 
-/// Number of times that the solver has changed its answers for circles alone.
-const SOLVER_OF_CIRCLES: u32 = 2;
-
-/// Number of times that the solver has changed its answers for rectangles.
-const SOLVER_OF_RECTANGLES: u32 = 1;
-
 /// [`SOLVER`] for pillars of a shape: raised where the answers for that shape alone have changed.
 pub fn solver_of(shape: PillarShape) -> u32 {
-    match shape {
-        PillarShape::Square => SOLVER,
-        PillarShape::Rectangle(_) => SOLVER + SOLVER_OF_RECTANGLES,
-        PillarShape::Circle => SOLVER + SOLVER_OF_CIRCLES,
-    }
+    SOLVER + shape.solver_revision()
 }
 
 /// Length of the checksum.

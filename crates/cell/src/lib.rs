@@ -13,6 +13,7 @@ mod model;
 mod neighbours;
 mod pointwise;
 mod polarisation;
+mod polarising;
 mod polynomial;
 mod published;
 mod rectangle;
@@ -47,6 +48,7 @@ pub use polarisation::{
     Analyser, AxisTables, FocusedLight, HandTables, LitStack, PassedTable, Polarisation, PolarisationAxis,
     PolarisedLight, PolarisedTables,
 };
+pub use polarising::polarising_cell;
 pub use polynomial::{Basis, ForwardPolynomial, InversePolynomial};
 pub use published::PublishedCell;
 pub use rectangle::{Handedness, OBLIQUE_RECTANGLES, RotatedRectangle, oblique_refused};

@@ -45,7 +45,7 @@ impl Fidelity {
     pub fn refusal(self, shape: PillarShape, lattice: LatticeKind) -> Option<(String, &'static str)> {
         let square_lattices_alone = matches!(self, Self::Published | Self::Neighbours);
         let for_rectangles = matches!(self, Self::Rigorous | Self::Calibrated);
-        if shape.rectangles().is_some() && !for_rectangles {
+        if shape.basis().is_some() && !for_rectangles {
             Some((
                 format!("rectangular pillars by the `{self}` cell"),
                 "ask for `rigorous`, as `fidelity` in [verify] of a design or with --fidelity: no other is made for rectangles",

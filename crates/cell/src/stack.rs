@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use metalith_core::{Error, Result};
-use metalith_pillars::PillarShape;
+use metalith_pillars::{OutlineForm, PillarShape};
 use metalith_rcwa::{
     CellLattice, Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, solve_each, transmit,
 };
@@ -68,7 +68,7 @@ impl CellStack {
             pitch_nm,
             lattice: CellLattice::Square,
             height_nm,
-            shape: PillarShape::Square,
+            shape: PillarShape::default(),
             film: Material::named("sin_luke_2015")?,
             substrate: Material::named("fused_silica_malitson_1965")?,
             under: Vec::new(),
@@ -103,7 +103,7 @@ impl CellStack {
     /// If the foot is wider than the pitch, the wavelength is outside the range of a material, or the pillars are
     /// rectangles, which no width distinguishes: see [`CellStack::rectangle_layers`] and [`CellStack::birefringent`].
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
-        if self.shape.rectangles().is_some() {
+        if !self.shape.has_width() {
             return Err(Error::refused(
                 "cell/rectangle-by-width",
                 "rectangular pillars, where those of a width are asked for",
@@ -155,11 +155,11 @@ impl CellStack {
 
     /// Cross-section of the pillar where it is so wide (nm).
     fn outline(&self, width_nm: f64) -> Outline {
-        match self.shape {
+        match self.shape.outline() {
             _ if width_nm <= 0.0 => Outline::empty(),
-            PillarShape::Square => Outline::rounded(width_nm, self.corner_radius_nm),
-            PillarShape::Circle => Outline::circle(width_nm),
-            PillarShape::Rectangle(_) => Outline::empty(),
+            OutlineForm::Square => Outline::rounded(width_nm, self.corner_radius_nm),
+            OutlineForm::Circle => Outline::circle(width_nm),
+            OutlineForm::Polygon => Outline::empty(),
         }
     }
 

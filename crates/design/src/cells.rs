@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use metalith_cell::{
     CellModel, CellStack, Fidelity, FittedCell, LitStack, Mapping, NeighbourCell, PointwiseCell, PublishedCell,
-    RotatedCell, TableSpec, UniformLayer, UprightCell, cache_folder,
+    TableSpec, UniformLayer, cache_folder, polarising_cell,
 };
 use metalith_core::{Error, Result};
-use metalith_pillars::Rectangles;
 use metalith_rcwa::{CellLattice, Material};
 
 use crate::spec::{CellSpec, UnderSpec};
@@ -159,16 +158,10 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
         .iter()
         .map(|fidelity| -> Result<Box<dyn CellModel>> {
             design.check_fidelity(*fidelity)?;
-            match design.cell.shape.rectangles() {
-                Some(Rectangles::Rotated(pillars)) => {
-                    let arriving = design.cell.arriving.unwrap_or_default();
-                    return Ok(Box::new(RotatedCell::new(design.cell_stack()?, pillars, arriving)));
-                }
-                Some(Rectangles::Upright(pillars)) => {
-                    let cell = UprightCell::new(design.cell_stack()?, pillars, design.axis());
-                    return Ok(Box::new(cell.kept_in(cache_folder().as_deref())));
-                }
-                None => {}
+            if let Some(focused) = design.focused()
+                && let Some(cell) = polarising_cell(&design.cell_stack()?, focused, cache_folder().as_deref())
+            {
+                return Ok(cell);
             }
             match fidelity {
                 Fidelity::Published => Ok(Box::new(PublishedCell::of_stack(&design.cell_stack()?)?)),

@@ -2,7 +2,7 @@
 
 use super::polygon::{distance, inside, overlap, ring_of, twice_area};
 use metalith_gds::{Point, Rect, simplified};
-use metalith_pillars::{CHORD_ERROR, PillarShape, circle_corners};
+use metalith_pillars::{CHORD_ERROR, Circle, circle_corners};
 
 /// Steps of work of one pair of sides of polygons: four distances of a point from a side.
 const SIDES: u64 = 8;
@@ -65,7 +65,7 @@ impl Body<'_> {
                 let apart = |a0: i64, a1: i64, b0: i64, b1: i64| (a0 + a1 - b0 - b1) as f64 / 2.0;
                 let between = [apart(a.x0, a.x1, b.x0, b.x1), apart(a.y0, a.y1, b.y0, b.y1)];
                 let widths = [a.width() as f64, b.width() as f64];
-                PillarShape::Circle.gap(widths, between).max(0.0)
+                Circle::gap_of_widths(widths, between).max(0.0)
             }
             _ => distance(&self.ring(), &other.ring()),
         }

@@ -6,7 +6,7 @@ use super::flat::FlatLayout;
 use super::rule::{Needs, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::LayerNumber;
-use metalith_pillars::PillarRows;
+use metalith_pillars::{PillarId, PillarRows};
 use metalith_report::exact;
 
 enum BudgetRule {
@@ -87,7 +87,7 @@ impl Writing {
             if *layer == flat.pillars {
                 for e in &flat.elements {
                     for (w, &count) in e.widths.histogram().iter().enumerate().skip(1) {
-                        area_nm2 += count as f64 * flat.shape.area_nm2(w as u16);
+                        area_nm2 += count as f64 * flat.shape.area_nm2(PillarId(w as u16));
                         shapes += count as f64;
                     }
                 }

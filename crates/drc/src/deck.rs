@@ -72,12 +72,8 @@ impl Deck {
     /// # Panics
     /// Never: it is tested.
     pub fn for_shape(shape: PillarShape) -> Self {
-        let name = match shape {
-            PillarShape::Square => "squares.toml",
-            PillarShape::Circle => "circles.toml",
-            PillarShape::Rectangle(_) => "rectangles.toml",
-        };
-        Self::shipped(Path::new(name)).expect("it is in the list")
+        let name = format!("{}.toml", shape.plural());
+        Self::shipped(Path::new(&name)).expect("it is in the list")
     }
 
     /// The deck that a design is checked by where no other is named: [`Deck::standard`] for the cell that this is of, and where

@@ -8,7 +8,7 @@ use metalith_core::document::{Limits, Section};
 use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_gds::{Point, Rect};
-use metalith_pillars::{Lattice, PillarRows};
+use metalith_pillars::{Lattice, PillarId, PillarRows};
 
 struct FillRule {
     window_um: f64,
@@ -70,7 +70,7 @@ impl Windows {
             for (j, (area, part)) in windows.iter_mut().zip(row.chunks(sites[0])).enumerate() {
                 let ix = first[0] + j * sites[0];
                 let full = (ix..).zip(part).all(|(ix, &w)| w != 0 || !lattice.has(ix, iy));
-                let more: u64 = part.iter().map(|&w| flat.shape.box_nm2(w)).sum();
+                let more: u64 = part.iter().map(|&w| flat.shape.box_nm2(PillarId(w))).sum();
                 *area = area.filter(|_| full).map(|area| area + more);
             }
         }

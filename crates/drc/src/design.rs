@@ -11,7 +11,7 @@ use std::borrow::Cow;
 use metalith_core::document::{Limits, Section};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{AskedLight, Design, Medium};
-use metalith_pillars::{Lattice, PillarRows};
+use metalith_pillars::{Lattice, PillarId, PillarRows};
 
 enum Against {
     Count,
@@ -109,9 +109,12 @@ impl Against {
                 for (column, (&w, &wanted)) in there.iter().zip(wanted).enumerate() {
                     // Missing and additional pillars are a matter of count.
                     if w != wanted && w != 0 && wanted != 0 {
-                        found.rect(&flat.pillar(k, row, column), || match flat.shape.rectangles() {
-                            None => format!("{w} nm wide, {wanted} nm designed"),
-                            Some(_) => format!("{}, designed {}", flat.shape.words(w), flat.shape.words(wanted)),
+                        found.rect(&flat.pillar(k, row, column), || match flat.shape.has_width() {
+                            true => format!("{w} nm wide, {wanted} nm designed"),
+                            false => {
+                                let words = |number| flat.shape.words(PillarId(number));
+                                format!("{}, designed {}", words(w), words(wanted))
+                            }
                         });
                     }
                 }

@@ -48,7 +48,7 @@ pub(super) fn sites(
     }
     let nothing = Discovered {
         sites: Vec::new(),
-        shape: PillarShape::Square,
+        shape: PillarShape::default(),
     };
     Ok((nothing, why))
 }

@@ -9,7 +9,7 @@ use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_gds::extract::{ExtractedElement, StoredPillars};
 use metalith_gds::{LayerNumber, Layout, Point, Rect};
-use metalith_pillars::{PillarRows, PillarShape};
+use metalith_pillars::{OutlineForm, PillarId, PillarRows, PillarShape};
 
 /// Everything on one layer that is not a pillar on the lattice of an element.
 #[derive(Default)]
@@ -101,15 +101,18 @@ impl FlatLayout<'_> {
     /// The pillar at a site, in database units.
     pub fn body(&self, element: usize, row: usize, column: usize) -> Body<'static> {
         let around = self.pillar(element, row, column);
-        match self.shape {
-            PillarShape::Square => Body::Rect(around),
-            PillarShape::Circle => Body::Disc(around),
-            PillarShape::Rectangle(pillars) => {
+        match self.shape.outline() {
+            OutlineForm::Square => Body::Rect(around),
+            OutlineForm::Circle => Body::Disc(around),
+            OutlineForm::Polygon => {
                 let (e, unit) = (&self.elements[element], |nm: i64| self.units(nm as f64).round() as i64);
                 let x = e.site.centre_nm[0] + e.site.lattice.place_nm(0, column);
                 let y = e.site.centre_nm[1] + e.site.lattice.place_nm(1, row);
                 let corner = |(dx, dy): (i64, i64)| Point::new(unit(x + dx), unit(y + dy));
-                let [a, b, c, d] = pillars.corners(e.widths.number(column, row)).map(corner);
+                let corners = self.shape.four_corners(PillarId(e.widths.number(column, row)));
+                let [a, b, c, d] = corners
+                    .expect("pillars that are polygons have four corners")
+                    .map(corner);
                 Body::Tilted([a, b, c, d, a])
             }
         }
@@ -117,13 +120,7 @@ impl FlatLayout<'_> {
 
     /// Half of what the pillar with a width or number takes along x and y (nm).
     pub fn half_nm(&self, number: u16) -> [f64; 2] {
-        match self.shape {
-            PillarShape::Square | PillarShape::Circle => [f64::from(number) / 2.0; 2],
-            PillarShape::Rectangle(pillars) => {
-                let (x, y) = pillars.reach(number);
-                [x as f64, y as f64]
-            }
-        }
+        self.shape.half_nm(PillarId(number))
     }
 
     /// The box around the pillar at a site, in database units.

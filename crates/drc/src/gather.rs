@@ -21,7 +21,7 @@ use metalith_gds::{
     BoxMemo, DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point, Rect, Selection,
     Shape, Text, Transform, Visitor, circle_of, rectangle_of, simplified,
 };
-use metalith_pillars::PillarShape;
+use metalith_pillars::{OutlineForm, PillarShape};
 
 /// Widest square that is decided by table (database units).
 const TABLE: usize = 4096;
@@ -422,7 +422,7 @@ impl Gather<'_, '_> {
     /// # Errors
     /// If that is too much work.
     fn other(&mut self, shape: &Shape<'_>, placements: &[Transform], square: bool) -> Result<()> {
-        let is_drawn_pillar = shape.layer == self.pillars && self.shape.rectangles().is_some();
+        let is_drawn_pillar = shape.layer == self.pillars && self.shape.outline() == OutlineForm::Polygon;
         if is_drawn_pillar {
             self.pillar_shapes += placements.len() as u64;
         } else {

@@ -8,7 +8,7 @@ use super::rule::{NO_DESIGN, NotRun, Rule, RuleOutcome, from_design};
 use super::tolerance::{EQUAL_NM, ROUNDING_NM};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, Point};
-use metalith_pillars::PillarRows;
+use metalith_pillars::{PillarId, PillarRows};
 
 pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Option<Box<dyn Rule>> {
     let nm = || Limits::new(0.001..=1e6, "nm");
@@ -149,7 +149,7 @@ impl Rule for ExposureGrid {
         if flat.elements.is_empty() {
             return Err(NotRun::Skipped(flat.no_elements.clone()));
         }
-        if flat.shape.rotated().is_some() {
+        if flat.shape.axis_edges_nm(PillarId(1)).is_empty() {
             let why = "rotated rectangles have no edges along the steps of the beam".to_owned();
             return Err(NotRun::Skipped(why));
         }
@@ -178,9 +178,9 @@ impl Rule for ExposureGrid {
                 });
             }
             let histogram = e.widths.histogram();
-            let edges = |number: usize| match flat.shape.upright() {
-                Some(pillars) => pillars.edges_nm(number as u16).map(f64::from).to_vec(),
-                None => vec![number as f64],
+            let edges = |number: usize| {
+                let edges_nm = flat.shape.axis_edges_nm(PillarId(number as u16));
+                edges_nm.into_iter().map(f64::from).collect::<Vec<_>>()
             };
             let is_off = |nm: &f64| self.remainder(*nm).abs() > ROUNDING_NM;
             let off: Vec<bool> = (0..histogram.len())
@@ -195,7 +195,11 @@ impl Rule for ExposureGrid {
             e.widths.each_pillar(|row, column, w| {
                 if off[usize::from(w)] {
                     found.rect(&flat.pillar(k, row, column), || {
-                        format!("{} is no multiple of {} nm", flat.shape.words(w), self.step_nm)
+                        format!(
+                            "{} is no multiple of {} nm",
+                            flat.shape.words(PillarId(w)),
+                            self.step_nm
+                        )
                     });
                 }
             });

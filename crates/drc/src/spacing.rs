@@ -10,7 +10,7 @@ use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
 use metalith_design::Design;
 use metalith_gds::LayerNumber;
-use metalith_pillars::{LatticeKind, PillarRows};
+use metalith_pillars::{LatticeKind, PillarId, PillarRows};
 use metalith_rcwa::CellLattice;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -113,7 +113,7 @@ fn least_gap_nm(design: &Design) -> f64 {
     let cell = &design.cell;
     let nearest_nm = CellLattice::drawn(cell.lattice, cell.pitch_nm).nearest_nm(f64::from(cell.pitch_nm));
     let (_, widest) = cell.width_range_nm;
-    cell.shape.least_gap(widest, [nearest_nm, 0.0]).max(0.0)
+    cell.shape.least_gap(PillarId(widest), [nearest_nm, 0.0]).max(0.0)
 }
 
 fn report_overlap(a: &Body<'_>, b: &Body<'_>, found: &mut Findings) {
@@ -209,7 +209,7 @@ fn on_lattices(
         let widest = widths.saturating_sub(1) as u16;
         let least = neighbours
             .iter()
-            .map(|&(up, right)| flat.shape.least_gap(widest, apart(up, right)));
+            .map(|&(up, right)| flat.shape.least_gap(PillarId(widest), apart(up, right)));
         if least.fold(f64::INFINITY, f64::min) >= nm {
             continue;
         }
@@ -230,7 +230,7 @@ fn on_lattices(
                         continue;
                     };
                     let Some(&other) = lines[up].get(c) else { continue };
-                    let gap = || flat.shape.gap([own, other].map(f64::from), apart(up, right));
+                    let gap = || flat.shape.gap([own, other].map(PillarId), apart(up, right));
                     if other != 0 && known.are_near([own, other], || gap() < nm - ROUNDING_NM) {
                         let gap = gap();
                         let (a, b) = (flat.body(k, row, column), flat.body(k, row + up, c));

@@ -98,7 +98,7 @@ fn rotated_rectangles_are_compared_by_rotation_and_to_the_nanometre() {
         gds.cell("TOP");
         for site in 0..100_usize {
             let (x, y) = (354 * (site % 10) as i32 - 1593, 354 * (site / 10) as i32 - 1593);
-            let corners = pillars.corners(number(site));
+            let corners = pillars.on_grid(number(site));
             let mut corners = corners.map(|(dx, dy)| (x + dx as i32, y + dy as i32)).to_vec();
             corners[1].0 += i32::from(bent == Some(site));
             corners.push(corners[0]);
@@ -141,7 +141,7 @@ fn upright_rectangles_are_compared_by_their_edges() {
             let (x, y) = (354 * (site % 10) as i32 - 1593, 354 * (site / 10) as i32 - 1593);
             let number = pillars.number(edges(site)).unwrap();
             let mut corners = pillars
-                .corners(number)
+                .on_grid(number)
                 .map(|(dx, dy)| (x + dx as i32, y + dy as i32))
                 .to_vec();
             corners.push(corners[0]);

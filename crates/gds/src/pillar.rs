@@ -5,7 +5,7 @@ use super::memo::{BoxMemo, OutlineMemo};
 use super::rectangle::tilted_rectangle_of;
 use super::shape::{Outline, Point, Rect, Shape, rectangle_of, simplified};
 use super::transform::Transform;
-use metalith_pillars::PillarShape;
+use metalith_pillars::{OutlineForm, PillarId, PillarShape};
 
 /// An outline that may be a pillar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,12 +26,12 @@ pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<D
         number: None,
         exact: false,
     };
-    match shape {
-        PillarShape::Square => rectangle_of(&simplified(points)).map(of_width),
-        PillarShape::Circle => circle_of(points, unit_nm).map(of_width),
-        PillarShape::Rectangle(pillars) => {
+    match shape.outline() {
+        OutlineForm::Square => rectangle_of(&simplified(points)).map(of_width),
+        OutlineForm::Circle => circle_of(points, unit_nm).map(of_width),
+        OutlineForm::Polygon => {
             let tilted = tilted_rectangle_of(points, unit_nm)?;
-            let number = tilted.number(pillars, unit_nm)?;
+            let number = tilted.number(shape, unit_nm)?;
             Some(DrawnPillar {
                 around: tilted.around,
                 number: Some(number),
@@ -45,7 +45,7 @@ pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<D
 /// long (nm).
 pub fn drawn_corners(shape: PillarShape, number: u16, unit_nm: f64) -> Vec<Point> {
     let unit = |nm: i64| (nm as f64 / unit_nm).round() as i64;
-    let corners = shape.corners(number, 0.0).into_iter();
+    let corners = shape.corners(PillarId(number), 0.0).into_iter();
     corners.map(|(x, y)| Point::new(unit(x), unit(y))).collect()
 }
 
@@ -53,6 +53,8 @@ pub fn drawn_corners(shape: PillarShape, number: u16, unit_nm: f64) -> Vec<Point
 /// recognised once each.
 pub struct PillarFinder {
     shape: PillarShape,
+    /// True if pillars are recognised by their corners, and those are the corners of upright boxes.
+    boxed: bool,
     unit_nm: f64,
     /// Answers for outlines as they are placed; boxes from the first corner.
     known: OutlineMemo<Option<DrawnPillar>>,
@@ -66,6 +68,7 @@ impl PillarFinder {
     pub fn new(shape: PillarShape, unit_nm: f64) -> Self {
         Self {
             shape,
+            boxed: shape.outline() == OutlineForm::Polygon && !shape.has_one_size(),
             unit_nm,
             known: OutlineMemo::default(),
             boxes: BoxMemo::default(),
@@ -76,7 +79,7 @@ impl PillarFinder {
     /// True if pillars have the same corners in an orientation that leaves an upright box unchanged: half a turn leaves
     /// every rectangle unchanged, a mirror about an axis upright ones.
     pub(super) fn keeps(&self, orientation: u8) -> bool {
-        self.shape.upright().is_some() || (self.shape.rectangles().is_some() && orientation & 4 == 0)
+        self.shape.outline() == OutlineForm::Polygon && self.shape.keeps(orientation & 4 != 0, 0)
     }
 
     /// Variant of [`pillar_of`] for a shape where it is placed.
@@ -84,7 +87,7 @@ impl PillarFinder {
     pub fn placed(&mut self, shape: &Shape<'_>, placement: &Transform) -> Option<DrawnPillar> {
         match shape.rect {
             // Upright pillars are boxes, told by their edges.
-            Some(rect) if self.shape.upright().is_some() && placement.is_square() => {
+            Some(rect) if self.boxed && placement.is_square() => {
                 let around = placement.apply_rect(&rect)?;
                 let (shape, unit_nm) = (self.shape, self.unit_nm);
                 let told = self.boxes.of(&around, || pillar_of(&around.outline(), shape, unit_nm));
@@ -103,8 +106,8 @@ impl PillarFinder {
             pillar_of(buffer, shape, unit_nm)
         };
         // Other outlines come with their boxes, or are few; what is turned otherwise is rounded where it stands.
-        let (Some(orientation), Some(first), PillarShape::Rectangle(_)) =
-            (outline.orientation(placement), outline.points().next(), shape)
+        let (Some(orientation), Some(first), OutlineForm::Polygon) =
+            (outline.orientation(placement), outline.points().next(), shape.outline())
         else {
             return ask();
         };
@@ -148,10 +151,10 @@ mod tests {
     /// Each pillar in each orientation, twice, one time elsewhere: what is remembered is what is said without memory.
     #[test]
     fn what_is_remembered_is_what_is_said_of_the_outline_where_it_is_placed() {
-        let rotated = PillarShape::Rectangle(PILLARS);
+        let rotated = PILLARS;
         let mut finder = PillarFinder::new(rotated, 1.0);
         for number in 1..=180 {
-            let corners = PILLARS.corners(number);
+            let corners = PILLARS.corners(PillarId(number), 0.0);
             for off in [0, 1] {
                 let mut points: Vec<Point> = corners.iter().map(|&(x, y)| Point::new(x + 31, y - 77)).collect();
                 points[2].x += off;
@@ -183,7 +186,7 @@ mod tests {
     #[test]
     fn upright_pillars_are_told_by_their_edges_in_every_orientation() {
         let pillars = UprightRectangles::of_lengths([90, 100, 150, 200].into_iter()).unwrap();
-        let upright = PillarShape::Rectangle(pillars.into());
+        let upright = PillarShape::from(pillars);
         let mut finder = PillarFinder::new(upright, 1.0);
         let mut found = 0;
         for (number, off) in (1..=pillars.count()).flat_map(|number| [(number, 0), (number, 1)]) {

@@ -1,7 +1,7 @@
 //! Outlines that stand for rectangles at any angle.
 
 use super::shape::{Point, Rect, rounding, simplified};
-use metalith_pillars::Rectangles;
+use metalith_pillars::{PillarId, PillarShape};
 
 /// A rectangle at any angle, as its corners on the grid show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,9 +64,10 @@ impl TiltedRectangle {
     }
 
     /// The number of the pillar that it is, if it is one of these; a database unit is so long (nm).
-    pub fn number(&self, pillars: Rectangles, unit_nm: f64) -> Option<u16> {
+    pub fn number(&self, pillars: PillarShape, unit_nm: f64) -> Option<u16> {
         let corners = self.corners.map(|c| c.map(|v| v * unit_nm));
-        pillars.recognised(&corners, self.slack * unit_nm)
+        let found = pillars.recognised(&corners, self.slack * unit_nm);
+        found.map(|PillarId(number)| number)
     }
 
     /// True if all corners are among these, from the middle.
@@ -79,13 +80,13 @@ impl TiltedRectangle {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use metalith_pillars::RotatedRectangles;
+    use metalith_pillars::{Rectangles, RotatedRectangles};
 
-    pub const PILLARS: Rectangles = Rectangles::Rotated(RotatedRectangles {
+    pub const PILLARS: PillarShape = PillarShape::Rectangle(Rectangles::Rotated(RotatedRectangles {
         width_nm: 90,
         length_nm: 240,
         steps: 180,
-    });
+    }));
 
     fn closed(corners: impl IntoIterator<Item = (i64, i64)>) -> Vec<Point> {
         let mut points: Vec<Point> = corners.into_iter().map(|(x, y)| Point::new(x + 177, y - 31)).collect();
@@ -96,11 +97,11 @@ pub(crate) mod tests {
     #[test]
     fn rectangles_at_any_angle_are_recognised_and_others_are_not() {
         for number in 1..=180 {
-            let corners = PILLARS.corners(number);
-            for outline in [closed(corners), closed(corners.into_iter().rev())] {
+            let corners = PILLARS.corners(PillarId(number), 0.0);
+            for outline in [closed(corners.clone()), closed(corners.into_iter().rev())] {
                 let found = tilted_rectangle_of(&outline, 1.0).unwrap();
                 assert_eq!(found.number(PILLARS, 1.0), Some(number));
-                let (x, y) = PILLARS.reach(number);
+                let (x, y) = PILLARS.reach(PillarId(number));
                 let around = Rect {
                     x0: 177 - x,
                     y0: -31 - y,
@@ -116,7 +117,7 @@ pub(crate) mod tests {
                 );
             }
         }
-        let corners = PILLARS.corners(37);
+        let corners = PILLARS.corners(PillarId(37), 0.0);
         // A vertex on a side changes nothing; a trapezoid, a rhombus, a triangle and a line are no rectangles.
         let more = [corners[0], corners[1], corners[2], corners[3], corners[0]];
         let mut more = closed(more);

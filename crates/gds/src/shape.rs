@@ -2,7 +2,7 @@
 
 use super::transform::{Transform, turned};
 use metalith_core::LayerNumber;
-use metalith_pillars::PillarShape;
+use metalith_pillars::{OutlineForm, PillarShape};
 
 /// Tolerance of the place of a corner of a circle or a rectangle, in database units or in nanometres, whichever is
 /// more: corners are rounded to one of these grids, twice where a cell is placed at an angle.
@@ -217,10 +217,10 @@ impl Shape<'_> {
     /// identified by their corners, where they are placed: see [`crate::pillar_of`].
     #[inline]
     pub fn pillar(&self, shape: PillarShape) -> Option<&Rect> {
-        match shape {
-            PillarShape::Square => self.rect.as_ref(),
-            PillarShape::Circle => self.circle.as_ref(),
-            PillarShape::Rectangle(_) => None,
+        match shape.outline() {
+            OutlineForm::Square => self.rect.as_ref(),
+            OutlineForm::Circle => self.circle.as_ref(),
+            OutlineForm::Polygon => None,
         }
     }
 }

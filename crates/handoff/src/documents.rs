@@ -5,9 +5,9 @@ use serde::Serialize;
 use super::census::LayoutStatistics;
 use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
 use super::exposure::{exposures, snapping};
+use super::kind_words::KindWords;
 use super::layouts::Layouts;
 use super::listing::Listing;
-use super::pad::measured;
 use super::process::Process;
 use super::sites::{Cross, MetrologySite, crosses, sites};
 use super::{job, tables};
@@ -93,7 +93,10 @@ fn measuring_tables(
     tables::write_sites(
         &files.add(
             "metrology/cd_table.csv",
-            format!("where to measure {}, columns to fill in", measured(design.cell.shape)),
+            format!(
+                "where to measure {}, columns to fill in",
+                KindWords::of(design.cell.shape).measured
+            ),
         ),
         &documents.sites,
         process,

@@ -7,7 +7,7 @@ use super::process::Process;
 use metalith_core::Result;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
-use metalith_pillars::{PillarRows, PillarShape, Rectangles};
+use metalith_pillars::{CHORD_ERROR, PillarId, PillarRows, PillarShape};
 
 /// Exposed area and writing time of each file of the first step.
 pub(super) fn exposures(
@@ -77,19 +77,15 @@ pub(super) fn snapping(array: &PillarArray, process: &Process) -> Result<Vec<(Be
 /// Square of what the shots change of a pillar (nm^2): of its width, or, mean over them, of the places of its corners.
 fn snapped_square(shape: PillarShape, number: u16, beam: &Beam) -> f64 {
     let off = |nm: f64| beam.snapped_nm(nm) - nm;
-    match shape {
-        PillarShape::Square | PillarShape::Circle => off(f64::from(number)).powi(2),
-        PillarShape::Rectangle(Rectangles::Upright(pillars)) => {
-            let edges = pillars.edges_nm(number).map(f64::from);
-            edges.map(|nm| off(nm).powi(2)).iter().sum::<f64>() / 2.0
-        }
-        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => {
-            let corners = pillars.corners(number);
-            let sum: f64 = corners
-                .iter()
-                .map(|&(x, y)| off(x as f64).powi(2) + off(y as f64).powi(2))
-                .sum();
-            sum / corners.len() as f64
-        }
+    let edges_nm = shape.axis_edges_nm(PillarId(number));
+    if edges_nm.is_empty() {
+        let corners = shape.corners(PillarId(number), CHORD_ERROR);
+        let sum: f64 = corners
+            .iter()
+            .map(|&(x, y)| off(x as f64).powi(2) + off(y as f64).powi(2))
+            .sum();
+        return sum / corners.len() as f64;
     }
+    let sum: f64 = edges_nm.iter().map(|&nm| off(f64::from(nm)).powi(2)).sum();
+    sum / edges_nm.len() as f64
 }

@@ -9,7 +9,6 @@ use super::process::Process;
 use super::zip;
 use metalith_core::{Error, Result};
 use metalith_design::Design;
-use metalith_pillars::PillarShape;
 
 /// Checks that the process can make the design at all.
 pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
@@ -53,9 +52,9 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
         return Err(Error::refused(
             "handoff/no-rules-for-pillars",
             format!("the pillars of the design are {shapes}, and the process has no decks of rules for them"),
-            match design.cell.shape {
-                PillarShape::Square => "add `pillar_rules`, `dose_rules` and `test_rules` to [checks]".to_owned(),
-                _ => format!("add a section [checks.{shapes}] with `pillar_rules`, `dose_rules` and `test_rules`"),
+            match design.cell.shape.is_square() {
+                true => "add `pillar_rules`, `dose_rules` and `test_rules` to [checks]".to_owned(),
+                false => format!("add a section [checks.{shapes}] with `pillar_rules`, `dose_rules` and `test_rules`"),
             },
         ));
     }

@@ -16,6 +16,7 @@ mod fields;
 mod front;
 mod guard;
 mod job;
+mod kind_words;
 mod layouts;
 mod listing;
 mod manifest;

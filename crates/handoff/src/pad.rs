@@ -2,7 +2,7 @@
 
 use metalith_design::Design;
 use metalith_layout::PillarForm;
-use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles, UprightRectangles};
+use metalith_pillars::{PillarId, PillarShape, Rectangles, RotatedRectangles, UprightRectangles};
 use serde::Serialize;
 
 use super::process::Process;
@@ -48,18 +48,14 @@ impl DrawnSize {
 
     /// A pillar of this shape with this width (nm) or number.
     pub(super) fn of(shape: PillarShape, number: u16) -> Self {
-        match shape {
-            PillarShape::Square | PillarShape::Circle => Self::width(number),
-            PillarShape::Rectangle(pillars) => {
-                let [width_nm, length_nm] = pillars.edges_nm(number);
-                Self {
-                    width_nm,
-                    length_nm: Some(length_nm),
-                    rotation_deg: shape
-                        .rotated()
-                        .map(|pillars| whole_mdeg(pillars.rotation(number).to_degrees())),
-                }
-            }
+        if shape.has_width() {
+            return Self::width(number);
+        }
+        let [width_nm, length_nm] = shape.edges_nm(PillarId(number));
+        Self {
+            width_nm,
+            length_nm: Some(length_nm),
+            rotation_deg: shape.has_one_size().then(|| whole_mdeg(shape.value(PillarId(number)))),
         }
     }
 }
@@ -67,16 +63,6 @@ impl DrawnSize {
 /// An angle (degrees) without the rounding of its computation.
 pub(super) fn whole_mdeg(deg: f64) -> f64 {
     (deg * 1e3).round() / 1e3
-}
-
-/// Quantity of the pillars of a design that is measured, in words.
-pub(super) fn measured(shape: PillarShape) -> &'static str {
-    match shape {
-        PillarShape::Square => "widths",
-        PillarShape::Circle => "diameters",
-        PillarShape::Rectangle(Rectangles::Rotated(_)) => "widths, lengths and rotations",
-        PillarShape::Rectangle(Rectangles::Upright(_)) => "widths along x and y",
-    }
 }
 
 /// The pillar that a pad is made of.
@@ -117,9 +103,8 @@ impl PadPillar {
             length_nm: u16::try_from(length).ok()?,
             steps: pillars.steps,
         };
-        let shape = PillarShape::Rectangle(resized.into());
         fits.then(|| Self {
-            form: PillarForm::of(design).with_shape(shape),
+            form: PillarForm::of(design).with_shape(resized.into()),
             number: pillars.steps,
             by_size: true,
         })
@@ -169,12 +154,13 @@ impl PadPillar {
 
 /// Pillars of the pads of a dose matrix.
 pub(super) fn dose_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
-    match design.cell.shape.rectangles() {
-        Some(Rectangles::Rotated(pillars)) => DOSE_ROTATIONS_DEG
-            .iter()
-            .map(|&deg| PadPillar::rotated(design, pillars, deg))
-            .collect(),
-        Some(Rectangles::Upright(pillars)) => upright_pads(design, pillars),
+    let pad = |number: u16| PadPillar {
+        form: PillarForm::of(design),
+        number,
+        by_size: !design.cell.shape.has_one_size(),
+    };
+    match standing_for_all(design, &DOSE_ROTATIONS_DEG) {
+        Some(numbers) => numbers.into_iter().map(pad).collect(),
         None => {
             let widths = process.dose_matrix.pad_widths_nm.iter();
             widths.map(|&w| PadPillar::of_width(design, w)).collect()
@@ -182,8 +168,21 @@ pub(super) fn dose_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
     }
 }
 
+/// Numbers of rectangles that stand for all of a design: those with the rotations nearest to these (degrees), or some sizes; none
+/// where pillars are chosen by their width.
+pub(super) fn standing_for_all(design: &Design, rotations_deg: &[f64]) -> Option<Vec<u16>> {
+    match design.cell.shape {
+        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => {
+            let number = |deg: &f64| pillars.number(deg.to_radians());
+            Some(rotations_deg.iter().map(number).collect())
+        }
+        PillarShape::Rectangle(Rectangles::Upright(pillars)) => Some(upright_sizes(design, pillars)),
+        PillarShape::Square | PillarShape::Circle => None,
+    }
+}
+
 /// Upright rectangles that the design chooses from, which stand for all of them.
-pub(super) fn upright_sizes(design: &Design, pillars: UprightRectangles) -> Vec<u16> {
+fn upright_sizes(design: &Design, pillars: UprightRectangles) -> Vec<u16> {
     let known = design
         .mapping
         .pillar_library
@@ -245,9 +244,9 @@ pub(super) fn test_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
 
 /// Width of a line to measure (nm), nearest to one that is asked for: one that pillars may have, or for rectangles any even one.
 pub(super) fn line_width(design: &Design, width_nm: f64) -> i64 {
-    match design.cell.shape.rectangles() {
-        Some(_) => (width_nm / 2.0).round() as i64 * 2,
-        None => i64::from(legal_width(design, width_nm)),
+    match design.cell.shape.has_width() {
+        false => (width_nm / 2.0).round() as i64 * 2,
+        true => i64::from(legal_width(design, width_nm)),
     }
 }
 

@@ -6,7 +6,6 @@ use super::pad::PadPillar;
 use super::process::{Method, Process, Tone};
 use super::structures::Structure;
 use metalith_design::Design;
-use metalith_pillars::Rectangles;
 use metalith_report::{Figure, Plan, PlanLayer};
 
 fn corners(r: RectNm) -> ((f64, f64), (f64, f64)) {
@@ -105,11 +104,8 @@ pub(super) fn tone(design: &Design, process: &Process) -> Figure {
         process.transfer.mask_thickness_nm * 1e-3,
     );
     // What a cut shows: from the narrowest to the widest pillar, of rectangles from edge to edge.
-    let (low, high) = match design.cell.shape.rectangles() {
-        Some(Rectangles::Rotated(pillars)) => (pillars.width_nm, pillars.length_nm),
-        Some(Rectangles::Upright(pillars)) => (pillars.shortest_nm, pillars.longest_nm()),
-        None => design.cell.width_range_nm,
-    };
+    let edges_nm = design.cell.shape.edge_range_nm();
+    let (low, high) = edges_nm.unwrap_or(design.cell.width_range_nm);
     let widths = [low, (low + high) / 2, high].map(|w| f64::from(w) * 1e-3);
     // Thickness of the substrate and room for words grow with the pillars.
     let scale = height / DRAWN_HEIGHT_UM;

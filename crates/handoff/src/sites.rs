@@ -1,9 +1,9 @@
 //! Places on the chip at which widths are to be measured, and crosses to align by.
 
-use metalith_pillars::{LatticeKind, PillarMap, PillarShape, Rectangles};
+use metalith_pillars::{LatticeKind, PillarId, PillarMap, PillarShape};
 use serde::Serialize;
 
-use super::pad::{DrawnSize, legal_width, upright_sizes, whole_mdeg};
+use super::pad::{DrawnSize, legal_width, standing_for_all, whole_mdeg};
 use super::process::Process;
 use super::structures::Structure;
 use metalith_design::Design;
@@ -108,12 +108,8 @@ pub(super) fn sites(
 /// Pillars to look for: widths in equal steps inside the range, not its ends, where few pillars are (nm); of
 /// rectangles, the numbers of a few rotations or sizes.
 fn targets(design: &Design) -> Vec<u16> {
-    match design.cell.shape.rectangles() {
-        Some(Rectangles::Rotated(pillars)) => {
-            return ROTATIONS_DEG.map(|deg| pillars.number(deg.to_radians())).to_vec();
-        }
-        Some(Rectangles::Upright(pillars)) => return upright_sizes(design, pillars),
-        None => {}
+    if let Some(numbers) = standing_for_all(design, &ROTATIONS_DEG) {
+        return numbers;
     }
     let (low, high) = design.cell.width_range_nm;
     let step = f64::from(high - low) / (WIDTHS + 1) as f64;
@@ -134,17 +130,17 @@ struct BestSite {
 /// The neighbours of a site in nm, in degrees, or by how much their edges differ.
 fn neighbours(shape: PillarShape, site: &BestSite) -> (Range<u16>, Range<f64>, Option<u16>) {
     let (low, high) = site.around;
-    match shape {
-        PillarShape::Square | PillarShape::Circle => {
-            let width = |from_own: i32| (i32::from(site.number) + from_own) as u16;
-            (Some((width(low), width(high))), None, None)
-        }
-        PillarShape::Rectangle(Rectangles::Upright(_)) => (None, None, Some(high.max(-low) as u16)),
-        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => {
-            let own = pillars.rotation(site.number).to_degrees();
-            let deg = |from_own: i32| whole_mdeg(own + f64::from(from_own) * pillars.step_deg());
+    if shape.has_width() {
+        let width = |from_own: i32| (i32::from(site.number) + from_own) as u16;
+        return (Some((width(low), width(high))), None, None);
+    }
+    match shape.step().filter(|_| shape.has_one_size()) {
+        Some(step_deg) => {
+            let own_deg = shape.value(PillarId(site.number));
+            let deg = |from_own: i32| whole_mdeg(own_deg + f64::from(from_own) * step_deg);
             (None, Some((deg(low), deg(high))), None)
         }
+        None => (None, None, Some(high.max(-low) as u16)),
     }
 }
 
@@ -152,16 +148,16 @@ fn neighbours(shape: PillarShape, site: &BestSite) -> (Range<u16>, Range<f64>, O
 /// upright rectangles, the difference of the edge that differs more.
 fn from_own(shape: PillarShape, own: u16, other: u16) -> i32 {
     let apart = i32::from(other) - i32::from(own);
-    match shape.rectangles() {
+    match shape.last() {
         None => apart,
-        Some(Rectangles::Upright(pillars)) => {
-            let (own, other) = (pillars.edges_nm(own), pillars.edges_nm(other));
+        Some(PillarId(steps)) if shape.has_one_size() => {
+            let (steps, half) = (i32::from(steps), i32::from(steps / 2));
+            (apart + half).rem_euclid(steps) - half
+        }
+        Some(_) => {
+            let [own, other] = [own, other].map(|number| shape.edges_nm(PillarId(number)));
             let by = [0, 1].map(|axis| i32::from(other[axis]) - i32::from(own[axis]));
             if by[1].abs() > by[0].abs() { by[1] } else { by[0] }
-        }
-        Some(Rectangles::Rotated(pillars)) => {
-            let (steps, half) = (i32::from(pillars.steps), i32::from(pillars.steps / 2));
-            (apart + half).rem_euclid(steps) - half
         }
     }
 }

@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use super::dose::{DoseRow, WriteTime};
+use super::kind_words::KindWords;
 use super::matrix::DoseBlock;
 use super::pad::DrawnSize;
 use super::process::Process;
 use super::sites::{Cross, MetrologySite};
 use super::structures::Structure;
 use metalith_core::{AtomicFile, Result};
-use metalith_pillars::{PillarShape, Rectangles};
+use metalith_pillars::PillarShape;
 
 /// Rows of text under a head.
 struct Csv(String);
@@ -58,12 +59,6 @@ pub(super) fn write_doses(
     layer: i16,
     shape: PillarShape,
 ) -> Result<()> {
-    let measured: &[&str] = match shape {
-        PillarShape::Square => &["measured_pad_width_nm"],
-        PillarShape::Circle => &["measured_pad_diameter_nm"],
-        PillarShape::Rectangle(Rectangles::Rotated(_)) => &["measured_pad_width_nm", "measured_pad_length_nm"],
-        PillarShape::Rectangle(Rectangles::Upright(_)) => &["measured_pad_x_nm", "measured_pad_y_nm"],
-    };
     let mut head = vec![
         "number",
         "layer",
@@ -76,7 +71,7 @@ pub(super) fn write_doses(
         "pads_x_um",
         "pads_y_um",
     ];
-    head.extend(measured);
+    head.extend(KindWords::of(shape).dose_columns);
     head.push("remarks");
     let mut csv = Csv::new(&head);
     for (dose, block) in doses.iter().zip(blocks) {
@@ -131,31 +126,8 @@ pub(super) fn write_times(path: &Path, files: &[(String, Vec<WriteTime>)]) -> Re
 /// Places to measure at. Squares and circles are measured along x and y, rectangles along their edges.
 pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Process, shape: PillarShape) -> Result<()> {
     let mut head = vec!["id", "file", "place", "x_um", "y_um", "element_x_um", "element_y_um"];
-    head.extend(drawn_columns(shape));
-    head.extend::<&[&str]>(match shape {
-        PillarShape::Square | PillarShape::Circle => &[
-            "neighbours_min_nm",
-            "neighbours_max_nm",
-            "expected_low_nm",
-            "expected_high_nm",
-            "measured_x_nm",
-            "measured_y_nm",
-        ],
-        PillarShape::Rectangle(Rectangles::Upright(_)) => &[
-            "neighbours_within_nm",
-            "expected_within_nm",
-            "measured_x_nm",
-            "measured_y_nm",
-        ],
-        PillarShape::Rectangle(Rectangles::Rotated(_)) => &[
-            "neighbours_min_deg",
-            "neighbours_max_deg",
-            "expected_within_nm",
-            "measured_width_nm",
-            "measured_length_nm",
-            "measured_rotation_deg",
-        ],
-    });
+    let words = KindWords::of(shape);
+    head.extend(words.drawn_columns.iter().chain(words.site_columns));
     head.push("remarks");
     let mut csv = Csv::new(&head);
     let within = 2.0 * process.metrology.width_tolerance_nm;
@@ -170,17 +142,17 @@ pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Proces
             site.element_y_um.map_or_else(String::new, um),
         ];
         cells.extend(drawn_cells(shape, Some(&site.drawn)));
-        if shape.upright().is_some() {
-            let by = site.around_by_nm.map_or_else(String::new, |nm| nm.to_string());
-            cells.extend([by, format!("{within:.1}")]);
-        } else if shape.rotated().is_some() {
-            let deg = |pick: fn((f64, f64)) -> f64| site.around_deg.map_or_else(String::new, |a| pick(a).to_string());
-            cells.extend([deg(|a| a.0), deg(|a| a.1), format!("{within:.1}")]);
-        } else {
+        if shape.has_width() {
             let nm = |pick: fn((u16, u16)) -> u16| site.around_nm.map_or_else(String::new, |a| pick(a).to_string());
             let width = f64::from(site.drawn.width_nm);
             let expected = [width - within, width + within].map(|nm| format!("{nm:.1}"));
             cells.extend([nm(|a| a.0), nm(|a| a.1)].into_iter().chain(expected));
+        } else if shape.has_one_size() {
+            let deg = |pick: fn((f64, f64)) -> f64| site.around_deg.map_or_else(String::new, |a| pick(a).to_string());
+            cells.extend([deg(|a| a.0), deg(|a| a.1), format!("{within:.1}")]);
+        } else {
+            let by = site.around_by_nm.map_or_else(String::new, |nm| nm.to_string());
+            cells.extend([by, format!("{within:.1}")]);
         }
         cells.resize(head.len(), String::new());
         csv.row(&cells);
@@ -188,24 +160,15 @@ pub(super) fn write_sites(path: &Path, sites: &[MetrologySite], process: &Proces
     csv.write(path)
 }
 
-/// Columns of what is drawn where something is measured.
-fn drawn_columns(shape: PillarShape) -> &'static [&'static str] {
-    match shape {
-        PillarShape::Square | PillarShape::Circle => &["drawn_nm"],
-        PillarShape::Rectangle(Rectangles::Rotated(_)) => &["drawn_width_nm", "drawn_length_nm", "drawn_rotation_deg"],
-        PillarShape::Rectangle(Rectangles::Upright(_)) => &["drawn_x_nm", "drawn_y_nm"],
-    }
-}
-
 fn drawn_cells(shape: PillarShape, drawn: Option<&DrawnSize>) -> Vec<String> {
     let width = drawn.map_or_else(String::new, |d| d.width_nm.to_string());
-    if shape.rectangles().is_none() {
+    if shape.has_width() {
         return vec![width];
     }
     let length = drawn.and_then(|d| d.length_nm).map(|nm| nm.to_string());
     let rotation = drawn.and_then(|d| d.rotation_deg).map(|deg| deg.to_string());
     let mut cells = vec![width, length.unwrap_or_default()];
-    cells.extend(shape.rotated().map(|_| rotation.unwrap_or_default()));
+    cells.extend(shape.has_one_size().then(|| rotation.unwrap_or_default()));
     cells
 }
 
@@ -239,7 +202,7 @@ pub(super) fn write_crosses(path: &Path, crosses: &[Cross], steps: &str) -> Resu
 
 pub(super) fn write_structures(path: &Path, structures: &[Structure], shape: PillarShape) -> Result<()> {
     let mut head = vec!["id", "x0_um", "y0_um", "x1_um", "y1_um"];
-    head.extend(drawn_columns(shape));
+    head.extend(KindWords::of(shape).drawn_columns);
     head.push("purpose");
     let mut csv = Csv::new(&head);
     for s in structures {

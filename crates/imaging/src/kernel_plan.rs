@@ -193,7 +193,7 @@ impl<'a> KernelPlan<'a> {
             model: &model_text,
             fidelity: model.map_or(self.design.verify.fidelity, |_| Fidelity::Calibrated),
             tabulated_um: &self.design.verify.wavelengths_um,
-            polarised: (self.design.cell.shape.rectangles()).map(|_| self.design.verify.light()),
+            polarised: (self.design.cell.shape.basis()).map(|_| self.design.verify.light()),
             basis: &self.basis,
             spec: &self.spec,
             // JSON knows no infinity.

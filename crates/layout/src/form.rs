@@ -1,7 +1,7 @@
 //! The outline of one pillar of each width or rotation, as it is written.
 
 use metalith_design::Design;
-use metalith_pillars::{CHORD_ERROR, PillarShape, Rectangles};
+use metalith_pillars::{CHORD_ERROR, PillarId, PillarShape};
 
 /// Form in which pillars are drawn: their shape, and the tolerance of the polygons of circles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,23 +47,16 @@ impl PillarForm {
 
     /// Corners of a pillar of an even width (nm) or a number about its middle, counter-clockwise, the first not repeated.
     pub fn corners(&self, number: u16) -> Vec<(i64, i64)> {
-        self.shape.corners(number, self.chord_error_nm)
+        self.shape.corners(PillarId(number), self.chord_error_nm)
     }
 
     /// Reach of a pillar from its middle along x and y (nm).
     pub fn reach(&self, number: u16) -> (i64, i64) {
-        self.shape.reach(number)
+        self.shape.reach(PillarId(number))
     }
 
     /// Name of the cell of one of these pillars: by its width, its rotation in steps, or its widths along x and y.
     pub fn cell_name(&self, number: u16) -> String {
-        match self.shape {
-            PillarShape::Square | PillarShape::Circle => format!("W{number}"),
-            PillarShape::Rectangle(Rectangles::Rotated(_)) => format!("R{number}"),
-            PillarShape::Rectangle(Rectangles::Upright(pillars)) => {
-                let [x, y] = pillars.edges_nm(number);
-                format!("W{x}X{y}")
-            }
-        }
+        self.shape.cell_name(PillarId(number))
     }
 }

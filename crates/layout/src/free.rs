@@ -35,7 +35,7 @@ pub fn write_free(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
-    if free.shape.rectangles().is_some() && array.shape != free.shape {
+    if !free.shape.has_width() && array.shape != free.shape {
         return Err(Error::refused(
             "layout/rectangles-without-design",
             "rectangles without a design",

@@ -1,6 +1,6 @@
 //! Density: area that is exposed around a pillar.
 
-use metalith_pillars::{PillarMap, PillarShape};
+use metalith_pillars::{PillarId, PillarMap, PillarShape};
 use rayon::prelude::*;
 
 /// Range of the backscattered electrons over which fill is averaged (um): exp(-r^2 / range^2).
@@ -19,10 +19,10 @@ pub fn fill(pillars: &PillarMap, shape: PillarShape) -> Vec<f32> {
     let n = lattice.sites();
     let steps_nm = lattice.steps_nm().map(f64::from);
     // Of the place in the grid of the lattice: beside each pillar of a hexagonal one is an empty place.
-    let area = |w: u16| match shape.rectangles() {
-        None => (f64::from(w) / steps_nm[0] * (f64::from(w) / steps_nm[1]) * shape.area_share()) as f32,
-        Some(_) if w == 0 => 0.0,
-        Some(_) => (shape.area_nm2(w) / (steps_nm[0] * steps_nm[1])) as f32,
+    let area = |w: u16| match shape.has_width() {
+        true => (f64::from(w) / steps_nm[0] * (f64::from(w) / steps_nm[1]) * shape.area_share()) as f32,
+        false if w == 0 => 0.0,
+        false => (shape.area_nm2(PillarId(w)) / (steps_nm[0] * steps_nm[1])) as f32,
     };
     let mut plane: Vec<f32> = pillars.number.iter().map(|&w| area(w)).collect();
     // Rows, then columns as the rows of the transposed plane.

@@ -43,7 +43,7 @@ impl<'a> DrawnElement<'a> {
         Self {
             pillars,
             aperture_radius_um,
-            shape: PillarShape::Square,
+            shape: PillarShape::default(),
             centre_um: [0.0; 2],
             fill: OnceLock::new(),
         }
@@ -188,7 +188,7 @@ impl AsBuiltElement {
         let aperture = ShiftedAperture::new(lattice, drawn.aperture_radius_um, geometry.aperture_offset_um);
         let covered = |site: usize| aperture.as_ref().is_some_and(|a| a.passes(site) == 0.0);
         // Rectangles are told by their number, and both edges are off by the same.
-        let rectangles = drawn.shape.rectangles().is_some();
+        let rectangles = !drawn.shape.has_width();
         let without = RectangleClass::WITHOUT_PILLAR;
         let mut known: HashMap<(u64, u16), u16> = HashMap::new();
         let (mut class, mut width_nm, mut count) = (vec![0; n * n], vec![0.0], vec![0u32]);

@@ -9,6 +9,7 @@ use metalith_cell::CellStack;
 use metalith_core::document::{self, Fault, FaultKind, Faults};
 use metalith_core::text::quoted;
 use metalith_core::{AtomicFile, Error, Result};
+use metalith_pillars::PillarId;
 
 /// Version of the format that is written. The first called its perturbation `departure`; it is still read.
 const SCHEMA: u32 = 2;
@@ -70,7 +71,7 @@ impl CalibratedModel {
     pub fn check_drawn(&self, stack: &CellStack, counts: impl IntoIterator<Item = Vec<u64>>) -> Result<()> {
         let drawn = |counts: Vec<u64>| (1..counts.len()).filter(move |number| counts[*number] > 0);
         let numbers = counts.into_iter().flat_map(drawn);
-        let edges = numbers.flat_map(|number| stack.shape.edges_nm(number as u16));
+        let edges = numbers.flat_map(|number| stack.shape.edges_nm(PillarId(number as u16)).map(f64::from));
         let [least, most] = edges.fold([f64::INFINITY, 0.0], |[least, most], nm| [nm.min(least), nm.max(most)]);
         match most > 0.0 {
             true => self.check_bias([least, most], stack.lattice.nearest_nm(stack.pitch_nm)),

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use metalith_cell::{CellModel, CellResponse, Fidelity, Illumination, RigorousCell, RotatedCell};
 use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, NeighbourCell, cell_models, neighbour_cell};
+use metalith_pillars::PolarisationBasis;
 
 use crate::merit::robust::cells_off_height;
 
@@ -147,9 +148,9 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
 /// # Errors
 /// If they are upright rectangles.
 pub(crate) fn check_shape(design: &Design) -> Result<()> {
-    match design.cell.shape.upright() {
-        None => Ok(()),
-        Some(_) => Err(Error::refused(
+    match design.cell.shape.basis() {
+        None | Some(PolarisationBasis::Circular) => Ok(()),
+        Some(PolarisationBasis::Linear) => Err(Error::refused(
             "optimise/upright-rectangles",
             "the pillars are upright rectangles, which have a phase for each polarisation",
             "use squares, circles or rotated rectangles: the optimiser finds one phase for all light",

@@ -1,6 +1,8 @@
-//! The polygon that stands for a circle, for whoever writes one or measures distances from it.
+//! Circles, which differ by their diameter, and the polygon that stands for one.
 
 use std::f64::consts::{FRAC_PI_4, PI};
+
+use crate::kind::{OutlineForm, PillarId, PillarKind};
 
 /// Fewest and most steps of an eighth of the circle.
 const STEPS: [f64; 2] = [2.0, 512.0];
@@ -54,6 +56,49 @@ fn without_straight(corners: &[(i64, i64)]) -> Vec<(i64, i64)> {
         (bx - ax) * (cy - by) != (by - ay) * (cx - bx)
     };
     (0..n).filter(turns).map(|k| corners[k]).collect()
+}
+
+/// Circles; the width is the diameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Circle;
+
+impl Circle {
+    /// Distance of two circles with these diameters whose centres are (dx, dy) apart, all in one unit; negative where they overlap.
+    pub fn gap_of_widths(widths: [f64; 2], [dx, dy]: [f64; 2]) -> f64 {
+        dx.hypot(dy) - 0.5 * (widths[0] + widths[1])
+    }
+}
+
+impl PillarKind for Circle {
+    fn name(&self) -> &'static str {
+        "circle"
+    }
+
+    fn plural(&self) -> &'static str {
+        "circles"
+    }
+
+    #[inline]
+    fn outline(&self) -> OutlineForm {
+        OutlineForm::Circle
+    }
+
+    fn corners(&self, PillarId(width): PillarId, chord_error_nm: f64) -> Vec<(i64, i64)> {
+        circle_corners(width.into(), chord_error_nm)
+    }
+
+    fn area_share(&self) -> f64 {
+        FRAC_PI_4
+    }
+
+    #[inline]
+    fn gap(&self, pair: [PillarId; 2], apart: [f64; 2]) -> f64 {
+        Self::gap_of_widths(pair.map(|PillarId(width)| f64::from(width)), apart)
+    }
+
+    fn solver_revision(&self) -> u32 {
+        2
+    }
 }
 
 #[cfg(test)]

@@ -304,6 +304,23 @@ impl Lattice {
         }
     }
 
+    /// Largest square of a distance from the centre within a circle of this diameter, in the units of [`Lattice::units2`]: exact.
+    pub fn most_units2(&self, diameter_nm: u32) -> i64 {
+        let (d, p) = (i128::from(diameter_nm), i128::from(self.pitch_nm));
+        match self.kind {
+            LatticeKind::Square => (d * d / (p * p)) as i64,
+            LatticeKind::Hexagonal => (d * d) as i64,
+        }
+    }
+
+    /// A pitch in the units of which [`Lattice::units2`] has squares.
+    pub fn units_of_pitch(&self) -> i64 {
+        match self.kind {
+            LatticeKind::Square => 2,
+            LatticeKind::Hexagonal => 2 * i64::from(self.pitch_nm),
+        }
+    }
+
     /// A length of which distances along both axes are whole numbers: half a pitch, or half a nanometre on a hexagonal
     /// lattice (nm).
     #[inline]

@@ -3,19 +3,23 @@
 mod circle;
 mod eighth;
 mod element_site;
+mod kind;
 mod lattice;
 mod pillar_check;
 mod rectangle;
 mod rows;
 mod shape;
+mod square;
 mod steepness;
 
-pub use circle::{CHORD_ERROR, circle_corners};
+pub use circle::{CHORD_ERROR, Circle, circle_corners};
 pub use eighth::EighthMap;
 pub use element_site::{ElementSite, PillarReader};
+pub use kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity};
 pub use lattice::{Lattice, LatticeKind, PillarMap};
 pub use pillar_check::PillarCheck;
 pub use rectangle::{Rectangles, RotatedRectangles, UprightRectangles};
 pub use rows::PillarRows;
 pub use shape::PillarShape;
+pub use square::Square;
 pub use steepness::Steepness;

@@ -89,7 +89,7 @@ impl PillarCheck {
     #[must_use]
     pub fn of_shape(self, shape: PillarShape) -> Self {
         Self {
-            largest_nm: self.largest_nm.filter(|_| shape.rectangles().is_none()),
+            largest_nm: self.largest_nm.filter(|_| shape.has_width()),
             ..self
         }
     }

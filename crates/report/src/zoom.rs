@@ -4,7 +4,7 @@ use svg::node::element::{Group, Path, SVG};
 
 use super::axis::Axis;
 use super::figure::{Figure, Frame, scale_bar};
-use metalith_pillars::{PillarMap, PillarShape};
+use metalith_pillars::{OutlineForm, PillarId, PillarMap, PillarShape};
 
 /// More pillars an axis than this would be dust.
 const MOST: f64 = 80.0;
@@ -47,7 +47,7 @@ impl PillarZoom {
         Self {
             title: title.into(),
             pillars,
-            shape: PillarShape::Square,
+            shape: PillarShape::default(),
             centre_um,
             span_um,
             side: 380.0,
@@ -65,15 +65,16 @@ impl PillarZoom {
         let outline = |([cx, cy], number): &([i64; 2], u16)| {
             let width = i64::from(*number);
             let (x, y) = (cx - width / 2, cy - width / 2);
-            match self.shape {
-                PillarShape::Square => format!("M{x} {y}h{width}v{width}h-{width}z"),
-                PillarShape::Circle => {
+            match self.shape.outline() {
+                OutlineForm::Square => format!("M{x} {y}h{width}v{width}h-{width}z"),
+                OutlineForm::Circle => {
                     let (radius, middle) = (width as f64 / 2.0, y as f64 + width as f64 / 2.0);
                     format!("M{x} {middle}a{radius} {radius} 0 1 0 {width} 0a{radius} {radius} 0 1 0 -{width} 0z")
                 }
-                PillarShape::Rectangle(pillars) => {
-                    let [a, b, c, d] = pillars.corners(*number).map(|(x, y)| format!("{} {}", cx + x, cy - y));
-                    format!("M{a}L{b}L{c}L{d}z")
+                OutlineForm::Polygon => {
+                    let corners = self.shape.corners(PillarId(*number), 0.0).into_iter();
+                    let corners = corners.map(|(x, y)| format!("{} {}", cx + x, cy - y));
+                    format!("M{}z", corners.collect::<Vec<_>>().join("L"))
                 }
             }
         };

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use metalith_cell::{BAND_ORDERS, CellStack, LitStack};
+use metalith_cell::{BAND_ORDERS, CellStack, FocusedLight, LitStack};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
@@ -284,7 +284,7 @@ fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Re
 
 /// Check that rectangles, if the pillars of a design are such, can be made like that.
 fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Result<()> {
-    if design.cell.shape.rectangles().is_none() {
+    if design.cell.shape.has_width() {
         return Ok(());
     }
     if made.changes.iter().any(|change| change.corner_rounding_nm != 0.0) {
@@ -349,16 +349,16 @@ impl MadeRange {
         drawn.extend(library.map(|pillar| pillar.number));
         let (least, most) = design.cell.width_range_nm;
         // Rectangles are told by numbers that are no widths.
-        let (narrow, wide) = match design.cell.shape.rectangles() {
-            Some(_) => (0.0, 0.0),
-            None => (
+        let (narrow, wide) = match design.cell.shape.has_width() {
+            false => (0.0, 0.0),
+            true => (
                 f64::from(drawn.first().map_or(least, |w| least.min(*w))),
                 f64::from(drawn.last().map_or(most, |w| most.max(*w))),
             ),
         };
-        let numbers = match design.cell.shape.upright() {
-            Some(_) => drawn.into_iter().collect(),
-            None => Vec::new(),
+        let numbers = match design.focused() {
+            Some(FocusedLight::Linear(_)) => drawn.into_iter().collect(),
+            _ => Vec::new(),
         };
         let (single, band) = wavelengths_um(design)?;
         let single = single.into_iter().map(|um| (um, bank_orders(design.cell.shape)));

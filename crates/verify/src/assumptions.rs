@@ -2,7 +2,7 @@
 
 use metalith_cell::{Fidelity, FocusedLight, ORDERS, Truncation};
 use metalith_design::{CellIncidence, Design, Element};
-use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles};
+use metalith_pillars::{OutlineForm, PolarisationBasis, RotatedRectangles};
 use metalith_report::{Cell, Column, Page, Table, exact, fixed, sig};
 
 use super::page::span;
@@ -51,7 +51,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             "Each pillar passes light as in an infinite lattice of equal pillars",
             if of_paper {
                 Slopes::of(design).overstated()
-            } else if design.cell.shape.rectangles().is_some() || !design.cell.lattice.is_square() {
+            } else if design.cell.shape.basis().is_some() || !design.cell.lattice.is_square() {
                 "not known; at the rim neighbours differ most".into()
             } else {
                 "not known for this cell; --fidelity neighbours tells".into()
@@ -68,18 +68,17 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     if design.verify.incidence == CellIncidence::Normal {
         angles(&mut row, design, found);
     }
-    if let Some(pillars) = design.cell.shape.rectangles() {
-        match pillars {
-            Rectangles::Rotated(pillars) => polarised(&mut row, design, found, pillars),
-            Rectangles::Upright(_) => birefringence::rows(&mut row, design, found),
-        }
+    if let Some(pillars) = design.cell.shape.rotated() {
+        polarised(&mut row, design, found, pillars);
+    } else if design.cell.shape.basis() == Some(PolarisationBasis::Linear) {
+        birefringence::rows(&mut row, design, found);
     } else if found.fidelity == Fidelity::Rigorous {
         row(
             &format!("Cells are solved with {ORDERS} diffraction orders an axis"),
-            match design.cell.shape {
+            match design.cell.shape.outline() {
                 _ if of_paper => "0.004 rms in |t|, 0.03 beside resonances".into(),
-                PillarShape::Circle => "0.004 rms in t, 0.01 beside resonances".into(),
-                PillarShape::Square | PillarShape::Rectangle(_) => {
+                OutlineForm::Circle => "0.004 rms in t, 0.01 beside resonances".into(),
+                OutlineForm::Square | OutlineForm::Polygon => {
                     "not known for this cell; more where the index is higher".into()
                 }
             },
@@ -127,7 +126,7 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
         row(
             "Cells are lit along the normal",
             prototype("not computed in this run".into()),
-            if design.cell.shape.rectangles().is_some() {
+            if design.cell.shape.basis().is_some() {
                 "rectangles are solved along the normal alone"
             } else {
                 "--oblique solves them at the angle at which light arrives, both polarisations"

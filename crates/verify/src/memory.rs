@@ -95,7 +95,7 @@ fn whole_mb(design: &Design) -> f64 {
 fn holdings(design: &Design) -> Vec<Holding> {
     let held = |element: &Element| {
         let lens = design.lens_of(element);
-        let turned = design.cell.shape.rectangles().is_some();
+        let turned = !design.cell.shape.keeps(true, 1);
         let round = !turned && lens.outline.is_none() && !lens.terms.iter().any(|term| term.is_of(element.index));
         match (element.wedge.sin_x, element.wedge.sin_y) {
             (0.0, 0.0) if round && design.cell.lattice.is_square() => Holding::Eighth,

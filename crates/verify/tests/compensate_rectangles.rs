@@ -69,7 +69,13 @@ fn upright_rectangles_are_drawn_longer_where_they_come_out_short() {
     for (&to, &from) in drawn.number.iter().zip(&was.number) {
         assert_eq!(to == 0, from == 0);
         if to > 0 {
-            let [to, from] = [to, from].map(|number| design.cell.shape.edges_nm(number));
+            let [to, from] = [to, from].map(|number| {
+                design
+                    .cell
+                    .shape
+                    .edges_nm(metalith_pillars::PillarId(number))
+                    .map(f64::from)
+            });
             assert_eq!(to, from.map(|edge| edge + SHORT_NM));
             pillars += 1;
             ends += u64::from(to.contains(&160.0));

@@ -149,7 +149,7 @@ impl NewArgs {
         terminal: &Terminal,
     ) -> Result<()> {
         let (cell, name) = (&like.cell, self.like.as_deref().unwrap_or(&like.name));
-        if cell.shape.rectangles().is_some() || !cell.under.is_empty() || !like.mapping.steered.is_empty() {
+        if cell.shape.basis().is_some() || !cell.under.is_empty() || !like.mapping.steered.is_empty() {
             return Err(refused(
                 name,
                 "only squares and circles on their substrate are chosen anew",

@@ -2,15 +2,15 @@
 
 use metalith::cell::{
     CellStack, FittedCell, FocusedLight, Handedness, LitStack, Mapping, NeighbourCell, PointwiseCell, Polarisation,
-    PolarisationAxis, PolarisedLight, PublishedCell, RotatedCell, UprightCell, cache_folder,
+    PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
 };
 use metalith::design::CellFile;
 use metalith::rcwa::CellLattice;
 use metalith::report::{exact, sig};
 use metalith::verify::Lighting;
 use metalith::{
-    Accuracy, AsBuiltChip, CalibratedModel, CellModel, Error, Extraction, LatticeKind, PillarShape, Rectangles, Result,
-    Wedge,
+    Accuracy, AsBuiltChip, CalibratedModel, CellModel, Error, Extraction, LatticeKind, PillarShape, PolarisationBasis,
+    Result, Wedge,
 };
 
 use super::{FidelityArg, PsfArgs, PsfLight};
@@ -77,7 +77,7 @@ impl PsfArgs {
                 "pitch, as found",
                 match Self::lattice_kind(found) {
                     LatticeKind::Square => format!("{} nm", Self::pitch_nm(found)),
-                    LatticeKind::Hexagonal => format!("{} nm, of a hexagonal lattice", Self::pitch_nm(found)),
+                    kind => format!("{} nm, of a {kind} lattice", Self::pitch_nm(found)),
                 },
             ),
             (
@@ -118,25 +118,10 @@ impl PsfArgs {
             (None, FidelityArg::Rigorous) => "rigorous coupled-wave analysis of a lattice of equal pillars".into(),
         };
         all.push(("cell", cell));
-        match found.shape.rectangles() {
-            Some(Rectangles::Rotated(pillars)) => {
-                let (size, step_deg) = ([pillars.width_nm, pillars.length_nm], pillars.step_deg());
-                let rotations = format!("{} x {} nm, read to {step_deg} degrees", size[0], size[1]);
-                all.push(("rotated rectangles", rotations));
-            }
-            Some(Rectangles::Upright(pillars)) => {
-                let (shortest, longest) = (pillars.shortest_nm, pillars.longest_nm());
-                let sizes = format!("edges of {shortest} to {longest} nm in steps of {} nm", pillars.step_nm);
-                all.push(("upright rectangles", sizes));
-            }
-            None => {}
+        if found.shape.basis().is_some() {
+            all.push(("pillars, as found", found.shape.description()));
+            all.push(("polarisation", self.polarised(found.shape)));
         }
-        all.extend(
-            found
-                .shape
-                .rectangles()
-                .map(|_| ("polarisation", self.polarised(found.shape))),
-        );
         if !published {
             all.push(("pillars", self.pillars()));
         }
@@ -145,18 +130,18 @@ impl PsfArgs {
 
     /// Polarisation of the light that arrives at pillars of a shape.
     pub(super) fn arriving(&self, shape: PillarShape) -> Polarisation {
-        let usual = match shape.upright() {
-            Some(_) => PolarisationAxis::X.polarisation(),
-            None => Polarisation::Circular(Handedness::default()),
+        let usual = match shape.basis() {
+            Some(PolarisationBasis::Linear) => PolarisationAxis::X.polarisation(),
+            _ => Polarisation::Circular(Handedness::default()),
         };
         self.arriving.unwrap_or(usual)
     }
 
     /// The light that they are taken to focus.
     fn focused(&self, shape: PillarShape) -> FocusedLight {
-        match shape.upright() {
-            Some(_) => FocusedLight::Linear(PolarisationAxis::nearest(self.arriving(shape))),
-            None => FocusedLight::Circular(self.hand().unwrap_or_default()),
+        match shape.basis() {
+            Some(PolarisationBasis::Linear) => FocusedLight::Linear(PolarisationAxis::nearest(self.arriving(shape))),
+            _ => FocusedLight::Circular(self.hand().unwrap_or_default()),
         }
     }
 
@@ -181,8 +166,8 @@ impl PsfArgs {
     /// Source and detector at pillars of a shape, in words.
     fn polarised(&self, shape: PillarShape) -> String {
         let (arriving, light) = (self.arriving(shape), self.polarised_light(shape));
-        let focused = match (shape.rotated(), self.hand()) {
-            (Some(_), Some(hand)) => format!(", {hand} is focused"),
+        let focused = match (shape.basis(), self.hand()) {
+            (Some(PolarisationBasis::Circular), Some(hand)) => format!(", {hand} is focused"),
             _ => String::new(),
         };
         let detector = light.detector(self.focused(shape));
@@ -194,7 +179,7 @@ impl PsfArgs {
         let shape = found.shape;
         let stated = LitStack {
             stack: self.stack(found)?,
-            focused: shape.rectangles().map(|_| self.focused(shape)),
+            focused: shape.basis().map(|_| self.focused(shape)),
         };
         model.check_drawn(&stated.stack, found.elements.iter().map(|e| e.widths.histogram()))?;
         Ok(AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref()))
@@ -203,15 +188,9 @@ impl PsfArgs {
     /// Cell that solves it for the pillars as drawn.
     pub(super) fn cell(&self, found: &Extraction, light: &PsfLight) -> Result<Box<dyn CellModel>> {
         let stack = self.stack(found)?;
-        match (found.shape.rectangles(), self.focused(found.shape)) {
-            (Some(Rectangles::Rotated(pillars)), FocusedLight::Circular(hand)) => {
-                return Ok(Box::new(RotatedCell::new(stack, pillars, hand)));
-            }
-            (Some(Rectangles::Upright(pillars)), FocusedLight::Linear(axis)) => {
-                let cell = UprightCell::new(stack, pillars, axis);
-                return Ok(Box::new(cell.kept_in(cache_folder().as_deref())));
-            }
-            _ => {}
+        let focused = self.focused(found.shape);
+        if let Some(cell) = polarising_cell(&stack, focused, cache_folder().as_deref()) {
+            return Ok(cell);
         }
         if matches!(self.fidelity, FidelityArg::Published) {
             return Ok(Box::new(PublishedCell::of_stack(&stack)?));

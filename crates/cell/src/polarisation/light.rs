@@ -1,5 +1,6 @@
 //! Light that is simulated at pillars that distinguish polarisations.
 
+use metalith_pillars::PolarisationBasis;
 use serde::Serialize;
 
 use super::{Analyser, Polarisation, PolarisationAxis};
@@ -21,6 +22,14 @@ impl FocusedLight {
         match self {
             Self::Circular(hand) => Polarisation::Circular(hand),
             Self::Linear(axis) => axis.polarisation(),
+        }
+    }
+
+    /// The basis that it is of: pillars of this basis focus it.
+    pub fn basis(self) -> PolarisationBasis {
+        match self {
+            Self::Circular(_) => PolarisationBasis::Circular,
+            Self::Linear(_) => PolarisationBasis::Linear,
         }
     }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::Along;
 use crate::CellStack;
 use crate::kept::{CacheEntry, bytes_of, complex_of, solver_of};
-use metalith_pillars::{PillarShape, UprightRectangles};
+use metalith_pillars::UprightRectangles;
 
 const MAGIC: [u8; 8] = *b"MLUPRT\0\x01";
 
@@ -29,7 +29,7 @@ pub(super) fn table(
         orders: usize,
     }
     let inputs = Inputs {
-        solver: solver_of(PillarShape::Rectangle(pillars.into())),
+        solver: solver_of(pillars.into()),
         stack,
         pillars,
         wavelength_um,

@@ -80,11 +80,9 @@ impl Symmetry {
         seen
     }
 
-    /// True if it leaves every pillar of a shape unchanged about its own middle: half a turn leaves a rectangle
-    /// unchanged, a mirror about an axis an upright one too.
+    /// True if it leaves every pillar of a kind unchanged about its own middle.
     pub fn keeps(self, shape: PillarShape) -> bool {
-        let is_along_axes = self.quarter_turns.is_multiple_of(2);
-        shape.rectangles().is_none() || (is_along_axes && (!self.mirrored || shape.upright().is_some()))
+        shape.keeps(self.mirrored, self.quarter_turns)
     }
 
     /// True if it maps a lattice onto itself: a hexagonal one has the symmetries of a rectangle.

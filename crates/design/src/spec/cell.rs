@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::lens::WAVELENGTH;
 use metalith_cell::{FocusedLight, Handedness, InversePolynomial, Polarisation, PolarisationAxis};
 use metalith_core::document::{Limits, Section};
-use metalith_pillars::{LatticeKind, PillarShape, RotatedRectangles, UprightRectangles};
+use metalith_pillars::{LatticeKind, PillarId, PillarShape, PolarisationBasis, RotatedRectangles, UprightRectangles};
 use metalith_rcwa::Material;
 
 /// The unit cell: a pillar on a lattice.
@@ -94,11 +94,11 @@ impl CellSpec {
             Kind::Circle => with_widths(s, PillarShape::Circle, widest),
             Kind::Rectangle => {
                 let pillars = read_rectangles(s, widest);
-                (PillarShape::Rectangle(pillars.into()), (1, pillars.steps), 1)
+                (pillars.into(), (1, pillars.steps), 1)
             }
             Kind::Upright => {
                 let pillars = read_upright(s, widest);
-                (PillarShape::Rectangle(pillars.into()), (1, pillars.count()), 1)
+                (pillars.into(), (1, pillars.count()), 1)
             }
         };
         if let Some(what) = lattice.refusal(shape) {
@@ -109,9 +109,8 @@ impl CellSpec {
                 "add `shape = \"circle\"`, or use the square lattice",
             );
         }
-        let arriving = shape
-            .rotated()
-            .map(|_| s.choice("arriving", &Handedness::CHOICES, Some(Handedness::default())));
+        let arriving = (shape.basis() == Some(PolarisationBasis::Circular))
+            .then(|| s.choice("arriving", &Handedness::CHOICES, Some(Handedness::default())));
         // Widths and places are whole nanometres; the key is there so that a design says so.
         s.optional_integer("database_unit_nm", 1..=1, "nm, the only unit that is written");
         let pillar_material = read_material(s, "pillar_material").unwrap_or_else(|| DEFAULT_FILM.into());
@@ -189,10 +188,8 @@ impl CellSpec {
 
     /// The largest width (nm) or number that a pillar can have: no width is beyond the pitch.
     pub fn most(&self) -> u16 {
-        match self.shape {
-            PillarShape::Square | PillarShape::Circle => self.lattice.widest_nm(self.pitch_nm) as u16,
-            PillarShape::Rectangle(pillars) => pillars.last(),
-        }
+        let last = self.shape.last().map(|PillarId(number)| number);
+        last.unwrap_or_else(|| self.lattice.widest_nm(self.pitch_nm) as u16)
     }
 
     /// The light that pillars give the phase of the design where they distinguish polarisations, in the light that it
@@ -201,7 +198,7 @@ impl CellSpec {
         let axis = || verified.map_or(PolarisationAxis::X, PolarisationAxis::nearest);
         match self.arriving {
             Some(hand) => Some(FocusedLight::Circular(hand)),
-            None => self.shape.upright().map(|_| FocusedLight::Linear(axis())),
+            None => (self.shape.basis() == Some(PolarisationBasis::Linear)).then(|| FocusedLight::Linear(axis())),
         }
     }
 

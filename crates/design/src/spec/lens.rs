@@ -10,7 +10,7 @@ use super::{CellSpec, term};
 use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TableReading, TermForm};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
-use metalith_pillars::Lattice;
+use metalith_pillars::{Lattice, PolarisationBasis};
 
 /// The lens that all elements of the array share, or that an element has of its own.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -122,7 +122,7 @@ impl LensSpec {
             y.finish();
             PhaseAlongY { phase, terms }
         });
-        if self.along_y.is_some() && cell.shape.upright().is_none() {
+        if self.along_y.is_some() && cell.shape.basis() != Some(PolarisationBasis::Linear) {
             s.fault_given(
                 &["cell.shape"],
                 "y",

@@ -13,6 +13,7 @@ use metalith_cell::{
 };
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Progress, Result};
+use metalith_pillars::PolarisationBasis;
 
 pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
 
@@ -87,7 +88,7 @@ impl MappingSpec {
     pub(crate) fn is_from_cells(s: &Section<'_, '_>, cell: &CellSpec, library: LibraryFile) -> bool {
         let says_none = !s.has("coefficients") && !s.has("table") && !cell.is_of_the_paper();
         let asked = s.has("source") || (library == LibraryFile::ToBeMade && says_none);
-        asked && cell.shape.rectangles().is_none()
+        asked && cell.shape.basis().is_none()
     }
 
     /// The wavelength that the mapping is made for (um), which other sections go by.
@@ -118,8 +119,8 @@ impl MappingSpec {
         from_cells: bool,
     ) -> Self {
         let published = InversePolynomial::published();
-        let rotated = cell.shape.rotated().is_some();
-        let upright = cell.shape.upright().is_some();
+        let rotated = cell.shape.basis() == Some(PolarisationBasis::Circular);
+        let upright = cell.shape.basis() == Some(PolarisationBasis::Linear);
         if s.has("source") {
             s.choice("source", &[("cells", ())], None);
         }

@@ -8,7 +8,7 @@ use super::{CellSpec, LibraryFile};
 use metalith_cell::{InversePolynomial, MappedCell, MappedDifference, MappedValue};
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Error, Result, Warning};
-use metalith_pillars::{LatticeKind, PillarShape, Rectangles};
+use metalith_pillars::LatticeKind;
 
 /// The cell that the mapping of a design is for, compared with its `[cell]`. It decides nothing of the layout.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,7 +25,7 @@ impl CellSpec {
     /// The cell as a mapping for this wavelength (um) states it.
     pub fn mapped(&self, wavelength_um: f64) -> MappedCell {
         let mut values: Vec<(&'static str, MappedValue)> = vec![
-            ("shape", shape_word(self.shape).into()),
+            ("shape", self.shape.design_name().into()),
             ("lattice", lattice_word(self.lattice).into()),
             ("pitch_nm", f64::from(self.pitch_nm).into()),
             ("pillar_height_nm", self.pillar_height_nm.into()),
@@ -56,15 +56,6 @@ impl CellSpec {
             values.push(("residual_nm", film.height_nm.into()));
         }
         MappedCell::new(values)
-    }
-}
-
-fn shape_word(shape: PillarShape) -> &'static str {
-    match shape.rectangles() {
-        Some(Rectangles::Rotated(_)) => "rectangle",
-        Some(Rectangles::Upright(_)) => "upright_rectangle",
-        None if shape.is_square() => "square",
-        None => "circle",
     }
 }
 
@@ -105,7 +96,7 @@ impl MappingIdentity {
                 section.fault(key, difference.to_string(), MappedCell::REMEDY);
             }
         }
-        let by_coefficients = !s.has("table") && cell.shape.rectangles().is_none();
+        let by_coefficients = !s.has("table") && cell.shape.basis().is_none();
         let published = InversePolynomial::published();
         let is_published = by_coefficients
             && polynomial.basis == published.basis

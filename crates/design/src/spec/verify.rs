@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use metalith_cell::{Analyser, Fidelity, OBLIQUE_RECTANGLES, Polarisation, PolarisedLight, PublishedCell};
 use metalith_core::document::{Limits, Section};
+use metalith_pillars::PolarisationBasis;
 
 use super::CellSpec;
 use super::lens::WAVELENGTH;
@@ -163,7 +164,7 @@ fn read_analyser(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Analyser> {
     let choices = [&[("none", None)], &named[..]].concat();
     let analyser = s.optional_choice_or_float(KEY, &choices, AXIS, |deg| Some(Analyser::Linear(deg)))??;
     polarising(s, KEY, "an analyser", cell);
-    if analyser == Analyser::Circular && cell.shape.upright().is_some() {
+    if analyser == Analyser::Circular && cell.shape.basis() == Some(PolarisationBasis::Linear) {
         s.fault_given(
             &["cell.shape"],
             KEY,
@@ -171,12 +172,12 @@ fn read_analyser(s: &Section<'_, '_>, cell: &CellSpec) -> Option<Analyser> {
             "use x, y or the angle of a linear one",
         );
     }
-    cell.shape.rectangles().map(|_| analyser)
+    cell.shape.basis().map(|_| analyser)
 }
 
 /// A fault at what counts only for pillars that distinguish polarisations.
 fn polarising(s: &Section<'_, '_>, key: &str, what: &str, cell: &CellSpec) {
-    if cell.shape.rectangles().is_none() {
+    if cell.shape.basis().is_none() {
         s.fault_given(
             &["cell.shape"],
             key,
@@ -190,7 +191,7 @@ fn read_incidence(s: &Section<'_, '_>, cell: &CellSpec) -> CellIncidence {
     let choices = [("normal", CellIncidence::Normal), ("oblique", CellIncidence::Oblique)];
     s.renamed("as_lit", "oblique");
     let incidence = s.choice("incidence", &choices, Some(CellIncidence::Normal));
-    if incidence == CellIncidence::Oblique && cell.shape.rectangles().is_some() {
+    if incidence == CellIncidence::Oblique && cell.shape.basis().is_some() {
         let [what, hint] = OBLIQUE_RECTANGLES;
         s.fault_given(&["cell.shape"], "incidence", what, hint);
     }

@@ -7,7 +7,7 @@ use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextA
 use metalith_core::text::printable_bytes;
 use metalith_gds::extract::{ExtractedElement, StoredPillars};
 use metalith_gds::{LayerNumber, Point, Rect};
-use metalith_pillars::{PillarRows, PillarShape};
+use metalith_pillars::{PillarId, PillarRows, PillarShape};
 
 /// Tiles along the longer side of the map of changes.
 const TILES: usize = 128;
@@ -158,12 +158,8 @@ fn element(
     shape: PillarShape,
     changes: &mut Changes,
 ) -> ElementDiff {
-    let rotated = shape.rotated().is_some();
-    let edges = |number: u16| {
-        shape
-            .rectangles()
-            .map_or([number; 2], |pillars| pillars.edges_nm(number))
-    };
+    let rotated = shape.has_one_size();
+    let edges = |number: u16| shape.edges_nm(PillarId(number));
     let lattice = a.site.lattice;
     let mut diff = ElementDiff {
         name: a.site.name.clone(),
@@ -203,8 +199,8 @@ fn element(
         }
         let x = (a.site.centre_nm[0] + lattice.place_nm(0, column)) as f64;
         let y = (a.site.centre_nm[1] + lattice.place_nm(1, row)) as f64;
-        let half = shape.widest_nm(from.max(to)) / 2.0;
-        let widths = shape.rectangles().is_none().then_some([from, to]);
+        let half = shape.widest_nm(PillarId(from.max(to))) / 2.0;
+        let widths = shape.has_width().then_some([from, to]);
         changes.add(what, layer, [x - half, y - half, x + half, y + half], widths);
     };
     for row in 0..n {

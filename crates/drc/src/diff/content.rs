@@ -10,7 +10,7 @@ use metalith_gds::{
     DrawnPillar, LayerNumber, Layout, LayoutCell, PillarFinder, Point, Rect, Selection, Shape, Text, Transform,
     Visitor, drawn_corners, rectangle_of, simplified,
 };
-use metalith_pillars::PillarShape;
+use metalith_pillars::{OutlineForm, PillarShape};
 
 /// Vertices that may be placed for each that may be held: most corners of rectangles are not.
 const PLACED: u64 = 8;
@@ -299,7 +299,7 @@ impl Visitor for ContentReader<'_> {
                 let mut put = 0;
                 if shape.layer == self.pillars {
                     self.pillar_shapes += placements.len() as u64;
-                    if self.shape.rectangles().is_some() {
+                    if self.shape.outline() == OutlineForm::Polygon {
                         put = self.filler.put_copies(&mut self.finder, shape, placements);
                     }
                 } else {

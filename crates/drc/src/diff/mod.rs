@@ -122,7 +122,7 @@ fn both(first: PillarShape, second: PillarShape) -> Result<PillarShape> {
             ),
         )
     })?;
-    Ok(PillarShape::Rectangle(united.into()))
+    Ok(united.into())
 }
 
 fn gcd(a: i64, b: i64) -> i64 {

@@ -18,7 +18,7 @@ const PILLARS: RotatedRectangles = RotatedRectangles {
 };
 
 fn pillar(gds: &mut Gds, (x, y): (i32, i32), number: u16) {
-    let corners = PILLARS.corners(number);
+    let corners = PILLARS.on_grid(number);
     let closed = corners.iter().chain(corners.first());
     let points: Vec<(i32, i32)> = closed.map(|&(dx, dy)| (x + dx as i32, y + dy as i32)).collect();
     gds.polygon(1, &points);
@@ -90,7 +90,7 @@ fn rules_see_the_edges_of_upright_rectangles() {
         lengths: 9,
     };
     let upright = |gds: &mut Gds, (x, y): (i32, i32), edges: [u16; 2]| {
-        let corners = SIZES.corners(SIZES.number(edges).unwrap());
+        let corners = SIZES.on_grid(SIZES.number(edges).unwrap());
         let points: Vec<(i32, i32)> = corners.map(|(dx, dy)| (x + dx as i32, y + dy as i32)).to_vec();
         gds.polygon(1, &[&points[..], &points[..1]].concat());
     };
@@ -161,7 +161,7 @@ fn cells_of_a_further_file_are_not_those_of_the_first() {
         gds.end_cell();
         layout(gds.end())
     };
-    let pillar = PILLARS.corners(30).map(|(x, y)| (x as i32, y as i32));
+    let pillar = PILLARS.on_grid(30).map(|(x, y)| (x as i32, y as i32));
     let trapezoid = [(-100, -50), (100, -50), (60, 50), (-60, 50)];
     let deck = deck_from("rules/rectangles.toml", &[]);
     let found = |further: &[(i32, i32)]| {

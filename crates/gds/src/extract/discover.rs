@@ -11,7 +11,7 @@ use crate::{
     Visitor,
 };
 use metalith_core::Progress;
-use metalith_pillars::{ElementSite, PillarShape, Rectangles};
+use metalith_pillars::{ElementSite, PillarShape};
 
 /// Settings of one search of a layout.
 #[derive(Clone, Copy)]
@@ -147,18 +147,18 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     let rectangles = (mostly || among)
         .then(|| map.sizes.pillars(how.widest_nm))
         .flatten()
-        .filter(|found| mostly || matches!(found.pillars, Rectangles::Upright(_)));
+        .filter(|found| mostly || found.with_squares);
     let shape = match &rectangles {
-        Some(found) => PillarShape::Rectangle(found.pillars),
+        Some(found) => found.shape,
         None if circles > squares => PillarShape::Circle,
         None => PillarShape::Square,
     };
     let places = match rectangles {
         None => map.pillars,
         // All of them are at their places already.
-        Some(found) if map.sizes.all_are(&found, squares) => match found.pillars {
-            Rectangles::Rotated(_) => map.tilted,
-            Rectangles::Upright(_) => map.tilted.united(map.pillars),
+        Some(found) if map.sizes.all_are(&found, squares) => match found.with_squares {
+            false => map.tilted,
+            true => map.tilted.united(map.pillars),
         },
         Some(_) => {
             let mut search = Search {

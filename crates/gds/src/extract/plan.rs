@@ -38,7 +38,7 @@ impl ExtractionPlan {
     pub fn given(pillar_layer: LayerNumber, elements: Vec<ElementSite>) -> Self {
         Self {
             pillar_layer,
-            shape: Some(PillarShape::Square),
+            shape: Some(PillarShape::default()),
             elements: Elements::Given(elements),
             top: None,
             listed: 1000,

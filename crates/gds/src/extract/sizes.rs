@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::sites::Scale;
 use crate::memo::{BoxMemo, OutlineMemo};
 use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
-use metalith_pillars::{Rectangles, RotatedRectangles, UprightRectangles};
+use metalith_pillars::{PillarShape, RotatedRectangles, UprightRectangles};
 
 /// Sizes that are distinguished: a layout has one, and what its corners make of it.
 const MOST_SIZES: usize = 1 << 12;
@@ -62,7 +62,9 @@ struct SeenRectangle {
 
 /// Rectangles that are pillars.
 pub(super) struct FoundRectangles {
-    pub pillars: Rectangles,
+    pub shape: PillarShape,
+    /// True if squares are such pillars too.
+    pub with_squares: bool,
     /// Number of them that are no squares.
     pub count: u64,
 }
@@ -120,7 +122,7 @@ impl Sizes {
 
     /// True if all rectangles are these pillars, and, where squares are too, all of so many squares.
     pub fn all_are(&self, found: &FoundRectangles, squares: u64) -> bool {
-        let Rectangles::Upright(pillars) = found.pillars else {
+        let Some(pillars) = found.shape.upright() else {
             return found.count == self.rectangles;
         };
         let lengths: BTreeSet<i64> = pillars.lengths_nm().map(i64::from).collect();
@@ -163,7 +165,8 @@ impl Sizes {
             .map(|nm| u16::try_from(nm).ok())
             .collect();
         Some(FoundRectangles {
-            pillars: UprightRectangles::of_lengths(lengths?.into_iter())?.into(),
+            shape: UprightRectangles::of_lengths(lengths?.into_iter())?.into(),
+            with_squares: true,
             count: most.iter().map(|(_, n)| n).sum(),
         })
     }
@@ -194,7 +197,8 @@ impl Sizes {
             steps: STEPS,
         };
         (width < length && length <= longest_nm).then_some(FoundRectangles {
-            pillars: pillars.into(),
+            shape: pillars.into(),
+            with_squares: false,
             count,
         })
     }

@@ -142,7 +142,7 @@ fn rectangles_of_a_magnified_cell_are_found_as_large_as_they_are() {
     gds.cell("LENS");
     for k in 0..36 {
         let (x, y) = (2 * (175 + 350 * (k % 6) - 1050), 2 * (175 + 350 * (k / 6) - 1050));
-        gds.polygon(1, &polygon_about(x, y, &drawn.corners(1 + 5 * k as u16)));
+        gds.polygon(1, &polygon_about(x, y, &drawn.on_grid(1 + 5 * k as u16)));
     }
     gds.end_cell();
     let read = extract(&layout(gds.end()), &ExtractionPlan::discover(PILLARS), &Silent).unwrap();

@@ -2,9 +2,8 @@
 
 use super::SHOWN;
 use crate::contents::Contents;
-use crate::pad::measured;
+use crate::kind_words::KindWords;
 use crate::pictures;
-use metalith_pillars::{PillarShape, Rectangles};
 use metalith_report::{Cell, Column, Page, Table};
 
 pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {
@@ -37,18 +36,11 @@ pub(super) fn tests(page: &mut Page, c: &Contents<'_>) {
 
 pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
     let shape = c.design.cell.shape;
-    page.section(format!("Where to measure {}", measured(shape)));
-    let (alike, expected) = match shape {
-        PillarShape::Square => ("nearly the same width", "drawn width"),
-        PillarShape::Circle => (
-            "nearly the same diameter",
-            "drawn diameter, along x and along y: where they differ the beam is astigmatic,",
-        ),
-        PillarShape::Rectangle(Rectangles::Rotated(_)) => ("nearly the same rotation", "drawn width and length"),
-        PillarShape::Rectangle(Rectangles::Upright(_)) => ("nearly the same edges", "drawn edges along x and y"),
-    };
+    let words = KindWords::of(shape);
+    page.section(format!("Where to measure {}", words.measured));
+    let KindWords { similar, expected, .. } = words;
     page.paragraph(format!(
-        "Sites on the lenses are those whose neighbours have {alike}, so that a miscount by one pillar changes the result little. \
+        "Sites on the lenses are those whose neighbours have {similar}, so that a miscount by one pillar changes the result little. \
          Expected: {expected} within two standard deviations of {} nm. `metrology/cd_table.csv` has columns to fill in.",
         c.process.metrology.width_tolerance_nm
     ));
@@ -61,8 +53,8 @@ pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
         Column::number("y", "um"),
         Column::number("Drawn", "nm"),
     ];
-    columns.extend(shape.rectangles().map(|_| Column::number("by", "nm")));
-    columns.extend(shape.rotated().map(|_| Column::number("Rotation", "degrees")));
+    columns.extend((!shape.has_width()).then(|| Column::number("by", "nm")));
+    columns.extend(shape.has_one_size().then(|| Column::number("Rotation", "degrees")));
     columns.push(Column::text("Neighbours"));
     let mut table = Table::new(columns);
     for s in c.documents.sites.iter().filter(|s| s.file == "pillars") {

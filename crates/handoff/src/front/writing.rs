@@ -2,9 +2,9 @@
 
 use crate::contents::Contents;
 use crate::dose::{DOSE_FORMULA, FORMULA, duration};
-use crate::pad::{dose_pads, measured};
+use crate::kind_words::KindWords;
+use crate::pad::dose_pads;
 use crate::{job, pictures};
-use metalith_pillars::{PillarShape, Rectangles};
 use metalith_report::{Cell, Column, Page, Table, fixed};
 
 pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
@@ -17,7 +17,7 @@ pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
         range[0],
         range[1],
         c.process.writer.acceleration_kv,
-        measured(c.design.cell.shape)
+        KindWords::of(c.design.cell.shape).measured
     ));
     page.figure(pictures::dose_matrix(
         c.process,
@@ -47,15 +47,7 @@ pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
 pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
     page.section("Write time");
     let w = &c.process.writer;
-    let shape = c.design.cell.shape;
-    let (snapped, changed) = match shape {
-        PillarShape::Square => ("a width that is no multiple of it", "rms change of width"),
-        PillarShape::Circle => ("a diameter that is no multiple of it", "rms change of diameter"),
-        PillarShape::Rectangle(Rectangles::Upright(_)) => ("a width that is no multiple of it", "rms change of width"),
-        PillarShape::Rectangle(Rectangles::Rotated(_)) => {
-            ("a corner that is on no multiple of it", "rms shift of corners")
-        }
-    };
+    let KindWords { snapped, changed, .. } = KindWords::of(c.design.cell.shape);
     page.code(format!("{FORMULA}\n{DOSE_FORMULA}"));
     page.paragraph(format!(
         "{}, {}: fields of {} um, grid {} nm, at most {} MHz. Overheads: {} us a shape, {} s a field, {} s a job. The shot \
@@ -94,7 +86,7 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
         Column::number("Current", "nA"),
         Column::number("Shot step", "nm"),
         Column::number("Clock", "MHz"),
-        Column::number(changed, "nm"),
+        Column::number(*changed, "nm"),
         Column::text("Pitch"),
     ])
     .caption("What the shots of each beam do to the pillars of the array");

@@ -11,7 +11,7 @@ use metalith_core::Result;
 use metalith_core::document::load;
 use metalith_design::Design;
 use metalith_drc::Deck;
-use metalith_pillars::PillarShape;
+use metalith_pillars::{OutlineForm, PillarShape};
 
 /// The processes that ship with the program.
 static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../processes");
@@ -226,10 +226,10 @@ pub struct JobSpec {
 impl CheckSpec {
     /// The decks of the first step for pillars of a shape, if the process has them.
     pub fn of_shape(&self, shape: PillarShape) -> Option<&ShapeRules> {
-        match shape {
-            PillarShape::Square => self.squares.as_ref(),
-            PillarShape::Circle => self.circles.as_ref(),
-            PillarShape::Rectangle(_) => self.rectangles.as_ref(),
+        match shape.outline() {
+            OutlineForm::Square => self.squares.as_ref(),
+            OutlineForm::Circle => self.circles.as_ref(),
+            OutlineForm::Polygon => self.rectangles.as_ref(),
         }
     }
 

@@ -2,11 +2,12 @@
 
 use super::{APART, BESIDE, NUMERAL, StructureLayers, Structures, clear_of_borders};
 use crate::drawing::{RectNm, Sheet, nm};
+use crate::kind_words::KindWords;
 use crate::matrix::top_pad;
 use crate::pad::{DrawnSize, line_width, test_pads};
 use crate::process::Process;
 use metalith_design::Design;
-use metalith_pillars::{LatticeKind, PillarShape, Rectangles};
+use metalith_pillars::LatticeKind;
 
 /// Lines of a dense CD group; odd, so that the middle one is as dense as lines get.
 const LINES: i64 = 5;
@@ -36,12 +37,7 @@ impl Structures {
         let side = nm(process.tests.pad_um);
         let pitch = pad_pitch_nm(design.cell.lattice, design.cell.pitch_nm, sparse);
         let cleave = sparse == 1;
-        let sizes = match design.cell.shape {
-            PillarShape::Square => "width",
-            PillarShape::Circle => "diameter",
-            PillarShape::Rectangle(Rectangles::Rotated(_)) => "width, length",
-            PillarShape::Rectangle(Rectangles::Upright(_)) => "widths along x and y",
-        };
+        let KindWords { sizes, .. } = KindWords::of(design.cell.shape);
         // Room at the left for the dashes of the cleave line.
         let mut x = APART + side + APART;
         let mut row = RectNm::at(x, y, side, side);

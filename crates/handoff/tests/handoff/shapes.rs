@@ -11,7 +11,7 @@ use metalith_gds::{
 };
 use metalith_handoff::{HandoffOptions, LayoutStatistics, handoff, verify_handoff};
 use metalith_layout::LayoutFormat;
-use metalith_pillars::{LatticeKind, PillarRows, PillarShape, Rectangles};
+use metalith_pillars::{LatticeKind, PillarId, PillarRows, PillarShape, Rectangles};
 use metalith_wave::Accuracy;
 
 use super::{PILLARS, SUMMED, TABLE_S, rows_in};
@@ -142,8 +142,8 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
     let each = counts.iter().enumerate().skip(1);
     let (ideal, off) = each.fold((0.0, 0.0), |(ideal, off), (w, &n)| {
         let (area_nm2, around_nm) = match shape {
-            PillarShape::Rectangle(r) => {
-                let [a, b] = r.edges_nm(w as u16).map(f64::from);
+            PillarShape::Rectangle(_) => {
+                let [a, b] = shape.edges_nm(PillarId(w as u16)).map(f64::from);
                 (a * b, 2.0 * (a + b))
             }
             _ => (FRAC_PI_4 * (w * w) as f64, 4.0 * FRAC_PI_4 * w as f64),

@@ -22,7 +22,7 @@ use super::stack::{off_cutoff, perturbed, possible_width_nm};
 use super::{CellChange, SolvedWidths};
 use metalith_cell::{CellStack, UPRIGHT_ORDERS, kept};
 use metalith_core::{Error, Progress, Result};
-use metalith_pillars::{Rectangles, RotatedRectangles};
+use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
 
 /// Version of the kept file.
@@ -275,10 +275,7 @@ impl CellBank {
     }
 
     fn rotated(&self) -> Option<RotatedRectangles> {
-        match self.stated.shape.rectangles()? {
-            Rectangles::Rotated(pillars) => Some(pillars),
-            Rectangles::Upright(_) => None,
-        }
+        self.stated.shape.rotated()
     }
 
     /// Transmissions of pillars of these widths (nm) with a change, along the normal.
@@ -319,8 +316,8 @@ impl CellBank {
                 let tables = &tables[self.colour((wavelength_um, orders))?];
                 let row = |bias: &f64| self.of_sizes(change, (sizes, tables), numbers, *bias);
                 let rows = biases_nm.iter().map(row).collect::<Result<_>>()?;
-                let pillars = self.stated.shape.rectangles().expect("sizes are of rectangles");
-                let bare = bare_row(&perturbed(&self.stated, change), pillars, numbers.len(), wavelength_um)?;
+                let etched = perturbed(&self.stated, change);
+                let bare = bare_row(&etched, sizes.pillars().into(), numbers.len(), wavelength_um)?;
                 Ok((rows, bare))
             }
         }

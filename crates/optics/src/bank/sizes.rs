@@ -109,6 +109,11 @@ impl Sizes {
         Self { pillars, spans }
     }
 
+    /// Pillars of the table.
+    pub fn pillars(&self) -> UprightRectangles {
+        self.pillars
+    }
+
     /// Number of pillars that are solved at first, in each stack.
     pub fn first(&self) -> usize {
         self.spans.iter().map(|span| span.nodes_nm.len()).sum()

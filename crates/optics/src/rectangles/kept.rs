@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::RowOrders;
 use metalith_cell::CellStack;
 use metalith_cell::kept::{CacheEntry, complex_of, solver_of};
-use metalith_pillars::{PillarShape, Rectangles};
+use metalith_pillars::Rectangles;
 
 const MAGIC: [u8; 8] = *b"MLMADE\0\x01";
 
@@ -32,7 +32,7 @@ pub(super) fn table(
         orders: RowOrders,
     }
     let inputs = Inputs {
-        solver: solver_of(PillarShape::Rectangle(pillars)),
+        solver: solver_of(pillars.into()),
         etched,
         pillars,
         numbers,

@@ -21,7 +21,7 @@ use metalith_cell::{
     PolarisedTables, RotationSamples, Spectral, UPRIGHT_ORDERS,
 };
 use metalith_core::{Error, Progress, Result};
-use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles};
+use metalith_pillars::{PillarShape, PolarisationBasis, Rectangles, RotatedRectangles};
 
 /// A class of rectangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,9 +46,9 @@ pub(super) type Colour = (f64, Spectral);
 /// Diffraction orders an axis that a bank of pillars of a shape is solved with at single wavelengths. Those of upright rectangles are as many
 /// as of pillars as drawn: with fewer, those of a lens beside a resonance have a Strehl ratio that is off by two in a hundred.
 pub fn bank_orders(shape: PillarShape) -> usize {
-    match shape.upright() {
-        Some(_) => UPRIGHT_ORDERS,
-        None => ORDERS,
+    match shape.basis() {
+        Some(PolarisationBasis::Linear) => UPRIGHT_ORDERS,
+        _ => ORDERS,
     }
 }
 
@@ -74,13 +74,8 @@ impl MadeRectangles {
     /// # Errors
     /// If they are no such rectangles, or the model has what they have no meaning for.
     pub fn new(stated: &CellStack, model: &CalibratedModel, focused: FocusedLight) -> Result<Self> {
-        let pillars = stated.shape.rectangles();
-        let fits = matches!(
-            (pillars, focused),
-            (Some(Rectangles::Rotated(_)), FocusedLight::Circular(_))
-                | (Some(Rectangles::Upright(_)), FocusedLight::Linear(_))
-        );
-        let Some(pillars) = pillars.filter(|_| fits) else {
+        let fits = stated.shape.basis() == Some(focused.basis());
+        let (true, PillarShape::Rectangle(pillars)) = (fits, stated.shape) else {
             return Err(Error::refused(
                 "light/not-focused",
                 "light of a polarisation that these pillars do not focus",
@@ -180,9 +175,9 @@ impl CalibratedModel {
     /// # Errors
     /// If they are rectangles and it says what counts for one width alone.
     pub fn check_shape(&self, shape: PillarShape) -> Result<()> {
-        match shape.rectangles() {
-            Some(_) => check_rectangles(self),
-            None => Ok(()),
+        match shape.has_width() {
+            false => check_rectangles(self),
+            true => Ok(()),
         }
     }
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::stack::{off_cutoff, possible_width_nm};
 use metalith_cell::{CellStack, RotationSamples, UPRIGHT_ORDERS, birefringent_pillars, birefringent_stacks};
 use metalith_core::{Progress, Result};
-use metalith_pillars::{PillarShape, Rectangles, RotatedRectangles};
+use metalith_pillars::{PillarId, PillarKind, PillarShape, Rectangles, RotatedRectangles};
 use metalith_rcwa::Orders;
 
 /// Number of diffraction orders an axis that rectangles are solved with.
@@ -51,7 +51,7 @@ pub(crate) fn solve_row(
                 RowOrders::Given(orders) => orders,
                 RowOrders::AsDrawn => UPRIGHT_ORDERS,
             })?;
-            let edges = |number: &u16| pillars.edges_nm(*number).map(|edge| f64::from(edge) + bias_nm);
+            let edges = |number: &u16| pillars.biased_edges_nm(PillarId(*number), bias_nm);
             let edges: Vec<[f64; 2]> = numbers.iter().map(edges).collect();
             let etched = std::slice::from_ref(etched);
             let one = |edges: [f64; 2]| Ok(solve_upright(etched, edges, wavelength_um, orders)?[0]);
@@ -105,7 +105,7 @@ pub(crate) fn bare_row(
 ) -> Result<Vec<Complex64>> {
     // Layers without a pillar: any shape will do, and one order is all there is.
     let bare = CellStack {
-        shape: PillarShape::Square,
+        shape: PillarShape::default(),
         ..etched.clone()
     };
     let t = bare.transmission(0.0, wavelength_um, Orders::new(1)?)?;

@@ -15,7 +15,7 @@ use crate::{CellChange, perturbed};
 use metalith_cell::kept::bytes_of;
 use metalith_cell::{BAND_ORDERS, CellStack};
 use metalith_core::{Progress, Result};
-use metalith_pillars::Rectangles;
+use metalith_pillars::{PillarShape, Rectangles};
 
 /// Biases of one element that are solved themselves at the most; of more, those a step apart are.
 const MOST_BIASES: usize = 4;
@@ -93,9 +93,10 @@ impl SolvedRectangles {
         let place = (etched.height_nm.to_bits(), um.to_bits(), bias_nm.to_bits(), orders);
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let of_all = [0];
-        let numbers = match self.pillars {
-            Rectangles::Rotated(_) => &of_all,
-            Rectangles::Upright(_) => numbers,
+        // Pillars of one size are solved together, whatever their rotation.
+        let numbers = match PillarShape::from(self.pillars).has_one_size() {
+            true => &of_all,
+            false => numbers,
         };
         let missing: Vec<u16> = {
             let known = known();

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use metalith_core::{Error, Result, lagrange_weight};
-use metalith_pillars::{Lattice, LatticeKind, PillarMap};
+use metalith_pillars::{Lattice, PillarMap};
 
 use super::links::{Link, Links, distance_of, neighbour};
 use super::node::{NODES, Node};
@@ -106,7 +106,7 @@ impl Rings {
     /// The ring of a site.
     pub fn ring_at(&self, ix: usize, iy: usize) -> Option<usize> {
         let r2 = self.lattice.units2(ix, iy);
-        (self.lattice.has(ix, iy) && r2 <= largest_units2(self.lattice, self.diameter_nm)).then(|| self.ring_of(r2))
+        (self.lattice.has(ix, iy) && r2 <= self.lattice.most_units2(self.diameter_nm)).then(|| self.ring_of(r2))
     }
 
     /// Pillars of one width a ring. The array that a layout of this lens alone would hold.
@@ -169,13 +169,13 @@ impl Rings {
 
     /// floor(r / pitch) from the square of a distance in units, exactly.
     fn ring_of(&self, units2: i64) -> usize {
-        (units2 as u64).isqrt() as usize / units_of_pitch(self.lattice) as usize
+        (units2 as u64).isqrt() as usize / self.lattice.units_of_pitch() as usize
     }
 
     /// Entries of `counts` for a ring.
     fn of_ring(&self, ring: usize) -> &[(i64, u32)] {
         let first = |k: usize| {
-            let least = (units_of_pitch(self.lattice) * k as i64).pow(2);
+            let least = (self.lattice.units_of_pitch() * k as i64).pow(2);
             self.counts.partition_point(|(r2, _)| *r2 < least)
         };
         &self.counts[first(ring)..first(ring + 1)]
@@ -183,7 +183,7 @@ impl Rings {
 
     /// Squares of the radii of [`Rings::nodes`], in the units of [`Lattice::units2`].
     pub fn node_units2(&self, ring: usize) -> [f64; NODES] {
-        let end = |k: usize| (units_of_pitch(self.lattice) * k as i64).pow(2) as f64;
+        let end = |k: usize| (self.lattice.units_of_pitch() * k as i64).pow(2) as f64;
         let (low, high) = (end(ring), end(ring + 1));
         std::array::from_fn(|j| {
             let angle = std::f64::consts::PI * (j as f64 + 0.5) / NODES as f64;
@@ -222,27 +222,10 @@ fn lagrange(at: &[f64; NODES], units2: i64) -> [f64; NODES] {
     })
 }
 
-/// A pitch in the units of [`Lattice::units2`].
-fn units_of_pitch(lattice: Lattice) -> i64 {
-    match lattice.kind() {
-        LatticeKind::Square => 2,
-        LatticeKind::Hexagonal => 2 * i64::from(lattice.pitch_nm()),
-    }
-}
-
-/// Largest square of a distance within a diameter, in the units of [`Lattice::units2`].
-fn largest_units2(lattice: Lattice, diameter_nm: u32) -> i64 {
-    let d = i64::from(diameter_nm);
-    match lattice.kind() {
-        LatticeKind::Square => d * d / i64::from(lattice.pitch_nm()).pow(2),
-        LatticeKind::Hexagonal => d * d,
-    }
-}
-
 /// Squares of the distances of the sites within a diameter, and how many sites are at each: of the quarter to the upper right, whose
 /// sites stand for their mirror images.
 fn counts(lattice: Lattice, diameter_nm: u32) -> Vec<(i64, u32)> {
-    let largest = largest_units2(lattice, diameter_nm);
+    let largest = lattice.most_units2(diameter_nm);
     let n = lattice.sites();
     let images = |i: usize| if 2 * i + 1 == n { 1 } else { 2 };
     let mut all = Vec::new();
@@ -267,6 +250,7 @@ mod tests {
 
     use super::*;
     use crate::write_phase_table;
+    use metalith_pillars::LatticeKind;
 
     fn lens() -> Rings {
         Rings::new(Lattice::covering(1_000_000, 350).unwrap(), 1_000_000).unwrap()
@@ -340,7 +324,7 @@ mod tests {
             for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
                 let ring = written.turns(ix, iy).map(|waves| (waves * count).round() as usize);
                 assert_eq!(rings.ring_at(ix, iy), ring, "{kind:?}, {pitch_nm} nm: {ix} {iy}");
-                let units = units_of_pitch(lattice) * ring.unwrap_or(0) as i64;
+                let units = lattice.units_of_pitch() * ring.unwrap_or(0) as i64;
                 borders += usize::from(units > 0 && lattice.units2(ix, iy) == units.pow(2));
             }
             assert_eq!(kind.is_square(), borders == 0);

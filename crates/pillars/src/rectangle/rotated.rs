@@ -4,6 +4,9 @@ use std::f64::consts::PI;
 
 use serde::Serialize;
 
+use crate::Circle;
+use crate::kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity};
+
 /// Rectangular pillars of one size on a layout. What tells one from another is its number, from 1 to `steps`: its rotation in
 /// steps of half a turn over `steps`. Half a turn leaves a rectangle as it is, so the last number stands for no rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -39,7 +42,7 @@ impl RotatedRectangles {
     }
 
     /// Corners of a pillar about its middle, each on the nearest place of the grid of whole nanometres, counter-clockwise.
-    pub fn corners(self, number: u16) -> [(i64, i64); 4] {
+    pub fn on_grid(self, number: u16) -> [(i64, i64); 4] {
         let (sin, cos) = self.rotation(number).sin_cos();
         let (w, l) = (f64::from(self.width_nm) / 2.0, f64::from(self.length_nm) / 2.0);
         let corner = |x: f64, y: f64| {
@@ -53,21 +56,15 @@ impl RotatedRectangles {
     /// The longest diagonal there is, of pillars as drawn (nm): corners on the grid lie up to 0.7 nm farther out than those of the
     /// rectangle itself.
     pub fn longest_diagonal_nm(self) -> f64 {
-        let corners = (1..=self.steps.max(1)).flat_map(|number| self.corners(number));
+        let corners = (1..=self.steps.max(1)).flat_map(|number| self.on_grid(number));
         let squared = corners.map(|(x, y)| x * x + y * y).max();
         2.0 * (squared.unwrap_or(0) as f64).sqrt()
-    }
-
-    /// Reach of the corners of a pillar from its middle along x and y (nm).
-    pub fn reach(self, number: u16) -> (i64, i64) {
-        let [a, b, ..] = self.corners(number);
-        (a.0.abs().max(b.0.abs()), a.1.abs().max(b.1.abs()))
     }
 
     /// Angle by which the rounding of its corners to the grid turns a pillar (rad): its axis as drawn less
     /// [`RotatedRectangles::rotation`].
     pub fn turned_by_grid(self, number: u16) -> f64 {
-        let [a, b, c, _] = self.corners(number).map(|(x, y)| (x as f64, y as f64));
+        let [a, b, c, _] = self.on_grid(number).map(|(x, y)| (x as f64, y as f64));
         let (along, across) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
         // The axis of the second moments of a parallelogram; that of the longer edge is a quarter turn on.
         let sum = |f: fn((f64, f64)) -> f64| f(along) + f(across);
@@ -80,11 +77,83 @@ impl RotatedRectangles {
     pub fn drawn_rotation(self, number: u16) -> f64 {
         self.rotation(number) + self.turned_by_grid(number)
     }
+}
 
-    /// Distance of two pillars of these numbers whose centres are (dx, dy) apart (nm), as drawn; negative where they overlap.
-    pub fn gap(self, numbers: [u16; 2], [dx, dy]: [f64; 2]) -> f64 {
-        let a = self.corners(numbers[0]).map(|(x, y)| [x as f64, y as f64]);
-        let b = self.corners(numbers[1]).map(|(x, y)| [x as f64 + dx, y as f64 + dy]);
+impl PillarKind for RotatedRectangles {
+    fn name(&self) -> &'static str {
+        "rectangle"
+    }
+
+    fn plural(&self) -> &'static str {
+        "rectangles"
+    }
+
+    fn description(&self) -> String {
+        format!(
+            "rectangles of {} x {} nm rotated in steps of {}°",
+            self.width_nm,
+            self.length_nm,
+            rounded(self.step_deg())
+        )
+    }
+
+    #[inline]
+    fn outline(&self) -> OutlineForm {
+        OutlineForm::Polygon
+    }
+
+    fn basis(&self) -> Option<PolarisationBasis> {
+        Some(PolarisationBasis::Circular)
+    }
+
+    #[inline]
+    fn has_width(&self) -> bool {
+        false
+    }
+
+    fn has_one_size(&self) -> bool {
+        true
+    }
+
+    fn last(&self) -> Option<PillarId> {
+        Some(PillarId(self.steps))
+    }
+
+    fn edge_range_nm(&self) -> Option<(u16, u16)> {
+        Some((self.width_nm, self.length_nm))
+    }
+
+    #[inline]
+    fn edges_nm(&self, _id: PillarId) -> [u16; 2] {
+        [self.width_nm, self.length_nm]
+    }
+
+    fn axis_edges_nm(&self, _id: PillarId) -> Vec<u16> {
+        Vec::new()
+    }
+
+    fn four_corners(&self, PillarId(number): PillarId) -> Option<[(i64, i64); 4]> {
+        Some(self.on_grid(number))
+    }
+
+    fn reach(&self, PillarId(number): PillarId) -> (i64, i64) {
+        let [a, b, ..] = self.on_grid(number);
+        (a.0.abs().max(b.0.abs()), a.1.abs().max(b.1.abs()))
+    }
+
+    fn half_nm(&self, id: PillarId) -> [f64; 2] {
+        let (x, y) = self.reach(id);
+        [x as f64, y as f64]
+    }
+
+    fn widest_nm(&self, _last: PillarId) -> f64 {
+        self.longest_diagonal_nm()
+    }
+
+    #[inline]
+    fn gap(&self, pair: [PillarId; 2], [dx, dy]: [f64; 2]) -> f64 {
+        let a = self.on_grid(pair[0].0).map(|(x, y)| [x as f64, y as f64]);
+        let b = self.on_grid(pair[1].0).map(|(x, y)| [x as f64 + dx, y as f64 + dy]);
         let separation = along_normals(&a, &b).max(along_normals(&b, &a));
         if separation <= 0.0 {
             return separation;
@@ -100,9 +169,16 @@ impl RotatedRectangles {
         nearest(&a, &b).min(nearest(&b, &a))
     }
 
-    /// The number of the pillar whose outline is this one about its middle (nm), in any order of its corners, if each is within
-    /// `slack_nm` of one of the pillar's.
-    pub fn recognised(self, corners: &[[f64; 2]; 4], slack_nm: f64) -> Option<u16> {
+    fn least_gap(&self, last: PillarId, apart: [f64; 2]) -> f64 {
+        // Pillars stay within circles, whatever their rotation.
+        Circle::gap_of_widths([self.widest_nm(last); 2], apart)
+    }
+
+    fn keeps(&self, mirrored: bool, quarter_turns: u8) -> bool {
+        !mirrored && quarter_turns.is_multiple_of(2)
+    }
+
+    fn recognised(&self, corners: &[[f64; 2]; 4], slack_nm: f64) -> Option<PillarId> {
         let edge = |k: usize| {
             let (a, b) = (corners[k], corners[(k + 1) % 4]);
             [b[0] - a[0], b[1] - a[1]]
@@ -115,11 +191,45 @@ impl RotatedRectangles {
             second
         };
         let number = self.number(along[1].atan2(along[0]) - PI / 2.0);
-        let drawn = self.corners(number).map(|(x, y)| [x as f64, y as f64]);
+        let drawn = self.on_grid(number).map(|(x, y)| [x as f64, y as f64]);
         let near = |p: &[f64; 2]| drawn.iter().any(|q| (p[0] - q[0]).hypot(p[1] - q[1]) <= slack_nm);
         let distinct = |k: usize| edge(k)[0].hypot(edge(k)[1]) > 2.0 * slack_nm;
-        ((0..4).all(distinct) && corners.iter().all(near)).then_some(number)
+        ((0..4).all(distinct) && corners.iter().all(near)).then_some(PillarId(number))
     }
+
+    fn words(&self, PillarId(number): PillarId) -> String {
+        format!("rotated by {} degrees", rounded(self.rotation(number).to_degrees()))
+    }
+
+    fn cell_name(&self, PillarId(number): PillarId) -> String {
+        format!("R{number}")
+    }
+
+    fn quantity(&self) -> Quantity {
+        Quantity {
+            word: "rotation",
+            title: "Rotation",
+            label: "rotation",
+            unit: "°",
+        }
+    }
+
+    fn value(&self, PillarId(number): PillarId) -> f64 {
+        self.rotation(number).to_degrees()
+    }
+
+    fn step(&self) -> Option<f64> {
+        Some(self.step_deg())
+    }
+
+    fn solver_revision(&self) -> u32 {
+        1
+    }
+}
+
+/// An angle (degrees) without the rounding of its computation.
+fn rounded(deg: f64) -> f64 {
+    (deg * 1e6).round() / 1e6
 }
 
 /// Largest distance by which a side of `a` has all of `b` beyond it; negative if none has.
@@ -163,9 +273,9 @@ mod tests {
             assert_eq!(PILLARS.number(PILLARS.rotation(number)), number);
             assert_eq!(PILLARS.number(PILLARS.rotation(number) - 3.0 * PI), number);
         }
-        assert_eq!(PILLARS.corners(180), [(-50, -125), (50, -125), (50, 125), (-50, 125)]);
-        assert_eq!(PILLARS.corners(90), [(125, -50), (125, 50), (-125, 50), (-125, -50)]);
-        assert_eq!(PILLARS.reach(90), (125, 50));
+        assert_eq!(PILLARS.on_grid(180), [(-50, -125), (50, -125), (50, 125), (-50, 125)]);
+        assert_eq!(PILLARS.on_grid(90), [(125, -50), (125, 50), (-125, 50), (-125, -50)]);
+        assert_eq!(PILLARS.reach(PillarId(90)), (125, 50));
     }
 
     #[test]
@@ -175,7 +285,7 @@ mod tests {
         // What that may turn half of the longer edge by, with two corners that give way to opposite sides.
         const TURNED: f64 = ROUNDED / 125.0;
         for number in 1..=180 {
-            let drawn = PILLARS.corners(number);
+            let drawn = PILLARS.on_grid(number);
             let (sin, cos) = PILLARS.rotation(number).sin_cos();
             for ((x, y), (u, v)) in drawn
                 .iter()
@@ -188,10 +298,10 @@ mod tests {
             let mut corners = drawn.map(|(x, y)| [x as f64, y as f64]);
             for _ in 0..4 {
                 corners.rotate_left(1);
-                assert_eq!(PILLARS.recognised(&corners, 0.1), Some(number));
+                assert_eq!(PILLARS.recognised(&corners, 0.1), Some(PillarId(number)));
                 let mut back = corners;
                 back.reverse();
-                assert_eq!(PILLARS.recognised(&back, 0.1), Some(number));
+                assert_eq!(PILLARS.recognised(&back, 0.1), Some(PillarId(number)));
             }
             corners[0][0] += 3.0;
             assert_eq!(PILLARS.recognised(&corners, 1.5), None);
@@ -200,7 +310,7 @@ mod tests {
             width_nm: 90,
             ..PILLARS
         };
-        let corners = thinner.corners(30).map(|(x, y)| [x as f64, y as f64]);
+        let corners = thinner.on_grid(30).map(|(x, y)| [x as f64, y as f64]);
         assert_eq!(PILLARS.recognised(&corners, 1.5), None);
         assert_eq!(PILLARS.recognised(&[[0.0; 2]; 4], 200.0), None);
     }
@@ -214,7 +324,7 @@ mod tests {
             ([180, 180], [130.0, 290.0], 50.0),
             ([180, 180], [40.0, 200.0], -50.0),
         ] {
-            let gap = PILLARS.gap(numbers, apart);
+            let gap = PILLARS.gap(numbers.map(PillarId), apart);
             assert!((gap - want).abs() < ROUNDING, "{numbers:?} {apart:?}: {gap}");
         }
     }

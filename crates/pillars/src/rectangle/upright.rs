@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity, gap_of_boxes};
+
 /// Upright rectangular pillars on a layout. Edges along x and along y are each one of a row of lengths in equal steps. What tells one
 /// pillar from another is its number, from 1 on: first by the edge along x, then by that along y.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -74,23 +76,9 @@ impl UprightRectangles {
     }
 
     /// Corners of a pillar about its middle (nm), counter-clockwise.
-    pub fn corners(self, number: u16) -> [(i64, i64); 4] {
-        let (x, y) = self.reach(number);
-        [(-x, -y), (x, -y), (x, y), (-x, y)]
-    }
-
-    /// Reach of a pillar from its middle along x and y (nm).
-    pub fn reach(self, number: u16) -> (i64, i64) {
+    pub fn on_grid(self, number: u16) -> [(i64, i64); 4] {
         let [x, y] = self.edges_nm(number).map(|nm| i64::from(nm) / 2);
-        (x, y)
-    }
-
-    /// Distance of two pillars of these numbers whose centres are (dx, dy) apart (nm); negative where they overlap.
-    pub fn gap(self, numbers: [u16; 2], [dx, dy]: [f64; 2]) -> f64 {
-        let [a, b] = numbers.map(|number| self.edges_nm(number));
-        let reach = |axis: usize| 0.5 * (f64::from(a[axis]) + f64::from(b[axis]));
-        let (x, y) = (dx.abs() - reach(0), dy.abs() - reach(1));
-        if x > 0.0 && y > 0.0 { x.hypot(y) } else { x.max(y) }
+        [(-x, -y), (x, -y), (x, y), (-x, y)]
     }
 
     /// The longest diagonal of the pillars up to a number (nm).
@@ -100,10 +88,78 @@ impl UprightRectangles {
         let x = if number > self.counted() { self.longest_nm() } else { x };
         f64::from(x).hypot(f64::from(y))
     }
+}
 
-    /// The number of the pillar whose outline is this one about its middle (nm), in any order of its corners, if each is within
-    /// `slack_nm` of one of the pillar's.
-    pub fn recognised(self, corners: &[[f64; 2]; 4], slack_nm: f64) -> Option<u16> {
+impl PillarKind for UprightRectangles {
+    fn name(&self) -> &'static str {
+        "rectangle"
+    }
+
+    fn plural(&self) -> &'static str {
+        "rectangles"
+    }
+
+    fn design_name(&self) -> &'static str {
+        "upright_rectangle"
+    }
+
+    fn description(&self) -> String {
+        format!(
+            "upright rectangles with edges of {} to {} nm in steps of {} nm",
+            self.shortest_nm,
+            self.longest_nm(),
+            self.step_nm
+        )
+    }
+
+    #[inline]
+    fn outline(&self) -> OutlineForm {
+        OutlineForm::Polygon
+    }
+
+    fn basis(&self) -> Option<PolarisationBasis> {
+        Some(PolarisationBasis::Linear)
+    }
+
+    #[inline]
+    fn has_width(&self) -> bool {
+        false
+    }
+
+    fn last(&self) -> Option<PillarId> {
+        Some(PillarId(self.count()))
+    }
+
+    fn edge_range_nm(&self) -> Option<(u16, u16)> {
+        Some((self.shortest_nm, self.longest_nm()))
+    }
+
+    #[inline]
+    fn edges_nm(&self, PillarId(number): PillarId) -> [u16; 2] {
+        (*self).edges_nm(number)
+    }
+
+    fn axis_edges_nm(&self, PillarId(number): PillarId) -> Vec<u16> {
+        (*self).edges_nm(number).to_vec()
+    }
+
+    fn four_corners(&self, PillarId(number): PillarId) -> Option<[(i64, i64); 4]> {
+        Some(self.on_grid(number))
+    }
+
+    fn widest_nm(&self, PillarId(last): PillarId) -> f64 {
+        self.longest_diagonal_nm(last)
+    }
+
+    fn least_gap(&self, _last: PillarId, apart: [f64; 2]) -> f64 {
+        gap_of_boxes([[f64::from(self.longest_nm()); 2]; 2], apart)
+    }
+
+    fn keeps(&self, _mirrored: bool, quarter_turns: u8) -> bool {
+        quarter_turns.is_multiple_of(2)
+    }
+
+    fn recognised(&self, corners: &[[f64; 2]; 4], slack_nm: f64) -> Option<PillarId> {
         let extent = |axis: usize| {
             let reach = corners.iter().map(|c| c[axis]);
             reach.clone().fold(f64::NEG_INFINITY, f64::max) - reach.fold(f64::INFINITY, f64::min)
@@ -114,10 +170,37 @@ impl UprightRectangles {
             (k >= 0.0 && k < f64::from(self.counted())).then(|| self.edge_nm(k as u16))
         };
         let number = self.number([nearest(extent(0))?, nearest(extent(1))?])?;
-        let drawn = self.corners(number).map(|(x, y)| [x as f64, y as f64]);
+        let drawn = self.on_grid(number).map(|(x, y)| [x as f64, y as f64]);
         let near = |p: &[f64; 2], q: &[f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]) <= slack_nm;
         let each_has_one = drawn.iter().all(|q| corners.iter().any(|p| near(p, q)));
-        each_has_one.then_some(number)
+        each_has_one.then_some(PillarId(number))
+    }
+
+    fn words(&self, PillarId(number): PillarId) -> String {
+        let [x, y] = (*self).edges_nm(number);
+        format!("{x} x {y} nm")
+    }
+
+    fn cell_name(&self, PillarId(number): PillarId) -> String {
+        let [x, y] = (*self).edges_nm(number);
+        format!("W{x}X{y}")
+    }
+
+    fn quantity(&self) -> Quantity {
+        Quantity {
+            word: "size",
+            title: "Width along x",
+            label: "width along x",
+            unit: "nm",
+        }
+    }
+
+    fn step(&self) -> Option<f64> {
+        Some(f64::from(self.step_nm))
+    }
+
+    fn solver_revision(&self) -> u32 {
+        1
     }
 }
 
@@ -149,7 +232,7 @@ mod tests {
         for edges in [[60, 80], [90, 80], [80, 300], [80, 81]] {
             assert_eq!(PILLARS.number(edges), None, "{edges:?}");
         }
-        assert_eq!(PILLARS.corners(12), [(-40, -50), (40, -50), (40, 50), (-40, 50)]);
+        assert_eq!(PILLARS.on_grid(12), [(-40, -50), (40, -50), (40, 50), (-40, 50)]);
     }
 
     #[test]
@@ -175,13 +258,13 @@ mod tests {
     #[test]
     fn outlines_are_recognised_in_any_order_and_others_are_not() {
         for number in [1, 5, 60, 121] {
-            let mut corners = PILLARS.corners(number).map(|(x, y)| [x as f64, y as f64]);
+            let mut corners = PILLARS.on_grid(number).map(|(x, y)| [x as f64, y as f64]);
             for _ in 0..4 {
                 corners.rotate_left(1);
-                assert_eq!(PILLARS.recognised(&corners, 1.5), Some(number));
+                assert_eq!(PILLARS.recognised(&corners, 1.5), Some(PillarId(number)));
                 let mut back = corners;
                 back.reverse();
-                assert_eq!(PILLARS.recognised(&back, 1.5), Some(number));
+                assert_eq!(PILLARS.recognised(&back, 1.5), Some(PillarId(number)));
             }
             corners[0][0] += 3.0;
             assert_eq!(PILLARS.recognised(&corners, 1.5), None);
@@ -205,7 +288,7 @@ mod tests {
             ([wide, tall], [210.0, 220.0], 50.0),
             ([tall, tall], [40.0, 0.0], -40.0),
         ] {
-            let gap = PILLARS.gap(numbers, apart);
+            let gap = PILLARS.gap(numbers.map(PillarId), apart);
             assert!((gap - want).abs() < ROUNDING, "{numbers:?} {apart:?}: {gap}");
         }
         assert_eq!(PILLARS.longest_diagonal_nm(11), 280f64.hypot(80.0));

@@ -18,6 +18,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::{PillarArray, SymmetryGroup};
 use metalith_optics::{CalibratedModel, NotApplied};
+use metalith_pillars::PillarId;
 
 pub use cases::{CompensationCase, compensation_cases};
 pub use page::write_compensation_report;
@@ -113,7 +114,7 @@ pub fn compensate(
     }
     let shape = design.cell.shape;
     // Least and greatest width there is, of rectangles of either edge.
-    let edges = |number: u16| shape.edges_nm(number);
+    let edges = |number: u16| shape.edges_nm(PillarId(number)).map(f64::from);
     let (first, last) = design.cell.width_range_nm;
     let (narrow, wide) = (edges(first)[0], edges(last)[0]);
     let (mut moved, mut pillars, mut at_limit) = (0.0, 0, 0);

@@ -3,7 +3,7 @@
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase, RadialPhase};
 use metalith_design::{Design, LensSpec};
-use metalith_pillars::{Lattice, PillarMap, PillarRows, PillarShape, Rectangles};
+use metalith_pillars::{Lattice, PillarId, PillarMap, PillarRows, PolarisationBasis};
 use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, exact};
 
 /// Pillars that the picture of the middle shows along an axis.
@@ -14,21 +14,12 @@ const RADIUS_POINTS: usize = 600;
 /// The section of the design.
 pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     page.section("What was designed");
-    let pillars = match design.cell.shape {
-        PillarShape::Square | PillarShape::Circle => design.cell.shape.plural().to_owned(),
-        PillarShape::Rectangle(Rectangles::Upright(pillars)) => format!(
-            "upright rectangles with edges of {} to {} nm in steps of {} nm, chosen by a phase for light along x and one for light along y",
-            pillars.shortest_nm,
-            pillars.longest_nm(),
-            pillars.step_nm
-        ),
-        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => format!(
-            "rectangles of {} x {} nm rotated in steps of {}° by half of the phase",
-            pillars.width_nm,
-            pillars.length_nm,
-            exact(pillars.step_deg())
-        ),
-    };
+    let pillars = design.cell.shape.description()
+        + match design.cell.shape.basis() {
+            None => "",
+            Some(PolarisationBasis::Circular) => ", by half of the phase",
+            Some(PolarisationBasis::Linear) => ", chosen by a phase for light along x and one for light along y",
+        };
     page.paragraph(format!(
         "{}; pillars, {pillars}, on a {}lattice of {} nm.",
         elements(design),
@@ -135,29 +126,19 @@ fn elements(design: &Design) -> String {
 
 /// Words of figures for the widths or numbers of pillars, and their axis.
 pub(super) fn numbers(design: &Design) -> (&'static str, Axis) {
-    match design.cell.shape {
-        PillarShape::Square | PillarShape::Circle => ("Width", Axis::linear("width", "nm")),
-        PillarShape::Rectangle(Rectangles::Rotated(_)) => ("Rotation", Axis::linear("rotation", "°")),
-        PillarShape::Rectangle(Rectangles::Upright(_)) => ("Width along x", Axis::linear("width along x", "nm")),
-    }
+    let quantity = design.cell.shape.quantity();
+    (quantity.title, Axis::linear(quantity.label, quantity.unit))
 }
 
 /// The width of a pillar (nm), that along x of an upright rectangle, or its rotation (degrees).
 pub(super) fn shown_number(design: &Design, number: u16) -> f64 {
-    match design.cell.shape {
-        PillarShape::Square | PillarShape::Circle => f64::from(number),
-        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => pillars.rotation(number).to_degrees(),
-        PillarShape::Rectangle(Rectangles::Upright(pillars)) => f64::from(pillars.edges_nm(number)[0]),
-    }
+    design.cell.shape.value(PillarId(number))
 }
 
 /// Step from one of these numbers to the next.
 pub(super) fn step(design: &Design) -> f64 {
-    match design.cell.shape {
-        PillarShape::Square | PillarShape::Circle => f64::from(design.cell.width_step_nm),
-        PillarShape::Rectangle(Rectangles::Rotated(pillars)) => pillars.step_deg(),
-        PillarShape::Rectangle(Rectangles::Upright(pillars)) => f64::from(pillars.step_nm),
-    }
+    let own = design.cell.shape.step();
+    own.unwrap_or(f64::from(design.cell.width_step_nm))
 }
 
 /// The sites about the middle of an element that figures show.

@@ -5,7 +5,6 @@ use crate::Verification;
 use crate::copies::place_words;
 use metalith_design::Design;
 use metalith_design::array::Symmetry;
-use metalith_pillars::{PillarShape, Rectangles};
 use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, counted, sig};
 
 /// Odd shapes that are listed in the page; all are in `report.json` up to its own limit.
@@ -14,11 +13,7 @@ const MOST_ODDITIES: usize = 20;
 /// The section of the file.
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     page.section("What was written");
-    let told_by = match design.cell.shape {
-        PillarShape::Square | PillarShape::Circle => "width",
-        PillarShape::Rectangle(Rectangles::Rotated(_)) => "rotation",
-        PillarShape::Rectangle(Rectangles::Upright(_)) => "size",
-    };
+    let told_by = design.cell.shape.quantity().word;
     let mut table = Table::new([
         Column::text("Element (m, n)"),
         Column::number("Pillars", ""),

@@ -169,7 +169,7 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
         layer.filter(|_| height > 0.0)
     };
     let under = [layer("spacer_nm", spacer), layer("residual_nm", film.clone())];
-    let shape = s.choice("shape", &PillarShape::CHOICES, Some(PillarShape::Square));
+    let shape = s.choice("shape", &PillarShape::CHOICES, Some(PillarShape::default()));
     let lattice = s.choice("lattice", &LatticeKind::CHOICES, Some(LatticeKind::Square));
     if let Some(what) = lattice.refusal(shape) {
         s.fault_given(

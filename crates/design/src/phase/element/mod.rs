@@ -8,7 +8,7 @@ use super::{PhaseTerm, RadialPhase};
 use crate::spec::OutlineRows;
 use crate::{Design, Element, LensOutline, LensSpec};
 use metalith_core::Wedge;
-use metalith_pillars::{Lattice, LatticeKind};
+use metalith_pillars::Lattice;
 
 /// Radii that are tabulated at most: 64 MB. A lens of 1 mm has a million.
 const MOST_ENTRIES: i64 = 1 << 23;
@@ -127,12 +127,7 @@ impl LensPhase {
     }
 
     fn with_entries(lattice: Lattice, diameter_nm: u32, radial: &RadialPhase, most: i64) -> Self {
-        // r^2 <= R^2 in half pitches: (2 R / p)^2, floored; exact in integers.
-        let (d, p) = (i128::from(diameter_nm), i128::from(lattice.pitch_nm()));
-        let limit = match lattice.kind() {
-            LatticeKind::Square => (d * d / (p * p)) as i64,
-            LatticeKind::Hexagonal => i64::from(diameter_nm).pow(2),
-        };
+        let limit = lattice.most_units2(diameter_nm);
         let (stride_log2, offset) = if lattice.sites().is_multiple_of(2) {
             (3, 2)
         } else {

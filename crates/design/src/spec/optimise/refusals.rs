@@ -4,6 +4,7 @@ use super::{MeritSpec, OptimiseSpec, SolverSpec};
 use crate::spec::CellSpec;
 use metalith_cell::Fidelity;
 use metalith_core::document::Section;
+use metalith_pillars::PolarisationBasis;
 
 impl OptimiseSpec {
     /// Dissimilar neighbours are known to the exchange of rings for the field on the axis, of pillars as drawn.
@@ -38,7 +39,7 @@ impl OptimiseSpec {
     /// Rotated rectangles have one size, and their number does not go on from the last rotation to the first as widths do: a ring
     /// takes one of them, and no slope or error of a width is known.
     pub(super) fn check_rotations(&self, s: &Section<'_, '_>, cell: &CellSpec) {
-        if cell.shape.upright().is_some() {
+        if cell.shape.basis() == Some(PolarisationBasis::Linear) {
             s.fault_given(
                 &["cell.shape"],
                 "cell",
@@ -47,7 +48,7 @@ impl OptimiseSpec {
             );
             return;
         }
-        if cell.shape.rectangles().is_none() {
+        if cell.shape.has_width() {
             return;
         }
         if matches!(self.fidelity, Fidelity::Fitted | Fidelity::Published) {
