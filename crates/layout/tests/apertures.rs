@@ -175,7 +175,7 @@ fn apertures_that_cannot_be_are_refused() {
         (
             l,
             "corners_x_um = [-10, 25, 25, 10, 10]",
-            "element#3.x_um/inconsistent element#3.corners_x_um/inconsistent apertures.chord_error_nm/inconsistent chip.size_um/inconsistent",
+            "element#3.x_um/inconsistent element#3.corners_x_um/inconsistent apertures.chord_error_nm/inconsistent",
         ),
         (
             l,
