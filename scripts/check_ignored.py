@@ -26,7 +26,7 @@ FULL = {
     "a_displaced_part_of_every_lens_is_found",
     "a_displaced_part_is_found_where_nobody_says_where_fields_meet",
     "what_is_planned_for_is_found_in_what_comes_back",
-    "what_captures_cannot_split_is_named_with_what_can",
+    "what_measurements_cannot_split_is_named_with_what_can",
     "a_session_of_a_hexagonal_lens_is_planned_and_diagnosed",
     # Studies and other work in shards.
     "pairs_of_shards_are_those_of_one_run",
