@@ -12,7 +12,7 @@ use metalith::design::CellFile;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
-    STREHL_AGAINST, SimulationCase, SinglePsfReport, single_psfs, single_white, write_single_psf_report,
+    STREHL_AGAINST, SimulationCase, SinglePsfReport, focus_words, single_psfs, single_white, write_single_psf_report,
 };
 use metalith::{
     AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, Layout, PolarisationBasis, Result, extract,
@@ -427,7 +427,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             psf.element,
             sig(psf.wavelength_um * 1e3, 4),
             sig(psf.metrics.strehl, 3),
-            focus(&psf.metrics),
+            focus_words(&psf.metrics).map_or_else(String::new, |words| format!(", {words}")),
             sig(psf.metrics.energy_1_pixel * 100.0, 3),
             sig(psf.metrics.peak_um[0], 5),
             sig(psf.metrics.peak_um[1], 5),
@@ -451,17 +451,4 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         print_line!("report: {}", folder.join("report.html").display());
     }
     Ok(Outcome::Fine)
-}
-
-/// Focusing efficiency and width of a PSF in words; empty if the window does not hold its width.
-fn focus(metrics: &metalith::wave::psf::PsfMetrics) -> String {
-    match (metrics.focusing_efficiency, metrics.fwhm_um) {
-        (Some(share), [Some(x), Some(y)]) => format!(
-            ", focusing efficiency {} %, FWHM {} x {} um",
-            sig(share * 100.0, 3),
-            sig(x, 3),
-            sig(y, 3)
-        ),
-        _ => String::new(),
-    }
 }

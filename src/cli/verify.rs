@@ -11,7 +11,7 @@ use metalith::sensor::Camera;
 use metalith::{
     Accuracy, AsBuiltChip, CalibratedModel, Design, Error, Fidelity, PillarArray, PillarRows, Result, SimulationCases,
     Verification, cell_models, verify,
-    verify::{Check, Simulation, lens_figures, limits_that_hold, verify_in_parts, verify_pillars},
+    verify::{Simulation, lens_figures, verdict_words, verify_in_parts, verify_pillars},
     write_report,
 };
 
@@ -255,11 +255,7 @@ impl Judging {
         if self.json {
             print_json(found);
         } else if terminal.is_quiet() {
-            found
-                .checks
-                .iter()
-                .filter(|check| !check.passed())
-                .for_each(print_check);
+            print_failed(found);
         } else {
             summary(design, found, folder);
         }
@@ -276,28 +272,25 @@ fn summary(design: &Design, found: &Verification, folder: &Path) {
     for quantity in found.model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");
     }
-    let failed: Vec<&Check> = found.checks.iter().filter(|check| !check.passed()).collect();
-    if failed.is_empty() {
-        print_line!("FILE MATCHES DESIGN: {}", limits_that_hold(found));
-    } else {
-        print_line!("{} of {} limits do not hold", failed.len(), found.checks.len());
-        failed.into_iter().for_each(print_check);
-    }
+    print_line!("{}", verdict_words(found));
+    print_failed(found);
     for line in lens_figures(design, found) {
         print_line!("lens ({}): {line}", found.fidelity);
     }
     print_line!("report: {}", folder.join("report.html").display());
 }
 
-fn print_check(check: &Check) {
-    let verdict = if check.passed() { "holds" } else { "FAILS" };
-    print_line!(
-        "{verdict}: {}: {} (limit {}, `{}`)",
-        check.what,
-        sig(check.reached, 4),
-        sig(check.limit, 4),
-        check.key
-    );
+/// The limits that do not hold.
+fn print_failed(found: &Verification) {
+    for check in found.checks.iter().filter(|check| !check.passed()) {
+        print_line!(
+            "FAILS: {}: {} (limit {}, `{}`)",
+            check.what,
+            sig(check.reached, 4),
+            sig(check.limit, 4),
+            check.key
+        );
+    }
 }
 
 pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {

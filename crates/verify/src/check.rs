@@ -26,11 +26,13 @@ pub enum Sense {
     AtLeast,
 }
 
-/// Number of limits that hold, in words.
-pub fn limits_that_hold(found: &Verification) -> String {
-    match found.checks.iter().filter(|check| check.passed()).count() {
-        1 => "the one limit holds".into(),
-        held => format!("all {held} limits hold"),
+/// Verdict on the limits of a design, in words.
+pub fn verdict_words(found: &Verification) -> String {
+    let (all, failed) = (found.checks.len(), found.checks.iter().filter(|c| !c.passed()).count());
+    match (failed, all) {
+        (0, 1) => "FILE MATCHES DESIGN: the one limit holds".into(),
+        (0, _) => format!("FILE MATCHES DESIGN: all {all} limits hold"),
+        _ => format!("{failed} of {all} limits do not hold"),
     }
 }
 

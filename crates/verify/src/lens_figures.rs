@@ -1,8 +1,8 @@
 //! What the lens does, in a few lines: the numbers that papers on metalenses give.
 
 use metalith_design::Design;
-use metalith_report::sig;
-use metalith_wave::psf::AIRY_FWHM;
+use metalith_report::{Cell, Column, sig};
+use metalith_wave::psf::{AIRY_FWHM, PsfMetrics};
 
 use super::{DistinctElement, PsfPair, Verification};
 
@@ -32,21 +32,12 @@ pub fn lens_figures(design: &Design, found: &Verification) -> Vec<String> {
 
 fn words(design: &Design, (element, spot): (&DistinctElement, &PsfPair)) -> String {
     let metrics = &spot.judged().metrics;
-    let light = metrics.focusing_efficiency.map_or_else(
+    let focus = focus_words(metrics).map_or_else(
         || "no focus within the window".to_owned(),
-        |share| format!("focusing efficiency {} %", sig(share * 100.0, 3)),
+        |words| words + &limit(design, element, spot),
     );
-    let width = match metrics.fwhm_um {
-        [Some(x), Some(y)] => format!(
-            ", FWHM {} x {} um{}",
-            sig(x, 3),
-            sig(y, 3),
-            limit(design, element, spot)
-        ),
-        _ => String::new(),
-    };
     format!(
-        "Strehl ratio {} (target phase {}), {light}{width}: {}",
+        "Strehl ratio {} (target phase {}), {focus}: {}",
         sig(metrics.strehl, 3),
         sig(spot.designed.metrics.strehl, 3),
         spot.label(&element.element)
@@ -65,4 +56,35 @@ fn limit(design: &Design, element: &DistinctElement, spot: &PsfPair) -> String {
         " (diffraction limit {})",
         sig(AIRY_FWHM * spot.wavelength_um / aperture, 3)
     )
+}
+
+/// Focusing efficiency and width of a PSF in words; none if the window does not hold its width.
+pub fn focus_words(metrics: &PsfMetrics) -> Option<String> {
+    let (share, [x, y]) = (metrics.focusing_efficiency?, metrics.fwhm_um);
+    Some(format!(
+        "focusing efficiency {} %, FWHM {} x {} um",
+        sig(share * 100.0, 3),
+        sig(x?, 3),
+        sig(y?, 3)
+    ))
+}
+
+/// Columns of a table for [`focus_cells`].
+pub(super) fn focus_columns() -> [Column; 3] {
+    [
+        Column::number("Focusing efficiency", "%"),
+        Column::number("FWHM x", "um"),
+        Column::number("y", "um"),
+    ]
+}
+
+/// Focusing efficiency and width of a PSF in a row of a table.
+pub(super) fn focus_cells(metrics: &PsfMetrics) -> [Cell; 3] {
+    let width = |um: Option<f64>| um.map_or_else(Cell::none, |um| Cell::sig(um, 3));
+    let share = metrics.focusing_efficiency;
+    [
+        share.map_or_else(Cell::none, |share| Cell::fixed(share * 100.0, 1)),
+        width(metrics.fwhm_um[0]),
+        width(metrics.fwhm_um[1]),
+    ]
 }

@@ -43,10 +43,10 @@ use metalith_wave::Accuracy;
 use metalith_wave::propagation::Steepness;
 
 pub use case::SimulationCases;
-pub use check::{Check, Sense, limits_that_hold};
+pub use check::{Check, Sense, verdict_words};
 pub use copies::CopyAngle;
 pub use large::{verify_in_parts, verify_pillars};
-pub use lens_figures::lens_figures;
+pub use lens_figures::{focus_words, lens_figures};
 pub use memory::Simulation;
 pub use metalith_optics::SimulationCase;
 pub use metalith_pillars::PillarCheck;

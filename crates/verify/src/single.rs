@@ -9,6 +9,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::lens_figures::{focus_cells, focus_columns};
 use super::single_white::SingleWhite;
 use super::white::CameraStatement;
 use super::{model_page, white_page};
@@ -221,34 +222,39 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         assumed.row([Cell::from(*what), Cell::from(value.as_str())]);
     }
     page.table(assumed);
-    let mut table = Table::new([
-        Column::text("Element"),
-        Column::number("Wavelength", "nm"),
-        Column::number("Strehl", ""),
-        Column::number("Focusing efficiency", "%"),
-        Column::number("FWHM x", "um"),
-        Column::number("y", "um"),
-        Column::number("Energy in 1 pixel", "%"),
-        Column::number("in 2", "%"),
-        Column::number("Peak x", "um"),
-        Column::number("y", "um"),
-    ]);
+    let mut table = Table::new(
+        [
+            Column::text("Element"),
+            Column::number("Wavelength", "nm"),
+            Column::number("Strehl", ""),
+        ]
+        .into_iter()
+        .chain(focus_columns())
+        .chain([
+            Column::number("Energy in 1 pixel", "%"),
+            Column::number("in 2", "%"),
+            Column::number("Peak x", "um"),
+            Column::number("y", "um"),
+        ]),
+    );
     let mut images = ImageGrid::new("PSFs", 4).values("|E|² / |E inc|²", "").log(4.0);
     for (k, found) in psfs.iter().enumerate() {
         let m = &found.metrics;
-        table.row([
-            Cell::from(found.element.as_str()),
-            Cell::sig(found.wavelength_um * 1e3, 5),
-            Cell::sig(m.strehl, 3),
-            m.focusing_efficiency
-                .map_or_else(Cell::none, |share| Cell::fixed(share * 100.0, 1)),
-            m.fwhm_um[0].map_or_else(Cell::none, |um| Cell::sig(um, 3)),
-            m.fwhm_um[1].map_or_else(Cell::none, |um| Cell::sig(um, 3)),
-            Cell::fixed(m.energy_1_pixel * 100.0, 2),
-            Cell::fixed(m.energy_2_pixels * 100.0, 2),
-            Cell::fixed(m.peak_um[0], 2),
-            Cell::fixed(m.peak_um[1], 2),
-        ]);
+        table.row(
+            [
+                Cell::from(found.element.as_str()),
+                Cell::sig(found.wavelength_um * 1e3, 5),
+                Cell::sig(m.strehl, 3),
+            ]
+            .into_iter()
+            .chain(focus_cells(m))
+            .chain([
+                Cell::fixed(m.energy_1_pixel * 100.0, 2),
+                Cell::fixed(m.energy_2_pixels * 100.0, 2),
+                Cell::fixed(m.peak_um[0], 2),
+                Cell::fixed(m.peak_um[1], 2),
+            ]),
+        );
         let nm = sig(found.wavelength_um * 1e3, 4);
         images = images.pixel_um(found.psf.window.step_um);
         images.image(format!("{}, {nm} nm", found.element), found.psf.values.clone());

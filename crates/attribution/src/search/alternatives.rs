@@ -181,7 +181,7 @@ mod tests {
     use super::*;
     use crate::linear_model::{ERROR_PERIODS, LinearModel, Term, setups};
 
-    /// What an error of the model may be: clear of noise, and predicted in every measurement that is left out.
+    /// Possible error of the model: clear of noise, and predicted in every measurement that is left out.
     #[test]
     fn an_effect_whose_interval_includes_zero_is_dropped() {
         const TRUTH: [f64; 2] = [0.0015, 0.02];

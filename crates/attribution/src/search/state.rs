@@ -6,7 +6,7 @@ use super::residual::{LEAST_GAIN, may_leave};
 use crate::fit::{Fit, FitProblem, Gain, HeldOutErrors, gain, held_out, mean_error};
 use crate::measurements::Measurements;
 
-/// What noise alone leaves varies so much: by this many standard deviations of the mean square of so many points.
+/// Scatter of the residual of noise alone: this many standard deviations of the mean square of a number of points.
 const CHANCE_SIGMAS: f64 = 2.0;
 
 /// Reduced chi-square per point beyond noise above which the search continues about what was found: what is found in full leaves
@@ -44,7 +44,7 @@ impl<'a, M: Measurements> SearchState<'a, M> {
         mean_error(&self.held_out)
     }
 
-    /// Whether more is left on measurements left out than `share` of the noise, and than that noise varies by.
+    /// True if more is left on measurements left out than `share` of the noise, and than that noise varies by.
     pub fn leaves_more_than(&self, share: f64) -> bool {
         self.error() > 1.0 + share.max(CHANCE_SIGMAS * (2.0 / self.problem.points().max(1.0)).sqrt())
     }
@@ -54,7 +54,7 @@ impl<'a, M: Measurements> SearchState<'a, M> {
         self.error() > may_leave(&self.problem, &self.fit)
     }
 
-    /// Whether less is left on measurements left out than by `other`: by more than the model errs by, and the 95 % confidence interval
+    /// True if less is left on measurements left out than by `other`: by more than the model errs by, and the 95 % confidence interval
     /// excludes none.
     pub fn surely_leaves_less_than(&self, other: &Self) -> bool {
         let Gain {

@@ -30,7 +30,7 @@ pub struct TriedEffect {
     pub effect: usize,
     /// Share of the residual that its signature alone explains, nuisances projected out.
     pub score: f64,
-    /// What a full fit gains on measurements left out; none where it was not fitted.
+    /// Gain of a full fit on measurements left out; none where it was not fitted.
     pub gain: Option<Gain>,
     /// Its parameters.
     pub values: Vec<f64>,
@@ -330,7 +330,7 @@ impl<M: Measurements> Candidate<M> {
         }
     }
 
-    /// By a fit that it is part of, and the error of this fit on measurements left out.
+    /// Value by a fit that it is part of, and the error of this fit on measurements left out.
     pub fn judge(&mut self, problem: &FitProblem<'_, M>, fit: Fit<M>, held: HeldOutErrors, errors_now: &HeldOutErrors) {
         self.tried.gain = Some(gain(problem, errors_now, &held));
         let slots = problem.model.slots_of(self.tried.effect);

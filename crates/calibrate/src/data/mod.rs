@@ -19,7 +19,7 @@ use crate::optics::PixelGrid;
 use crate::set::{ElementIndex, LedIndex, MeasuredSet, PerLed};
 use metalith_sensor::frame::{expected, saturated};
 
-/// How a measurement was lit and where it was taken: measurements are grouped by this.
+/// Illumination and place of a measurement: measurements are grouped by both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeasurementSetup {
     pub element: ElementIndex,

@@ -1,5 +1,6 @@
 //! Page of the written file: one distinct element, its PSFs, contrast and orders.
 
+use crate::lens_figures::{focus_cells, focus_columns};
 use ndarray::Array2;
 
 use crate::{DistinctElement, PsfResult, Verification, white_page};
@@ -140,43 +141,48 @@ fn steepness(element: &DistinctElement) -> String {
 
 fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
     let [half, nyquist] = PixelFrequencies::of(pixel_um).reported().map(exact);
-    let mut table = Table::new([
-        Column::text("Wavelength, field angle"),
-        Column::text("Of"),
-        Column::number("Strehl", ""),
-        Column::number("Focusing efficiency", "%"),
-        Column::number("FWHM x", "um"),
-        Column::number("y", "um"),
-        Column::number("Energy in 1 pixel", "%"),
-        Column::number("in 2", "%"),
-        Column::number(format!("MTF {half}/mm"), ""),
-        Column::number(format!("{nyquist}/mm"), ""),
-        Column::number("Centroid x", "um"),
-        Column::number("y", "um"),
-        Column::number("PSF difference", ""),
-    ]);
+    let mut table = Table::new(
+        [
+            Column::text("Wavelength, field angle"),
+            Column::text("Of"),
+            Column::number("Strehl", ""),
+        ]
+        .into_iter()
+        .chain(focus_columns())
+        .chain([
+            Column::number("Energy in 1 pixel", "%"),
+            Column::number("in 2", "%"),
+            Column::number(format!("MTF {half}/mm"), ""),
+            Column::number(format!("{nyquist}/mm"), ""),
+            Column::number("Centroid x", "um"),
+            Column::number("y", "um"),
+            Column::number("PSF difference", ""),
+        ]),
+    );
     for spot in &element.spots {
         let mut row = |of: String, spot_of: &PsfResult, difference: Cell| {
             let (m, [half, nyquist]) = (&spot_of.metrics, spot_of.mtf());
-            table.row([
-                Cell::from(match spot.copy {
-                    None => spot.place(),
-                    Some(_) => format!("{}, which is {}", spot.place(), spot.label(&element.element)),
-                }),
-                Cell::from(of),
-                Cell::sig(m.strehl, 3),
-                m.focusing_efficiency
-                    .map_or_else(Cell::none, |share| Cell::fixed(share * 100.0, 1)),
-                m.fwhm_um[0].map_or_else(Cell::none, |um| Cell::sig(um, 3)),
-                m.fwhm_um[1].map_or_else(Cell::none, |um| Cell::sig(um, 3)),
-                Cell::fixed(m.energy_1_pixel * 100.0, 2),
-                Cell::fixed(m.energy_2_pixels * 100.0, 2),
-                Cell::fixed(half, 3),
-                Cell::fixed(nyquist, 3),
-                Cell::fixed(m.centroid_um[0] - spot.chief_ray_um[0], 2),
-                Cell::fixed(m.centroid_um[1] - spot.chief_ray_um[1], 2),
-                difference,
-            ]);
+            table.row(
+                [
+                    Cell::from(match spot.copy {
+                        None => spot.place(),
+                        Some(_) => format!("{}, which is {}", spot.place(), spot.label(&element.element)),
+                    }),
+                    Cell::from(of),
+                    Cell::sig(m.strehl, 3),
+                ]
+                .into_iter()
+                .chain(focus_cells(m))
+                .chain([
+                    Cell::fixed(m.energy_1_pixel * 100.0, 2),
+                    Cell::fixed(m.energy_2_pixels * 100.0, 2),
+                    Cell::fixed(half, 3),
+                    Cell::fixed(nyquist, 3),
+                    Cell::fixed(m.centroid_um[0] - spot.chief_ray_um[0], 2),
+                    Cell::fixed(m.centroid_um[1] - spot.chief_ray_um[1], 2),
+                    difference,
+                ]),
+            );
         };
         row("design phase".into(), &spot.designed, Cell::none());
         for (k, (fidelity, extracted)) in spot.extracted.iter().enumerate() {

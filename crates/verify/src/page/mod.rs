@@ -6,7 +6,7 @@ mod written;
 
 use std::path::Path;
 
-use super::{PsfResult, Sense, Verification, assumptions, lens_figures, limits_that_hold, model_page};
+use super::{PsfResult, Sense, Verification, assumptions, lens_figures, model_page, verdict_words};
 use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
@@ -38,12 +38,7 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
     if let Some(why) = &found.not_simulated {
         page.paragraph(format!("Every pillar was compared; nothing was simulated: {why}."));
     }
-    let failed = found.checks.iter().filter(|c| !c.passed()).count();
-    let words = match failed {
-        0 => format!("FILE MATCHES DESIGN: {}.", limits_that_hold(found)),
-        _ => format!("{failed} of {} limits do not hold.", found.checks.len()),
-    };
-    page.verdict(Verdict::of(failed == 0), words);
+    page.verdict(Verdict::of(found.passed()), format!("{}.", verdict_words(found)));
     for line in lens_figures(design, found) {
         page.paragraph(format!("Lens: {line}."));
     }
