@@ -44,6 +44,10 @@ class Psf:
     pixel_um: float = field(repr=False)
     """Edge of the sensor pixel that energies and frequencies are of (um)."""
     strehl: float
+    fwhm_um: tuple[float | None, float | None] = field(repr=False)
+    """Full width at half maximum along x and y (um); None if it reaches beyond the window."""
+    focusing_efficiency: float | None = field(repr=False)
+    """Power in a circle of three full widths about the peak, over the power incident on the aperture."""
     peak_um: tuple[float, float] = field(repr=False)
     centroid_um: tuple[float, float] = field(repr=False)
     energy_1_pixel: float = field(repr=False)

@@ -200,6 +200,8 @@ fn told<'py>(py: Python<'py>, (found, made): (Vec<Found>, Option<AsBuiltChip>)) 
         dict.set_item("values", PyArray2::from_owned_array(py, f.psf.psf.values))?;
         dict.set_item("pixel_um", f.pixel_um)?;
         dict.set_item("strehl", m.strehl)?;
+        dict.set_item("fwhm_um", (m.fwhm_um[0], m.fwhm_um[1]))?;
+        dict.set_item("focusing_efficiency", m.focusing_efficiency)?;
         dict.set_item("peak_um", (m.peak_um[0], m.peak_um[1]))?;
         dict.set_item("centroid_um", (m.centroid_um[0], m.centroid_um[1]))?;
         dict.set_item("energy_1_pixel", m.energy_1_pixel)?;

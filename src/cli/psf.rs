@@ -423,10 +423,11 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         .map_or_else(String::new, |light| exact(args.pixel_um(light)));
     for psf in &psfs {
         print_line!(
-            "{}, {} nm: Strehl {}, {} % in a pixel of {pixel_um} um, peak at ({}, {}) um",
+            "{}, {} nm: Strehl {}{}, {} % in a pixel of {pixel_um} um, peak at ({}, {}) um",
             psf.element,
             sig(psf.wavelength_um * 1e3, 4),
             sig(psf.metrics.strehl, 3),
+            focus(&psf.metrics),
             sig(psf.metrics.energy_1_pixel * 100.0, 3),
             sig(psf.metrics.peak_um[0], 5),
             sig(psf.metrics.peak_um[1], 5),
@@ -450,4 +451,17 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         print_line!("report: {}", folder.join("report.html").display());
     }
     Ok(Outcome::Fine)
+}
+
+/// Focusing efficiency and width of a PSF in words; empty if the window does not hold its width.
+fn focus(metrics: &metalith::wave::psf::PsfMetrics) -> String {
+    match (metrics.focusing_efficiency, metrics.fwhm_um) {
+        (Some(share), [Some(x), Some(y)]) => format!(
+            ", focusing efficiency {} %, FWHM {} x {} um",
+            sig(share * 100.0, 3),
+            sig(x, 3),
+            sig(y, 3)
+        ),
+        _ => String::new(),
+    }
 }

@@ -78,6 +78,21 @@ pub fn with_keys(text: &str, head: &str, nth: usize, keys: &[(&str, Option<&str>
     out
 }
 
+/// The text without a section, such as `[mapping.cell]`: from its head to the head of the next one.
+pub fn without_section(text: &str, head: &str) -> String {
+    let (mut within, mut depth) = (false, 0);
+    let kept = text.split_inclusive('\n').filter(|line| {
+        let (said, opened) = before_comment(line);
+        if depth == 0 && said.trim().starts_with('[') {
+            within = said.trim().replace(char::is_whitespace, "") == head;
+            return !within;
+        }
+        depth = (depth + opened).max(0);
+        !within
+    });
+    kept.collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -109,5 +124,14 @@ mod tests {
             with_keys(marks, "[[mark]]", 1, &[("x", Some("5"))]),
             "[[mark]]\nx = 1\n[[mark]]\nx = 5\n"
         );
+    }
+    #[test]
+    fn a_section_ends_with_the_head_of_the_next() {
+        let text = "[mapping]\na = 1\n[mapping.cell]   # mine\nb = [\n[2]]\n\n[layout]\nc = 3\n";
+        assert_eq!(
+            without_section(text, "[mapping.cell]"),
+            "[mapping]\na = 1\n[layout]\nc = 3\n"
+        );
+        assert_eq!(without_section(text, "[array]"), text);
     }
 }

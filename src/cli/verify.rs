@@ -11,7 +11,7 @@ use metalith::sensor::Camera;
 use metalith::{
     Accuracy, AsBuiltChip, CalibratedModel, Design, Error, Fidelity, PillarArray, PillarRows, Result, SimulationCases,
     Verification, cell_models, verify,
-    verify::{Check, Simulation, verify_in_parts, verify_pillars},
+    verify::{Check, Simulation, lens_figures, limits_that_hold, verify_in_parts, verify_pillars},
     write_report,
 };
 
@@ -261,7 +261,7 @@ impl Judging {
                 .filter(|check| !check.passed())
                 .for_each(print_check);
         } else {
-            summary(found, folder);
+            summary(design, found, folder);
         }
         Ok(if found.passed() {
             Outcome::Fine
@@ -271,22 +271,21 @@ impl Judging {
     }
 }
 
-fn summary(found: &Verification, folder: &Path) {
-    for element in &found.distinct {
-        for spot in &element.spots {
-            print_line!(
-                "{}: Strehl {} ({}), {} designed",
-                spot.label(&element.element),
-                sig(spot.judged().metrics.strehl, 3),
-                found.fidelity,
-                sig(spot.designed.metrics.strehl, 3),
-            );
-        }
-    }
+/// The verdict on the file, what the lens does, and the page.
+fn summary(design: &Design, found: &Verification, folder: &Path) {
     for quantity in found.model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");
     }
-    found.checks.iter().for_each(print_check);
+    let failed: Vec<&Check> = found.checks.iter().filter(|check| !check.passed()).collect();
+    if failed.is_empty() {
+        print_line!("FILE MATCHES DESIGN: {}", limits_that_hold(found));
+    } else {
+        print_line!("{} of {} limits do not hold", failed.len(), found.checks.len());
+        failed.into_iter().for_each(print_check);
+    }
+    for line in lens_figures(design, found) {
+        print_line!("lens ({}): {line}", found.fidelity);
+    }
     print_line!("report: {}", folder.join("report.html").display());
 }
 

@@ -162,7 +162,7 @@ fn designs(folder: &Path) -> Vec<Format> {
             ["broadband", "imaging", "neighbours", "robust"]
                 .map(|name| file(&format!("designs/phases/{name}.csv")))
                 .into(),
-            |path| RadialPhase::read_table(path, Interpolation::Linear, 1.0),
+            |path| RadialPhase::read_table(path, Interpolation::Nearest, 1.0),
         ),
         Format::new(
             "library",

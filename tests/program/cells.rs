@@ -68,7 +68,7 @@ fn the_library_of_upright_rectangles_is_made_of_the_design() {
     assert_eq!(made.status.code(), Some(0), "{}", String::from_utf8_lossy(&made.stderr));
     let printed = String::from_utf8_lossy(&made.stdout).into_owned();
     assert!(
-        printed.contains("sizes are the nearest for some pair of phases"),
+        printed.contains("sizes are the nearest to some pair of phases"),
         "{printed}"
     );
     let [library, shipped] = [

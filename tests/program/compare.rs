@@ -49,7 +49,7 @@ fn what_cannot_be_compared_is_refused() {
         (&[&one, "--design", "designs/tio2_532.toml"], "error[compare/no-layout]"),
         (
             &[&one, "--design", "designs/mini_3x3.toml:none.gds", "--method", "magic"],
-            "'--method <",
+            "error[restore/unknown-method]",
         ),
         (
             &[&one, flatcam[0], flatcam[1], "--mask-distance-um", "0"],

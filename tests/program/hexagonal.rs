@@ -408,7 +408,7 @@ fn a_hexagonal_lens_is_optimised() {
     let refused = asked(&how("published"));
     assert_eq!(refused.status.code(), Some(2));
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(said.contains("optimise.cell/inconsistent"), "{said}");
+    assert!(said.contains("error[cell/model-not-for-pillar]"), "{said}");
     let path = how("fitted");
     let output = asked(&path);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();

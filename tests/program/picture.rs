@@ -45,7 +45,7 @@ fn what_cannot_be_pictured_is_refused() {
         (&["--camera", &beside], "error[imaging/sensor-misplaced]"),
         (&["--camera", &dark], "error[camera/no-light]"),
         (&["--camera", gt, "--field-deg", "150"], "error[imaging/scene-too-wide]"),
-        (&["--camera", gt, "--method", "magic"], "'--method <"),
+        (&["--camera", gt, "--method", "magic"], "error[restore/unknown-method]"),
         (&["--camera", gt, "--distance-mm", "0"], "error[option/scene-distance]"),
         (&["--camera", gt, "--field-deg", "NaN"], "error[imaging/field-of-view]"),
         (&["--camera", "cameras/none.toml"], "error[file/system]"),
@@ -120,7 +120,11 @@ fn frames_that_cannot_be_restored_are_refused() {
         (&small, &[][..], "error[table/format]"),
         (&whole, &[], "error[table/format]"),
         (&whole, &["--white", "20", "--black-level", "20"], "error[table/format]"),
-        (&whole, &["--white", "4095", "--method", "magic"], "'--method <"),
+        (
+            &whole,
+            &["--white", "4095", "--method", "magic"],
+            "error[restore/unknown-method]",
+        ),
     ] {
         let mut command = Command::cargo_bin("metalith").unwrap();
         command

@@ -90,7 +90,7 @@ fn golden_numbers_of_the_mini_design() {
     let numbers = numbers(&report(folder.path()));
     golden("mini_3x3/report.json", format!("{numbers:#}\n").as_bytes());
     let html = fs::read_to_string(folder.path().join("report.html")).unwrap();
-    assert!(html.contains("all 3 limits hold"));
+    assert!(html.contains("all 4 limits hold"));
     // The cell that judges says how far it is from supercells, and what it does not count.
     let found = report(folder.path());
     for order in found["distinct"]
@@ -207,7 +207,7 @@ fn limits_on_white_light_decide_and_name_the_channel() {
     let output = metalith(&fast, &[folder.path(), &path]);
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     let found = report(folder.path());
-    assert!(!holds(&found, "white_mtf_min") && holds(&found, "white_energy_2_pixels_min"));
+    assert!(!holds(&found, "polychromatic_mtf_min") && holds(&found, "polychromatic_energy_2_pixels_min"));
     // Where the worst of it is.
     let printed = String::from_utf8(output.stdout).unwrap();
     assert!(printed.contains("channel mono"), "{printed}");

@@ -135,7 +135,7 @@ mod tests {
             ("led_width = 2.6", ["0 to 1.50", "what is stated, 1"]),
             ("source_distance = 2000.0", ["source_distance = 2000", "5,000 to"]),
             ("defocus = 100", ["0 to 60.0 um", "may have"]),
-            ("defokus = 1", ["gaap", "did you mean"]),
+            ("defokus = 1", ["defokus", "did you mean"]),
         ] {
             let error = checked(wanted).unwrap_err().to_string();
             for part in parts {

@@ -110,7 +110,7 @@ fn page(study: &LibraryStudy) -> Page {
     ]);
     page.section("The library");
     page.paragraph(format!(
-        "{} of {} sizes are the nearest for some pair of phases. A site gets the pillar whose fields along x and y, in phase and amplitude, are nearest to both target phases without loss. Both phases count from a constant. The constants have the smallest error and change no image.",
+        "{} of {} sizes are the nearest to some pair of phases. A site gets the pillar whose fields along x and y, in phase and amplitude, are nearest to both target phases without loss. Both phases count from a constant. The constants have the smallest error and change no image.",
         study.nearest.pillars().len(),
         study.pillars.count()
     ));

@@ -69,6 +69,12 @@ fn words(error: &Error) -> String {
         Some(begin) => &line[begin..],
         None => line,
     });
+    // A path from the root of the machine is shown by its file.
+    let name = |word: &str| match word.strip_prefix('/').and_then(|path| path.rsplit('/').next()) {
+        Some(file) => file.to_owned(),
+        None => word.to_owned(),
+    };
+    let lines = lines.map(|line| line.split(' ').map(name).collect::<Vec<_>>().join(" "));
     lines.collect::<Vec<_>>().join("\n")
 }
 
@@ -143,7 +149,7 @@ fn what_does_not_fit_together_is_said() {
           help: keep `noise_photon` and `noise_read`, or the numbers in electrons
         camera.toml:11:1: [channel] lacks `band_nm`
           help: add `band_nm`: a list of 2 numbers
-        camera.toml:13:22: there is no file /tmp/.tmpjh9d3a/none.csv
+        camera.toml:13:22: there is no file none.csv
           help: relative paths count from the folder of this file
         camera.toml:17:10: there is no diode
           help: add one or more sections [[illuminant.led]]

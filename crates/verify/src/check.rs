@@ -26,6 +26,14 @@ pub enum Sense {
     AtLeast,
 }
 
+/// Number of limits that hold, in words.
+pub fn limits_that_hold(found: &Verification) -> String {
+    match found.checks.iter().filter(|check| check.passed()).count() {
+        1 => "the one limit holds".into(),
+        held => format!("all {held} limits hold"),
+    }
+}
+
 impl Check {
     /// True if the limit holds; what is not a number holds no limit.
     pub fn passed(&self) -> bool {

@@ -10,7 +10,7 @@ use metalith::{Design, Error, LatticeKind, PillarShape, Result};
 use super::chosen::Materials;
 use super::{NewArgs, chord_nm};
 use crate::cli::Terminal;
-use crate::cli::section_text::with_keys;
+use crate::cli::section_text::{with_keys, without_section};
 
 fn refused(like: &str, what: &str) -> Error {
     Error::refused(
@@ -134,6 +134,8 @@ impl NewArgs {
                 &mut set,
                 terminal,
             )?;
+            // The mapping is solved from the new cell: what the old one was for is no longer said.
+            text = without_section(&text, "[mapping.cell]");
         }
         Ok(text)
     }
@@ -220,6 +222,7 @@ impl NewArgs {
                 ("table", None),
                 ("basis", None),
                 ("coefficients", None),
+                ("accept", None),
                 ("band_nm", None),
                 ("compared_nm", None),
             ],

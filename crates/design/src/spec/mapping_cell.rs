@@ -85,7 +85,8 @@ impl MappingIdentity {
             differences = stated.differences(&own);
             differences.retain(|difference| {
                 let stated = format!("mapping.cell.{}", difference.key);
-                section.sound(&["mapping.cell", &stated, &place(difference.key)])
+                // A spacer without a material is one mistake.
+                section.sound(&["mapping.cell", &stated, &place(difference.key), "cell.spacer_nm"])
             });
             for difference in differences.iter().filter(|_| is_refused) {
                 let key = if section.has(difference.key) {

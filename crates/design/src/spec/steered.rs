@@ -150,7 +150,7 @@ mod tests {
         let error = Design::parse(path, &text.replacen("[layout]", steered, 1)).unwrap_err();
         assert_eq!(error.ids(), ["mapping.steered#0.steps/inconsistent"], "{error}");
         insta::assert_snapshot!(metalith_testing::without_folder(error, path.parent().unwrap()), @"
-            hologram.toml:47:9: elements that are placed one by one are no steps from the middle of a grid
+            hologram.toml:48:9: elements that are placed one by one are no steps from the middle of a grid
               help: leave `[[mapping.steered]]` out, or use `elements` and `spacing_um` of [array] in place of [[element]]
             ");
     }

@@ -130,32 +130,32 @@ pub const LEGITIMATE: &[(&str, &str, &str)] = &[
         "legitimate: a limit is the choice of a designer, and the verdict states it",
     ),
     (
-        "verify.limits.white_mtf_min",
+        "verify.limits.polychromatic_mtf_min",
         "x 10",
         "legitimate: a limit is the choice of a designer, and the verdict states it",
     ),
     (
-        "verify.limits.white_mtf_min",
+        "verify.limits.polychromatic_mtf_min",
         "/ 10",
         "legitimate: a limit is the choice of a designer, and the verdict states it",
     ),
     (
-        "verify.limits.white_mtf_lp_mm",
+        "verify.limits.polychromatic_mtf_lp_mm",
         "x 10",
         "legitimate: a limit is the choice of a designer, and the verdict states it",
     ),
     (
-        "verify.limits.white_mtf_lp_mm",
+        "verify.limits.polychromatic_mtf_lp_mm",
         "/ 10",
         "legitimate: a limit is the choice of a designer, and the verdict states it",
     ),
     (
-        "verify.limits.white_energy_2_pixels_min",
+        "verify.limits.polychromatic_energy_2_pixels_min",
         "x 10",
         "legitimate: a limit is the choice of a designer, and the verdict states it",
     ),
     (
-        "verify.limits.white_energy_2_pixels_min",
+        "verify.limits.polychromatic_energy_2_pixels_min",
         "/ 10",
         "legitimate: a limit is the choice of a designer, and the verdict states it",
     ),

@@ -77,7 +77,10 @@ fn film_and_process_must_agree() {
     let folder = tempfile::tempdir().unwrap();
     let options = altered(
         folder.path(),
-        &[("\"sin_luke_2015\"", "\"alumina_malitson_dodge_1972\"")],
+        &[
+            ("\"sin_luke_2015\"", "\"alumina_malitson_dodge_1972\""),
+            ("[mapping]", "[mapping]\naccept = \"a test of another film\""),
+        ],
     );
     let error = handoff(&options, &Silent).unwrap_err();
     assert_eq!(error.id(), "handoff/film-material");

@@ -139,6 +139,9 @@ fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
         Column::text("Wavelength, field angle"),
         Column::text("Of"),
         Column::number("Strehl ratio", ""),
+        Column::number("Focusing efficiency", "%"),
+        Column::number("FWHM x", "um"),
+        Column::number("y", "um"),
         Column::number("Energy in 1 pixel", "%"),
         Column::number("in 2", "%"),
         Column::number(format!("MTF {half}/mm"), ""),
@@ -157,6 +160,10 @@ fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
                 }),
                 Cell::from(of),
                 Cell::sig(m.strehl, 3),
+                m.focusing_efficiency
+                    .map_or_else(Cell::none, |share| Cell::fixed(share * 100.0, 1)),
+                m.fwhm_um[0].map_or_else(Cell::none, |um| Cell::sig(um, 3)),
+                m.fwhm_um[1].map_or_else(Cell::none, |um| Cell::sig(um, 3)),
                 Cell::fixed(m.energy_1_pixel * 100.0, 2),
                 Cell::fixed(m.energy_2_pixels * 100.0, 2),
                 Cell::fixed(half, 3),
@@ -176,7 +183,7 @@ fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
             row(format!("layout, {fidelity}"), extracted, difference);
         }
     }
-    table.caption("The target, and the layout as read back with each simulation model. Energies are shares of the light that arrives at the element. The centroid counts from the chief ray.")
+    table.caption("The target, and the layout as read back with each simulation model. The focusing efficiency is the power in a circle of three full widths at half maximum (FWHM) about the peak. Focusing efficiency and energies are shares of the power that arrives at the element. The centroid counts from the chief ray.")
 }
 
 /// Samples along an axis of a PSF that are shown: a small window is shown whole.

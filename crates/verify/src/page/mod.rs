@@ -6,7 +6,7 @@ mod written;
 
 use std::path::Path;
 
-use super::{PsfResult, Sense, Verification, assumptions, model_page};
+use super::{PsfResult, Sense, Verification, assumptions, lens_figures, limits_that_hold, model_page};
 use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
@@ -42,11 +42,13 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
     }
     let failed = found.checks.iter().filter(|c| !c.passed()).count();
     let words = match failed {
-        0 if found.checks.len() == 1 => "FILE MATCHES DESIGN: the one limit holds.".into(),
-        0 => format!("FILE MATCHES DESIGN: all {} limits hold.", found.checks.len()),
+        0 => format!("FILE MATCHES DESIGN: {}.", limits_that_hold(found)),
         _ => format!("{failed} of {} limits do not hold.", found.checks.len()),
     };
     page.verdict(Verdict::of(failed == 0), words);
+    for line in lens_figures(design, found) {
+        page.paragraph(format!("Lens: {line}."));
+    }
     for warning in &found.warnings {
         page.note(format!("Warning: {}. {}. `{}`", warning.what, warning.hint, warning.id));
     }

@@ -38,6 +38,14 @@ impl Window {
         self.centre_um[axis] + (i as f64 - 0.5 * (self.samples as f64 - 1.0)) * self.step_um
     }
 
+    /// Sample nearest to a place from the element's centre (um) along an axis; the first or the last for one beyond the window.
+    pub fn sample_at(&self, axis: usize, place_um: f64) -> usize {
+        let last = self.samples as f64 - 1.0;
+        ((place_um - self.centre_um[axis]) / self.step_um + 0.5 * last)
+            .round()
+            .clamp(0.0, last) as usize
+    }
+
     /// Distance from the middle to the outermost sample of an axis (um).
     pub fn half_width_um(&self) -> f64 {
         0.5 * (self.samples as f64 - 1.0) * self.step_um

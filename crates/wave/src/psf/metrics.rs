@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{IdealPsf, PixelFrequencies, Psf, pixel_mtf};
+use super::{FOCUS_FWHM, IdealPsf, PixelFrequencies, Psf, pixel_mtf};
 
 /// The numbers that two PSFs are compared by.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -13,6 +13,11 @@ pub struct PsfMetrics {
     pub peak_um: [f64; 2],
     /// Centre of gravity of the window from the element's centre, x and y (um).
     pub centroid_um: [f64; 2],
+    /// Full width at half maximum along x and y (um); none if it reaches beyond the window.
+    pub fwhm_um: [Option<f64>; 2],
+    /// Focusing efficiency: power in a circle of three full widths about the peak, over the power incident on the aperture. None without
+    /// a width.
+    pub focusing_efficiency: Option<f64>,
     /// Energy in a square of one pixel about the peak, over what the perfect aperture passes.
     pub energy_1_pixel: f64,
     /// Share of the energy in a square of two pixels an edge.
@@ -42,9 +47,19 @@ impl Psf {
         let [half, nyquist] = PixelFrequencies::of(pixel_um).reported();
         let seen = |lp_mm: f64| mtf(lp_mm).map(|m| m * pixel_mtf(pixel_um, lp_mm));
         let share = |edge_um| self.energy_in_square_um2(peak_um, edge_um) / matched.power_um2;
+        let fwhm_um = self.fwhm_um();
+        let focusing_efficiency = match fwhm_um {
+            [Some(x), Some(y)] => {
+                let focus_um = FOCUS_FWHM * (x * y).sqrt();
+                Some(self.power_in_circle_um2(peak_um, focus_um) / matched.power_um2)
+            }
+            _ => None,
+        };
         PsfMetrics {
             strehl: peak / matched.peak,
             peak_um,
+            fwhm_um,
+            focusing_efficiency,
             centroid_um: self.centroid_um(),
             energy_1_pixel: share(pixel_um),
             energy_2_pixels: share(2.0 * pixel_um),

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | the function, its peak and centroid | here |
 //! | energy in squares, circles and pixels | `energy` |
+//! | width at half maximum, power near the peak | `width` |
 //! | contrast | `mtf` |
 //! | all numbers that are reported | `metrics` |
 //! | what the best element of the same shape would do | `reference` |
@@ -18,6 +19,7 @@ mod mtf;
 mod orders;
 mod polychromatic;
 mod reference;
+mod width;
 
 use metalith_core::part;
 use ndarray::{Array2, Axis};
@@ -30,6 +32,7 @@ pub use mtf::{PixelFrequencies, pixel_mtf};
 pub use orders::order_shares;
 pub use polychromatic::{BandPart, BandSample, Polychromatic, band_otf, polychromatic};
 pub use reference::IdealPsf;
+pub use width::{AIRY_FWHM, FOCUS_FWHM};
 
 /// |E|^2 / |E_inc|^2 on a window of the sensor's plane, E_inc in the medium of incidence.
 ///

@@ -108,7 +108,7 @@ mod tests {
         let error = Design::parse(&path, &text).unwrap_err();
         assert_eq!(error.ids(), ["optimise.cell/inconsistent"]);
         insta::assert_snapshot!(metalith_testing::without_folder(error, path.parent().unwrap()), @"
-            hexagonal_1550.toml:53:8: a hexagonal lattice by the `neighbours` cell
+            hexagonal_1550.toml:62:8: a hexagonal lattice by the `neighbours` cell
               help: use the cell `rigorous`
             ");
     }
