@@ -65,7 +65,7 @@ pub fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
 fn describe(planned: &MeasurementPlan) {
     print_line!("{}", planned.sentence());
     for c in &planned.confusions {
-        print_line!("not told apart: {} and {}; {}", c.effect, c.looks_like, c.remedy());
+        print_line!("not distinguished: {} and {}; {}", c.effect, c.looks_like, c.remedy());
     }
     print_line!("{}", planned.folder.join("measurement.toml").display());
     print_line!("{}", planned.page.display());

@@ -439,7 +439,7 @@ pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     for element in white.iter().flat_map(|w| &w.1) {
         for channel in &element.channels {
             print_line!(
-                "{}, white light, channel {}: {} % in a square of two pixels, spread {} um",
+                "{}, polychromatic, channel {}: {} % in a square of two pixels, spread {} um",
                 element.element,
                 channel.channel,
                 sig(channel.energy_2_pixels * 100.0, 3),

@@ -38,7 +38,7 @@ fn the_command_reports_on_a_cell_and_reuses_its_library() {
     let json: serde_json::Value = serde_json::from_slice(&before[1]).unwrap();
     assert!(json.to_string().contains("round_trip"));
     let page = String::from_utf8_lossy(&before[0]).into_owned();
-    assert!(page.contains("Widths to stay away from") && !page.contains("NaN"));
+    assert!(page.contains("Widths to avoid") && !page.contains("NaN"));
 }
 
 /// The shipped library of upright rectangles is what the command makes of its design, to the byte.

@@ -39,7 +39,7 @@ fn page(comparison: &ComparisonResult) -> Page {
         }
     }
     page.figure(best.caption(format!(
-        "The first photograph, {}, restored from the frame of each camera in the way that scores best over all photographs. Every camera fills its own field with it.",
+        "The first photograph, {}, restored from the frame of each camera by the method with the best score over all photographs. The photograph fills the field of each camera.",
         comparison.photographs.first().map_or("", String::as_str)
     )));
     page.section("Scores");
@@ -49,7 +49,7 @@ fn page(comparison: &ComparisonResult) -> Page {
         s.psnr_linear_db
     });
     page.paragraph(
-        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values if nothing else is said. CPU seconds are of one picture. Frames of cameras without a lens are no pictures and have no scores. LPIPS needs the weights of that measure (`--lpips`): without them its column is empty.",
+        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values unless stated otherwise. CPU seconds are for one picture. Frames of cameras without a lens are not pictures and have no scores. LPIPS needs its weights (`--lpips`); without them the column is empty.",
     );
     for camera in &comparison.cameras {
         one(&mut page, camera);
@@ -119,7 +119,7 @@ fn one(page: &mut Page, camera: &ComparedCamera) {
     for (way, picture) in restored.zip(&pictures.pictures) {
         row.photo(way.words(), &picture.mapv(srgb::encoded));
     }
-    page.figure(row.caption("The first photograph; a mosaic of colours is shown as colours."));
+    page.figure(row.caption("The first photograph. The mosaic of a colour filter array is shown as colours."));
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ const SAME: f64 = 1e-6;
 pub fn write_page(plan: &MeasurementPlan, set: &MeasuredSet, unseen: usize) -> Result<()> {
     let mut page = Page::new(
         format!("Check list: {}", set.title),
-        "what to measure, and what it will tell",
+        "Measurements to take, and the effects that they will find",
     );
     let verdict = if plan.finds_all() { Verdict::Pass } else { Verdict::Fail };
     page.verdict(verdict, format!("{}.", plan.sentence()));
@@ -33,20 +33,20 @@ pub fn write_page(plan: &MeasurementPlan, set: &MeasuredSet, unseen: usize) -> R
             count(plan.measurements.iter().map(|c| u64::from(c.frames)).sum()),
         ),
         ("Widths by SEM", count(set.sem.len() as u64)),
-        ("Pairs not told apart", count(plan.confusions.len() as u64)),
+        ("Pairs not distinguished", count(plan.confusions.len() as u64)),
     ]);
     instructions(&mut page, plan, set);
     measurements(&mut page, plan, set);
     effects(&mut page, plan);
     confusions(&mut page, plan);
     pictures(&mut page, set);
-    page.section("How it was planned");
+    page.section("Method");
     page.paragraph(format!(
-        "{} measurements were considered: every element, colour, angle and distance of the bench{}. Each was simulated with every effect at two sizes; what it tells is its Fisher information at the noise of the camera, with registration, flux and black level free. Measurements were added one by one, each time the one that helps the worst detection most, until every effect is found and told from every other where any measurements of the bench can do so; then measurements that had become needless were taken out, and frames were lowered as far as they can be. Needed is twice the gain that a calibration takes for more than the error of its own model.",
+        "{} measurements were considered: every element, colour, angle and distance of the bench{}. Each was simulated with every effect at two sizes. The information of a measurement is its Fisher information at the noise of the camera, with registration, flux and black level free. Measurements were added one by one, each time the one that most improves the weakest detections. This ends when every effect is found and distinguished from every other, as far as measurements of this bench allow. Then measurements that are no longer needed were removed, and each of the others got the fewest frames that suffice. The needed gain is twice the gain that a calibration requires beyond the error of its model.",
         count(plan.candidates as u64),
-        if unseen > 0 { format!(" ({unseen} more leave the element too steeply, or land too far from its axis)") } else { String::new() }
+        if unseen > 0 { format!(" ({unseen} more were left out: their light leaves the element too steeply, or lands too far from its axis)") } else { String::new() }
     ));
-    page.paragraph("This rests on a simulation of the design as drawn, with effects one at a time and one beside another: a chip that differs by much more than the wanted sizes may need other measurements.");
+    page.paragraph("The plan is based on a simulation of the design as drawn, with single effects and pairs of effects. A chip that differs by much more than the wanted sizes may need other measurements.");
     page.write(&plan.page)
 }
 
@@ -55,23 +55,23 @@ fn instructions(page: &mut Page, plan: &MeasurementPlan, set: &MeasuredSet) {
     page.section("At the bench");
     page.list([
         format!(
-            "Save each measurement as the mean of its frames, with its fractions, or as the stack of all: raw digital numbers with the black level ({} DN) in, {} rows of {} pixels, the first row at the lowest y.",
+            "Save each measurement as the mean of its frames, without rounding, or as the stack of all frames: raw digital numbers with the black level ({} DN) included, {} rows of {} pixels, the first row at the lowest y.",
             exact(camera.black_level_dn), camera.rows, camera.cols
         ),
         format!(
             "Place the middle of the window at the stated place from the axis of the element, to {} pixels ({} um a pixel in the plane of the sensor).",
             exact(camera.registration_sigma_px), exact(camera.pixel_um)
         ),
-        "Set the exposure by an opening without pillars, or without the chip, as the column “open” says. If the exposure has to be another one, correct `scale_dn` of the measurement in measurement.toml by the same factor.".to_owned(),
-        "If dark frames are taken, take one for each exposure time, and name it by `dark_frame` and `dark_frames` beside `file` of the measurements that were exposed so long.".to_owned(),
+        "Set the exposure with an opening without pillars, or without the chip, to the value of the column “open”. If you need another exposure, multiply `scale_dn` of the measurement in measurement.toml by the same factor.".to_owned(),
+        "If you take dark frames, take one for each exposure time. Name it with `dark_frame` and `dark_frames` in each measurement of this exposure time.".to_owned(),
         format!(
-            "Put the frames into `{}`, under their names. A measurement that fails is left out by deleting its section in measurement.toml.",
+            "Put the frames into `{}`, with the names of the table. If a measurement fails, delete its section in measurement.toml.",
             plan.folder.join("captures").display()
         ),
         if set.sem.is_empty() {
-            "No widths by SEM are part of this plan.".to_owned()
+            "This plan has no widths by SEM.".to_owned()
         } else {
-            format!("Measure {} widths by SEM, from above, and fill in `measured_nm` in cd_sem.csv; lines without it are left out.", set.sem.len())
+            format!("Measure {} widths by SEM from above, and fill in `measured_nm` in cd_sem.csv. Lines without a value are left out.", set.sem.len())
         },
         format!("Then: `metalith calibrate {}`", plan.folder.display()),
     ]);
@@ -91,7 +91,7 @@ fn measurements(page: &mut Page, plan: &MeasurementPlan, set: &MeasuredSet) {
         Column::number("Open", "DN"),
         Column::number("Brightest", "DN"),
     ])
-    .caption("Angles of incidence in air. Distances are from the pillar tops. Open: what light through an opening without pillars adds to the black level, far from its rim. Brightest: the brightest pixel to expect, black level included.");
+    .caption("Angles of incidence in air. Distances are from the pillar tops. Open: signal above the black level behind an opening without pillars, far from its rim. Brightest: expected value of the brightest pixel, black level included.");
     for c in &plan.measurements {
         let pair = |v: [f64; 2]| format!("{}, {}", exact(v[0]), exact(v[1]));
         let glass = set.stack.cell.substrate.index(c.led_nm * 1e-3).map_or(1.0, |n| n.re);
@@ -114,7 +114,7 @@ fn measurements(page: &mut Page, plan: &MeasurementPlan, set: &MeasuredSet) {
 }
 
 fn effects(page: &mut Page, plan: &MeasurementPlan) {
-    page.section("What it will find");
+    page.section("Effects that will be found");
     let mut table = Table::new([
         Column::text("Effect"),
         Column::text("Wanted size"),
@@ -122,7 +122,7 @@ fn effects(page: &mut Page, plan: &MeasurementPlan) {
         Column::text("Half of the 95 % interval"),
         Column::text("Found"),
     ])
-    .caption("Wanted sizes are changes from what is stated; where a calibration reports the whole instead, that stands in brackets. Gain: by how much reduced chi-square per pixel falls when the effect is fitted. The interval is that of the effect alone, the error of the model counted in.");
+    .caption("Wanted sizes are changes from the stated values. If a calibration reports the whole value instead, it is in brackets. Gain: decrease of the reduced chi-square per pixel when the effect is fitted. The interval is for the effect alone and includes the error of the model.");
     for e in &plan.effects {
         let with_unit = |v: f64| format!("{} {}", sig(v, 3), e.unit).trim_end().to_owned();
         let wanted = match (e.reported - e.wanted).abs() > SAME * e.wanted {
@@ -132,9 +132,9 @@ fn effects(page: &mut Page, plan: &MeasurementPlan) {
         let words = match (e.detected, e.reachable, e.gain >= e.needed) {
             (true, _, _) => "yes".to_owned(),
             (_, _, true) => "no: its interval includes zero".to_owned(),
-            (_, true, _) => format!("no: {} is needed, more measurements would do", sig(e.needed, 2)),
+            (_, true, _) => format!("no: {} is needed; more measurements would suffice", sig(e.needed, 2)),
             (_, false, _) => format!(
-                "no: {} is needed, no measurement of this bench shows as much",
+                "no: {} is needed; no measurements of this bench reach this gain",
                 sig(e.needed, 2)
             ),
         };
@@ -150,18 +150,18 @@ fn effects(page: &mut Page, plan: &MeasurementPlan) {
 }
 
 fn confusions(page: &mut Page, plan: &MeasurementPlan) {
-    page.section("What it cannot tell apart");
+    page.section("Effects that cannot be distinguished");
     if plan.confusions.is_empty() {
-        page.paragraph("Every effect that is found is told from every other.");
+        page.paragraph("Every effect that is found is distinguished from every other.");
         return;
     }
     let mut table = Table::new([
         Column::text("Effect"),
-        Column::text("looks like"),
+        Column::text("Resembles"),
         Column::number("Gain", "per pixel"),
-        Column::text("Told apart by"),
+        Column::text("Distinguished by"),
     ])
-    .caption("Gain: what reduced chi-square per pixel keeps of the first effect when the second is fitted to it.");
+    .caption("Gain: part of the gain of the first effect that remains when the second effect is fitted to it, in reduced chi-square per pixel.");
     for c in &plan.confusions {
         let first = format!("{} {} of ", sig(c.size, 3), c.unit);
         let at: Vec<String> = c.at.iter().map(|v| sig(*v, 2)).collect();
@@ -178,7 +178,7 @@ fn confusions(page: &mut Page, plan: &MeasurementPlan) {
 }
 
 fn pictures(page: &mut Page, set: &MeasuredSet) {
-    page.section("What to expect");
+    page.section("Expected pictures");
     let mut grid = ImageGrid::new("Expected measurements", COLUMNS)
         .pixel_um(set.camera.pixel_um)
         .values("digital number", "DN")
@@ -186,5 +186,7 @@ fn pictures(page: &mut Page, set: &MeasuredSet) {
     for c in set.measurements.iter().take(MOST_PICTURES) {
         grid.image(&c.name, c.dn.mapv(|v| f64::from(v) - set.camera.black_level_dn));
     }
-    page.figure(grid.caption("Of the chip as drawn, without noise, black level taken out, on one logarithmic scale."));
+    page.figure(
+        grid.caption("Expected images of the chip as drawn, without noise and black level, on one logarithmic scale."),
+    );
 }

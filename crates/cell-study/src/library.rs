@@ -86,14 +86,12 @@ fn page(study: &LibraryStudy) -> Page {
     let mut page = Page::new(
         format!("Cells of {}", study.name),
         format!(
-            "Upright rectangles by their widths at {nm} nm, each in a lattice of equals, by rigorous coupled-wave analysis with {UPRIGHT_ORDERS} \
+            "Upright rectangles by their widths at {nm} nm, each in a lattice of equal pillars, by rigorous coupled-wave analysis with {UPRIGHT_ORDERS} \
              diffraction orders an axis."
         ),
     );
-    page.section("What each size does to light along x");
-    page.paragraph(
-        "Light along y sees the mirror image: both widths exchanged. Neither turns to the other polarisation.",
-    );
+    page.section("Transmission of each size for light along x");
+    page.paragraph("For light along y both widths are exchanged. No light is converted to the other polarisation.");
     let lengths = usize::from(study.pillars.lengths);
     let over_sizes = |of: &[f64]| Array2::from_shape_fn((lengths, lengths), |(y, x)| of[y * lengths + x]);
     let ends = [study.pillars.shortest_nm, study.pillars.longest_nm()].map(f64::from);
@@ -104,17 +102,15 @@ fn page(study: &LibraryStudy) -> Page {
             .values("phase", "waves")
             .range(-0.5, 0.5)
             .cyclic()
-            .caption("Phase of light along x, but for a constant."),
+            .caption("Phase of light along x, up to a constant."),
         map("Power", &study.passed_x)
-            .values("share that passes", "")
+            .values("transmitted share", "")
             .range(0.0, 1.0)
-            .caption("Share of the power of light along x in the zero order."),
+            .caption("Share of the power of light along x in the zeroth order."),
     ]);
     page.section("The library");
     page.paragraph(format!(
-        "{} of {} sizes are the nearest to some pair of phases. A site has the pillar whose fields along x and y, phase and amplitude, \
-         are nearest to those of both phases without loss. Both phases are counted from constants, which no image shows, that leave the \
-         least.",
+        "{} of {} sizes are the nearest to some pair of phases. A site gets the pillar whose fields along x and y, in phase and amplitude, are nearest to both target phases without loss. Both phases count from a constant. The constants have the smallest error and change no image.",
         study.nearest.pillars().len(),
         study.pillars.count()
     ));
@@ -134,7 +130,7 @@ fn page(study: &LibraryStudy) -> Page {
         Column::number("rms", "rad"),
         Column::number("largest", "rad"),
         Column::number("follows the phase", "%"),
-        Column::number("passes", "%"),
+        Column::number("transmitted", "%"),
     ]);
     for (name, errors) in [
         ("of all sizes", Some(&study.errors)),
@@ -155,11 +151,10 @@ fn page(study: &LibraryStudy) -> Page {
             ]);
         }
     }
-    page.row([phases.caption("Where there are none, the nearest is far: smaller steps, or taller pillars, fill it.")]);
+    page.row([phases.caption("Empty regions have a large error, because the nearest pillar is far. Smaller steps or taller pillars fill them.")]);
     page.table(table.caption(
-        "Over all pairs of phases: phase of the pillar against that asked for, the share of the power that arrives which follows it (the \
-         first order of a blazed grating), and the share that passes.",
+        "Errors over all pairs of phases: phase of the pillar minus target phase; share of the arriving power that follows the target phase (first order of a blazed grating); transmitted share.",
     ));
-    page.note("`library.csv` beside this page is what a design takes as `library` in [mapping].");
+    page.note("`library.csv` in the folder of this page is the file for `library` in [mapping] of a design.");
     page
 }

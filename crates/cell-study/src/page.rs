@@ -48,7 +48,7 @@ fn wavelengths(study: &CellStudy) -> String {
 /// The mappings as a design file takes them.
 fn steered_toml(study: &CellStudy) -> String {
     let mut text = format!(
-        "# Most light in the first order, mean of {} nm, among unlike neighbours:\n# metalith cells --steered\n",
+        "# Most light in the first order, mean of {} nm, with dissimilar neighbours:\n# metalith cells --steered\n",
         wavelengths(study)
     );
     for study in &study.steered {
@@ -56,7 +56,7 @@ fn steered_toml(study: &CellStudy) -> String {
         let SteeringSteps(first, second) = study.steps;
         if !study.is_better() {
             text += &format!(
-                "\n# Steps [{first}, {second}]: the common mapping stays, supercells find {} times its light with the best that the sum over pairs found.\n",
+                "\n# Steps [{first}, {second}]: the common mapping stays; with the best mapping of the coupled model supercells find {} times its light.\n",
                 fixed(study.gain(), 3)
             );
             continue;
@@ -73,11 +73,7 @@ fn steered_toml(study: &CellStudy) -> String {
 fn steered(page: &mut Page, study: &CellStudy) {
     page.section("Mappings of steered elements");
     page.paragraph(
-        "Where the phase is steep, unlike pillars stand side by side. For the elements that are so many steps from the \
-         centre these mappings bring most light into the first order, seen from where the element looks. Shares are of the \
-         arriving light, with the common mapping and with the element's own: by supercells of rows of the element's pillars, \
-         and by the sum over pairs that the mapping was chosen by. `mapping_steered.toml` has the coefficients as a design \
-         file takes them.",
+        "Where the phase is steep, dissimilar pillars are neighbours. Each row of the table is for elements at a number of steps from the centre. The mapping of a row sends most light into the first order, for light from the viewing direction. Each cell gives the share of the arriving light with the common mapping, then with the element's own mapping: by supercells of rows of the element's pillars, and by the coupled model that the search used. `mapping_steered.toml` has the coefficients in the form of a design file.",
     );
     let mut columns = vec![
         Column::text("Steps"),
@@ -106,7 +102,7 @@ fn steered(page: &mut Page, study: &CellStudy) {
 fn page(study: &CellStudy) -> Page {
     let mut page = Page::new(
         format!("The cell of {}", study.design),
-        "Transmission by rigorous coupled-wave analysis, and what polynomials make of it",
+        "Transmission by rigorous coupled-wave analysis, and polynomials fitted to it",
     );
     page.facts(&[
         ("Film", study.film.clone()),
@@ -118,8 +114,8 @@ fn page(study: &CellStudy) -> Page {
             format!("{} nm", sig(study.mapping_um * 1e3, 4)),
         ),
         (
-            "Phase between the ends there",
-            format!("{} turns", fixed(study.span_waves, 2)),
+            "Phase between narrowest and widest pillar at this wavelength",
+            format!("{} waves", fixed(study.span_waves, 2)),
         ),
     ]);
     maps(&mut page, study);
@@ -150,19 +146,16 @@ fn maps(page: &mut Page, study: &CellStudy) {
     });
     page.section("Over width and wavelength");
     page.paragraph(
-        "Light comes along the normal through the substrate. What the zero order does not carry leaves in \
-         the orders of the lattice within the glass, below the wavelength at which they vanish there, or \
-         is reflected. The narrow dark lines are guided-mode resonances: there the phase turns by up to a \
-         whole turn within a few nanometres of width or wavelength.",
+        "Light arrives along the normal through the substrate. Light that is not in the zeroth order is reflected, or leaves in orders of the lattice in the substrate at wavelengths short enough for such orders. The narrow dark lines are guided-mode resonances. There the phase changes by up to one wave within a few nanometres of width or wavelength.",
     );
-    let mut zero = HeatMap::new("Power of the zero order", power, x(), y())
-        .values("zero order", "of the incident")
+    let mut zero = HeatMap::new("Power of the zeroth order", power, x(), y())
+        .values("zeroth order", "of the incident")
         .range(0.0, 1.0);
     for dip in dips(study) {
         zero = zero.mark(dip.0, dip.1, dip.2);
     }
     page.figure(zero.caption(
-        "Share of the incident power that goes straight on. Marked: the deepest point of each dip below \
+        "Share of the incident power in the zeroth order. Marked: the deepest point of each dip below \
          the threshold, by its width.",
     ));
     page.figure(
@@ -170,7 +163,7 @@ fn maps(page: &mut Page, study: &CellStudy) {
             .values("phase", "waves")
             .range(0.0, 1.0)
             .cyclic()
-            .caption("Phase of the zero order from the foot of the pillar to its top, modulo one turn."),
+            .caption("Phase of the zeroth order from the foot of the pillar to its top, modulo one wave."),
     );
 }
 
@@ -193,12 +186,9 @@ fn dips(study: &CellStudy) -> Vec<(f64, f64, String)> {
 }
 
 fn mappings(page: &mut Page, study: &CellStudy) {
-    page.section("Where a mapping sends the light");
+    page.section("Diffraction orders of the mappings");
     page.paragraph(format!(
-        "A lens is nearly everywhere a ramp on which all phases occur alike. The first order of that ramp \
-         makes the image, the zero order is haze. Powers are of the incident light, by rigorous theory. \
-         `fitted` is the inverse polynomial of degree three, `exact` the width whose phase is nearest, \
-         `most light` the mapping of any form with the most first order from {:.0} to {:.0} nm.",
+        "A lens is nearly everywhere a ramp of the phase, on which all phases occur equally often. The first order of the ramp makes the image. The zeroth order is stray light. Powers are shares of the incident light, by RCWA. `fitted` is the inverse polynomial of degree three, `exact` takes the width whose phase is nearest, and `most light` is the mapping of any form with most light in the first order from {:.0} to {:.0} nm.",
         study.best_band_um.0 * 1e3,
         study.best_band_um.1 * 1e3,
     ));
@@ -207,7 +197,7 @@ fn mappings(page: &mut Page, study: &CellStudy) {
         columns.push(Column::number(format!("First at {:.0} nm", l * 1e3), ""));
     }
     for l in &study.compared_um {
-        columns.push(Column::number(format!("Zero at {:.0} nm", l * 1e3), ""));
+        columns.push(Column::number(format!("Zeroth at {:.0} nm", l * 1e3), ""));
     }
     columns.push(Column::number("First, mean of the band", ""));
     let mut table = Table::new(columns);
@@ -224,7 +214,7 @@ fn mappings(page: &mut Page, study: &CellStudy) {
             "First order over the band",
             (|o| o.first) as fn(&metalith_cell::RampOrders) -> f64,
         ),
-        ("Zero order over the band", |o| o.zero),
+        ("Zeroth order over the band", |o| o.zero),
     ] {
         let mut chart = Chart::new(
             title,
@@ -238,7 +228,7 @@ fn mappings(page: &mut Page, study: &CellStudy) {
         {
             chart.line(m.name, m.band.iter().map(|o| (o.wavelength_um * 1e3, of(o))));
         }
-        page.figure(chart.caption("By rigorous theory, for the widths as they are written."));
+        page.figure(chart.caption("By RCWA, for the widths as written."));
     }
     avoidance(page, study);
     for m in &study.mappings {
@@ -248,7 +238,7 @@ fn mappings(page: &mut Page, study: &CellStudy) {
             page.code(format!("coefficients = [{}]", list.join(", ")));
         }
     }
-    page.paragraph("Cell that the mappings made here are for, as a design states it after the keys of `[mapping]`:");
+    page.paragraph("Cell of the mappings on this page. A design states it after the keys of `[mapping]`:");
     page.code(study.mapped_cell.to_toml());
 }
 
@@ -266,8 +256,7 @@ fn same_as_published(study: &CellStudy) -> bool {
 fn avoidance(page: &mut Page, study: &CellStudy) {
     if let (Some(exact), Some(wary)) = (named(study, "exact"), named(study, "exact, bad widths avoided")) {
         page.note(format!(
-            "Staying away from widths that are bad at {} nm costs {} rad of phase error (rms {} instead of {}) \
-             and changes the first order, on the mean of the band, from {} to {}.",
+            "Avoiding widths that are bad at {} nm increases the phase error by {} rad (rms {} instead of {}). The first order, as the mean over the band, changes from {} to {}.",
             wavelengths(study),
             fixed(wary.phase.rms_rad - exact.phase.rms_rad, 3),
             fixed(wary.phase.rms_rad, 3),
@@ -285,8 +274,7 @@ fn error_cells(error: &MappingError) -> [Cell; 2] {
 fn inverse(page: &mut Page, study: &CellStudy) {
     page.section("Phase to width");
     page.paragraph(
-        "Duty cycle over phase by least squares, on widths whose phase rises. The error is that of the \
-         rigorous phase of the width the polynomial asks for, with a constant taken off.",
+        "Duty cycle over phase, fitted by least squares to widths whose phase rises. The error is the phase by RCWA of the width that the polynomial gives, minus the phase that was asked for and a constant.",
     );
     let mut table = Table::new([
         Column::text("Powers"),
@@ -318,7 +306,9 @@ fn inverse(page: &mut Page, study: &CellStudy) {
             fit.map_or(&[], |f| f.polynomial.coefficients.as_slice()),
         );
     }
-    page.table(table.caption("No numbers: no polynomial of that degree stays within the widths of the cell."));
+    page.table(
+        table.caption("A row has no numbers if no polynomial of this degree stays within the widths of the cell."),
+    );
 }
 
 fn forward(page: &mut Page, study: &CellStudy) {
@@ -346,15 +336,14 @@ fn forward(page: &mut Page, study: &CellStudy) {
     }
     page.table(table);
     page.figure(lines.caption(
-        "Rigorous phase against a polynomial in duty cycle and wavelength, each wavelength with its own \
-         constant taken off. What no degree follows are the resonances.",
+        "Phase by RCWA minus a polynomial in duty cycle and wavelength, and minus a constant for each wavelength. No degree follows the resonances.",
     ));
 }
 
 fn bad(page: &mut Page, study: &CellStudy) {
-    page.section("Widths to stay away from");
+    page.section("Widths to avoid");
     page.paragraph(format!(
-        "Zero order below {}, or a phase that falls with the width; every 10 nm.",
+        "At these widths the zeroth order is below {}, or the phase falls with the width. Wavelengths are every 10 nm.",
         sig(study.options.threshold, 2)
     ));
     let mut table = Table::new([Column::number("Wavelength", "nm"), Column::text("Widths [nm]")]);

@@ -113,19 +113,17 @@ pub fn write_rotation_report(study: &RotationStudy, folder: &Path) -> Result<()>
     let mut page = Page::new(
         format!("Cells of {}", study.name),
         format!(
-            "Rectangles by their rotation at {nm} nm, each in a lattice of equals, by rigorous coupled-wave analysis."
+            "Rectangles by their rotation at {nm} nm, each in a lattice of equal pillars, by rigorous coupled-wave analysis."
         ),
     );
     page.section("Phase by rotation");
     page.paragraph(
-        "A pillar that is rotated adds twice its rotation to the phase of the light that it converts to the other circular \
-         polarisation, and the lattice, which does not turn with it, something that repeats every quarter turn. Rotations are \
-         those of the outlines as drawn, with their corners on the grid of 1 nm.",
+        "A rotated pillar converts light to the other circular polarisation and adds twice its rotation to the phase. The lattice does not rotate with the pillar. It adds a phase that repeats every 90 degrees. Rotations are the rotations of outlines as drawn, with corners on the grid of 1 nm.",
     );
     let chart = |title: &str, unit: &'static str, name: &'static str| {
         Chart::new(title, Axis::linear("rotation", "°"), Axis::linear(name, unit)).size(420.0, 260.0)
     };
-    let mut added = chart("What the lattice adds", "rad", "phase");
+    let mut added = chart("Phase of the lattice", "rad", "phase");
     added.points("drawn", study.points.iter().map(|p| (p.rotation_deg, p.added_rad)));
     let mut light = chart("Light", "", "share of the arriving power");
     light.points("converted", study.points.iter().map(|p| (p.rotation_deg, p.converted)));
@@ -134,13 +132,12 @@ pub fn write_rotation_report(study: &RotationStudy, folder: &Path) -> Result<()>
         study.points.iter().map(|p| (p.rotation_deg, p.unconverted)),
     );
     page.row([
-        added.caption("Phase of the converted light less twice the rotation and a constant."),
-        light.caption("Zero order, both circular polarisations."),
+        added.caption("Phase of the converted light minus twice the rotation and a constant."),
+        light.caption("Zeroth order, both circular polarisations."),
     ]);
     page.section("Mappings from phase to rotation");
     page.paragraph(
-        "Half of the phase and a Fourier series in twice the phase. What is left is the phase of the pillars as drawn against \
-         the phase that the mapping has them for; rounding a site to the nearest rotation comes on top.",
+        "A mapping is half of the phase plus a Fourier series in twice the phase. The table gives its residual: the phase of pillars as drawn minus the phase that the mapping assigns to them. The error of rounding to the nearest rotation is additional.",
     );
     let mut table = Table::new([
         Column::text("Mapping"),
@@ -162,7 +159,10 @@ pub fn write_rotation_report(study: &RotationStudy, folder: &Path) -> Result<()>
     page.table(table);
     for fit in &study.fits {
         page.details(
-            format!("{}, as a design takes them", counted(fit.mapping.sines.len(), "term")),
+            format!(
+                "{}, in the form of a design file",
+                counted(fit.mapping.sines.len(), "term")
+            ),
             |inner| {
                 inner.code(rotation_keys(fit, &study.mapped_cell));
             },

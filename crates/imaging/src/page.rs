@@ -106,7 +106,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
     let names = pages.camera.channel_names();
     let head = pictures_side_by_side(pages.scene, pages.frame, &pages.restored[0], &names);
     page.figure(head.caption(
-        "The frame is what the sensor records, neighbours' light and stray light included; its mosaic is shown as colours. The picture is restored from this frame alone.",
+        "The frame is the recorded signal of the sensor. It includes stray light and the overlapping light of other elements. Its mosaic is shown as colours. The picture is restored from this frame alone.",
     ));
     let first = &report.restorations[0];
     let whole = &first.scores[0];
@@ -129,7 +129,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
         ("SSIM", score(fixed(whole.ssim, 3))),
         of_linear_light,
         (
-            "Light in images, of all that arrives",
+            "Light in images, of all arriving light",
             report
                 .budget
                 .iter()
@@ -192,17 +192,17 @@ fn map(title: &str, values: &Array2<f64>, what: &str) -> HeatMap {
 
 /// Section of the samples: where they differ, detail is invented.
 fn uncertainty(page: &mut Page, uncertainty: &Uncertainty, report: &UncertaintyReport) {
-    page.section("How sure the picture is");
+    page.section("Uncertainty of the picture");
     let mut row = PhotoRow::new("Mean of samples", 250.0);
     row.photo("mean", &uncertainty.mean.mapv(srgb::encoded));
     page.figure(row.caption(format!(
-        "{} pictures that the frame may be of were drawn by the learnt prior; their mean has {} dB.",
+        "The learnt prior drew {} pictures that agree with the frame. The PSNR of their mean is {} dB.",
         uncertainty.samples,
         fixed(report.scores[0].psnr_db, 2)
     )));
     let map = map("Uncertainty", &uncertainty.spread, "deviation");
     page.figure(map.caption(format!(
-        "Deviation of the samples from their mean, of sRGB values: where it is large, detail is invented. The order of the pixels by uncertainty and that by true error have a rank correlation of {}. It says where, not how much: samples deviate by {} on average, their mean errs by {}.",
+        "Standard deviation of the samples, in sRGB values. Where it is large, detail is invented. The rank correlation of this uncertainty with the true error is {}. The map shows where errors are, but not their size: samples deviate by {} on average, and the error of their mean is {}.",
         fixed(report.rank_correlation, 2),
         fixed(report.spread, 3),
         fixed(report.error, 3)
@@ -224,7 +224,7 @@ fn scores(page: &mut Page, report: &PictureReport) {
         table.row(row);
     }
     page.table(table.caption(
-        "Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values against what an ideal camera of these channels gives.",
+        "Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM compare sRGB values with the picture of an ideal camera that has the same channels.",
     ));
     let mut columns = vec![Column::text("Linear light"), Column::text("Elements")];
     columns.extend(zones("PSNR", "dB"));
@@ -245,25 +245,25 @@ fn scores(page: &mut Page, report: &PictureReport) {
     }
     let forecasts = match report.restorations.iter().any(|r| !r.forecast_db.is_empty()) {
         true => {
-            "The forecasts are made on a random scene, which says what share of the detail of each size is lost where: one is for the mean over photographs (GB82), the other for the detail that this scene has in each zone. Whole photographs differ from that mean by some 3 dB. "
+            "The forecasts come from a random scene. It shows the share of detail of each size that is lost in each zone. One forecast is for the mean over photographs (GB82), the other for the detail of this scene in each zone. Single photographs differ from the mean by some 3 dB. "
         }
         false => "",
     };
     page.table(table.caption(format!(
-        "{forecasts}The restoration knows less than the simulation: on a random scene its operator errs by {} of the light of a pixel (root mean square), channel by channel, which is taken for noise.",
+        "{forecasts}The restoration uses a coarser operator than the simulation. On a random scene its error is {} of the light of a pixel (root mean square), channel by channel. This error counts as noise.",
         report.of_frame.error_words()
     )));
 }
 
 fn budget(page: &mut Page, report: &PictureReport) {
-    page.section("Where the light goes");
+    page.section("Light budget");
     let mut table = Table::new([
         Column::text("Channel"),
         Column::number("Images", "%"),
-        Column::number("StrayLight on the sensor", "%"),
-        Column::number("Beside the sensor", "%"),
-        Column::number("Not passed", "%"),
-        Column::number("Not travelling", "%"),
+        Column::number("Stray light on the sensor", "%"),
+        Column::number("Outside the sensor", "%"),
+        Column::number("Not transmitted", "%"),
+        Column::number("Evanescent", "%"),
         Column::number("Sum", "%"),
         Column::number("Undiffracted", "%"),
     ]);
@@ -283,7 +283,7 @@ fn budget(page: &mut Page, report: &PictureReport) {
         ]);
     }
     page.table(table.caption(
-        "Of the light that arrives at the openings of all elements from a white scene. Images are what lands within the kernels' windows; undiffracted light is a part of stray light and of what lands beside the sensor. What is not passed is reflected, absorbed, left in the glass, or leaves more steeply than half a wavelength over the pitch.",
+        "Shares of the light that arrives from a white scene at the openings of all elements. Images: light within the windows of the kernels. Undiffracted light is a part of the stray light and of the light outside the sensor. Light that is not transmitted is reflected, absorbed, stays in the substrate, or leaves at a sine beyond half the wavelength over the pitch.",
     ));
 }
 
@@ -291,7 +291,7 @@ fn geometry(page: &mut Page, report: &PictureReport) {
     if report.homographies.is_empty() {
         return;
     }
-    page.section("What a homography would miss");
+    page.section("Error of a homography");
     let channels: Vec<&str> = report.budget.iter().map(|b| b.channel.as_str()).collect();
     let mut columns = vec![Column::text("Element")];
     for channel in &channels {
@@ -308,23 +308,23 @@ fn geometry(page: &mut Page, report: &PictureReport) {
         }
         table.row(row);
     }
-    page.table(table.caption("Distance of the chief rays from the best homography of scene and sub-image."));
+    page.table(table.caption("Distance of the chief rays from the best homography between scene and sub-image."));
 }
 
 /// List what was assumed.
 pub(crate) fn list_assumptions(page: &mut Page, all: &[Assumption]) {
-    page.section("What was assumed");
+    page.section("Assumptions");
     page.list(all.iter().map(|a| format!("{}: {}", a.what, a.value)));
 }
 
 fn worth(page: &mut Page, cases: &[AssumedScore]) {
     let Some(physics) = cases.first() else { return };
-    page.section("What the assumptions of others are worth");
+    page.section("Effect of simplified models");
     let mut columns = vec![Column::text("Approximation")];
     for zone in Zone::ALL {
         columns.push(Column::number(format!("PSNR, {}", zone.name()), "dB"));
     }
-    columns.push(Column::number("Worth, whole", "dB"));
+    columns.push(Column::number("Gain, whole", "dB"));
     columns.push(Column::number("SSIM, whole", ""));
     columns.push(Column::number("Linear light, whole", "dB"));
     let mut table = Table::new(columns);
@@ -337,7 +337,7 @@ fn worth(page: &mut Page, cases: &[AssumedScore]) {
         table.row(row);
     }
     page.table(table.caption(
-        "The same scene, recorded and restored as if something simpler were so (Chakravarthula et al. 2023): by Tikhonov and all elements. A picture that is better than the first has it from the assumption, not from the chip.",
+        "The same scene, recorded and restored with the simplifications of Chakravarthula et al. (2023), by Tikhonov and all elements. The first row has all of the physics. A better score in another row comes from the simplification, not from the chip.",
     ));
 }
 
@@ -347,7 +347,7 @@ fn contrast(page: &mut Page, curves: &[ContrastCurve]) {
     }
     page.section("Contrast of fine detail");
     let mut chart = Chart::new(
-        "Contrast over that of the scene",
+        "Contrast over the contrast of the scene",
         Axis::linear("frequency", "cycles a degree"),
         Axis::linear("contrast", ""),
     );
@@ -355,6 +355,6 @@ fn contrast(page: &mut Page, curves: &[ContrastCurve]) {
         chart.line(curve.of.as_str(), curve.points.iter().copied());
     }
     page.figure(chart.caption(
-        "In the middle of the field. The frame is read behind the element that looks ahead, by the pixels that count a channel, as it was recorded, noise included; the picture is the mean of its colours in linear light. A restoration may raise contrast beyond one, and what it adds by itself counts here as if it were seen.",
+        "Contrast in the middle of the field. Frame: recorded values behind the element whose viewing direction is the normal, pixels of one channel, noise included. Picture: mean of the colours in linear light. A restoration may raise contrast above one. Detail that the restoration invents counts too.",
     ));
 }

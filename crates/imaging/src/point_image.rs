@@ -86,7 +86,7 @@ fn half_light(values: &Array2<f64>) -> f64 {
 /// The section of a page.
 pub fn section(page: &mut Page, images: &[PointImage], pixel_um: f64) {
     let Some(first) = images.first() else { return };
-    page.section("PSFs in white light");
+    page.section("Polychromatic PSFs");
     let channels = images.iter().filter(|i| i.element == first.element).count();
     let mut grid = ImageGrid::new("Image of a white point", channels)
         .values("share of the light in a pixel", "")
@@ -97,7 +97,7 @@ pub fn section(page: &mut Page, images: &[PointImage], pixel_um: f64) {
         grid.image(format!("{}, {}", image.element, image.channel), image.values.clone());
     }
     page.figure(grid.caption(
-        "A point in the middle of the field of each distinct element, white in the camera's light, by what each channel counts of it: wavelengths that a wedge sends elsewhere land there. Energy in a pixel of the sensor, as a share of the light of the channel that arrives at the element. The window of the kernels, four decades; what lands outside is in the stray light.",
+        "Image of a white point in the middle of the field of each distinct element, as each channel counts it. A wedge spreads its wavelengths over the sensor. Values are the energy in a pixel of the sensor, as a share of the light of the channel that arrives at the element. Shown is the window of the kernels, four decades. Light outside this window is in the stray light.",
     ));
     let mut table = Table::new([
         Column::text("Element"),
@@ -116,7 +116,7 @@ pub fn section(page: &mut Page, images: &[PointImage], pixel_um: f64) {
         ]);
     }
     page.table(table.caption(
-        "Diameter of the circle about the middle of the image that holds half of it, the pixel included; and what of the light of the channel that arrives at the element is in the image.",
+        "Half of the light within: diameter of the circle about the middle of the image that contains half of its light, pixel included. In the window: share of the arriving light of the channel that is in the image.",
     ));
 }
 

@@ -272,11 +272,11 @@ impl ImagingSystem {
                     .map(|um| fixed(um * 1e3))
                     .collect();
                 format!(
-                    "`{fidelity}`: pillars among unlike neighbours, from tables at {} nm, between them by paths; lit from the middle of each element's field, whatever the angle of arrival, both polarisations as one",
+                    "`{fidelity}`: coupled model, from tables at {} nm, interpolated between them by optical paths; solved for light from the viewing direction of each element at every angle of arrival, mean of both polarisations",
                     nm.join(", ")
                 )
             }
-            _ => format!("`{fidelity}`, solved along the normal, whatever the angle of arrival"),
+            _ => format!("`{fidelity}`, solved at normal incidence for every angle of arrival"),
         };
         let assumption = |what: &str, value: String| Assumption {
             what: what.to_owned(),
@@ -286,11 +286,11 @@ impl ImagingSystem {
         let polarised = (self.design.focused())
             .map(|focused| assumption("polarisation", polarised(focused, self.design.verify.light())));
         let mut all = vec![
-            assumption("cell", cell),
+            assumption("simulation model", cell),
             assumption(
                 "field of the kernels",
                 format!(
-                    "{} degrees from the axis of each element, at {} x {} places; between them kernels are blended{}; steeper light is traced as rays",
+                    "{} degrees from the axis of each element, at {} x {} places; between these, kernels are interpolated{}; steeper light is traced as rays",
                     fixed(
                         (spec.reach_um / sensor_um(&self.design, &self.camera))
                             .atan()
@@ -301,14 +301,14 @@ impl ImagingSystem {
                     match self.between {
                         BetweenNodes::Linear => "",
                         BetweenNodes::Sixfold =>
-                            " by polynomials through six along each axis, as light of narrow bands asks for",
+                            " by polynomials through six along each axis, because the light has narrow bands",
                     }
                 ),
             ),
             assumption(
                 "window of a kernel",
                 format!(
-                    "{} pixels; what lands outside is the stray light, in squares of {} pixels",
+                    "{} pixels; light outside of it is stray light, in squares of {} pixels",
                     spec.window,
                     crate::stray_light::CELL_PIXELS
                 ),
@@ -316,7 +316,7 @@ impl ImagingSystem {
             assumption(
                 "wavelengths",
                 format!(
-                    "at most {} nm apart, nearer in the light of narrow lamps; between them the PSF is blended and moves with the chief ray",
+                    "at most {} nm apart, closer for narrow lamps; between these, the PSF is interpolated and moves with the chief ray",
                     metalith_sensor::WavelengthSteps::USUAL_NM
                 ),
             ),
@@ -333,7 +333,7 @@ impl ImagingSystem {
             assumption(
                 "restoration",
                 format!(
-                    "knows the kernels of three primaries at {} of the places, one point of the scene for four pixels, and none of its spectra",
+                    "uses kernels of three primaries at {} of the places and one point of the scene for four pixels; it does not use the spectra of the scene",
                     match self.restored_step {
                         0..=2 => "half",
                         3..=4 => "a quarter",
@@ -343,14 +343,14 @@ impl ImagingSystem {
             ),
             assumption(
                 "metal",
-                "opaque; light passes the openings alone, and nothing is reflected twice".into(),
+                "opaque; light passes the openings only, and multiple reflections are not simulated".into(),
             ),
         ];
         all.extend(polarised);
         all.extend(self.pillars.as_ref().map(|found| assumption("layout", found.words())));
         let averaged = averaging(&self.given, &self.view);
         all.extend(averaged.map(|words| {
-            let words = format!("{words}; pictures have the size of the averaged scene, and scores are against it");
+            let words = format!("{words}; pictures have the size of the averaged scene, and scores compare with it");
             assumption("pixels of the scene", words)
         }));
         all
@@ -361,7 +361,7 @@ impl ImagingSystem {
 fn place_of_sensor(design: &Design, camera: &Camera) -> String {
     let distance_um = sensor_um(design, camera);
     let source = match camera.sensor.distance_um {
-        Some(_) => "as the camera says",
+        Some(_) => "from the camera file",
         None => "the focal length of [lens]",
     };
     let off = design.lens_sizes_um().map(|[_, focal_um]| focal_um);
@@ -371,7 +371,7 @@ fn place_of_sensor(design: &Design, camera: &Camera) -> String {
         off.iter().copied().reduce(f64::max),
     ) {
         (Some(least), Some(most)) => format!(
-            "; elements of other focal lengths are out of focus there: {} of {} ({})",
+            "; {} of {} elements have another focal length ({}) and are out of focus",
             off.len(),
             design.elements().len(),
             match least == most {
@@ -390,7 +390,7 @@ fn polarised(focused: FocusedLight, light: PolarisedLight) -> String {
     let own = focused.polarisation();
     let source = match arriving == own {
         true => format!("all light arrives {arriving}, as behind a filter"),
-        false => format!("all light arrives {arriving}, and pillars focus what arrives {own}"),
+        false => format!("all light arrives {arriving}, and pillars focus light that arrives {own}"),
     };
     format!("{source}; {}, in image and stray light", light.detector(focused))
 }

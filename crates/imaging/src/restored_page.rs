@@ -78,12 +78,12 @@ impl RestoredReport {
             row.photo(format!("{}{way}", restored.method), &picture.mapv(srgb::encoded));
         }
         page.figure(row.caption(
-            "The mosaic of the frame is shown as colours. Pictures are restored from this frame alone; how bright they are follows from `white` in [exposure] of the camera.",
+            "The mosaic of the frame is shown as colours. Pictures are restored from this frame alone. `white` in [exposure] of the camera sets their brightness.",
         ));
         page.facts(&[
             ("Pixels at full scale", of.saturated_words()),
             ("Mean signal, of full scale", fixed(frame.mean_signal(), 3)),
-            ("The operator of the restoration errs by", of.error_words()),
+            ("Error of the operator of the restoration", of.error_words()),
         ]);
         list_assumptions(&mut page, &of.assumptions);
         page

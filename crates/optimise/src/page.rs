@@ -12,17 +12,11 @@ use metalith_core::Result;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, Verdict, sig, write_json};
 
 /// Basis of the figures of an optimisation, in words for people.
-const BY_EQUAL_NEIGHBOURS: &str = "Merit, Strehl ratios before and after and those of the layout that is read back take each pillar for one \
-     of a lattice of equal pillars. `metalith run` judges by unlike neighbours where that is the `fidelity` of [verify], as it is by \
-     default for the cell of the paper, and may give other Strehl ratios.";
+const BY_EQUAL_NEIGHBOURS: &str = "Merit and all Strehl ratios, of the layout as read back too, use the local periodic approximation (LPA): each pillar transmits as in a lattice of equal pillars. `metalith run` may give other Strehl ratios, because it uses the coupled model for the cell of the paper, unless `fidelity` in [verify] states another.";
 
-const BY_UNLIKE_NEIGHBOURS: &str = "Merit and Strehl ratios of the cell `neighbours` have each pillar among those that stand about it, as \
-     `metalith run` does by default for the cell of the paper, and pictures the mean of each ring; Strehl ratios of the cell `rigorous` take \
-     it for one of a lattice of equal pillars.";
+const BY_UNLIKE_NEIGHBOURS: &str = "Merit and Strehl ratios of the model `neighbours` use the coupled model: each pillar transmits with its real neighbours, as in `metalith run` by default for the cell of the paper. Figures over wavelength use the mean of each ring. Strehl ratios of the model `rigorous` use the local periodic approximation (LPA).";
 
-const BY_CONVERTED_LIGHT: &str = "Merit and figures are of the light that the rectangles convert of the hand that is focused, each taken for \
-     one of a lattice of pillars that are all rotated alike, with as many diffraction orders as one of many wavelengths takes. `metalith run` \
-     solves its wavelengths with more orders, counts what is not converted too, and simulates the `polarisation` of [verify].";
+const BY_CONVERTED_LIGHT: &str = "Merit and figures are of converted light of the handedness that is focused. Each rectangle transmits as in a lattice of equally rotated rectangles, with the diffraction orders for wavelengths of a band. `metalith run` solves its wavelengths with more orders, also counts light that is not converted, and simulates the `polarisation` of [verify].";
 
 /// All that is reported.
 #[derive(Clone, Debug, Serialize)]
@@ -149,7 +143,7 @@ impl OptimiseReport {
         }
         page.section("Strehl ratio");
         page.paragraph(
-            "On a grid of 0.5 nm between the wavelengths that were optimised on, against the same aperture \
+            "On a grid of 0.5 nm, also between the optimised wavelengths, against the same aperture \
              passing all its power in the zero order with the perfect phase.",
         );
         page.table(self.table());
@@ -182,7 +176,7 @@ impl OptimiseReport {
     fn rest(&self, page: &mut Page) {
         if !self.merit_over_limit.is_empty() {
             let mut chart = Chart::new(
-                "What the limit costs",
+                "Merit over the limit",
                 Axis::linear("limit on the phase step", "waves").range(0.0, 0.5),
                 Axis::linear("geometric-mean Strehl ratio", ""),
             );
@@ -190,7 +184,7 @@ impl OptimiseReport {
             chart.marker(self.step_limit_waves, "this design");
             page.section("Merit against limit");
             page.figure(
-                chart.caption("Exchange at temperature zero from the optimised phase; on the grid optimised on."),
+                chart.caption("Exchange at temperature zero from the optimised phase, at the optimised wavelengths."),
             );
         }
         if !self.expected_psnr_db.is_empty() {
@@ -203,7 +197,9 @@ impl OptimiseReport {
                 table.row([Cell::fixed(angle, 1), Cell::fixed(before, 2), Cell::fixed(after, 2)]);
             }
             page.section("Expected images");
-            page.paragraph("PSNR to be expected after inverse filtering, in closed form, at wavelengths between those optimised on.");
+            page.paragraph(
+                "Expected PSNR after inverse filtering, in closed form, at wavelengths between the optimised ones.",
+            );
             page.table(table);
         }
         if let Some((_, draws)) = self.with_errors.first() {
@@ -225,14 +221,14 @@ impl OptimiseReport {
             }
             page.section("With errors of fabrication");
             page.paragraph(format!(
-                "Geometric-mean Strehl ratio over {} draws of width, film height and gap.",
+                "Geometric-mean Strehl ratio over {} draws of width, film height and defocus.",
                 draws.len()
             ));
             page.table(table);
         }
         if self.history.len() > 1 {
             let mut chart = Chart::new(
-                "The way there",
+                "Progress of the merit",
                 Axis::linear("sweep or step", ""),
                 Axis::linear("merit", ""),
             );
@@ -279,7 +275,7 @@ impl OptimiseReport {
             if let Some(judged) = rings.max_by_key(|j| j.fidelity) {
                 let points = judged.strehl.wavelength_um.iter().zip(&judged.strehl.ratio);
                 let floored = points.map(|(l, s)| (l * 1e3, s.max(1e-7)));
-                chart.line(format!("{name}, {} cell", judged.fidelity.name()), floored);
+                chart.line(format!("{name}, model {}", judged.fidelity.name()), floored);
             }
         }
         chart.caption("Before and after.")

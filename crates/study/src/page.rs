@@ -42,7 +42,7 @@ fn page(result: &StudyResult) -> Page {
         .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let mut page = Page::new(
         format!("Study of {name}"),
-        "A chip made many times with the tolerances of its process",
+        "Many simulated chips with the tolerances of a process",
     );
     let all = result.yields.last().expect("the yield over all limits is always there");
     page.facts(&[
@@ -60,9 +60,7 @@ fn page(result: &StudyResult) -> Page {
         ("Key", plan.key[..16].to_owned()),
     ]);
     page.section("Yield");
-    page.paragraph(
-        "Draws that hold each limit, counted. Intervals are Wilson's, 95 %, for the finite number of draws.",
-    );
+    page.paragraph("Number of draws that hold each limit, with Wilson's 95 % interval for the finite number of draws.");
     page.table(yields(result));
     if !result.responses.is_empty() {
         page.section("What contributes");
@@ -85,7 +83,7 @@ fn page(result: &StudyResult) -> Page {
         }));
         page.section("How tight for a yield of 90 %");
         page.paragraph(
-            "What the spread of each quantity would have to be multiplied by, the others as stated, and all of them at once. \
+            "Factor for the spread of each quantity that gives this yield, with the spread of the others as stated; last, one factor for all. \
              Draws are moved by the fit above and keep what it misses of them.",
         );
         let worst = result.responses.iter().map(|r| r.predicted).fold(1.0, f64::min);
@@ -112,7 +110,7 @@ fn page(result: &StudyResult) -> Page {
     over_grid(&mut page, result);
     if !result.shown.is_empty() {
         page.section("Worst draws");
-        page.paragraph("By the least margin over the limits, in units of what that margin varies by.");
+        page.paragraph("Draws with the smallest margin to a limit, in units of the standard deviation of that margin.");
         page.table(worst(result));
         for draw in &result.shown {
             let k = draw.record.draw;
@@ -139,7 +137,10 @@ fn page(result: &StudyResult) -> Page {
                     grid.image(spot.place(), images.extracted.mapv(f64::from));
                 }
             }
-            page.figure(grid.pixel_um(step_um).caption("PSFs as made, middle of the field."));
+            page.figure(
+                grid.pixel_um(step_um)
+                    .caption("PSFs as fabricated, middle of the field."),
+            );
         }
     }
     page
@@ -194,8 +195,8 @@ fn shares(result: &StudyResult) -> Table {
 fn tightenings(result: &StudyResult) -> Table {
     let mut table = Table::new([
         Column::text("Quantity"),
-        Column::text("Factor on its spread"),
-        Column::number("Yield without any spread of it", "%"),
+        Column::text("Factor for the spread"),
+        Column::number("Yield without this spread", "%"),
     ]);
     for t in &result.tightenings {
         let factor = match t.factor {

@@ -14,11 +14,11 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     if found.not_simulated.is_some() {
         return;
     }
-    page.section("What is assumed");
+    page.section("Assumptions");
     let mut table = Table::new([
         Column::text("Assumption"),
         Column::text("Size for this design"),
-        Column::text("How it is known"),
+        Column::text("Basis"),
     ]);
     let mut row = |what: &str, size: String, how: &str| {
         table.row([Cell::from(what), Cell::from(size), Cell::from(how)]);
@@ -26,42 +26,42 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     let of_paper = design.cell.is_of_the_paper();
     if found.fidelity == Fidelity::Neighbours {
         row(
-            "Each pillar passes light by its own width and those of its twelve nearest neighbours",
+            "The transmission of a pillar depends on its width and on the widths of its twelve nearest neighbours",
             format!("{}; {}", left_out(found), equal_neighbours(found)),
             &format!(
-                "a sum over pairs, fitted to supercells of unlike pillars; {}white light is between the wavelengths that have tables. Phase errors of the mapping still take neighbours for equals",
+                "sum over pairs, fitted to supercells of dissimilar pillars; {}polychromatic light is interpolated between the wavelengths that have tables. Phase errors of the mapping assume equal neighbours",
                 if of_paper {
-                    "rows of real pillars of prototype_3x3 are met to some hundredths of the light; "
+                    "for rows of real pillars of prototype_3x3 the error is some hundredths of the light; "
                 } else {
                     ""
                 }
             ),
         );
         row(
-            "Light that leaves in steep orders or in the other polarisation is not counted, nor what pairs cannot explain",
+            "Three parts of the light are not counted: steep orders, the other polarisation, and light that pairs of pillars do not explain",
             if of_paper {
                 Slopes::of(design).not_counted()
             } else {
                 "not known for this cell; more where the phase is steep".into()
             },
-            "light that passes blazed rows of the mapping of the shipped designs by the sum over pairs, against their supercells, along the normal; as a steered element looks, rows of 2.5 pillars a turn lose 36 % at 455 nm in steep orders alone. Steep is beyond half the wavelength over the pitch",
+            "light that the sum over pairs transmits along the normal through blazed rows, with the mapping of the shipped designs, against their supercells. From the viewing direction rows of 2.5 pillars per wave lose 36 % at 455 nm in steep orders alone. Steep is a sine beyond half the wavelength over the pitch",
         );
     } else if found.fidelity != Fidelity::Published && found.fidelity != Fidelity::Fitted {
         row(
-            "Each pillar passes light as in an infinite lattice of equal pillars",
+            "Each pillar transmits as in an infinite lattice of equal pillars (local periodic approximation)",
             if of_paper {
                 Slopes::of(design).overstated()
             } else if design.cell.shape.basis().is_some() || !design.cell.lattice.is_square() {
                 "not known; at the rim neighbours differ most".into()
             } else {
-                "not known for this cell; --fidelity neighbours tells".into()
+                "not known for this cell; --fidelity neighbours shows it".into()
             },
-            "rows of unlike pillars solved rigorously, for the mapping of the shipped designs; where the phase jumps from pillar to pillar it is more",
+            "supercells of dissimilar pillars with the mapping of the shipped designs; the error is larger where the phase jumps from pillar to pillar",
         );
     } else {
         row(
-            "Pillars change the phase alone, by a polynomial",
-            "amplitude and resonances are left out".into(),
+            "Pillars change the phase only, by a polynomial",
+            "amplitude and resonances are not simulated".into(),
             "--fidelity rigorous shows them",
         );
     }
@@ -88,25 +88,25 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
     media::rows(&mut row, design, found);
     let (least, most) = outside(found);
     row(
-        "PSFs and energies are of a window about the chief ray; MTF counts all light that passes by this cell",
+        "PSFs and energies are of a window about the chief ray; MTF counts all light that the simulation model transmits",
         format!(
-            "{} % of the light is outside of the window",
+            "{} % of the transmitted light is outside of the window",
             span(fixed(least * 100.0, 0), fixed(most * 100.0, 0))
         ),
         "power of all pillars against the energy of the window",
     );
     row(
-        "In the tables by wavelength, each wavelength comes from the direction that suits it; those of white light have one direction",
+        "In figures of single wavelengths, light comes from the viewing direction at this wavelength; in polychromatic figures all wavelengths come from one direction",
         dispersion(design),
-        "f sin(psi) / lambda_w: light of a band from one direction is spread by so much",
+        "f sin(psi) / lambda_w: spread of a band of light from one direction",
     );
     row(
-        "A scalar field from point samples, one a pillar",
+        "The field is scalar, with one point sample for each pillar",
         match found.accuracy {
-            "fast" => "1e-3 of the amplitude of a perfect lens".into(),
-            _ => "1e-5 of the amplitude of a perfect lens".into(),
+            "fast" => "1e-3 of the amplitude of an ideal lens".into(),
+            _ => "1e-5 of the amplitude of an ideal lens".into(),
         },
-        "direct sums in double precision; polarisation of the field behind the lens is left out",
+        "direct sums in double precision; the polarisation of the field behind the lens is not simulated",
     );
     page.table(table);
 }
@@ -116,7 +116,7 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
     let prototype = |size: String| {
         if design.cell.is_of_the_paper() {
             format!(
-                "{size}; equal pillars of the corner element of prototype_3x3 keep, of the Strehl ratio of its design, {OF_ANGLE}"
+                "{size}; in the local periodic approximation the corner element of prototype_3x3 has, of the Strehl ratio of its target, {OF_ANGLE}"
             )
         } else {
             size
@@ -124,12 +124,12 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
     };
     if found.fidelity != Fidelity::Neighbours {
         row(
-            "Cells are lit along the normal",
+            "Cells are solved at normal incidence",
             prototype("not computed in this run".into()),
             if design.cell.shape.basis().is_some() {
-                "rectangles are solved along the normal alone"
+                "rectangles are solved at normal incidence only"
             } else {
-                "--oblique solves them at the angle at which light arrives, both polarisations"
+                "--oblique solves them at the angle of arrival, for both polarisations"
             },
         );
         return;
@@ -137,24 +137,24 @@ fn angles(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Ver
     let widest_deg = design.verify.field_angles.iter().map(|a| a.x_deg.hypot(a.y_deg));
     let widest_deg = widest_deg.fold(0.0, f64::max);
     row(
-        "Cells are lit from the middle of each element's field",
+        "Cells are solved for light from the viewing direction of each element",
         if widest_deg == 0.0 {
             "none: there is no other field angle".into()
         } else {
             prototype(format!(
-                "field angles are up to {}° from there: not computed in this run",
+                "field angles are up to {}° from this direction: not computed in this run",
                 sig(widest_deg, 3)
             ))
         },
-        "--oblique solves them for each field angle: a table of 50 to 60 CPU s for each wavelength and direction that has none yet",
+        "--oblique solves them for each field angle; each new wavelength and direction needs a table of 50 to 60 CPU s",
     );
     if let Some(camera) = &found.camera {
         let ends = [camera.wavelengths_nm.first(), camera.wavelengths_nm.last()];
         let apart = ends.into_iter().flatten().map(|nm| white_apart_deg(design, nm * 1e-3));
         row(
-            "In white light, which arrives from one direction, cells are lit from where the element looks at each wavelength",
+            "Polychromatic light comes from one direction, but its cells are solved for the viewing direction at each wavelength",
             in_degrees(apart.fold(0.0, f64::max)),
-            "angle between both directions for the outermost element; --oblique lights cells from the point itself",
+            "angle between both directions for the outermost element; --oblique solves cells for the direction of the point",
         );
     }
 }
@@ -169,7 +169,7 @@ fn in_degrees(apart_deg: f64) -> String {
 
 /// Effect of the angle on the corner element of `designs/prototype_3x3.toml`, at 455, 530 and 660 nm:
 /// docs/method/verify.md, "Angle of incidence".
-const OF_ANGLE: &str = "57 to 83 % along the normal, 48 to 85 % at oblique incidence in the middle of its field and 21 to 77 % at 15° from there";
+const OF_ANGLE: &str = "57 to 83 % at normal incidence, 48 to 85 % at oblique incidence in the middle of its field, and 21 to 77 % at oblique incidence 15° from the middle";
 
 /// Largest angle between where an element looks at a wavelength (um) and where it looks at that of its wedge (degrees).
 fn white_apart_deg(design: &Design, wavelength_um: f64) -> f64 {
@@ -207,15 +207,14 @@ fn polarised(
     let arriving = light.arriving_at(focused);
     let (what, whose) = match arriving == focused.polarisation() {
         true => (
-            "pillars convert it to the other hand with twice their rotation as phase".into(),
-            "light of the other hand diverges, of unpolarised light that is half: `polarisation` in [verify]",
+            "pillars convert it to the other handedness with twice their rotation as phase".into(),
+            "light of the other handedness, half of unpolarised light, diverges; `polarisation` in [verify] states the light",
         ),
         false => (
             format!(
-                "pillars convert each hand to the other with twice their rotation as phase, and focus what arrives {hand} circularly \
-                 polarised"
+                "pillars convert each handedness to the other with twice their rotation as phase, and focus light that arrives {hand} circularly polarised"
             ),
-            "Strehl ratios and shares are of all light that arrives, and the design phase focuses all of it",
+            "Strehl ratios and shares are of all light that arrives; the target focuses all of it",
         ),
     };
     row(
@@ -225,7 +224,7 @@ fn polarised(
             lands.into_iter().flatten().collect::<Vec<_>>().join("; "),
             light.detector(focused)
         ),
-        &format!("Jones matrices of both hands; {whose}"),
+        &format!("Jones matrices for both handednesses; {whose}"),
     );
     let turned = (1..=pillars.steps)
         .map(|number| pillars.turned_by_grid(number).abs())
@@ -233,20 +232,20 @@ fn polarised(
     row(
         "Rotations are rounded to steps, and corners to the grid of 1 nm",
         format!(
-            "steps of {}° are {} rad of phase at most; the grid turns pillars by up to {}°, {} rad, which is simulated, and shears them, which is not",
+            "steps of {}° are {} rad of phase at most. The grid rotates pillars by up to {}°, {} rad, which is simulated. It also shears them, which is not simulated",
             sig(pillars.step_deg(), 3),
             sig(pillars.step_deg().to_radians(), 2),
             sig(turned.to_degrees(), 2),
             sig(2.0 * turned, 2),
         ),
-        "axis of each outline as it is drawn, against its rotation; each site has the pillar drawn nearest to what is asked",
+        "axis of each outline as drawn, against its rotation; each site has the pillar whose drawn rotation is nearest",
     );
     let lattice = found.rotations;
     row(
         if design.mapping.rotation.is_half() {
             "The phase is twice the rotation"
         } else {
-            "The phase is twice the rotation and what the lattice adds to it, by the series of [mapping]"
+            "The phase is twice the rotation plus the phase of the lattice, by the series of [mapping]"
         },
         match &lattice {
             Some(EqualRotations { own, half, .. }) if own != half => format!(
@@ -256,19 +255,19 @@ fn polarised(
                 fixed(half.worst_rad, 4)
             ),
             Some(EqualRotations { own, .. }) => format!(
-                "off by {} rad rms, {} at most, for pillars as drawn; `metalith cells` has a series that takes it back",
+                "off by {} rad rms, {} at most, for pillars as drawn; `metalith cells` gives a series that corrects it",
                 fixed(own.rms_rad, 4),
                 fixed(own.worst_rad, 4)
             ),
             None => "not known".into(),
         },
-        "phase of the converted light of all rotations in lattices of equals, solved rigorously at the wavelength of the mapping",
+        "phase of the converted light of all rotations in lattices of equal pillars, by RCWA at the wavelength of the mapping",
     );
     row(
-        "Cells are solved at seven rotations, the others by a Fourier series, with as many diffraction orders as they need",
+        "Seven rotations are solved, with as many diffraction orders as they need; a Fourier series gives the others",
         match lattice.and_then(|l| l.truncation) {
             Some(Truncation { orders, fewer, apart }) => format!(
-                "{orders} orders an axis: {} at most in t from {fewer} orders, so some 0.002 may be left",
+                "{orders} orders an axis: t differs by {} at most from {fewer} orders, so an error of some 0.002 may remain",
                 sig(apart, 2)
             ),
             None => "not known".into(),
@@ -315,10 +314,10 @@ fn equal_neighbours(found: &Verification) -> String {
     });
     let each: Vec<String> = each.collect();
     if each.is_empty() {
-        return "what equal neighbours would have was not simulated beside it".into();
+        return "the local periodic approximation was not simulated for comparison".into();
     }
     format!(
-        "equal neighbours would have in the first order, by wavelength, {}",
+        "light in the first order by the local periodic approximation over the coupled model, by wavelength: {}",
         each.join("; ")
     )
 }

@@ -23,7 +23,7 @@ pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, fo
             follows.join(", "),
             light.detector(focused)
         ),
-        "Jones matrices along both axes, which turn no polarisation; `polarisation` in [verify] says which light arrives",
+        "Jones matrices along both axes, which do not convert polarisation; `polarisation` in [verify] states the arriving light",
     );
     if let Some(library) = &design.mapping.pillar_library {
         let errors = library.errors();
@@ -37,11 +37,11 @@ pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, fo
                 sig(x.worst_rad, 2),
                 sig(y.worst_rad, 2)
             ),
-            "phases and amplitudes of the library's own file; `metalith cells` makes a finer one of smaller steps",
+            "phases and amplitudes from the file of the library; with smaller steps `metalith cells` makes a finer one",
         );
     }
     row(
-        &format!("Cells are solved with {UPRIGHT_ORDERS} diffraction orders an axis, those of a band with fewer"),
+        &format!("Cells are solved with {UPRIGHT_ORDERS} diffraction orders an axis, cells of a band with fewer"),
         "0.003 rms in t, 0.006 at most, for fifteen sizes of three materials".into(),
         "against 41 orders: docs/method/cells.md",
     );

@@ -79,7 +79,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             limits.wrong_widths_max as f64,
         ),
         at_most(
-            "shapes on the pillar layer that are no pillar".into(),
+            "shapes on the pillar layer that are not pillars".into(),
             "foreign_shapes_max",
             found.foreign.total() as f64,
             limits.foreign_shapes_max as f64,
@@ -144,7 +144,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
         && let Some((place, least)) = worst(spots().map(|(place, s)| (place, -s.strehl_ratio())))
     {
         checks.push(Check {
-            what: format!("Strehl of the layout over that of the design phase, {place}"),
+            what: format!("Strehl ratio of the layout over the Strehl ratio of the target, {place}"),
             key: "strehl_ratio_min",
             reached: -least,
             limit: limits.strehl_ratio_min,
@@ -165,13 +165,13 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
     };
     let whites: [White<'_>; 2] = [
         (
-            "contrast in white light",
+            "polychromatic MTF",
             "polychromatic_mtf_min",
             limits.polychromatic_mtf_min,
             &|w| w.least_contrast(contrast_lp_mm),
         ),
         (
-            "share of white light in a square of 2 pixels",
+            "share of polychromatic light in a square of 2 pixels",
             "polychromatic_energy_2_pixels_min",
             limits.polychromatic_energy_2_pixels_min,
             &|w| w.energy_2_pixels,

@@ -16,13 +16,13 @@ const MILLIMETRE_UM: f64 = 1000.0;
 pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Verification) {
     let sentences = LatticeOrders::summary(&found.lattice_orders);
     let known = match found.fidelity {
-        Fidelity::Published | Fidelity::Fitted => "this cell takes nothing off for it",
-        _ => "what is left is in the tables of where light goes, as all transmitted in the zero order of the lattice",
+        Fidelity::Published | Fidelity::Fitted => "this simulation model does not subtract this light",
+        _ => "the tables of orders give the remaining light as all light in the zeroth order of the lattice",
     };
     row(
-        "What the lattice of the pillars sends into oblique orders is lost to the image",
+        "Light that the lattice of the pillars sends into oblique orders does not reach the image",
         if sentences.is_empty() {
-            "nothing: there are no such orders in either medium".into()
+            "none: neither medium has such orders".into()
         } else {
             sentences.join("; ")
         },
@@ -34,21 +34,21 @@ pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, fo
         row(
             "The mapping was solved from the cell of the design",
             solved.words(),
-            "the width with the nearest phase among equal neighbours, without widths that pass less than 0.3 of the light or where a wider pillar has less phase",
+            "width with the nearest phase in a lattice of equal pillars; widths that transmit less than 0.3 of the light, or at which the phase falls with the width, are avoided",
         );
     }
     if let Some(gaps) = gaps(design) {
         row(
-            "Between samples of an index that are far apart it is a guess",
+            "The refractive index between samples that are far apart is a guess",
             gaps,
-            "a monotonic cubic between the two samples, which stays between their values: measure the film nearer to the wavelength",
+            "monotonic cubic between the two samples, which stays between their values; to improve it, measure the film nearer to the wavelength",
         );
     }
     if let Some(loss) = loss(design) {
         row(
             "Light arrives through a substrate without loss",
             loss,
-            "its index is taken for real, which changes what a face passes by less than a millionth; what is lost on the way is in no figure",
+            "the index is taken as real, which changes the transmission of a face by less than a millionth; no figure counts the loss in the substrate",
         );
     }
 }

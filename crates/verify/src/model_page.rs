@@ -6,12 +6,12 @@ use metalith_report::Page;
 /// Section on what the model changes, and what of it is not applied.
 pub(super) fn write(page: &mut Page, model: &ModelStatement) {
     page.paragraph(format!(
-        "Pillars, apertures, light and sensor are those of the calibrated model of {}: {}. {}",
+        "Pillars, apertures, light and sensor follow the calibrated model of {}: {}. {}",
         model.set,
         model.finding,
         match model.applied.is_empty() {
-            true => "It changes nothing that is simulated here.",
-            false => "It changes what is stated by, under the keys of the model file:",
+            true => "The model changes nothing that is simulated here.",
+            false => "The model adds these changes to the stated values, by the keys of the model file:",
         }
     ));
     if !model.applied.is_empty() {

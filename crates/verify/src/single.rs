@@ -204,19 +204,21 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     let elements = distinct(found);
     let mut page = Page::new(
         format!("PSFs of {file}"),
-        "a layout without a design, computed from its bytes",
+        "a layout without a design, computed from the bytes of its file",
     );
     page.facts(&[
         ("Pillars", format!("{} {}", count(found.pillars), found.shape.plural())),
         ("Elements", found.elements.len().to_string()),
-        ("of them distinct", elements.len().to_string()),
+        ("Distinct elements", elements.len().to_string()),
         ("Other shapes on the pillar layer", count(found.oddities.total())),
     ]);
     if let Some(model) = model {
         model_page::write(&mut page, model);
     }
-    page.section("What is assumed");
-    page.paragraph("A layout holds shapes alone. These were options of the command, or their defaults:");
+    page.section("Assumptions");
+    page.paragraph(
+        "A layout contains shapes only. The other quantities are options of the command, or their defaults:",
+    );
     let mut assumed = Table::new([Column::text("Quantity"), Column::text("Value")]);
     for (what, value) in assumptions {
         assumed.row([Cell::from(*what), Cell::from(value.as_str())]);
@@ -226,7 +228,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         [
             Column::text("Element"),
             Column::number("Wavelength", "nm"),
-            Column::number("Strehl", ""),
+            Column::number("Strehl ratio", ""),
         ]
         .into_iter()
         .chain(focus_columns())
@@ -262,9 +264,9 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     }
     page.section("PSFs");
     page.table(table.caption(STREHL_AGAINST));
-    page.figure(images.caption("The whole window, four decades."));
+    page.figure(images.caption("Whole window, four decades."));
     if let Some((camera, elements)) = white {
-        page.section("White light, from one direction");
+        page.section("Polychromatic figures");
         for element in elements {
             page.subsection(&element.element);
             white_page::channels(&mut page, camera, &element.channels, &[]);
@@ -274,7 +276,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     let zooms = elements.iter().take(4).map(|(site, widths)| {
         PillarZoom::new(format!("Middle of {}", site.name), widths, (0.0, 0.0), 10.0)
             .shape(found.shape)
-            .caption("As read, to scale.")
+            .caption("Pillars as read, to scale.")
     });
     page.row(zooms);
     write_json(

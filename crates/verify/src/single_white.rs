@@ -56,7 +56,7 @@ pub fn single_white(
     let elements = distinct(found);
     let widest = largest_number(&elements);
     progress.begin(
-        "simulating white light",
+        "simulating polychromatic light",
         (elements.len() * sampling.wavelengths_nm.len()) as u64,
     );
     let point = || Point {

@@ -134,7 +134,7 @@ impl<'a> WhiteSimulator<'a> {
     pub fn solve(&self, judge: &CaseOptics<'_>, elements: &[Element], progress: &dyn Progress) -> Result<()> {
         if incidence(self.design) == Incidence::Oblique {
             let all = elements.len() * self.colours.len();
-            progress.begin("solving cells for oblique white light", all as u64);
+            progress.begin("solving cells for oblique polychromatic light", all as u64);
         }
         for (um, _) in &self.colours {
             for element in elements {

@@ -16,12 +16,9 @@ const MOST_PIXELS: usize = 240;
 /// Pictures, contrast and numbers of one element.
 pub(super) fn write(page: &mut Page, found: &Verification, element: &DistinctElement) {
     let Some(camera) = &found.camera else { return };
-    page.subsection(format!(
-        "Element {} in white light, from one direction",
-        element.element.label()
-    ));
+    page.subsection(format!("Element {}: polychromatic figures", element.element.label()));
     page.paragraph(format!(
-        "A point of the scene in the direction in which the element looks at {} nm, by the `{}` cell.",
+        "A point of the scene in the viewing direction of the element at {} nm, simulated with the model `{}`.",
         exact(element.element.wedge.wavelength_um * 1e3),
         found.fidelity,
     ));
@@ -68,16 +65,16 @@ pub(super) fn channels(
         Axis::linear("MTF", "").range(0.0, 1.0),
     );
     for white in channels {
-        chart.line(format!("white light, {}", white.channel), white.curve());
+        chart.line(format!("polychromatic, {}", white.channel), white.curve());
     }
     for (name, psf) in alone {
         chart.line(name.as_str(), psf.mtf_curve.iter().copied());
     }
-    page.figure(images.caption(format!("The middle of the window of each channel, {DECADES} decades.")));
+    page.figure(images.caption(format!("Middle of the window of each channel, {DECADES} decades.")));
     page.figure(chart.caption(if alone.is_empty() {
         "Mean of x and y."
     } else {
-        "Mean of x and y. White light from one direction beside single wavelengths, each from the direction that suits it."
+        "Mean of x and y. Polychromatic light comes from one direction. Each single wavelength comes from the viewing direction at this wavelength."
     }));
 }
 
@@ -88,10 +85,10 @@ fn table(camera: &CameraStatement, channels: &[WhiteChannel]) -> Table {
         Column::text("Channel"),
         Column::number("Light from 10 to 90 %", "nm"),
         Column::number("Spread of the chief ray", "um"),
-        Column::number("Direction of it", "°"),
+        Column::number("Direction of the spread", "°"),
         Column::number("Energy in 1 pixel", "%"),
         Column::number("in 2", "%"),
-        Column::number("All that passes", "%"),
+        Column::number("Transmitted", "%"),
         Column::number(format!("MTF {half}/mm along x"), ""),
         Column::number("y", ""),
         Column::number(format!("{nyquist}/mm along x"), ""),
@@ -120,7 +117,7 @@ fn table(camera: &CameraStatement, channels: &[WhiteChannel]) -> Table {
     }
     let least = channels.iter().map(|w| w.counted).fold(1.0, f64::min);
     table.caption(format!(
-        "Energies are of the light that arrives at the element, about the brightest place. The error of sampling is the largest change of an MTF when every second wavelength is left out. {}",
+        "Energies are shares of the light that arrives at the element, in squares about the brightest place. The error of sampling is the largest change of an MTF if every second wavelength is left out. {}",
         simulated_words(least)
     ))
 }

@@ -107,7 +107,7 @@ impl PsfArgs {
                     Some(light) if light.white.is_some() => {
                         let tables: Vec<String> = light.tabulated_um().iter().map(|um| exact(um * 1e3)).collect();
                         format!(
-                            "; white light is between the wavelengths that have tables, {} nm",
+                            "; polychromatic light is interpolated between the wavelengths that have tables, {} nm",
                             tables.join(", ")
                         )
                     }

@@ -13,7 +13,7 @@ pub(super) const SIGMAS: f64 = 6.0;
 pub(super) fn measurements(page: &mut Page, session: &Session<'_>, simulations: &Simulations, evidence: &Evidence) {
     page.section("Measurements");
     page.paragraph(
-        "Each row: the camera, the model, and the residual in standard deviations of the noise, before and after.",
+        "Each row shows the recorded image, the model, and the residual in standard deviations of the noise, before and after the fit.",
     );
     let set = session.set();
     let (finding, data) = (&evidence.finding, &evidence.data);
@@ -71,9 +71,7 @@ pub(super) fn measurements(page: &mut Page, session: &Session<'_>, simulations: 
             }
             page.row([
                 seen.caption("Camera and model on one logarithmic scale."),
-                left.caption(
-                    "Residual; the number is the reduced chi-square per pixel when the measurement was left out.",
-                ),
+                left.caption("Residual. The number is the reduced chi-square per pixel with the measurement held out."),
             ]);
         };
         if place == 0 {
@@ -97,7 +95,7 @@ pub(super) fn widths(page: &mut Page, session: &Session<'_>, finding: &Finding) 
     let mut chart = Chart::new(
         "Widths by SEM",
         Axis::linear("designed width", "nm"),
-        Axis::linear("measured less designed", "nm"),
+        Axis::linear("measured minus designed", "nm"),
     );
     let (low, high) = session.simulator.bench.widths_nm();
     chart.band(

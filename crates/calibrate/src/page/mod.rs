@@ -52,19 +52,19 @@ pub fn write_page(
         ),
     ]);
     page.paragraph(
-        "Errors are reduced chi-square per pixel: noise alone gives 1. Held out: predicted by a fit to measurements of other colours, elements or distances; only registration, flux and black level are adjusted. Null test: the error that random smooth terms leave.",
+        "Errors are reduced chi-square per pixel; noise alone gives 1. Held out: the measurement is predicted by a fit to measurements of other colours, elements or distances, and only registration, flux and black level are adjusted. Null test: held-out error with random smooth terms in place of effects.",
     );
     if let Some(share) = diagnosis.missing_by_speckle {
         page.paragraph(format!(
-            "Pillars that are missing at random places make a speckle that no fit can predict; its variance is known and counts as noise in the errors after. By the speckle alone, {} % of the pillars are missing.",
+            "Pillars that are missing at random places make a speckle that no fit can predict. The variance of the speckle is known. It counts as noise in the errors after the fit. Speckle-based missing fraction: {} % of the pillars.",
             sig(100.0 * share, 3)
         ));
     }
     effects(&mut page, diagnosis);
     if !diagnosis.patterns.is_empty() {
-        page.section("Patterns of what is left");
+        page.section("Patterns of the residual");
         page.paragraph(
-            "Each quantity was also fitted free for each element, colour, distance and angle. These remove most of what is left; what the values follow says which effect is missing.",
+            "Each quantity was also fitted separately for each element, colour, distance and angle. The quantities of this list remove most of the residual. The trend of their values shows which effect is missing.",
         );
         page.list(diagnosis.patterns.iter().map(FreePattern::sentence));
     }
@@ -103,7 +103,7 @@ fn effects(page: &mut Page, diagnosis: &Diagnosis) {
         Column::text("Effect"),
         Column::text("Value"),
         Column::text("95 % interval"),
-        Column::text("Half of it by noise alone, by the model alone"),
+        Column::text("Half of the interval by noise alone, by the error of the model alone"),
         Column::text("Cannot be distinguished from"),
         Column::text("Measurement that would distinguish"),
     ]);
@@ -142,13 +142,13 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
     if diagnosis.ladder.is_empty() {
         return;
     }
-    page.section("Fidelity of the cell");
+    page.section("Simulation models");
     let mut table = Table::new([
-        Column::text("Cell"),
+        Column::text("Simulation model"),
         Column::number("Reduced chi-square per pixel", "fitted"),
         Column::number("Reduced chi-square per pixel", "held out"),
     ])
-    .caption("Nuisances fitted, nothing else. The polynomials lack amplitude and resonances.");
+    .caption("Only the nuisances are fitted. The polynomials lack amplitude and resonances.");
     for rung in &diagnosis.ladder {
         table.row([
             Cell::code(&rung.fidelity),
@@ -166,7 +166,7 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
     else {
         return;
     };
-    let mut pictures = ImageGrid::new("Residual under three fidelities of the cell", diagnosis.ladder.len())
+    let mut pictures = ImageGrid::new("Residual with each simulation model", diagnosis.ladder.len())
         .pixel_um(session.set().camera.pixel_um)
         .values("residual", "sigma")
         .range(-SIGMAS, SIGMAS)
@@ -184,11 +184,11 @@ fn ladder(page: &mut Page, session: &Session<'_>, diagnosis: &Diagnosis) {
 fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
     page.section("Candidates");
     page.paragraph(
-        "Every effect is scored by the share of the residual that its signature explains; the leaders are fitted, and judged by what they gain on measurements left out.",
+        "The score of an effect is the share of the residual that its signature explains. The leading effects are fitted. Their gain on held-out measurements decides.",
     );
     let mut chart = Ranking::new(
         "Candidates",
-        Axis::linear("gain on measurements left out", "reduced chi-square per pixel"),
+        Axis::linear("gain on held-out measurements", "reduced chi-square per pixel"),
     );
     for r in diagnosis.ranking.iter().filter(|r| r.held_out_gain.is_some()) {
         let interval = r.held_out_gain_interval.map(|[a, b]| (a, b));
@@ -201,7 +201,7 @@ fn ranking(page: &mut Page, diagnosis: &Diagnosis) {
         );
     }
     page.figure(chart.caption(
-        "Gain of each leader, with its 95 % confidence interval over groups of measurements. An effect that was taken in a later step has its gain beyond the effects that were taken before it.",
+        "Gain of each leading effect, with its 95 % confidence interval over groups of measurements. The gain of an effect that was taken in a later step is additional to the gain of the effects before it.",
     ));
     page.details("All candidates", |inner| {
         inner.table(candidates(&diagnosis.ranking));

@@ -19,7 +19,7 @@ pub(super) fn smooth_residual(page: &mut Page, session: &Session<'_>, evidence: 
     };
     page.section("Smooth residual");
     page.paragraph(format!(
-        "Smooth shapes, which stand for no effect, fitted to what the effects leave. They lower the reduced chi-square per pixel from {} to {}. The path over the lens is {} nm rms, with a noise of {} nm.",
+        "Smooth terms, which represent no effect, are fitted to the residual of the effects. They lower the reduced chi-square per pixel from {} to {}. Their optical path over the lens is {} nm rms, with a noise of {} nm.",
         sig(free.chi2.0, 4),
         sig(free.chi2.1, 4),
         sig(free.path_rms_nm.0, 3),
@@ -82,7 +82,7 @@ pub(super) fn confusable(page: &mut Page, session: &Session<'_>, simulations: &S
     pairs.sort_by(|a, b| c[*b].abs().total_cmp(&c[*a].abs()));
     if pairs.is_empty() {
         page.paragraph(format!(
-            "None of the effects that were tried: no two signatures have a cosine above {ALIKE}."
+            "All effects that were tried can be distinguished: no two signatures have a cosine above {ALIKE}."
         ));
         return;
     }
@@ -133,7 +133,7 @@ pub(super) fn nuisances(page: &mut Page, session: &Session<'_>, found: &Nuisance
             .map(|(led, f)| format!("{} nm: {}", led.name(), fixed(*f, 4)))
             .collect();
         inner.paragraph(format!(
-            "Flux over what is stated: {}. Black level off by {} DN.",
+            "Flux over the stated flux: {}. Error of the black level: {} DN.",
             flux.join(", "),
             fixed(found.black_dn, 3)
         ));

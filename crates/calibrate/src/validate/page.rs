@@ -49,7 +49,7 @@ pub fn write_validation(folder: &Path, validation: &Validation) -> Result<()> {
         (
             "Sets with effects of the list",
             format!(
-                "{} of {}: all of them named; {}: something beside them",
+                "{} of {}: all effects named; {}: other effects named in addition",
                 validation.with_effects_named, validation.with_effects, validation.with_effects_beside
             ),
         ),
@@ -85,7 +85,7 @@ fn limits(page: &mut Page, validation: &Validation) {
         Column::text("Interval there"),
         Column::number("Estimated limit", "typical sizes"),
     ])
-    .caption("The smallest size from which on an effect was named, alone or as one of several alternatives; the estimated limit is the size at which its residual would reach the least gain of a claim.");
+    .caption("Detection limit: the smallest size above which the effect was always named, alone or as one of several alternatives. The estimated limit is the size at which the residual of the effect reaches the least gain of a claim.");
     for limit in &validation.limits {
         let at = |t: &&ValidationTrial| t.truth == limit.name && Some(t.size.abs()) == limit.named_from;
         let first = validation.trials.iter().find(at);
@@ -129,7 +129,7 @@ fn coverage(page: &mut Page, validation: &Validation) {
         Column::number("Error, rms", "standard deviations"),
         Column::number("Error, rms", "of the true value"),
     ])
-    .caption("Numbers that were claimed beside the true ones. A standard deviation is half of one side of the interval; errors of one are what intervals promise, smaller ones say that they are too wide.");
+    .caption("Claimed values compared with the true values. A standard deviation is half of one side of the interval. Correct intervals have an rms error of one standard deviation; a smaller error means that the intervals are too wide.");
     for own in &validation.coverage_by_effect {
         table.row([
             Cell::code(&own.effect),

@@ -47,15 +47,15 @@ pub fn write_compensation_report(
     let s = &compensated.summary;
     page.facts(&[
         ("Widths moved, rms", format!("{} nm", sig(s.moved_rms_nm, 3))),
-        ("Error as made, uncorrected", sig(s.error[0], 3)),
-        ("Error as made, corrected", sig(s.error[1], 3)),
-        ("Newly at an end of the range", count(s.at_limit)),
+        ("Error as fabricated, uncorrected", sig(s.error[0], 3)),
+        ("Error as fabricated, corrected", sig(s.error[1], 3)),
+        ("Pillars moved to an end of the range", count(s.at_limit)),
     ]);
     page.paragraph(
-        "Error: rms difference of the complex transmission of the pillars as made from that intended, over the rms of the latter, at all wavelengths of the design together, of upright rectangles in both polarisations, with one free phase for each of these. Corrected pillars are those of the file that was read back.",
+        "Error: rms difference of the complex transmissions of fabricated and intended pillars, over the rms transmission of the intended pillars. It is over all wavelengths of the design, and for upright rectangles over both polarisations, with one free phase for each of these. Corrected pillars are read back from the file.",
     );
     page.paragraph(
-        "Made elements have all that the model says of pillars, apertures, light and sensor; widths can correct the pillars alone.",
+        "Fabricated elements include the whole model: pillars, apertures, light and sensor. A change of widths can correct the pillars only.",
     );
     for quantity in line.chip.statement().not_applied {
         page.note(quantity.to_string());

@@ -13,7 +13,7 @@ const RADIUS_POINTS: usize = 600;
 
 /// The section of the design.
 pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
-    page.section("What was designed");
+    page.section("The design");
     let pillars = design.cell.shape.description()
         + match design.cell.shape.basis() {
             None => "",
@@ -31,7 +31,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     let zoomed = middle(rows.as_ref());
     let span_um = ZOOMED_PITCHES * array.lattice.pitch_um();
     page.row([
-        chip(design).caption("The chip from above: openings, pillars, marks and outline as they are written."),
+        chip(design).caption("The chip from above: openings, pillars, marks and outline as written."),
         PillarZoom::new(
             "Pillars in the middle of the centre element",
             &zoomed,
@@ -39,7 +39,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
             span_um,
         )
         .shape(design.cell.shape)
-        .caption("Pillars as they are written, to scale."),
+        .caption("Pillars as written, to scale."),
     ]);
     if design.array.has_own_lenses() {
         page.table(own_lenses(design));
@@ -57,7 +57,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     let mut turns = Chart::new(
         "Phase over the radius",
         Axis::linear("radius", "um"),
-        Axis::linear("phase", "turns"),
+        Axis::linear("phase", "waves"),
     )
     .size(420.0, 260.0);
     match &along_y {
@@ -79,7 +79,7 @@ pub(super) fn write(page: &mut Page, design: &Design, array: &PillarArray) {
     });
     widths.points("as written", shown.into_iter().take(last.min(RADIUS_POINTS)));
     page.row([
-        turns.caption("Centre element, before the modulo."),
+        turns.caption("Phase of the centre element, unwrapped."),
         widths.caption(format!(
             "Centre element, the first {} sites from the middle.",
             last.min(RADIUS_POINTS)
@@ -117,7 +117,7 @@ fn elements(design: &Design) -> String {
             steered(format!(", steered by {}° a step", design.array.steering_deg)),
         ),
         (count, None) if design.array.has_own_lenses() => format!(
-            "{count} elements, each with a lens of its own where the table says so, {}",
+            "{count} elements with individual lenses where the table states one, {}",
             one_by_one()
         ),
         (count, None) => format!("{count} elements of {lens}, {}", one_by_one()),

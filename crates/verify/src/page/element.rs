@@ -19,12 +19,12 @@ const PSF_SHOWN_UM: f64 = 60.0;
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, element: &DistinctElement) {
     page.section(format!("Element {}", element.element.label()));
     page.paragraph(format!(
-        "Stands for {} of {}{}. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, by the `{}` cell, {} rad rms, {} at most. {}",
+        "This element represents {} of {}{}. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, with the simulation model `{}`, {} rad rms, {} at most. {}",
         element.copies,
         counted(found.elements.len(), "element"),
         match element.copies {
             1 => "",
-            _ => ": figures of the others are these, with places, directions and field angles turned as the table of elements says",
+            _ => ": the others have the same figures, with places, directions and field angles transformed as in the table of elements",
         },
         sig(element.phase.rounding.rms_rad, 3),
         sig(element.phase.rounding.largest_rad, 3),
@@ -40,19 +40,16 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
         .filter_map(|spot| Some((spot, spot.images()?)))
         .collect();
     // Designed above extracted, a column for each wavelength.
-    let mut images = ImageGrid::new("PSF designed above extracted", shown.len())
+    let mut images = ImageGrid::new("PSF of the target above the layout", shown.len())
         .values("|E|² / |E inc|²", "")
         .log(PSF_DECADES)
         .side((760.0 / shown.len().max(1) as f64).min(230.0));
     for (spot, seen) in &shown {
         images = images.pixel_um(seen.step_um);
-        images.image(format!("designed, {}", spot.place()), cut(&seen.designed, seen.step_um));
+        images.image(format!("target, {}", spot.place()), cut(&seen.designed, seen.step_um));
     }
     for (spot, seen) in &shown {
-        images.image(
-            format!("extracted, {}", spot.place()),
-            cut(&seen.extracted, seen.step_um),
-        );
+        images.image(format!("layout, {}", spot.place()), cut(&seen.extracted, seen.step_um));
     }
     let shown_um = shown.first().map_or(PSF_SHOWN_UM, |(_, seen)| {
         shown_samples(&seen.designed, seen.step_um) as f64 * seen.step_um
@@ -64,30 +61,30 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
     );
     for (spot, _) in &shown {
         let colour = format!("{} nm", exact(spot.wavelength_um * 1e3));
-        chart.line(format!("designed, {colour}"), spot.designed.mtf_curve.iter().copied());
-        chart.line(format!("extracted, {colour}"), spot.judged().mtf_curve.iter().copied());
+        chart.line(format!("target, {colour}"), spot.designed.mtf_curve.iter().copied());
+        chart.line(format!("layout, {colour}"), spot.judged().mtf_curve.iter().copied());
     }
     page.figure(images.caption(format!(
-        "The middle {} um about the chief ray, {PSF_DECADES} decades; extracted by the `{}` cell.",
+        "The middle {} um about the chief ray, {PSF_DECADES} decades. The layout is simulated with the model `{}`.",
         sig(shown_um, 3),
         found.fidelity
     )));
-    page.figure(chart.caption("In the middle of the field, mean of x and y."));
+    page.figure(chart.caption("MTF in the middle of the field, mean of x and y."));
     let converts = element.orders.iter().any(|o| o.unconverted.is_some());
     let diverges = element.orders.iter().any(|o| o.diverging.is_some());
     let mut columns = vec![
         Column::number("Wavelength", "nm"),
-        Column::text("Cell"),
+        Column::text("Simulation model"),
         Column::number("First order", "%"),
-        Column::number("Zero order", "%"),
+        Column::number("Zeroth order", "%"),
         Column::number("Second order", "%"),
-        Column::number("All transmitted in the zero order of the lattice", "%"),
+        Column::number("All light in the zeroth order of the lattice", "%"),
     ];
     if converts {
-        columns.push(Column::number("Not converted, beside it", "%"));
+        columns.push(Column::number("Not converted, in addition", "%"));
     }
     if diverges {
-        columns.push(Column::number("Diverging, of the other hand", "%"));
+        columns.push(Column::number("Diverging, other handedness", "%"));
     }
     let mut orders = Table::new(columns);
     for entry in &element.orders {
@@ -105,21 +102,19 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
         orders.row(cells);
     }
     let whose = if found.fidelity == Fidelity::Neighbours {
-        "the mapping's own account, for `neighbours` by that of the element's pillars"
+        "the mapping; for `neighbours` by the pillars of the element"
     } else {
-        "the mapping's own account"
+        "the mapping"
     };
     let mut beside = String::new();
     if converts {
-        beside += " Light that is not converted passes as if there were no phase too; it is in the PSFs, beside the orders of what is \
-                   converted.";
+        beside += " Light that is not converted passes as if the element had no phase. It is in the PSFs, in addition to the orders of the converted light.";
     }
     if diverges {
-        beside += " Orders are of the hand that is focused, the other one diverges, and is in the PSFs too; all are shares of all light \
-                   that arrives.";
+        beside += " Orders are of the handedness that is focused. Light of the other handedness diverges and is in the PSFs too. All shares are of all light that arrives.";
     }
     page.table(orders.caption(format!(
-        "Where light goes by {whose}: the first order is the image, the zero order passes the element as if it had no phase.{beside}",
+        "Share of light in each order, computed from {whose}. The first order makes the image. The zeroth order passes the element as if it had no phase.{beside}",
     )));
     white_page::write(page, found, element);
 }
@@ -128,11 +123,11 @@ fn steepness(element: &DistinctElement) -> String {
     let steep = &element.steepness;
     match steep.from_pitches {
         None => format!(
-            "The design phase nowhere steps by more than pi a pitch ({} rad at most).",
+            "The phase of the target steps by at most {} rad from pillar to pillar, less than pi.",
             sig(steep.largest_step_rad, 3)
         ),
         Some(from) => format!(
-            "The design phase steps by more than pi a pitch at {} % of the pillars, the first of them {} pitches from the middle.",
+            "The phase of the target steps by more than pi from pillar to pillar at {} % of the pillars. The first of them is {} pitches from the middle.",
             sig(steep.steep_sites as f64 / steep.sites.max(1) as f64 * 100.0, 3),
             sig(from, 4),
         ),
@@ -145,7 +140,7 @@ fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
         [
             Column::text("Wavelength, field angle"),
             Column::text("Of"),
-            Column::number("Strehl", ""),
+            Column::number("Strehl ratio", ""),
         ]
         .into_iter()
         .chain(focus_columns())
@@ -184,7 +179,7 @@ fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
                 ]),
             );
         };
-        row("design phase".into(), &spot.designed, Cell::none());
+        row("target".into(), &spot.designed, Cell::none());
         for (k, (fidelity, extracted)) in spot.extracted.iter().enumerate() {
             let difference = if k == 0 {
                 Cell::sig(spot.psf_difference, 3)
@@ -194,7 +189,7 @@ fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
             row(format!("layout, {fidelity}"), extracted, difference);
         }
     }
-    table.caption("The unrounded design phase beside the pillars read back, by each cell. The focusing efficiency is the power in a circle of three full widths at half maximum (FWHM) about the peak. It and the energies are over the power that arrives at the element; the centroid counts from the chief ray.")
+    table.caption("The target, and the layout as read back with each simulation model. The focusing efficiency is the power in a circle of three full widths at half maximum (FWHM) about the peak. Focusing efficiency and energies are shares of the power that arrives at the element. The centroid counts from the chief ray.")
 }
 
 /// Samples along an axis of a PSF that are shown: a small window is shown whole.

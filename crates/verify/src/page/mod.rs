@@ -36,7 +36,9 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
         format!("{}, computed from the bytes of {}", design.name, found.layout.file),
     );
     if let Some(why) = &found.not_simulated {
-        page.paragraph(format!("Every pillar was compared; nothing was simulated: {why}."));
+        page.paragraph(format!(
+            "Every pillar was compared with the design. Nothing was simulated: {why}."
+        ));
     }
     page.verdict(Verdict::of(found.passed()), format!("{}.", verdict_words(found)));
     for line in lens_figures(design, found) {
@@ -50,13 +52,13 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
     let mut facts = vec![
         ("Pillars", count(found.layout.pillars)),
         ("Elements", found.elements.len().to_string()),
-        ("of them distinct", found.distinct.len().to_string()),
+        ("Distinct elements", found.distinct.len().to_string()),
         ("Strehl ratio, least to greatest", strehl(found)),
         (contrast_at.as_str(), contrast(found)),
     ];
     let white_contrast_at = found.camera.as_ref().map(|camera| {
         let half = exact(camera.frequencies().half_nyquist_lp_mm);
-        format!("MTF at {half} lp/mm, a whole channel from one direction")
+        format!("MTF at {half} lp/mm, polychromatic, one channel")
     });
     // Without a camera there is no channel.
     facts.extend(white_contrast_at.as_deref().map(|what| (what, white_contrast(found))));
@@ -121,7 +123,7 @@ pub(crate) fn span(least: String, most: String) -> String {
 fn limits(page: &mut Page, found: &Verification) {
     page.section("Limits");
     let mut table = Table::new([
-        Column::text("What, and where it is worst"),
+        Column::text("Quantity, and place of its worst value"),
         Column::number("Reached", ""),
         Column::number("Limit", ""),
         Column::verdict(),
@@ -139,12 +141,12 @@ fn limits(page: &mut Page, found: &Verification) {
         ]);
     }
     page.table(table.caption(
-        "From `[verify.limits]` of the design file; limits that it does not set have their default, or none.",
+        "Limits are from `[verify.limits]` of the design file. A limit that the file does not set has its default value or is not checked.",
     ));
 }
 
 fn method(page: &mut Page, design: &Design, found: &Verification) {
-    page.section("How it was computed");
+    page.section("Method");
     if let Some(model) = &found.model {
         model_page::write(page, model);
     }
@@ -156,18 +158,18 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
         .max()
         .unwrap_or(0);
     page.paragraph(format!(
-        "Design `{}`, digest `{}`. Everything about the layout is computed from the file that was read back. Fields: the lattice of point samples, each with the area of its cell as weight, folded ({} mode), frequencies weighed by where their rays land; at most {} frequency bins had to be relabelled towards the mean ray. PSF: |E|² over that of the incident wave. Strehl: against the same aperture, sites without a pillar included, passing all its power in the zero order with the perfect phase for the place where the chief ray lands. MTF: the transform of the PSF over all light that the element passes by the cell that judges, of which what lands outside of the window is a veil. Field angles count from where an element looks at each wavelength.",
+        "Design `{}`, digest `{}`. All figures of the layout are computed from the file that was read back. Field: sum over the sites of the lattice, each weighted by the area of its cell, by the folded propagator ({} mode). Each frequency is weighted by the place where its ray lands; at most {} frequency bins were shifted towards the mean ray. PSF: |E|² over |E|² of the incident wave. Strehl ratio: against the same aperture, sites without a pillar included, that transmits all power in the zeroth order with the perfect phase for the place where the chief ray lands. MTF: transform of the PSF over all light that the element transmits in the simulation model; light outside of the window is stray light. Field angles count from the viewing direction of the element at each wavelength.",
         found.design, found.design_digest, found.accuracy, count(relabelled),
     ));
     page.paragraph(format!(
-        "The cell that judges is `{}`, lit {}; wavelengths {} nm; windows of {} x {} samples of one pitch about the chief ray; sensor pixels of {} um.",
+        "Simulation model: `{}`, for light {}. Wavelengths: {} nm. Windows: {} x {} samples, one pitch apart, about the chief ray. Sensor pixels: {} um.",
         found.fidelity,
         match design.verify.incidence {
             CellIncidence::Normal if found.fidelity == Fidelity::Neighbours => {
-                "from the middle of each element's field"
+                "from the viewing direction of each element"
             }
             CellIncidence::Normal => "along the normal at all field angles",
-            CellIncidence::Oblique => "at the angle that light arrives at, both polarisations",
+            CellIncidence::Oblique => "at its angle of arrival, both polarisations",
         },
         design.verify.wavelengths_um.iter().map(|w| exact(w * 1e3)).collect::<Vec<_>>().join(", "),
         design.verify.window_samples,

@@ -12,7 +12,7 @@ const MOST_ODDITIES: usize = 20;
 
 /// The section of the file.
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
-    page.section("What was written");
+    page.section("The file");
     let told_by = design.cell.shape.quantity().word;
     let mut table = Table::new([
         Column::text("Element (m, n)"),
@@ -36,7 +36,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         ]);
     }
     page.table(table.caption(format!(
-        "Every site of every element, compared with the {told_by} that the design asks for. An element that is simulated as another has its figures with the place (x, y) where the table says; its field angles are turned alike."
+        "Every site of every element is compared with the {told_by} of the design. The last column names the element that is simulated in its place. The figures of that element hold with the place (x, y) of the table, and with field angles transformed in the same way."
     )));
     let mut layers = Table::new([
         Column::text("Layer"),
@@ -55,7 +55,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         ]);
     }
     page.table(layers.caption(format!(
-        "Layers of {}, all references followed: {}, {} deep, top cell `{}`.",
+        "Layers of {}, shapes of all references counted: {}, {} deep, top cell `{}`.",
         found.layout.file,
         counted(found.layout.cells, "cell"),
         found.layout.depth,
