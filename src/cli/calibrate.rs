@@ -18,7 +18,7 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[command(
     after_help = "Example:\n  metalith calibrate bench/session-1 --out out/session-1\n\nWrites diagnosis.json, report.html, model.toml and, if the residual shows a pattern, proposal.toml; those of an earlier run are removed. With the verdict unexplained or data_unfit there is no model.toml. Exit code 1 if too few measurements can be used."
 )]
-pub struct CalibrateArgs {
+pub(crate) struct CalibrateArgs {
     /// Folders of sets, or their `measurement.toml`. Sessions of one plan share their simulations.
     #[arg(required = true)]
     sets: Vec<PathBuf>,
@@ -78,7 +78,7 @@ pub struct CalibrateArgs {
     json: bool,
 }
 
-pub fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let name = |set: &PathBuf| {
         let folder = if set.is_dir() {

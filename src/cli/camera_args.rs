@@ -10,7 +10,7 @@ use super::{Terminal, standard_input};
 
 /// The chip, the camera that it is in, and the field of its scenes.
 #[derive(Args)]
-pub struct CameraArgs {
+pub(crate) struct CameraArgs {
     /// The design of the layout: elements, wedges, cell; `-` for standard input.
     #[arg(long)]
     pub design: PathBuf,
@@ -29,7 +29,7 @@ pub struct CameraArgs {
 }
 
 /// Contents of the files of [`CameraArgs`].
-pub struct CameraFiles {
+pub(crate) struct CameraFiles {
     pub design: Design,
     pub camera: Camera,
     pub model: Option<CalibratedModel>,
@@ -39,7 +39,7 @@ pub struct CameraFiles {
 ///
 /// # Errors
 /// If it is none that a scene can have.
-pub fn distance_um(distance_mm: Option<f64>) -> Result<f64> {
+pub(crate) fn distance_um(distance_mm: Option<f64>) -> Result<f64> {
     match distance_mm {
         None => Ok(f64::INFINITY),
         Some(mm) if mm > 0.0 => Ok(mm * 1e3),
@@ -56,7 +56,7 @@ impl CameraArgs {
     ///
     /// # Errors
     /// If one cannot be read.
-    pub fn read(&self, terminal: &Terminal) -> Result<CameraFiles> {
+    pub(crate) fn read(&self, terminal: &Terminal) -> Result<CameraFiles> {
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         for quantity in model.iter().flat_map(|m| m.perturbation.not_applied()) {
             terminal.say(&quantity.to_string());

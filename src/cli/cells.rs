@@ -17,7 +17,7 @@ use super::{Outcome, Terminal, print_json, print_line, standard_input};
 /// Tabulate the unit cell of a design by RCWA, fit it, and report the errors of its mapping.
 #[derive(Args)]
 #[command(after_help = "Example:\n  metalith cells designs/prototype_3x3.toml --out out/cells")]
-pub struct CellsArgs {
+pub(crate) struct CellsArgs {
     /// The design file.
     design: PathBuf,
 
@@ -58,7 +58,7 @@ pub struct CellsArgs {
 }
 
 /// Do it.
-pub fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     if args.write && args.design.as_os_str() == "-" {
         return Err(Error::refused(

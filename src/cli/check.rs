@@ -18,7 +18,7 @@ use super::{Outcome, Terminal, print_line, standard_input};
     after_help = "Exit codes: 0 clean or all waived, 1 violations, 2 bad input, 3 a rule did not run.\n\
     Example:\n  metalith check out/mini_3x3/mini_3x3_pillars.gds --design designs/mini_3x3.toml --sarif check.sarif"
 )]
-pub struct CheckArgs {
+pub(crate) struct CheckArgs {
     /// The layout, in any hierarchy, of any program; `-` for standard input.
     layout: PathBuf,
 
@@ -96,7 +96,7 @@ impl CheckArgs {
     }
 }
 
-pub fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     args.paths_are_apart()?;
     let named = args.rules.as_deref().map(Deck::read).transpose()?;
     let waivers = args.waivers.as_deref().map(Waivers::read).transpose()?;

@@ -27,7 +27,7 @@ use super::{Outcome, Terminal, images, output, print_json, print_line};
     camera, such as one behind a relay, names camera and field after the layout:\n  \
     --design nano=designs/neural_nano_optics.toml::cameras/gt1930_relay.toml:28.9"
 )]
-pub struct CompareArgs {
+pub(crate) struct CompareArgs {
     /// Photographs, or folders of them: PNG, JPEG or NPY, all of one size.
     #[arg(required = true)]
     photographs: Vec<PathBuf>,
@@ -98,7 +98,7 @@ pub struct CompareArgs {
 
 /// What stands before the sensor of a camera without a lens.
 #[derive(Args)]
-pub struct LenslessArgs {
+pub(crate) struct LenslessArgs {
     /// Distance of the mask of `flatcam` from the sensor (um).
     #[arg(long, default_value_t = MaskSpec::standard().distance_um, value_name = "UM")]
     mask_distance_um: f64,
@@ -122,7 +122,7 @@ pub struct LenslessArgs {
 
 impl LenslessArgs {
     /// True if nobody asked for another mask or surface.
-    pub fn is_standard(&self) -> bool {
+    pub(crate) fn is_standard(&self) -> bool {
         let (mask, surface) = (MaskSpec::standard(), DiffuserSpec::standard());
         let own = [self.mask_distance_um, self.mask_feature_um];
         let rough = [self.diffuser_distance_um, self.diffuser_grain_um, self.diffuser_opening];
@@ -133,7 +133,7 @@ impl LenslessArgs {
     ///
     /// # Errors
     /// If a length is out of its range.
-    pub fn camera(&self, rival: Rival) -> Result<Lensless> {
+    pub(crate) fn camera(&self, rival: Rival) -> Result<Lensless> {
         Ok(match rival {
             Rival::Flatcam => Lensless::FlatCam(MaskSpec::new(self.mask_feature_um, self.mask_distance_um)?),
             Rival::Diffusercam => Lensless::DiffuserCam(DiffuserSpec::new(
@@ -147,7 +147,7 @@ impl LenslessArgs {
 
 /// A camera without a lens.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-pub enum Rival {
+pub(crate) enum Rival {
     /// A mask that is a product of two sequences.
     Flatcam,
     /// A rough surface.
@@ -156,7 +156,7 @@ pub enum Rival {
 
 /// A design, as it is asked for.
 #[derive(Clone)]
-pub struct ComparedDesign {
+pub(crate) struct ComparedDesign {
     name: Option<String>,
     design: PathBuf,
     layout: Option<PathBuf>,
@@ -198,7 +198,7 @@ impl ComparedDesign {
     ///
     /// # Errors
     /// If the design cannot be read, or has no layout.
-    pub fn listed(&self) -> Result<ListedDesign> {
+    pub(crate) fn listed(&self) -> Result<ListedDesign> {
         Ok(ListedDesign {
             name: self.name.clone(),
             layout: self.layout(&Design::read(&self.design)?)?,
@@ -252,7 +252,7 @@ impl CompareArgs {
     }
 }
 
-pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let comparison = args.comparison()?;
     let outputs = ["compare.html", "compare.json"].map(|n| args.out.join(n));
@@ -287,7 +287,7 @@ pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
 }
 
 /// Write the page and the numbers of a comparison, and print its table.
-pub fn tell(comparison: &ComparisonResult, folder: &Path) -> Result<Outcome> {
+pub(crate) fn tell(comparison: &ComparisonResult, folder: &Path) -> Result<Outcome> {
     write_comparison(comparison, folder)?;
     output::line(format_args!("{}", comparison.markdown()));
     output::line(format_args!("page: {}", folder.join("compare.html").display()));

@@ -11,7 +11,7 @@ use super::verify::FidelityArg;
 
 /// Design that a layout is compared with.
 #[derive(Args)]
-pub struct CompensatedFor {
+pub(crate) struct CompensatedFor {
     /// `metalith layout --compensate MODEL` made the layout: its pillars are compared with the compensated design.
     #[arg(id = "compensated", long, value_name = "MODEL", requires = "design")]
     pub model: Option<PathBuf>,
@@ -22,7 +22,7 @@ impl CompensatedFor {
     ///
     /// # Errors
     /// If the model cannot be read, a cell cannot be solved, or the user stopped it.
-    pub fn array(&self, design: &mut Design, terminal: &Terminal) -> Result<PillarArray> {
+    pub(crate) fn array(&self, design: &mut Design, terminal: &Terminal) -> Result<PillarArray> {
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let array = PillarArray::build(design, terminal)?;
         match model {
@@ -40,7 +40,7 @@ impl CompensatedFor {
 ///
 /// # Errors
 /// If both a model, named by `option`, and a cell are given.
-pub fn judged_as_made(option: &str, model: Option<&Path>, fidelity: Option<FidelityArg>) -> Result<()> {
+pub(crate) fn judged_as_made(option: &str, model: Option<&Path>, fidelity: Option<FidelityArg>) -> Result<()> {
     if model.is_none() || fidelity.is_none() {
         return Ok(());
     }

@@ -11,25 +11,25 @@ use super::{Arguments, Outcome, Terminal, output, print_line};
 /// Print the completion script of a shell.
 #[derive(Args)]
 #[command(after_help = "Example:\n  metalith completions bash > ~/.local/share/bash-completion/completions/metalith")]
-pub struct CompletionsArgs {
+pub(crate) struct CompletionsArgs {
     shell: Shell,
 }
 
 /// Write the manual pages of the program and of each command into a folder.
 #[derive(Args)]
-pub struct ManualArgs {
+pub(crate) struct ManualArgs {
     /// Folder for `metalith.1`, `metalith-run.1` and so on.
     folder: PathBuf,
 }
 
-pub fn run(args: &CompletionsArgs, _terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &CompletionsArgs, _terminal: &Terminal) -> Result<Outcome> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut Arguments::command(), "metalith", &mut text);
     output::line(format_args!("{}", String::from_utf8_lossy(&text).trim_end()));
     Ok(Outcome::Fine)
 }
 
-pub fn manual(args: &ManualArgs, _terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn manual(args: &ManualArgs, _terminal: &Terminal) -> Result<Outcome> {
     let mut program = Arguments::command();
     program.build();
     let whole = std::iter::once(program.clone());

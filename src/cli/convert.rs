@@ -17,7 +17,7 @@ use super::{Outcome, Terminal, print_line};
     after_help = "Examples:\n  metalith convert out/lens_pillars.gds out/lens_pillars.oas\n  \
     metalith convert from_elsewhere.oas lens.gds"
 )]
-pub struct ConvertArgs {
+pub(crate) struct ConvertArgs {
     /// The layout to read, `-` for standard input; its first bytes show its format.
     from: PathBuf,
 
@@ -29,7 +29,7 @@ pub struct ConvertArgs {
     format: Option<FormatArg>,
 }
 
-pub fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<Outcome> {
     super::paths::apart([args.from.as_path()], &[&args.to])?;
     let format = args.format.map_or_else(|| LayoutFormat::of_name(&args.to), Into::into);
     terminal.stop_on_interrupt();

@@ -21,7 +21,7 @@ use super::{Outcome, Terminal, print_line};
 #[command(
     after_help = "Example:\n  metalith dataset photographs --layout out/prototype_3x3/prototype_3x3_pillars.gds \\\n    --camera cameras/gt1930.toml --design designs/prototype_3x3.toml --out out/pairs"
 )]
-pub struct DatasetArgs {
+pub(crate) struct DatasetArgs {
     /// Folder of PNG, JPEG or NPY images.
     images: PathBuf,
 
@@ -75,7 +75,7 @@ fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result
     Ok(Outcome::Fine)
 }
 
-pub fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let CameraFiles { design, camera, model } = args.with.read(terminal)?;
     let images = images_in(&args.images)?;

@@ -19,7 +19,7 @@ use super::{Outcome, Terminal, print_json, print_line};
 /// With `--add` the noise is added first, and the result is compared with the picture.
 #[derive(Args)]
 #[command(after_help = "Example:\n  metalith denoise photograph.png --noise 25 --add --out clean.png")]
-pub struct DenoiseArgs {
+pub(crate) struct DenoiseArgs {
     /// The picture: PNG, JPEG or NPY.
     picture: PathBuf,
 
@@ -63,7 +63,7 @@ fn noise(text: &str) -> std::result::Result<f32, String> {
     }
 }
 
-pub fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.out.is_none() && !args.add {
         return Err(Error::refused(
             "denoise/nothing-to-do",

@@ -15,7 +15,7 @@ use super::{Outcome, Terminal, print_line};
 #[derive(Args)]
 #[command(after_help = "Exit codes: 0 same geometry, 1 different, 2 bad input.\n\
     Example:\n  metalith diff golden/lens.gds out/lens_pillars.gds --report diff.html")]
-pub struct DiffArgs {
+pub(crate) struct DiffArgs {
     /// The first layout.
     a: PathBuf,
 
@@ -39,7 +39,7 @@ pub struct DiffArgs {
     json: bool,
 }
 
-pub fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     let report: Vec<_> = args.report.as_deref().into_iter().collect();
     super::paths::apart([args.a.as_path(), &args.b], &report)?;
     terminal.stop_on_interrupt();

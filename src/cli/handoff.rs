@@ -21,7 +21,7 @@ use super::{Outcome, Terminal, print_line};
                   Exit codes: 0 fine; 1 a check failed, or the folder was altered; 2 bad input; \
                   3 a check could not run."
 )]
-pub struct HandoffArgs {
+pub(crate) struct HandoffArgs {
     /// The design file.
     #[arg(required_unless_present = "verify", conflicts_with = "verify")]
     design: Option<PathBuf>,
@@ -65,7 +65,7 @@ pub struct HandoffArgs {
     json: bool,
 }
 
-pub fn run(args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     match (&args.verify, &args.design) {
         (Some(folder), _) => look(folder, args.json, terminal),

@@ -15,7 +15,7 @@ use metalith::imaging::scene::images_in;
 ///
 /// # Errors
 /// As [`images_in`].
-pub fn of_all(given: &[PathBuf]) -> Result<Vec<PathBuf>> {
+pub(crate) fn of_all(given: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut all = Vec::new();
     for path in given {
         match path.is_dir() {
@@ -27,6 +27,6 @@ pub fn of_all(given: &[PathBuf]) -> Result<Vec<PathBuf>> {
 }
 
 /// Reads the side of a scene whose pictures are scored (pixels).
-pub fn scored_sides() -> RangedI64ValueParser<u16> {
+pub(crate) fn scored_sides() -> RangedI64ValueParser<u16> {
     clap::value_parser!(u16).range(*SCORED_SIDES.start() as i64..=*SCORED_SIDES.end() as i64)
 }

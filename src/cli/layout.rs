@@ -16,7 +16,7 @@ use super::{Outcome, Terminal, print_line, standard_input};
 #[command(
     after_help = "Examples:\n  metalith layout designs/mini_3x3.toml --out out/mini --hierarchy flat\n  metalith layout designs/mini_3x3.toml --format oasis\n  metalith layout designs/mini_3x3.toml --compensate out/calibrate/session-1/model.toml"
 )]
-pub struct LayoutArgs {
+pub(crate) struct LayoutArgs {
     /// The design file.
     design: PathBuf,
 
@@ -35,7 +35,7 @@ pub struct LayoutArgs {
 
 /// Where files go and how they are nested.
 #[derive(Args)]
-pub struct Target {
+pub(crate) struct Target {
     /// Folder for the files, created if need be; `out/NAME` of the design if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -50,7 +50,7 @@ pub struct Target {
 
 /// The format of layouts that are written.
 #[derive(Args, Clone, Copy)]
-pub struct FormatArgs {
+pub(crate) struct FormatArgs {
     /// Format of the layouts; GDSII if left out.
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
@@ -92,7 +92,7 @@ impl FormatArgs {
     ///
     /// # Errors
     /// If an encoding of OASIS is asked for in GDSII.
-    pub fn asked(&self) -> Result<Option<LayoutFormat>> {
+    pub(crate) fn asked(&self) -> Result<Option<LayoutFormat>> {
         let encoding = match self.oasis {
             Some(EncodingArg::Compact) | None => OasisEncoding::Compact,
             Some(EncodingArg::Plain) => OasisEncoding::Plain,
@@ -112,7 +112,7 @@ impl FormatArgs {
 }
 
 /// Files that were written.
-pub struct Files {
+pub(crate) struct Files {
     pub pillars: Written,
     pub apertures: Written,
     pub properties: PathBuf,
@@ -130,14 +130,14 @@ enum HierarchyArg {
 
 impl Target {
     /// The folder that the files of a design go to.
-    pub fn folder(&self, design: &Design) -> PathBuf {
+    pub(crate) fn folder(&self, design: &Design) -> PathBuf {
         self.out
             .clone()
             .unwrap_or_else(|| PathBuf::from("out").join(&design.name))
     }
 
     /// Write all files of a design.
-    pub fn write(&self, design: &Design, array: &PillarArray, terminal: &Terminal) -> Result<Files> {
+    pub(crate) fn write(&self, design: &Design, array: &PillarArray, terminal: &Terminal) -> Result<Files> {
         let folder = self.folder(design);
         let file = |suffix: &str| folder.join(format!("{}{suffix}", design.name));
         let properties = file(".lyp");
@@ -168,7 +168,7 @@ impl Target {
     }
 }
 
-pub fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design, terminal)?;
     let warnings = design.warnings()?;
     terminal.warnings(&warnings);

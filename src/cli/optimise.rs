@@ -23,7 +23,7 @@ use super::{Outcome, Terminal, print_json, print_line, standard_input};
     Ctrl-C stores the best phase so far; the same command continues from there.\n\n\
     Example:\n  metalith optimise designs/broadband_3x3.toml --out out/optimised"
 )]
-pub struct OptimiseArgs {
+pub(crate) struct OptimiseArgs {
     /// The design file.
     design: PathBuf,
 
@@ -58,7 +58,7 @@ pub struct OptimiseArgs {
     starts_per_shard: u64,
 }
 
-pub fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.plan.is_some() {
         standard_input::named([args.design.as_path()])?;
     }

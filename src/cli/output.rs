@@ -17,18 +17,18 @@ macro_rules! print_line {
 pub(super) use print_line;
 
 /// Write a value as indented JSON and a line break.
-pub fn print_json(value: &impl Serialize) {
+pub(crate) fn print_json(value: &impl Serialize) {
     let text = serde_json::to_string_pretty(value).expect("plain data serialises");
     line(format_args!("{text}"));
 }
 
 /// True if the path of an output means standard output.
-pub fn is_standard_output(path: &Path) -> bool {
+pub(crate) fn is_standard_output(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
 /// Prints a line, for [`print_line!`].
-pub fn line(text: Arguments<'_>) {
+pub(crate) fn line(text: Arguments<'_>) {
     let mut out = stdout().lock();
     let written = out
         .write_fmt(text)
@@ -42,11 +42,11 @@ pub fn line(text: Arguments<'_>) {
 }
 
 /// Write a text to standard error, as `eprint!` does, but without a panic where it cannot be written: what it says is no answer.
-pub fn tell(text: &str) {
+pub(crate) fn tell(text: &str) {
     let _ = stderr().lock().write_all(text.as_bytes());
 }
 
 /// Reason why something that was to be printed is not, if so. A closed pipe is no failure.
-pub fn failure() -> Option<&'static str> {
+pub(crate) fn failure() -> Option<&'static str> {
     FAILED.get().map(String::as_str)
 }

@@ -8,7 +8,7 @@ use metalith::{Error, Result};
 ///
 /// # Errors
 /// With the name of the first such file.
-pub fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&Path]) -> Result<()> {
+pub(crate) fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&Path]) -> Result<()> {
     let inputs: Vec<(&Path, Identity)> = inputs.into_iter().map(|path| (path, Identity::of(path))).collect();
     for (k, output) in outputs.iter().enumerate() {
         let own = Identity::of(output);
@@ -29,7 +29,7 @@ pub fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&Path]) 
 }
 
 /// The name of a file without its folders.
-pub fn name_of(path: &Path) -> String {
+pub(crate) fn name_of(path: &Path) -> String {
     path.file_name()
         .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
@@ -39,7 +39,7 @@ pub fn name_of(path: &Path) -> String {
 ///
 /// # Errors
 /// As [`metalith::AtomicFile::create`].
-pub fn writable(outputs: &[&Path]) -> Result<()> {
+pub(crate) fn writable(outputs: &[&Path]) -> Result<()> {
     outputs
         .iter()
         .try_for_each(|output| metalith::AtomicFile::create(output).map(drop))

@@ -25,7 +25,7 @@ use super::{Outcome, Terminal, print_json, print_line};
     The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in \
     scenes chart, star and edge; a scene with pixels finer than half a sensor pixel is averaged. Kernels are cached."
 )]
-pub struct PictureArgs {
+pub(crate) struct PictureArgs {
     /// The pillar layout; `-` for standard input.
     layout: PathBuf,
 
@@ -99,7 +99,7 @@ const PIXELS: u16 = 800;
 
 /// Whose assumptions are compared with the physics.
 #[derive(Clone, Copy, clap::ValueEnum)]
-pub enum Assume {
+pub(crate) enum Assume {
     Paper,
 }
 
@@ -150,7 +150,7 @@ impl PictureArgs {
     }
 }
 
-pub fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let methods = RestorationMethod::of_names(&args.method)?;
     let CameraFiles { design, camera, model } = args.with.read(terminal)?;

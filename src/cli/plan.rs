@@ -14,7 +14,7 @@ use super::{Outcome, Terminal, print_json, print_line, standard_input};
 #[command(
     after_help = "Example:\n  metalith plan designs/mini_3x3.toml --bench bench.toml --out out/session-1\n\nWrites measurement.toml, plan.html (a check list to print) and plan.json; frames go to captures/. Exit code 1 if an effect is not found at its wanted size."
 )]
-pub struct PlanArgs {
+pub(crate) struct PlanArgs {
     /// The design file.
     design: PathBuf,
 
@@ -39,7 +39,7 @@ pub struct PlanArgs {
     json: bool,
 }
 
-pub fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let design = standard_input::design(&args.design, terminal)?;
     let bench = BenchFile::read(&args.bench)?;

@@ -30,7 +30,7 @@ use super::{Outcome, Terminal, print_line};
     Light has normal incidence unless --angle-x-deg, --angle-y-deg say otherwise. The window is about the element's axis \
     unless --at-x-um, --at-y-um say otherwise. A steered element sends light of normal incidence far off its axis."
 )]
-pub struct PsfArgs {
+pub(crate) struct PsfArgs {
     /// The layout, of any program; `-` for standard input.
     layout: PathBuf,
 
@@ -181,7 +181,7 @@ impl From<CircularArg> for Handedness {
 }
 
 /// `1/0`, or `1`, as layer 1, datatype 0.
-pub fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
+pub(crate) fn layer(text: &str) -> std::result::Result<LayerNumber, String> {
     let (layer, datatype) = text.split_once('/').unwrap_or((text, "0"));
     match (layer.parse(), datatype.parse()) {
         (Ok(layer), Ok(datatype)) => Ok(LayerNumber::new(layer, datatype)),
@@ -317,7 +317,7 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     Ok(())
 }
 
-pub fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let stated = args.cell.as_deref().map(CellFile::read).transpose()?;
     let args = &PsfArgs { stated, ..args.clone() };
     terminal.stop_on_interrupt();

@@ -21,7 +21,7 @@ const RENAMED: [(&str, &[&str], &str); 9] = [
 ];
 
 /// Hint on what to do instead, for arguments that were refused for an option of an earlier version.
-pub fn hint(error: &clap::Error, given: &[OsString]) -> Option<&'static str> {
+pub(crate) fn hint(error: &clap::Error, given: &[OsString]) -> Option<&'static str> {
     let Some(ContextValue::String(option)) = error.get(ContextKind::InvalidArg) else {
         return None;
     };

@@ -24,7 +24,7 @@ use super::{Outcome, Terminal, print_json, print_line};
     The frame is a grey PNG of 8 or 16 bits with all pixels of the sensor: the mosaic of its colour filter array, else one \
     channel below the other. `white` in [exposure] of the camera sets the brightness of the picture. Kernels are cached."
 )]
-pub struct RestoreArgs {
+pub(crate) struct RestoreArgs {
     /// The pillar layout; `-` for standard input.
     layout: PathBuf,
 
@@ -73,7 +73,7 @@ pub struct RestoreArgs {
     json: bool,
 }
 
-pub fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let wanted = pictures(&args.method, args.separate)?;
     let CameraFiles { design, camera, model } = args.with.read(terminal)?;

@@ -14,7 +14,7 @@ use super::{Outcome, Terminal, standard_input};
 #[command(
     after_help = "Example:\n  metalith run designs/mini_3x3.toml --out out/mini\n\nExit code 1 if a limit of the design does not hold."
 )]
-pub struct RunArgs {
+pub(crate) struct RunArgs {
     /// The design file.
     design: PathBuf,
 
@@ -25,7 +25,7 @@ pub struct RunArgs {
     judging: Judging,
 }
 
-pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = standard_input::design(&args.design, terminal)?;
     terminal.warnings(&design.warnings()?);
     // What could not be read back is not written; `metalith layout` writes it.

@@ -19,7 +19,7 @@ fn before_comment(line: &str) -> (&str, i32) {
 /// The text with these values at keys of a section, such as `[mapping]`, or of the section of such a name at place `nth` from zero,
 /// such as `[[mark]]`; a key without a value is taken out. Values that are there are replaced where they stand, others follow the
 /// head of the section, and a section that is not there is added at the end. All other lines and comments stay.
-pub fn with_keys(text: &str, head: &str, nth: usize, keys: &[(&str, Option<&str>)]) -> String {
+pub(crate) fn with_keys(text: &str, head: &str, nth: usize, keys: &[(&str, Option<&str>)]) -> String {
     let mut out = String::with_capacity(text.len());
     let (mut seen, mut depth, mut dropped) = (0, 0, false);
     let (mut within, mut after_head) = (false, None);
@@ -79,7 +79,7 @@ pub fn with_keys(text: &str, head: &str, nth: usize, keys: &[(&str, Option<&str>
 }
 
 /// The text without a section, such as `[mapping.cell]`: from its head to the head of the next one.
-pub fn without_section(text: &str, head: &str) -> String {
+pub(crate) fn without_section(text: &str, head: &str) -> String {
     let (mut within, mut depth) = (false, 0);
     let kept = text.split_inclusive('\n').filter(|line| {
         let (said, opened) = before_comment(line);

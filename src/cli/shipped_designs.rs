@@ -8,7 +8,7 @@ use metalith::{AtomicFile, Design, Error, Result};
 static DESIGNS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/designs");
 
 /// A design of the repository, with the files that it names.
-pub struct ShippedDesign {
+pub(crate) struct ShippedDesign {
     name: String,
     text: &'static str,
     /// Files by their paths from the design.
@@ -17,7 +17,7 @@ pub struct ShippedDesign {
 
 impl ShippedDesign {
     /// The names of all, in the order of the alphabet.
-    pub fn names() -> Vec<&'static str> {
+    pub(crate) fn names() -> Vec<&'static str> {
         let toml = DESIGNS
             .files()
             .filter(|f| f.path().extension().is_some_and(|e| e == "toml"));
@@ -30,7 +30,7 @@ impl ShippedDesign {
     ///
     /// # Panics
     /// If it is none of them.
-    pub fn of(name: &str) -> Self {
+    pub(crate) fn of(name: &str) -> Self {
         let file = DESIGNS.get_file(format!("{name}.toml")).expect("one of the names");
         let text = file.contents_utf8().expect("designs are text");
         let named = DESIGNS.dirs().flat_map(Dir::files).filter(|f| {
@@ -49,7 +49,7 @@ impl ShippedDesign {
     /// # Errors
     /// If a file is there that says something else, the name is none of a design, or a file cannot be written, and those of `change`:
     /// then none of them is left.
-    pub fn write(
+    pub(crate) fn write(
         &self,
         design: &Path,
         name: &str,

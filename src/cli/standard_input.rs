@@ -25,7 +25,7 @@ fn is_standard_input(path: &Path) -> bool {
 ///
 /// # Errors
 /// If one of these is `-`.
-pub fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()> {
+pub(crate) fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()> {
     match paths.into_iter().any(is_standard_input) {
         false => Ok(()),
         true => Err(Error::refused(
@@ -51,7 +51,7 @@ fn take() -> Result<io::StdinLock<'static>> {
 
 /// A file that is read: that of its path, or for `-` a copy of standard input, which is removed with this. Layouts are read
 /// more than once and from many places, which a pipe cannot.
-pub struct InputFile {
+pub(crate) struct InputFile {
     path: PathBuf,
     _copy: Option<TempDir>,
 }
@@ -61,7 +61,7 @@ impl InputFile {
     ///
     /// # Errors
     /// If there is no room for the copy in the folder of temporary files.
-    pub fn of(path: &Path) -> Result<Self> {
+    pub(crate) fn of(path: &Path) -> Result<Self> {
         if !is_standard_input(path) {
             return Ok(Self {
                 path: path.to_owned(),
@@ -92,7 +92,7 @@ impl Deref for InputFile {
 ///
 /// # Errors
 /// As [`Design::read`]; also if standard input is no text, or too long.
-pub fn design(path: &Path, terminal: &Terminal) -> Result<Design> {
+pub(crate) fn design(path: &Path, terminal: &Terminal) -> Result<Design> {
     let design = if is_standard_input(path) {
         Design::parse_with(Path::new(NAME), &design_text()?, terminal)
     } else {
@@ -106,7 +106,7 @@ pub fn design(path: &Path, terminal: &Terminal) -> Result<Design> {
 ///
 /// # Errors
 /// As [`design`].
-pub fn design_without_library(path: &Path) -> Result<Design> {
+pub(crate) fn design_without_library(path: &Path) -> Result<Design> {
     if is_standard_input(path) {
         Design::parse_without_library(Path::new(NAME), &design_text()?)
     } else {

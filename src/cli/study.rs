@@ -19,7 +19,7 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[command(
     after_help = "Example:\n  metalith study plan tolerance.toml --out out/study\n  metalith study run out/study --missing\n  metalith study merge out/study --out out/study/result.csv"
 )]
-pub struct StudyArgs {
+pub(crate) struct StudyArgs {
     #[command(subcommand)]
     step: Step,
 }
@@ -109,7 +109,7 @@ struct MergeArgs {
     psfs: usize,
 }
 
-pub fn run(args: &StudyArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &StudyArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     match &args.step {
         Step::Plan(args) => plan_study(args, terminal),

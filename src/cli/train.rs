@@ -28,7 +28,7 @@ use super::{Outcome, Terminal, print_json, print_line};
     metalith train photographs --stage flatnet --camera cameras/gt1930.toml --field-deg 80 --pixels 512 --steps 1200 \\\n    \
     --out flatnet.safetensors"
 )]
-pub struct TrainArgs {
+pub(crate) struct TrainArgs {
     /// Folder of PNG, JPEG or NPY photographs.
     folder: PathBuf,
 
@@ -142,7 +142,7 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
     name.into()
 }
 
-pub fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let spec = TrainingSpec {
         steps: args.steps,

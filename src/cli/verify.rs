@@ -25,7 +25,7 @@ use super::{Outcome, Terminal, print_json, print_line, standard_input};
     after_help = "Example:\n  metalith verify designs/mini_3x3.toml out/mini_3x3/mini_3x3_pillars.gds --fast\n\n\
     A compensated layout (--compensated MODEL) is simulated as fabricated by that model, unless --model names another one."
 )]
-pub struct VerifyArgs {
+pub(crate) struct VerifyArgs {
     /// The design file.
     design: PathBuf,
 
@@ -45,7 +45,7 @@ pub struct VerifyArgs {
 
 /// How a layout is judged.
 #[derive(Args, Clone)]
-pub struct Judging {
+pub(crate) struct Judging {
     /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
     #[arg(long)]
     fast: bool,
@@ -111,7 +111,7 @@ impl Judging {
     ///
     /// # Errors
     /// If it could be neither simulated nor compared with its design, or its pillars cannot be judged by the cell.
-    pub fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
+    pub(crate) fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
         let fidelity = self.fidelity(design);
         design.check_fidelity(fidelity)?;
         if self.oblique && design.cell.shape.basis().is_some() {
@@ -128,7 +128,7 @@ impl Judging {
     ///
     /// # Errors
     /// If they cannot.
-    pub fn check_drawn(&self, design: &Design, array: &PillarArray) -> Result<()> {
+    pub(crate) fn check_drawn(&self, design: &Design, array: &PillarArray) -> Result<()> {
         match self.model()? {
             Some(model) => {
                 let counts = array.classes.iter().map(|class| class.widths.histogram());
@@ -143,7 +143,7 @@ impl Judging {
     }
 
     /// Say how a layout will be simulated, if not as usual.
-    pub fn announce(simulation: &Simulation, terminal: &Terminal) {
+    pub(crate) fn announce(simulation: &Simulation, terminal: &Terminal) {
         match simulation {
             Simulation::Whole => {}
             Simulation::InParts { parts, needed_mb, .. } => terminal.say(&format!(
@@ -162,7 +162,7 @@ impl Judging {
     }
 
     /// Read back, simulate, write the report into `folder`, and say what came out.
-    pub fn judge(
+    pub(crate) fn judge(
         &self,
         design: &Design,
         array: &PillarArray,
@@ -293,7 +293,7 @@ fn print_failed(found: &Verification) {
     }
 }
 
-pub fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design, terminal)?;
     terminal.warnings(&design.warnings()?);
     let layout = InputFile::of(&args.layout)?;

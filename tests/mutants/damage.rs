@@ -32,7 +32,7 @@ const VALUES: [&str; 18] = [
 ];
 
 /// A mutant of one of the files of a format.
-pub fn mutant(rng: &mut ChaCha8Rng, format: &Format) -> Vec<u8> {
+pub(crate) fn mutant(rng: &mut ChaCha8Rng, format: &Format) -> Vec<u8> {
     match format.kind {
         Kind::Bytes => metalith_testing::mutate::mutate(rng, &format.corpus),
         Kind::Text if rng.random_range(0..3) == 0 => metalith_testing::mutate::mutate(rng, &format.corpus),

@@ -24,7 +24,7 @@ use super::images;
 
 /// What may be damaged in a file.
 #[derive(Clone, Copy)]
-pub enum Kind {
+pub(crate) enum Kind {
     Bytes,
     /// Lines and values too.
     Text,
@@ -33,7 +33,7 @@ pub enum Kind {
 }
 
 /// One format.
-pub struct Format {
+pub(crate) struct Format {
     pub name: &'static str,
     /// Where a file of it is put to be read.
     pub file: PathBuf,
@@ -64,7 +64,7 @@ impl Format {
 }
 
 /// All formats; their files are put below `folder`.
-pub fn all(folder: &Path) -> Vec<Format> {
+pub(crate) fn all(folder: &Path) -> Vec<Format> {
     let own = |name: &str| {
         let own = folder.join(name);
         fs::create_dir_all(&own).unwrap();

@@ -5,11 +5,11 @@ use std::io::Cursor;
 use tiff::encoder::{TiffEncoder, colortype};
 
 /// Types of numbers in NPY files, as their headers name them, and the bytes of one.
-pub const FLOAT: (&str, usize) = ("<f4", 4);
-pub const WORD: (&str, usize) = ("<u2", 2);
+pub(crate) const FLOAT: (&str, usize) = ("<f4", 4);
+pub(crate) const WORD: (&str, usize) = ("<u2", 2);
 
 /// A PNG whose values rise and fall.
-pub fn png(width: u32, height: u32, colour: png::ColorType, depth: png::BitDepth) -> Vec<u8> {
+pub(crate) fn png(width: u32, height: u32, colour: png::ColorType, depth: png::BitDepth) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(colour);
@@ -28,7 +28,7 @@ fn encoder_bytes(width: u32, height: u32, colour: png::ColorType, depth: png::Bi
 }
 
 /// An NPY file of positive numbers.
-pub fn npy(shape: &[usize], (kind, size): (&str, usize)) -> Vec<u8> {
+pub(crate) fn npy(shape: &[usize], (kind, size): (&str, usize)) -> Vec<u8> {
     let axes: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({axes}), }}");
     // The values begin at a multiple of 64 bytes, the header ends with a new line.
@@ -46,7 +46,7 @@ pub fn npy(shape: &[usize], (kind, size): (&str, usize)) -> Vec<u8> {
 }
 
 /// A grey TIFF of 16 bits and some pages.
-pub fn tiff(size: usize, pages: usize) -> Vec<u8> {
+pub(crate) fn tiff(size: usize, pages: usize) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
     for page in 0..pages {

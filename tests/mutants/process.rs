@@ -6,7 +6,7 @@ use std::fs;
 const TICKS: f64 = 100.0;
 
 /// CPU time of all threads so far (s).
-pub fn cpu_s() -> f64 {
+pub(crate) fn cpu_s() -> f64 {
     let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     // The name in parentheses may hold blanks; user and system time are the 12th and 13th fields after it.
     let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace();
@@ -19,13 +19,13 @@ pub fn cpu_s() -> f64 {
 }
 
 /// Begin to look for the largest memory anew.
-pub fn forget_peak() {
+pub(crate) fn forget_peak() {
     // Refused in some containers: the peak is then that of the whole process, a stricter figure.
     let _ = fs::write("/proc/self/clear_refs", "5");
 }
 
 /// Largest resident memory (bytes) since [`forget_peak`].
-pub fn peak_bytes() -> u64 {
+pub(crate) fn peak_bytes() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     let kilobytes = line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<u64>().ok());

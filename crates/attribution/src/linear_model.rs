@@ -18,11 +18,11 @@ use crate::measurements::{MeasurementEquations, Measurements, References, elimin
 use crate::surrogate::Surrogate;
 
 /// Edge of the window in points.
-pub const POINTS: usize = 32;
+pub(crate) const POINTS: usize = 32;
 
 /// Units of the measurement for unit prediction, and one standard deviation of each point.
-pub const SCALE: f64 = 1000.0;
-pub const SIGMA: f64 = 10.0;
+pub(crate) const SCALE: f64 = 1000.0;
+pub(crate) const SIGMA: f64 = 10.0;
 
 /// Contrast of the base along each axis; it gives the place of the window something to hold on to.
 const BASE_CONTRAST: f64 = 0.4;
@@ -36,20 +36,20 @@ const OFFSET_SIGMA: f64 = 0.5;
 const OWN: usize = 2;
 
 /// Smooth terms that stand for nothing, and those of each kind of error of the model.
-pub const NULL_TERMS: usize = 11;
+pub(crate) const NULL_TERMS: usize = 11;
 const TERMS_OF_KIND: usize = 3;
 
 /// The kind of error whose first term has the pattern of [`ERROR_PERIODS`], and its size.
 const ERROR_KIND: usize = 1;
-pub const ERROR_SIZE: f64 = 0.0026;
-pub const LIKENESS: f64 = 0.4;
+pub(crate) const ERROR_SIZE: f64 = 0.0026;
+pub(crate) const LIKENESS: f64 = 0.4;
 
 /// Coefficient of a term of the error of the model at its step.
-pub const ERROR_STEP: f64 = 0.03;
+pub(crate) const ERROR_STEP: f64 = 0.03;
 
 /// One effect of one parameter.
 #[derive(Clone)]
-pub struct Term {
+pub(crate) struct Term {
     /// Amplitude of the patterns, as a function of the parameter.
     pub amplitude: fn(f64) -> f64,
     /// Patterns by their periods along x and y, each with a factor.
@@ -58,7 +58,7 @@ pub struct Term {
 
 impl Term {
     /// Linear in its parameter: the amplitude of one pattern.
-    pub fn linear(periods: [u32; 2]) -> Self {
+    pub(crate) fn linear(periods: [u32; 2]) -> Self {
         Self {
             amplitude: |theta| theta,
             patterns: vec![(periods, 1.0)],
@@ -68,7 +68,7 @@ impl Term {
 
 /// What the first two terms change together and neither alone: the product of their parameters, on one pattern.
 #[derive(Clone, Copy)]
-pub struct Product {
+pub(crate) struct Product {
     pub periods: [u32; 2],
     /// Amplitude for parameters of one; its sign is the other in every second object.
     pub factor: f64,
@@ -76,7 +76,7 @@ pub struct Product {
 
 /// What a measurement is of: measurements are grouped by this.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setup {
+pub(crate) struct Setup {
     /// Number of its gain.
     pub gain: usize,
     pub object: usize,
@@ -85,13 +85,13 @@ pub struct Setup {
 
 /// A prediction: a constant and some cosines by their periods over the window along x and y.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Waves {
+pub(crate) struct Waves {
     pub constant: f64,
     pub waves: Vec<([u32; 2], f64)>,
 }
 
 impl Waves {
-    pub fn new(constant: f64, waves: &[([u32; 2], f64)]) -> Self {
+    pub(crate) fn new(constant: f64, waves: &[([u32; 2], f64)]) -> Self {
         let mut out = Self {
             constant,
             waves: Vec::new(),
@@ -110,7 +110,7 @@ impl Waves {
     }
 
     /// Values at the points of a window that is off by so much along x and y.
-    pub fn points(&self, off: [f64; 2]) -> Vec<f64> {
+    pub(crate) fn points(&self, off: [f64; 2]) -> Vec<f64> {
         let mut out = vec![self.constant; POINTS * POINTS];
         for (periods, amplitude) in &self.waves {
             // cos(a + b) = cos a cos b - sin a sin b.
@@ -158,7 +158,7 @@ fn add_products(to: &mut [f64], factor: f64, [x, y]: [[Vec<f64>; 2]; 2]) {
 
 /// Values at the points of each window, with noise.
 #[derive(Clone)]
-pub struct Samples {
+pub(crate) struct Samples {
     pub signal: PerMeasurement<Vec<f64>>,
     pub setup: PerMeasurement<Setup>,
     references: References,
@@ -166,7 +166,7 @@ pub struct Samples {
 
 /// The nuisances of [`Samples`].
 #[derive(Clone)]
-pub struct Nuisances {
+pub(crate) struct Nuisances {
     /// Place of each window along both axes (points).
     place: PerMeasurement<[f64; 2]>,
     gain: Vec<f64>,
@@ -175,7 +175,7 @@ pub struct Nuisances {
 
 /// The normal equations of a window: its place, all gains, the offset, further parameters, the residual.
 #[derive(Clone)]
-pub struct Equations(DMatrix<f64>);
+pub(crate) struct Equations(DMatrix<f64>);
 
 impl MeasurementEquations for Equations {
     fn reduced(&self) -> DMatrix<f64> {
@@ -330,7 +330,7 @@ impl Measurements for Samples {
 }
 
 /// The model.
-pub struct LinearModel {
+pub(crate) struct LinearModel {
     terms: Vec<Term>,
     product: Option<Product>,
     slots: Vec<Slot>,
@@ -338,16 +338,16 @@ pub struct LinearModel {
 }
 
 /// Range and typical size of each parameter: amplitudes relative to the base.
-pub const PARAMETER: Parameter = Parameter::new(-1.0, 1.0, 0.02);
+pub(crate) const PARAMETER: Parameter = Parameter::new(-1.0, 1.0, 0.02);
 
 /// Periods of the pattern of a smooth term that stands for nothing; no effect of a test may use these.
-pub fn smooth_periods(term: usize) -> [u32; 2] {
+pub(crate) fn smooth_periods(term: usize) -> [u32; 2] {
     [term as u32 + 1, 9]
 }
 
 impl LinearModel {
     /// Effects `terms`, seen in measurements of which each is as `setup` says.
-    pub fn new(terms: Vec<Term>, setup: Vec<Setup>) -> Self {
+    pub(crate) fn new(terms: Vec<Term>, setup: Vec<Setup>) -> Self {
         let slots = (0..terms.len()).map(|effect| Slot {
             effect,
             index: 0,
@@ -363,7 +363,7 @@ impl LinearModel {
 
     /// The first two terms are the numbers of one effect, which do not merely add.
     #[must_use]
-    pub fn with_first_two_joined(mut self, product: Product) -> Self {
+    pub(crate) fn with_first_two_joined(mut self, product: Product) -> Self {
         self.product = Some(product);
         for (s, slot) in self.slots.iter_mut().enumerate().skip(1) {
             (slot.effect, slot.index) = (s - 1, usize::from(s == 1));
@@ -372,12 +372,12 @@ impl LinearModel {
     }
 
     /// The surrogate about zero, with smooth terms.
-    pub fn surrogate(&self) -> Surrogate<Samples> {
+    pub(crate) fn surrogate(&self) -> Surrogate<Samples> {
         Surrogate::simulate(self, &vec![0.0; self.slots.len()], true, &Silent).unwrap()
     }
 
     /// Noise-free data, each measurement with parameters of its own; `noise` is a seed.
-    pub fn data(&self, theta: impl Fn(usize) -> Vec<f64>, noise: Option<u64>) -> Samples {
+    pub(crate) fn data(&self, theta: impl Fn(usize) -> Vec<f64>, noise: Option<u64>) -> Samples {
         let mut rng = ChaCha8Rng::seed_from_u64(noise.unwrap_or(0));
         let sigma = if noise.is_some() { SIGMA } else { 0.0 };
         let values = (0..self.setup.len()).map(|m| {
@@ -399,12 +399,12 @@ impl LinearModel {
     }
 
     /// The problem of some data.
-    pub fn problem<'a>(&'a self, data: &'a Samples) -> FitProblem<'a, Samples> {
+    pub(crate) fn problem<'a>(&'a self, data: &'a Samples) -> FitProblem<'a, Samples> {
         FitProblem::new(self, self.surrogate(), data)
     }
 
     /// The prediction of a measurement at a point.
-    pub fn prediction(&self, point: &ParameterPoint, of: &Setup) -> Waves {
+    pub(crate) fn prediction(&self, point: &ParameterPoint, of: &Setup) -> Waves {
         let mut waves = vec![([1, 0], BASE_CONTRAST), ([0, 1], BASE_CONTRAST)];
         for (term, theta) in self.terms.iter().zip(&point.theta) {
             let amplitude = (term.amplitude)(*theta);
@@ -424,18 +424,18 @@ impl LinearModel {
 }
 
 /// Periods of the pattern of an error of the model. Effects with this pattern have wide intervals.
-pub const ERROR_PERIODS: [u32; 2] = [6, 7];
+pub(crate) const ERROR_PERIODS: [u32; 2] = [6, 7];
 
 /// Amplitude of the pattern of a smooth term at its step.
-pub const SMOOTH_STEP: f64 = 0.05;
+pub(crate) const SMOOTH_STEP: f64 = 0.05;
 
 /// Inner product of a pattern of unit amplitude with itself over one measurement, whitened: half the points.
-pub fn information() -> f64 {
+pub(crate) fn information() -> f64 {
     0.5 * (POINTS * POINTS) as f64 * (SCALE / SIGMA).powi(2)
 }
 
 /// Measurements with so many gains, objects and runs, each combination once.
-pub fn setups(gains: usize, objects: usize, runs: usize) -> Vec<Setup> {
+pub(crate) fn setups(gains: usize, objects: usize, runs: usize) -> Vec<Setup> {
     let mut out = Vec::new();
     for gain in 0..gains {
         for object in 0..objects {

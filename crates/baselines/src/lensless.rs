@@ -109,7 +109,7 @@ const BAND_NM: [f64; 2] = [400.0, 700.0];
 ///
 /// # Errors
 /// If a channel counts no visible light.
-pub fn of_one_wavelength(camera: &Camera) -> Result<Camera> {
+pub(crate) fn of_one_wavelength(camera: &Camera) -> Result<Camera> {
     let [low, high] = BAND_NM;
     Ok(without_dispersion(
         camera,
@@ -301,7 +301,7 @@ impl LenslessBench {
 
 /// Light of a surface of unit radiance under these tangents, for a unit of tangents and of the sensor, over that along the
 /// normal: the projected solid angle d^2 sines / d^2 tangents.
-pub fn falloff([tx, ty]: [f64; 2]) -> f64 {
+pub(crate) fn falloff([tx, ty]: [f64; 2]) -> f64 {
     (1.0 + tx * tx + ty * ty).powi(-2)
 }
 
@@ -312,7 +312,7 @@ pub(crate) mod tests {
     use metalith_sensor::ColourFilter;
 
     /// A small camera, a scene of the statistics of photographs.
-    pub fn small(pixels: usize, columns: u32, rows: u32) -> (Camera, SceneImage) {
+    pub(crate) fn small(pixels: usize, columns: u32, rows: u32) -> (Camera, SceneImage) {
         let mut camera = Camera::three_bands(5.86);
         (camera.sensor.columns, camera.sensor.rows) = (columns, rows);
         camera.sensor.filter = ColourFilter::Rggb;

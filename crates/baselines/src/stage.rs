@@ -31,7 +31,7 @@ pub enum StageKind {
 }
 
 /// Pictures of a frame that the last stage of each baseline camera sees.
-pub const PICTURES: usize = 5;
+pub(crate) const PICTURES: usize = 5;
 
 impl StageKind {
     /// All of them.

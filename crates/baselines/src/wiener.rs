@@ -33,7 +33,7 @@ struct Tiles<'a> {
 ///
 /// # Errors
 /// If the user stopped it.
-pub fn pictures(
+pub(crate) fn pictures(
     system: &ImagingSystem,
     operator: &FrameOperator<'_>,
     recorded: &Recorded<'_>,

@@ -172,7 +172,7 @@ pub(super) mod tests {
     use super::*;
 
     /// The bench of small sessions, with these sections beside `[captures]`.
-    pub fn small_bench(more: &str) -> BenchFile {
+    pub(crate) fn small_bench(more: &str) -> BenchFile {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("bench.toml");
         let bench = metalith_testing::session::bench();

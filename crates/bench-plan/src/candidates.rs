@@ -23,7 +23,7 @@ const DEFOCUS: f64 = 0.035;
 const SEM_REACH: f64 = 0.97;
 
 /// The design as a session without measurements, and all measurements that the bench could take of it.
-pub struct Candidates {
+pub(crate) struct Candidates {
     pub set: MeasuredSet,
     pub measurements: Vec<Measurement>,
     /// Measurements that were left out because no camera could see their light, or it lands farther off than a set may say.
@@ -34,7 +34,7 @@ pub struct Candidates {
 ///
 /// # Errors
 /// If the layout cannot be read, or nothing can be seen of any element.
-pub fn candidates(
+pub(crate) fn candidates(
     design: &Design,
     bench: &BenchFile,
     layout: &Path,
@@ -73,7 +73,7 @@ pub fn candidates(
 ///
 /// # Errors
 /// If the design has no such element, or its opening is no circle.
-pub fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element>> {
+pub(crate) fn chosen_elements(design: &Design, bench: &BenchFile) -> Result<Vec<Element>> {
     let all = design.elements();
     let is_round = |e: &Element| design.lens_of(e).outline.is_none();
     let not_round = |what: String| {
@@ -121,12 +121,12 @@ fn without_repeats<T: PartialEq>(all: Vec<T>) -> Vec<T> {
 }
 
 /// Diameter of the largest lens of a design (um): the lattices of all are as large.
-pub fn lens_diameter_um(design: &Design) -> f64 {
+pub(crate) fn lens_diameter_um(design: &Design) -> f64 {
     f64::from(design.array.largest_nm(&design.lens)) * 1e-3
 }
 
 /// Distances at which an element of this focal length is looked at (um), to a tenth of a micrometre.
-pub fn distances_um(bench: &BenchFile, focal_um: f64) -> Vec<f64> {
+pub(crate) fn distances_um(bench: &BenchFile, focal_um: f64) -> Vec<f64> {
     let all = match bench.distances_um.is_empty() {
         true => vec![focal_um * (1.0 - DEFOCUS), focal_um, focal_um * (1.0 + DEFOCUS)],
         false => bench.distances_um.clone(),
@@ -232,7 +232,7 @@ fn landing_um(wedge: Wedge, aoi_deg: [f64; 2], wavelength_um: f64, f_um: f64) ->
 }
 
 /// Sites for a SEM, spread evenly over the area of each lens, the same number of each element.
-pub fn sem_sites(set: &MeasuredSet, offer: SemOffer) -> Vec<SemSite> {
+pub(crate) fn sem_sites(set: &MeasuredSet, offer: SemOffer) -> Vec<SemSite> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let elements = set.elements.len().max(1);
     let each = offer.sites.div_ceil(elements);

@@ -15,7 +15,7 @@ use metalith_attribution::{LEAST_GAIN, covariance, projected};
 
 /// Gain in reduced chi-square per pixel that is asked for: twice what a calibration takes for more than the error of its
 /// own model, because what comes back is noisy.
-pub const NEEDED: f64 = 2.0 * LEAST_GAIN;
+pub(crate) const NEEDED: f64 = 2.0 * LEAST_GAIN;
 
 /// Least margin that is told from nothing.
 const NOTHING: f64 = 1e-9;
@@ -32,7 +32,7 @@ const SAME: f64 = 1e-9;
 
 /// One thing that is asked of a set.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Requirement {
+pub(crate) struct Requirement {
     /// Number of the parameter.
     pub slot: usize,
     /// Its wanted size.
@@ -43,7 +43,7 @@ pub struct Requirement {
 
 /// Where a candidate stands: groups that a calibration leaves out in turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub(crate) struct Place {
     pub element: usize,
     pub led: usize,
     pub aoi_rad: [f64; 2],
@@ -51,7 +51,7 @@ pub struct Place {
 }
 
 /// What is weighed.
-pub struct Choice<'a> {
+pub(crate) struct Choice<'a> {
     pub information: &'a Information,
     pub places: Vec<Place>,
     pub requirements: Vec<Requirement>,
@@ -61,7 +61,7 @@ pub struct Choice<'a> {
 
 /// A measurement that was chosen, with its frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Picked {
+pub(crate) struct Picked {
     pub candidate: usize,
     pub frames: u32,
 }
@@ -72,7 +72,7 @@ impl Choice<'_> {
     }
 
     /// Some candidates with all of the frames.
-    pub fn whole(&self, candidates: impl IntoIterator<Item = usize>) -> Vec<Picked> {
+    pub(crate) fn whole(&self, candidates: impl IntoIterator<Item = usize>) -> Vec<Picked> {
         let frames = self.most_frames();
         candidates
             .into_iter()
@@ -82,7 +82,7 @@ impl Choice<'_> {
 
     /// Inner products of all parameters in a set, with its nuisances projected out, and its pixels. Registration was taken
     /// out with the most frames: a frame knows it far better than the stage does, so that fewer make no difference.
-    pub fn products(&self, picked: &[Picked]) -> (DMatrix<f64>, f64) {
+    pub(crate) fn products(&self, picked: &[Picked]) -> (DMatrix<f64>, f64) {
         let mut form = self.information.prior.clone();
         let mut pixels = 0.0;
         for p in picked {
@@ -95,7 +95,7 @@ impl Choice<'_> {
     }
 
     /// Gain per pixel of each requirement, over what is needed.
-    pub fn margins(&self, picked: &[Picked]) -> Vec<f64> {
+    pub(crate) fn margins(&self, picked: &[Picked]) -> Vec<f64> {
         if picked.is_empty() {
             return vec![0.0; self.requirements.len()];
         }
@@ -138,7 +138,7 @@ impl Choice<'_> {
 
     /// Whether any measurements of the bench meet each requirement: all of them, those of one colour, element, distance or angle,
     /// or one alone. Measurements that show nothing of an effect dilute its gain, so that all are not always the best.
-    pub fn reachable(&self) -> Vec<bool> {
+    pub(crate) fn reachable(&self) -> Vec<bool> {
         let all: Vec<usize> = (0..self.places.len()).collect();
         let mut sets: Vec<Vec<usize>> = vec![all.clone()];
         for &c in &all {
@@ -168,7 +168,7 @@ impl Choice<'_> {
     }
 
     /// The measurements to take, at most so many, in the order of the candidates.
-    pub fn measurements(&self, reachable: &[bool], most: usize) -> Vec<Picked> {
+    pub(crate) fn measurements(&self, reachable: &[bool], most: usize) -> Vec<Picked> {
         let mut picked: Vec<Picked> = Vec::new();
         let mut now = self.score(&picked, reachable);
         while now < -SAME && picked.len() < most {
@@ -223,7 +223,7 @@ impl Choice<'_> {
 }
 
 /// Chi-square that an effect of the wanted size adds and that the parameters beside it cannot take up.
-pub fn energy(products: &DMatrix<f64>, r: &Requirement) -> f64 {
+pub(crate) fn energy(products: &DMatrix<f64>, r: &Requirement) -> f64 {
     let own = products[(r.slot, r.slot)];
     let taken: f64 = match lookalike(products, r) {
         Some(values) => r
@@ -238,7 +238,7 @@ pub fn energy(products: &DMatrix<f64>, r: &Requirement) -> f64 {
 }
 
 /// The values of the parameters beside it that look most like an effect of the wanted size; none if there are none beside it.
-pub fn lookalike(products: &DMatrix<f64>, r: &Requirement) -> Option<Vec<f64>> {
+pub(crate) fn lookalike(products: &DMatrix<f64>, r: &Requirement) -> Option<Vec<f64>> {
     if r.beside.is_empty() {
         return None;
     }

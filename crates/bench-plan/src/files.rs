@@ -24,7 +24,13 @@ const TABLE_MARGIN_NM: f64 = 15.0;
 ///
 /// # Errors
 /// If a file cannot be written, or a material is not known at an LED.
-pub fn write_set(folder: &Path, design: &Design, bench: &BenchFile, set: &MeasuredSet, layout: &str) -> Result<()> {
+pub(crate) fn write_set(
+    folder: &Path,
+    design: &Design,
+    bench: &BenchFile,
+    set: &MeasuredSet,
+    layout: &str,
+) -> Result<()> {
     let cell = &set.stack.cell;
     write_table(&folder.join("film_nk.csv"), &cell.film, set)?;
     let mut substrate = cell.substrate.name().to_owned();
@@ -53,7 +59,7 @@ pub fn write_set(folder: &Path, design: &Design, bench: &BenchFile, set: &Measur
 }
 
 /// The file of a measurement, from the folder of the set.
-pub fn frame_file(name: &str, bench: &BenchFile) -> String {
+pub(crate) fn frame_file(name: &str, bench: &BenchFile) -> String {
     format!("captures/{name}.{}", bench.ending)
 }
 

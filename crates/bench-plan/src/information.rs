@@ -19,7 +19,7 @@ use metalith_calibrate::{Simulator, WIDTH_ROOM_NM};
 const TOGETHER: usize = 12;
 
 /// A measurement, exposed as it would be, and what it tells.
-pub struct Told {
+pub(crate) struct Told {
     /// With its scale set to the exposure, and what it would show.
     pub measurement: Measurement,
     /// Inner products of flux of each LED, black level, every parameter, and the residual, as
@@ -30,7 +30,7 @@ pub struct Told {
 }
 
 /// What all candidates tell.
-pub struct Information {
+pub(crate) struct Information {
     pub told: Vec<Told>,
     /// What is known of flux and black level beforehand.
     pub prior: DMatrix<f64>,
@@ -41,10 +41,10 @@ pub struct Information {
 }
 
 /// The effects that are tried on a set.
-pub type EffectsOf<'a> = dyn Fn(&MeasuredSet) -> Result<Vec<Box<dyn Effect>>> + 'a;
+pub(crate) type EffectsOf<'a> = dyn Fn(&MeasuredSet) -> Result<Vec<Box<dyn Effect>>> + 'a;
 
 /// Cells for a set, for simulators that follow one another.
-pub fn cells_of(set: &MeasuredSet, sampling: BenchSampling, cache: Option<std::path::PathBuf>) -> CellSource {
+pub(crate) fn cells_of(set: &MeasuredSet, sampling: BenchSampling, cache: Option<std::path::PathBuf>) -> CellSource {
     let bench = Bench::new(set, sampling);
     let (low, high) = bench.widths_nm();
     let widths = (low - WIDTH_ROOM_NM, high + WIDTH_ROOM_NM);
@@ -60,7 +60,7 @@ pub fn cells_of(set: &MeasuredSet, sampling: BenchSampling, cache: Option<std::p
 ///
 /// # Errors
 /// If a cell cannot be solved, or the user stopped it.
-pub fn information(
+pub(crate) fn information(
     candidates: &Candidates,
     bench: &BenchFile,
     sampling: BenchSampling,
@@ -105,7 +105,7 @@ pub fn information(
 }
 
 /// The set with each measurement exposed so that its brightest pixel reaches a share of saturation, and showing what it would.
-pub fn exposed(set: &MeasuredSet, surrogate: &Surrogate, peak: f64) -> MeasuredSet {
+pub(crate) fn exposed(set: &MeasuredSet, surrogate: &Surrogate, peak: f64) -> MeasuredSet {
     let camera = set.camera;
     let room = (peak * camera.saturation_dn - camera.black_level_dn).max(1.0);
     let mut out = set.clone();

@@ -63,7 +63,7 @@ pub struct Confusion {
 }
 
 /// An amount of an effect in its unit for a value of one of its parameters.
-pub fn amount(effect: &dyn Effect, parameter: f64, set: &MeasuredSet) -> f64 {
+pub(crate) fn amount(effect: &dyn Effect, parameter: f64, set: &MeasuredSet) -> f64 {
     let zero = effect.value(0.0, set);
     let value = effect.value(parameter.abs(), set);
     // Of some the value is absolute; of a distance that is infinite without effect it is the amount.
@@ -77,7 +77,7 @@ pub fn amount(effect: &dyn Effect, parameter: f64, set: &MeasuredSet) -> f64 {
 
 /// Every effect at its wanted size in a session that shows what `exposed` says; `margins` are of the requirements that ask
 /// for detection alone.
-pub fn effects(
+pub(crate) fn effects(
     simulator: &Simulator<'_>,
     surrogate: &Surrogate,
     exposed: &MeasuredSet,
@@ -125,7 +125,7 @@ pub fn effects(
 }
 
 /// What the chosen measurements cannot tell apart: pairs of effects that are both found, by the worst direction of each pair.
-pub fn confusions(
+pub(crate) fn confusions(
     simulator: &Simulator<'_>,
     set: &MeasuredSet,
     choice: &Choice<'_>,

@@ -19,7 +19,7 @@ const SAME: f64 = 1e-6;
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_page(plan: &MeasurementPlan, set: &MeasuredSet, unseen: usize) -> Result<()> {
+pub(crate) fn write_page(plan: &MeasurementPlan, set: &MeasuredSet, unseen: usize) -> Result<()> {
     let mut page = Page::new(
         format!("Check list: {}", set.title),
         "Measurements to take, and the effects that they will find",

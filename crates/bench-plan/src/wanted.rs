@@ -22,7 +22,7 @@ fn asked(effect: &dyn Effect) -> impl Iterator<Item = (usize, Parameter)> + use<
 ///
 /// # Errors
 /// If a name is not known; if a size is beyond, with what sizes are counted from.
-pub fn check_wanted(set: &MeasuredSet, bench: &BenchFile) -> Result<()> {
+pub(crate) fn check_wanted(set: &MeasuredSet, bench: &BenchFile) -> Result<()> {
     let known = all_effects(set);
     let names: Vec<String> = bench.wanted.keys().cloned().collect();
     check_effects(&known, &names)?;
@@ -62,7 +62,7 @@ fn beyond(effect: &dyn Effect, wanted: f64, parameter: &Parameter, set: &Measure
 
 /// Each parameter of each effect is to be detected, and to be told from each other effect. Parameters that change nothing
 /// by themselves are not asked for.
-pub fn requirements(effects: &[Box<dyn Effect>], bench: &BenchFile) -> Vec<Requirement> {
+pub(crate) fn requirements(effects: &[Box<dyn Effect>], bench: &BenchFile) -> Vec<Requirement> {
     let mut slots: Vec<Vec<usize>> = Vec::new();
     let mut own: Vec<(usize, usize, f64)> = Vec::new();
     let mut next = 0;
@@ -93,7 +93,7 @@ pub fn requirements(effects: &[Box<dyn Effect>], bench: &BenchFile) -> Vec<Requi
 }
 
 /// An effect that cannot be found is not to be told from others.
-pub fn only_of_what_is_found(choice: &Choice<'_>, reachable: &mut [bool]) {
+pub(crate) fn only_of_what_is_found(choice: &Choice<'_>, reachable: &mut [bool]) {
     let lost: Vec<usize> = choice
         .requirements
         .iter()

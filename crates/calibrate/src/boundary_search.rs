@@ -22,7 +22,7 @@ const MOST_ASKED: usize = 2;
 const ROUNDS: usize = 2;
 
 /// An answer, with its evidence where there was enough to search in.
-pub type Found = (Diagnosis, Option<Evidence>);
+pub(crate) type Found = (Diagnosis, Option<Evidence>);
 
 /// What is made of an answer, and of the session that it is of.
 type Conclude<'c, T> = dyn Fn(&Session<'_>, &Simulations, Found) -> Result<T> + 'c;
@@ -31,7 +31,7 @@ type Conclude<'c, T> = dyn Fn(&Session<'_>, &Simulations, Found) -> Result<T> + 
 ///
 /// # Errors
 /// If a cell cannot be solved, the user stopped it, or as `conclude` says.
-pub fn search_about_boundaries<T>(
+pub(crate) fn search_about_boundaries<T>(
     session: &Session<'_>,
     simulations: &Simulations,
     conclude: &Conclude<'_, T>,

@@ -8,7 +8,7 @@ use metalith_attribution::ModelError;
 
 /// What a cell and the model around it err by, as one standard deviation.
 #[derive(Clone, Copy, Debug)]
-pub struct CellError {
+pub(crate) struct CellError {
     /// Of each polynomial over width of the relative amplitude that a cell transmits.
     pub amplitude: f64,
     /// The same of the phase (rad).
@@ -26,7 +26,7 @@ impl CellError {
     /// `the_error_of_a_cell_in_intervals_is_that_of_its_truncation`). The likeness and the shapes are the most
     /// likely ones for what 156 numbers in synthetic sets err by, whose cells have 11 and 15 orders: 0.38, and 0.33 of what 900 shapes
     /// would make. Sets by a program that shares nothing with this one err by less.
-    pub const MEASURED: Self = Self {
+    pub(crate) const MEASURED: Self = Self {
         amplitude: 0.0005,
         phase_rad: 0.0026,
         likeness: 0.4,
@@ -36,7 +36,7 @@ impl CellError {
 
     /// What a claim must stand against: the cell errs by the whole of its truncation in amplitude as well, and what effects change errs
     /// in the smooth shapes alone, which are most like effects.
-    pub const CAUTIOUS: Self = Self {
+    pub(crate) const CAUTIOUS: Self = Self {
         amplitude: 0.003,
         phase_rad: 0.003,
         likeness: 1.0,
@@ -45,7 +45,7 @@ impl CellError {
     };
 
     /// As the statistics see it: amplitudes and phases, as [`SmoothShape`](crate::smooth_shape::SmoothShape) has them.
-    pub fn of_model(&self) -> ModelError {
+    pub(crate) fn of_model(&self) -> ModelError {
         ModelError {
             sizes: vec![self.amplitude, self.phase_rad],
             likeness: self.likeness,

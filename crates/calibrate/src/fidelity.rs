@@ -30,7 +30,7 @@ pub struct Rung {
 ///
 /// # Errors
 /// If a cell cannot be fitted or simulated, or the user stopped it.
-pub fn compare_fidelities(
+pub(crate) fn compare_fidelities(
     set: &MeasuredSet,
     sampling: BenchSampling,
     problem: &FitProblem<'_>,

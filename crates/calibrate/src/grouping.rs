@@ -6,7 +6,7 @@ use crate::set::{MeasuredSet, MeasurementIndex};
 
 /// What measurements have in common that share a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Grouping {
+pub(crate) enum Grouping {
     Element,
     Colour,
     Distance,
@@ -15,15 +15,15 @@ pub enum Grouping {
 
 impl Grouping {
     /// All of them, in the order of the groupings of [`Data`](crate::data::Data).
-    pub const ALL: [Self; 4] = [Self::Element, Self::Colour, Self::Distance, Self::Angle];
+    pub(crate) const ALL: [Self; 4] = [Self::Element, Self::Colour, Self::Distance, Self::Angle];
 
     /// The grouping of a pattern.
-    pub fn of(pattern: &Pattern) -> Self {
+    pub(crate) fn of(pattern: &Pattern) -> Self {
         Self::ALL[pattern.by]
     }
 
     /// As a word.
-    pub fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Element => "element",
             Self::Colour => "colour",
@@ -34,7 +34,7 @@ impl Grouping {
 
     /// What measurements of one group have in common: the place of the element (um), the centre of the LED (nm), the distance (um),
     /// or the angle of incidence (degrees).
-    pub fn coordinates(self, set: &MeasuredSet, measurement: MeasurementIndex) -> [f64; 2] {
+    pub(crate) fn coordinates(self, set: &MeasuredSet, measurement: MeasurementIndex) -> [f64; 2] {
         let own = &set.measurements[measurement];
         match self {
             Self::Element => set.elements[own.element].centre_um,
@@ -46,7 +46,7 @@ impl Grouping {
 }
 
 /// What the values of a pattern are like over what its groups differ in; none where that is a single place.
-pub fn linear_trend(pattern: &Pattern, set: &MeasuredSet) -> Option<LinearTrend> {
+pub(crate) fn linear_trend(pattern: &Pattern, set: &MeasuredSet) -> Option<LinearTrend> {
     let by = Grouping::of(pattern);
     let at: Vec<[f64; 2]> = pattern.groups.iter().map(|&c| by.coordinates(set, c)).collect();
     LinearTrend::new(&at, &pattern.values)

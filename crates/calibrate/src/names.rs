@@ -7,7 +7,7 @@ const FARTHEST: f64 = 0.4;
 pub const RENAMED: [(&str, &str); 2] = [("gap", "defocus"), ("gap_gradient", "defocus_gradient")];
 
 /// A message on those of `wanted` that are not in `known`, each with the nearest known name; none if all are.
-pub fn unknown_names(known: &[String], wanted: &[String]) -> Option<String> {
+pub(crate) fn unknown_names(known: &[String], wanted: &[String]) -> Option<String> {
     let mut unknown: Vec<&String> = Vec::new();
     for name in wanted {
         if !known.contains(name) && !unknown.contains(&name) {

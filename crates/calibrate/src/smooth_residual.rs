@@ -18,7 +18,7 @@ const SIDE: usize = 96;
 const CURVE_POINTS: u32 = 41;
 
 /// Smooth shapes fitted to what is left; everything found and every nuisance is projected out.
-pub struct SmoothResidual {
+pub(crate) struct SmoothResidual {
     /// Optical path over the lens (nm), common to colours and elements; NaN outside. Shape `[SIDE, SIDE]`, row
     /// index along +y.
     pub path_nm: Array2<f64>,
@@ -38,7 +38,7 @@ pub struct SmoothResidual {
 
 impl SmoothResidual {
     /// Fit the shapes to what a fit leaves; none if the surrogate has no smooth terms.
-    pub fn new(simulator: &Simulator<'_>, problem: &FitProblem<'_>, fit: &Fit) -> Option<Self> {
+    pub(crate) fn new(simulator: &Simulator<'_>, problem: &FitProblem<'_>, fit: &Fit) -> Option<Self> {
         let leds = problem.data.leds;
         let surrogate = &problem.surrogate;
         let simulated = surrogate.smooth_terms();

@@ -3,14 +3,14 @@
 use metalith_attribution::SmoothTerm;
 
 /// Number of polynomials of the smooth optical path: Noll's 5 to 15, through fourth order.
-pub const PATH_TERMS: usize = 11;
+pub(crate) const PATH_TERMS: usize = 11;
 
 /// Number of polynomials of the smooth transmission over width, for each LED.
-pub const TRANSMISSION_TERMS: usize = 3;
+pub(crate) const TRANSMISSION_TERMS: usize = 3;
 
 /// A smooth change of the chip.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SmoothShape {
+pub(crate) enum SmoothShape {
     /// Zernike polynomial of the optical path, counted from zero. Null tests are made of these.
     Path(usize),
     /// Legendre polynomial of the relative amplitude over width, counted from zero.
@@ -21,7 +21,7 @@ pub enum SmoothShape {
 
 impl SmoothShape {
     /// All of them: paths, amplitudes, phases.
-    pub fn all() -> impl Iterator<Item = Self> {
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
         let paths = (0..PATH_TERMS).map(Self::Path);
         let amplitudes = (0..TRANSMISSION_TERMS).map(Self::Transmission);
         paths.chain(amplitudes).chain((0..TRANSMISSION_TERMS).map(Self::Phase))
@@ -29,7 +29,7 @@ impl SmoothShape {
 
     /// Coefficient at which a shape is simulated, small enough for images to be linear in it: nm of path, a relative
     /// change of amplitude, or rad.
-    pub fn step(self) -> f64 {
+    pub(crate) fn step(self) -> f64 {
         match self {
             Self::Path(_) => 8.0,
             Self::Transmission(_) | Self::Phase(_) => 0.03,
@@ -37,7 +37,7 @@ impl SmoothShape {
     }
 
     /// As the statistics see it. A cell errs by amplitude and phase, in each LED by its own.
-    pub fn term(self) -> SmoothTerm {
+    pub(crate) fn term(self) -> SmoothTerm {
         let kind = match self {
             Self::Path(_) => None,
             Self::Transmission(_) => Some(0),

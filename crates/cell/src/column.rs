@@ -25,7 +25,7 @@ pub(super) struct WidthSpectrum {
 impl WidthSpectrum {
     /// Sample `t` until in the middle of every interval the cubic through the samples around it was
     /// within `tolerance` before the middle itself was added.
-    pub fn sample(band_um: (f64, f64), tolerance: f64, t: impl Fn(f64) -> Result<Complex64>) -> Result<Self> {
+    pub(crate) fn sample(band_um: (f64, f64), tolerance: f64, t: impl Fn(f64) -> Result<Complex64>) -> Result<Self> {
         let (low, high) = band_um;
         let steps = ((high - low) / FIRST_STEP_UM - 1e-6).ceil().max(3.0) as usize;
         let wavelengths_um: Vec<f64> = (0..=steps)
@@ -87,7 +87,7 @@ impl WidthSpectrum {
     }
 
     /// The cubic through the four samples around a wavelength.
-    pub fn at(&self, wavelength_um: f64) -> Complex64 {
+    pub(crate) fn at(&self, wavelength_um: f64) -> Complex64 {
         lagrange(&self.wavelengths_um, |i| self.t[i], wavelength_um)
     }
 }

@@ -145,13 +145,13 @@ pub(super) mod tests {
     const QUARTER: f64 = 1e-6;
 
     /// Nearly half-wave plates at 532 nm, in steps of a degree.
-    pub const PILLARS: RotatedRectangles = RotatedRectangles {
+    pub(crate) const PILLARS: RotatedRectangles = RotatedRectangles {
         width_nm: 100,
         length_nm: 250,
         steps: 180,
     };
 
-    pub fn titania() -> CellStack {
+    pub(crate) fn titania() -> CellStack {
         CellStack {
             film: Material::named("tio2_siefke_2016").unwrap(),
             ..CellStack::paper(355.0, 600.0).unwrap()

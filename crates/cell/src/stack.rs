@@ -384,7 +384,7 @@ const MOST_TAPER: f64 = std::f64::consts::FRAC_PI_4;
 pub(super) mod tests {
     use super::*;
 
-    pub fn paper() -> CellStack {
+    pub(crate) fn paper() -> CellStack {
         CellStack::paper(350.0, 700.0).unwrap()
     }
 

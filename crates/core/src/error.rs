@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Cause of an error, for [`std::error::Error::source`].
-pub type Cause = Box<dyn std::error::Error + Send + Sync>;
+pub(crate) type Cause = Box<dyn std::error::Error + Send + Sync>;
 
 /// Result of every fallible operation of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

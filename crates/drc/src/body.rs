@@ -28,7 +28,7 @@ pub(super) fn disc_ring(r: &Rect) -> Vec<Point> {
 }
 
 impl Body<'_> {
-    pub fn bounds(&self) -> Rect {
+    pub(crate) fn bounds(&self) -> Rect {
         match self {
             Self::Rect(r) | Self::Disc(r) => *r,
             Self::Tilted(p) => Rect::around(p),
@@ -37,7 +37,7 @@ impl Body<'_> {
     }
 
     /// Steps of work that comparing two shapes takes.
-    pub fn effort(&self, other: &Self) -> u64 {
+    pub(crate) fn effort(&self, other: &Self) -> u64 {
         match (self, other) {
             (Self::Rect(_), Self::Rect(_)) => 1,
             _ => SIDES.saturating_mul(self.sides()).saturating_mul(other.sides()),
@@ -45,7 +45,7 @@ impl Body<'_> {
     }
 
     /// Its corners, closed.
-    pub fn ring(&self) -> Vec<Point> {
+    pub(crate) fn ring(&self) -> Vec<Point> {
         match self {
             Self::Rect(r) => ring_of(r).to_vec(),
             Self::Disc(r) => disc_ring(r),
@@ -55,7 +55,7 @@ impl Body<'_> {
     }
 
     /// Euclidean distance; zero if they touch or overlap.
-    pub fn gap(&self, other: &Self) -> f64 {
+    pub(crate) fn gap(&self, other: &Self) -> f64 {
         match (self, other) {
             (Self::Rect(a), Self::Rect(b)) => {
                 let (dx, dy) = between(a, b);
@@ -72,7 +72,7 @@ impl Body<'_> {
     }
 
     /// True if a place is inside, not on the edge.
-    pub fn holds(&self, p: Point) -> bool {
+    pub(crate) fn holds(&self, p: Point) -> bool {
         let r = self.bounds();
         let within = p.x > r.x0 && p.x < r.x1 && p.y > r.y0 && p.y < r.y1;
         match self {
@@ -87,7 +87,7 @@ impl Body<'_> {
     }
 
     /// Corners, the first not counted twice.
-    pub fn sides(&self) -> u64 {
+    pub(crate) fn sides(&self) -> u64 {
         match self {
             Self::Rect(_) | Self::Tilted(_) => 4,
             Self::Disc(r) => disc_ring(r).len() as u64 - 1,
@@ -96,7 +96,7 @@ impl Body<'_> {
     }
 
     /// True if they share area.
-    pub fn overlaps(&self, other: &Self) -> bool {
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
         let (a, b) = (self.bounds(), other.bounds());
         let boxes = a.x0 < b.x1 && b.x0 < a.x1 && a.y0 < b.y1 && b.y0 < a.y1;
         match (self, other) {
@@ -106,7 +106,7 @@ impl Body<'_> {
     }
 
     /// True if they are the same area drawn twice.
-    pub fn equals(&self, other: &Self) -> bool {
+    pub(crate) fn equals(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Rect(a), Self::Rect(b)) | (Self::Disc(a), Self::Disc(b)) => a == b,
             (Self::Ring(a), Self::Ring(b)) => same_ring(a, b),

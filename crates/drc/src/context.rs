@@ -16,7 +16,7 @@ pub(super) struct Context {
 
 impl Context {
     /// The layer named by `layer`, the pillars if left out.
-    pub fn layer(&self, s: &Section<'_, '_>, key: &str) -> LayerNumber {
+    pub(crate) fn layer(&self, s: &Section<'_, '_>, key: &str) -> LayerNumber {
         match s.optional_text(key) {
             None => self.pillars,
             Some(name) => self.named(s, key, &name),
@@ -24,7 +24,7 @@ impl Context {
     }
 
     /// The layers named by `layers`, the pillars if left out.
-    pub fn some_layers(&self, s: &Section<'_, '_>) -> Vec<LayerNumber> {
+    pub(crate) fn some_layers(&self, s: &Section<'_, '_>) -> Vec<LayerNumber> {
         if s.has("layers") {
             s.texts("layers").iter().map(|n| self.named(s, "layers", n)).collect()
         } else {
@@ -33,7 +33,7 @@ impl Context {
     }
 
     /// True if the deck has this check on this layer.
-    pub fn covers(&self, check: &str, layer: LayerNumber) -> bool {
+    pub(crate) fn covers(&self, check: &str, layer: LayerNumber) -> bool {
         self.covered
             .iter()
             .any(|(c, layers)| c == check && layers.contains(&layer))

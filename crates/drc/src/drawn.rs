@@ -20,7 +20,7 @@ pub(super) struct DrawnOutline<'a> {
 
 impl<'a> DrawnOutline<'a> {
     /// Outline of a shape with these points.
-    pub fn new(
+    pub(crate) fn new(
         shape: &metalith_gds::Shape<'_>,
         points: &'a [Point],
         placements: &'a [Transform],
@@ -39,38 +39,38 @@ impl<'a> DrawnOutline<'a> {
     }
 
     /// Corners only, closed.
-    pub fn corners(&self) -> &[Point] {
+    pub(crate) fn corners(&self) -> &[Point] {
         self.simple.get_or_init(|| simplified(self.points))
     }
 
     /// Twice the area, positive if counter-clockwise.
-    pub fn twice_area(&self) -> i128 {
+    pub(crate) fn twice_area(&self) -> i128 {
         twice_area(self.points)
     }
 
-    pub fn bounds(&self) -> Rect {
+    pub(crate) fn bounds(&self) -> Rect {
         self.rect.unwrap_or_else(|| Rect::around(self.points))
     }
 
     /// The upright rectangle that its corners make.
-    pub fn rectangle(&self) -> Option<Rect> {
+    pub(crate) fn rectangle(&self) -> Option<Rect> {
         self.rect.or_else(|| metalith_gds::rectangle_of(self.corners()))
     }
 
     /// True if two sides cross, or touch where they should not.
-    pub fn crosses_itself(&self) -> bool {
+    pub(crate) fn crosses_itself(&self) -> bool {
         *self
             .crosses
             .get_or_init(|| self.rect.is_none() && crosses_itself(self.corners()))
     }
 
     /// True if all sides are along the axes.
-    pub fn is_manhattan(&self) -> bool {
+    pub(crate) fn is_manhattan(&self) -> bool {
         self.rect.is_some() || self.corners().windows(2).all(|s| s[0].x == s[1].x || s[0].y == s[1].y)
     }
 
     /// Smallest interior or exterior angle between two sides (degrees); 180 if there is no corner.
-    pub fn sharpest_deg(&self) -> f64 {
+    pub(crate) fn sharpest_deg(&self) -> f64 {
         let c = self.corners();
         if c.len() < 4 {
             return if c.is_empty() { 180.0 } else { 0.0 };

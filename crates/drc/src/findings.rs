@@ -41,7 +41,7 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    pub fn new(rule: &str, unit_nm: f64, input: &CheckInput<'_>) -> Self {
+    pub(crate) fn new(rule: &str, unit_nm: f64, input: &CheckInput<'_>) -> Self {
         let waivers = input.waivers.map_or_else(Vec::new, |w| w.valid(rule, input.today));
         let mut by_hash = HashMap::new();
         for (k, waiver) in waivers.iter().enumerate() {
@@ -62,7 +62,7 @@ impl Findings {
     }
 
     /// A place of the layout, in database units.
-    pub fn at(&mut self, points: &[Point], words: impl FnOnce() -> String) {
+    pub(crate) fn at(&mut self, points: &[Point], words: impl FnOnce() -> String) {
         self.total += 1;
         if self.markers.len() >= self.most && self.waivers.is_empty() {
             return;
@@ -76,7 +76,7 @@ impl Findings {
     }
 
     /// A rectangle of the layout, in database units.
-    pub fn rect(&mut self, r: &Rect, words: impl FnOnce() -> String) {
+    pub(crate) fn rect(&mut self, r: &Rect, words: impl FnOnce() -> String) {
         let corner = |x, y| Point::new(x, y);
         let ring = [
             corner(r.x0, r.y0),
@@ -88,7 +88,7 @@ impl Findings {
     }
 
     /// Records the same place in every copy of a cell.
-    pub fn copies(&mut self, points: &[Point], placements: &[Transform], words: impl Fn() -> String) {
+    pub(crate) fn copies(&mut self, points: &[Point], placements: &[Transform], words: impl Fn() -> String) {
         for (k, placement) in placements.iter().enumerate() {
             if self.markers.len() >= self.most && self.waivers.is_empty() {
                 self.total += (placements.len() - k) as u64;
@@ -100,7 +100,7 @@ impl Findings {
     }
 
     /// Something that has no place; `subject` identifies it.
-    pub fn plain(&mut self, subject: &str, words: impl FnOnce() -> String) {
+    pub(crate) fn plain(&mut self, subject: &str, words: impl FnOnce() -> String) {
         self.total += 1;
         let hash = digest(&format!("{}\n{subject}", self.rule));
         self.keep(Vec::new(), hash, words);
@@ -123,7 +123,7 @@ impl Findings {
     }
 
     /// Indices of the waivers that were tried, in the order of the file, with the number of findings that each covered.
-    pub fn tried(&self) -> impl Iterator<Item = (usize, u64)> + '_ {
+    pub(crate) fn tried(&self) -> impl Iterator<Item = (usize, u64)> + '_ {
         self.waivers.iter().map(|w| w.index).zip(self.matched.iter().copied())
     }
 }

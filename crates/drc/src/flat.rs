@@ -22,17 +22,17 @@ pub(super) struct Loose {
 
 impl Loose {
     /// Shapes.
-    pub fn len(&self) -> u64 {
+    pub(crate) fn len(&self) -> u64 {
         (self.rects.len() + self.polygons.len()) as u64
     }
 
-    pub fn rect(&self, k: usize) -> Rect {
+    pub(crate) fn rect(&self, k: usize) -> Rect {
         let [x0, y0, x1, y1] = self.rects[k].map(i64::from);
         Rect { x0, y0, x1, y1 }
     }
 
     /// One shape, rectangles first.
-    pub fn body(&self, k: usize) -> Body<'_> {
+    pub(crate) fn body(&self, k: usize) -> Body<'_> {
         match self.rects.len() {
             n if k < n => Body::Rect(self.rect(k)),
             n => Body::Ring(&self.polygons[k - n]),
@@ -40,12 +40,12 @@ impl Loose {
     }
 
     /// All shapes, rectangles first.
-    pub fn bodies(&self) -> impl Iterator<Item = Body<'_>> {
+    pub(crate) fn bodies(&self) -> impl Iterator<Item = Body<'_>> {
         (0..self.rects.len() + self.polygons.len()).map(|k| self.body(k))
     }
 
     /// Bounding boxes of all, rectangles first.
-    pub fn bounds(&self) -> impl Iterator<Item = Rect> + '_ {
+    pub(crate) fn bounds(&self) -> impl Iterator<Item = Rect> + '_ {
         (0..self.rects.len())
             .map(|k| self.rect(k))
             .chain(self.polygons.iter().map(|p| Rect::around(p)))
@@ -94,12 +94,12 @@ pub(super) struct FlatLayout<'a> {
 
 impl FlatLayout<'_> {
     /// A length in database units.
-    pub fn units(&self, nm: f64) -> f64 {
+    pub(crate) fn units(&self, nm: f64) -> f64 {
         nm / self.unit_nm
     }
 
     /// The pillar at a site, in database units.
-    pub fn body(&self, element: usize, row: usize, column: usize) -> Body<'static> {
+    pub(crate) fn body(&self, element: usize, row: usize, column: usize) -> Body<'static> {
         let around = self.pillar(element, row, column);
         match self.shape.outline() {
             OutlineForm::Square => Body::Rect(around),
@@ -119,12 +119,12 @@ impl FlatLayout<'_> {
     }
 
     /// Half of what the pillar with a width or number takes along x and y (nm).
-    pub fn half_nm(&self, number: u16) -> [f64; 2] {
+    pub(crate) fn half_nm(&self, number: u16) -> [f64; 2] {
         self.shape.half_nm(PillarId(number))
     }
 
     /// The box around the pillar at a site, in database units.
-    pub fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
+    pub(crate) fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
         let e = &self.elements[element];
         let [half_x, half_y] = self.half_nm(e.widths.number(column, row));
         let x = (e.site.centre_nm[0] + e.site.lattice.place_nm(0, column)) as f64;
@@ -139,11 +139,11 @@ impl FlatLayout<'_> {
     }
 
     /// Pillars on lattices.
-    pub fn pillars_on_lattices(&self) -> u64 {
+    pub(crate) fn pillars_on_lattices(&self) -> u64 {
         self.elements.iter().map(|e| e.widths.pillars()).sum::<u64>() + self.odd_on_lattice
     }
 
-    pub fn loose(&self, layer: LayerNumber) -> Option<&Loose> {
+    pub(crate) fn loose(&self, layer: LayerNumber) -> Option<&Loose> {
         self.loose.get(&layer)
     }
 }

@@ -31,7 +31,7 @@ pub(super) struct Allowance {
 }
 
 impl Allowance {
-    pub fn of<'l>(layouts: impl IntoIterator<Item = &'l Layout>) -> Self {
+    pub(crate) fn of<'l>(layouts: impl IntoIterator<Item = &'l Layout>) -> Self {
         let bytes = layouts.into_iter().map(Layout::bytes).fold(0, u64::saturating_add);
         let grown = |base: u64, a_byte: u64| bytes.saturating_mul(a_byte).saturating_add(base);
         Self {
@@ -60,7 +60,7 @@ pub(super) struct Work<'p> {
 }
 
 impl<'p> Work<'p> {
-    pub fn new(allowance: &Allowance, progress: &'p dyn Progress) -> Self {
+    pub(crate) fn new(allowance: &Allowance, progress: &'p dyn Progress) -> Self {
         Self {
             left: Cell::new(allowance.steps),
             unseen: Cell::new(0),
@@ -74,7 +74,7 @@ impl<'p> Work<'p> {
     /// # Errors
     /// If they are more than the files allow, or the user asked to stop.
     #[inline]
-    pub fn spend(&self, steps: u64) -> Result<(), Stop> {
+    pub(crate) fn spend(&self, steps: u64) -> Result<(), Stop> {
         let Some(left) = self.left.get().checked_sub(steps) else {
             return Err(Stop::TooMuch(format!(
                 "more than {} steps of work, which is out of proportion to the size of the files",
@@ -95,7 +95,7 @@ impl<'p> Work<'p> {
     ///
     /// # Errors
     /// If so.
-    pub fn look(&self) -> Result<(), Stop> {
+    pub(crate) fn look(&self) -> Result<(), Stop> {
         if self.progress.stopped() {
             return Err(Stop::Interrupted);
         }

@@ -21,7 +21,7 @@ pub(super) enum CellInput {
 
 impl CellInput {
     /// Start reading a layout that was read once.
-    pub fn open(source: &Source, format: FileFormat, texts: &super::oasis::Texts) -> Result<Self> {
+    pub(crate) fn open(source: &Source, format: FileFormat, texts: &super::oasis::Texts) -> Result<Self> {
         Ok(match format {
             FileFormat::Gds => Self::Gds(source.open()?),
             FileFormat::Oasis => Self::Oasis(Box::new(OasisCells::open(source, texts.clone())?)),
@@ -29,7 +29,7 @@ impl CellInput {
     }
 
     /// Place in the file of the next byte.
-    pub fn offset(&self) -> u64 {
+    pub(crate) fn offset(&self) -> u64 {
         match self {
             Self::Gds(input) => input.offset(),
             Self::Oasis(cells) => cells.offset(),
@@ -38,7 +38,7 @@ impl CellInput {
 
     /// Go to the first element of a cell. In OASIS cells are read in the order of the file: going back inside a CBLOCK
     /// unpacks it again.
-    pub fn seek(&mut self, cell: &LayoutCell) -> Result<()> {
+    pub(crate) fn seek(&mut self, cell: &LayoutCell) -> Result<()> {
         match self {
             Self::Gds(input) => {
                 input.seek(cell.bytes.start)?;

@@ -22,7 +22,7 @@ pub(super) enum ElementKind {
 
 impl ElementKind {
     /// The element that a record begins, if it begins one.
-    pub fn of(record_kind: u8) -> Option<Self> {
+    pub(crate) fn of(record_kind: u8) -> Option<Self> {
         Some(match record_kind {
             kind::BOUNDARY => Self::Boundary,
             kind::BOX => Self::Box,
@@ -84,7 +84,7 @@ impl Default for ElementContent {
 
 impl ElementContent {
     /// Forget the last element.
-    pub fn begin(&mut self, offset: u64, kind: ElementKind) {
+    pub(crate) fn begin(&mut self, offset: u64, kind: ElementKind) {
         let (mut points, mut name, mut string) = (
             std::mem::take(&mut self.points),
             std::mem::take(&mut self.name),
@@ -104,7 +104,13 @@ impl ElementContent {
     }
 
     /// Read the records after the head up to ENDEL, in any order.
-    pub fn read(&mut self, input: &mut Input, head: Record, kind: ElementKind, limits: &ReadLimits) -> Result<()> {
+    pub(crate) fn read(
+        &mut self,
+        input: &mut Input,
+        head: Record,
+        kind: ElementKind,
+        limits: &ReadLimits,
+    ) -> Result<()> {
         self.begin(head.offset, kind);
         let (mut has_layer, mut has_datatype) = (false, false);
         loop {
@@ -234,13 +240,13 @@ impl ElementContent {
     }
 
     /// Transform of the first copy of the cell referred to.
-    pub fn transform(&self) -> Option<Transform> {
+    pub(crate) fn transform(&self) -> Option<Transform> {
         let at = self.points.first().copied().unwrap_or_default();
         Transform::of_reference(self.mirror, self.magnification, self.angle_deg, at)
     }
 
     /// Copies of the cell referred to.
-    pub fn copies(&self) -> u64 {
+    pub(crate) fn copies(&self) -> u64 {
         match self.kind {
             ElementKind::Array => u64::from(self.columns) * u64::from(self.rows),
             _ => 1,
@@ -249,7 +255,7 @@ impl ElementContent {
 
     /// Place of copy `k` of an array: columns first. Distances that do not divide are rounded a copy, so that the last
     /// one is where the file says.
-    pub fn origin(&self, k: u64) -> Point {
+    pub(crate) fn origin(&self, k: u64) -> Point {
         if self.kind != ElementKind::Array {
             return self.points[0];
         }
@@ -267,7 +273,7 @@ impl ElementContent {
     }
 
     /// Transform of copy `k` of the cell referred to.
-    pub fn copy(&self, k: u64) -> Transform {
+    pub(crate) fn copy(&self, k: u64) -> Transform {
         let origin = self.origin(k);
         match self.transform().unwrap_or(Transform::IDENTITY) {
             Transform::Square { orientation, .. } => Transform::Square {

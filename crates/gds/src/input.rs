@@ -34,7 +34,7 @@ enum Stream {
 }
 
 impl Source {
-    pub fn file(path: &Path) -> Result<Self> {
+    pub(crate) fn file(path: &Path) -> Result<Self> {
         let meta = std::fs::metadata(path).map_err(Error::io("read", path))?;
         if !meta.is_file() {
             return Err(Error::NotAFile { path: path.to_owned() });
@@ -45,14 +45,14 @@ impl Source {
         })
     }
 
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         match self {
             Self::File { path, .. } => path,
             Self::Memory { name, .. } => name,
         }
     }
 
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         match self {
             Self::File { bytes, .. } => *bytes,
             Self::Memory { bytes, .. } => bytes.len() as u64,
@@ -60,7 +60,7 @@ impl Source {
     }
 
     /// The file as it is, to be read in OASIS.
-    pub fn raw(&self) -> Result<Box<dyn ReadSeek>> {
+    pub(crate) fn raw(&self) -> Result<Box<dyn ReadSeek>> {
         Ok(match self {
             Self::File { path, bytes } => Box::new(unchanged(path, *bytes)?),
             Self::Memory { bytes, .. } => Box::new(Cursor::new(bytes.clone())),
@@ -68,7 +68,7 @@ impl Source {
     }
 
     /// Format that the first bytes are of; GDSII has no mark of its own.
-    pub fn format(&self) -> Result<FileFormat> {
+    pub(crate) fn format(&self) -> Result<FileFormat> {
         let mut first = Vec::new();
         let most = metalith_oasis::MAGIC.len() as u64;
         let read = self.raw()?.take(most).read_to_end(&mut first);
@@ -81,7 +81,7 @@ impl Source {
     }
 
     /// Start reading at the first byte.
-    pub fn open(&self) -> Result<Input> {
+    pub(crate) fn open(&self) -> Result<Input> {
         let stream = match self {
             Self::File { path, bytes } => {
                 let file = unchanged(path, *bytes)?;
@@ -132,12 +132,12 @@ pub(super) struct Input {
 
 impl Input {
     /// Place of the next byte.
-    pub fn offset(&self) -> u64 {
+    pub(crate) fn offset(&self) -> u64 {
         self.place(self.from)
     }
 
     /// An error at a place of this file.
-    pub fn fault(&self, offset: u64, cause: LayoutError) -> Error {
+    pub(crate) fn fault(&self, offset: u64, cause: LayoutError) -> Error {
         Error::Layout {
             path: self.path.clone(),
             offset,
@@ -146,7 +146,7 @@ impl Input {
     }
 
     /// The bytes at hand: at least one whole record, unless the file ends before.
-    pub fn window(&mut self) -> Result<&[u8]> {
+    pub(crate) fn window(&mut self) -> Result<&[u8]> {
         if self.to - self.from < LONGEST && !self.ended {
             self.fill()?;
         }
@@ -154,7 +154,7 @@ impl Input {
     }
 
     /// Step over bytes of the window.
-    pub fn consume(&mut self, count: usize) {
+    pub(crate) fn consume(&mut self, count: usize) {
         debug_assert!(self.from + count <= self.to);
         self.from += count;
     }
@@ -203,7 +203,7 @@ impl Input {
     }
 
     /// Go to a place of the file; free if it is in the block.
-    pub fn seek(&mut self, offset: u64) -> Result<()> {
+    pub(crate) fn seek(&mut self, offset: u64) -> Result<()> {
         let start = self.block.start as u64;
         if offset >= self.begin && offset <= self.place(self.to) {
             self.from = (start + offset - self.begin) as usize;
@@ -222,7 +222,7 @@ impl Input {
     ///
     /// # Errors
     /// If the file ends before it is complete, or its length is impossible.
-    pub fn next(&mut self) -> Result<Record> {
+    pub(crate) fn next(&mut self) -> Result<Record> {
         let offset = self.offset();
         let window = self.window()?;
         let held = window.len();
@@ -252,12 +252,12 @@ impl Input {
     }
 
     /// The bytes of a record read last.
-    pub fn body(&self, record: Record) -> &[u8] {
+    pub(crate) fn body(&self, record: Record) -> &[u8] {
         &self.block.bytes[record.from..record.to]
     }
 
     /// The body of a record that must have this data type and be a whole number of `unit` bytes long.
-    pub fn checked(&self, record: Record, data: u8, unit: usize) -> Result<&[u8]> {
+    pub(crate) fn checked(&self, record: Record, data: u8, unit: usize) -> Result<&[u8]> {
         let body = self.body(record);
         if record.data != data || body.is_empty() || !body.len().is_multiple_of(unit) {
             let cause = LayoutError::RecordBody {
@@ -273,26 +273,26 @@ impl Input {
     }
 
     /// The one two-byte integer of a record.
-    pub fn int2(&self, record: Record) -> Result<i16> {
+    pub(crate) fn int2(&self, record: Record) -> Result<i16> {
         let body = self.checked(record, record::data::INT2, 2)?;
         Ok(i16::from_be_bytes([body[0], body[1]]))
     }
 
     /// The one four-byte integer of a record.
-    pub fn int4(&self, record: Record) -> Result<i32> {
+    pub(crate) fn int4(&self, record: Record) -> Result<i32> {
         let body = self.checked(record, record::data::INT4, 4)?;
         Ok(i32::from_be_bytes([body[0], body[1], body[2], body[3]]))
     }
 
     /// Real number `k` of a record that has at least `k + 1`.
-    pub fn real8(&self, record: Record, k: usize) -> Result<f64> {
+    pub(crate) fn real8(&self, record: Record, k: usize) -> Result<f64> {
         let body = self.checked(record, record::data::REAL8, 8 * (k + 1))?;
         let bytes = body[8 * k..8 * k + 8].try_into().expect("eight bytes");
         Ok(super::real::decode(bytes))
     }
 
     /// The text of a record without the zero that pads it to an even length.
-    pub fn text(&self, record: Record) -> Result<&[u8]> {
+    pub(crate) fn text(&self, record: Record) -> Result<&[u8]> {
         let body = self.body(record);
         if record.data != record::data::ASCII {
             let cause = LayoutError::NotText {

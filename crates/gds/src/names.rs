@@ -16,26 +16,26 @@ pub(super) struct Names {
 
 impl Names {
     /// Bytes of all names.
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.bytes
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.list.len()
     }
 
-    pub fn name(&self, number: u32) -> &[u8] {
+    pub(crate) fn name(&self, number: u32) -> &[u8] {
         &self.list[number as usize]
     }
 
     /// The number of a name, if it was met.
-    pub fn find(&self, name: &[u8]) -> Option<u32> {
+    pub(crate) fn find(&self, name: &[u8]) -> Option<u32> {
         self.numbers.get(name).copied()
     }
 
     /// Names with numbered ones replaced by those of `table`, found by either, and for each number of before its
     /// number now: that of the first with the same name. One that is not in the table is called by its number.
-    pub fn resolve(&self, table: &HashMap<u64, Vec<u8>>) -> (Self, Vec<u32>) {
+    pub(crate) fn resolve(&self, table: &HashMap<u64, Vec<u8>>) -> (Self, Vec<u32>) {
         let mut resolved = Self::default();
         let renumbered = self.list.iter().map(|name| match numbered(name) {
             None => resolved.number(name),
@@ -51,7 +51,7 @@ impl Names {
     }
 
     /// The number of a name, a new one if it is new.
-    pub fn number(&mut self, name: &[u8]) -> u32 {
+    pub(crate) fn number(&mut self, name: &[u8]) -> u32 {
         if let Some(number) = self.find(name) {
             return number;
         }
@@ -68,13 +68,13 @@ impl Names {
 pub(super) struct Recent(Vec<(u64, u32)>);
 
 impl Recent {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(vec![(0, 0); SLOTS])
     }
 
     /// The number of the name with this key, asked of `find` if it was not met lately.
     #[inline]
-    pub fn number(&mut self, key: u64, find: impl FnOnce(&[u8]) -> u32) -> u32 {
+    pub(crate) fn number(&mut self, key: u64, find: impl FnOnce(&[u8]) -> u32) -> u32 {
         let slot = &mut self.0[(key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 54) as usize % SLOTS];
         if slot.0 != key {
             let bytes = key.to_le_bytes();

@@ -42,7 +42,7 @@ pub(super) struct Copies<'a> {
 impl Copies<'_> {
     /// Call `with` with the place of each copy from the first.
     #[inline]
-    pub fn each<E>(&self, mut with: impl FnMut(Point) -> Result<(), E>) -> Result<(), E> {
+    pub(crate) fn each<E>(&self, mut with: impl FnMut(Point) -> Result<(), E>) -> Result<(), E> {
         self.repetition.each(|[x, y]| with(Point::new(x, y)))
     }
 }
@@ -83,7 +83,7 @@ pub(super) struct OasisCells {
 }
 
 impl OasisCells {
-    pub fn open(source: &Source, texts: Texts) -> Result<Self> {
+    pub(crate) fn open(source: &Source, texts: Texts) -> Result<Self> {
         let reader = OasisReader::unverified(source.raw()?, OasisLimits::default());
         Ok(Self::of(reader.map_err(located(source.path()))?, source, texts, true))
     }
@@ -98,11 +98,11 @@ impl OasisCells {
         }
     }
 
-    pub fn offset(&self) -> u64 {
+    pub(crate) fn offset(&self) -> u64 {
         self.reader.offset()
     }
 
-    pub fn fault(&self, offset: u64, cause: LayoutError) -> Error {
+    pub(crate) fn fault(&self, offset: u64, cause: LayoutError) -> Error {
         Error::Layout {
             path: self.path.clone(),
             offset,
@@ -111,7 +111,7 @@ impl OasisCells {
     }
 
     /// Go to the first element of a cell.
-    pub fn seek(&mut self, cell: &LayoutCell) -> Result<()> {
+    pub(crate) fn seek(&mut self, cell: &LayoutCell) -> Result<()> {
         let place = OasisPlace {
             offset: cell.bytes.start,
             inner: cell.inner,
@@ -124,7 +124,7 @@ impl OasisCells {
     }
 
     /// Hand the elements up to the next cell to `sink`, reporting to `progress`.
-    pub fn cell<S: Sink>(
+    pub(crate) fn cell<S: Sink>(
         &mut self,
         limits: &ReadLimits,
         sink: &mut S,

@@ -2,50 +2,50 @@
 
 /// Record types by number. Those not named here hold nothing that changes geometry.
 pub(super) mod kind {
-    pub const HEADER: u8 = 0x00;
-    pub const BGNLIB: u8 = 0x01;
-    pub const LIBNAME: u8 = 0x02;
-    pub const UNITS: u8 = 0x03;
-    pub const ENDLIB: u8 = 0x04;
-    pub const BGNSTR: u8 = 0x05;
-    pub const STRNAME: u8 = 0x06;
-    pub const ENDSTR: u8 = 0x07;
-    pub const BOUNDARY: u8 = 0x08;
-    pub const PATH: u8 = 0x09;
-    pub const SREF: u8 = 0x0A;
-    pub const AREF: u8 = 0x0B;
-    pub const TEXT: u8 = 0x0C;
-    pub const LAYER: u8 = 0x0D;
-    pub const DATATYPE: u8 = 0x0E;
-    pub const WIDTH: u8 = 0x0F;
-    pub const XY: u8 = 0x10;
-    pub const ENDEL: u8 = 0x11;
-    pub const SNAME: u8 = 0x12;
-    pub const COLROW: u8 = 0x13;
-    pub const NODE: u8 = 0x15;
-    pub const TEXTTYPE: u8 = 0x16;
-    pub const STRING: u8 = 0x19;
-    pub const STRANS: u8 = 0x1A;
-    pub const MAG: u8 = 0x1B;
-    pub const ANGLE: u8 = 0x1C;
-    pub const PATHTYPE: u8 = 0x21;
-    pub const NODETYPE: u8 = 0x2A;
-    pub const PROPATTR: u8 = 0x2B;
-    pub const BOX: u8 = 0x2D;
-    pub const BOXTYPE: u8 = 0x2E;
-    pub const BGNEXTN: u8 = 0x30;
-    pub const ENDEXTN: u8 = 0x31;
+    pub(crate) const HEADER: u8 = 0x00;
+    pub(crate) const BGNLIB: u8 = 0x01;
+    pub(crate) const LIBNAME: u8 = 0x02;
+    pub(crate) const UNITS: u8 = 0x03;
+    pub(crate) const ENDLIB: u8 = 0x04;
+    pub(crate) const BGNSTR: u8 = 0x05;
+    pub(crate) const STRNAME: u8 = 0x06;
+    pub(crate) const ENDSTR: u8 = 0x07;
+    pub(crate) const BOUNDARY: u8 = 0x08;
+    pub(crate) const PATH: u8 = 0x09;
+    pub(crate) const SREF: u8 = 0x0A;
+    pub(crate) const AREF: u8 = 0x0B;
+    pub(crate) const TEXT: u8 = 0x0C;
+    pub(crate) const LAYER: u8 = 0x0D;
+    pub(crate) const DATATYPE: u8 = 0x0E;
+    pub(crate) const WIDTH: u8 = 0x0F;
+    pub(crate) const XY: u8 = 0x10;
+    pub(crate) const ENDEL: u8 = 0x11;
+    pub(crate) const SNAME: u8 = 0x12;
+    pub(crate) const COLROW: u8 = 0x13;
+    pub(crate) const NODE: u8 = 0x15;
+    pub(crate) const TEXTTYPE: u8 = 0x16;
+    pub(crate) const STRING: u8 = 0x19;
+    pub(crate) const STRANS: u8 = 0x1A;
+    pub(crate) const MAG: u8 = 0x1B;
+    pub(crate) const ANGLE: u8 = 0x1C;
+    pub(crate) const PATHTYPE: u8 = 0x21;
+    pub(crate) const NODETYPE: u8 = 0x2A;
+    pub(crate) const PROPATTR: u8 = 0x2B;
+    pub(crate) const BOX: u8 = 0x2D;
+    pub(crate) const BOXTYPE: u8 = 0x2E;
+    pub(crate) const BGNEXTN: u8 = 0x30;
+    pub(crate) const ENDEXTN: u8 = 0x31;
     /// Last number that release 6 gives a meaning.
-    pub const LAST: u8 = 0x3B;
+    pub(crate) const LAST: u8 = 0x3B;
 }
 
 /// Data types by number.
 pub(super) mod data {
-    pub const BITS: u8 = 1;
-    pub const INT2: u8 = 2;
-    pub const INT4: u8 = 3;
-    pub const REAL8: u8 = 5;
-    pub const ASCII: u8 = 6;
+    pub(crate) const BITS: u8 = 1;
+    pub(crate) const INT2: u8 = 2;
+    pub(crate) const INT4: u8 = 3;
+    pub(crate) const REAL8: u8 = 5;
+    pub(crate) const ASCII: u8 = 6;
 }
 
 /// One record; its body stands in the buffer of the input it came from until the next is read.

@@ -82,7 +82,7 @@ pub(crate) mod tests {
     use super::*;
     use metalith_pillars::{Rectangles, RotatedRectangles};
 
-    pub const PILLARS: PillarShape = PillarShape::Rectangle(Rectangles::Rotated(RotatedRectangles {
+    pub(crate) const PILLARS: PillarShape = PillarShape::Rectangle(Rectangles::Rotated(RotatedRectangles {
         width_nm: 90,
         length_nm: 240,
         steps: 180,

@@ -140,7 +140,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    pub fn new(limits: ReadLimits) -> Self {
+    pub(crate) fn new(limits: ReadLimits) -> Self {
         Self {
             limits,
             cells: Vec::new(),
@@ -171,7 +171,7 @@ impl Tally {
     }
 
     /// A cell with this name begins.
-    pub fn begin_cell(&mut self, name: &[u8], offset: u64, inner: Option<u64>) -> Result<(), LayoutError> {
+    pub(crate) fn begin_cell(&mut self, name: &[u8], offset: u64, inner: Option<u64>) -> Result<(), LayoutError> {
         if name.is_empty() || name.len() > self.limits.name_bytes {
             return Err(LayoutError::CellName { bytes: name.len() });
         }
@@ -196,12 +196,12 @@ impl Tally {
     }
 
     /// An element of the current cell has properties.
-    pub fn count_properties(&mut self) {
+    pub(crate) fn count_properties(&mut self) {
         self.cells.last_mut().expect("a cell was begun").with_properties += 1;
     }
 
     /// Result for a file whose cells may have numbers, with the names of these.
-    pub fn finish_numbered(
+    pub(crate) fn finish_numbered(
         mut self,
         units: [f64; 2],
         names: &HashMap<u64, Vec<u8>>,
@@ -238,7 +238,7 @@ impl Tally {
     }
 
     /// The current cell is complete.
-    pub fn end(&mut self, offset: u64) {
+    pub(crate) fn end(&mut self, offset: u64) {
         let cell = self.cells.last_mut().expect("a cell was begun");
         cell.bytes.end = offset;
         for number in self.touched.drain(..) {

@@ -61,7 +61,7 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    pub fn new(limits: &'a ReadLimits, progress: &'a dyn Progress) -> Self {
+    pub(crate) fn new(limits: &'a ReadLimits, progress: &'a dyn Progress) -> Self {
         Self {
             limits,
             progress,
@@ -73,7 +73,7 @@ impl<'a> Walk<'a> {
 
     /// Use the grammar for every element.
     #[cfg(test)]
-    pub fn slowly(mut self) -> Self {
+    pub(crate) fn slowly(mut self) -> Self {
         self.fast = false;
         self
     }
@@ -82,7 +82,7 @@ impl<'a> Walk<'a> {
     ///
     /// # Errors
     /// If the user asked to stop.
-    pub fn report(&mut self, offset: u64) -> Result<()> {
+    pub(crate) fn report(&mut self, offset: u64) -> Result<()> {
         self.progress.advance(offset.saturating_sub(self.reported));
         self.reported = offset;
         if self.progress.stopped() {
@@ -92,12 +92,12 @@ impl<'a> Walk<'a> {
     }
 
     /// Start counting bytes of progress at a place.
-    pub fn start_at(&mut self, offset: u64) {
+    pub(crate) fn start_at(&mut self, offset: u64) {
         self.reported = offset;
     }
 
     /// Hand the elements up to the end of the cell to `sink`.
-    pub fn cell<S: Sink>(&mut self, input: &mut CellInput, sink: &mut S) -> Result<()> {
+    pub(crate) fn cell<S: Sink>(&mut self, input: &mut CellInput, sink: &mut S) -> Result<()> {
         match input {
             CellInput::Gds(input) => self.gds_cell(input, sink),
             CellInput::Oasis(cells) => cells.cell(self.limits, sink, |offset| self.report(offset)),
@@ -105,7 +105,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Hand the elements up to ENDSTR to `sink`.
-    pub fn gds_cell<S: Sink>(&mut self, input: &mut Input, sink: &mut S) -> Result<()> {
+    pub(crate) fn gds_cell<S: Sink>(&mut self, input: &mut Input, sink: &mut S) -> Result<()> {
         loop {
             if self.fast {
                 self.fast_run(input, sink)?;

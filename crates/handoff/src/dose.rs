@@ -124,7 +124,7 @@ pub struct DoseRow {
 }
 
 /// The doses of the matrix, in the order of the process file.
-pub fn doses(process: &Process) -> Vec<DoseRow> {
+pub(crate) fn doses(process: &Process) -> Vec<DoseRow> {
     let factors = process.dose_matrix.factors.iter().enumerate();
     factors
         .map(|(i, &factor)| DoseRow {

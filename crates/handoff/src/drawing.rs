@@ -33,25 +33,25 @@ pub(super) struct RectNm {
 }
 
 impl RectNm {
-    pub fn new(x0: i64, y0: i64, x1: i64, y1: i64) -> Self {
+    pub(crate) fn new(x0: i64, y0: i64, x1: i64, y1: i64) -> Self {
         Self { x0, y0, x1, y1 }
     }
 
     /// A rectangle of this size with its lower left corner at a place.
-    pub fn at(x: i64, y: i64, width: i64, height: i64) -> Self {
+    pub(crate) fn at(x: i64, y: i64, width: i64, height: i64) -> Self {
         Self::new(x, y, x + width, y + height)
     }
 
     /// The rectangle with all edges moved outwards.
-    pub fn grown(self, by: i64) -> Self {
+    pub(crate) fn grown(self, by: i64) -> Self {
         Self::new(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
     }
 
-    pub fn centre(&self) -> (i64, i64) {
+    pub(crate) fn centre(&self) -> (i64, i64) {
         ((self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2)
     }
 
-    pub fn united(&self, other: &Self) -> Self {
+    pub(crate) fn united(&self, other: &Self) -> Self {
         Self::new(
             self.x0.min(other.x0),
             self.y0.min(other.y0),
@@ -68,20 +68,20 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
-    pub fn new(name: impl Into<String>) -> Self {
+    pub(crate) fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
             elements: Vec::new(),
         }
     }
 
-    pub fn rectangle(&mut self, layer: LayerPair, r: RectNm) {
+    pub(crate) fn rectangle(&mut self, layer: LayerPair, r: RectNm) {
         let corners = [(r.x0, r.y0), (r.x1, r.y0), (r.x1, r.y1), (r.x0, r.y1)];
         self.polygon(layer, (0, 0), &corners);
     }
 
     /// A polygon with these corners about a place, the first not repeated.
-    pub fn polygon(&mut self, layer: LayerPair, (x, y): (i64, i64), corners: &[(i64, i64)]) {
+    pub(crate) fn polygon(&mut self, layer: LayerPair, (x, y): (i64, i64), corners: &[(i64, i64)]) {
         let closed = corners.iter().chain(corners.first());
         let boundary = GdsBoundary {
             layer: layer.0,
@@ -92,7 +92,7 @@ impl Sheet {
         self.elements.push(boundary.into());
     }
 
-    pub fn text(&mut self, layer: LayerPair, (x, y): (i64, i64), words: impl Into<String>) {
+    pub(crate) fn text(&mut self, layer: LayerPair, (x, y): (i64, i64), words: impl Into<String>) {
         let text = GdsTextElem {
             string: words.into(),
             layer: layer.0,
@@ -103,7 +103,7 @@ impl Sheet {
         self.elements.push(text.into());
     }
 
-    pub fn place(&mut self, cell: &str, (x, y): (i64, i64), symmetry: Symmetry) {
+    pub(crate) fn place(&mut self, cell: &str, (x, y): (i64, i64), symmetry: Symmetry) {
         let strans = (symmetry != Symmetry::IDENTITY).then(|| GdsStrans {
             reflected: symmetry.mirrored,
             angle: (symmetry.quarter_turns > 0).then(|| 90.0 * f64::from(symmetry.quarter_turns)),
@@ -119,7 +119,7 @@ impl Sheet {
     }
 
     /// An array of copies along x and y with these steps, the first at a given position.
-    pub fn array(&mut self, cell: &str, (x, y): (i64, i64), (columns, rows): (i16, i16), steps: [i64; 2]) {
+    pub(crate) fn array(&mut self, cell: &str, (x, y): (i64, i64), (columns, rows): (i16, i16), steps: [i64; 2]) {
         let reference = GdsArrayRef {
             name: cell.to_owned(),
             xy: [
@@ -135,7 +135,7 @@ impl Sheet {
     }
 
     /// A number or word in blocks, its lower left corner at a place. Characters: digits and a few capitals.
-    pub fn numerals(&mut self, layer: LayerPair, (x, y): (i64, i64), height: i64, words: &str) {
+    pub(crate) fn numerals(&mut self, layer: LayerPair, (x, y): (i64, i64), height: i64, words: &str) {
         let block = height / 5;
         for (k, c) in words.chars().enumerate() {
             let left = x + 4 * block * k as i64;
@@ -152,7 +152,7 @@ impl Sheet {
     }
 
     /// Width of [`Sheet::numerals`].
-    pub fn numerals_width(height: i64, words: &str) -> i64 {
+    pub(crate) fn numerals_width(height: i64, words: &str) -> i64 {
         let block = height / 5;
         (4 * words.chars().count() as i64 - 1).max(0) * block
     }
@@ -194,7 +194,7 @@ pub(super) struct Drawing {
 
 impl Drawing {
     /// An empty drawing. The date stands in its headers, checked when the design was read.
-    pub fn new(name: &str, timestamp: &str) -> Self {
+    pub(crate) fn new(name: &str, timestamp: &str) -> Self {
         let date = timestamp.parse::<NaiveDateTime>().unwrap_or_default();
         let mut library = GdsLibrary::new(name);
         library.units = GdsUnits::new(1e-3, 1e-9);
@@ -206,7 +206,7 @@ impl Drawing {
     }
 
     /// Add a cell; cells come before those that refer to them.
-    pub fn add(&mut self, sheet: Sheet) {
+    pub(crate) fn add(&mut self, sheet: Sheet) {
         self.tree.structs.push(GdsStruct {
             name: sheet.name,
             dates: self.tree.dates.clone(),
@@ -215,7 +215,7 @@ impl Drawing {
     }
 
     /// Add a cell of one pillar with these corners, for arrays of it.
-    pub fn add_pillar(&mut self, name: &str, layer: LayerPair, corners: &[(i64, i64)]) {
+    pub(crate) fn add_pillar(&mut self, name: &str, layer: LayerPair, corners: &[(i64, i64)]) {
         let mut sheet = Sheet::new(name);
         sheet.polygon(layer, (0, 0), corners);
         self.add(sheet);
@@ -223,7 +223,7 @@ impl Drawing {
 
     /// Add the pillars of a lens as a cell of this name, folded by its symmetries. Squares are drawn where they are; other
     /// outlines, which have more corners, once each in a cell of their own.
-    pub fn add_lens(&mut self, name: &str, layer: LayerPair, class: &Class, form: PillarForm) {
+    pub(crate) fn add_lens(&mut self, name: &str, layer: LayerPair, class: &Class, form: PillarForm) {
         let own = |number: u16| format!("{name}_{}", form.cell_name(number));
         if !form.is_square() {
             let counts = class.widths.histogram();
@@ -262,7 +262,7 @@ impl Drawing {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<()> {
+    pub(crate) fn write(&self, path: &Path) -> Result<()> {
         let format = LayoutFormat::of_name(path);
         if format == LayoutFormat::Gds {
             return self.write_gds(path);

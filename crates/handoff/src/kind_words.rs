@@ -91,7 +91,7 @@ const UPRIGHT: KindWords = KindWords {
 
 impl KindWords {
     /// Words and columns of pillars of this kind.
-    pub fn of(shape: PillarShape) -> &'static Self {
+    pub(crate) fn of(shape: PillarShape) -> &'static Self {
         match shape {
             PillarShape::Square => &SQUARES,
             PillarShape::Circle => &CIRCLES,

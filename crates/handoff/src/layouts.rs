@@ -45,7 +45,7 @@ impl OfEach<PathBuf> {
     ///
     /// # Errors
     /// If one cannot be read, or the user stopped it.
-    pub fn open(&self, progress: &dyn Progress) -> Result<OfEach<Layout>> {
+    pub(crate) fn open(&self, progress: &dyn Progress) -> Result<OfEach<Layout>> {
         let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), progress);
         Ok(OfEach {
             pillars: open(&self.pillars)?,
@@ -64,7 +64,7 @@ impl OfEach<Layout> {
     ///
     /// # Errors
     /// If one cannot be read, or the user stopped it.
-    pub fn census(&self, progress: &dyn Progress) -> Result<Vec<LayoutStatistics>> {
+    pub(crate) fn census(&self, progress: &dyn Progress) -> Result<Vec<LayoutStatistics>> {
         [
             &self.pillars,
             &self.apertures,

@@ -12,7 +12,7 @@ pub(super) struct Listing {
 }
 
 impl Listing {
-    pub fn new(folder: &Path) -> Self {
+    pub(crate) fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
             files: Vec::new(),
@@ -20,12 +20,12 @@ impl Listing {
     }
 
     /// Path of something in the folder.
-    pub fn at(&self, name: &str) -> PathBuf {
+    pub(crate) fn at(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
     /// List a file; where it is to be written.
-    pub fn add(&mut self, name: impl Into<String>, purpose: impl Into<String>) -> PathBuf {
+    pub(crate) fn add(&mut self, name: impl Into<String>, purpose: impl Into<String>) -> PathBuf {
         let name = name.into();
         let path = self.folder.join(&name);
         self.files.push((name, purpose.into()));
@@ -36,7 +36,7 @@ impl Listing {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn write(&mut self, name: impl Into<String>, purpose: impl Into<String>, bytes: &[u8]) -> Result<()> {
+    pub(crate) fn write(&mut self, name: impl Into<String>, purpose: impl Into<String>, bytes: &[u8]) -> Result<()> {
         AtomicFile::write(&self.add(name, purpose), bytes)
     }
 }

@@ -111,16 +111,16 @@ impl PadPillar {
     }
 
     /// Corners about its middle (nm), counter-clockwise.
-    pub fn corners(&self) -> Vec<(i64, i64)> {
+    pub(crate) fn corners(&self) -> Vec<(i64, i64)> {
         self.form.corners(self.number)
     }
 
-    pub fn drawn(&self) -> DrawnSize {
+    pub(crate) fn drawn(&self) -> DrawnSize {
         DrawnSize::of(self.form.shape(), self.number)
     }
 
     /// Digits next to the pad: its width (nm), its rotation (degrees), or its edges.
-    pub fn digits(&self) -> String {
+    pub(crate) fn digits(&self) -> String {
         let drawn = self.drawn();
         match (drawn.length_nm, drawn.rotation_deg) {
             (Some(length), _) if self.by_size => format!("{}X{length}", drawn.width_nm),
@@ -130,7 +130,7 @@ impl PadPillar {
     }
 
     /// Name of its cell.
-    pub fn cell_name(&self) -> String {
+    pub(crate) fn cell_name(&self) -> String {
         if self.by_size {
             format!("W{}", self.digits())
         } else {
@@ -139,7 +139,7 @@ impl PadPillar {
     }
 
     /// Its size and direction in words.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let drawn = self.drawn();
         match (drawn.length_nm, drawn.rotation_deg) {
             (Some(length), Some(deg)) => {

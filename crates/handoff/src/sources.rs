@@ -44,7 +44,7 @@ impl Sources {
     ///
     /// # Errors
     /// Mistakes in one of them; a file that cannot be read, is no ordinary file, or changes while it is read.
-    pub fn read(options: &HandoffOptions) -> Result<Self> {
+    pub(crate) fn read(options: &HandoffOptions) -> Result<Self> {
         let (design, mut kept) = read_design(&options.design)?;
         let process = match &options.process {
             Some(path) => Process::read(path)?,
@@ -100,13 +100,13 @@ impl Sources {
     }
 
     /// The decks of the first step for the pillars of the design.
-    pub fn first_step(&self) -> &ShapeRules {
+    pub(crate) fn first_step(&self) -> &ShapeRules {
         let rules = self.process.checks.of_shape(self.design.cell.shape);
         rules.expect("a process that has none is refused before")
     }
 
     /// A deck that the process names.
-    pub fn deck(&self, rules: &Path) -> &Deck {
+    pub(crate) fn deck(&self, rules: &Path) -> &Deck {
         let found = self.decks.iter().find(|(path, _)| path == rules);
         &found.expect("all decks of the process are read").1
     }
@@ -115,7 +115,7 @@ impl Sources {
     ///
     /// # Errors
     /// If one cannot be written.
-    pub fn keep(&self, files: &mut Listing) -> Result<()> {
+    pub(crate) fn keep(&self, files: &mut Listing) -> Result<()> {
         let mut taken = BTreeSet::new();
         for input in &self.kept {
             let name = unique(&taken, &input.name);

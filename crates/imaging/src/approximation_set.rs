@@ -47,7 +47,7 @@ const ORDER: i32 = 4;
 pub(crate) const PATCH: u32 = 420;
 
 /// Light under an angle from the axis of an element, whose tangent is given, over that on the axis.
-pub fn butterworth(tangent: f64) -> f64 {
+pub(crate) fn butterworth(tangent: f64) -> f64 {
     (1.0 + (tangent.atan().to_degrees() / CUTOFF_DEG).powi(2 * ORDER))
         .sqrt()
         .recip()

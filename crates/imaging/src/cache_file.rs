@@ -130,7 +130,7 @@ fn read<T>(
 }
 
 /// The bank that was kept for these inputs in a folder; none if there is none that can be used.
-pub fn cached_bank(folder: &Path, inputs: &[u8]) -> Option<KernelBank> {
+pub(crate) fn cached_bank(folder: &Path, inputs: &[u8]) -> Option<KernelBank> {
     read(&file_of(folder, "kernels", inputs), BANK_MAGIC, inputs, |content| {
         let head: BankHead = content.head()?;
         let turn = |(of, place): &(usize, usize)| Some((*of, *Symmetry::ALL.get(*place)?));
@@ -156,7 +156,7 @@ pub fn cached_bank(folder: &Path, inputs: &[u8]) -> Option<KernelBank> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn cache_bank(folder: &Path, inputs: &[u8], bank: &KernelBank) -> Result<()> {
+pub(crate) fn cache_bank(folder: &Path, inputs: &[u8], bank: &KernelBank) -> Result<()> {
     let pairs = |all: &[(usize, Symmetry)]| all.iter().map(|(of, turn)| (*of, place(*turn))).collect::<Vec<_>>();
     let head = BankHead {
         spec: bank.spec,
@@ -182,7 +182,7 @@ pub fn cache_bank(folder: &Path, inputs: &[u8], bank: &KernelBank) -> Result<()>
 }
 
 /// The stray light that was kept for these inputs in a folder; none if there is none that can be used.
-pub fn cached_stray_light(folder: &Path, inputs: &[u8]) -> Option<StrayLight> {
+pub(crate) fn cached_stray_light(folder: &Path, inputs: &[u8]) -> Option<StrayLight> {
     read(&file_of(folder, "veil", inputs), STRAY_LIGHT_MAGIC, inputs, |content| {
         let head: StrayLightHead = content.head()?;
         let sizes = [head.cells[0], head.cells[1], head.channels, head.bases];
@@ -201,7 +201,7 @@ pub fn cached_stray_light(folder: &Path, inputs: &[u8]) -> Option<StrayLight> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn cache_stray_light(folder: &Path, inputs: &[u8], stray_light: &StrayLight) -> Result<()> {
+pub(crate) fn cache_stray_light(folder: &Path, inputs: &[u8], stray_light: &StrayLight) -> Result<()> {
     let head = StrayLightHead {
         cells: stray_light.cells,
         channels: stray_light.channels,
@@ -218,7 +218,7 @@ pub fn cache_stray_light(folder: &Path, inputs: &[u8], stray_light: &StrayLight)
 }
 
 /// Count of the pillars of a design that a layout has; `None` if it is not cached.
-pub fn cached_pillars(folder: &Path, inputs: &[u8]) -> Option<PillarCount> {
+pub(crate) fn cached_pillars(folder: &Path, inputs: &[u8]) -> Option<PillarCount> {
     read(&file_of(folder, "pillars", inputs), PILLARS_MAGIC, inputs, |content| {
         content.head()
     })
@@ -228,7 +228,7 @@ pub fn cached_pillars(folder: &Path, inputs: &[u8]) -> Option<PillarCount> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn cache_pillars(folder: &Path, inputs: &[u8], pillars: &PillarCount) -> Result<()> {
+pub(crate) fn cache_pillars(folder: &Path, inputs: &[u8], pillars: &PillarCount) -> Result<()> {
     write(&file_of(folder, "pillars", inputs), PILLARS_MAGIC, inputs, pillars, &[])
 }
 

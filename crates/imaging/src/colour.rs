@@ -16,7 +16,7 @@ pub struct ChannelColours {
 }
 
 /// Share of a channel's light that a spectrum reflects.
-pub fn share(channel: &ChannelSampling, spectrum: &SceneSpectrum) -> f64 {
+pub(crate) fn share(channel: &ChannelSampling, spectrum: &SceneSpectrum) -> f64 {
     let sums = channel.parts.iter().fold((0.0, 0.0), |(a, b), p| {
         (a + p.weight * spectrum.at(0.5 * (p.nm[0] + p.nm[1])), b + p.weight)
     });

@@ -19,7 +19,7 @@ const LEAST_IN_WINDOWS: f64 = 0.02;
 const LEAST_COVERED: f64 = 0.95;
 
 /// Kernels must hold a part of the light that can be called an image.
-pub fn check_windows(
+pub(crate) fn check_windows(
     stray_light: &StrayLight,
     bases: usize,
     channels: &[ChannelSampling],
@@ -46,7 +46,7 @@ pub fn check_windows(
 }
 
 /// A camera must see the chip, and the array the scene.
-pub fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, view: &SceneView) -> Result<()> {
+pub(crate) fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, view: &SceneView) -> Result<()> {
     if !(view.field_deg > 0.0 && view.field_deg < 175.0 && view.distance_um > 0.0) {
         return Err(Error::refused(
             "imaging/field-of-view",
@@ -103,7 +103,7 @@ pub fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Camera, vi
 ///
 /// # Errors
 /// If it sees not even one degree.
-pub fn widest_field_deg(design: &Design, camera: &Camera, pixels: usize, most_deg: u32) -> Result<f64> {
+pub(crate) fn widest_field_deg(design: &Design, camera: &Camera, pixels: usize, most_deg: u32) -> Result<f64> {
     let (elements, spec) = (element_views(design, camera), BankSpec::standard(design, camera));
     let sees = |field_deg: f64| {
         let view = SceneView {
@@ -122,7 +122,7 @@ pub fn widest_field_deg(design: &Design, camera: &Camera, pixels: usize, most_de
 }
 
 /// A cube must know the light that the channels count.
-pub fn check_coverage(scene: &SceneImage, channels: &[ChannelSampling]) -> Result<()> {
+pub(crate) fn check_coverage(scene: &SceneImage, channels: &[ChannelSampling]) -> Result<()> {
     // Where all of its spectra are known.
     let ends = scene.basis.iter().filter_map(|b| Some((*b.nm.first()?, *b.nm.last()?)));
     let (low, high) = ends.fold((0.0, f64::INFINITY), |(a, b), (low, high)| {

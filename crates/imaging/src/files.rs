@@ -61,7 +61,7 @@ pub fn picture_file(method: RestorationMethod, joint: bool) -> String {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write_restored(path: &Path, picture: &Array3<f64>) -> Result<()> {
+pub(crate) fn write_restored(path: &Path, picture: &Array3<f64>) -> Result<()> {
     png16::write_picture(path, &picture.mapv(srgb::encoded))
 }
 

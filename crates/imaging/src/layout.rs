@@ -29,7 +29,7 @@ pub struct PillarCount {
 ///
 /// # Errors
 /// If one has none: the layout is of another design.
-pub fn check_elements(design: &Design, extraction: &Extraction) -> Result<()> {
+pub(crate) fn check_elements(design: &Design, extraction: &Extraction) -> Result<()> {
     let all = design.elements();
     let found = all.iter().zip(&extraction.elements);
     let empty: Vec<&Element> = found

@@ -94,7 +94,7 @@ pub(crate) mod tests {
     use super::*;
 
     /// The numbers of a picture of 16 bits, row by row.
-    pub fn numbers(bytes: &[u8]) -> Vec<u16> {
+    pub(crate) fn numbers(bytes: &[u8]) -> Vec<u16> {
         let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
         let mut data = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut data).unwrap();

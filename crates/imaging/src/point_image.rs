@@ -84,7 +84,7 @@ fn half_light(values: &Array2<f64>) -> f64 {
 }
 
 /// The section of a page.
-pub fn section(page: &mut Page, images: &[PointImage], pixel_um: f64) {
+pub(crate) fn section(page: &mut Page, images: &[PointImage], pixel_um: f64) {
     let Some(first) = images.first() else { return };
     page.section("Polychromatic PSFs");
     let channels = images.iter().filter(|i| i.element == first.element).count();

@@ -15,7 +15,7 @@ pub(super) struct FixedShapes<'a> {
 
 impl<'a> FixedShapes<'a> {
     /// Marks of the first step, outline of the chip and label.
-    pub fn of_pillars(design: &'a Design) -> Self {
+    pub(crate) fn of_pillars(design: &'a Design) -> Self {
         let layers = &design.layout.layers;
         let mut fixed = Self::default();
         fixed.add(&layers.pillar_marks, mark::crosses(&design.layout.marks));
@@ -25,7 +25,7 @@ impl<'a> FixedShapes<'a> {
     }
 
     /// Openings, marks of the second step and label.
-    pub fn of_apertures(design: &'a Design) -> Self {
+    pub(crate) fn of_apertures(design: &'a Design) -> Self {
         let layers = &design.layout.layers;
         let mut fixed = Self::default();
         fixed.add(&layers.apertures, super::aperture::openings(design));
@@ -49,7 +49,7 @@ impl<'a> FixedShapes<'a> {
     }
 
     /// Shapes as elements of GDSII.
-    pub fn gds(&self) -> Vec<GdsElement> {
+    pub(crate) fn gds(&self) -> Vec<GdsElement> {
         let polygons = self
             .polygons
             .iter()

@@ -18,7 +18,7 @@ pub(super) struct LibraryFrame {
 
 impl LibraryFrame {
     /// An empty library of this name: database unit 1 nm, user unit 1 um, one date for everything.
-    pub fn new(name: String, date: NaiveDateTime) -> Result<Self> {
+    pub(crate) fn new(name: String, date: NaiveDateTime) -> Result<Self> {
         let mut library = GdsLibrary::new(name);
         library.units = GdsUnits::new(1e-3, 1e-9);
         library.dates = GdsDateTimes {
@@ -30,17 +30,17 @@ impl LibraryFrame {
     }
 
     /// The records before the first cell.
-    pub fn head(&self) -> &[u8] {
+    pub(crate) fn head(&self) -> &[u8] {
         &self.bytes[..self.bytes.len() - END]
     }
 
     /// The record after the last cell.
-    pub fn tail(&self) -> &[u8] {
+    pub(crate) fn tail(&self) -> &[u8] {
         &self.bytes[self.bytes.len() - END..]
     }
 
     /// A cell with these elements, cut before its end.
-    pub fn cell(&self, name: &str, elements: Vec<GdsElement>) -> Result<(Vec<u8>, Vec<u8>)> {
+    pub(crate) fn cell(&self, name: &str, elements: Vec<GdsElement>) -> Result<(Vec<u8>, Vec<u8>)> {
         let mut library = self.empty.clone();
         library.structs.push(GdsStruct {
             name: name.to_owned(),

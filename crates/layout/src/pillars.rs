@@ -116,7 +116,7 @@ fn widths_of(array: &PillarArray) -> BTreeSet<u16> {
 }
 
 impl<'a> PillarWriter<'a> {
-    pub fn create(
+    pub(crate) fn create(
         path: &'a Path,
         frame: &'a LibraryFrame,
         layer: &'a LayoutLayer,
@@ -140,7 +140,7 @@ impl<'a> PillarWriter<'a> {
 
     /// Write each class once, folded by its symmetries, and refer to it for each element.
     /// Says which classes have no symmetry to fold by.
-    pub fn folded(&mut self, array: &PillarArray) -> Result<Vec<String>> {
+    pub(crate) fn folded(&mut self, array: &PillarArray) -> Result<Vec<String>> {
         // Squares are as short as references to them; other outlines are written once each.
         let template = if self.form.is_square() {
             Template::Square(SquareRecord::on(self.layer.number()))
@@ -186,7 +186,7 @@ impl<'a> PillarWriter<'a> {
     }
 
     /// Write a cell for each width and one reference a pillar, each element a cell of its own.
-    pub fn referenced(&mut self, array: &PillarArray) -> Result<()> {
+    pub(crate) fn referenced(&mut self, array: &PillarArray) -> Result<()> {
         let template = Template::References(self.width_cells(array)?);
         for (k, placed) in array.placed.iter().enumerate() {
             let name = format!("E{k}");
@@ -207,7 +207,7 @@ impl<'a> PillarWriter<'a> {
 
     /// Write the top cell with what is fixed and the elements, as references or, if `flat` is given,
     /// all their pillars; then the end of the library. Returns the length of the file.
-    pub fn finish(mut self, top: &str, mut fixed: Vec<GdsElement>, flat: Option<&PillarArray>) -> Result<u64> {
+    pub(crate) fn finish(mut self, top: &str, mut fixed: Vec<GdsElement>, flat: Option<&PillarArray>) -> Result<u64> {
         fixed.append(&mut self.placed);
         let (begin, end) = self.frame.cell(top, fixed)?;
         self.put(&begin)?;

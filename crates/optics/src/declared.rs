@@ -152,7 +152,7 @@ pub(crate) struct RowPlaces {
 }
 
 impl RowPlaces {
-    pub fn new(lattice: Lattice, iy: usize, radius_um: f64, centre_um: [f64; 2]) -> Self {
+    pub(crate) fn new(lattice: Lattice, iy: usize, radius_um: f64, centre_um: [f64; 2]) -> Self {
         let x: Vec<f64> = (0..lattice.sites()).map(|ix| lattice.place_um(0, ix)).collect();
         let y = lattice.place_um(1, iy);
         Self {
@@ -166,7 +166,7 @@ impl RowPlaces {
     }
 
     /// `x y r theta R X Y`, which pupils and widths have in common.
-    pub fn inputs(&self) -> [Input<'_>; 7] {
+    pub(crate) fn inputs(&self) -> [Input<'_>; 7] {
         [
             Input::Row(&self.x),
             Input::Scalar(self.y),

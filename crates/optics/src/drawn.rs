@@ -24,7 +24,7 @@ pub(crate) struct DrawnCells<'a> {
 
 impl<'a> DrawnCells<'a> {
     /// Pillars up to a width (nm) or number on a lattice.
-    pub fn new(cell: &'a dyn CellModel, lattice: LatticeKind, largest_number: u16) -> Self {
+    pub(crate) fn new(cell: &'a dyn CellModel, lattice: LatticeKind, largest_number: u16) -> Self {
         Self {
             cell,
             lattice,
@@ -37,7 +37,7 @@ impl<'a> DrawnCells<'a> {
     ///
     /// # Errors
     /// As [`CellModel::response`].
-    pub fn response(&self, light: &Illumination<'_>, progress: &dyn Progress) -> Result<Arc<CellResponse>> {
+    pub(crate) fn response(&self, light: &Illumination<'_>, progress: &dyn Progress) -> Result<Arc<CellResponse>> {
         self.ask(self.cell, light, progress)
     }
 

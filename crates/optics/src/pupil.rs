@@ -10,7 +10,7 @@ use metalith_wave::kernels::cis;
 
 /// The terms of an element. What is the same at all wavelengths is evaluated once.
 #[derive(Clone, Debug)]
-pub struct PupilTerms {
+pub(crate) struct PupilTerms {
     lattice: Lattice,
     radius_um: f64,
     centre_um: [f64; 2],
@@ -24,7 +24,7 @@ pub struct PupilTerms {
 impl PupilTerms {
     /// The terms of a geometry for an element on this lattice. Paths that are the same at all wavelengths are added
     /// to `path_um` (um, row by row; empty for none).
-    pub fn new(
+    pub(crate) fn new(
         geometry: &GeometryChange,
         lattice: Lattice,
         radius_um: f64,
@@ -62,7 +62,7 @@ impl PupilTerms {
     }
 
     /// Let a share of the amplitude of each site pass, beside all terms.
-    pub fn pass(&mut self, share: impl Fn(usize) -> f64) {
+    pub(crate) fn pass(&mut self, share: impl Fn(usize) -> f64) {
         let n = self.lattice.sites();
         self.amplitude.resize(n * n, 0.0);
         for (site, change) in self.amplitude.iter_mut().enumerate() {
@@ -72,7 +72,7 @@ impl PupilTerms {
 
     /// Apply the terms to a row of the light that leaves the sites, at a wavelength (um). Paths that are the same at
     /// all wavelengths are not among them.
-    pub fn multiply(&self, iy: usize, wavelength_um: f64, row: &mut [Complex32]) {
+    pub(crate) fn multiply(&self, iy: usize, wavelength_um: f64, row: &mut [Complex32]) {
         let n = self.lattice.sites();
         if !self.turns.is_empty() {
             for (to, turns) in row.iter_mut().zip(&self.turns[iy * n..]) {

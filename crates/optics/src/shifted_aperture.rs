@@ -6,7 +6,7 @@ use metalith_pillars::Lattice;
 const LEAST_DRAWN: f64 = 0.5;
 
 /// Open part of each site under a shifted aperture.
-pub struct ShiftedAperture {
+pub(crate) struct ShiftedAperture {
     lattice: Lattice,
     radius_um: f64,
     offset_um: [f64; 2],
@@ -14,7 +14,7 @@ pub struct ShiftedAperture {
 
 impl ShiftedAperture {
     /// Aperture of a radius (um) whose centre is off the centre of the pillars (um); `None` if it is not.
-    pub fn new(lattice: Lattice, radius_um: f64, offset_um: [f64; 2]) -> Option<Self> {
+    pub(crate) fn new(lattice: Lattice, radius_um: f64, offset_um: [f64; 2]) -> Option<Self> {
         (offset_um != [0.0; 2]).then_some(Self {
             lattice,
             radius_um,
@@ -24,7 +24,7 @@ impl ShiftedAperture {
 
     /// Share of what a site transmits, of its amplitude, that passes: that of its cell which was open and still is. It changes
     /// smoothly as the aperture moves: to a fit, sites that open and close as a whole would be noise.
-    pub fn passes(&self, site: usize) -> f64 {
+    pub(crate) fn passes(&self, site: usize) -> f64 {
         let n = self.lattice.sites();
         let place = [self.lattice.place_um(0, site % n), self.lattice.place_um(1, site / n)];
         let shifted = [place[0] - self.offset_um[0], place[1] - self.offset_um[1]];

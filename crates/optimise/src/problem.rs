@@ -23,7 +23,7 @@ const SIDE_LOBE_POINTS: usize = 48;
 const SIDE_LOBE_STEP_NM: f64 = 15.0;
 
 /// Wavelengths of a design's merit (um).
-pub fn band(spec: &OptimiseSpec) -> Vec<f64> {
+pub(crate) fn band(spec: &OptimiseSpec) -> Vec<f64> {
     wavelengths(spec.band_um.0 * 1e3, spec.band_um.1 * 1e3, spec.step_um * 1e3)
 }
 
@@ -32,7 +32,7 @@ pub fn band(spec: &OptimiseSpec) -> Vec<f64> {
 ///
 /// # Errors
 /// If the kernel does not fit, or the cell does not cover the band.
-pub fn field_problem(
+pub(crate) fn field_problem(
     lens: &Lens,
     spec: &OptimiseSpec,
     merit: &MeritSpec,
@@ -132,7 +132,7 @@ pub fn views(spec: &OptimiseSpec, views: &ViewSpec, shift: f64) -> Views {
 ///
 /// # Errors
 /// As [`Deconvolution::new`].
-pub fn deconvolution(
+pub(crate) fn deconvolution(
     lens: &Lens,
     spec: &OptimiseSpec,
     cell: &dyn CellModel,

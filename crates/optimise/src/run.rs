@@ -137,7 +137,7 @@ impl OptimiseTask {
 }
 
 /// Phase in the middle of each ring (waves).
-pub fn turns_of(rings: &Rings, phase: &RadialPhase) -> Vec<f64> {
+pub(crate) fn turns_of(rings: &Rings, phase: &RadialPhase) -> Vec<f64> {
     (0..rings.len())
         .map(|ring| phase.turns(rings.middle_um(ring).powi(2)))
         .collect()

@@ -44,7 +44,7 @@ impl Shape {
 
 /// Weights in the order in which they are used.
 #[derive(Clone, Debug)]
-pub struct Packed {
+pub(crate) struct Packed {
     shape: Shape,
     /// `[output / 4][input][tap][output % 4]`
     values: Vec<f32>,
@@ -52,12 +52,12 @@ pub struct Packed {
 
 impl Packed {
     /// Weights packed for the forward pass.
-    pub fn forward(shape: Shape, weights: &[f32]) -> Self {
+    pub(crate) fn forward(shape: Shape, weights: &[f32]) -> Self {
         Self::by(shape, |o, i, t| weights[(o * shape.inputs + i) * shape.taps + t])
     }
 
     /// Weights packed for the gradient of the inputs: channels exchanged, taps mirrored.
-    pub fn backward(shape: Shape, weights: &[f32]) -> Self {
+    pub(crate) fn backward(shape: Shape, weights: &[f32]) -> Self {
         let mirrored = Shape {
             inputs: shape.outputs,
             outputs: shape.inputs,
@@ -81,7 +81,7 @@ impl Packed {
     }
 
     /// The convolution of features; negative values are set to zero if `rectified`.
-    pub fn apply(&self, input: &Features, rectified: bool) -> Features {
+    pub(crate) fn apply(&self, input: &Features, rectified: bool) -> Features {
         let mut out = Features::zero(self.shape.outputs, input.rows, input.columns);
         let (span, origin, plane) = (input.span(), input.origin(), input.plane_len());
         if span <= PIECE {
@@ -184,7 +184,7 @@ impl WithSimd for Piece<'_> {
 }
 
 /// Add the gradient of the weights to `gradient`: of each the sum over positions of input times gradient of output.
-pub fn add_weight_gradient(shape: Shape, input: &Features, output: &Features, gradient: &mut [f32]) {
+pub(crate) fn add_weight_gradient(shape: Shape, input: &Features, output: &Features, gradient: &mut [f32]) {
     Arch::new().dispatch(WeightGradient {
         shape,
         input,

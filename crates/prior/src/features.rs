@@ -3,7 +3,7 @@
 use ndarray::ArrayView2;
 
 /// Positions that a convolution takes at a time, whatever the width of a register; a plane is a multiple of it.
-pub const BLOCK: usize = 16;
+pub(crate) const BLOCK: usize = 16;
 
 /// Planes `[channel][row][column]` of single precision.
 ///

@@ -13,7 +13,7 @@ const LEVELS: usize = 3;
 /// Colours of a picture.
 pub const COLOURS: usize = 3;
 /// Rows and columns that the network takes are multiples of this, in its own resolution: half of the picture's.
-pub const MULTIPLE: usize = 1 << (LEVELS - 1);
+pub(crate) const MULTIPLE: usize = 1 << (LEVELS - 1);
 
 /// Size of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

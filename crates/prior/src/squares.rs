@@ -7,10 +7,10 @@ use crate::features::Features;
 use crate::network::{COLOURS, MULTIPLE, Network};
 
 /// Sides of a network's input in the picture: two pixels a square, and halves of them.
-pub const SIDE: usize = 2 * MULTIPLE;
+pub(crate) const SIDE: usize = 2 * MULTIPLE;
 
 /// Planes `[row, column, plane]` of pictures, four pixels of a square as channels, and maps of half as many rows and columns.
-pub fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features {
+pub(crate) fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features {
     let (rows, columns, count) = pictures.dim();
     let mut planes = Features::zero(count, rows, columns);
     for (c, plane) in pictures.axis_iter(Axis(2)).enumerate() {
@@ -26,7 +26,7 @@ pub fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features {
 }
 
 /// A picture with what the network answers added to it.
-pub fn corrected(network: &Network, input: Features, mut picture: Array3<f32>) -> Array3<f32> {
+pub(crate) fn corrected(network: &Network, input: Features, mut picture: Array3<f32>) -> Array3<f32> {
     let answer = network.apply(input).shuffled();
     for c in 0..COLOURS {
         let mut plane = picture.index_axis_mut(Axis(2), c);
@@ -38,7 +38,7 @@ pub fn corrected(network: &Network, input: Features, mut picture: Array3<f32>) -
 }
 
 /// Larger by its mirror image at the far sides.
-pub fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
+pub(crate) fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
     let (h, w, n) = picture.dim();
     let back = |i: usize, n: usize| if i < n { i } else { (2 * n - 1).saturating_sub(i) };
     Array3::from_shape_fn((rows, columns, n), |(y, x, c)| picture[[back(y, h), back(x, w), c]])

@@ -19,18 +19,18 @@ const TRAINING: &str = "training";
 const LONGEST: u64 = 256 << 20;
 
 /// Weights that are shipped with the program.
-pub fn shipped_weights() -> Result<Vec<f32>> {
+pub(crate) fn shipped_weights() -> Result<Vec<f32>> {
     let path = Path::new("the shipped weights");
     parse(SHIPPED, path, &Plan::new(Size::DENOISER))
 }
 
 /// Weights of a denoiser in a file.
-pub fn read_weights(path: &Path) -> Result<Vec<f32>> {
+pub(crate) fn read_weights(path: &Path) -> Result<Vec<f32>> {
     parse(&read(path)?, path, &Plan::new(Size::DENOISER))
 }
 
 /// Weights of a network whose size follows from what the file says they were learnt from.
-pub fn read_described<T>(
+pub(crate) fn read_described<T>(
     path: &Path,
     described: impl Fn(&serde_json::Value) -> Option<(T, Size)>,
 ) -> Result<(T, Vec<f32>)> {

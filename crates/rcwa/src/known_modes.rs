@@ -35,7 +35,7 @@ pub(super) struct KnownModes {
 impl KnownModes {
     /// Room for layers of a stack in the symmetries of both polarisations. Of a stack that is solved individually,
     /// nothing is kept: see [`KnownModes::default`].
-    pub fn of_layers(layers: usize) -> Self {
+    pub(crate) fn of_layers(layers: usize) -> Self {
         Self {
             room: 2 * layers,
             last: VecDeque::new(),
@@ -46,7 +46,7 @@ impl KnownModes {
     ///
     /// # Errors
     /// Those of `find`.
-    pub fn of(&mut self, section: Section, find: impl FnOnce() -> Result<Modes>) -> Result<Arc<Modes>> {
+    pub(crate) fn of(&mut self, section: Section, find: impl FnOnce() -> Result<Modes>) -> Result<Arc<Modes>> {
         if let Some((_, known)) = self.last.iter().find(|(known, _)| *known == section) {
             return Ok(Arc::clone(known));
         }

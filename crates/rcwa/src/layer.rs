@@ -31,7 +31,7 @@ pub(super) struct Modes {
 }
 
 impl Modes {
-    pub fn of(section: &CrossSection<'_>, basis: &FieldBasis) -> Result<Self> {
+    pub(crate) fn of(section: &CrossSection<'_>, basis: &FieldBasis) -> Result<Self> {
         if let Some(permittivity) = section.uniform() {
             return Ok(Self::uniform(permittivity, &basis.rows));
         }
@@ -43,7 +43,7 @@ impl Modes {
     }
 
     /// Modes of a layer without structure: the plane waves.
-    pub fn uniform(permittivity: Complex64, rows: &Rows) -> Self {
+    pub(crate) fn uniform(permittivity: Complex64, rows: &Rows) -> Self {
         let medium = Medium::new(permittivity, rows);
         let identity = Mat::<Complex64>::identity(rows.len(), rows.len());
         Self {
@@ -54,7 +54,7 @@ impl Modes {
     }
 
     /// Modes of a layer with these permittivity matrices.
-    pub fn structured<T: Scalar>(permittivity: &Permittivity<T>, rows: &Rows) -> Result<Self> {
+    pub(crate) fn structured<T: Scalar>(permittivity: &Permittivity<T>, rows: &Rows) -> Result<Self> {
         let Eigen { values, packed } = T::eigen(permittivity.operator(rows).as_ref())?;
         let bw = permittivity.curl_of(rows, &packed);
         let gamma: Vec<Complex64> = values.iter().map(|&g2| root(g2)).collect();
@@ -85,7 +85,7 @@ pub(super) struct Medium {
 }
 
 impl Medium {
-    pub fn new(permittivity: Complex64, rows: &Rows) -> Self {
+    pub(crate) fn new(permittivity: Complex64, rows: &Rows) -> Self {
         let gamma = rows
             .list
             .iter()
@@ -101,7 +101,7 @@ impl Medium {
     }
 
     /// Y times the columns of a field.
-    pub fn admittance(&self, rows: &Rows, field: &Mat<Complex64>) -> Mat<Complex64> {
+    pub(crate) fn admittance(&self, rows: &Rows, field: &Mat<Complex64>) -> Mat<Complex64> {
         let entries: Vec<_> = rows
             .list
             .iter()

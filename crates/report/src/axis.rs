@@ -94,7 +94,7 @@ pub(super) struct Ticks {
 
 impl Fitted {
     /// Place of a value; none for one that a logarithmic axis does not have.
-    pub fn place(&self, x: f64) -> Option<f64> {
+    pub(crate) fn place(&self, x: f64) -> Option<f64> {
         let share = if self.axis.logarithmic {
             if x <= 0.0 {
                 return None;
@@ -110,7 +110,7 @@ impl Fitted {
     }
 
     /// Position of a value; values that are not positive are at the low end of a logarithmic axis.
-    pub fn place_or_end(&self, x: f64) -> Option<f64> {
+    pub(crate) fn place_or_end(&self, x: f64) -> Option<f64> {
         self.place(x).or_else(|| x.is_finite().then_some(self.start))
     }
 
@@ -138,7 +138,7 @@ impl Fitted {
         }
     }
 
-    pub fn ticks(&self) -> Ticks {
+    pub(crate) fn ticks(&self) -> Ticks {
         if self.axis.logarithmic && self.high / self.low > 8.0 {
             self.decades()
         } else {
@@ -206,7 +206,7 @@ impl Fitted {
 
     /// Distance from the left edge of a drawing at which a chart with this axis may begin, so that labels and title
     /// next to it do not touch.
-    pub fn left(&self) -> f64 {
+    pub(crate) fn left(&self) -> f64 {
         /// Enough for five digits.
         const USUAL: f64 = 66.0;
         /// Width of the title, and of the ticks between labels and chart.
@@ -230,7 +230,7 @@ impl Fitted {
     }
 
     /// Description of the axis as text.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         format!("{} from {} to {}", self.title(0), sig(self.low, 3), sig(self.high, 3))
     }
 }

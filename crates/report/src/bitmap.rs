@@ -58,7 +58,7 @@ pub(super) mod tests {
     use super::*;
 
     /// Size and bytes of a picture, colours and opacity of palettes written out.
-    pub fn decode(address: &str) -> (png::OutputInfo, Vec<u8>) {
+    pub(crate) fn decode(address: &str) -> (png::OutputInfo, Vec<u8>) {
         let bytes = STANDARD
             .decode(address.strip_prefix("data:image/png;base64,").unwrap())
             .unwrap();

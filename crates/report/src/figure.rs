@@ -152,16 +152,16 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    pub fn width(&self) -> f64 {
+    pub(crate) fn width(&self) -> f64 {
         self.right - self.left
     }
 
-    pub fn height(&self) -> f64 {
+    pub(crate) fn height(&self) -> f64 {
         self.bottom - self.top
     }
 
     /// Ticks, labels and titles of both axes; grid lines under the data if wanted.
-    pub fn axes(&self, x: &Fitted, y: &Fitted, grid: bool) -> Group {
+    pub(crate) fn axes(&self, x: &Fitted, y: &Fitted, grid: bool) -> Group {
         let mut group = Group::new();
         let across = x.ticks();
         for (value, label) in &across.labelled {

@@ -66,7 +66,7 @@ pub fn counted(n: usize, what: &str) -> String {
 }
 
 /// `10⁻³` and the like.
-pub fn power_of_ten(exponent: i32) -> String {
+pub(crate) fn power_of_ten(exponent: i32) -> String {
     format!("10{}", superscript(exponent))
 }
 
@@ -105,7 +105,7 @@ fn superscript(exponent: i32) -> String {
 }
 
 /// Shortest exact text of a coordinate in a drawing, to a hundredth.
-pub fn short(x: f64) -> String {
+pub(crate) fn short(x: f64) -> String {
     let mut text = format!("{x:.2}");
     while text.ends_with('0') {
         text.pop();

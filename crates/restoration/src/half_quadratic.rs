@@ -75,7 +75,7 @@ impl Standing {
 }
 
 /// Restores by rounds of both steps.
-pub fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
+pub(crate) fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
     let schedule = denoiser.schedule();
     let standing = Standing::begin(system, progress)?;
     progress.begin("restoring by splitting", (schedule.rounds * schedule.steps) as u64);
@@ -84,7 +84,7 @@ pub fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dy
 
 /// Pictures that the frame may be of, one for each seed: after some rounds of the splitting one clean picture is drawn in
 /// place of the expected one, and the rest of the rounds holds it to the frame.
-pub fn samples(
+pub(crate) fn samples(
     system: &NormalSystem<'_>,
     denoiser: &LearnedDenoiser,
     seeds: std::ops::Range<u64>,

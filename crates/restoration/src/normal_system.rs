@@ -35,7 +35,7 @@ impl DataTerm<'_> {
 }
 
 /// The systems of a frame.
-pub struct NormalSystem<'a> {
+pub(crate) struct NormalSystem<'a> {
     term: DataTerm<'a>,
     /// A* W S.
     pub data: Planes,
@@ -49,7 +49,7 @@ const LEAST_SHARE: f32 = 0.02;
 
 impl<'a> NormalSystem<'a> {
     /// System of some of the elements, with or without the stray light.
-    pub fn new(recorded: &Recorded<'a>, elements: &[usize], stray_light: bool) -> Self {
+    pub(crate) fn new(recorded: &Recorded<'a>, elements: &[usize], stray_light: bool) -> Self {
         let operator = recorded.operator;
         let sums = operator.row_sums(recorded.inverse_variance, elements, stray_light);
         let mut light = Array2::<f32>::zeros(operator.picture_shape());
@@ -80,22 +80,22 @@ impl<'a> NormalSystem<'a> {
     }
 
     /// Rows and columns of the picture.
-    pub fn shape(&self) -> (usize, usize) {
+    pub(crate) fn shape(&self) -> (usize, usize) {
         self.term.operator.picture_shape()
     }
 
     /// A black picture.
-    pub fn black(&self) -> Planes {
+    pub(crate) fn black(&self) -> Planes {
         vec![Array2::zeros(self.shape()); self.data.len()]
     }
 
     /// Statistics of the planes.
-    pub fn statistics(&self) -> &SceneStatistics {
+    pub(crate) fn statistics(&self) -> &SceneStatistics {
         &self.term.statistics
     }
 
     /// The left side of the system.
-    pub fn apply(&self, x: &[Array2<f32>], terms: Terms) -> Planes {
+    pub(crate) fn apply(&self, x: &[Array2<f32>], terms: Terms) -> Planes {
         let mut out = self.term.apply(x);
         for ((to, x), size) in out.iter_mut().zip(x).zip(self.statistics().sizes()) {
             add_prior(to, x, terms);
@@ -108,7 +108,7 @@ impl<'a> NormalSystem<'a> {
     ///
     /// # Errors
     /// If the user stopped it.
-    pub fn solve(
+    pub(crate) fn solve(
         &self,
         mut x: Planes,
         right: &[Array2<f32>],

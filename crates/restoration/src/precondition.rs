@@ -46,7 +46,7 @@ const BINS: usize = 12;
 const SEED: u64 = 1;
 
 /// Approximate inverse for a frame.
-pub struct Preconditioner {
+pub(crate) struct Preconditioner {
     fft: SquareFft,
     /// The light of each place to the power of -[`LIGHT_POWER`].
     unit: Array2<f32>,
@@ -63,7 +63,7 @@ fn place(squared: f64) -> f64 {
 impl Preconditioner {
     /// Preconditioner for the light of each place, one where most is and nowhere zero, and for what a frame of so many
     /// planes comes back as.
-    pub fn new(light: &Array2<f32>, planes: usize, there_and_back: impl Fn(&[Array2<f32>]) -> Planes) -> Self {
+    pub(crate) fn new(light: &Array2<f32>, planes: usize, there_and_back: impl Fn(&[Array2<f32>]) -> Planes) -> Self {
         let (rows, columns) = light.dim();
         let mut own = Self {
             fft: SquareFft::new(fft_size(rows.max(columns) + BORDER)),
@@ -105,7 +105,7 @@ impl Preconditioner {
     }
 
     /// One over the prior and a share of the response, for each frequency of a plane's spectrum.
-    pub fn filter(&self, plane: usize, terms: Terms) -> Vec<f32> {
+    pub(crate) fn filter(&self, plane: usize, terms: Terms) -> Vec<f32> {
         let response = &self.response[plane];
         let size = self.fft.size();
         let squared = squared_frequencies(size);
@@ -126,7 +126,7 @@ impl Preconditioner {
 
     /// The inverse of the prior between two powers of the light of each place. The two are in one unit where a place
     /// counts most; each plane has a filter of its own.
-    pub fn apply(&self, right: &[Array2<f32>], filters: &[Vec<f32>]) -> Planes {
+    pub(crate) fn apply(&self, right: &[Array2<f32>], filters: &[Vec<f32>]) -> Planes {
         right
             .par_iter()
             .zip(filters)

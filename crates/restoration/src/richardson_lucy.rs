@@ -9,7 +9,7 @@ use crate::recorded::Recorded;
 /// Rounds; noise grows with them.
 const ROUNDS: usize = 12;
 
-pub fn restore(
+pub(crate) fn restore(
     recorded: &Recorded<'_>,
     elements: &[usize],
     stray_light: bool,

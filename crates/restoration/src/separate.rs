@@ -46,7 +46,7 @@ impl Blend {
 }
 
 /// Restore by each element alone, then blend.
-pub fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dyn Progress) -> Result<Planes> {
+pub(crate) fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progress: &dyn Progress) -> Result<Planes> {
     let operator = recorded.operator;
     let mut blend = Blend::new(operator.picture_shape(), operator.inputs());
     restore_each(recorded, method, progress, &mut |_, picture, inverse_variance| {

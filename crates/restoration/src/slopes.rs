@@ -12,7 +12,7 @@ pub enum SlopeBorder {
 }
 
 /// Slopes towards the next row and the next column.
-pub fn slopes(x: &Array2<f32>, border: SlopeBorder) -> [Array2<f32>; 2] {
+pub(crate) fn slopes(x: &Array2<f32>, border: SlopeBorder) -> [Array2<f32>; 2] {
     let (rows, columns) = x.dim();
     let next = |i: usize, n: usize| match border {
         SlopeBorder::Even => (i + 1 < n).then_some(i + 1),
@@ -29,7 +29,7 @@ pub fn slopes(x: &Array2<f32>, border: SlopeBorder) -> [Array2<f32>; 2] {
 }
 
 /// The adjoint of [`slopes`].
-pub fn slopes_adjoint([down, right]: &[Array2<f32>; 2], border: SlopeBorder) -> Array2<f32> {
+pub(crate) fn slopes_adjoint([down, right]: &[Array2<f32>; 2], border: SlopeBorder) -> Array2<f32> {
     let (rows, columns) = down.dim();
     match border {
         SlopeBorder::Even => Array2::from_shape_fn((rows, columns), |(i, j)| {

@@ -14,7 +14,7 @@ const STEPS: usize = 2;
 /// Slopes of the grey plane of the statistics of scenes along one axis, and so of the others: photographs have 0.075.
 const SLOPES: ExponentialSlopes = ExponentialSlopes { expected: 0.075 };
 
-pub fn restore(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Planes> {
+pub(crate) fn restore(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Planes> {
     let terms = Terms {
         slopes: SLOPES.penalty(1.0) / system.scale,
         bends: 0.0,

@@ -78,7 +78,7 @@ struct MadeRange {
 
 impl StudyBench {
     /// StudyBench for a tolerance that was read. `key`: of the random numbers.
-    pub fn new(tolerance: Tolerance, key: [u8; 32], files: Files) -> Result<Self> {
+    pub(crate) fn new(tolerance: Tolerance, key: [u8; 32], files: Files) -> Result<Self> {
         let base = match &tolerance.model {
             Some(path) => CalibratedModel::read(path)?.perturbation,
             None => Perturbation::default(),
@@ -111,7 +111,7 @@ impl StudyBench {
     ///
     /// # Errors
     /// If a file has changed since the plan was made.
-    pub fn open(plan: &Plan) -> Result<Self> {
+    pub(crate) fn open(plan: &Plan) -> Result<Self> {
         let tolerance = Tolerance::read(&plan.tolerance)?;
         let files = plan.files();
         let known = if files.layouts.len() as u64 == tolerance.designs() {
@@ -144,7 +144,7 @@ impl StudyBench {
     ///
     /// # Errors
     /// If its layout cannot be read, or it cannot be judged in a study.
-    pub fn take(
+    pub(crate) fn take(
         &self,
         number: u64,
         bank: &dyn Fn(&CellStack, BankRange) -> Result<CellBank>,
@@ -209,7 +209,7 @@ impl StudyBench {
     }
 
     /// Pillars whose tables the design that was taken last has, for every width and wavelength.
-    pub fn stacks(&self) -> usize {
+    pub(crate) fn stacks(&self) -> usize {
         let current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         current.as_ref().map_or(0, |s| s.bank.stacks())
     }
@@ -218,7 +218,7 @@ impl StudyBench {
     ///
     /// # Errors
     /// If the tables cannot be used, it cannot be simulated, or the user stopped it.
-    pub fn draw(&self, k: u64, progress: &dyn Progress) -> Result<JudgedDraw> {
+    pub(crate) fn draw(&self, k: u64, progress: &dyn Progress) -> Result<JudgedDraw> {
         let number = self.drawer.design_of(k);
         let subject = self.subject(number, progress)?;
         let drawn = self.drawer.draw(self.key, k)?;
@@ -265,7 +265,7 @@ impl StudyBench {
     }
 
     /// All limits: of the design, then of the study.
-    pub fn limits(&self, found: &Verification) -> Vec<LimitStatement> {
+    pub(crate) fn limits(&self, found: &Verification) -> Vec<LimitStatement> {
         let of_design = found.checks.iter().map(LimitStatement::of_check);
         of_design
             .chain(self.tolerance.limits.iter().map(LimitStatement::of_figure))

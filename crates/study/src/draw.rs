@@ -47,7 +47,7 @@ pub(crate) struct Sampler {
 
 impl Sampler {
     /// Sampler for a tolerance that was read; `base` is what its model says.
-    pub fn new(tolerance: &Tolerance, base: Perturbation) -> Self {
+    pub(crate) fn new(tolerance: &Tolerance, base: Perturbation) -> Self {
         let effects = effects();
         let at = |name: &str| {
             effects
@@ -97,12 +97,12 @@ impl Sampler {
     }
 
     /// Perturbation from which everything that does not vary is taken.
-    pub fn base(&self) -> &Perturbation {
+    pub(crate) fn base(&self) -> &Perturbation {
         &self.base
     }
 
     /// Name and unit of each quantity; grids first.
-    pub fn names(&self) -> Vec<(String, String)> {
+    pub(crate) fn names(&self) -> Vec<(String, String)> {
         self.quantities
             .iter()
             .map(|q| (q.name.clone(), q.unit.clone()))
@@ -110,12 +110,12 @@ impl Sampler {
     }
 
     /// True if a quantity is drawn, and not one of a grid.
-    pub fn is_random(&self, quantity: usize) -> bool {
+    pub(crate) fn is_random(&self, quantity: usize) -> bool {
         matches!(self.quantities[quantity].source, Source::Random(_))
     }
 
     /// All draws at all points of the grid.
-    pub fn count(&self) -> u64 {
+    pub(crate) fn count(&self) -> u64 {
         self.draws * self.points()
     }
 
@@ -129,7 +129,7 @@ impl Sampler {
     }
 
     /// Number of the design that a draw is of.
-    pub fn design_of(&self, k: u64) -> u64 {
+    pub(crate) fn design_of(&self, k: u64) -> u64 {
         let effects = self.quantities.iter().map(|q| match &q.source {
             Source::Grid(values) => values.len() as u64,
             Source::Design(_) | Source::Random(_) => 1,
@@ -138,7 +138,7 @@ impl Sampler {
     }
 
     /// Amount and value at each place of the grid of a quantity; none for one that is drawn.
-    pub fn grid(&self, quantity: usize) -> Option<Vec<(f64, Scalar)>> {
+    pub(crate) fn grid(&self, quantity: usize) -> Option<Vec<(f64, Scalar)>> {
         match &self.quantities[quantity].source {
             Source::Grid(values) => Some(values.iter().map(|v| (*v, Scalar::Number(*v))).collect()),
             Source::Design(grid) => {
@@ -153,7 +153,7 @@ impl Sampler {
     ///
     /// # Errors
     /// If a distribution has next to nothing within the physical range of its effect.
-    pub fn draw(&self, key: [u8; 32], k: u64) -> Result<Drawn> {
+    pub(crate) fn draw(&self, key: [u8; 32], k: u64) -> Result<Drawn> {
         let mut rng = ChaCha8Rng::from_seed(key);
         rng.set_stream(k);
         let mut point = k / self.draws;
@@ -200,7 +200,7 @@ impl Sampler {
     }
 
     /// The middle of a quantity: what it is where nothing varies.
-    pub fn middle(&self, quantity: usize) -> f64 {
+    pub(crate) fn middle(&self, quantity: usize) -> f64 {
         match &self.quantities[quantity].source {
             Source::Random(Distribution::Normal { mean, .. }) => *mean,
             Source::Random(Distribution::Uniform { low, high }) => 0.5 * (low + high),
@@ -213,7 +213,7 @@ impl Sampler {
     }
 
     /// Perturbation of a chip by these amounts.
-    pub fn perturbation(&self, drawn: &Drawn) -> Perturbation {
+    pub(crate) fn perturbation(&self, drawn: &Drawn) -> Perturbation {
         let mut to = self.base.clone();
         for (e, effect) in self.effects.iter().enumerate() {
             let own = self

@@ -138,7 +138,7 @@ impl PictureBench {
     ///
     /// # Errors
     /// If one of them cannot be read, or the scene is too small to be scored.
-    pub fn open(spec: &PictureSpec) -> Result<Self> {
+    pub(crate) fn open(spec: &PictureSpec) -> Result<Self> {
         let far = f64::INFINITY;
         let scene = match &spec.scene {
             SceneChoice::BuiltIn(kind, pixels) => chart(*kind, *pixels, spec.field_deg, far),
@@ -153,13 +153,13 @@ impl PictureBench {
     }
 
     /// Wavelengths (um) and orders at which pictures of a design ask for cells.
-    pub fn colours(&self, design: &Design) -> Result<Vec<(f64, usize)>> {
+    pub(crate) fn colours(&self, design: &Design) -> Result<Vec<(f64, usize)>> {
         let nm = sampling_of(design, &self.camera)?.wavelengths_nm;
         Ok(nm.into_iter().map(|nm| (nm * 1e-3, BAND_ORDERS)).collect())
     }
 
     /// True if restorations know the chip as designed, not the chip of the draw.
-    pub fn knows_design(&self) -> bool {
+    pub(crate) fn knows_design(&self) -> bool {
         self.spec.kernels == KnownKernels::Design
     }
 
@@ -186,7 +186,7 @@ impl PictureBench {
     ///
     /// # Errors
     /// As [`ImagingSystem::of_pillars`].
-    pub fn known(
+    pub(crate) fn known(
         &self,
         design: &Design,
         extraction: &Extraction,
@@ -202,7 +202,7 @@ impl PictureBench {
     ///
     /// # Errors
     /// As [`ImagingSystem::of_pillars`] and [`ImagingSystem::restore`].
-    pub fn take(
+    pub(crate) fn take(
         &self,
         design: &Design,
         extraction: &Extraction,

@@ -116,7 +116,7 @@ pub(crate) struct Table {
 
 impl Table {
     /// `middles`: of each quantity.
-    pub fn new(names: Vec<String>, middles: &[f64], random: Vec<bool>, records: &[DrawRecord]) -> Self {
+    pub(crate) fn new(names: Vec<String>, middles: &[f64], random: Vec<bool>, records: &[DrawRecord]) -> Self {
         let spread = |i: usize| {
             let squares = records.iter().map(|r| (r.amounts[i] - middles[i]).powi(2));
             (squares.sum::<f64>() / records.len().max(1) as f64).sqrt()
@@ -135,7 +135,12 @@ impl Table {
     }
 
     /// The response of one limit; none if it does not vary, is not always a number, or draws are too few.
-    pub fn response(&self, limit: usize, statement: &LimitStatement, records: &[DrawRecord]) -> Option<Response> {
+    pub(crate) fn response(
+        &self,
+        limit: usize,
+        statement: &LimitStatement,
+        records: &[DrawRecord],
+    ) -> Option<Response> {
         let margins: Vec<f64> = records
             .iter()
             .map(|r| r.reached[limit].map(|v| statement.margin(v)))
@@ -192,7 +197,7 @@ impl Table {
     }
 
     /// Tightening of each quantity alone, and of all together, for a yield over all limits.
-    pub fn tightenings(
+    pub(crate) fn tightenings(
         &self,
         wanted: f64,
         limits: &[LimitStatement],

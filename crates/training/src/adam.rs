@@ -14,7 +14,7 @@ pub(crate) struct Adam {
 
 impl Adam {
     /// Before the first step.
-    pub fn new(weights: usize) -> Self {
+    pub(crate) fn new(weights: usize) -> Self {
         Self {
             first: vec![0.0; weights],
             second: vec![0.0; weights],
@@ -22,7 +22,7 @@ impl Adam {
     }
 
     /// Step number `step`, counted from one, of length `rate` a weight.
-    pub fn step(&mut self, weights: &mut [f32], gradient: &[f32], step: u64, rate: f32) {
+    pub(crate) fn step(&mut self, weights: &mut [f32], gradient: &[f32], step: u64, rate: f32) {
         let missing = BETAS.map(|s| 1.0 - f64::from(s).powf(step as f64) as f32);
         let means = self.first.iter_mut().zip(&mut self.second);
         for ((weight, g), (first, second)) in weights.iter_mut().zip(gradient).zip(means) {

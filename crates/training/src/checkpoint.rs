@@ -28,7 +28,7 @@ const NAMES: [&str; 3] = ["weights", "first", "second"];
 
 impl Checkpoint {
     /// Before the first step.
-    pub fn begin(weights: Vec<f32>) -> Self {
+    pub(crate) fn begin(weights: Vec<f32>) -> Self {
         Self {
             step: 0,
             loss: 0.0,
@@ -38,7 +38,7 @@ impl Checkpoint {
     }
 
     /// Write it, whole or not at all. `origin` is what it is learnt from.
-    pub fn write(&self, path: &Path, origin: &str) -> Result<()> {
+    pub(crate) fn write(&self, path: &Path, origin: &str) -> Result<()> {
         let bytes = [&self.weights, &self.adam.first, &self.adam.second]
             .map(|values| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
         let about = HashMap::from([
@@ -65,7 +65,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// If it is damaged, or of another origin.
-    pub fn read(path: &Path, origin: &str, weights: usize) -> Result<Option<Self>> {
+    pub(crate) fn read(path: &Path, origin: &str, weights: usize) -> Result<Option<Self>> {
         if !path.exists() {
             return Ok(None);
         }

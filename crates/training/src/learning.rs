@@ -253,7 +253,7 @@ pub(crate) mod tests {
     use super::*;
 
     /// Checks that the gradient of every layer is what difference quotients say, on one example.
-    pub fn gradients_hold(size: Size, sample: impl Fn() -> Sample) {
+    pub(crate) fn gradients_hold(size: Size, sample: impl Fn() -> Sample) {
         /// A difference quotient in single precision of a loss of some thousand terms.
         const QUOTIENT: f64 = 0.02;
         let plan = Plan::new(size);
@@ -284,7 +284,7 @@ pub(crate) mod tests {
     }
 
     /// A picture of waves and edges.
-    pub fn picture(seed: usize, side: usize) -> Array3<f32> {
+    pub(crate) fn picture(seed: usize, side: usize) -> Array3<f32> {
         Array3::from_shape_fn((side, side, 3), |(y, x, c)| {
             let wave = (0.1 * (x * (seed + 1)) as f32 + 0.05 * (y * (c + 1)) as f32).sin();
             let edge = if (x / 16 + y / 24 + seed).is_multiple_of(2) {

@@ -41,7 +41,7 @@ pub(super) struct Slopes {
 }
 
 impl Slopes {
-    pub fn of(design: &Design) -> Self {
+    pub(crate) fn of(design: &Design) -> Self {
         let pitch_um = design.lattice().pitch_um();
         let wedge = |e: &Element| e.wedge.sin_x.hypot(e.wedge.sin_y) / e.wedge.wavelength_um * pitch_um;
         // The lens adds its own slope, at its rim as much as sin(atan(R / f)) / wavelength.
@@ -58,7 +58,7 @@ impl Slopes {
     }
 
     /// Excess by which the local periodic approximation overstates the first order, in words.
-    pub fn overstated(&self) -> String {
+    pub(crate) fn overstated(&self) -> String {
         let worst = |turns: f64| percent(between(&OVERSTATED, turns).into_iter().fold(0.0, f64::max));
         format!(
             "first order too high by up to {} % in the middle of the outermost element, {}{} % at its steepest rim",
@@ -69,7 +69,7 @@ impl Slopes {
     }
 
     /// Share of the light that passes which the sum over pairs does not count, in words.
-    pub fn not_counted(&self) -> String {
+    pub(crate) fn not_counted(&self) -> String {
         let shares = |turns: f64| up_to(&NOT_COUNTED, turns).map(percent).join(", ");
         format!(
             "up to {} % of what passes in the middle of the outermost element, {}{} % at its steepest rim, at 455, 530, 660 nm; contrast \

@@ -108,7 +108,7 @@ impl<'a> WhiteSimulator<'a> {
     ///
     /// # Errors
     /// As [`camera_of`]; also if a wavelength is outside what the cell covers.
-    pub fn new(design: &'a Design, lattice: Lattice, judge: SimulationCase<'_>) -> Result<Option<Self>> {
+    pub(crate) fn new(design: &'a Design, lattice: Lattice, judge: SimulationCase<'_>) -> Result<Option<Self>> {
         let Some((camera, sampling)) = camera_of(design)? else {
             return Ok(None);
         };
@@ -131,7 +131,7 @@ impl<'a> WhiteSimulator<'a> {
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
-    pub fn solve(&self, judge: &CaseOptics<'_>, elements: &[Element], progress: &dyn Progress) -> Result<()> {
+    pub(crate) fn solve(&self, judge: &CaseOptics<'_>, elements: &[Element], progress: &dyn Progress) -> Result<()> {
         if incidence(self.design) == Incidence::Oblique {
             let all = elements.len() * self.colours.len();
             progress.begin("solving cells for oblique polychromatic light", all as u64);
@@ -164,12 +164,12 @@ impl<'a> WhiteSimulator<'a> {
     }
 
     /// Number of PSFs of one element.
-    pub fn psfs(&self) -> usize {
+    pub(crate) fn psfs(&self) -> usize {
         self.colours.len()
     }
 
     /// Statement of the camera that the figures are for.
-    pub fn statement(&self) -> CameraStatement {
+    pub(crate) fn statement(&self) -> CameraStatement {
         CameraStatement::of(&self.camera, &self.sampling)
     }
 
@@ -177,7 +177,7 @@ impl<'a> WhiteSimulator<'a> {
     ///
     /// # Errors
     /// If a cell cannot be solved, a wavelength does not reach the sensor, or the user stopped it.
-    pub fn simulate(
+    pub(crate) fn simulate(
         &self,
         element: &Element,
         phase: &ElementPhase<'_>,

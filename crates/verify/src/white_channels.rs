@@ -100,7 +100,7 @@ impl Channels<'_> {
     ///
     /// # Errors
     /// If a wavelength does not reach the sensor.
-    pub fn channel(&self, channel: &ChannelSampling) -> Result<WhiteChannel> {
+    pub(crate) fn channel(&self, channel: &ChannelSampling) -> Result<WhiteChannel> {
         let landing = |nm: f64| self.point.landing_um(nm * 1e-3);
         let parts = channel.parts.iter().map(|p| {
             Ok(BandPart {
@@ -190,7 +190,7 @@ impl Point {
     }
 
     /// Its light of one wavelength.
-    pub fn wave(&self, wavelength_um: f64) -> PlaneWave {
+    pub(crate) fn wave(&self, wavelength_um: f64) -> PlaneWave {
         PlaneWave {
             wavelength_um,
             sin_x: self.sines[0],
@@ -202,7 +202,7 @@ impl Point {
     ///
     /// # Errors
     /// If it does not reach the sensor.
-    pub fn landing_um(&self, wavelength_um: f64) -> Result<[f64; 2]> {
+    pub(crate) fn landing_um(&self, wavelength_um: f64) -> Result<[f64; 2]> {
         let wave = self.wave(wavelength_um);
         Ok(propagation::landing_um(&self.wedge, &wave, self.distance_um)?)
     }

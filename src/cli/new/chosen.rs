@@ -26,7 +26,7 @@ const WINDOW: f64 = 20.0;
 const SAMPLES: [f64; 2] = [64.0, 512.0];
 
 /// Film and substrate, by the names that the design has for them.
-pub struct Materials {
+pub(crate) struct Materials {
     pub film: Material,
     pub substrate: Material,
     names: [String; 2],
@@ -36,7 +36,7 @@ pub struct Materials {
 
 impl Materials {
     /// Materials that are named, else those for a wavelength (um). Paths count from `folder`.
-    pub fn new(film: Option<&str>, substrate: Option<&str>, wavelength_um: f64, folder: &Path) -> Result<Self> {
+    pub(crate) fn new(film: Option<&str>, substrate: Option<&str>, wavelength_um: f64, folder: &Path) -> Result<Self> {
         let usual = FILMS.iter().find(|(most_um, _)| wavelength_um <= *most_um);
         let usual = usual.map_or(FILMS[1].1, |(_, name)| name);
         let glass = if wavelength_um <= GLASS_UM {
@@ -67,7 +67,7 @@ impl Materials {
     }
 
     /// Band about a wavelength (nm), as a list of TOML, where the film is known: that of `metalith cells`.
-    pub fn band_nm(&self, nm: f64) -> Option<String> {
+    pub(crate) fn band_nm(&self, nm: f64) -> Option<String> {
         let (low_um, high_um) = self.film.range_um();
         let low = (nm * (1.0 - BAND)).floor().max((low_um * 1e3).ceil());
         let high = (nm * (1.0 + BAND)).ceil().min((high_um * 1e3).floor());
@@ -75,7 +75,7 @@ impl Materials {
     }
 
     /// Names of film and substrate as a design has them.
-    pub fn names(&self) -> [&str; 2] {
+    pub(crate) fn names(&self) -> [&str; 2] {
         [&self.names[0], &self.names[1]]
     }
 
@@ -99,7 +99,7 @@ impl Materials {
 }
 
 /// The pillars of a new design: texts of its file.
-pub struct StartCell {
+pub(crate) struct StartCell {
     pub pillars: String,
     pub lattice: &'static str,
     pub film_word: String,
@@ -120,7 +120,7 @@ fn line(key: &str, value: impl std::fmt::Display, note: &str) -> String {
 
 impl StartCell {
     /// The silicon nitride pillars of the paper, for colour.
-    pub fn of_the_paper() -> Self {
+    pub(crate) fn of_the_paper() -> Self {
         let keys = [
             line("pitch_nm", 350, ""),
             line("pillar_height_nm", 700, ""),
@@ -171,7 +171,7 @@ impl StartCell {
     }
 
     /// A cell that was chosen.
-    pub fn chosen(request: &CellRequest, cell: &ChosenCell, materials: &Materials) -> Self {
+    pub(crate) fn chosen(request: &CellRequest, cell: &ChosenCell, materials: &Materials) -> Self {
         let nm = request.wavelength_um * 1e3;
         let given = |is_given: bool, why: String| if is_given { format!("as asked; {why}") } else { why };
         let index = |material: &Material| material.index(request.wavelength_um).map_or(1.0, |n| n.re);

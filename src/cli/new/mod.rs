@@ -42,7 +42,7 @@ const STEERING_DEG: f64 = 15.0;
                   run lens.toml\n  metalith new mine.toml --diameter-um 200 --focal-length-um 480\n  metalith new pair.toml --like \
                   birefringent_532"
 )]
-pub struct NewArgs {
+pub(crate) struct NewArgs {
     /// The file to write, which gives the design its name. An existing file is never replaced.
     design: PathBuf,
 
@@ -267,7 +267,7 @@ impl NewArgs {
     }
 }
 
-pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
+pub(crate) fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.design.exists() {
         return Err(Error::refused(
             "new/exists",

@@ -45,7 +45,7 @@ impl WhiteLight {
 
 impl PsfLight {
     /// Wavelengths that have tables of unlike neighbours (um), rising: white light is known between them, and little beyond.
-    pub fn tabulated_um(&self) -> Vec<f64> {
+    pub(crate) fn tabulated_um(&self) -> Vec<f64> {
         let of_white = self.white.iter().flat_map(|white| &white.colours_um);
         let mut all: Vec<f64> = self.wavelengths_um.iter().chain(of_white).copied().collect();
         all.sort_by(f64::total_cmp);
@@ -54,7 +54,7 @@ impl PsfLight {
     }
 
     /// The band that it lies in (um), as far as materials are known.
-    pub fn band_um(&self, known_um: (f64, f64)) -> (f64, f64) {
+    pub(crate) fn band_um(&self, known_um: (f64, f64)) -> (f64, f64) {
         let ends_nm = self.white.iter().flat_map(|white| white.sampling.ends_nm());
         let of_white = ends_nm.map(|nm| nm * 1e-3);
         band_about(self.wavelengths_um.iter().copied().chain(of_white), known_um)

@@ -24,7 +24,7 @@ const TOLD_APART: f64 = 1e-7;
 pub(super) const DRAWS: usize = 400;
 
 /// Seed of all draws: every run gives the same answer.
-pub const SEED: u64 = 0x6d65_7461;
+pub(crate) const SEED: u64 = 0x6d65_7461;
 
 /// Reduced chi-square per point of each measurement when it was left out with its group, in each way of leaving out; none for
 /// measurements that do not count, and where nothing could be learned from the others.

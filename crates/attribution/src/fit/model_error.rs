@@ -68,7 +68,7 @@ impl IntervalParts {
 
 /// 95 % half-widths of the active parameters of a fit by the error of the model alone; zero where no smooth terms were
 /// simulated.
-pub fn model_half_widths<M: Measurements>(
+pub(crate) fn model_half_widths<M: Measurements>(
     problem: &FitProblem<'_, M>,
     fit: &Fit<M>,
     error: &ModelError,

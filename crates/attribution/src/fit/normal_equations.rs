@@ -71,7 +71,7 @@ pub fn minimise(form: &DMatrix<f64>, free: &[usize]) -> (DVector<f64>, f64) {
 }
 
 /// The form with some parameters held at given values: their columns move into the residual.
-pub fn hold(form: &DMatrix<f64>, at: &[(usize, f64)]) -> DMatrix<f64> {
+pub(crate) fn hold(form: &DMatrix<f64>, at: &[(usize, f64)]) -> DMatrix<f64> {
     let last = form.nrows() - 1;
     let mut move_by = DVector::zeros(form.nrows());
     move_by[last] = 1.0;

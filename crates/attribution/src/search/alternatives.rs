@@ -28,7 +28,7 @@ pub struct Alternative {
 
 /// Drop effects that the others have made redundant, and those whose intervals include zero since all was refined, with their
 /// runners-up.
-pub fn drop_redundant<M: Measurements>(
+pub(crate) fn drop_redundant<M: Measurements>(
     now: &mut SearchState<'_, M>,
     chosen: &mut Vec<usize>,
     runners_up: &mut Vec<Vec<usize>>,
@@ -66,7 +66,7 @@ fn includes_zero<M: Measurements>(now: &SearchState<'_, M>, effect: usize) -> bo
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
-pub fn alternatives<M: Measurements>(
+pub(crate) fn alternatives<M: Measurements>(
     now: &mut SearchState<'_, M>,
     chosen: &mut [usize],
     runners_up: &[Vec<usize>],

@@ -134,7 +134,7 @@ impl<M: Measurements> SearchHistory<M> {
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
-pub fn attribute<M: Measurements>(
+pub(crate) fn attribute<M: Measurements>(
     problem: FitProblem<'_, M>,
     full: bool,
     ends: Option<&EndsSearch<'_, M>>,

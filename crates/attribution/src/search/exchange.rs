@@ -19,7 +19,7 @@ const ALIKE: f64 = 0.8;
 const MAY_LEAVE: f64 = 0.25;
 
 /// An exchange that explains what was left.
-pub struct Exchange<'a, M: Measurements> {
+pub(crate) struct Exchange<'a, M: Measurements> {
     /// Which of the effects found is replaced, and by which.
     pub place: usize,
     pub effect: usize,
@@ -32,7 +32,7 @@ pub struct Exchange<'a, M: Measurements> {
 }
 
 /// Effects of a step that gained nearly as much as the one that was taken, best first.
-pub fn much_alike(tried: &[TriedEffect], taken: &TriedEffect) -> Vec<TriedEffect> {
+pub(crate) fn much_alike(tried: &[TriedEffect], taken: &TriedEffect) -> Vec<TriedEffect> {
     let gain = |t: &TriedEffect| t.gain.map_or(0.0, |g| g.value);
     let alike = |t: &&TriedEffect| t.effect != taken.effect && gain(t) > ALIKE * gain(taken);
     let mut found: Vec<TriedEffect> = tried.iter().filter(alike).cloned().collect();
@@ -45,7 +45,7 @@ pub fn much_alike(tried: &[TriedEffect], taken: &TriedEffect) -> Vec<TriedEffect
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
-pub fn find_exchange<'a, M: Measurements>(
+pub(crate) fn find_exchange<'a, M: Measurements>(
     now: &SearchState<'a, M>,
     chosen: &[usize],
     alike: &[Vec<TriedEffect>],

@@ -26,10 +26,10 @@ const PROMISING: f64 = 0.25;
 const MAY_LEAVE: f64 = 0.05;
 
 /// And the reduced chi-square per point that it may leave where the error is small.
-pub const LEAST_LEFT: f64 = 0.05;
+pub(crate) const LEAST_LEFT: f64 = 0.05;
 
 /// Effects that explain a residual together, or one that only a surrogate about its own fit shows.
-pub struct FoundTogether<'a, M: Measurements> {
+pub(crate) struct FoundTogether<'a, M: Measurements> {
     pub tried: Vec<TriedEffect>,
     pub state: SearchState<'a, M>,
     /// All effects that were fitted.
@@ -41,7 +41,7 @@ pub struct FoundTogether<'a, M: Measurements> {
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
-pub fn find_pair<'a, M: Measurements>(
+pub(crate) fn find_pair<'a, M: Measurements>(
     now: &SearchState<'a, M>,
     chosen: &[usize],
     full: bool,
@@ -110,7 +110,7 @@ pub fn find_pair<'a, M: Measurements>(
 }
 
 /// Effects as they were tried, each with its score, if all are sound and together leave next to nothing of what `now` leaves.
-pub fn sound<M: Measurements>(
+pub(crate) fn sound<M: Measurements>(
     now: &SearchState<'_, M>,
     state: &SearchState<'_, M>,
     effects: &[(usize, f64)],

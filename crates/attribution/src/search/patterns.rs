@@ -35,7 +35,7 @@ pub struct Pattern {
 }
 
 /// Patterns that remove most of what a fit leaves, the best first.
-pub fn patterns<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>) -> Vec<Pattern> {
+pub(crate) fn patterns<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>) -> Vec<Pattern> {
     let slots: Vec<usize> = (0..problem.model.slots().len()).collect();
     let wide = problem.at(&slots, fit.theta.clone(), fit.nuisances.clone());
     let points = problem.points();

@@ -24,7 +24,7 @@ const EXPLAINS: f64 = 0.3;
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
-pub fn follow_leaders_anew<'a, M: Measurements>(
+pub(crate) fn follow_leaders_anew<'a, M: Measurements>(
     now: &SearchState<'a, M>,
     chosen: &[usize],
     progress: &dyn Progress,

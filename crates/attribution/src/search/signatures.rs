@@ -7,7 +7,7 @@ use crate::measurements::Measurements;
 
 /// Effects by the share of the residual that their signature explains, highest first; nuisances and what is
 /// chosen are projected out.
-pub fn score_effects<M: Measurements>(
+pub(crate) fn score_effects<M: Measurements>(
     problem: &FitProblem<'_, M>,
     now: &Fit<M>,
     chosen: &[usize],
@@ -18,7 +18,7 @@ pub fn score_effects<M: Measurements>(
 }
 
 /// The same for all pairs of effects.
-pub fn score_pairs<M: Measurements>(
+pub(crate) fn score_pairs<M: Measurements>(
     problem: &FitProblem<'_, M>,
     now: &Fit<M>,
     chosen: &[usize],

@@ -12,7 +12,7 @@ const CHANCE_SIGMAS: f64 = 2.0;
 /// Reduced chi-square per point beyond noise above which the search continues about what was found: what is found in full leaves
 /// 0.002 to 0.006. A residual of 1.1 can hide an effect of its typical size, which looks small and unsure on a surrogate
 /// that is centred elsewhere.
-pub const MORE_IS_LEFT: f64 = 0.01;
+pub(crate) const MORE_IS_LEFT: f64 = 0.01;
 
 /// Times that a search continues about a fit, and the share of the error above noise that each may leave for the next to be worth its
 /// simulations.

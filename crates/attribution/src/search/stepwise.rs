@@ -12,7 +12,7 @@ use crate::fit::{
 use crate::measurements::Measurements;
 
 /// Candidates that are fitted in full at each step.
-pub const LEADERS: usize = 6;
+pub(crate) const LEADERS: usize = 6;
 
 /// Share of the error above noise that an effect must remove.
 const LEAST_SHARE: f64 = 0.15;
@@ -94,7 +94,7 @@ impl Rejection {
 }
 
 /// The outcome of a step.
-pub struct SelectionStep<M: Measurements> {
+pub(crate) struct SelectionStep<M: Measurements> {
     pub tried: Vec<TriedEffect>,
     /// Effects that were fitted in full.
     pub leaders: Vec<usize>,
@@ -105,7 +105,7 @@ pub struct SelectionStep<M: Measurements> {
 }
 
 /// An effect that is being tried.
-pub struct Candidate<M: Measurements> {
+pub(crate) struct Candidate<M: Measurements> {
     pub tried: TriedEffect,
     fitted: Option<(Fit<M>, HeldOutErrors)>,
 }
@@ -115,7 +115,7 @@ pub struct Candidate<M: Measurements> {
 ///
 /// # Errors
 /// If a simulation fails, or the user stopped it.
-pub fn step_forward<M: Measurements>(
+pub(crate) fn step_forward<M: Measurements>(
     state: &mut SearchState<'_, M>,
     chosen: &[usize],
     extend: bool,
@@ -239,7 +239,7 @@ const LEAST_ERROR: f64 = 1e-6;
 const AT_END: f64 = 1e-6;
 
 /// Whether the parameters lie within their physical ranges, not at the ends; an end that is a sound value counts as within.
-pub fn physical<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>, slots: &[usize]) -> bool {
+pub(crate) fn physical<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>, slots: &[usize]) -> bool {
     slots.iter().all(|&s| {
         let Parameter {
             range: (a, b),
@@ -252,7 +252,7 @@ pub fn physical<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>, slot
 }
 
 /// The best fit of some effects on top of those in `chosen`, over all starting points.
-pub fn fit_with<M: Measurements>(
+pub(crate) fn fit_with<M: Measurements>(
     problem: &FitProblem<'_, M>,
     now: &Fit<M>,
     chosen: &[usize],
@@ -317,7 +317,7 @@ fn sort<M: Measurements>(candidates: &mut [Candidate<M>]) {
 
 impl<M: Measurements> Candidate<M> {
     /// Not fitted yet.
-    pub fn new(effect: usize, score: f64) -> Self {
+    pub(crate) fn new(effect: usize, score: f64) -> Self {
         Self {
             tried: TriedEffect {
                 effect,
@@ -331,7 +331,13 @@ impl<M: Measurements> Candidate<M> {
     }
 
     /// Value by a fit that it is part of, and the error of this fit on measurements left out.
-    pub fn judge(&mut self, problem: &FitProblem<'_, M>, fit: Fit<M>, held: HeldOutErrors, errors_now: &HeldOutErrors) {
+    pub(crate) fn judge(
+        &mut self,
+        problem: &FitProblem<'_, M>,
+        fit: Fit<M>,
+        held: HeldOutErrors,
+        errors_now: &HeldOutErrors,
+    ) {
         self.tried.gain = Some(gain(problem, errors_now, &held));
         let slots = problem.model.slots_of(self.tried.effect);
         self.tried.values = slots.iter().map(|&s| fit.theta[s]).collect();
@@ -343,7 +349,7 @@ impl<M: Measurements> Candidate<M> {
     }
 
     /// Why it cannot be taken, whatever others do.
-    pub fn fault(&self, problem: &FitProblem<'_, M>, errors_now: &HeldOutErrors) -> Option<Rejection> {
+    pub(crate) fn fault(&self, problem: &FitProblem<'_, M>, errors_now: &HeldOutErrors) -> Option<Rejection> {
         let Gain {
             value,
             interval: [low, _],

@@ -19,7 +19,7 @@ const SAME_CHANGE: f64 = 0.3;
 
 /// Changes of all predictions with one parameter.
 #[derive(Clone)]
-pub struct Curve<M: Measurements> {
+pub(crate) struct Curve<M: Measurements> {
     /// The value that offsets are from.
     about: f64,
     /// Offsets from the base; zero is not among them.
@@ -32,7 +32,7 @@ pub struct Curve<M: Measurements> {
 
 impl<M: Measurements> Curve<M> {
     /// A polynomial through the changes at some offsets from a value of the parameter.
-    pub fn new(
+    pub(crate) fn new(
         about: f64,
         nodes: Vec<f64>,
         changes: impl IntoIterator<Item = PerMeasurement<M::Prediction>>,
@@ -48,22 +48,22 @@ impl<M: Measurements> Curve<M> {
     }
 
     /// The changes of a parameter that was not simulated.
-    pub fn unknown() -> Self {
+    pub(crate) fn unknown() -> Self {
         Self::new(0.0, Vec::new(), [], false)
     }
 
     /// Whether offsets are from this value.
-    pub fn is_about(&self, value: f64) -> bool {
+    pub(crate) fn is_about(&self, value: f64) -> bool {
         self.about == value
     }
 
     /// Whether it was simulated at any offset.
-    pub fn is_simulated(&self) -> bool {
+    pub(crate) fn is_simulated(&self) -> bool {
         !self.nodes.is_empty()
     }
 
     /// Add an offset, near which the polynomial is evaluated from now on.
-    pub fn add(&mut self, node: f64, changes: PerMeasurement<M::Prediction>) {
+    pub(crate) fn add(&mut self, node: f64, changes: PerMeasurement<M::Prediction>) {
         if self.nodes.len() >= MOST_NODES {
             let farthest = (0..self.nodes.len())
                 .max_by(|&a, &b| (self.nodes[a] - node).abs().total_cmp(&(self.nodes[b] - node).abs()));
@@ -77,7 +77,7 @@ impl<M: Measurements> Curve<M> {
     }
 
     /// The change of one prediction at an offset: changes at the nodes and their factors.
-    pub fn change(&self, u: f64, measurement: MeasurementIndex) -> impl Iterator<Item = (&M::Prediction, f32)> {
+    pub(crate) fn change(&self, u: f64, measurement: MeasurementIndex) -> impl Iterator<Item = (&M::Prediction, f32)> {
         self.changes
             .iter()
             .zip(self.weights(u))
@@ -85,7 +85,7 @@ impl<M: Measurements> Curve<M> {
     }
 
     /// Its derivative by the offset.
-    pub fn slope(&self, u: f64, measurement: MeasurementIndex) -> impl Iterator<Item = (&M::Prediction, f32)> {
+    pub(crate) fn slope(&self, u: f64, measurement: MeasurementIndex) -> impl Iterator<Item = (&M::Prediction, f32)> {
         self.changes
             .iter()
             .zip(self.slopes(u))
@@ -94,7 +94,7 @@ impl<M: Measurements> Curve<M> {
 
     /// The changes at `node`, from those that `anew` has at `-node`: what is even in the offset is taken as this curve has it. None where
     /// that may be wrong by more than [`SECOND_SIDE`]: it is taken to be so by the share by which the change at `-node` is another.
-    pub fn other_side(&self, anew: &Self, node: f64) -> Option<PerMeasurement<M::Prediction>> {
+    pub(crate) fn other_side(&self, anew: &Self, node: f64) -> Option<PerMeasurement<M::Prediction>> {
         let (low, high) = self.ends();
         if !self.is_about(anew.about) || self.kinked || anew.kinked || low > -node.abs() || high < node.abs() {
             return None;
@@ -116,7 +116,7 @@ impl<M: Measurements> Curve<M> {
     }
 
     /// Least and greatest simulated offset.
-    pub fn ends(&self) -> (f64, f64) {
+    pub(crate) fn ends(&self) -> (f64, f64) {
         let low = self.nodes.iter().copied().fold(0.0, f64::min);
         let high = self.nodes.iter().copied().fold(0.0, f64::max);
         (low, high)

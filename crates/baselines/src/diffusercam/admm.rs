@@ -12,7 +12,7 @@ use super::grid::CoarseGrid;
 
 /// Settings of a descent: how far a scene is sought, and how strongly slopes are held down.
 #[derive(Clone, Copy, Debug)]
-pub struct Descent {
+pub(crate) struct Descent {
     /// Rounds of all steps.
     pub rounds: usize,
     /// The penalty of slopes over that which follows from the noise.
@@ -21,7 +21,7 @@ pub struct Descent {
 
 impl Descent {
     /// To the end, by the noise.
-    pub const WHOLE: Self = Self {
+    pub(crate) const WHOLE: Self = Self {
         rounds: 80,
         slopes: 1.0,
     };
@@ -39,7 +39,7 @@ const BORDER: f64 = 100.0;
 const LEAST_SLOPES: f64 = 0.03;
 
 /// A channel of a camera whose kernel is the same everywhere.
-pub struct Deconvolution {
+pub(crate) struct Deconvolution {
     grid: CoarseGrid,
     fft: SquareFft,
     kernel: Vec<Complex32>,
@@ -49,7 +49,7 @@ pub struct Deconvolution {
 
 impl Deconvolution {
     /// Deconvolution on a grid.
-    pub fn new(grid: CoarseGrid) -> Self {
+    pub(crate) fn new(grid: CoarseGrid) -> Self {
         let fft = SquareFft::new(grid.size);
         let n = grid.size;
         let squared: Vec<f32> = squared_frequencies(n).into_iter().map(|s| s as f32).collect();
@@ -62,12 +62,12 @@ impl Deconvolution {
     }
 
     /// The grid.
-    pub fn grid(&self) -> &CoarseGrid {
+    pub(crate) fn grid(&self) -> &CoarseGrid {
         &self.grid
     }
 
     /// Image of a scene on the grid in squares of the sensor.
-    pub fn seen(&self, scene: &Array2<f32>) -> Array2<f32> {
+    pub(crate) fn seen(&self, scene: &Array2<f32>) -> Array2<f32> {
         let [rows, columns] = self.grid.data;
         part(self.image(scene).view(), 0..rows, 0..columns).to_owned()
     }
@@ -91,7 +91,7 @@ impl Deconvolution {
     ///
     /// # Errors
     /// If the user stopped it.
-    pub fn solve(
+    pub(crate) fn solve(
         &self,
         data: &Array2<f32>,
         variance: f64,

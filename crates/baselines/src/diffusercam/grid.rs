@@ -11,7 +11,7 @@ use rayon::prelude::*;
 const FINER: f64 = 1.2;
 
 /// A scene on a square grid whose step moves the caustic by one pixel, and the convolutions with it.
-pub struct FineGrid {
+pub(crate) struct FineGrid {
     /// Steps from the middle of the scene to its border.
     half: [usize; 2],
     /// Tangent of a step.
@@ -27,7 +27,7 @@ pub struct FineGrid {
 impl FineGrid {
     /// Grid for a scene, the tangent of a step, rows and columns of the sensor, and kernels by channel and plane of the
     /// scene, all of one shape.
-    pub fn new(view: &SceneView, step: f64, frame: [usize; 2], kernels: &[Vec<Array2<f32>>]) -> Self {
+    pub(crate) fn new(view: &SceneView, step: f64, frame: [usize; 2], kernels: &[Vec<Array2<f32>>]) -> Self {
         let half = half_of(view, step);
         let (rows, columns) = kernels[0][0].dim();
         let kernel = [rows, columns];
@@ -48,13 +48,13 @@ impl FineGrid {
     }
 
     /// Places along the longer axis that hold a scene and its convolution with kernels of these rows and columns.
-    pub fn places(view: &SceneView, step: f64, kernel: [usize; 2]) -> usize {
+    pub(crate) fn places(view: &SceneView, step: f64, kernel: [usize; 2]) -> usize {
         let half = half_of(view, step);
         (2 * half[0] + kernel[0]).max(2 * half[1] + kernel[1])
     }
 
     /// A plane of the scene at the places of the grid.
-    pub fn sampled(&self, plane: &Array2<f32>, view: &SceneView) -> Array2<f32> {
+    pub(crate) fn sampled(&self, plane: &Array2<f32>, view: &SceneView) -> Array2<f32> {
         if self.step > FINER * view.pixel() {
             let view = view.no_finer(self.step);
             return sampled(&averaged(plane, &view), &view, self.half, self.step);
@@ -63,7 +63,7 @@ impl FineGrid {
     }
 
     /// Frames of all channels from planes of the scene on the grid.
-    pub fn frames(&self, planes: &[Array2<f32>]) -> Vec<Array2<f32>> {
+    pub(crate) fn frames(&self, planes: &[Array2<f32>]) -> Vec<Array2<f32>> {
         let spectra: Vec<Vec<Complex32>> = planes
             .par_iter()
             .map(|p| self.fft.of_plane(p, &mut FftScratch::default()))
@@ -96,7 +96,7 @@ impl FineGrid {
 }
 
 /// The scene at every second place, and what it sends to the pixels of one channel in each square of two by two.
-pub struct CoarseGrid {
+pub(crate) struct CoarseGrid {
     half: [usize; 2],
     step: f64,
     /// Places of the squares that count the channel.
@@ -112,7 +112,7 @@ pub struct CoarseGrid {
 impl CoarseGrid {
     /// Grid for the kernel of a grey surface on the pixels of a sensor, and the pixels of a square that count the
     /// channel.
-    pub fn new(fine: &FineGrid, grey: &Array2<f32>, places: &[[usize; 2]]) -> Self {
+    pub(crate) fn new(fine: &FineGrid, grey: &Array2<f32>, places: &[[usize; 2]]) -> Self {
         let half = fine.half.map(|h| h / 2);
         // The finer grid and this one have their middles together: its first place is that of `skipped`.
         let skipped = [0, 1].map(|a| fine.half[a] as i64 - 2 * half[a] as i64);
@@ -162,17 +162,17 @@ impl CoarseGrid {
     }
 
     /// Rows and columns of the scene on this grid.
-    pub fn scene(&self) -> [usize; 2] {
+    pub(crate) fn scene(&self) -> [usize; 2] {
         self.half.map(|h| 2 * h + 1)
     }
 
     /// A plane of the scene at the places of the grid.
-    pub fn sampled(&self, plane: &Array2<f32>, view: &SceneView) -> Array2<f32> {
+    pub(crate) fn sampled(&self, plane: &Array2<f32>, view: &SceneView) -> Array2<f32> {
         sampled(plane, view, self.half, self.step)
     }
 
     /// Light of the channel in each square: the mean of the pixels that count it.
-    pub fn data(&self, light: &Array2<f32>) -> Array2<f32> {
+    pub(crate) fn data(&self, light: &Array2<f32>) -> Array2<f32> {
         let share = 1.0 / self.places.len() as f32;
         Array2::from_shape_fn((self.data[0], self.data[1]), |(y, x)| {
             let pixels = self.places.iter().map(|p| light[[2 * y + p[0], 2 * x + p[1]]]);
@@ -181,7 +181,7 @@ impl CoarseGrid {
     }
 
     /// Mean variance of the light of a square, for how much each pixel is to be trusted.
-    pub fn variance(&self, inverse_variance: &Array2<f32>) -> f64 {
+    pub(crate) fn variance(&self, inverse_variance: &Array2<f32>) -> f64 {
         let known = inverse_variance.iter().filter(|t| **t > 0.0);
         let (sum, count) = known.fold((0.0, 0.0), |(s, n), t| (s + 1.0 / f64::from(*t), n + 1.0));
         sum / f64::max(count, 1.0) / self.places.len() as f64
@@ -189,7 +189,7 @@ impl CoarseGrid {
 }
 
 /// A plane on a grid of places of the scene as a picture of it, by cubics through four places (Catmull and Rom).
-pub fn on_scene(plane: &Array2<f32>, step: f64, view: &SceneView) -> Array2<f32> {
+pub(crate) fn on_scene(plane: &Array2<f32>, step: f64, view: &SceneView) -> Array2<f32> {
     let (rows, columns) = plane.dim();
     let weights = |place: f64, n: usize| {
         let i = place.floor();

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::DiffuserSpec;
 
 /// Heights between random numbers on a grid, by cubic B-splines: slopes and curvatures are continuous.
-pub struct RoughSurface {
+pub(crate) struct RoughSurface {
     numbers: Array2<f64>,
     grain_um: f64,
     /// Distance beyond the opening at which rays may land (um): four standard deviations of their way.
@@ -30,7 +30,7 @@ const MOST_BENT: f64 = 0.5;
 
 impl RoughSurface {
     /// Surface with an opening of this height and width (um).
-    pub fn new(spec: &DiffuserSpec, opening_um: [f64; 2]) -> Self {
+    pub(crate) fn new(spec: &DiffuserSpec, opening_um: [f64; 2]) -> Self {
         let [rows, columns] = opening_um.map(|um| (um / spec.grain_um).ceil() as usize + 4);
         let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
         // Curvature times (n - 1) times the distance is the power.
@@ -48,7 +48,7 @@ impl RoughSurface {
     }
 
     /// Pixels of this size around the opening that rays may land on.
-    pub fn border(&self, pixel_um: f64) -> usize {
+    pub(crate) fn border(&self, pixel_um: f64) -> usize {
         (self.border_um / pixel_um).ceil() as usize
     }
 
@@ -70,7 +70,7 @@ impl RoughSurface {
     /// Share of the light of the opening in each pixel below it, for rays that land by `bent_um` times the slope from where
     /// they passed: the distance times the index less one. `opening` is in pixels; the grid is wider by a border on all
     /// sides, and its middle is that of the opening.
-    pub fn caustic(&self, opening: [usize; 2], pixel_um: f64, bent_um: f64) -> Array2<f32> {
+    pub(crate) fn caustic(&self, opening: [usize; 2], pixel_um: f64, bent_um: f64) -> Array2<f32> {
         let [rows, columns] = opening;
         let border = self.border(pixel_um);
         let shape = (rows + 2 * border, columns + 2 * border);

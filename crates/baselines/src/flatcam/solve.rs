@@ -9,7 +9,7 @@ use ndarray::{Array2, ArrayView2};
 const CORRELATION: f64 = 0.95;
 
 /// The way from places of a scene to pixels along one axis, decomposed.
-pub struct Factor {
+pub(crate) struct Factor {
     /// `[pixel, mode]`.
     left: Mat<f64>,
     values: Vec<f64>,
@@ -22,7 +22,7 @@ impl Factor {
     ///
     /// # Errors
     /// If the decomposition fails.
-    pub fn new(all: &Mat<f64>, first: usize) -> Result<Self> {
+    pub(crate) fn new(all: &Mat<f64>, first: usize) -> Result<Self> {
         let places = all.ncols();
         let root = correlated(places);
         let own = Mat::from_fn((all.nrows() - first).div_ceil(2), places, |i, j| {
@@ -53,21 +53,21 @@ fn correlated(n: usize) -> Mat<f64> {
 }
 
 /// Factors of both axes.
-pub struct TwoFactors {
+pub(crate) struct TwoFactors {
     down: Factor,
     across: Factor,
 }
 
 impl TwoFactors {
     /// Along columns of the frame, and along its rows.
-    pub fn new(down: Factor, across: Factor) -> Self {
+    pub(crate) fn new(down: Factor, across: Factor) -> Self {
         Self { down, across }
     }
 
     /// The picture X that is likeliest for pixels Y, if both are normal: noise of one variance, and a picture whose
     /// covariance is a product of both axes. `strength` is the noise over the picture, of the largest singular value, squared.
     /// One picture for each strength.
-    pub fn solve(&self, pixels: &ArrayView2<'_, f32>, strengths: &[f64]) -> Vec<Array2<f32>> {
+    pub(crate) fn solve(&self, pixels: &ArrayView2<'_, f32>, strengths: &[f64]) -> Vec<Array2<f32>> {
         let y = Mat::from_fn(pixels.nrows(), pixels.ncols(), |i, j| f64::from(pixels[[i, j]]));
         let modes = self.down.left.transpose() * y * &self.across.left;
         let largest = self.down.values[0] * self.across.values[0];

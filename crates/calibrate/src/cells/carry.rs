@@ -16,7 +16,7 @@ const BENT: f64 = 0.06;
 const BESIDE: usize = 1;
 
 /// Transmissions over width at one wavelength.
-pub struct Carried {
+pub(crate) struct Carried {
     pub t: Vec<Complex64>,
     /// Widths that have to be solved in full.
     pub resonant: Vec<usize>,
@@ -24,7 +24,7 @@ pub struct Carried {
 
 /// `fine` and `coarse` are those of the stated pillar with many and few orders, `changed` those of the changed
 /// one with few.
-pub fn carried_over(fine: &[Complex64], coarse: &[Complex64], changed: &[Complex64]) -> Carried {
+pub(crate) fn carried_over(fine: &[Complex64], coarse: &[Complex64], changed: &[Complex64]) -> Carried {
     let last = fine.len() - 1;
     let shift = most_alike(coarse, changed);
     let like = |k: usize| k.saturating_add_signed(shift).min(last);

@@ -17,7 +17,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
-pub use table::PillarTable;
+pub(crate) use table::PillarTable;
 
 use self::carry::{Carried, carried_over};
 use metalith_cell::kept;

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use ndarray::{Array2, Zip};
 
-pub use equations::FrameEquations;
+pub(crate) use equations::FrameEquations;
 pub use nuisances::Nuisances;
 
 use crate::grouping::Grouping;

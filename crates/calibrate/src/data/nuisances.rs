@@ -11,7 +11,7 @@ use crate::optics::PixelGrid;
 use crate::set::{MeasurementIndex, PerLed, PerMeasurement};
 
 /// How far the black level may be off (DN), one standard deviation: sensors drift by less over a session.
-pub const BLACK_SIGMA_DN: f64 = 0.5;
+pub(crate) const BLACK_SIGMA_DN: f64 = 0.5;
 
 /// The nuisances of a set.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@ const REACH: i64 = 48;
 const BETTER: f32 = 1.02;
 
 /// Whole pixels (x, y) by which a window is off: the shift at which `seen` and `expected` correlate best.
-pub fn whole_pixel_shift(seen: &Array2<f32>, expected: &Array2<f32>) -> [f64; 2] {
+pub(crate) fn whole_pixel_shift(seen: &Array2<f32>, expected: &Array2<f32>) -> [f64; 2] {
     let (rows, cols) = seen.dim();
     let mut planner = FftPlanner::new();
     let along_x = planner.plan_fft_forward(cols);

@@ -4,7 +4,7 @@ use super::{Effect, Parameter, Stage, ValueError};
 use metalith_optics::{DeclaredQuantity, Perturbation};
 
 /// Optical path over every lens by some Zernike polynomials of one kind, the same at all colours.
-pub struct Aberration {
+pub(crate) struct Aberration {
     pub name: &'static str,
     /// Noll's numbers of the polynomials, each normalised to an rms of one over the aperture.
     pub noll: &'static [u32],
@@ -12,7 +12,7 @@ pub struct Aberration {
 }
 
 /// Aberrations through third order; tilts are registration, defocus is an effect of its own.
-pub const ABERRATIONS: [Aberration; 4] = [
+pub(crate) const ABERRATIONS: [Aberration; 4] = [
     Aberration {
         name: "astigmatism",
         noll: &[5, 6],

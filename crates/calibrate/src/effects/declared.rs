@@ -11,7 +11,7 @@ use metalith_optics::{CompiledTerm, DeclaredQuantity, DeclaredTerm, Perturbation
 use metalith_report::sig;
 
 /// Most parameters of one effect: a step of the search fits all of them at once.
-pub const MOST_PARAMETERS: usize = 6;
+pub(crate) const MOST_PARAMETERS: usize = 6;
 
 /// Largest number that a file may ask for, in any unit.
 const LARGEST: f64 = 1e6;

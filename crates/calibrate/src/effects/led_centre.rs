@@ -4,7 +4,7 @@ use super::{Effect, Parameter, Stage, ValueError};
 use metalith_optics::Perturbation;
 
 /// Added to the centre of one LED.
-pub struct LedCentre {
+pub(crate) struct LedCentre {
     /// Index of the LED in the set.
     pub led: usize,
     /// `led_centre_` and its stated centre.

@@ -12,10 +12,12 @@ mod stitching;
 mod table;
 mod value_error;
 
-pub use declared::{DeclaredEffect, DeclaredParameter, MOST_PARAMETERS};
-pub use metalith_attribution::{Parameter, ValueError};
-pub use stitching::StitchedFields;
-pub use value_error::value_error_of;
+pub(crate) use declared::MOST_PARAMETERS;
+pub use declared::{DeclaredEffect, DeclaredParameter};
+pub use metalith_attribution::Parameter;
+pub(crate) use metalith_attribution::ValueError;
+pub(crate) use stitching::StitchedFields;
+pub(crate) use value_error::value_error_of;
 
 use super::set::MeasuredSet;
 use metalith_core::{Error, Result};
@@ -128,7 +130,7 @@ pub trait Effect: Send + Sync {
 }
 
 /// The measurement that can distinguish two effects, as listed by either of them.
-pub fn separate_by(a: &dyn Effect, b: &str) -> Option<&'static str> {
+pub(crate) fn separate_by(a: &dyn Effect, b: &str) -> Option<&'static str> {
     let root = |name: &str| {
         if name.starts_with("led_centre") {
             "led_centre".to_owned()
@@ -184,7 +186,7 @@ pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {
 ///
 /// # Errors
 /// If a declared effect has the name of another.
-pub fn with_declared(set: &MeasuredSet, declared: &[DeclaredEffect]) -> Result<Vec<Box<dyn Effect>>> {
+pub(crate) fn with_declared(set: &MeasuredSet, declared: &[DeclaredEffect]) -> Result<Vec<Box<dyn Effect>>> {
     let mut effects = all(set);
     for own in declared {
         // Boundaries of write fields may be tried later, on a set that does not say where they run.

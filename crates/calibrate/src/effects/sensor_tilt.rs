@@ -11,13 +11,13 @@ const MOST_UM: f64 = 60.0;
 
 /// The tilt along x and y, about the middle of all elements, or along the one line that they are in: measurements of elements side by
 /// side tell nothing of a tilt about this line.
-pub struct SensorTilt {
+pub(crate) struct SensorTilt {
     extent: Extent,
 }
 
 impl SensorTilt {
     /// For the elements of a set; none if all of them are in one place.
-    pub fn of(set: &MeasuredSet) -> Option<Self> {
+    pub(crate) fn of(set: &MeasuredSet) -> Option<Self> {
         let at: Vec<[f64; 2]> = set.elements.iter().map(|e| e.centre_um).collect();
         Some(Self {
             extent: Extent::of(&at)?,

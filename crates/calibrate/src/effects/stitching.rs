@@ -14,7 +14,7 @@ const TYPICAL: f64 = 0.02;
 
 /// A boundary at the same place in every lens: the displacement beyond it along x and y, and its place. Tried where it is known about
 /// where boundaries run, and where one at some place would explain much of what all others leave.
-pub struct StitchedFields {
+pub(crate) struct StitchedFields {
     /// Axis that the boundary is across.
     axis: usize,
     /// Its stated place from the middle of a lens (um).
@@ -24,12 +24,12 @@ pub struct StitchedFields {
 
 impl StitchedFields {
     /// Names of such effects, by the axis that the boundary is across.
-    pub const NAMES: [&'static str; 2] = ["stitching_x", "stitching_y"];
+    pub(crate) const NAMES: [&'static str; 2] = ["stitching_x", "stitching_y"];
     /// Index, among their numbers, of the place of the boundary.
-    pub const PLACE: usize = 2;
+    pub(crate) const PLACE: usize = 2;
 
     /// Boundaries across x and across y for the lenses of a set that says where they run.
-    pub fn of(set: &MeasuredSet) -> impl Iterator<Item = Self> + use<> {
+    pub(crate) fn of(set: &MeasuredSet) -> impl Iterator<Item = Self> + use<> {
         let diameter_um = set.stack.lens_diameter_um;
         let places = set.field_boundary_um.into_iter();
         places.flat_map(move |place| {

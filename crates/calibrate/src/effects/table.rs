@@ -18,7 +18,7 @@ type Reported = fn(&[f64], &[f64]) -> Vec<(f64, [f64; 2])>;
 
 /// An effect of the table.
 #[derive(Clone, Copy)]
-pub struct TableEffect {
+pub(crate) struct TableEffect {
     /// The name it is reported by.
     pub name: &'static str,
     /// Unit of the value that is reported.
@@ -68,7 +68,7 @@ const PLAIN: TableEffect = TableEffect {
 };
 
 /// All of them, in the order of tables and of the search.
-pub static TABLE: [TableEffect; 18] = [
+pub(crate) static TABLE: [TableEffect; 18] = [
     // Every pillar is wider or narrower than drawn by the same amount.
     TableEffect {
         name: "cd_bias",
@@ -327,7 +327,7 @@ pub static TABLE: [TableEffect; 18] = [
 ];
 
 /// The effect that chips of circles cannot have.
-pub const CORNER_ROUNDING: &str = "corner_rounding";
+pub(crate) const CORNER_ROUNDING: &str = "corner_rounding";
 
 /// The amplitude of two parameters in quadrature, with its interval.
 fn amplitude(numbers: &[f64], half_widths: &[f64]) -> Vec<(f64, [f64; 2])> {

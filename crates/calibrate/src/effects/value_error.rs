@@ -14,7 +14,7 @@ const OF_STACK: f64 = 4e-3;
 const OF_OTHERS: f64 = 2e-3;
 
 /// The error of the values of effects of a stage that were not measured one by one.
-pub const fn value_error_of(stage: Stage) -> ValueError {
+pub(crate) const fn value_error_of(stage: Stage) -> ValueError {
     match stage {
         Stage::Stack => ValueError::of_value(OF_STACK),
         Stage::Geometry | Stage::Diffraction | Stage::Source | Stage::Camera => ValueError::of_value(OF_OTHERS),

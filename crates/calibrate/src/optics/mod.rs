@@ -2,5 +2,5 @@
 
 mod spectrum;
 
-pub use metalith_sensor::{Optic, PixelGrid, Reading};
-pub use spectrum::Quadrature;
+pub(crate) use metalith_sensor::{Optic, PixelGrid, Reading};
+pub(crate) use spectrum::Quadrature;

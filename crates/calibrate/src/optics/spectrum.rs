@@ -6,7 +6,7 @@ use metalith_optics::LightChange;
 /// Equidistant wavelengths over a Gaussian: for smooth integrands this sum converges faster than any power
 /// of its step.
 #[derive(Clone, Debug)]
-pub struct Quadrature {
+pub(crate) struct Quadrature {
     /// Wavelengths (nm).
     pub wavelengths_nm: Vec<f64>,
     led: BenchLed,
@@ -24,7 +24,7 @@ const MOST_SIGMAS: f64 = 5.2;
 
 impl Quadrature {
     /// Wavelengths not more than `step_nm` apart, within `range_nm`.
-    pub fn new(led: BenchLed, step_nm: f64, range_nm: (f64, f64)) -> Self {
+    pub(crate) fn new(led: BenchLed, step_nm: f64, range_nm: (f64, f64)) -> Self {
         let (sigmas, beyond_nm) = REACH_OF_NARROW;
         let sigma_nm = led.sigma_nm();
         let reach = (REACH_SIGMAS * sigma_nm)
@@ -41,7 +41,7 @@ impl Quadrature {
 
     /// Weights, with a sum of one, of this LED, the `led`-th of its set, where lamps are changed: shifted, scaled in
     /// width, and as declared.
-    pub fn weights(&self, led: usize, change: &LightChange) -> Vec<f64> {
+    pub(crate) fn weights(&self, led: usize, change: &LightChange) -> Vec<f64> {
         let (sigma, centre) = (self.led.sigma_nm() * (1.0 + change.led_width), self.led.centre_nm);
         let gaussian = |l: &f64| (-0.5 * ((l - centre - change.shift_nm(led)) / sigma).powi(2)).exp();
         let raw: Vec<f64> = self

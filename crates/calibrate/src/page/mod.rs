@@ -20,7 +20,7 @@ use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdi
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_page(
+pub(crate) fn write_page(
     path: &Path,
     session: &Session<'_>,
     simulations: &Simulations,
@@ -243,7 +243,7 @@ fn capitalised(text: &str) -> String {
 }
 
 /// Numbers of a JSON value to four digits.
-pub fn round_json(value: &serde_json::Value) -> String {
+pub(crate) fn round_json(value: &serde_json::Value) -> String {
     match value {
         serde_json::Value::Array(items) => {
             format!("[{}]", items.iter().map(round_json).collect::<Vec<_>>().join(", "))

@@ -199,7 +199,7 @@ fn strongest_of(frames: &[Frame], blur: f64, places: &[[i32; 2]], progress: &dyn
 impl Ghost {
     /// As an effect to be fitted: a copy with a spot of its own, a Gaussian whose variance may be zero. One form serves sharp
     /// and blurred copies, so that no two proposals compete for the same light.
-    pub fn declared(&self, pixel_um: f64) -> DeclaredEffect {
+    pub(crate) fn declared(&self, pixel_um: f64) -> DeclaredEffect {
         let place = |name: &str, at: i32| {
             let (start, room) = (f64::from(at) * pixel_um, f64::from(ROOM_PIXELS) * pixel_um);
             DeclaredParameter {

@@ -17,7 +17,7 @@ use metalith_core::{Progress, Result};
 pub use write_fields::{FieldBoundary, boundary_of_fields};
 
 /// A shape is proposed if it removes this share of the chi-square above noise: less is a part of something else.
-pub const WORTH_PROPOSING: f64 = 0.3;
+pub(crate) const WORTH_PROPOSING: f64 = 0.3;
 
 /// An effect that may explain what a finding leaves.
 #[derive(Clone, Debug)]

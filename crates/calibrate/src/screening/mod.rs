@@ -28,7 +28,7 @@ pub struct UnusableMeasurement {
 }
 
 /// Measurements that cannot be used, by a fit of the nuisances to the set as stated.
-pub fn unusable_measurements(
+pub(crate) fn unusable_measurements(
     set: &MeasuredSet,
     problem: &FitProblem<'_>,
     nuisances: &Nuisances,

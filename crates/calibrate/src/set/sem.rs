@@ -28,7 +28,7 @@ const MEASURED: usize = 5;
 ///
 /// # Errors
 /// If the file cannot be read or a line is not what its columns say.
-pub fn read(path: &Path) -> Result<Vec<SemSite>> {
+pub(crate) fn read(path: &Path) -> Result<Vec<SemSite>> {
     let text = document::load(path)?;
     let fault = |line: usize, what: String| Error::Table {
         path: path.to_owned(),

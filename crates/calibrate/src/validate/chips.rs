@@ -7,10 +7,10 @@ use crate::effects::{Effect, Parameter, Stage};
 use metalith_core::{Error, Result};
 
 /// The truth of a set without any effect.
-pub const NOTHING: &str = "nothing";
+pub(crate) const NOTHING: &str = "nothing";
 
 /// Sizes at which every effect is tried (typical sizes).
-pub const SIZES: [f64; 3] = [0.5, 1.0, 2.0];
+pub(crate) const SIZES: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// Effects that are tried together, each at its typical size: of one stage and of several, alike and unlike.
 const PAIRS: [(&str, &str); 8] = [
@@ -28,10 +28,10 @@ const PAIRS: [(&str, &str); 8] = [
 const SHARES: [f64; 3] = [1.0, -0.6, 0.4];
 
 /// An effect with its parameters.
-pub type AppliedEffect = (String, Vec<f64>);
+pub(crate) type AppliedEffect = (String, Vec<f64>);
 
 /// A chip and a bench that sets are made of.
-pub struct SyntheticChip {
+pub(crate) struct SyntheticChip {
     pub truth: String,
     /// Size in typical sizes; of two effects, the size of the first.
     pub size: f64,
@@ -40,7 +40,7 @@ pub struct SyntheticChip {
 
 impl SyntheticChip {
     /// Chip without effect.
-    pub fn stated() -> Self {
+    pub(crate) fn stated() -> Self {
         Self {
             truth: NOTHING.into(),
             size: 0.0,
@@ -49,7 +49,7 @@ impl SyntheticChip {
     }
 
     /// Chip with one effect.
-    pub fn single(name: &str, size: f64, numbers: Vec<f64>) -> Self {
+    pub(crate) fn single(name: &str, size: f64, numbers: Vec<f64>) -> Self {
         Self {
             truth: name.into(),
             size,
@@ -74,7 +74,7 @@ fn numbers(parameters: Vec<Parameter>, size: f64) -> Vec<f64> {
 }
 
 /// One chip for each effect and size, one for each pair of effects that are both among these.
-pub fn of_each_effect(effects: &[&dyn Effect]) -> Vec<SyntheticChip> {
+pub(crate) fn of_each_effect(effects: &[&dyn Effect]) -> Vec<SyntheticChip> {
     let singles = effects.iter().flat_map(|effect| {
         SIZES.map(|size| SyntheticChip::single(&effect.name(), size, numbers(effect.parameters(), size)))
     });
@@ -92,7 +92,7 @@ pub fn of_each_effect(effects: &[&dyn Effect]) -> Vec<SyntheticChip> {
 ///
 /// # Errors
 /// If the text has another form, an effect is not among these, or a size lies outside of what physics allows.
-pub fn of_text(effects: &[&dyn Effect], text: &str) -> Result<SyntheticChip> {
+pub(crate) fn of_text(effects: &[&dyn Effect], text: &str) -> Result<SyntheticChip> {
     let wrong = |what: String, hint: String| Error::refused("calibrate/trial", format!("trial `{text}`: {what}"), hint);
     let mut parts: Vec<AppliedEffect> = Vec::new();
     let mut first = None;
@@ -155,7 +155,7 @@ pub fn of_text(effects: &[&dyn Effect], text: &str) -> Result<SyntheticChip> {
 /// Chips, so many, with one or two effects each, of 0.5 to 2 typical sizes and both signs, drawn from a seed. Effects
 /// of the pillar itself take one of [`SIZES`], and no two of them meet: tables of cells would be solved for one chip
 /// alone.
-pub fn at_random(effects: &[&dyn Effect], count: u64, seed: u64) -> Vec<SyntheticChip> {
+pub(crate) fn at_random(effects: &[&dyn Effect], count: u64, seed: u64) -> Vec<SyntheticChip> {
     let [least, .., most] = SIZES;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut chips = Vec::new();

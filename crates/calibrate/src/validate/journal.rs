@@ -9,14 +9,14 @@ use super::ValidationTrial;
 use metalith_core::{Error, Result};
 
 /// A file of one line of JSON for each set, in the order in which they end; none if nobody asked for one.
-pub struct Journal<'p>(Option<(&'p Path, Mutex<File>)>);
+pub(crate) struct Journal<'p>(Option<(&'p Path, Mutex<File>)>);
 
 impl<'p> Journal<'p> {
     /// An empty one, in a folder that is made if need be.
     ///
     /// # Errors
     /// If folder or file cannot be made.
-    pub fn new(path: Option<&'p Path>) -> Result<Self> {
+    pub(crate) fn new(path: Option<&'p Path>) -> Result<Self> {
         let Some(path) = path else {
             return Ok(Self(None));
         };
@@ -31,7 +31,7 @@ impl<'p> Journal<'p> {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn keep(&self, trial: &ValidationTrial) -> Result<()> {
+    pub(crate) fn keep(&self, trial: &ValidationTrial) -> Result<()> {
         let Some((path, file)) = &self.0 else {
             return Ok(());
         };

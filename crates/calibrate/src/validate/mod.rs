@@ -6,7 +6,7 @@ mod journal;
 mod noiseless;
 mod page;
 mod summary;
-pub mod synthetic;
+pub(crate) mod synthetic;
 
 use std::path::PathBuf;
 

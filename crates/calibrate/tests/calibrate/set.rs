@@ -11,7 +11,7 @@ use metalith_testing::session::small_set;
 
 /// The small set on disk, and a folder for tables of cells: every test would solve the same ones. Both are emptied
 /// by the first test that needs them, so that no run depends on another.
-pub static FOLDERS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
+pub(crate) static FOLDERS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
     ["small-set", "cells"].map(|name| {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrate").join(name);
         let _ = fs::remove_dir_all(&folder);
@@ -20,24 +20,24 @@ pub static FOLDERS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
     })
 });
 
-pub static LIKE: LazyLock<MeasuredSet> = LazyLock::new(|| {
+pub(crate) static LIKE: LazyLock<MeasuredSet> = LazyLock::new(|| {
     let [folder, _] = &*FOLDERS;
     small_set(folder);
     MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap()
 });
 
 /// Simulations with some of the effects whose cells need not be solved again.
-pub static SIMULATIONS: LazyLock<Simulations> =
+pub(crate) static SIMULATIONS: LazyLock<Simulations> =
     LazyLock::new(|| Session::new(&LIKE, settings()).unwrap().simulate(&Silent).unwrap());
 
-pub static SYNTHESIZER: LazyLock<Synthesizer<'static>> =
+pub(crate) static SYNTHESIZER: LazyLock<Synthesizer<'static>> =
     LazyLock::new(|| Synthesizer::new(&LIKE, &settings()).unwrap());
 
-pub fn settings() -> Settings {
+pub(crate) fn settings() -> Settings {
     with_effects(&["cd_bias", "defocus", "tilt", "led_width", "zero_order", "pixel_blur"])
 }
 
-pub fn with_effects(names: &[&str]) -> Settings {
+pub(crate) fn with_effects(names: &[&str]) -> Settings {
     Settings {
         sampling: BenchSampling {
             spectrum: 0.34,
@@ -52,13 +52,13 @@ pub fn with_effects(names: &[&str]) -> Settings {
 }
 
 /// A set like the small one with some effects.
-pub fn synthetic(parts: &[(&str, &[f64])], seed: u64) -> MeasuredSet {
+pub(crate) fn synthetic(parts: &[(&str, &[f64])], seed: u64) -> MeasuredSet {
     let images = SYNTHESIZER.with_effects(&[parts.to_vec()], &Silent).unwrap().remove(0);
     SYNTHESIZER.draw(&images, seed)
 }
 
 /// The names of what was found, in order of the alphabet.
-pub fn names(d: &Diagnosis) -> Vec<&str> {
+pub(crate) fn names(d: &Diagnosis) -> Vec<&str> {
     let mut found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
     found.sort_unstable();
     found

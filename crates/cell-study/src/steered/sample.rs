@@ -30,7 +30,7 @@ pub(super) struct SiteSample {
 
 impl SiteSample {
     /// Sites of a lens with a wedge on it that have all their neighbours.
-    pub fn new(lens: &LensPhase, wedge: &Wedge) -> Self {
+    pub(crate) fn new(lens: &LensPhase, wedge: &Wedge) -> Self {
         let phase = ElementPhase::new(lens, wedge);
         let n = lens.lattice().sites();
         let offsets = neighbours(lens.lattice().kind());
@@ -60,7 +60,7 @@ impl SiteSample {
 
     /// Share of the light in the first order for each table (responses for s and p, all of one basis), mean of s and p,
     /// where a phase of u turns is drawn with `width_nm(u)`.
-    pub fn shares(&self, width_nm: impl Fn(f64) -> f64 + Sync, tables: &[[NeighbourResponse; 2]]) -> Vec<f64> {
+    pub(crate) fn shares(&self, width_nm: impl Fn(f64) -> f64 + Sync, tables: &[[NeighbourResponse; 2]]) -> Vec<f64> {
         let Some([first, _]) = tables.first() else {
             return Vec::new();
         };

@@ -72,7 +72,7 @@ pub(super) struct Output {
 
 impl Output {
     /// `file` is the empty file at `path`, open for writing.
-    pub fn new(file: File, path: &Path) -> Self {
+    pub(crate) fn new(file: File, path: &Path) -> Self {
         Self {
             file,
             path: path.to_owned(),
@@ -84,12 +84,12 @@ impl Output {
     }
 
     /// The file as far as it is written.
-    pub fn file(&self) -> &File {
+    pub(crate) fn file(&self) -> &File {
         &self.file
     }
 
     /// Hand over what waits; the file, complete.
-    pub fn finish(&mut self) -> io::Result<&File> {
+    pub(crate) fn finish(&mut self) -> io::Result<&File> {
         self.put(self.waiting)?;
         Ok(&self.file)
     }

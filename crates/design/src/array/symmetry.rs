@@ -191,7 +191,7 @@ pub(super) mod tests {
     use super::*;
 
     /// A lens of 12 sites across, whose widths follow from twice the place from the middle.
-    pub fn lens(f: impl Fn(i64, i64) -> u16) -> PillarMap {
+    pub(crate) fn lens(f: impl Fn(i64, i64) -> u16) -> PillarMap {
         let lattice = Lattice::new(350, 12).unwrap();
         let mut map = PillarMap::empty(lattice);
         for iy in 0..12 {

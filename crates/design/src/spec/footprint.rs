@@ -15,7 +15,7 @@ pub(crate) struct Footprint {
 impl Footprint {
     /// Footprint of a lens whose outline is turned by so many degrees; `None` where there is no lattice, which is
     /// another mistake.
-    pub fn of(lens: &LensSpec, rotation_deg: f64, cell: &CellSpec) -> Option<Self> {
+    pub(crate) fn of(lens: &LensSpec, rotation_deg: f64, cell: &CellSpec) -> Option<Self> {
         let lattice = Lattice::of_kind_covering(cell.lattice, lens.diameter_nm, cell.pitch_nm).ok()?;
         let reach = match &lens.outline {
             Some(outline) => lattice.within(outline.rotated(rotation_deg).ends_nm()),
@@ -28,7 +28,7 @@ impl Footprint {
     }
 
     /// Least distance of two such elements side by side along x and along y (nm): their pillars are then a pitch apart.
-    pub fn sides_nm(&self) -> [i64; 2] {
+    pub(crate) fn sides_nm(&self) -> [i64; 2] {
         self.ends_nm.map(|[least, greatest]| greatest - least + self.pitch_nm)
     }
 

@@ -102,7 +102,7 @@ pub struct LayoutSpec {
 }
 
 /// `YYYY-MM-DDThh:mm:ss`.
-pub type NaiveTimestamp = String;
+pub(crate) type NaiveTimestamp = String;
 
 /// A valid date for every reader of the format, and not "now".
 const FIXED_TIMESTAMP: &str = "2000-01-01T00:00:00";

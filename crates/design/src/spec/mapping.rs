@@ -19,7 +19,7 @@ pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle 
 
 /// State of the library of upright rectangles, or of the mapping that is solved from the cell, that a reader requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LibraryFile {
+pub(crate) enum LibraryFile {
     Needed,
     /// Library or mapping that the caller makes; until then a design has no pillars.
     ToBeMade,

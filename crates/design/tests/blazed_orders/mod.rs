@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 /// One order of a grating.
 #[derive(Clone, Copy)]
-pub struct BlazeOrder {
+pub(crate) struct BlazeOrder {
     /// Amplitude along the incident field for s and p incident, `[incident]`, less the phase of the grating at the
     /// origin: it does not turn with `offset_turns`. Its squared modulus is the share.
     pub amplitude: [Complex64; 2],
@@ -17,7 +17,7 @@ pub struct BlazeOrder {
 }
 
 /// The orders of a solved grating.
-pub struct BlazeOrders {
+pub(crate) struct BlazeOrders {
     /// Wave vector of the first order less that of the incident wave, as in
     /// [`SupercellOrder::wave`](metalith_rcwa::SupercellOrder::wave).
     first: [i64; 2],
@@ -28,7 +28,7 @@ pub struct BlazeOrders {
 impl BlazeOrders {
     /// The orders of a grating whose phases (turns, 0 <= u < 1) are drawn by `width_nm`, in light from a direction with
     /// these `sines` in air along x and y.
-    pub fn solve(blaze: &Blaze, cell: &CoarseCell<'_>, width_nm: impl Fn(f64) -> f64, sines: [f64; 2]) -> Self {
+    pub(crate) fn solve(blaze: &Blaze, cell: &CoarseCell<'_>, width_nm: impl Fn(f64) -> f64, sines: [f64; 2]) -> Self {
         let lattice = SiteLattice::of_grating(blaze.turns, blaze.sites).unwrap();
         let response = cell
             .solve(lattice, &blaze.widths_nm(&lattice, width_nm), sines)
@@ -45,7 +45,7 @@ impl BlazeOrders {
     }
 
     /// Order `m`: its wave vector is the sum of the incident wave's and m times the grating's. Zero where it does not propagate.
-    pub fn order(&self, m: i32) -> BlazeOrder {
+    pub(crate) fn order(&self, m: i32) -> BlazeOrder {
         let [x, y] = self.first.map(|v| i32::try_from(i64::from(m) * v).ok());
         let order = x.zip(y).and_then(|(x, y)| self.response.order([x, y]));
         let Some(order) = order else {
@@ -63,7 +63,7 @@ impl BlazeOrders {
 }
 
 /// Sines by which the first order of a grating is turned, for a wavelength over the pitch.
-pub fn first_order_sines(blaze: &Blaze, wavelength_over_pitch: f64) -> [f64; 2] {
+pub(crate) fn first_order_sines(blaze: &Blaze, wavelength_over_pitch: f64) -> [f64; 2] {
     blaze
         .turns
         .map(|t| f64::from(t) / blaze.sites as f64 * wavelength_over_pitch)

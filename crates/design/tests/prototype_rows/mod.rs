@@ -13,10 +13,10 @@ use metalith_design::{Design, PillarRule};
 use num_complex::Complex64;
 
 /// Places where rows begin, from the middle of the element (um).
-pub const RADII_UM: [f64; 4] = [60.0, 180.0, 300.0, 440.0];
+pub(crate) const RADII_UM: [f64; 4] = [60.0, 180.0, 300.0, 440.0];
 
 /// Share of the light that models put elsewhere than the supercell of a row, mean of s and p.
-pub struct RowMisfit {
+pub(crate) struct RowMisfit {
     pub radius_um: f64,
     pub direction: [i32; 2],
     /// Equal neighbours, lit along the normal.
@@ -28,7 +28,7 @@ pub struct RowMisfit {
 }
 
 /// Rows of one light, and what the table of neighbours leaves of supercells that it was not fitted to.
-pub struct Misfits {
+pub(crate) struct Misfits {
     pub rows: Vec<RowMisfit>,
     pub left_out: f64,
     /// Share of the light in the first order of all rows together, mean of s and p: by equal neighbours lit as the rows
@@ -38,39 +38,39 @@ pub struct Misfits {
 
 impl Misfits {
     /// Mean over the rows: equal neighbours lit along the normal and as the rows are, and those that there are.
-    pub fn means(&self) -> [f64; 3] {
+    pub(crate) fn means(&self) -> [f64; 3] {
         let mean = |of: fn(&RowMisfit) -> f64| self.rows.iter().map(of).sum::<f64>() / self.rows.len() as f64;
         [mean(|r| r.normal), mean(|r| r.oblique), mean(|r| r.neighbours)]
     }
 }
 
 /// Amplitude in an order of a blazed row, of what its sites pass. Phases are without that of the wedge at the middle of pillar 0.
-pub fn order(blaze: &Blaze, sites: &[Complex64], order: f64) -> Complex64 {
+pub(crate) fn order(blaze: &Blaze, sites: &[Complex64], order: f64) -> Complex64 {
     let back = |x: usize| Complex64::cis(-TAU * order * blaze.phase(x, 0));
     sites.iter().enumerate().map(|(x, t)| t * back(x)).sum::<Complex64>() / sites.len() as f64
 }
 
-pub struct Prototype {
+pub(crate) struct Prototype {
     pub design: Design,
     pub mapping: Mapping,
 }
 
 impl Prototype {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let design = Design::read(&metalith_testing::design("prototype_3x3")).unwrap();
         let rule = PillarRule::new(&design.cell, &design.mapping);
         let mapping = Mapping::new(|u| rule.width_nm(u));
         Self { design, mapping }
     }
 
-    pub fn neighbours(&self, wavelength_um: f64, sines: [f64; 2]) -> NeighbourTable {
+    pub(crate) fn neighbours(&self, wavelength_um: f64, sines: [f64; 2]) -> NeighbourTable {
         let spec = NeighbourTableSpec { wavelength_um, sines };
         let stack = self.design.cell_stack().unwrap();
         NeighbourTable::obtain(&spec, &stack, std::slice::from_ref(&self.mapping), None, &Silent).unwrap()
     }
 
     /// Rows of an element that is steered by these angles along x and y, in light from where it looks.
-    pub fn misfits(&self, wavelength_nm: f64, steered_deg: [f64; 2]) -> Misfits {
+    pub(crate) fn misfits(&self, wavelength_nm: f64, steered_deg: [f64; 2]) -> Misfits {
         let um = wavelength_nm * 1e-3;
         // Steered towards -x and -y, so that light arrives from the other side as tables have it.
         let [sin_x, sin_y] = steered_deg.map(|deg| -deg.to_radians().sin());

@@ -1,7 +1,7 @@
 //! The blazed rows of golden/truth/supercell.csv, beside what single cells and supercells with few orders make of them.
 
 #[path = "../blazed_orders/mod.rs"]
-pub mod blazed_orders;
+pub(crate) mod blazed_orders;
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -12,7 +12,7 @@ use metalith_design::{Design, PillarRule};
 use num_complex::Complex64;
 
 /// A line of the table; its columns are described in golden/truth/README.md.
-pub struct Row {
+pub(crate) struct Row {
     pub cells: usize,
     pub turns: i32,
     pub wavelength_nm: u32,
@@ -33,7 +33,7 @@ pub struct Row {
 /// Rows of one grating and one wavelength. Differences are root mean squares over offsets, incidences and
 /// polarisations.
 #[derive(Clone, Default)]
-pub struct Summary {
+pub(crate) struct Summary {
     pub rows: usize,
     /// Mean share of the first order: by the truth, by single cells at normal incidence, by single cells at the angle
     /// of arrival, by [`BlazeOrders`].
@@ -50,7 +50,7 @@ pub struct Summary {
 }
 
 /// The table.
-pub fn read() -> Vec<Row> {
+pub(crate) fn read() -> Vec<Row> {
     let path = metalith_testing::root().join("golden/truth/supercell.csv");
     let text = std::fs::read_to_string(path).unwrap();
     text.lines()
@@ -123,7 +123,7 @@ fn summary(rows: &[&Row], design: &Design, cell: &CoarseCell<'_>) -> Summary {
 }
 
 /// A summary for each (cells, turns, wavelength in nm).
-pub fn compare(rows: &[Row]) -> BTreeMap<(usize, i32, u32), Summary> {
+pub(crate) fn compare(rows: &[Row]) -> BTreeMap<(usize, i32, u32), Summary> {
     let design = Design::read(&metalith_testing::design("prototype_3x3")).unwrap();
     let stack = design.cell_stack().unwrap();
     let (low, high) = design.cell.width_range_nm;
@@ -148,7 +148,7 @@ pub fn compare(rows: &[Row]) -> BTreeMap<(usize, i32, u32), Summary> {
 }
 
 /// All groups as one.
-pub fn total<'a>(groups: impl Iterator<Item = &'a Summary> + Clone) -> Summary {
+pub(crate) fn total<'a>(groups: impl Iterator<Item = &'a Summary> + Clone) -> Summary {
     let n: usize = groups.clone().map(|s| s.rows).sum();
     let mean = |of: &dyn Fn(&Summary) -> f64| groups.clone().map(|s| s.rows as f64 * of(s)).sum::<f64>() / n as f64;
     let square = |of: &dyn Fn(&Summary) -> f64| mean(&|s| of(s).powi(2)).sqrt();

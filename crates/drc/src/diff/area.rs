@@ -30,7 +30,7 @@ pub(super) struct Sides(Vec<End>);
 
 impl Sides {
     /// Add a ring, counter-clockwise and not closed: with sign 1 of the first set, with -1 of the second.
-    pub fn add(&mut self, ring: &[Point], sign: i32) {
+    pub(crate) fn add(&mut self, ring: &[Point], sign: i32) {
         for (k, &p) in ring.iter().enumerate() {
             let q = ring[(k + 1) % ring.len()];
             if p == q {
@@ -53,7 +53,7 @@ impl Sides {
     }
 
     /// True if both sets cover every place equally often: all that begins at a place of a line ends there.
-    pub fn cancel(mut self) -> bool {
+    pub(crate) fn cancel(mut self) -> bool {
         self.0.sort_unstable();
         let place = |e: &End| (e.direction, e.offset, e.at);
         self.0

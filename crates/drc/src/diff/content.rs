@@ -70,7 +70,7 @@ impl Strings {
     }
 
     /// The strings in order, the texts of both layouts numbered and sorted by it.
-    pub fn sorted(self, contents: [&mut Content; 2]) -> Vec<Box<[u8]>> {
+    pub(crate) fn sorted(self, contents: [&mut Content; 2]) -> Vec<Box<[u8]>> {
         let mut strings: Vec<(Box<[u8]>, u32)> = self.0.into_iter().collect();
         strings.sort_unstable();
         let mut place = vec![0; strings.len()];
@@ -90,7 +90,7 @@ impl Strings {
 
 impl Content {
     /// Read a layout; its coordinates times `factor` are in the common unit.
-    pub fn read(
+    pub(crate) fn read(
         layout: &Layout,
         factor: i64,
         wanted: WantedPillars<'_>,

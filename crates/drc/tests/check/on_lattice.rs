@@ -6,13 +6,13 @@ use metalith_testing::gds::Gds;
 use crate::{broken, input, layout};
 
 /// Middle of a site of a lattice about the origin (nm).
-pub fn site(pitch: i32, sites: i32, column: i32, row: i32) -> (i32, i32) {
+pub(crate) fn site(pitch: i32, sites: i32, column: i32, row: i32) -> (i32, i32) {
     let at = |k: i32| pitch * k - pitch * (sites - 1) / 2;
     (at(column), at(row))
 }
 
 /// Rules that are broken with their counts, and pillars on lattices, of what `draw` leaves at each site with `more` on it.
-pub fn broken_on_lattice(
+pub(crate) fn broken_on_lattice(
     deck: &Deck,
     sites: i32,
     draw: impl Fn(&mut Gds, i32, i32),

@@ -25,7 +25,7 @@ pub(super) struct Cluster<'a> {
 
 impl Cluster<'_> {
     /// Its lattice, and how far its pillars reach; none if it is too small to be an element.
-    pub fn element(&self) -> Result<Option<ElementSite>, ExtractionError> {
+    pub(crate) fn element(&self) -> Result<Option<ElementSite>, ExtractionError> {
         let pillars: u64 = self.members.iter().map(|&k| self.tiles.pillars(k)).sum();
         if pillars < FEWEST {
             return Ok(None);

@@ -23,7 +23,13 @@ pub(super) struct PillarCollector {
 
 impl PillarCollector {
     /// Holds `most` sites.
-    pub fn new(plan: &ExtractionPlan, shape: PillarShape, sites: Vec<ElementSite>, scale: Scale, most: u64) -> Self {
+    pub(crate) fn new(
+        plan: &ExtractionPlan,
+        shape: PillarShape,
+        sites: Vec<ElementSite>,
+        scale: Scale,
+        most: u64,
+    ) -> Self {
         Self {
             layer: plan.pillar_layer,
             shape,
@@ -36,7 +42,7 @@ impl PillarCollector {
         }
     }
 
-    pub fn finish(self, top: String) -> Result<Extraction<StoredPillars>, ExtractionError> {
+    pub(crate) fn finish(self, top: String) -> Result<Extraction<StoredPillars>, ExtractionError> {
         Ok(Extraction {
             top,
             shape: self.shape,

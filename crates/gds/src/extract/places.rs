@@ -14,7 +14,7 @@ pub(super) struct Centre {
 impl Centre {
     /// Centre of the box around a shape, if it is near enough and on the grid.
     #[inline]
-    pub fn of(r: &Rect, scale: Scale) -> Option<Self> {
+    pub(crate) fn of(r: &Rect, scale: Scale) -> Option<Self> {
         if !scale.reaches(r) {
             return None;
         }
@@ -40,7 +40,7 @@ pub(super) struct Places {
 
 impl Places {
     /// Places by tiles whose side is two to the power of `bits` (half nm).
-    pub fn new(scale: Scale, bits: u32) -> Self {
+    pub(crate) fn new(scale: Scale, bits: u32) -> Self {
         Self {
             scale,
             tiles: TileMap::new(bits),
@@ -52,14 +52,14 @@ impl Places {
     }
 
     /// The tiles, unless they are more than are held.
-    pub fn finish(mut self) -> Option<TileMap> {
+    pub(crate) fn finish(mut self) -> Option<TileMap> {
         self.place_own();
         (!self.scattered).then_some(self.tiles)
     }
 
     /// These places and those of other shapes.
     #[must_use]
-    pub fn united(mut self, mut others: Self) -> Self {
+    pub(crate) fn united(mut self, mut others: Self) -> Self {
         self.place_own();
         others.place_own();
         self.scattered |= others.scattered || !self.tiles.unite(&others.tiles);
@@ -67,7 +67,7 @@ impl Places {
     }
 
     /// A cell with these placements begins.
-    pub fn begin(&mut self, placements: &[Transform]) {
+    pub(crate) fn begin(&mut self, placements: &[Transform]) {
         self.place_own();
         self.placements.clear();
         if self.gathers(placements) {
@@ -79,7 +79,7 @@ impl Places {
 
     /// A shape of the current cell; `centre` says where it is in a placement, if it is looked for.
     #[inline]
-    pub fn add(&mut self, placements: &[Transform], mut centre: impl FnMut(&Transform) -> Option<Centre>) {
+    pub(crate) fn add(&mut self, placements: &[Transform], mut centre: impl FnMut(&Transform) -> Option<Centre>) {
         // A tile too many, and no more is looked for.
         self.scattered |= self.tiles.len().max(self.own.len()) > MOST_TILES;
         if self.scattered {

@@ -125,7 +125,7 @@ pub(super) struct Sites {
 }
 
 impl Sites {
-    pub fn new(sites: &[ElementSite], scale: Scale) -> Self {
+    pub(crate) fn new(sites: &[ElementSite], scale: Scale) -> Self {
         let grids: Vec<Grid> = sites.iter().map(|s| Grid::new(s, scale)).collect();
         let widths = grids.iter().flat_map(|g| g.extent().map(|[_, width]| width));
         let tile = widths.max().unwrap_or(1).max(1);
@@ -150,13 +150,13 @@ impl Sites {
 
     /// Pitch of an element (nm).
     #[inline]
-    pub fn pitch_nm(&self, element: u32) -> i64 {
+    pub(crate) fn pitch_nm(&self, element: u32) -> i64 {
         self.grids[element as usize].pitch_nm
     }
 
     /// Place of a pillar on the sites. `guess` is the element to try first, and is set to the one found.
     #[inline]
-    pub fn stand(&self, pillar: &Rect, guess: &mut u32) -> Standing {
+    pub(crate) fn stand(&self, pillar: &Rect, guess: &mut u32) -> Standing {
         let x = (pillar.x0 + pillar.x1) * self.scale.num;
         let y = (pillar.y0 + pillar.y1) * self.scale.num;
         // Half a database unit, doubled and scaled.

@@ -72,7 +72,7 @@ pub(super) struct FoundRectangles {
 impl Sizes {
     /// Count so many copies of a shape, each so many times as large as in its cell and turned by quarters or not, if it is a
     /// rectangle and no square: the box around it, in its cell.
-    pub fn count(&mut self, shape: &Shape<'_>, copies: u64, placed: &Transform, scale: Scale) -> Option<Rect> {
+    pub(crate) fn count(&mut self, shape: &Shape<'_>, copies: u64, placed: &Transform, scale: Scale) -> Option<Rect> {
         let magnification = placed.magnification();
         let unequal = shape.rect.is_none_or(|r| r.width() != r.height());
         if !unequal || shape.circle.is_some() || shape.outline.len() != 5 {
@@ -116,12 +116,12 @@ impl Sizes {
 
     /// Rectangles found, if they are pillars no longer than this (nm): upright ones of several sizes, or rectangles of
     /// the size that most have, by their rotation.
-    pub fn pillars(&self, longest_nm: i64) -> Option<FoundRectangles> {
+    pub(crate) fn pillars(&self, longest_nm: i64) -> Option<FoundRectangles> {
         self.upright(longest_nm).or_else(|| self.alike(longest_nm))
     }
 
     /// True if all rectangles are these pillars, and, where squares are too, all of so many squares.
-    pub fn all_are(&self, found: &FoundRectangles, squares: u64) -> bool {
+    pub(crate) fn all_are(&self, found: &FoundRectangles, squares: u64) -> bool {
         let Some(pillars) = found.shape.upright() else {
             return found.count == self.rectangles;
         };
@@ -173,7 +173,7 @@ impl Sizes {
 
     /// Count so many squares of a width (nm).
     #[inline]
-    pub fn count_squares(&mut self, width_nm: i64, copies: u64) {
+    pub(crate) fn count_squares(&mut self, width_nm: i64, copies: u64) {
         let Ok(width) = usize::try_from(width_nm) else { return };
         if width < MOST_WIDTHS {
             if width >= self.squares.len() {

@@ -90,14 +90,14 @@ pub(super) struct Surveyor {
 
 impl Surveyor {
     /// A cell with these placements begins.
-    pub fn begin(&mut self, placements: &[Transform]) {
+    pub(crate) fn begin(&mut self, placements: &[Transform]) {
         self.flush();
         self.placements.clear();
         self.placements.extend_from_slice(placements);
     }
 
     #[inline]
-    pub fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
+    pub(crate) fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
         let bounds = shape.rect.unwrap_or_else(|| shape.outline.around());
         if placements.first().is_some_and(Transform::is_square) || placements == self.placements {
             let entry = self.cell.entry(shape.layer);
@@ -114,7 +114,7 @@ impl Surveyor {
         }
     }
 
-    pub fn text(&mut self, text: &Text<'_>, placements: &[Transform], scale: Scale, most: usize) {
+    pub(crate) fn text(&mut self, text: &Text<'_>, placements: &[Transform], scale: Scale, most: usize) {
         self.cell.entry(text.layer).texts += 1;
         for placement in placements {
             if self.texts.len() >= most {
@@ -135,7 +135,7 @@ impl Surveyor {
         }
     }
 
-    pub fn finish(mut self, scale: Scale) -> Survey {
+    pub(crate) fn finish(mut self, scale: Scale) -> Survey {
         self.flush();
         let mut total = self.total.of;
         total.sort_by_key(|(layer, _)| *layer);

@@ -65,7 +65,7 @@ pub(super) struct TileMap {
 
 impl TileMap {
     /// Map of tiles whose side is two to the power of `bits` (half nm).
-    pub fn new(bits: u32) -> Self {
+    pub(crate) fn new(bits: u32) -> Self {
         Self {
             bits,
             numbers: HashMap::new(),
@@ -94,7 +94,7 @@ impl TileMap {
         (column << self.bits, row << self.bits)
     }
 
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.numbers.clear();
         self.tiles.clear();
         self.samples.clear();
@@ -102,21 +102,21 @@ impl TileMap {
     }
 
     /// Number of tiles.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.tiles.len()
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.tiles.is_empty()
     }
 
     /// Pillars in a tile.
-    pub fn pillars(&self, tile: usize) -> u64 {
+    pub(crate) fn pillars(&self, tile: usize) -> u64 {
         self.tiles[tile].1.pillars
     }
 
     /// Around the centres in a tile (half nm).
-    pub fn bounds(&self, tile: usize) -> Rect {
+    pub(crate) fn bounds(&self, tile: usize) -> Rect {
         let (key, tile) = &self.tiles[tile];
         let corner = self.corner(*key);
         let place = |(x, y): (i32, i32)| (corner.0 + i64::from(x), corner.1 + i64::from(y));
@@ -128,7 +128,7 @@ impl TileMap {
     }
 
     /// Centres remembered of a tile (half nm).
-    pub fn samples(&self, tile: usize) -> impl Iterator<Item = Point> + '_ {
+    pub(crate) fn samples(&self, tile: usize) -> impl Iterator<Item = Point> + '_ {
         let (key, Tile { sampled, .. }) = &self.tiles[tile];
         let corner = self.corner(*key);
         self.samples[tile][..usize::from(*sampled)]
@@ -137,7 +137,7 @@ impl TileMap {
     }
 
     /// The last centre met in a tile that has samples (half nm).
-    pub fn last(&self, tile: usize) -> Option<Point> {
+    pub(crate) fn last(&self, tile: usize) -> Option<Point> {
         let (key, Tile { sampled, .. }) = &self.tiles[tile];
         let (corner, (x, y)) = (self.corner(*key), self.last[tile]);
         (*sampled > 0).then(|| Point::new(corner.0 + i64::from(x), corner.1 + i64::from(y)))
@@ -176,7 +176,7 @@ impl TileMap {
 
     /// Count a pillar by its centre; it serves as a sample of the lattice if it is an `even` number of nm wide.
     #[inline]
-    pub fn add(&mut self, centre: Point, even: bool, guess: &mut u32) {
+    pub(crate) fn add(&mut self, centre: Point, even: bool, guess: &mut u32) {
         let number = self.at(centre, guess);
         let (x, y) = self.within(centre);
         let part = |v: i64| (v * PARTS) >> self.bits;
@@ -192,7 +192,7 @@ impl TileMap {
 
     /// Add the tiles of a cell, as large as these, where a placement, which moves by half nanometres, puts them; whether there is
     /// room.
-    pub fn place(&mut self, cell: &Self, placement: &Transform) -> bool {
+    pub(crate) fn place(&mut self, cell: &Self, placement: &Transform) -> bool {
         let mut guess = 0;
         for (number, (key, tile)) in cell.tiles.iter().enumerate() {
             let Some(bounds) = placement.apply_rect(&cell.bounds(number)) else {
@@ -234,7 +234,7 @@ impl TileMap {
     }
 
     /// Take in the tiles of a map of other shapes, as large as these; whether there is room.
-    pub fn unite(&mut self, other: &Self) -> bool {
+    pub(crate) fn unite(&mut self, other: &Self) -> bool {
         let mut guess = 0;
         for (number, (key, tile)) in other.tiles.iter().enumerate() {
             let (x, y) = other.corner(*key);
@@ -269,7 +269,7 @@ impl TileMap {
     }
 
     /// Tiles that touch, corners included.
-    pub fn clusters(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn clusters(&self) -> Vec<Vec<usize>> {
         let mut seen = vec![false; self.tiles.len()];
         let mut clusters = Vec::new();
         for start in 0..self.tiles.len() {

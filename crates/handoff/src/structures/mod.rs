@@ -61,7 +61,7 @@ struct StructureLayers {
 
 impl Structures {
     /// Lay out all structures that the process asks for, in rows from below.
-    pub fn new(design: &Design, process: &Process) -> Self {
+    pub(crate) fn new(design: &Design, process: &Process) -> Self {
         let all = &design.layout.layers;
         let layers = StructureLayers {
             pillars: number(&all.pillars),
@@ -143,7 +143,7 @@ impl Structures {
     ///
     /// # Errors
     /// If one cannot be written.
-    pub fn write(self, design: &Design, pillars: &Path, step2: &Path) -> Result<Vec<Structure>> {
+    pub(crate) fn write(self, design: &Design, pillars: &Path, step2: &Path) -> Result<Vec<Structure>> {
         let timestamp = &design.layout.timestamp;
         let mut drawing = Drawing::new("TESTS", timestamp);
         for pillar in &self.pillars {

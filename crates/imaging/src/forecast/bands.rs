@@ -12,4 +12,4 @@ pub(super) const BANDS: [f64; 14] = [
 ];
 
 /// Powers of a plane by band.
-pub type Bands = [f64; BANDS.len()];
+pub(crate) type Bands = [f64; BANDS.len()];

@@ -42,7 +42,7 @@ pub(crate) struct Exposed {
 
 impl Exposed {
     /// Exposure of the noise of a sensor, and the mean signal that a scene gave.
-    pub fn of(noise: Noise, signal: f64) -> Self {
+    pub(crate) fn of(noise: Noise, signal: f64) -> Self {
         Self { noise, signal }
     }
 

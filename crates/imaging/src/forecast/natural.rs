@@ -3,7 +3,7 @@
 use super::bands::{Bands, ZONES};
 
 /// Statistics of a zone of the field.
-pub struct NaturalZone {
+pub(crate) struct NaturalZone {
     /// Mean light, white being one.
     pub light: f64,
     /// Powers of the planes that vary independently: grey, red against blue, and green against both.
@@ -12,7 +12,7 @@ pub struct NaturalZone {
 
 /// The mean of 25 photographs of 576 x 576 pixels (GB82 image dataset, CC0), by `examples/scene_power`. Frequencies are those of a
 /// photograph's own pixels: one of other pixels has other powers next to the finest that they hold.
-pub const NATURAL: [NaturalZone; ZONES.len()] = [
+pub(crate) const NATURAL: [NaturalZone; ZONES.len()] = [
     NaturalZone {
         light: 0.2110,
         planes: [

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// Most bytes that the numbers of a bank or of its stray light may have: both are held in memory, and refused before they are
 /// made if they would be more.
-pub const MOST_BYTES: u64 = 4 << 30;
+pub(crate) const MOST_BYTES: u64 = 4 << 30;
 /// Radius of lenses whose fast fields err by more than accurate ones, which cost as much there: what is seen of them is mostly the
 /// window of a kernel (um).
 pub(crate) const SMALL_UM: f64 = 150.0;

@@ -10,5 +10,5 @@ mod bank;
 mod build;
 mod spectrum;
 
-pub(crate) use bank::SMALL_UM;
-pub use bank::{BankSpec, DistinctKernels, KernelBank, MOST_BYTES, TurnedKernel};
+pub use bank::{BankSpec, KernelBank};
+pub(crate) use bank::{DistinctKernels, MOST_BYTES, SMALL_UM, TurnedKernel};

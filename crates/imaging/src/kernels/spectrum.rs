@@ -14,21 +14,21 @@ use crate::spectra::SceneSpectrum;
 use metalith_wave::kernels::{FftScratch, SquareFft};
 
 /// Squares an axis of a pixel.
-pub const QUARTERS: usize = 4;
+pub(crate) const QUARTERS: usize = 4;
 
 /// Plan that kernels are made with: transforms of one window size.
-pub struct SpectrumPlan {
+pub(crate) struct SpectrumPlan {
     /// Pixels an axis of a kernel, even.
     pub window: usize,
     fft: SquareFft,
 }
 
 /// The spectrum of the PSF of one wavelength on quarters of pixels, the chief ray in the middle.
-pub struct PsfSpectrum(Vec<Complex32>);
+pub(crate) struct PsfSpectrum(Vec<Complex32>);
 
 /// A part of a channel, as it acts in one direction.
 #[derive(Clone, Debug)]
-pub struct MovedPart {
+pub(crate) struct MovedPart {
     /// Share of the channel's light.
     pub weight: f64,
     /// Wavelength (nm).
@@ -41,7 +41,7 @@ pub struct MovedPart {
 
 impl MovedPart {
     /// Part whose chief ray lands there, made of these wavelengths.
-    pub fn new(part: &ChannelPart, total: f64, blended: Vec<(usize, f64)>, offset: [f64; 2]) -> Self {
+    pub(crate) fn new(part: &ChannelPart, total: f64, blended: Vec<(usize, f64)>, offset: [f64; 2]) -> Self {
         Self {
             weight: part.weight / total,
             nm: 0.5 * (part.nm[0] + part.nm[1]),
@@ -51,14 +51,14 @@ impl MovedPart {
     }
 
     /// True if its PSF is in a kernel of so many pixels: parts that land farther off belong to the stray light.
-    pub fn inside(&self, window: usize) -> bool {
+    pub(crate) fn inside(&self, window: usize) -> bool {
         self.offset.iter().all(|o| o.abs() <= 0.5 * window as f64)
     }
 }
 
 impl SpectrumPlan {
     /// Plan for kernels of `window` pixels an axis, an even number.
-    pub fn new(window: usize) -> Self {
+    pub(crate) fn new(window: usize) -> Self {
         // Half a window more than the kernel: what parts that have moved put beyond it comes back outside of it.
         Self {
             window,
@@ -67,7 +67,7 @@ impl SpectrumPlan {
     }
 
     /// Spectrum of the energies in quarters of the pixels of a window, row by row, its chief ray in the middle.
-    pub fn spectrum(&self, quarters: &[f32], scratch: &mut FftScratch) -> PsfSpectrum {
+    pub(crate) fn spectrum(&self, quarters: &[f32], scratch: &mut FftScratch) -> PsfSpectrum {
         let (inner, size) = (self.window * QUARTERS, self.fft.size());
         let from = (size - inner) / 2;
         let mut square = vec![0.0; size * size];
@@ -82,7 +82,7 @@ impl SpectrumPlan {
     /// Kernels of a channel for each spectrum of the scene: energy in a pixel whose middle is at
     /// `(i - window + 1/2) / 2` pixels from the chief ray, i from 0 to 2 window - 1 along x and along y, as it counts in a
     /// sum over points half a pixel apart; see [`PlacedPixel`].
-    pub fn kernels(
+    pub(crate) fn kernels(
         &self,
         spectra: &[PsfSpectrum],
         parts: &[MovedPart],

@@ -15,7 +15,7 @@ use super::warp::{CellPoint, Warp};
 use crate::geometry::{ElementView, SceneSpace};
 
 /// One element of an operator.
-pub struct ElementOperator<'a> {
+pub(crate) struct ElementOperator<'a> {
     element: usize,
     view: ElementView,
     pub(super) source: KernelSource<'a>,
@@ -44,7 +44,7 @@ pub(super) struct NodePlan {
 }
 
 impl<'a> ElementOperator<'a> {
-    pub fn new(
+    pub(crate) fn new(
         element: usize,
         view: &ElementView,
         source: &KernelSource<'a>,
@@ -202,7 +202,7 @@ impl<'a> ElementOperator<'a> {
 
     /// Add the light of pixels to the places of the scene that they look at, as if nothing were blurred: a plane for each
     /// channel.
-    pub fn lay_on_scene(&self, frames: &[Array2<f32>], planes: &mut [Array2<f32>]) {
+    pub(crate) fn lay_on_scene(&self, frames: &[Array2<f32>], planes: &mut [Array2<f32>]) {
         let cell = self.source.points.cell();
         for (channel, plan) in self.channels.iter().enumerate() {
             let Some(warp) = plan.warps.first() else { continue };
@@ -226,7 +226,7 @@ pub(super) struct Light {
 
 impl NodePlan {
     /// Weights over its rectangle for light of a warp: those that are kept, or made now.
-    pub fn weights(&self, warp: &Warp, source: &KernelSource<'_>) -> Cow<'_, [f32]> {
+    pub(crate) fn weights(&self, warp: &Warp, source: &KernelSource<'_>) -> Cow<'_, [f32]> {
         match self.weights.is_empty() {
             true => Cow::Owned(self.weights_of(warp, source.between, source.spec.nodes)),
             false => Cow::Borrowed(&self.weights),

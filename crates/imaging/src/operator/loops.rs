@@ -4,12 +4,12 @@ use num_complex::Complex32;
 use pulp::{Arch, Simd, WithSimd};
 
 /// Adds the products of `a` and `b`.
-pub fn multiply_add(sum: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
+pub(crate) fn multiply_add(sum: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     Arch::new().dispatch(Products::<false> { sum, a, b });
 }
 
 /// Adds the products of `a` with the conjugates of `b`.
-pub fn multiply_conj_add(sum: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
+pub(crate) fn multiply_conj_add(sum: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     Arch::new().dispatch(Products::<true> { sum, a, b });
 }
 
@@ -41,7 +41,7 @@ impl<const CONJUGATE: bool> WithSimd for Products<'_, CONJUGATE> {
 
 /// A rectangle of an image of many columns.
 #[derive(Clone, Copy)]
-pub struct Rectangle {
+pub(crate) struct Rectangle {
     pub first: [usize; 2],
     pub shape: [usize; 2],
     /// Columns of the image.
@@ -56,12 +56,12 @@ impl Rectangle {
     }
 
     /// True if an image has any light in it.
-    pub fn is_lit(&self, image: &[f32]) -> bool {
+    pub(crate) fn is_lit(&self, image: &[f32]) -> bool {
         (0..self.shape[0]).any(|y| image[self.row(y)].iter().any(|v| *v != 0.0))
     }
 
     /// Copy it into the corner of a square of `size` columns.
-    pub fn copy(&self, image: &[f32], square: &mut [f32], size: usize) {
+    pub(crate) fn copy(&self, image: &[f32], square: &mut [f32], size: usize) {
         for (y, to) in square.chunks_exact_mut(size).take(self.shape[0]).enumerate() {
             to[..self.shape[1]].copy_from_slice(&image[self.row(y)]);
             to[self.shape[1]..].fill(0.0);
@@ -69,7 +69,7 @@ impl Rectangle {
     }
 
     /// Add the corner of a square of `size` columns to it.
-    pub fn add(&self, square: &[f32], size: usize, image: &mut [f32]) {
+    pub(crate) fn add(&self, square: &[f32], size: usize, image: &mut [f32]) {
         Arch::new().dispatch(|| {
             for (y, from) in square.chunks_exact(size).take(self.shape[0]).enumerate() {
                 image[self.row(y)].iter_mut().zip(from).for_each(|(t, f)| *t += f);
@@ -79,7 +79,7 @@ impl Rectangle {
 
     /// Weighted sum of images times hats, into the corner of a square of `size` columns. Rows below the corner are left as they
     /// are.
-    pub fn cut(&self, images: &[(&[f32], f32)], hats: &[f32], square: &mut [f32], size: usize) {
+    pub(crate) fn cut(&self, images: &[(&[f32], f32)], hats: &[f32], square: &mut [f32], size: usize) {
         Arch::new().dispatch(|| {
             let rows = square.chunks_exact_mut(size).zip(hats.chunks_exact(self.shape[1]));
             for (y, (to, hats)) in rows.enumerate() {
@@ -96,7 +96,7 @@ impl Rectangle {
     }
 
     /// The adjoint of [`Rectangle::cut`] for one image.
-    pub fn paste(&self, square: &[f32], size: usize, weight: f32, hats: &[f32], image: &mut [f32]) {
+    pub(crate) fn paste(&self, square: &[f32], size: usize, weight: f32, hats: &[f32], image: &mut [f32]) {
         Arch::new().dispatch(|| {
             let rows = square.chunks_exact(size).zip(hats.chunks_exact(self.shape[1]));
             for (y, (from, hats)) in rows.enumerate() {

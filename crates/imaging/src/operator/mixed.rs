@@ -5,7 +5,7 @@ use num_complex::Complex32;
 
 /// Kernels of a node as spectra, each for a mixture of the inputs.
 #[derive(Clone, Debug, Default)]
-pub struct MixedKernels {
+pub(crate) struct MixedKernels {
     /// Spectra by phase and mixture.
     spectra: Vec<Complex32>,
     /// Weights of the inputs in each mixture.
@@ -21,7 +21,7 @@ impl MixedKernels {
     /// Mixtures of spectra of `size` frequencies an axis, by phase and input. Inputs are taken to vary with the
     /// spectrum of scenes, and by `statistics` with one another: planes of the picture (rows) from independent ones
     /// (columns); none for inputs that are not mixed.
-    pub fn new(spectra: Vec<Complex32>, inputs: usize, size: usize, statistics: Option<&DMatrix<f64>>) -> Self {
+    pub(crate) fn new(spectra: Vec<Complex32>, inputs: usize, size: usize, statistics: Option<&DMatrix<f64>>) -> Self {
         let entries = (size / 2 + 1) * size;
         let alone = |i: usize| (0..inputs).map(|k| f32::from(u8::from(i == k))).collect();
         let Some(statistics) = statistics.filter(|s| s.nrows() == inputs && s.is_square()) else {
@@ -91,17 +91,17 @@ impl MixedKernels {
     }
 
     /// True if there are none.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.spectra.is_empty()
     }
 
     /// Weights of the inputs in each mixture.
-    pub fn mixtures(&self) -> &[Vec<f32>] {
+    pub(crate) fn mixtures(&self) -> &[Vec<f32>] {
         &self.mixtures
     }
 
     /// Spectrum of a phase for a mixture.
-    pub fn spectrum(&self, phase: usize, mixture: usize) -> &[Complex32] {
+    pub(crate) fn spectrum(&self, phase: usize, mixture: usize) -> &[Complex32] {
         &self.spectra[(phase * self.mixtures.len() + mixture) * self.entries..][..self.entries]
     }
 }

@@ -28,7 +28,7 @@ fn rectangles(node: &NodePlan, columns: usize, reach: usize) -> [Rectangle; 2] {
 
 impl ElementOperator<'_> {
     /// The sub-images of planes of the scene.
-    pub fn apply(&self, scene: &[Array2<f32>], scratch: &mut FftScratch) -> Vec<SubImage> {
+    pub(crate) fn apply(&self, scene: &[Array2<f32>], scratch: &mut FftScratch) -> Vec<SubImage> {
         let (reach, cell) = (self.source.reach(), self.source.points.cell());
         let mut images = Vec::new();
         for (channel, plan) in self.channels.iter().enumerate() {
@@ -85,7 +85,7 @@ impl ElementOperator<'_> {
     }
 
     /// The adjoint of [`ElementOperator::apply`]: from frames by channel to planes of the scene.
-    pub fn adjoint(
+    pub(crate) fn adjoint(
         &self,
         frames: &[Array2<f32>],
         shape: (usize, usize),

@@ -6,7 +6,7 @@ use pulp::Arch;
 use super::source::{LOBES, lanczos};
 
 /// A weighted mean over neighbours along both axes; beyond its borders a scene is as it is there.
-pub struct Smoothing {
+pub(crate) struct Smoothing {
     /// Weights of the pixel itself and of those on each of its sides.
     weights: Vec<f32>,
 }
@@ -14,7 +14,7 @@ pub struct Smoothing {
 impl Smoothing {
     /// Smoothing for points that are `step` pixels of the scene apart: waves of two steps keep half of their height. A
     /// grid that is finer than the scene needs none.
-    pub fn new(step: f64) -> Self {
+    pub(crate) fn new(step: f64) -> Self {
         let reach = if step > 0.5 {
             (LOBES as f64 * step).ceil() as usize
         } else {
@@ -29,7 +29,7 @@ impl Smoothing {
         }
     }
 
-    pub fn apply(&self, plane: &Array2<f32>) -> Array2<f32> {
+    pub(crate) fn apply(&self, plane: &Array2<f32>) -> Array2<f32> {
         self.along_both(plane, |from, to| {
             let reach = self.weights.len() - 1;
             let padded = [&vec![from[0]; reach][..], from, &vec![from[from.len() - 1]; reach]].concat();
@@ -38,7 +38,7 @@ impl Smoothing {
     }
 
     /// The adjoint of [`Smoothing::apply`].
-    pub fn adjoint(&self, plane: &Array2<f32>) -> Array2<f32> {
+    pub(crate) fn adjoint(&self, plane: &Array2<f32>) -> Array2<f32> {
         self.along_both(plane, |from, to| {
             let (reach, n) = (self.weights.len() - 1, from.len());
             let dark = vec![0.0; 2 * reach];

@@ -17,7 +17,7 @@ use crate::kernels::{BankSpec, KernelBank, TurnedKernel};
 
 /// Source of kernels.
 #[derive(Clone)]
-pub struct KernelSource<'a> {
+pub(crate) struct KernelSource<'a> {
     pub bank: &'a KernelBank,
     pub points: ScenePoints,
     pub inputs: SceneInputs,
@@ -33,14 +33,14 @@ pub struct KernelSource<'a> {
 }
 
 /// Lobes of [`lanczos`] on both sides.
-pub const LOBES: usize = 3;
+pub(crate) const LOBES: usize = 3;
 /// Points on both sides of a square of two by two pixels, half a pixel apart, that its light is spread over between it and
 /// its neighbours.
 const SPREAD: usize = 4 * LOBES;
 
 /// Interpolation (Duchon, J. Appl. Meteorol. 18, 1016 (1979)): the weight of a value at a distance in steps of the grid, no
 /// more than three steps away. Waves of four steps keep 99 % of their height; a cubic of two steps leaves 88 %.
-pub fn lanczos(distance: f64) -> f64 {
+pub(crate) fn lanczos(distance: f64) -> f64 {
     let sinc = |t: f64| if t == 0.0 { 1.0 } else { (PI * t).sin() / (PI * t) };
     if distance.abs() < LOBES as f64 {
         sinc(distance) * sinc(distance / LOBES as f64)
@@ -59,7 +59,7 @@ fn spread() -> Vec<f32> {
 }
 
 impl<'a> KernelSource<'a> {
-    pub fn new(bank: &'a KernelBank, detail: &Detail, sensor: &Sensor, channel_names: &[String]) -> Self {
+    pub(crate) fn new(bank: &'a KernelBank, detail: &Detail, sensor: &Sensor, channel_names: &[String]) -> Self {
         let steps = bank.spec.nodes - 1;
         assert!(steps.is_multiple_of(detail.node_step), "every step ends at a node");
         let cell = detail.points.cell();
@@ -94,7 +94,7 @@ impl<'a> KernelSource<'a> {
     }
 
     /// Planes of the scene that a channel sees, each with the spectra whose kernels act on it.
-    pub fn inputs(&self, channel: usize) -> Vec<(usize, Range<usize>)> {
+    pub(crate) fn inputs(&self, channel: usize) -> Vec<(usize, Range<usize>)> {
         match &self.inputs {
             SceneInputs::Spectra(all) => all.clone().enumerate().map(|(i, b)| (i, b..b + 1)).collect(),
             SceneInputs::Channels(all) => vec![(channel, all.clone())],
@@ -102,12 +102,12 @@ impl<'a> KernelSource<'a> {
     }
 
     /// Pixels of a cell whose light is found for a channel, row and column.
-    pub fn phases(&self, channel: usize) -> &[[usize; 2]] {
+    pub(crate) fn phases(&self, channel: usize) -> &[[usize; 2]] {
         &self.phases[channel]
     }
 
     /// Cells on each side of its own that a kernel reaches.
-    pub fn reach(&self) -> usize {
+    pub(crate) fn reach(&self) -> usize {
         let spread = match self.points {
             ScenePoints::OneASquare => SPREAD / 2,
             _ => 0,
@@ -117,7 +117,7 @@ impl<'a> KernelSource<'a> {
 
     /// The kernel of a node, for light at a point of a cell, on one pixel of each cell: `2 reach + 1` values an axis, the
     /// middle one in the cell itself.
-    pub fn pixels(
+    pub(crate) fn pixels(
         &self,
         element: usize,
         node: [usize; 2],

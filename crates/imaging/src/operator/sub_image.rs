@@ -3,7 +3,7 @@
 use ndarray::Array2;
 
 /// The sub-image of an element: the pixels of one phase of its cells, in one channel.
-pub struct SubImage {
+pub(crate) struct SubImage {
     pub channel: usize,
     /// Pixels of the sensor.
     pub grid: PixelGrid,
@@ -13,7 +13,7 @@ pub struct SubImage {
 
 /// Every `step`-th pixel of the sensor, on it or beyond.
 #[derive(Clone, Copy)]
-pub struct PixelGrid {
+pub(crate) struct PixelGrid {
     /// Row and column of the first.
     pub origin: [i64; 2],
     /// Pixels of the sensor from one to the next.
@@ -34,7 +34,7 @@ impl PixelGrid {
     }
 
     /// Light of these pixels of a frame, row by row; none beyond the sensor.
-    pub fn gather(&self, frame: &Array2<f32>) -> Vec<f32> {
+    pub(crate) fn gather(&self, frame: &Array2<f32>) -> Vec<f32> {
         let mut light = vec![0.0; self.shape[0] * self.shape[1]];
         let (rows, row) = self.on(0, frame.nrows());
         let (columns, column) = self.on(1, frame.ncols());
@@ -50,7 +50,7 @@ impl PixelGrid {
 
 impl SubImage {
     /// Add what lies on the sensor to its frames: the adjoint of [`PixelGrid::gather`].
-    pub fn add_to(&self, frames: &mut [Array2<f32>]) {
+    pub(crate) fn add_to(&self, frames: &mut [Array2<f32>]) {
         let frame = &mut frames[self.channel];
         let (rows, row) = self.grid.on(0, frame.nrows());
         let (columns, column) = self.grid.on(1, frame.ncols());

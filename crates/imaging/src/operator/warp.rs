@@ -13,7 +13,7 @@ use crate::kernels::BankSpec;
 /// The sub-image of one element in one channel: a rectangle of cells, squares of pixels of the sensor's grid, on or off the
 /// sensor.
 #[derive(Clone)]
-pub struct Warp {
+pub(crate) struct Warp {
     /// Row and column of its first cell.
     pub origin: [i64; 2],
     /// Rows and columns of cells.
@@ -40,7 +40,7 @@ struct Look {
 
 /// Point of each cell at which the scene is sampled.
 #[derive(Clone, Copy)]
-pub struct CellPoint {
+pub(crate) struct CellPoint {
     /// Pixels an axis of a cell.
     pub cell: usize,
     /// Shift from the middle of the cell along x and y (pixels).
@@ -55,7 +55,7 @@ pub struct CellPoint {
 
 impl Warp {
     /// Warp for light of a wavelength (um), one point of each cell.
-    pub fn new(
+    pub(crate) fn new(
         element: &ElementView,
         sensor: &Sensor,
         spec: &BankSpec,
@@ -146,7 +146,7 @@ impl Warp {
     }
 
     /// The pixels of the sensor that are one phase of its cells, and of `beyond` more cells on each side.
-    pub fn pixels(&self, cell: usize, phase: [usize; 2], beyond: usize) -> PixelGrid {
+    pub(crate) fn pixels(&self, cell: usize, phase: [usize; 2], beyond: usize) -> PixelGrid {
         PixelGrid {
             origin: [0, 1].map(|a| (self.origin[a] - beyond as i64) * cell as i64 + phase[a] as i64),
             step: cell,
@@ -155,7 +155,7 @@ impl Warp {
     }
 
     /// Light of planes of the scene on each cell.
-    pub fn sample(&self, planes: &[&Array2<f32>]) -> Vec<Vec<f32>> {
+    pub(crate) fn sample(&self, planes: &[&Array2<f32>]) -> Vec<Vec<f32>> {
         let from: Vec<_> = planes.iter().map(|p| p.as_standard_layout()).collect();
         let sample = |plane: &[f32]| {
             let mut out = vec![0.0; self.flux.len()];
@@ -174,7 +174,7 @@ impl Warp {
     }
 
     /// The adjoint of [`Warp::sample`]: adds to planes of the scene, whose rows are whole.
-    pub fn scatter(&self, light: &[&[f32]], planes: &mut [Array2<f32>]) {
+    pub(crate) fn scatter(&self, light: &[&[f32]], planes: &mut [Array2<f32>]) {
         for (light, plane) in light.iter().zip(planes) {
             let plane = plane.as_slice_mut().expect("rows are whole");
             for Look { cell, pixel, share } in &self.looks {
@@ -194,7 +194,7 @@ impl Warp {
 
     /// Supports of `n` by `n` nodes, row by row: the rectangle of the sub-image in which the weights of the node are
     /// not zero, as first row and column, rows and columns.
-    pub fn supports(&self, between: BetweenNodes, n: usize) -> Vec<Option<([usize; 2], [usize; 2])>> {
+    pub(crate) fn supports(&self, between: BetweenNodes, n: usize) -> Vec<Option<([usize; 2], [usize; 2])>> {
         let mut ends = vec![([usize::MAX; 2], [0; 2]); n * n];
         for (i, place) in self.nodes.iter().enumerate().filter(|(i, _)| self.flux[*i] > 0.0) {
             let at = [i / self.shape[1], i % self.shape[1]];

@@ -300,7 +300,7 @@ pub(super) mod tests {
     }
 
     /// An NPY file of doubles in rows; `shape` as Python writes it.
-    pub fn npy_bytes(shape: &str, values: &[f64]) -> Vec<u8> {
+    pub(crate) fn npy_bytes(shape: &str, values: &[f64]) -> Vec<u8> {
         npy_of("<f8", shape, values.iter().flat_map(|v| v.to_le_bytes()))
     }
 

@@ -22,12 +22,12 @@ use pulp::Arch;
 use crate::kernels::MOST_BYTES;
 
 pub use shares::LightShares;
-pub use squares::{gather, lay, lift, spread};
+pub(crate) use squares::{gather, lay, lift, spread};
 
 /// Squares an axis into which the light of a scene is gathered.
-pub const SCENE_CELLS: usize = 20;
+pub(crate) const SCENE_CELLS: usize = 20;
 /// Pixels an axis of a square of the sensor.
-pub const CELL_PIXELS: usize = 16;
+pub(crate) const CELL_PIXELS: usize = 16;
 
 /// Stray light: where a channel's light of a scene's squares goes that no kernel holds.
 #[derive(Clone, Debug)]
@@ -45,7 +45,7 @@ pub struct StrayLight {
 }
 
 /// Squares that cover a sensor.
-pub fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
+pub(crate) fn sensor_cells(sensor: &Sensor) -> [usize; 2] {
     [sensor.rows, sensor.columns].map(|n| (n as usize).div_ceil(CELL_PIXELS))
 }
 

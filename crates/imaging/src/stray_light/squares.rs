@@ -6,7 +6,7 @@ use super::{CELL_PIXELS, SCENE_CELLS};
 use crate::geometry::SceneView;
 
 /// Gather the light of a plane of the scene into squares: hats about their middles, times projected solid angle.
-pub fn gather(view: &SceneView, plane: ArrayView2<'_, f32>) -> Vec<f64> {
+pub(crate) fn gather(view: &SceneView, plane: ArrayView2<'_, f32>) -> Vec<f64> {
     let [down, across] = scene_hats(view);
     let mut cells = vec![0.0; SCENE_CELLS * SCENE_CELLS];
     for ((y, row), hat) in plane.rows().into_iter().enumerate().zip(&down) {
@@ -18,7 +18,7 @@ pub fn gather(view: &SceneView, plane: ArrayView2<'_, f32>) -> Vec<f64> {
 }
 
 /// The adjoint of [`gather`]: adds to a plane.
-pub fn spread(view: &SceneView, cells: &[f64], plane: &mut Array2<f32>) {
+pub(crate) fn spread(view: &SceneView, cells: &[f64], plane: &mut Array2<f32>) {
     let [down, across] = scene_hats(view);
     for ((y, mut row), hat) in plane.rows_mut().into_iter().enumerate().zip(&down) {
         let line = line_of(cells, hat, SCENE_CELLS);
@@ -28,7 +28,7 @@ pub fn spread(view: &SceneView, cells: &[f64], plane: &mut Array2<f32>) {
 }
 
 /// Spreads squares over the pixels of the sensor: straight lines between the middles of squares.
-pub fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
+pub(crate) fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
     let [down, across] = sensor_hats(frame.dim().into(), shape);
     for (mut row, hat) in frame.rows_mut().into_iter().zip(&down) {
         let line = line_of(cells, hat, shape[1]);
@@ -38,7 +38,7 @@ pub fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
 }
 
 /// The adjoint of [`lay`].
-pub fn lift(frame: &Array2<f32>, shape: [usize; 2]) -> Vec<f64> {
+pub(crate) fn lift(frame: &Array2<f32>, shape: [usize; 2]) -> Vec<f64> {
     let [down, across] = sensor_hats(frame.dim().into(), shape);
     let mut cells = vec![0.0; shape[0] * shape[1]];
     for (row, hat) in frame.rows().into_iter().zip(&down) {
@@ -49,7 +49,7 @@ pub fn lift(frame: &Array2<f32>, shape: [usize; 2]) -> Vec<f64> {
 }
 
 /// Projected solid angle of a pixel of the scene.
-pub fn solid_angle(view: &SceneView, row: f64, column: f64) -> f64 {
+pub(crate) fn solid_angle(view: &SceneView, row: f64, column: f64) -> f64 {
     let [tx, ty] = view.tangents(row, column);
     (view.pixel() / (1.0 + tx * tx + ty * ty)).powi(2)
 }

@@ -13,17 +13,17 @@ use metalith_sensor::{Camera, Channel, Illuminant, Response, Sensor};
 use ndarray::Array3;
 
 /// The middle element, and its neighbour below and to the left.
-pub const MIDDLE: usize = 4;
-pub const BELOW: usize = 1;
-pub const LEFT: usize = 3;
+pub(crate) const MIDDLE: usize = 4;
+pub(crate) const BELOW: usize = 1;
+pub(crate) const LEFT: usize = 3;
 
 /// Elements with individual lenses: a hexagon of 80 um with a shorter focal length, which looks aside, and a cubic
 /// phase.
-pub const HEXAGON: usize = 2;
-pub const CUBIC: usize = 3;
+pub(crate) const HEXAGON: usize = 2;
+pub(crate) const CUBIC: usize = 3;
 
 /// Pixels of 2 um an axis: the middle element and two of its neighbours, or two lenses of their own.
-pub const ROWS: u32 = 120;
+pub(crate) const ROWS: u32 = 120;
 
 fn camera(bands: &[[f64; 2]], offset_um: [f64; 2]) -> Camera {
     let plain = Camera::three_bands(2.0);
@@ -49,7 +49,7 @@ fn camera(bands: &[[f64; 2]], offset_um: [f64; 2]) -> Camera {
     }
 }
 
-pub struct Setup {
+pub(crate) struct Setup {
     pub design: Design,
     pub camera: Camera,
     extraction: Extraction,
@@ -58,7 +58,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    pub fn chip(&self) -> ChipInLight<'_> {
+    pub(crate) fn chip(&self) -> ChipInLight<'_> {
         let case = SimulationCase::from(self.cells[0].as_ref());
         ChipInLight::new(
             &self.design,
@@ -71,19 +71,19 @@ impl Setup {
         .unwrap()
     }
 
-    pub fn stray_light(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> StrayLight {
+    pub(crate) fn stray_light(&self, chip: &ChipInLight<'_>, bank: &KernelBank) -> StrayLight {
         let (sensor, scene) = (&self.camera.sensor, &self.scene);
         StrayLight::build(chip, bank, &scene.basis, sensor, &scene.view, &Silent).unwrap()
     }
 }
 
 /// Nine elements of one lens.
-pub fn setup(bands: &[[f64; 2]], size: usize) -> Setup {
+pub(crate) fn setup(bands: &[[f64; 2]], size: usize) -> Setup {
     setup_of("mini_3x3", camera(bands, [-75.0, -75.0]), size)
 }
 
 /// Four lenses of their own kinds, of which the sensor sees the two below.
-pub fn mixed(bands: &[[f64; 2]], size: usize) -> Setup {
+pub(crate) fn mixed(bands: &[[f64; 2]], size: usize) -> Setup {
     setup_of("mixed_lenses", camera(bands, [0.0, -75.0]), size)
 }
 
@@ -109,7 +109,7 @@ fn setup_of(name: &str, camera: Camera, size: usize) -> Setup {
 const WAVES: [f64; 2] = [17.3, 14.8];
 
 /// Waves of three colours within four degrees of a direction (degrees), fading towards there.
-pub fn waves(size: usize, about_deg: [f64; 2]) -> SceneImage {
+pub(crate) fn waves(size: usize, about_deg: [f64; 2]) -> SceneImage {
     let empty = SceneImage::of_rgb("", &Array3::zeros((size, size, 3)), 44.0, f64::INFINITY);
     let rgb = Array3::from_shape_fn((size, size, 3), |(y, x, c)| {
         let t = empty.view.tangents(y as f64, x as f64);
@@ -121,7 +121,7 @@ pub fn waves(size: usize, about_deg: [f64; 2]) -> SceneImage {
     SceneImage::of_rgb("waves", &rgb, 44.0, f64::INFINITY)
 }
 
-pub fn spec(window: usize, nodes: usize) -> BankSpec {
+pub(crate) fn spec(window: usize, nodes: usize) -> BankSpec {
     BankSpec {
         pixel_um: 2.0,
         window,

@@ -95,7 +95,7 @@ pub(super) struct Encoded {
 }
 
 impl Encoded {
-    pub const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         blocks: Vec::new(),
         bounds: NOTHING,
         pillars: 0,
@@ -126,7 +126,7 @@ pub(super) fn bounds_of(corners: [i64; 4]) -> CellBounds {
 }
 
 impl<'a> ElementPillars<'a> {
-    pub fn new(
+    pub(crate) fn new(
         widths: &'a dyn PillarRows,
         group: &'a SymmetryGroup,
         parts: &'a [DomainPart],
@@ -149,29 +149,29 @@ impl<'a> ElementPillars<'a> {
     }
 
     /// Lists in the strips that suit its symmetries.
-    pub fn lists(&self) -> PillarEncoding {
+    pub(crate) fn lists(&self) -> PillarEncoding {
         PillarEncoding::Lists(StripsOf::of(self.group))
     }
 
     /// True if the element is more than a mirror image of itself.
-    pub fn has_many_symmetries(&self) -> bool {
+    pub(crate) fn has_many_symmetries(&self) -> bool {
         self.group.members().len() > 2
     }
 
     /// True if there is no pillar.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
 
     /// The cell with most pillars: its blocks are not held.
-    pub fn largest(&self) -> usize {
+    pub(crate) fn largest(&self) -> usize {
         (0..self.parts.len())
             .max_by_key(|&k| self.parts[k].pillars)
             .unwrap_or(0)
     }
 
     /// Encode all pillars; blocks of the largest cell are handed to `put` in order, those of the others returned.
-    pub fn encode(
+    pub(crate) fn encode(
         &self,
         encoding: PillarEncoding,
         progress: &dyn Progress,
@@ -233,7 +233,7 @@ impl<'a> ElementPillars<'a> {
     }
 
     /// Bytes of a pillar, from some pieces; none if no pillar is in them.
-    pub fn bytes_of_sample(&self, encoding: PillarEncoding) -> Option<f64> {
+    pub(crate) fn bytes_of_sample(&self, encoding: PillarEncoding) -> Option<f64> {
         let every = if self.has_many_symmetries() { SAMPLE / 2 } else { SAMPLE };
         let pieces: Vec<usize> = (every / 3..encoding.pieces(self.widths.lattice().sites()))
             .step_by(every)

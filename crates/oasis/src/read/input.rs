@@ -69,7 +69,7 @@ pub(super) struct Input<R> {
 }
 
 impl<R: Read + Seek> Input<R> {
-    pub fn new(mut raw: R, limits: &OasisLimits) -> Result<Self, OasisError> {
+    pub(crate) fn new(mut raw: R, limits: &OasisLimits) -> Result<Self, OasisError> {
         let file_bytes = raw.seek(SeekFrom::End(0))?;
         raw.seek(SeekFrom::Start(0))?;
         Ok(Self {
@@ -85,12 +85,12 @@ impl<R: Read + Seek> Input<R> {
         })
     }
 
-    pub fn file_bytes(&self) -> u64 {
+    pub(crate) fn file_bytes(&self) -> u64 {
         self.file_bytes
     }
 
     /// Hand all bytes of the file to `with`, and be where it was.
-    pub fn whole(&mut self, mut with: impl FnMut(&[u8])) -> Result<(), OasisError> {
+    pub(crate) fn whole(&mut self, mut with: impl FnMut(&[u8])) -> Result<(), OasisError> {
         let back = self.window.place();
         self.raw.seek(SeekFrom::Start(0))?;
         loop {
@@ -106,7 +106,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// The last bytes of the file, as many as fit in `tail`.
-    pub fn tail(&mut self, tail: &mut [u8]) -> Result<(), OasisError> {
+    pub(crate) fn tail(&mut self, tail: &mut [u8]) -> Result<(), OasisError> {
         let back = self.window.place();
         self.raw.seek(SeekFrom::Start(self.file_bytes - tail.len() as u64))?;
         self.raw.read_exact(tail)?;
@@ -116,17 +116,17 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// Place where the record that is being read begins.
-    pub fn record(&self) -> OasisPlace {
+    pub(crate) fn record(&self) -> OasisPlace {
         self.record
     }
 
     /// True if a CBLOCK is being read.
-    pub fn in_block(&self) -> bool {
+    pub(crate) fn in_block(&self) -> bool {
         self.block.is_some()
     }
 
     /// Place of the next byte of the file, of the CBLOCK if one is being read.
-    pub fn offset(&self) -> u64 {
+    pub(crate) fn offset(&self) -> u64 {
         self.place().offset
     }
 
@@ -145,7 +145,7 @@ impl<R: Read + Seek> Input<R> {
 
     /// An error in the record that is being read.
     #[cold]
-    pub fn fault(&self, fault: OasisFault) -> OasisError {
+    pub(crate) fn fault(&self, fault: OasisFault) -> OasisError {
         OasisError::Fault {
             offset: self.record.offset,
             inner: self.record.inner,
@@ -154,7 +154,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// Begin a record: leave a CBLOCK that is at its end. None at the end of the file.
-    pub fn begin_record(&mut self) -> Result<Option<u64>, OasisError> {
+    pub(crate) fn begin_record(&mut self) -> Result<Option<u64>, OasisError> {
         self.record = self.place();
         while self.window.from == self.window.to && !self.fill()? {
             if self.block.is_none() {
@@ -237,7 +237,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// Go on with what the CBLOCK whose head was read unpacks to.
-    pub fn enter_block(&mut self, unpacked: u64, packed: u64) -> Result<(), OasisError> {
+    pub(crate) fn enter_block(&mut self, unpacked: u64, packed: u64) -> Result<(), OasisError> {
         self.unpacked = self.unpacked.saturating_add(unpacked);
         if self.unpacked > self.most_unpacked {
             return Err(self.fault(OasisFault::Limit {
@@ -269,7 +269,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// Go to a place of the file outside of CBLOCKs; free if it is in the window.
-    pub fn seek(&mut self, offset: u64) -> Result<(), OasisError> {
+    pub(crate) fn seek(&mut self, offset: u64) -> Result<(), OasisError> {
         self.leave_block();
         let held = self.window.base..=self.window.base + self.window.to as u64;
         if held.contains(&offset) {
@@ -282,7 +282,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// Go forward to a place of the CBLOCK at `offset` if that is being read and not past it.
-    pub fn skip_in_block(&mut self, offset: u64, inner: u64) -> Result<bool, OasisError> {
+    pub(crate) fn skip_in_block(&mut self, offset: u64, inner: u64) -> Result<bool, OasisError> {
         if self.block.as_ref().is_none_or(|b| b.record != offset) || self.window.place() > inner {
             return Ok(false);
         }
@@ -315,7 +315,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     #[inline]
-    pub fn byte(&mut self) -> Result<u8, OasisError> {
+    pub(crate) fn byte(&mut self) -> Result<u8, OasisError> {
         if self.window.from == self.window.to {
             self.need()?;
         }
@@ -325,7 +325,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// Append so many bytes to `out`.
-    pub fn bytes(&mut self, mut count: usize, out: &mut Vec<u8>) -> Result<(), OasisError> {
+    pub(crate) fn bytes(&mut self, mut count: usize, out: &mut Vec<u8>) -> Result<(), OasisError> {
         while count > 0 {
             if self.window.from == self.window.to {
                 self.need()?;
@@ -340,7 +340,7 @@ impl<R: Read + Seek> Input<R> {
 
     /// An unsigned integer in its shortest form.
     #[inline]
-    pub fn unsigned(&mut self) -> Result<u64, OasisError> {
+    pub(crate) fn unsigned(&mut self) -> Result<u64, OasisError> {
         let first = self.byte()?;
         if first < 0x80 {
             return Ok(u64::from(first));
@@ -350,7 +350,7 @@ impl<R: Read + Seek> Input<R> {
 
     /// An unsigned integer that may have zeros above: counts and offsets that a writer fills in afterwards, and the
     /// length of an empty padding of END, which some writers pad instead.
-    pub fn unsigned_padded(&mut self) -> Result<u64, OasisError> {
+    pub(crate) fn unsigned_padded(&mut self) -> Result<u64, OasisError> {
         let first = self.byte()?;
         if first < 0x80 {
             return Ok(u64::from(first));

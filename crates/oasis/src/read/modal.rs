@@ -12,7 +12,7 @@ pub(super) struct Named {
 }
 
 impl Named {
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.known = false;
     }
 }
@@ -58,7 +58,7 @@ pub(super) struct Modal {
 
 impl Modal {
     /// Resets the variables to the state in which a cell begins. Memory is kept.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         let kept = std::mem::take(self);
         *self = Self {
             polygon: kept.polygon,

@@ -13,7 +13,7 @@ type Result<T> = std::result::Result<T, OasisError>;
 impl<R: Read + Seek> Input<R> {
     /// An unsigned integer of at most `most`.
     #[inline]
-    pub fn at_most(&mut self, most: u64) -> Result<u64> {
+    pub(crate) fn at_most(&mut self, most: u64) -> Result<u64> {
         let value = self.unsigned()?;
         if value > most {
             return Err(self.fault(OasisFault::TooLarge { value, most }));
@@ -23,14 +23,14 @@ impl<R: Read + Seek> Input<R> {
 
     /// A length or distance: not negative, no farther than coordinates may be.
     #[inline]
-    pub fn distance(&mut self, limits: &OasisLimits) -> Result<i64> {
+    pub(crate) fn distance(&mut self, limits: &OasisLimits) -> Result<i64> {
         let value = self.unsigned()?;
         self.near(value, limits)
     }
 
     /// A signed integer: sign in the lowest bit.
     #[inline]
-    pub fn signed(&mut self, limits: &OasisLimits) -> Result<i64> {
+    pub(crate) fn signed(&mut self, limits: &OasisLimits) -> Result<i64> {
         let value = self.unsigned()?;
         let magnitude = self.near(value >> 1, limits)?;
         Ok(if value & 1 == 0 { magnitude } else { -magnitude })
@@ -45,7 +45,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     #[cold]
-    pub fn too_far(&self, found: u64, limits: &OasisLimits) -> OasisError {
+    pub(crate) fn too_far(&self, found: u64, limits: &OasisLimits) -> OasisError {
         self.fault(OasisFault::Limit {
             limit: OasisLimit::Farthest,
             found,
@@ -55,7 +55,7 @@ impl<R: Read + Seek> Input<R> {
 
     /// A step in the plane ("g-delta").
     #[inline]
-    pub fn step(&mut self, limits: &OasisLimits) -> Result<[i64; 2]> {
+    pub(crate) fn step(&mut self, limits: &OasisLimits) -> Result<[i64; 2]> {
         let value = self.unsigned()?;
         if value & 1 == 0 {
             let [x, y] = direction(value >> 1);
@@ -67,13 +67,13 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// A real number.
-    pub fn real(&mut self) -> Result<f64> {
+    pub(crate) fn real(&mut self) -> Result<f64> {
         let kind = self.unsigned()?;
         self.real_of(kind)
     }
 
     /// A real number whose type was read.
-    pub fn real_of(&mut self, kind: u64) -> Result<f64> {
+    pub(crate) fn real_of(&mut self, kind: u64) -> Result<f64> {
         let sign = if kind.is_multiple_of(2) { 1.0 } else { -1.0 };
         let value = match kind {
             0 | 1 => sign * self.unsigned()? as f64,
@@ -89,7 +89,7 @@ impl<R: Read + Seek> Input<R> {
         Ok(value)
     }
 
-    pub fn array<const N: usize>(&mut self) -> Result<[u8; N]> {
+    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N]> {
         let mut bytes = [0; N];
         for byte in &mut bytes {
             *byte = self.byte()?;
@@ -98,7 +98,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// A string of any bytes.
-    pub fn string(&mut self, limits: &OasisLimits, out: &mut Vec<u8>) -> Result<()> {
+    pub(crate) fn string(&mut self, limits: &OasisLimits, out: &mut Vec<u8>) -> Result<()> {
         let length = self.unsigned()?;
         if length > limits.string_bytes as u64 {
             return Err(self.fault(OasisFault::Limit {
@@ -112,7 +112,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// A name: printable, at least one character.
-    pub fn name(&mut self, limits: &OasisLimits, out: &mut Vec<u8>) -> Result<()> {
+    pub(crate) fn name(&mut self, limits: &OasisLimits, out: &mut Vec<u8>) -> Result<()> {
         self.string(limits, out)?;
         if out.is_empty() {
             return Err(self.fault(OasisFault::EmptyName));
@@ -124,7 +124,13 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// A point list, from the first point, which is not in it. `closed` for polygons, whose last point may be implied.
-    pub fn points(&mut self, kind: u8, closed: bool, limits: &OasisLimits, out: &mut Vec<[i64; 2]>) -> Result<()> {
+    pub(crate) fn points(
+        &mut self,
+        kind: u8,
+        closed: bool,
+        limits: &OasisLimits,
+        out: &mut Vec<[i64; 2]>,
+    ) -> Result<()> {
         let list = self.unsigned()?;
         let found = self.unsigned()?;
         if found > limits.points as u64 {
@@ -182,7 +188,7 @@ impl<R: Read + Seek> Input<R> {
     }
 
     /// A repetition; none if the last one is used again.
-    pub fn repetition(&mut self, limits: &OasisLimits) -> Result<Option<Repetition>> {
+    pub(crate) fn repetition(&mut self, limits: &OasisLimits) -> Result<Option<Repetition>> {
         let kind = self.unsigned()?;
         let count = |input: &mut Self| Ok::<u64, OasisError>(input.at_most(u64::MAX - 2)? + 2);
         let grid = |count, step| Repetition::Grid { count, step };

@@ -38,12 +38,12 @@ const ALL: [NameTable; 6] = [
 
 impl Tables {
     /// The name of the entry read last.
-    pub fn last(&self) -> &[u8] {
+    pub(crate) fn last(&self) -> &[u8] {
         &self.name
     }
 
     /// The offsets of the tables, from START or END.
-    pub fn read_offsets<R: Read + Seek>(&mut self, input: &mut Input<R>) -> Result<(), OasisError> {
+    pub(crate) fn read_offsets<R: Read + Seek>(&mut self, input: &mut Input<R>) -> Result<(), OasisError> {
         for state in &mut self.states {
             let strict = input.at_most(1)? == 1;
             let offset = input.unsigned_padded()?;
@@ -53,7 +53,7 @@ impl Tables {
     }
 
     /// Checks that the tables stand where their offsets say.
-    pub fn check_offsets<R: Read + Seek>(&self, input: &Input<R>) -> Result<(), OasisError> {
+    pub(crate) fn check_offsets<R: Read + Seek>(&self, input: &Input<R>) -> Result<(), OasisError> {
         for (table, state) in ALL.into_iter().zip(&self.states) {
             if let (Some(found), Some(said)) = (state.first, state.strict_offset)
                 && found != said
@@ -66,7 +66,7 @@ impl Tables {
     }
 
     /// Read an entry.
-    pub fn read<R: Read + Seek>(
+    pub(crate) fn read<R: Read + Seek>(
         &mut self,
         input: &mut Input<R>,
         record: u8,

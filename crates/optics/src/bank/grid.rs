@@ -48,7 +48,7 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    pub fn over(low: f64, high: f64, most_step: f64) -> Self {
+    pub(crate) fn over(low: f64, high: f64, most_step: f64) -> Self {
         if high <= low {
             return Self {
                 first: low,
@@ -64,12 +64,12 @@ impl Axis {
         }
     }
 
-    pub fn node(&self, k: usize) -> f64 {
+    pub(crate) fn node(&self, k: usize) -> f64 {
         self.first + k as f64 * self.step
     }
 
     /// All nodes, rising.
-    pub fn all(&self) -> Vec<f64> {
+    pub(crate) fn all(&self) -> Vec<f64> {
         (0..self.nodes).map(|k| self.node(k)).collect()
     }
 
@@ -82,7 +82,7 @@ impl Axis {
     }
 
     /// Nodes and weights for a value; none if it is outside.
-    pub fn weights(&self, value: f64) -> Option<Vec<(usize, f64)>> {
+    pub(crate) fn weights(&self, value: f64) -> Option<Vec<(usize, f64)>> {
         let x = self.steps_to(value)?;
         if self.nodes == 1 {
             return Some(vec![(0, 1.0)]);
@@ -97,18 +97,18 @@ pub(super) struct StackGrid([Axis; QUANTITIES]);
 
 impl StackGrid {
     /// Over all changes between the least and the most of each number.
-    pub fn over([least, most]: &[CellChange; 2]) -> Self {
+    pub(crate) fn over([least, most]: &[CellChange; 2]) -> Self {
         let (least, most) = (quantities(least), quantities(most));
         Self(std::array::from_fn(|k| Axis::over(least[k], most[k], STEPS[k])))
     }
 
     /// Number of stacks.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.0.iter().map(|a| a.nodes).product()
     }
 
     /// The change of a stack of the grid.
-    pub fn change(&self, mut stack: usize) -> CellChange {
+    pub(crate) fn change(&self, mut stack: usize) -> CellChange {
         change_of(self.0.each_ref().map(|axis| {
             let k = stack % axis.nodes;
             stack /= axis.nodes;
@@ -117,7 +117,7 @@ impl StackGrid {
     }
 
     /// Stacks and weights of the cubics along every axis; none if a number is outside.
-    pub fn weights(&self, change: &CellChange) -> Option<Vec<(usize, f64)>> {
+    pub(crate) fn weights(&self, change: &CellChange) -> Option<Vec<(usize, f64)>> {
         let mut stacks = vec![(0, 1.0)];
         let mut stride = 1;
         for (axis, value) in self.0.iter().zip(quantities(change)) {
@@ -132,13 +132,13 @@ impl StackGrid {
     }
 
     /// True if a change is between the nodes.
-    pub fn holds(&self, change: &CellChange) -> bool {
+    pub(crate) fn holds(&self, change: &CellChange) -> bool {
         let mut axes = self.0.iter().zip(quantities(change));
         axes.all(|(axis, value)| axis.steps_to(value).is_some())
     }
 
     /// Value at a change that the grid holds, by rational functions along every axis, from the values of all stacks.
-    pub fn between(&self, change: &CellChange, of_stacks: impl Iterator<Item = Complex64>) -> Complex64 {
+    pub(crate) fn between(&self, change: &CellChange, of_stacks: impl Iterator<Item = Complex64>) -> Complex64 {
         let mut values: Vec<Complex64> = of_stacks.collect();
         for (axis, value) in self.0.iter().zip(quantities(change)) {
             let nodes = axis.all();

@@ -68,7 +68,7 @@ fn told(edges_nm: [u16; 2]) -> (u16, u16, bool) {
 
 impl Sizes {
     /// Pillars with these numbers, whose edges are off by the least to the most (nm).
-    pub fn new(pillars: UprightRectangles, numbers: &[u16], [least, most]: [f64; 2]) -> Self {
+    pub(crate) fn new(pillars: UprightRectangles, numbers: &[u16], [least, most]: [f64; 2]) -> Self {
         let mut lines: BTreeMap<u16, Vec<u16>> = BTreeMap::new();
         for number in numbers {
             let (short, longer, _) = told(pillars.edges_nm(*number));
@@ -110,17 +110,17 @@ impl Sizes {
     }
 
     /// Pillars of the table.
-    pub fn pillars(&self) -> UprightRectangles {
+    pub(crate) fn pillars(&self) -> UprightRectangles {
         self.pillars
     }
 
     /// Number of pillars that are solved at first, in each stack.
-    pub fn first(&self) -> usize {
+    pub(crate) fn first(&self) -> usize {
         self.spans.iter().map(|span| span.nodes_nm.len()).sum()
     }
 
     /// Words for the pillar of a number whose edges are off by `bias_nm`.
-    pub fn words(&self, number: u16, bias_nm: f64) -> String {
+    pub(crate) fn words(&self, number: u16, bias_nm: f64) -> String {
         let [x, y] = self.pillars.edges_nm(number);
         format!("pillar of {x} x {y} nm whose edges are off by {bias_nm} nm")
     }
@@ -129,7 +129,7 @@ impl Sizes {
     ///
     /// # Errors
     /// Those of `solve`; also if the user stopped it.
-    pub fn solve(
+    pub(crate) fn solve(
         &self,
         solve: &(dyn Fn([f64; 2]) -> Result<Vec<Along>> + Sync),
         progress: &dyn Progress,
@@ -167,7 +167,7 @@ impl Sizes {
 
     /// Transmissions along x and along y, in all stacks, of the pillar of a number whose edges are off by `bias_nm`; none if it is on no line that
     /// was solved.
-    pub fn of_stacks<'a>(
+    pub(crate) fn of_stacks<'a>(
         &self,
         tables: &'a SizeTables,
         number: u16,
@@ -256,7 +256,7 @@ pub(super) struct SizeTables {
 
 impl SizeTables {
     /// Numbers that a file stores.
-    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> {
         self.curves.iter().flat_map(|curve| {
             let count = std::iter::once(curve.nodes_nm.len() as f64);
             let t = curve.t.iter().flatten().flatten().flat_map(|z| [z.re, z.im]);
@@ -265,7 +265,7 @@ impl SizeTables {
     }
 
     /// One wavelength from the front of the numbers of a file.
-    pub fn take(rest: &mut &[f64], sizes: &Sizes, stacks: usize) -> Option<Self> {
+    pub(crate) fn take(rest: &mut &[f64], sizes: &Sizes, stacks: usize) -> Option<Self> {
         let mut curve = || {
             let (count, after) = rest.split_first()?;
             let (nodes, after) = after.split_at_checked(*count as usize)?;

@@ -36,7 +36,7 @@ pub(super) struct Colour {
 
 impl Colour {
     /// Weights of four widths for any between them; none outside.
-    pub fn weights(&self, width_nm: f64) -> Option<[(usize, f64); 4]> {
+    pub(crate) fn weights(&self, width_nm: f64) -> Option<[(usize, f64); 4]> {
         let (first, last) = (self.widths_nm.first()?, self.widths_nm.last()?);
         if !(*first..=*last).contains(&width_nm) {
             return None;
@@ -52,7 +52,7 @@ impl Colour {
     }
 
     /// One row of all widths, and of a site without pillar, for these stacks and weights; `each` numbers a width.
-    pub fn row(&self, stacks: &[(usize, f64)], each: usize) -> Vec<Complex64> {
+    pub(crate) fn row(&self, stacks: &[(usize, f64)], each: usize) -> Vec<Complex64> {
         let length = (self.widths_nm.len() + 1) * each;
         let mut row = vec![Complex64::ZERO; length];
         for (stack, weight) in stacks {
@@ -64,14 +64,14 @@ impl Colour {
     }
 
     /// Numbers that a file stores.
-    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> {
         let count = std::iter::once(self.widths_nm.len() as f64);
         let t = self.t.iter().flat_map(|z| [z.re, z.im]);
         count.chain(self.widths_nm.iter().copied()).chain(t)
     }
 
     /// One wavelength from the front of the numbers of a file: `rows` for a width.
-    pub fn take(rest: &mut &[f64], rows: usize) -> Option<Self> {
+    pub(crate) fn take(rest: &mut &[f64], rows: usize) -> Option<Self> {
         let (count, after) = rest.split_first()?;
         let count = *count as usize;
         let (widths, after) = after.split_at_checked(count)?;

@@ -73,7 +73,7 @@ impl MadeRectangles {
     ///
     /// # Errors
     /// If they are no such rectangles, or the model has what they have no meaning for.
-    pub fn new(stated: &CellStack, model: &CalibratedModel, focused: FocusedLight) -> Result<Self> {
+    pub(crate) fn new(stated: &CellStack, model: &CalibratedModel, focused: FocusedLight) -> Result<Self> {
         let fits = stated.shape.basis() == Some(focused.basis());
         let (true, PillarShape::Rectangle(pillars)) = (fits, stated.shape) else {
             return Err(Error::refused(
@@ -91,7 +91,7 @@ impl MadeRectangles {
     }
 
     /// Same rectangles, whose solved rows are cached in a folder from one run to the next.
-    pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
+    pub(crate) fn kept_in(mut self, folder: Option<&Path>) -> Self {
         if let RowSource::Solved(solved) = &mut self.source {
             solved.folder = folder.map(Path::to_owned);
         }
@@ -99,7 +99,7 @@ impl MadeRectangles {
     }
 
     /// Same rectangles with all rows from a bank of the same pillars.
-    pub fn of_bank(self, bank: &Arc<CellBank>) -> Self {
+    pub(crate) fn of_bank(self, bank: &Arc<CellBank>) -> Self {
         Self {
             source: RowSource::Bank(Arc::clone(bank)),
             ..self
@@ -111,7 +111,7 @@ impl MadeRectangles {
     ///
     /// # Errors
     /// If a cell cannot be solved, or is not in the bank; also if the user stopped it.
-    pub fn tables(
+    pub(crate) fn tables(
         &self,
         change: &CellChange,
         classes: &[RectangleClass],
@@ -152,7 +152,7 @@ impl MadeRectangles {
 
     /// Solved widths from tables of light that leaves such classes: one table for all light that interferes with no
     /// other.
-    pub fn solved(leaving: Vec<PassedTable>) -> SolvedWidths {
+    pub(crate) fn solved(leaving: Vec<PassedTable>) -> SolvedWidths {
         let mut solved = SolvedWidths {
             pillars: Vec::new(),
             bare: Vec::new(),

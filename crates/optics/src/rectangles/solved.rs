@@ -37,7 +37,7 @@ pub(crate) struct SolvedRectangles {
 }
 
 impl SolvedRectangles {
-    pub fn new(stated: CellStack, pillars: Rectangles) -> Self {
+    pub(crate) fn new(stated: CellStack, pillars: Rectangles) -> Self {
         Self {
             stated,
             pillars,
@@ -50,7 +50,7 @@ impl SolvedRectangles {
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn rows(
+    pub(crate) fn rows(
         &self,
         change: &CellChange,
         (um, spectral): Colour,

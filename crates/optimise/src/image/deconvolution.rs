@@ -212,7 +212,7 @@ pub(crate) fn bracket(table: &[Complex64], width_nm: f64) -> (usize, f64) {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::rings::mapping::tests::published;
     use crate::{PixelWindow, Rings, Start};
@@ -220,7 +220,7 @@ pub mod tests {
     use metalith_core::Silent;
     use metalith_pillars::Lattice;
 
-    pub fn small() -> (Lens, Deconvolution) {
+    pub(crate) fn small() -> (Lens, Deconvolution) {
         let rings = Rings::new(Lattice::covering(60_000, 350).unwrap(), 60_000).unwrap();
         let lens = Lens {
             rings,

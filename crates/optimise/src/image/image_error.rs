@@ -10,7 +10,7 @@ use crate::PixelWindow;
 /// Power of image and noise at every frequency of a window's quarter plane, and the number of modes that
 /// each stands for.
 #[derive(Clone, Debug)]
-pub struct Spectrum {
+pub(crate) struct Spectrum {
     image: Vec<f64>,
     count: Vec<f64>,
     noise: f64,
@@ -19,7 +19,7 @@ pub struct Spectrum {
 impl Spectrum {
     /// Powers of natural images level off below one period a window; noise is white. Powers are such that their sums
     /// over all modes are variances.
-    pub fn new(scene: &Scene, noise: &Noise, window: PixelWindow) -> Self {
+    pub(crate) fn new(scene: &Scene, noise: &Noise, window: PixelWindow) -> Self {
         let side = window.pixels / 2 + 1;
         let share = |i: usize| if i == 0 || i == window.pixels / 2 { 1.0 } else { 2.0 };
         let mut image = Vec::with_capacity(side * side);
@@ -42,7 +42,7 @@ impl Spectrum {
     }
 
     /// Number of modes of the quarter plane.
-    pub fn modes(&self) -> usize {
+    pub(crate) fn modes(&self) -> usize {
         self.image.len()
     }
 
@@ -52,7 +52,7 @@ impl Spectrum {
     /// S N / (|H|^2 S + N).
     ///
     /// If `slopes` are given, the derivative by each blur (not its conjugate) times `scale` is added to them.
-    pub fn error(&self, blurs: &[&[Complex32]], scale: f64, mut slopes: Option<&mut [Vec<Complex64>]>) -> f64 {
+    pub(crate) fn error(&self, blurs: &[&[Complex32]], scale: f64, mut slopes: Option<&mut [Vec<Complex64>]>) -> f64 {
         let share = 1.0 / blurs.len() as f64;
         let mut sum = 0.0;
         for at in 0..self.image.len() {

@@ -49,7 +49,7 @@ impl Default for Views {
 
 /// Middle of the window from where the chief ray lands (um): half way between the rays from both edges of
 /// the lens, if it is a perfect lens for light along its axis.
-pub fn window_offset_um(lens: &Lens, angle_rad: f64, side_um: f64) -> f64 {
+pub(crate) fn window_offset_um(lens: &Lens, angle_rad: f64, side_um: f64) -> f64 {
     let radius = 0.5e-3 * f64::from(lens.rings.diameter_nm());
     let landing = |x: f64| {
         let sine = (angle_rad.sin() - x / x.hypot(lens.distance_um)).clamp(-0.999, 0.999);

@@ -13,7 +13,7 @@ pub(crate) struct Wiener {
 
 impl Wiener {
     /// Filter from the mean |H|^2 of the blurs and the powers S of the scene and N of the noise.
-    pub fn new(blur_power: f64, signal: f64, noise: f64) -> Self {
+    pub(crate) fn new(blur_power: f64, signal: f64, noise: f64) -> Self {
         Self {
             signal,
             total: (blur_power * signal + noise).max(f64::MIN_POSITIVE),
@@ -21,12 +21,12 @@ impl Wiener {
     }
 
     /// Share of the scene's power that is restored; the expected square error is S (1 - share).
-    pub fn restored(&self, blur: Complex64) -> f64 {
+    pub(crate) fn restored(&self, blur: Complex64) -> f64 {
         blur.norm_sqr() * self.signal / self.total
     }
 
     /// Expected power of what is seen, mean |H|^2 S + N.
-    pub fn seen(&self) -> f64 {
+    pub(crate) fn seen(&self) -> f64 {
         self.total
     }
 }

@@ -14,10 +14,10 @@ use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Result};
 
 /// Rows are padded to whole groups of this many, so that inner loops have no ends to tidy.
-pub const LANES: usize = 32;
+pub(crate) const LANES: usize = 32;
 /// Added to every intensity under a logarithm, in units of the matched peak: keeps a field of zero finite
 /// and is a thousandth of a hyperbolic lens at its worst wavelength.
-pub const FLOOR: f64 = 1e-9;
+pub(crate) const FLOOR: f64 = 1e-9;
 
 /// Merit that the intensities of a block make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -239,7 +239,7 @@ fn transmissions(conditions: &[Option<Condition>], cells: &[&dyn CellModel], wid
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::merit::focus::FabricationError;
     use crate::rings::mapping::tests::published;
@@ -248,7 +248,7 @@ pub mod tests {
     use metalith_cell::PublishedCell;
     use metalith_pillars::Lattice;
 
-    pub fn lens() -> Lens {
+    pub(crate) fn lens() -> Lens {
         let rings = Rings::new(Lattice::covering(60_000, 350).unwrap(), 60_000).unwrap();
         Lens {
             rings,
@@ -257,7 +257,7 @@ pub mod tests {
     }
 
     /// Two blocks of each kind, one of them made 5 nm too wide.
-    pub fn problem() -> FieldProblem {
+    pub(crate) fn problem() -> FieldProblem {
         let (lens, cell) = (lens(), PublishedCell::new(350));
         let cells: [&dyn CellModel; 1] = [&cell];
         let wide = FabricationError {
@@ -277,7 +277,7 @@ pub mod tests {
     }
 
     /// Phases whose widths are half way between whole ones: transmission is a straight line between those.
-    pub fn start() -> Vec<f64> {
+    pub(crate) fn start() -> Vec<f64> {
         let mapping = published();
         let waves = Start::Hyperbolic { wavelength_um: 0.55 }.waves(&lens(), 0);
         let uneven = waves.iter().enumerate().map(|(i, t)| t + 0.1 * (i as f64 * 1.7).sin());

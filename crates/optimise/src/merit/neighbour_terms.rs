@@ -18,7 +18,7 @@ use metalith_core::{Error, Result};
 use num_complex::Complex64;
 
 /// Terms that neighbours add at each row.
-pub struct NeighbourTerms {
+pub(crate) struct NeighbourTerms {
     links: Links,
     rows: usize,
     /// Field of what a neighbour adds, `[link][row]`.
@@ -42,7 +42,7 @@ pub struct RingContext {
 }
 
 /// Terms of neighbours with what each pillar transmits on the mean over its neighbours.
-pub struct PairTerms {
+pub(crate) struct PairTerms {
     pub terms: NeighbourTerms,
     /// Transmissions of each row, by width (nm) as far as it was asked for; `None` for padding.
     pub own: Vec<Option<Vec<Complex64>>>,
@@ -55,7 +55,7 @@ impl NeighbourTerms {
     /// # Errors
     /// If they take more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with
     /// errors, or the cell is not coupled at a wavelength.
-    pub fn of(
+    pub(crate) fn of(
         conditions: &[Option<Condition>],
         widths: &[u16],
         max_width_nm: u16,
@@ -133,7 +133,7 @@ impl NeighbourTerms {
     }
 
     /// Fields of all pairs together, added to those of rings by themselves.
-    pub fn add_pairs(&self, widths_nm: &[u16], fields: &mut [Complex64]) {
+    pub(crate) fn add_pairs(&self, widths_nm: &[u16], fields: &mut [Complex64]) {
         for (k, link) in self.links.all().iter().enumerate() {
             let (k_re, k_im) = self.kernel.row(k, self.rows);
             let v = self.neighbour[usize::from(widths_nm[link.other])];
@@ -148,7 +148,7 @@ impl NeighbourTerms {
     }
 
     /// Context of a ring: what its width, whatever it is, is multiplied with, while others have these widths.
-    pub fn visit(&self, ring: usize, widths_nm: &[u16]) -> RingContext {
+    pub(crate) fn visit(&self, ring: usize, widths_nm: &[u16]) -> RingContext {
         let mut visit = RingContext {
             around: Planes::zeros(PRODUCTS * self.rows),
             reverse: Planes::zeros(NEIGHBOUR_DEGREE * self.rows),
@@ -181,7 +181,7 @@ impl NeighbourTerms {
 
     /// Add what the width of a ring that is visited contributes beside its own transmission.
     #[inline(always)]
-    pub fn add_contribution(&self, width_nm: u16, visit: &RingContext, out: &mut Planes) {
+    pub(crate) fn add_contribution(&self, width_nm: u16, visit: &RingContext, out: &mut Planes) {
         let (re, im) = (&mut out.re[..], &mut out.im[..]);
         for product in 0..PRODUCTS {
             let around = visit.around.row(product, self.rows);

@@ -3,7 +3,7 @@
 use super::node::NODES;
 
 /// Kinds of neighbours by their distance: one pitch, the diagonal, two pitches.
-pub const DISTANCES: usize = 3;
+pub(crate) const DISTANCES: usize = 3;
 
 /// Neighbours of the sites of a ring that are in one ring, at one distance.
 #[derive(Clone, Debug)]
@@ -68,13 +68,13 @@ impl Links {
 }
 
 /// Column and row of the neighbour of a site at an offset, if they are of a lattice of so many.
-pub fn neighbour([ix, iy]: [usize; 2], [dx, dy]: [i32; 2], sites: usize) -> Option<[usize; 2]> {
+pub(crate) fn neighbour([ix, iy]: [usize; 2], [dx, dy]: [i32; 2], sites: usize) -> Option<[usize; 2]> {
     let inside = |at: usize, by: i32| at.checked_add_signed(by as isize).filter(|at| *at < sites);
     Some([inside(ix, dx)?, inside(iy, dy)?])
 }
 
 /// The kind of a neighbour by its distance.
-pub fn distance_of([x, y]: [i32; 2]) -> usize {
+pub(crate) fn distance_of([x, y]: [i32; 2]) -> usize {
     match x * x + y * y {
         1 => 0,
         2 => 1,

@@ -104,7 +104,7 @@ fn choices_of(widths: &[u16]) -> Vec<WidthChoice> {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(crate) mod tests {
     use super::*;
 
     use metalith_cell::InversePolynomial;
@@ -112,7 +112,7 @@ pub mod tests {
     use metalith_pillars::PillarShape;
 
     /// The rule of the shipped designs but for the coefficients.
-    pub fn rule(coefficients: &[f64]) -> PillarRule {
+    pub(crate) fn rule(coefficients: &[f64]) -> PillarRule {
         let cell = CellSpec {
             lattice: Default::default(),
             pitch_nm: 350,
@@ -151,7 +151,7 @@ pub mod tests {
     }
 
     /// The published mapping, all powers.
-    pub fn published() -> Mapping {
+    pub(crate) fn published() -> Mapping {
         Mapping::new(&rule(&[0.2923, 0.6809, -0.1484]))
     }
 

@@ -2,7 +2,7 @@
 
 /// Points at which a ring is sampled along r^2. The kernels turn by at most 1.2 rad across a ring of
 /// one pitch (400 nm, NA 0.2); Chebyshev interpolation at eight points then errs by 1e-9.
-pub const NODES: usize = 8;
+pub(crate) const NODES: usize = 8;
 
 /// One radius that stands for a part of a ring.
 #[derive(Clone, Copy, Debug, Default)]

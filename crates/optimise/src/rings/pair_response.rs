@@ -16,11 +16,11 @@ use metalith_cell::{
 use metalith_core::{Result, Silent};
 
 /// Products that a pair at any distance is a sum of: for each distance those of [`SiteResponse::pair_factors`].
-pub const PRODUCTS: usize = DISTANCES * NEIGHBOUR_DEGREE;
+pub(crate) const PRODUCTS: usize = DISTANCES * NEIGHBOUR_DEGREE;
 
 /// The sum over pairs at one wavelength, by width (nm); of widths that were not asked for it knows nothing.
 #[derive(Clone, Debug)]
-pub struct PairResponse {
+pub(crate) struct PairResponse {
     /// Mean transmission of a pillar over its neighbours.
     pub own: Vec<Complex64>,
     /// Factors of the own width, mean over the neighbours at a distance: in a ring there are equally many on all sides.
@@ -34,7 +34,7 @@ impl PairResponse {
     ///
     /// # Errors
     /// As [`CellModel::response`].
-    pub fn of(
+    pub(crate) fn of(
         cell: &dyn CellModel,
         wavelength_um: f64,
         widths_nm: impl IntoIterator<Item = u16>,
@@ -68,14 +68,14 @@ impl PairResponse {
     }
 
     /// Term that a neighbour at a distance adds.
-    pub fn pair(&self, distance: usize, own_nm: u16, neighbour_nm: u16) -> Complex64 {
+    pub(crate) fn pair(&self, distance: usize, own_nm: u16, neighbour_nm: u16) -> Complex64 {
         let factors = &self.factors[usize::from(own_nm)][distance * NEIGHBOUR_DEGREE..][..NEIGHBOUR_DEGREE];
         let neighbour = &self.neighbour[usize::from(neighbour_nm)];
         factors.iter().zip(neighbour).map(|(a, b)| a * b).sum()
     }
 
     /// Field on the axis of a lens with pillars of `widths_nm[k]` in ring `k`.
-    pub fn on_axis(&self, rings: &Rings, field: &RingField<'_>, widths_nm: &[u16]) -> Complex64 {
+    pub(crate) fn on_axis(&self, rings: &Rings, field: &RingField<'_>, widths_nm: &[u16]) -> Complex64 {
         let links = rings.links();
         let of_ring = |ring: usize| {
             let linked = links.all()[links.of_ring(ring)].iter().zip(field.on_axis_by_link(ring));
@@ -86,7 +86,7 @@ impl PairResponse {
     }
 
     /// The mean transmission of the sites of each ring.
-    pub fn of_rings(&self, rings: &Rings, widths_nm: &[u16]) -> Vec<Complex64> {
+    pub(crate) fn of_rings(&self, rings: &Rings, widths_nm: &[u16]) -> Vec<Complex64> {
         let links = rings.links();
         let of_ring = |ring: usize| {
             let share = 1.0 / f64::from(rings.sites_of(ring));

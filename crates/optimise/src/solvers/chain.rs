@@ -22,7 +22,7 @@ pub(crate) struct Course {
 }
 
 impl Course {
-    pub fn new((chains, hot_sweeps, temperature): (u32, u32, (f64, f64)), blocks: u32) -> Self {
+    pub(crate) fn new((chains, hot_sweeps, temperature): (u32, u32, (f64, f64)), blocks: u32) -> Self {
         let schedule = Schedule {
             hot_sweeps,
             cold_sweeps: COLD_SWEEPS,
@@ -54,7 +54,7 @@ pub(crate) struct Best<'p> {
 }
 
 impl<'p> Best<'p> {
-    pub fn new(progress: &'p dyn Progress) -> Self {
+    pub(crate) fn new(progress: &'p dyn Progress) -> Self {
         Self {
             merit: Mutex::new(f64::MIN),
             progress,
@@ -71,7 +71,7 @@ impl<'p> Best<'p> {
 }
 
 impl Found {
-    pub fn optimised(self, start: &'static str, interrupted: Option<Checkpoint>) -> Optimised {
+    pub(crate) fn optimised(self, start: &'static str, interrupted: Option<Checkpoint>) -> Optimised {
         Optimised {
             waves: self.waves,
             widths_nm: self.widths_nm,

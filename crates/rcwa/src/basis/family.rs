@@ -17,7 +17,7 @@ pub(crate) enum Family {
 
 impl Family {
     /// Families of Ex, Ey and Ez for this one of Ex.
-    pub fn of_components(self) -> [Self; 3] {
+    pub(crate) fn of_components(self) -> [Self; 3] {
         match self {
             Self::Product(x, y) => {
                 [(x, y), (x.derived(), y.derived()), (x.derived(), y)].map(|(x, y)| Self::Product(x, y))
@@ -28,7 +28,7 @@ impl Family {
     }
 
     /// The orders of its functions, ascending along x, then along y.
-    pub fn orders(self, highest: usize) -> Vec<[i32; 2]> {
+    pub(crate) fn orders(self, highest: usize) -> Vec<[i32; 2]> {
         let last = highest as i32;
         match self {
             Self::Product(x, y) => {
@@ -45,7 +45,7 @@ impl Family {
     }
 
     /// Place of an order among its functions.
-    pub fn position(self, [m, n]: [i32; 2], highest: usize) -> Option<usize> {
+    pub(crate) fn position(self, [m, n]: [i32; 2], highest: usize) -> Option<usize> {
         let last = highest as i32;
         match self {
             Self::Product(x, y) => Some(x.position(m, highest)? * y.len(highest) + y.position(n, highest)?),
@@ -62,7 +62,7 @@ impl Family {
     }
 
     /// The order of the function that the plane wave of an order is part of, and the factor of that part.
-    pub fn function(self, [m, n]: [i32; 2]) -> ([i32; 2], f64) {
+    pub(crate) fn function(self, [m, n]: [i32; 2]) -> ([i32; 2], f64) {
         match self {
             Self::Product(x, y) => {
                 let ((m, a), (n, b)) = (x.function(m), y.function(n));
@@ -81,7 +81,7 @@ impl Family {
     }
 
     /// The waves that a function joins to that of its own order, by the signs of both axes, and the sign of each.
-    pub fn images(self) -> Vec<([i32; 2], f64)> {
+    pub(crate) fn images(self) -> Vec<([i32; 2], f64)> {
         let along = |space: Space| -> Vec<(i32, f64)> {
             match space {
                 Space::Full => vec![(1, 1.0)],

@@ -40,7 +40,7 @@ fn largest(along_axis: usize, squares: impl Fn(i32) -> Vec<usize>) -> usize {
 
 impl RetainedOrders {
     /// The largest circle of a square lattice with no more orders than are kept with so many along an axis.
-    pub fn disc(along_axis: usize) -> Self {
+    pub(crate) fn disc(along_axis: usize) -> Self {
         let all = |last: i32| {
             let of_row = |m: i32| (-last..=last).map(move |n| square([m, n]));
             (-last..=last).flat_map(of_row).collect()
@@ -49,7 +49,7 @@ impl RetainedOrders {
     }
 
     /// The largest circle of staggered rows with no more orders than a square lattice keeps with so many along an axis.
-    pub fn circle(along_axis: usize) -> Self {
+    pub(crate) fn circle(along_axis: usize) -> Self {
         let all = |last: i32| {
             let of_row = |m: i32| (-last..=last).map(move |n| [m, n]);
             let sites = (-last..=last).flat_map(of_row).filter(|[m, n]| (m + n) % 2 == 0);
@@ -59,7 +59,7 @@ impl RetainedOrders {
     }
 
     /// The largest order along both axes.
-    pub fn reach(self) -> [usize; 2] {
+    pub(crate) fn reach(self) -> [usize; 2] {
         match self {
             Self::Square(highest) => [highest; 2],
             Self::Disc(most) => [most.isqrt(); 2],
@@ -68,7 +68,7 @@ impl RetainedOrders {
     }
 
     /// True if an order is retained.
-    pub fn has(self, [m, n]: [i32; 2]) -> bool {
+    pub(crate) fn has(self, [m, n]: [i32; 2]) -> bool {
         match self {
             Self::Square(highest) => [m, n].iter().all(|order| order.unsigned_abs() as usize <= highest),
             Self::Disc(most) => square([m, n]) <= most,
@@ -77,7 +77,7 @@ impl RetainedOrders {
     }
 
     /// The orders of the functions of a family, ascending along x, then along y.
-    pub fn orders(self, family: Family) -> Vec<[i32; 2]> {
+    pub(crate) fn orders(self, family: Family) -> Vec<[i32; 2]> {
         match self {
             Self::Square(highest) => family.orders(highest),
             Self::Disc(most) | Self::Circle(most) => {
@@ -89,7 +89,7 @@ impl RetainedOrders {
     }
 
     /// Place of an order among `orders`, those of the family.
-    pub fn position(self, family: Family, orders: &[[i32; 2]], order: [i32; 2]) -> Option<usize> {
+    pub(crate) fn position(self, family: Family, orders: &[[i32; 2]], order: [i32; 2]) -> Option<usize> {
         match self {
             Self::Square(highest) => family.position(order, highest),
             Self::Disc(_) | Self::Circle(_) => orders.binary_search(&order).ok(),

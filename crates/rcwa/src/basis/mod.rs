@@ -25,7 +25,7 @@ pub(super) enum Space {
 
 impl Space {
     /// Component that the derivative leads to.
-    pub fn derived(self) -> Self {
+    pub(crate) fn derived(self) -> Self {
         match self {
             Self::Full => Self::Full,
             Self::Even => Self::Odd,
@@ -34,7 +34,7 @@ impl Space {
     }
 
     /// The orders of its functions, ascending.
-    pub fn orders(self, highest: usize) -> std::ops::RangeInclusive<i32> {
+    pub(crate) fn orders(self, highest: usize) -> std::ops::RangeInclusive<i32> {
         let m = highest as i32;
         match self {
             Self::Full => -m..=m,
@@ -43,7 +43,7 @@ impl Space {
         }
     }
 
-    pub fn len(self, highest: usize) -> usize {
+    pub(crate) fn len(self, highest: usize) -> usize {
         match self {
             Self::Full => 2 * highest + 1,
             Self::Even => highest + 1,
@@ -52,13 +52,13 @@ impl Space {
     }
 
     /// Place of an order among its functions.
-    pub fn position(self, order: i32, highest: usize) -> Option<usize> {
+    pub(crate) fn position(self, order: i32, highest: usize) -> Option<usize> {
         let first = *self.orders(highest).start();
         (order >= first && order <= highest as i32).then(|| (order - first) as usize)
     }
 
     /// The order of the function that the plane wave e_order is part of, and the factor of that part.
-    pub fn function(self, order: i32) -> (i32, f64) {
+    pub(crate) fn function(self, order: i32) -> (i32, f64) {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         match self {
             Self::Full => (order, 1.0),
@@ -69,7 +69,7 @@ impl Space {
     }
 
     /// Multiplication by an even function with Fourier coefficients `f` (orders 0..=2 highest).
-    pub fn toeplitz<T: Scalar>(self, f: &[T], highest: usize) -> Mat<T> {
+    pub(crate) fn toeplitz<T: Scalar>(self, f: &[T], highest: usize) -> Mat<T> {
         let orders: Vec<i32> = self.orders(highest).collect();
         let n = orders.len();
         Mat::from_fn(n, n, |i, j| {
@@ -101,12 +101,12 @@ pub(super) struct FieldRow {
 
 impl FieldRow {
     /// Entry of the divergence, that maps this row to Ez: k along the component.
-    pub fn divergence(&self) -> f64 {
+    pub(crate) fn divergence(&self) -> f64 {
         self.k[self.component]
     }
 
     /// Entry of the curl, that maps this row to Hz: -ky for Ex, kx for Ey.
-    pub fn curl(&self) -> f64 {
+    pub(crate) fn curl(&self) -> f64 {
         if self.component == 0 { -self.k[1] } else { self.k[0] }
     }
 }
@@ -122,7 +122,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.list.len()
     }
 }
@@ -141,7 +141,7 @@ pub(super) struct FieldBasis {
 impl FieldBasis {
     /// `family` is that of Ex, `k` the wave vector of the zero order over k0, `steps` the wavelength over the periods along
     /// the axes. The k of an axis in an even or odd space is zero, and both are in a family that half a turn tells.
-    pub fn new(kept: RetainedOrders, family: Family, k: [f64; 2], steps: [f64; 2]) -> Self {
+    pub(crate) fn new(kept: RetainedOrders, family: Family, k: [f64; 2], steps: [f64; 2]) -> Self {
         let families = family.of_components();
         let orders = families.map(|f| kept.orders(f));
         let place = |c: usize, order: [i32; 2]| kept.position(families[c], &orders[c], order);
@@ -171,7 +171,7 @@ impl FieldBasis {
     }
 
     /// Row and factor of the plane wave of order (m, n) in a component.
-    pub fn plane_wave(&self, component: usize, m: i32, n: i32) -> Option<(usize, f64)> {
+    pub(crate) fn plane_wave(&self, component: usize, m: i32, n: i32) -> Option<(usize, f64)> {
         let family = self.families[component];
         let (order, factor) = family.function([m, n]);
         let place = self.kept.position(family, &self.orders[component], order)?;
@@ -179,7 +179,7 @@ impl FieldBasis {
     }
 
     /// The plane-wave amplitudes of order (m, n) of the field in column `column` of `field`.
-    pub fn amplitude(&self, field: &Mat<Complex64>, column: usize, m: i32, n: i32) -> [Complex64; 2] {
+    pub(crate) fn amplitude(&self, field: &Mat<Complex64>, column: usize, m: i32, n: i32) -> [Complex64; 2] {
         [0, 1].map(|component| {
             self.plane_wave(component, m, n)
                 .map_or(Complex64::ZERO, |(row, factor)| field[(row, column)] * factor)

@@ -94,7 +94,7 @@ impl IndexOver {
 
 impl Dispersion {
     /// Wavelengths it is known for (um).
-    pub fn range_um(&self) -> (f64, f64) {
+    pub(crate) fn range_um(&self) -> (f64, f64) {
         match self {
             Self::Constant { .. } => (0.0, f64::INFINITY),
             Self::Sellmeier { range_um, .. } | Self::Cauchy { range_um, .. } => *range_um,
@@ -108,7 +108,7 @@ impl Dispersion {
     }
 
     /// Wavelengths of its samples (um), rising: from one to the next n and k stay between their values there.
-    pub fn samples_um(&self) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn samples_um(&self) -> impl Iterator<Item = f64> + '_ {
         let samples: &[[f64; 3]] = match self {
             Self::Table { samples } | Self::Parts { k: Some(samples), .. } => samples,
             Self::Parts {
@@ -121,7 +121,7 @@ impl Dispersion {
     }
 
     /// Complex index n + i k at a wavelength (um) in that range.
-    pub fn index(&self, wavelength_um: f64) -> Complex64 {
+    pub(crate) fn index(&self, wavelength_um: f64) -> Complex64 {
         let l2 = wavelength_um * wavelength_um;
         match self {
             Self::Constant { n, k } => Complex64::new(*n, *k),

@@ -10,16 +10,16 @@ use serde::Serialize;
 pub(super) struct Steps(Vec<[f64; 2]>);
 
 impl Steps {
-    pub fn empty() -> Self {
+    pub(crate) fn empty() -> Self {
         Self(Vec::new())
     }
 
-    pub fn rectangle(widths_nm: [f64; 2]) -> Self {
+    pub(crate) fn rectangle(widths_nm: [f64; 2]) -> Self {
         Self(vec![widths_nm.map(|w| 0.5 * w)])
     }
 
     /// A square whose corners are quarter circles, of so many steps each: the area is that of the rounded square.
-    pub fn rounded(width_nm: f64, radius_nm: f64, steps: usize) -> Self {
+    pub(crate) fn rounded(width_nm: f64, radius_nm: f64, steps: usize) -> Self {
         let radius = radius_nm.min(0.5 * width_nm);
         if radius <= 0.0 {
             return Self::rectangle([width_nm; 2]);
@@ -33,35 +33,35 @@ impl Steps {
     }
 
     /// The largest width along x and y (nm).
-    pub fn extent_nm(&self) -> [f64; 2] {
+    pub(crate) fn extent_nm(&self) -> [f64; 2] {
         match (self.0.first(), self.0.last()) {
             (Some(first), Some(last)) => [2.0 * last[0], 2.0 * first[1]],
             _ => [0.0, 0.0],
         }
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.0.iter().all(|c| c[0] <= 0.0 || c[1] <= 0.0)
     }
 
-    pub fn fills(&self, width_nm: f64) -> bool {
+    pub(crate) fn fills(&self, width_nm: f64) -> bool {
         self.0.iter().any(|c| c[0] >= 0.5 * width_nm && c[1] >= 0.5 * width_nm)
     }
 
     /// True if the diagonal mirrors it.
-    pub fn is_square(&self) -> bool {
+    pub(crate) fn is_square(&self) -> bool {
         let n = self.0.len();
         let same = |a: f64, b: f64| a.to_bits() == b.to_bits();
         (0..n).all(|k| same(self.0[k][0], self.0[n - 1 - k][1]))
     }
 
-    pub fn is_sound(&self) -> bool {
+    pub(crate) fn is_sound(&self) -> bool {
         self.0.iter().flatten().all(|v| v.is_finite() && *v >= 0.0)
     }
 
     /// Bands of constant width along one axis: for `axis` 0 the width along x, where |y| is between two
     /// bounds; for `axis` 1 the width along y by bounds of |x|.
-    pub fn bands(&self, axis: usize) -> Vec<Band> {
+    pub(crate) fn bands(&self, axis: usize) -> Vec<Band> {
         let n = self.0.len();
         let across = 1 - axis;
         (0..n)

@@ -38,7 +38,7 @@ pub(super) struct CrossSection<'a> {
 
 impl CrossSection<'_> {
     /// The permittivity of a layer without structure.
-    pub fn uniform(&self) -> Option<Complex64> {
+    pub(crate) fn uniform(&self) -> Option<Complex64> {
         if self.outline.is_empty() || self.inside == self.outside {
             Some(self.outside)
         } else {
@@ -58,7 +58,7 @@ pub(super) struct Permittivity<T> {
 }
 
 impl<T: Scalar> Permittivity<T> {
-    pub fn new(section: &CrossSection<'_>, basis: &FieldBasis) -> Self {
+    pub(crate) fn new(section: &CrossSection<'_>, basis: &FieldBasis) -> Self {
         let mut found = match section.outline.sides() {
             Sides::Upright(bands) => upright::permittivity(section, basis, &bands),
             Sides::Slanted(form) => normal::permittivity(section, basis, &form),
@@ -77,7 +77,7 @@ impl<T: Scalar> Permittivity<T> {
     }
 
     /// A B, whose eigenvalues are the squares of the propagation constants.
-    pub fn operator(&self, rows: &Rows) -> Mat<T> {
+    pub(crate) fn operator(&self, rows: &Rows) -> Mat<T> {
         let n = rows.len();
         let offset = [0, rows.of_x];
         // k^T e_t, then e^-1 times it.
@@ -121,7 +121,7 @@ impl<T: Scalar> Permittivity<T> {
     }
 
     /// B times the columns of `w`.
-    pub fn curl_of(&self, rows: &Rows, w: &Mat<T>) -> Mat<T> {
+    pub(crate) fn curl_of(&self, rows: &Rows, w: &Mat<T>) -> Mat<T> {
         let (n, split) = (rows.len(), rows.of_x);
         let mut out = Mat::<T>::zeros(n, w.ncols());
         let range = [0..split, split..n];

@@ -30,7 +30,7 @@ impl Coefficients {
         ((m + x) * (2 * y + 1) + n + y) as usize
     }
 
-    pub fn at(&self, m: i32, n: i32) -> f64 {
+    pub(crate) fn at(&self, m: i32, n: i32) -> f64 {
         self.values[self.place(m, n)]
     }
 }
@@ -50,7 +50,7 @@ pub(super) struct Moments {
 impl Moments {
     /// Moments for orders up to `highest` along each axis, which are equal on a square lattice. Staggered rows have
     /// circles.
-    pub fn of(form: &SlantedForm, pitch_nm: f64, lattice: CellLattice, highest: [usize; 2]) -> Self {
+    pub(crate) fn of(form: &SlantedForm, pitch_nm: f64, lattice: CellLattice, highest: [usize; 2]) -> Self {
         match (*form, lattice) {
             (SlantedForm::Circle { diameter_nm }, CellLattice::Square) => {
                 Self::of_circle(diameter_nm / pitch_nm, highest[0])

@@ -39,7 +39,7 @@ pub(crate) struct PillarTensor {
 
 impl PillarTensor {
     /// C, for permittivities in the pillar and outside of it.
-    pub fn stretch(inside: Complex64, outside: Complex64) -> Self {
+    pub(crate) fn stretch(inside: Complex64, outside: Complex64) -> Self {
         let half = 0.5 * (outside / inside - 1.0);
         Self {
             uniform: Complex64::ONE,
@@ -50,7 +50,7 @@ impl PillarTensor {
     }
 
     /// C S.
-    pub fn energy(inside: Complex64, outside: Complex64) -> Self {
+    pub(crate) fn energy(inside: Complex64, outside: Complex64) -> Self {
         let contrast = inside - outside;
         let quarter = 0.25 * contrast * contrast / inside;
         Self {

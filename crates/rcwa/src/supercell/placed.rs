@@ -13,7 +13,7 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    pub fn of(cell: &Supercell) -> Self {
+    pub(crate) fn of(cell: &Supercell) -> Self {
         Self {
             lattice: cell.lattice,
             staggered: match cell.sites {
@@ -24,7 +24,7 @@ impl Placed {
     }
 
     /// The plane waves that are kept: see [`SiteLattice::waves`] and [`SiteLattice::staggered_waves`].
-    pub fn waves(&self, highest: usize) -> Vec<[i32; 2]> {
+    pub(crate) fn waves(&self, highest: usize) -> Vec<[i32; 2]> {
         match self.staggered {
             None => self.lattice.waves(highest),
             Some(_) => self.lattice.staggered_waves(highest),
@@ -32,7 +32,7 @@ impl Placed {
     }
 
     /// Wave vector of a wave over that in vacuum, where `k` is that of the incident one and `step` the wavelength over the pitch.
-    pub fn sines(&self, wave: [i32; 2], k: [f64; 2], step: f64) -> [f64; 2] {
+    pub(crate) fn sines(&self, wave: [i32; 2], k: [f64; 2], step: f64) -> [f64; 2] {
         if self.staggered.is_some() {
             let vector = self.vector(wave);
             return [0, 1].map(|axis| k[axis] + vector[axis] * step);
@@ -42,7 +42,7 @@ impl Placed {
     }
 
     /// Wave vector of a wave less that of the incident one, times the pitch, over one turn.
-    pub fn vector(&self, wave: [i32; 2]) -> [f64; 2] {
+    pub(crate) fn vector(&self, wave: [i32; 2]) -> [f64; 2] {
         let [x, y] = wave.map(|turns| f64::from(turns) / self.lattice.len() as f64);
         match self.staggered {
             None => [x, y],
@@ -51,7 +51,7 @@ impl Placed {
     }
 
     /// True if the x axis mirrors it by mirroring each of its sites.
-    pub fn is_mirrored_row(&self) -> bool {
+    pub(crate) fn is_mirrored_row(&self) -> bool {
         self.staggered.is_none() && self.lattice.is_row()
     }
 }

@@ -138,7 +138,7 @@ pub(super) struct Lines {
 
 impl Lines {
     /// Place of a site (pitches).
-    pub fn site(&self, line: usize, step: usize) -> [usize; 2] {
+    pub(crate) fn site(&self, line: usize, step: usize) -> [usize; 2] {
         if self.axis == 0 { [step, line] } else { [line, step] }
     }
 }

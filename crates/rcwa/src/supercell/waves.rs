@@ -22,13 +22,13 @@ pub(super) struct Waves {
 impl Waves {
     /// Number of components of the field. Of a row, the rows of Ex and Ey in one symmetry about the x axis are together
     /// as many as there are plane waves.
-    pub fn unknowns(placed: &Placed, highest: usize, y: Space) -> usize {
+    pub(crate) fn unknowns(placed: &Placed, highest: usize, y: Space) -> usize {
         let waves = placed.waves(highest).len();
         if y == Space::Full { 2 * waves } else { waves }
     }
 
     /// `k` is the wave vector of the zero order over k0, `step` the wavelength over the pitch.
-    pub fn new(placed: &Placed, highest: usize, y: Space, k: [f64; 2], step: f64) -> Self {
+    pub(crate) fn new(placed: &Placed, highest: usize, y: Space, k: [f64; 2], step: f64) -> Self {
         let spaces = [y, y.derived(), y];
         let all = placed.waves(highest);
         let of = spaces.map(|space| -> Vec<[i32; 2]> {
@@ -69,7 +69,7 @@ impl Waves {
     }
 
     /// Row and factor of a plane wave in a component (0 for Ex, 1 for Ey).
-    pub fn plane_wave(&self, component: usize, wave: [i32; 2]) -> Option<(usize, f64)> {
+    pub(crate) fn plane_wave(&self, component: usize, wave: [i32; 2]) -> Option<(usize, f64)> {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let factor = match self.spaces[component] {
             Space::Full => 1.0,
@@ -86,7 +86,7 @@ impl Waves {
     }
 
     /// Amplitudes of Ex and Ey of a plane wave of the field in column `column` of `field`.
-    pub fn amplitude(&self, field: &Mat<Complex64>, column: usize, wave: [i32; 2]) -> [Complex64; 2] {
+    pub(crate) fn amplitude(&self, field: &Mat<Complex64>, column: usize, wave: [i32; 2]) -> [Complex64; 2] {
         [0, 1].map(|component| {
             self.plane_wave(component, wave)
                 .map_or(Complex64::ZERO, |(row, factor)| field[(row, column)] * factor)

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::{Pages, other_size};
 
 /// The values of a grey PNG of 8 or 16 bits.
-pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
+pub(crate) fn read(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
     let wrong = |e: png::DecodingError| format!("it is no PNG file that can be read: {e}");
     let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
     let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(wrong)?;

@@ -208,7 +208,7 @@ pub(super) mod tests {
     use super::*;
     use crate::ColourFilter;
 
-    pub fn camera() -> RelayCamera {
+    pub(crate) fn camera() -> RelayCamera {
         RelayCamera {
             pixel_um: 1.0,
             rows: 2,

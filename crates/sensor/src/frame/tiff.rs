@@ -10,7 +10,7 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use super::{MOST_PIXELS, Pages, other_size};
 
 /// The values of each page: grey of 8 or 16 bits, or of 32 bits with a decimal point.
-pub fn read(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
+pub(crate) fn read(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
     let wrong = |e: tiff::TiffError| format!("it is no TIFF file that can be read: {e}");
     let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
     let mut limits = Limits::default();

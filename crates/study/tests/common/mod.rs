@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A design that is solved in some seconds: one small lens, one wavelength and white light.
-pub fn tolerance(folder: &Path, draws: u64) -> PathBuf {
+pub(crate) fn tolerance(folder: &Path, draws: u64) -> PathBuf {
     let design = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml")).unwrap();
     let small = [
         ("diameter_um = 60", "diameter_um = 20"),
@@ -47,7 +47,7 @@ at_least = 0.01
 }
 
 /// A camera for one lens of 20 um: small pixels, one channel.
-pub const SMALL_CAMERA: &str = r#"
+pub(crate) const SMALL_CAMERA: &str = r#"
 schema = 1
 name = "small"
 [sensor]

@@ -19,10 +19,10 @@ const START_STEP_UM: f64 = 0.02;
 
 /// Pillars that are alike: intended width (nm) or number, and step of density, with how many there are.
 #[derive(Default)]
-pub struct Kinds(BTreeMap<(u16, i32), u64>);
+pub(crate) struct Kinds(BTreeMap<(u16, i32), u64>);
 
 /// Drawn width of each kind.
-pub struct DrawnWidths {
+pub(crate) struct DrawnWidths {
     pub drawn: BTreeMap<(u16, i32), u16>,
     /// Relative rms error if widths stay as they are.
     pub before: f64,
@@ -32,7 +32,7 @@ pub struct DrawnWidths {
 
 impl Kinds {
     /// Count the pillars of an element that stands for `copies`.
-    pub fn count(&mut self, widths: &PillarMap, steps: &[i32], copies: u64) {
+    pub(crate) fn count(&mut self, widths: &PillarMap, steps: &[i32], copies: u64) {
         for (&w, &step) in widths.number.iter().zip(steps) {
             if w > 0 {
                 *self.0.entry((w, step)).or_default() += copies;
@@ -41,13 +41,13 @@ impl Kinds {
     }
 
     /// Least and greatest step of density; zeros without pillars.
-    pub fn steps(&self) -> (i32, i32) {
+    pub(crate) fn steps(&self) -> (i32, i32) {
         let all = self.0.keys().map(|k| k.1);
         (all.clone().min().unwrap_or(0), all.max().unwrap_or(0))
     }
 
     /// Choose among all widths that may be drawn, for a line that was solved for the steps of density.
-    pub fn choose(&self, line: &Line) -> DrawnWidths {
+    pub(crate) fn choose(&self, line: &Line) -> DrawnWidths {
         let same: BTreeMap<_, _> = self.0.keys().map(|&(w, step)| ((w, step), w)).collect();
         let (before, own) = self.agreement(line, &same);
         let by_path = |path_um: f64| -> Vec<Complex64> {

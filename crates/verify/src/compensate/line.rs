@@ -12,7 +12,7 @@ use metalith_pillars::{PillarMap, PillarShape};
 
 /// Transmissions at one wavelength, of upright rectangles in one polarisation.
 #[derive(Clone, Debug)]
-pub struct ColourTransmissions {
+pub(crate) struct ColourTransmissions {
     pub wavelength_um: f64,
     /// Axis that the light is polarised along, for upright rectangles, which have a phase for each.
     pub axis: Option<PolarisationAxis>,
@@ -26,7 +26,7 @@ pub struct ColourTransmissions {
 }
 
 /// A line, for the wavelengths that a design is verified at.
-pub struct Line {
+pub(crate) struct Line {
     /// Chips as they would be if nothing differed from what is stated.
     pub stated: AsBuiltChip,
     /// Chips as they are made.
@@ -43,7 +43,7 @@ impl Line {
     ///
     /// # Errors
     /// If a cell cannot be solved, a number of the model cannot be, it says what no width can undo, or the pillars are rotated rectangles.
-    pub fn new(design: &Design, model: &CalibratedModel, progress: &dyn Progress) -> Result<Self> {
+    pub(crate) fn new(design: &Design, model: &CalibratedModel, progress: &dyn Progress) -> Result<Self> {
         let drawn: Vec<u16> = design.cell.widths_nm().collect();
         check_shape(design.cell.shape)?;
         let directed = model.perturbation.geometry.directed_widths();
@@ -107,13 +107,13 @@ impl Line {
     }
 
     /// True if the width of a pillar depends on what is drawn around it.
-    pub fn varies_by_site(&self) -> bool {
+    pub(crate) fn varies_by_site(&self) -> bool {
         self.chip.perturbation().geometry.varies_by_site()
     }
 
     /// Steps that density adds to the width at every site of an element as drawn, whose opening in the metal has this radius (um), row
     /// by row.
-    pub fn steps(&self, drawn: &PillarMap, aperture_radius_um: f64) -> Vec<i32> {
+    pub(crate) fn steps(&self, drawn: &PillarMap, aperture_radius_um: f64) -> Vec<i32> {
         let element = self.chip.drawn(drawn, aperture_radius_um);
         let steps = element.site_steps(&self.chip.perturbation().geometry);
         steps.unwrap_or_else(|| vec![0; drawn.number.len()])
@@ -123,7 +123,7 @@ impl Line {
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn solve(&mut self, least: i32, most: i32, progress: &dyn Progress) -> Result<()> {
+    pub(crate) fn solve(&mut self, least: i32, most: i32, progress: &dyn Progress) -> Result<()> {
         let steps: Vec<i32> = (least..=most).collect();
         progress.begin("pillars as they are made", (self.colours.len() * steps.len()) as u64);
         self.first_step = least;
@@ -140,7 +140,7 @@ impl Line {
 
     /// Transmission of a pillar at one of the colours, drawn at a place of [`Line::drawn`], at a step of density that
     /// was solved for.
-    pub fn made(&self, colour: &ColourTransmissions, place: usize, step: i32) -> Complex64 {
+    pub(crate) fn made(&self, colour: &ColourTransmissions, place: usize, step: i32) -> Complex64 {
         colour.made[place][(step - self.first_step) as usize]
     }
 }

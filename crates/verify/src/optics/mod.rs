@@ -44,7 +44,7 @@ pub(super) struct ReadElement<'r> {
 
 impl<'a> ElementSimulator<'a> {
     /// Simulator for these cases.
-    pub fn new(
+    pub(crate) fn new(
         design: &'a Design,
         lattice: Lattice,
         cases: &SimulationCases<'a>,
@@ -62,7 +62,7 @@ impl<'a> ElementSimulator<'a> {
     }
 
     /// The case that judges.
-    pub fn judge(&self) -> &CaseOptics<'a> {
+    pub(crate) fn judge(&self) -> &CaseOptics<'a> {
         &self.cases[0]
     }
 
@@ -70,7 +70,7 @@ impl<'a> ElementSimulator<'a> {
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
-    pub fn solve(&self, chosen: &[Chosen], progress: &dyn Progress) -> Result<()> {
+    pub(crate) fn solve(&self, chosen: &[Chosen], progress: &dyn Progress) -> Result<()> {
         let lit: Vec<(&Element, FieldAngle)> = chosen.iter().flat_map(all_angles).collect();
         let colours = &self.design.verify.wavelengths_um;
         if incidence(self.design) == Incidence::Oblique {
@@ -131,7 +131,7 @@ impl<'a> ElementSimulator<'a> {
     }
 
     /// Number of wavelengths and angles of one element.
-    pub fn psfs(&self, one: &Chosen) -> usize {
+    pub(crate) fn psfs(&self, one: &Chosen) -> usize {
         self.design.verify.wavelengths_um.len() * one.angles.len()
     }
 
@@ -139,7 +139,7 @@ impl<'a> ElementSimulator<'a> {
     ///
     /// # Errors
     /// As [`CaseOptics::element`].
-    pub fn read<'r>(&'r self, element: &Element, widths: &'r dyn PillarRows) -> Result<ReadElement<'r>> {
+    pub(crate) fn read<'r>(&'r self, element: &Element, widths: &'r dyn PillarRows) -> Result<ReadElement<'r>> {
         let placement = Placement {
             radius_um: self.design.lens_of(element).radius_um(),
             aperture_radius_um: self.design.aperture_radius_of_um(element),
@@ -156,7 +156,7 @@ impl<'a> ElementSimulator<'a> {
     ///
     /// # Errors
     /// If a cell cannot be solved, a direction is too steep, or the user stopped it.
-    pub fn simulate(
+    pub(crate) fn simulate(
         &self,
         one: &Chosen,
         phase: &ElementPhase<'_>,

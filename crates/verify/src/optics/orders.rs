@@ -18,7 +18,7 @@ impl ElementSimulator<'_> {
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
-    pub fn orders(
+    pub(crate) fn orders(
         &self,
         element: &Element,
         phase: &ElementPhase<'_>,

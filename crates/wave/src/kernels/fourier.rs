@@ -23,7 +23,7 @@ pub(crate) struct Fourier {
 
 impl Fourier {
     /// Transform for images of this shape.
-    pub fn periodic(size: [usize; 2]) -> Self {
+    pub(crate) fn periodic(size: [usize; 2]) -> Self {
         let mut planner = FftPlanner::new();
         Self {
             size,
@@ -33,21 +33,21 @@ impl Fourier {
     }
 
     /// Frequency of element `i` of an axis of a spectrum (cycles a pixel).
-    pub fn frequency(&self, axis: usize, i: usize) -> f64 {
+    pub(crate) fn frequency(&self, axis: usize, i: usize) -> f64 {
         let n = self.size[axis];
         let signed = if 2 * i < n { i as f64 } else { i as f64 - n as f64 };
         signed / n as f64
     }
 
     /// Spectrum of an image.
-    pub fn of_image(&self, image: &Array2<f64>) -> Array2<Complex64> {
+    pub(crate) fn of_image(&self, image: &Array2<f64>) -> Array2<Complex64> {
         let mut plane = image.map(|v| Complex64::from(*v));
         self.run(&self.forward, &mut plane);
         plane
     }
 
     /// The image of a spectrum.
-    pub fn to_image(&self, mut spectrum: Array2<Complex64>) -> Array2<f64> {
+    pub(crate) fn to_image(&self, mut spectrum: Array2<Complex64>) -> Array2<f64> {
         self.run(&self.inverse, &mut spectrum);
         let scale = 1.0 / (self.size[0] * self.size[1]) as f64;
         spectrum.map(|v| v.re * scale)

@@ -68,7 +68,7 @@ pub(super) struct FrequencyBand {
 }
 
 impl FrequencyBand {
-    pub fn choose(
+    pub(crate) fn choose(
         lattice: Lattice,
         radius_um: f64,
         wavelength_um: f64,
@@ -105,7 +105,7 @@ impl FrequencyBand {
     }
 
     /// Band with a period and a fade of the caller's: `fade_um` is where it begins and where it ends.
-    pub fn new(
+    pub(crate) fn new(
         lattice: Lattice,
         wavelength_um: f64,
         window: &Window,

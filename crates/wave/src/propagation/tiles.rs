@@ -33,7 +33,7 @@ const OBLIQUE: f64 = 1.15;
 
 impl Tiling {
     /// Tiling for light that lands at a distance from the pillars (um).
-    pub fn at(lattice: &Lattice, wavelength_um: f64, distance_um: f64) -> Self {
+    pub(crate) fn at(lattice: &Lattice, wavelength_um: f64, distance_um: f64) -> Self {
         let [x, y] = lattice.steps_um();
         let places = BEST_EDGE * (wavelength_um * distance_um).sqrt() / x.max(y);
         let [least, most] = SIDES.map(f64::log2);
@@ -44,12 +44,12 @@ impl Tiling {
     }
 
     /// Step from one tile to the next (places).
-    pub fn hop(self) -> usize {
+    pub(crate) fn hop(self) -> usize {
         self.side / 2
     }
 
     /// Distance at which two neighbouring directions of a tile land from one another, along each axis (um).
-    pub fn landing_um(self, lattice: &Lattice) -> [f64; 2] {
+    pub(crate) fn landing_um(self, lattice: &Lattice) -> [f64; 2] {
         lattice
             .steps_um()
             .map(|step| self.spread_um2 / (self.side as f64 * step))
@@ -68,7 +68,7 @@ impl Tiling {
     }
 
     /// Directions of a tile.
-    pub fn directions(self) -> usize {
+    pub(crate) fn directions(self) -> usize {
         self.side * self.side
     }
 }
@@ -148,7 +148,13 @@ pub(super) struct Leaving {
 
 impl Leaving {
     /// Directions for light that arrives with these sines.
-    pub fn new(lattice: &Lattice, tiling: Tiling, wavelength_um: f64, arriving: [f64; 2], towards: [f64; 2]) -> Self {
+    pub(crate) fn new(
+        lattice: &Lattice,
+        tiling: Tiling,
+        wavelength_um: f64,
+        arriving: [f64; 2],
+        towards: [f64; 2],
+    ) -> Self {
         let steps = lattice.steps_um();
         let moved = |offset: f64| {
             [0, 1].map(|a| {
@@ -169,7 +175,7 @@ impl Leaving {
 
     /// Sines of a bin along x and one along y.
     #[inline]
-    pub fn sines(&self, kx: usize, ky: usize) -> [f64; 2] {
+    pub(crate) fn sines(&self, kx: usize, ky: usize) -> [f64; 2] {
         let of = |[x, y]: &[Vec<f64>; 2]| [x[kx], y[ky]];
         let away = |s: [f64; 2]| (s[0] - self.towards[0]).powi(2) + (s[1] - self.towards[1]).powi(2);
         let whole = of(&self.whole);

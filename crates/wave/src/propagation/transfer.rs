@@ -43,7 +43,7 @@ const GRAZING: f64 = 1e-12;
 impl Transfer<'_> {
     /// Works out how much each frequency of a column counts for the window, by where its ray from the element's
     /// centre lands `distance_um` behind it: it fades from `full_um` to `zero_um` of the window's middle.
-    pub fn fade(&self, distance_um: f64, column: FrequencyColumn, faded: &mut FadedColumn) {
+    pub(crate) fn fade(&self, distance_um: f64, column: FrequencyColumn, faded: &mut FadedColumn) {
         let df = self.fade.period_um.map(|period| 1.0 / period);
         let [fx, first] = [0, 1].map(|a| column.first[a] as f64 * df[a]);
         let rest = self.wavelength_um.powi(-2) - fx * fx;
@@ -68,7 +68,7 @@ impl Transfer<'_> {
     }
 
     /// Factor from the transfer function to one distance to the one for a distance that is `step_um` farther.
-    pub fn step(&self, step_um: f64, faded: &FadedColumn, out: &mut [Complex32]) {
+    pub(crate) fn step(&self, step_um: f64, faded: &FadedColumn, out: &mut [Complex32]) {
         pulp::Arch::new().dispatch(|| {
             for (out, fz) in out.iter_mut().zip(&faded.axial) {
                 *out = cis(step_um * fz);
@@ -77,7 +77,13 @@ impl Transfer<'_> {
     }
 
     /// `out[i]` is what multiplies frequency `i` of a column on its way to `distance_um`.
-    pub fn to_distance(&self, distance_um: f64, column: FrequencyColumn, faded: &FadedColumn, out: &mut [Complex32]) {
+    pub(crate) fn to_distance(
+        &self,
+        distance_um: f64,
+        column: FrequencyColumn,
+        faded: &FadedColumn,
+        out: &mut [Complex32],
+    ) {
         let df = self.fade.period_um.map(|period| 1.0 / period);
         let [fx, first] = [0, 1].map(|a| column.first[a] as f64 * df[a]);
         let along_x = fx * self.shift_um[0];

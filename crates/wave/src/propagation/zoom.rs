@@ -23,7 +23,7 @@ pub(super) struct Zoom {
 
 impl Zoom {
     /// `cycles` is c above, the phase of neighbouring inputs at neighbouring outputs (turns).
-    pub fn new(planner: &mut FftPlanner<f32>, inputs: usize, first: i64, outputs: usize, cycles: f64) -> Self {
+    pub(crate) fn new(planner: &mut FftPlanner<f32>, inputs: usize, first: i64, outputs: usize, cycles: f64) -> Self {
         let size = fft_size(inputs + outputs - 1);
         let middle = 0.5 * (outputs as f64 - 1.0);
         let square = |n: f64| 0.5 * cycles * n * n;
@@ -51,7 +51,13 @@ impl Zoom {
     }
 
     /// The sum for every output. `padded` and `fft` are working memory.
-    pub fn run(&self, x: &[Complex32], y: &mut [Complex32], padded: &mut Vec<Complex32>, fft: &mut Vec<Complex32>) {
+    pub(crate) fn run(
+        &self,
+        x: &[Complex32],
+        y: &mut [Complex32],
+        padded: &mut Vec<Complex32>,
+        fft: &mut Vec<Complex32>,
+    ) {
         padded.clear();
         padded.resize(self.kernel.len(), Complex32::ZERO);
         multiply_to(&mut padded[..self.inputs], x, &self.before);
@@ -62,7 +68,13 @@ impl Zoom {
     }
 
     /// The adjoint: from outputs to inputs.
-    pub fn adjoint(&self, y: &[Complex32], x: &mut [Complex32], padded: &mut Vec<Complex32>, fft: &mut Vec<Complex32>) {
+    pub(crate) fn adjoint(
+        &self,
+        y: &[Complex32],
+        x: &mut [Complex32],
+        padded: &mut Vec<Complex32>,
+        fft: &mut Vec<Complex32>,
+    ) {
         padded.clear();
         padded.resize(self.kernel.len(), Complex32::ZERO);
         padded[..self.outputs].copy_from_slice(y);

@@ -141,9 +141,9 @@ pub(super) mod tests {
 
     /// The spectrum of the Gaussian at half the sampling rate is exp(-2 (pi sigma / 2 step)^2) = 1e-17, times the
     /// number of samples and a margin.
-    pub const BAND: f64 = 1e-9;
+    pub(crate) const BAND: f64 = 1e-9;
 
-    pub fn gaussian(sigma_um: f64, at_um: [f64; 2]) -> Psf {
+    pub(crate) fn gaussian(sigma_um: f64, at_um: [f64; 2]) -> Psf {
         let window = Window {
             centre_um: [100.0, -40.0],
             step_um: 0.5,
@@ -162,8 +162,8 @@ pub(super) mod tests {
         }
     }
 
-    pub const AT: [f64; 2] = [100.3, -41.2];
-    pub const SIGMA: f64 = 1.4;
+    pub(crate) const AT: [f64; 2] = [100.3, -41.2];
+    pub(crate) const SIGMA: f64 = 1.4;
 
     /// Light that goes on beyond the window, with its middle on a sample.
     #[test]

@@ -258,12 +258,12 @@ pub(super) mod tests {
     use crate::kernels::sinc;
 
     /// Sums and transforms of a few hundred thousand numbers.
-    pub const ROUNDING: f64 = 1e-9;
+    pub(crate) const ROUNDING: f64 = 1e-9;
 
     const LP_MM: [f64; 3] = [5.0, 42.7, 85.3];
 
     /// A Gaussian about a landing, with the transform that it has by its closed form.
-    pub fn sample(sigma: f64, landing_um: [f64; 2], power: f64) -> BandSample {
+    pub(crate) fn sample(sigma: f64, landing_um: [f64; 2], power: f64) -> BandSample {
         let mut psf = gaussian(sigma, [100.0, -40.0]);
         let peak = power / (std::f64::consts::TAU * sigma * sigma);
         psf.values *= peak;
@@ -279,7 +279,12 @@ pub(super) mod tests {
     }
 
     /// Parts of a band along a line from one landing to another, with the weight at each share of the way.
-    pub fn line(parts: usize, ends: [[f64; 2]; 2], samples: usize, weight: impl Fn(f64) -> f64) -> Vec<BandPart> {
+    pub(crate) fn line(
+        parts: usize,
+        ends: [[f64; 2]; 2],
+        samples: usize,
+        weight: impl Fn(f64) -> f64,
+    ) -> Vec<BandPart> {
         let at = |s: f64| [0, 1].map(|a| ends[0][a] + s * (ends[1][a] - ends[0][a]));
         (0..parts)
             .map(|i| {

@@ -51,7 +51,7 @@ impl Rotation {
     const NONE: Self = Self(1.0, 0.0);
 
     /// Rotation by so many degrees, from x towards y; exact where it is quarter turns.
-    pub fn of_deg(deg: f64) -> Self {
+    pub(crate) fn of_deg(deg: f64) -> Self {
         let quarters = (deg / 90.0).round();
         let (sin, cos) = (deg - 90.0 * quarters).to_radians().sin_cos();
         match quarters.rem_euclid(4.0) as u8 {
@@ -63,7 +63,7 @@ impl Rotation {
     }
 
     /// Place to which the rotation takes a place.
-    pub fn after(self, x: f64, y: f64) -> (f64, f64) {
+    pub(crate) fn after(self, x: f64, y: f64) -> (f64, f64) {
         let Self(cos, sin) = self;
         (cos * x - sin * y, cos * y + sin * x)
     }

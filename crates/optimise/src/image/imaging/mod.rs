@@ -11,7 +11,7 @@ use crate::image::pupil::Pupil;
 
 /// Plans and place to work for one pupil. The field is even in y, so that columns stand for themselves
 /// and their mirror images.
-pub struct Imaging<'p> {
+pub(crate) struct Imaging<'p> {
     pupil: &'p Pupil,
     window: PixelWindow,
     forward: Arc<dyn Fft<f32>>,
@@ -22,7 +22,7 @@ pub struct Imaging<'p> {
 
 /// The large buffers, which one view hands on to the next: memory fresh from the system costs a sixth of the time.
 #[derive(Default)]
-pub struct Scratch {
+pub(crate) struct Scratch {
     /// Rows of cells after the transform along x: `[cell y][x]`.
     rows: Vec<Complex32>,
     /// Field on the sensor for y >= 0: `[x][y]`, y from 0 to size / 2.
@@ -31,15 +31,15 @@ pub struct Scratch {
 
 /// BufferPool that nobody is in.
 #[derive(Default)]
-pub struct BufferPool(Mutex<Vec<Scratch>>);
+pub(crate) struct BufferPool(Mutex<Vec<Scratch>>);
 
 impl BufferPool {
-    pub fn enter(&self) -> Scratch {
+    pub(crate) fn enter(&self) -> Scratch {
         let mut rooms = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         rooms.pop().unwrap_or_default()
     }
 
-    pub fn leave(&self, imaging: Imaging<'_>) {
+    pub(crate) fn leave(&self, imaging: Imaging<'_>) {
         let mut rooms = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         rooms.push(imaging.room);
     }
@@ -47,10 +47,10 @@ impl BufferPool {
 
 /// Transfer function at the frequencies (i, j) / window, i and j from 0 to half the pixels: the others
 /// follow, H(-i, j) = conj H(i, j) since the PSF is real, and H(i, -j) = H(i, j) since it is even in y.
-pub type OpticalTransfer = Vec<Complex32>;
+pub(crate) type OpticalTransfer = Vec<Complex32>;
 
 impl<'p> Imaging<'p> {
-    pub fn new(pupil: &'p Pupil, window: PixelWindow, mut room: Scratch) -> Self {
+    pub(crate) fn new(pupil: &'p Pupil, window: PixelWindow, mut room: Scratch) -> Self {
         // Both are written in full before they are read.
         room.rows.resize(pupil.cells.1 * pupil.size, Complex32::default());
         room.field
@@ -83,7 +83,7 @@ impl<'p> Imaging<'p> {
     }
 
     /// The transfer function, `[j][i]`, from the transmissions of the rings.
-    pub fn transfer(&mut self, t_re: &[f32], t_im: &[f32]) -> OpticalTransfer {
+    pub(crate) fn transfer(&mut self, t_re: &[f32], t_im: &[f32]) -> OpticalTransfer {
         self.propagate(t_re, t_im);
         let (n, half, modes) = (self.pupil.size, self.pupil.size / 2 + 1, self.modes());
         // Along y: even and real, two columns in one transform.
@@ -114,7 +114,7 @@ impl<'p> Imaging<'p> {
     /// Adds to `g_re`, `g_im` the derivative by the conjugate of each ring's transmission of a real number
     /// whose derivative by the transfer function (not its conjugate) is `slope`, at the transmissions last
     /// given to [`Imaging::transfer`].
-    pub fn adjoint(&mut self, slope: &[Complex32], g_re: &mut [f32], g_im: &mut [f32]) {
+    pub(crate) fn adjoint(&mut self, slope: &[Complex32], g_re: &mut [f32], g_im: &mut [f32]) {
         let (n, half, modes) = (self.pupil.size, self.pupil.size / 2 + 1, self.modes());
         // dL/dI(x, y) = sum over j of 2 Re[sum over i of slope exp(-2 pi i (i x) / n)] cos(2 pi j y / n)
         let mut along_x = vec![0.0f32; modes * n];

@@ -21,7 +21,7 @@ use num_complex::Complex32;
 use crate::PixelWindow;
 use crate::merit::focus::Lens;
 use geometry::Geometry;
-pub use spreading::USED;
+pub(crate) use spreading::USED;
 use spreading::{SPREAD, Spreading, first_cell, intensity_weights};
 
 /// Contribution of each ring of unit transmission to each cell of directions.

@@ -10,7 +10,7 @@ use super::geometry::SitePair;
 pub(super) const SPREAD: usize = 4;
 /// Part of the window that is used, 1 / 1.25 of it. The rest keeps aliases of the gridding, which are of
 /// exp(-pi SPREAD sqrt(1 - 1 / 1.25)) = 4e-3 of the field at the edge of that part, away from it.
-pub const USED: f64 = 0.8;
+pub(crate) const USED: f64 = 0.8;
 /// Shape of the spreading kernel exp(SHAPE (sqrt(1 - (z / 2)^2) - 1)), 0.97 pi SPREAD (1 - USED / 2)
 /// (Barnett, Magland, af Klinteberg 2019).
 const SHAPE: f64 = 0.97 * PI * SPREAD as f64 * (1.0 - 0.5 * USED);

@@ -46,7 +46,7 @@ pub(super) struct Pairs {
 }
 
 impl Pairs {
-    pub fn new(tiling: Tiling, lattice: &Lattice) -> Self {
+    pub(crate) fn new(tiling: Tiling, lattice: &Lattice) -> Self {
         Self {
             across: tiling.side / PAIR,
             landing_um: tiling.landing_um(lattice),
@@ -54,17 +54,17 @@ impl Pairs {
     }
 
     /// All of them.
-    pub fn count(self) -> usize {
+    pub(crate) fn count(self) -> usize {
         self.across * self.across
     }
 
     /// Index of the direction in the middle of a pair, along an axis.
-    pub fn middle(pair: usize) -> usize {
+    pub(crate) fn middle(pair: usize) -> usize {
         pair * PAIR + PAIR / 2
     }
 
     /// Add the power of each direction of a tile that is at a place of its block (um); columns first.
-    pub fn add(self, powers: impl Iterator<Item = f32>, place_um: [f32; 2], sums: &mut [Moments]) {
+    pub(crate) fn add(self, powers: impl Iterator<Item = f32>, place_um: [f32; 2], sums: &mut [Moments]) {
         let side = self.across * PAIR;
         let step = self.landing_um.map(|um| um as f32);
         let beyond = |k: usize, a: usize| (k as f32 - Self::middle(k / PAIR) as f32) * step[a];
@@ -133,7 +133,7 @@ impl Moments {
 
 impl Block {
     /// Block from the power of each pair of directions, columns first; `None` for a block without light.
-    pub fn of(sums: &[Moments], pairs: Pairs, middle_um: [f64; 2]) -> Option<Self> {
+    pub(crate) fn of(sums: &[Moments], pairs: Pairs, middle_um: [f64; 2]) -> Option<Self> {
         let power = |i: usize| sums[i].power_um2;
         let total: f64 = (0..sums.len()).map(|i| f64::from(power(i))).sum();
         if total <= 0.0 {
@@ -165,12 +165,12 @@ impl Block {
     }
 
     /// All its light but what was left out.
-    pub fn bins(&self) -> impl Iterator<Item = &Bin> {
+    pub(crate) fn bins(&self) -> impl Iterator<Item = &Bin> {
         self.strong.iter().chain(&self.weak)
     }
 
     /// All its power (um^2).
-    pub fn power_um2(&self) -> f64 {
+    pub(crate) fn power_um2(&self) -> f64 {
         self.bins().map(|b| f64::from(b.power_um2)).sum::<f64>() + self.rest_um2
     }
 }
