@@ -23,6 +23,10 @@ RENAMED = {
     "white": "polychromatic",
     "zero_order": "zeroth_order",
 }
+# Keys that NEW may have and OLD had not: what came with later abilities. Their values are compared where both have them.
+ADDED = {"warnings", "mapped_cell", "fwhm_um", "focusing_efficiency"}
+# Limits (by their keys) that NEW holds a chip to and OLD did not.
+ADDED_LIMITS = {"mapping_phase_rms_max_rad"}
 # Stands for a sentence, whose words are free, and for digests of pages that hold sentences.
 PROSE = "(prose)"
 HASH = re.compile(r"\[([0-9a-f]{16})\]")
@@ -46,7 +50,7 @@ def without_prose(value):
     if isinstance(value, dict):
         return {key: without_prose(v) for key, v in value.items() if key not in OF_THE_PROGRAM}
     if isinstance(value, list):
-        return [without_prose(v) for v in value]
+        return [without_prose(v) for v in value if not (isinstance(v, dict) and v.get("key") in ADDED_LIMITS)]
     if isinstance(value, str) and (SHA256.fullmatch(value) or re.search(r"\s", value)):
         return PROSE + "".join(HASH.findall(value))
     return value
@@ -95,7 +99,7 @@ def _objects(old, new, tolerance, place, found):
         _values(old[key], new[key], tolerance, f"{place}.{key}", found)
     # Sentences may come and go.
     gone = [key for key in old if key not in new and old[key] != PROSE]
-    came = [key for key in new if key not in old and new[key] != PROSE]
+    came = [key for key in new if key not in old and key not in ADDED and new[key] != PROSE]
     for key in gone:
         for candidate in came:
             trial = Found()
