@@ -99,7 +99,7 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
     };
     if let Some(k) = (1..outs.len()).find(|&k| outs[..k].contains(&outs[k])) {
         return Err(Error::refused(
-            "calibrate/same-answer",
+            "calibrate/same-output-folder",
             format!(
                 "{} and a set before it would be answered in {}",
                 args.sets[k].display(),
@@ -110,7 +110,7 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
     }
     if args.validate && args.sets.len() > 1 {
         return Err(Error::refused(
-            "calibrate/several-sets",
+            "calibrate/several-sets-to-validate",
             "a validation of several sets",
             "validate one at a time: synthetic sets are made like one",
         ));

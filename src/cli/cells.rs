@@ -76,7 +76,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     match design.cell.shape.basis() {
         Some(_) if args.steered => {
             return Err(Error::refused(
-                "cells/steered-rectangles",
+                "cells/steered-without-squares",
                 "mappings of steered elements for rectangles",
                 "leave out --steered: unlike neighbours are known of squares alone",
             ));

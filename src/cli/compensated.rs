@@ -45,7 +45,7 @@ pub(crate) fn judged_as_made(option: &str, model: Option<&Path>, fidelity: Optio
         return Ok(());
     }
     Err(Error::refused(
-        "option/fidelity-of-compensated",
+        "option/fidelity-with-compensated",
         "`--fidelity` describes pillars as drawn, and a compensated layout is judged as it is made",
         format!("leave out `--fidelity`, or `{option}` for the layout as designed"),
     ))

@@ -84,7 +84,7 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     if is_planned(&args.out) {
         return Err(Error::refused(
-            "dataset/folder-of-plan",
+            "dataset/folder-holds-plan",
             format!("{} holds a plan, which is carried out in shards", args.out.display()),
             "make them by `metalith study run FOLDER --missing`, or name another folder with --out",
         ));

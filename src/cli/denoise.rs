@@ -66,7 +66,7 @@ fn noise(text: &str) -> std::result::Result<f32, String> {
 pub(crate) fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.out.is_none() && !args.add {
         return Err(Error::refused(
-            "denoise/nothing-to-do",
+            "denoise/no-output",
             "nothing would come of this",
             "name a file with --out, or hold the result against the picture with --add",
         ));

@@ -120,7 +120,7 @@ impl PictureArgs {
         let built_in = self.scene.parse::<BuiltIn>().ok();
         let idle = |option: &str, what: &str| {
             Err(Error::refused(
-                "option/not-of-scene",
+                "option/not-for-scene",
                 format!("{option} says nothing of `{}`: it is of {what}", self.scene),
                 format!("leave {option} out, or give another scene"),
             ))
@@ -327,10 +327,10 @@ mod tests {
         assert_eq!(scene(&["star"]).unwrap(), 800);
         assert_eq!(scene(&["edge", "--pixels", "33"]).unwrap(), 33);
         for (of, id) in [
-            (&["star", "--wavelengths-nm", "400,500"][..], "option/not-of-scene"),
-            (&["scene.png", "--pixels", "64"], "option/not-of-scene"),
+            (&["star", "--wavelengths-nm", "400,500"][..], "option/not-for-scene"),
+            (&["scene.png", "--pixels", "64"], "option/not-for-scene"),
             (&[&small], "score/too-small"),
-            (&[&tiny], "table/format"),
+            (&[&tiny], "table/malformed"),
         ] {
             let error = scene(of).unwrap_err();
             assert_eq!(error.id(), id, "{error}");

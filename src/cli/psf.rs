@@ -220,7 +220,7 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
         return Ok(());
     }
     Err(Error::refused(
-        "psf/not-pillars",
+        "psf/mostly-other-shapes",
         format!(
             "{}: only {} of {} shapes on layer {} are {} on a lattice",
             args.layout.display(),
@@ -262,7 +262,7 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
         && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))
     {
         return Err(Error::refused(
-            "psf/kinds-of-pillars",
+            "cell/fidelity-not-for-pillars",
             format!("{}: {what}", args.layout.display()),
             hint,
         ));
@@ -275,7 +275,7 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
 fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if found.shape.basis().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
         return Err(Error::refused(
-            "light/polarisation-of-pillars",
+            "light/polarisation-without-rectangles",
             format!(
                 "{}: light of a polarisation for {}",
                 args.layout.display(),
@@ -306,7 +306,7 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     }
     if args.analyser == Some(Analyser::Circular) && args.hand().is_none() {
         return Err(Error::refused(
-            "light/analyser",
+            "light/handedness-missing",
             format!(
                 "a circular analyser in light that arrives {}",
                 args.arriving(found.shape)

@@ -29,7 +29,7 @@ pub(crate) fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()>
     match paths.into_iter().any(is_standard_input) {
         false => Ok(()),
         true => Err(Error::refused(
-            "option/plan-of-standard-input",
+            "option/plan-from-standard-input",
             "a plan of a file from standard input",
             "name the file: shards read it again",
         )),

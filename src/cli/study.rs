@@ -147,7 +147,7 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let found = work.cut().status()?;
     if let Some((path, why)) = found.unusable.first() {
         return Err(Error::refused(
-            "study/tables-unreadable",
+            "study/shard-unusable",
             format!("{} cannot be used: {why}", path.display()),
             "remove it first",
         ));
@@ -243,7 +243,7 @@ fn submit(args: &SubmitArgs) -> Result<Outcome> {
             .map_err(Error::io("start sbatch for", &submission.script))?;
         if !answer.status.success() {
             return Err(Error::refused(
-                "study/sbatch",
+                "study/sbatch-failed",
                 format!(
                     "sbatch refused {}: {}",
                     submission.script.display(),

@@ -92,7 +92,7 @@ impl TrainArgs {
 
     /// The camera that a last stage is for.
     fn comparison(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Comparison> {
-        let wrong = |what: &str, hint: &str| Err(Error::refused("train/stage-camera", what, hint));
+        let wrong = |what: &str, hint: &str| Err(Error::refused("train/stage-not-for-camera", what, hint));
         let lensless = match (kind, &self.design) {
             (StageKind::FlatNet, None) => vec![self.bare.camera(Rival::Flatcam)?],
             (StageKind::UnrolledDiffuser, None) => vec![self.bare.camera(Rival::Diffusercam)?],
@@ -160,7 +160,7 @@ pub(crate) fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(kind) => args.stage(kind, files, &spec, [&out, &state], terminal)?,
         None if !args.bare.is_standard() => {
             return Err(Error::refused(
-                "train/no-stage",
+                "train/option-without-stage",
                 "numbers of a mask or of a rough surface, and no last stage to teach",
                 "give --stage flatnet or --stage unrolled-diffuser, or leave them out",
             ));

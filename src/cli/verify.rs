@@ -183,7 +183,7 @@ impl Judging {
             Simulation::Whole => {}
             _ if camera.is_some() => {
                 return Err(Error::refused(
-                    "verify/too-large",
+                    "verify/picture-too-large",
                     "a picture of a layout whose elements are too large to be held in full",
                     "leave out --picture, or allow more memory with --memory-mb",
                 ));

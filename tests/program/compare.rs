@@ -53,15 +53,15 @@ fn what_cannot_be_compared_is_refused() {
         ),
         (
             &[&one, flatcam[0], flatcam[1], "--mask-distance-um", "0"],
-            "error[flatcam/geometry]",
+            "error[flatcam/geometry-out-of-range]",
         ),
         (
             &[&one, "--rivals", "diffusercam", "--diffuser-opening", "9"],
-            "error[diffusercam/geometry]",
+            "error[diffusercam/geometry-out-of-range]",
         ),
         (
             &[&one, flatcam[0], flatcam[1], "--lpips", "cameras/gt1930.toml"],
-            "error[table/format]: cameras/gt1930.toml",
+            "error[table/malformed]: cameras/gt1930.toml",
         ),
     ];
     for (arguments, id) in cases {
@@ -171,7 +171,7 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     train("blending")
         .assert()
         .code(2)
-        .stderr(contains(refusal("train/stage-camera")));
+        .stderr(contains(refusal("train/stage-not-for-camera")));
     train("magic").assert().code(2).stderr(contains("'--stage <"));
     train("flatnet").assert().success().stdout(contains("weights"));
     let whole = fs::read(at("stage.safetensors")).unwrap();
@@ -205,7 +205,7 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     .code(2)
     .stderr(contains(format!(
         "{}{}",
-        refusal("table/format"),
+        refusal("table/malformed"),
         at("stage.safetensors")
     )));
 }

@@ -405,7 +405,7 @@ fn what_cannot_be_read_is_bad_input() {
     let output = metalith(&["psf"], &[&junk]);
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let place = format!("{}{}, byte 0: ", super::refusal("layout/format"), junk.display());
+    let place = format!("{}{}, byte 0: ", super::refusal("layout/malformed"), junk.display());
     assert!(said.contains(&place), "{said}");
     let output = metalith(&["run"], &[&folder.path().join("nowhere.toml")]);
     assert_eq!(output.status.code(), Some(2));

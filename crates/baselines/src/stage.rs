@@ -122,6 +122,6 @@ pub(crate) fn encoded(picture: &Array3<f64>) -> Array3<f32> {
 pub(crate) fn camera_digest(optics: &impl Serialize, camera: &Camera, view: &SceneView) -> Result<String> {
     let field = [view.rows as f64, view.columns as f64, view.field_deg];
     let text = serde_json::to_vec(&(optics, camera, field))
-        .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+        .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
     Ok(hex(&Sha256::digest(text)))
 }

@@ -17,7 +17,7 @@ use metalith_calibrate::set_format as read;
 pub fn check_plannable(design: &Design, bench: &BenchFile) -> Result<()> {
     if !design.cell.shape.has_width() {
         return Err(Error::refused(
-            "plan/rectangles",
+            "plan/rectangles-unsupported",
             format!("{} is a design of rectangles", design.path.display()),
             "plan sessions of squares or circles: sets are read of these alone",
         ));

@@ -135,7 +135,7 @@ impl CellRequest {
         let even_below = |pitch: f64| 2.0 * ((pitch - 1e-9) / 2.0).floor();
         if self.sine() >= 1.0 {
             return Err(Error::refused(
-                "new/aperture",
+                "new/aperture-too-high",
                 format!(
                     "a numerical aperture of {:.3} and steering by a sine of {:.3}: no lattice carries more than 1 together",
                     self.numerical_aperture, self.steering_sine
@@ -149,7 +149,7 @@ impl CellRequest {
         let (film, substrate) = (self.index(&self.film)?, self.index(&self.substrate)?);
         if film <= 1.2 {
             return Err(Error::refused(
-                "new/index",
+                "new/index-too-low",
                 format!(
                     "{} has an index of {film:.3} at {nm:.1} nm, hardly more than air",
                     self.film
@@ -175,7 +175,7 @@ impl CellRequest {
         }
         if pitch_nm > nyquist_nm {
             return Err(Error::refused(
-                "new/pitch-aperture",
+                "new/pitch-too-coarse",
                 format!(
                     "a pitch of {pitch_nm} nm samples the phase at the rim by more than half a wave: a numerical aperture of {:.3} needs {nyquist_nm:.1} \
                      nm or less",
@@ -287,7 +287,7 @@ impl CellRequest {
             ),
             None => "take another material, or leave the pitch out".into(),
         };
-        Error::refused("new/height", what, hint)
+        Error::refused("new/no-usable-height", what, hint)
     }
 
     /// Narrowest and widest pillar and the step (nm) on a pitch.

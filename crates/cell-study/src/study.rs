@@ -55,7 +55,7 @@ impl StudyOptions {
         match (0.0..1.0).contains(&self.threshold) {
             true => Ok(()),
             false => Err(Error::refused(
-                "cells/bad-zero-order",
+                "cells/threshold-out-of-range",
                 format!("widths are bad below a zero order of {}", self.threshold),
                 "give a share of the incident power, such as 0.3",
             )),

@@ -105,7 +105,7 @@ impl CellStack {
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
         if !self.shape.has_width() {
             return Err(Error::refused(
-                "cell/rectangle-by-width",
+                "cell/rectangles-unsupported",
                 "rectangular pillars, where those of a width are asked for",
                 "use squares or circles here: calibration knows no rectangles, `optimise` no upright ones; the other commands do",
             ));
@@ -339,14 +339,14 @@ impl CellStack {
         let lean = self.taper.abs();
         if lean.is_nan() || lean >= MOST_TAPER {
             return Err(Error::refused(
-                "cell/side-wall",
+                "cell/side-wall-out-of-range",
                 format!("walls that lean by {} degrees", self.taper.to_degrees()),
                 "use an angle from upright below 45 degrees",
             ));
         }
         if !(self.height_nm.is_finite() && self.height_nm > 0.0) {
             return Err(Error::refused(
-                "cell/height",
+                "cell/height-out-of-range",
                 format!("pillars {} nm high", self.height_nm),
                 "give a positive height",
             ));
@@ -354,14 +354,14 @@ impl CellStack {
         let sound = |v: f64| v.is_finite() && v >= 0.0;
         if let Some(under) = self.under.iter().find(|u| !sound(u.height_nm)) {
             return Err(Error::refused(
-                "cell/residual-film",
+                "cell/residual-film-out-of-range",
                 format!("{} nm of {} under the pillars", under.height_nm, under.material),
                 "give a thickness of zero or more",
             ));
         }
         if !sound(self.corner_radius_nm) || !sound(self.mask_height_nm) {
             return Err(Error::refused(
-                "cell/corner-radius",
+                "cell/corner-radius-out-of-range",
                 format!(
                     "a corner radius of {} nm with {} nm of mask",
                     self.corner_radius_nm, self.mask_height_nm
@@ -478,9 +478,14 @@ pub(super) mod tests {
             },
             100.0,
             0.5,
-            "cell/height",
+            "cell/height-out-of-range",
         );
-        refused(CellStack { taper: 1.0, ..paper() }, 100.0, 0.5, "cell/side-wall");
+        refused(
+            CellStack { taper: 1.0, ..paper() },
+            100.0,
+            0.5,
+            "cell/side-wall-out-of-range",
+        );
         refused(
             CellStack {
                 corner_radius_nm: -1.0,
@@ -488,10 +493,15 @@ pub(super) mod tests {
             },
             100.0,
             0.5,
-            "cell/corner-radius",
+            "cell/corner-radius-out-of-range",
         );
-        refused(CellStack { taper: 0.1, ..paper() }, 330.0, 0.5, "rcwa/width");
-        refused(paper(), 100.0, 0.25, "rcwa/out-of-range");
+        refused(
+            CellStack { taper: 0.1, ..paper() },
+            330.0,
+            0.5,
+            "rcwa/width-out-of-range",
+        );
+        refused(paper(), 100.0, 0.25, "rcwa/material-out-of-range");
         for width in [f64::NAN, f64::INFINITY, -5.0, -1e9] {
             refused(paper(), width, 0.5, "cell/width-out-of-range");
             let oblique = paper().oblique(width, 0.5, [0.1, 0.0], orders);

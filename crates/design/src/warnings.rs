@@ -99,7 +99,7 @@ impl Design {
         names.dedup();
         (!names.is_empty()).then(|| {
             Warning::new(
-                "phase/unwrapped",
+                "phase/wrapped",
                 format!(
                     "phases of {} are wrapped: whole waves are added where they jump",
                     names.join(", ")
@@ -164,7 +164,7 @@ impl Design {
         });
         let (extent_um, radius_um) = maps.find(|(extent, radius)| *extent > WIDE_MAP * radius)?;
         Some(Warning::new(
-            "phase/wide-map",
+            "phase/map-too-wide",
             format!("a map of phases reaches to {extent_um:.1} um from its middle, and the lens to {radius_um:.1} um"),
             "check `pitch_um`, the distance of the places of the map",
         ))
@@ -181,7 +181,7 @@ impl Design {
         });
         let (disc_um, lens_um) = discs.find(|(disc, lens)| !(0.5..=2.0).contains(&(disc / lens)))?;
         Some(Warning::new(
-            "phase/zernike-disc",
+            "phase/zernike-radius-differs",
             format!("Zernike polynomials are of a disc with a radius of {disc_um} um, and the lens has {lens_um} um"),
             "check `normalisation_radius_um`; left out, it is the radius of the lens",
         ))
@@ -194,7 +194,7 @@ impl Design {
         let most = self.lenses().into_iter().map(beside).fold(0.0, f64::max);
         (most > WIDE_MARGIN).then(|| {
             Warning::new(
-                "apertures/wide-margin",
+                "apertures/margin-too-wide",
                 format!(
                     "beside a lens its opening passes light through {:.0} % of the area of the lens, which no pillar focuses",
                     most * 100.0

@@ -277,7 +277,7 @@ impl Drawing {
         let mut bytes = Vec::new();
         self.tree.write(&mut bytes).map_err(|e| {
             Error::refused(
-                "layout/encoding",
+                "layout/encoding-failed",
                 format!("{} cannot be encoded: {e:?}", path.display()),
                 "please report this with the design and the process file",
             )

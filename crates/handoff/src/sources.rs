@@ -167,7 +167,7 @@ fn read_design(path: &Path) -> Result<(Design, Vec<InputCopy>)> {
     for ((path, ..), bytes) in named.iter().zip(&before) {
         if !same_files || read_at_most(path, LONGEST, "an input of a hand-off")? != *bytes {
             return Err(Error::refused(
-                "file/replaced-meanwhile",
+                "file/changed-meanwhile",
                 format!("{} changed while it was read", path.display()),
                 "try again when nothing writes to it",
             ));

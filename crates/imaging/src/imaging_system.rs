@@ -156,7 +156,7 @@ impl ImagingSystem {
         let scene = self.simulated(scene);
         if scene.view != self.view || scene.basis[..] != self.basis[..self.scene_spectra] {
             return Err(Error::refused(
-                "imaging/scenes-differ",
+                "scene/views-differ",
                 format!(
                     "the scene `{}` has another size, field or spectra than the first",
                     scene.name

@@ -200,7 +200,8 @@ impl<'a> KernelPlan<'a> {
             scene_distance_um: self.scene.view.distance_um.min(f64::MAX),
             cubic_nm: self.cubic_nm.as_deref(),
         };
-        serde_json::to_vec(&inputs).map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))
+        serde_json::to_vec(&inputs)
+            .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))
     }
 
     pub(crate) fn chip<'c>(

@@ -50,7 +50,7 @@ pub(crate) fn check_elements(design: &Design, extraction: &Extraction) -> Result
         format!(" ({}), the first about ({x:.1}, {y:.1}) um", why(foreign))
     });
     Err(Error::refused(
-        "imaging/element-not-in-layout",
+        "layout/element-not-found",
         format!(
             "element {} of `{}` at ({x}, {y}) um has no pillar in this layout{others}: on layer {} stand {} pillars on sites of elements, and {} other shapes{where_first}",
             first.label(),

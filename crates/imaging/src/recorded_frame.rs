@@ -56,7 +56,7 @@ impl ImagingSystem {
         let planes = planes_of(&self.camera);
         if signals.len() != planes {
             return Err(Error::refused(
-                "restore/planes",
+                "restore/plane-count-differs",
                 format!("{} planes of a frame, and the camera gives {planes}", signals.len()),
                 "give one for a sensor with a colour filter array, else one for each channel",
             ));

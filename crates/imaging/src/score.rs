@@ -118,7 +118,7 @@ pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScor
     let (rows, columns, colours) = truth.dim();
     if picture.dim() != truth.dim() || colours != 3 {
         return Err(Error::refused(
-            "score/shapes",
+            "score/sizes-differ",
             format!("pictures of shapes {:?} and {:?}", picture.dim(), truth.dim()),
             "give two of one shape, (rows, columns, 3)",
         ));

@@ -145,7 +145,7 @@ impl RealisedCells {
     /// Error that a bank has no answer.
     pub(super) fn along_normal_alone() -> Error {
         Error::refused(
-            "study/oblique",
+            "study/oblique-unsupported",
             "tables of cells are for light along the normal",
             "leave out `incidence = \"oblique\"`",
         )

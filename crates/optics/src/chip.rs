@@ -64,7 +64,7 @@ impl AsBuiltChip {
         if !faults.is_empty() {
             let all: Vec<String> = faults.iter().map(ToString::to_string).collect();
             return Err(Error::refused(
-                "model/refused",
+                "model/impossible-values",
                 all.join("\n"),
                 "correct the calibrated model",
             ));

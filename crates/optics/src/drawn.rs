@@ -156,7 +156,7 @@ pub(crate) fn coupled<'e>(
 /// directions.
 pub(crate) fn not_held() -> Error {
     Error::refused(
-        "verify/too-large",
+        "verify/element-too-large",
         "an element whose pillars are too many to be held is judged as made, or among its unlike neighbours",
         "judge it by the cell of a lattice of equal pillars, as drawn",
     )

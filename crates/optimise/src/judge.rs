@@ -98,7 +98,7 @@ impl OptimiseTask {
     ) -> Result<Vec<f64>> {
         if cells.iter().any(|cell| cell.fidelity() == Fidelity::Neighbours) {
             return Err(Error::refused(
-                "optimise/errors-among-neighbours",
+                "optimise/errors-with-neighbours",
                 "errors of fabrication among unlike neighbours",
                 "judge them with the cell `rigorous`",
             ));

@@ -127,7 +127,7 @@ impl OptimiseTask {
             StartSpec::Previous => Start::Previous(self.own_waves.clone()),
             StartSpec::Log => {
                 return Err(Error::refused(
-                    "optimise/log-from-itself",
+                    "optimise/start-needs-own-result",
                     "the merit `log` cannot begin with its own result",
                     "use start = \"all\" or \"log_asphere\"; \"log\" is for Adam, and for the merit `deconvolution`",
                 ));

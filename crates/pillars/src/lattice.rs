@@ -105,14 +105,14 @@ impl Lattice {
         }
         if sites == 0 || sites > 1 << 20 {
             return Err(Error::refused(
-                "lattice/sites",
+                "lattice/site-count-out-of-range",
                 format!("a lattice of {sites} sites an axis"),
                 "use between 1 and 1,048,576 sites an axis",
             ));
         }
         if kind == LatticeKind::Hexagonal && sites.is_multiple_of(2) {
             return Err(Error::refused(
-                "lattice/sites",
+                "lattice/even-site-count",
                 format!("a hexagonal lattice of {sites} places an axis"),
                 "use an odd number: one is in the centre",
             ));

@@ -74,7 +74,7 @@ impl PostProcessor {
     pub fn finish(&self, pictures: &[Array3<f32>]) -> Result<Array3<f32>> {
         if pictures.len() != self.provenance.pictures {
             return Err(metalith_core::Error::refused(
-                "stage/number-of-pictures",
+                "stage/picture-count-differs",
                 format!(
                     "{} pictures of a frame for a network that was taught by {}",
                     pictures.len(),

@@ -78,7 +78,7 @@ pub fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training: &str) 
         (layer.name.clone(), view)
     });
     let bytes = safetensors::serialize(views, Some(about))
-        .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+        .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
     AtomicFile::write(path, &bytes)
 }
 

@@ -98,7 +98,7 @@ impl Camera {
         match dark {
             None => Ok(self),
             Some(channel) => Err(Error::refused(
-                "camera/no-light",
+                "camera/channel-without-light",
                 format!(
                     "{}: channel `{}` counts none of the light of the illuminant",
                     path.display(),

@@ -230,7 +230,7 @@ impl Camera {
             if kept <= 0.0 {
                 let [short, long] = range_nm.map(|nm| (nm * 10.0).round() / 10.0);
                 return Err(Error::refused(
-                    "camera/no-light",
+                    "camera/channel-without-light",
                     format!(
                         "channel `{}` of the camera counts no light from {short} to {long} nm",
                         channel.name

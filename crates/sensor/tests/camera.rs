@@ -134,7 +134,7 @@ fn what_does_not_fit_together_is_said() {
         (
             "source = \"equal_energy\"",
             "source = \"leds\"\n[[illuminant.led]]\ncentre_nm = 900\nwidth_nm = 10",
-            "camera/no-light",
+            "camera/channel-without-light",
         ),
         // 4095 steps of one electron are 0.41 of the well.
         ("bits = 12", "bits = 12\ngain_e = 1", "sensor.gain_e/inconsistent"),

@@ -85,7 +85,7 @@ impl StudyBench {
         };
         if base.declared().next().is_some() {
             return Err(Error::refused(
-                "study/declared-effects",
+                "study/declared-effects-unsupported",
                 "a model with declared effects: how wide their pillars become is not known before they are drawn",
                 "give a model without declared effects",
             ));
@@ -165,7 +165,7 @@ impl StudyBench {
         let design = self.tolerance.design(number)?;
         if design.verify.incidence == CellIncidence::Oblique {
             return Err(Error::refused(
-                "study/oblique",
+                "study/oblique-unsupported",
                 "a study takes the cells along the normal, and the design asks for them as they are lit",
                 "leave out `incidence = \"oblique\"` in [verify] of the design of the study",
             ));
@@ -289,14 +289,14 @@ fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Res
     }
     if made.changes.iter().any(|change| change.corner_rounding_nm != 0.0) {
         return Err(Error::refused(
-            "study/corner-rounding",
+            "study/rounded-rectangles",
             "`corner_rounding` of rectangles",
             "leave it out of the study and of its model: rectangles are solved with sharp corners",
         ));
     }
     if has_picture {
         return Err(Error::refused(
-            "study/pictures-of-rectangles",
+            "study/pictures-with-rectangles",
             "pictures of rectangles in a study",
             "leave out [picture]; `metalith picture` takes the picture of the chip as drawn",
         ));

@@ -193,7 +193,7 @@ impl Sampler {
             }
         }
         Err(Error::refused(
-            "study/amount-impossible",
+            "study/distribution-out-of-range",
             format!("`{}` is hardly ever within what a chip can have", quantity.name),
             "give a distribution that overlaps with the physical range of the effect",
         ))

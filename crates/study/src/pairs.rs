@@ -225,7 +225,7 @@ impl PairsRequest {
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let first = self.images.first();
         let first =
-            first.ok_or_else(|| Error::refused("study/no-images", "no images", "give a folder with at least one"))?;
+            first.ok_or_else(|| Error::refused("scene/no-images", "no images", "give a folder with at least one"))?;
         ImagingSystem::open_cached(
             &design,
             &self.layout,

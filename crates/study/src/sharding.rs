@@ -170,7 +170,7 @@ impl Sharding {
         match self.own_header(first_line) {
             Err((id, why)) => Some((id, why.into())),
             Ok(header) if header != self.header(shard) => Some((
-                "study/shard-cut-otherwise",
+                "study/shard-range-differs",
                 format!(
                     "holds {}s {} to {} as shard {}, of a plan that was cut otherwise",
                     self.part,

@@ -245,7 +245,7 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
     let text = fs::read_to_string(&design).unwrap();
     fs::write(&design, text.replace("window_samples = 32", "window_samples = 34")).unwrap();
     let changed = refusal(Run::open(&made).map(|_| ()));
-    assert_eq!(changed.id(), "study/another-plan");
+    assert_eq!(changed.id(), "study/plan-differs");
     assert!(plan(&path, &study, PlanSettings::default(), &Silent).is_err());
 }
 

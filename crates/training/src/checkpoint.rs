@@ -57,7 +57,7 @@ impl Checkpoint {
             (*name, view)
         });
         let file = safetensors::serialize(views, Some(about))
-            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+            .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
         AtomicFile::write(path, &file)
     }
 

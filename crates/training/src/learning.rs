@@ -92,14 +92,14 @@ impl TrainingSpec {
         let fault = |id, what: &str, hint: &str| Err(Error::refused(id, what, hint));
         if !self.piece.is_multiple_of(8) || !(32..=512).contains(&self.piece) {
             return fault(
-                "train/piece",
+                "train/piece-out-of-range",
                 "pieces of this size cannot be learnt from",
                 "give a multiple of 8 from 32 to 512",
             );
         }
         if self.steps == 0 || !(1..=256).contains(&self.batch) {
             return fault(
-                "train/nothing-to-learn",
+                "train/steps-out-of-range",
                 "nothing to learn",
                 "give at least one step, and 1 to 256 pieces a step",
             );

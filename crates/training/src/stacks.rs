@@ -60,7 +60,7 @@ impl Stack {
             (*name, view)
         });
         let file = safetensors::serialize(views, Some(about))
-            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+            .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
         AtomicFile::write(path, &file)
     }
 
@@ -154,7 +154,7 @@ impl Stacks {
         Self::check(stacks.len(), [least(0), least(1)], piece)?;
         if let Some(other) = stacks.iter().find(|s| s.pictures() != provenance.pictures) {
             return Err(Error::refused(
-                "stage/number-of-pictures",
+                "stage/picture-count-differs",
                 format!(
                     "{} pictures of a frame, and {} of others",
                     other.pictures(),

@@ -27,7 +27,7 @@ impl<'a> SimulationCases<'a> {
     pub fn of_cells(cells: &'a [Box<dyn CellModel>]) -> Result<Self> {
         let (judge, beside) = cells.split_first().ok_or_else(|| {
             Error::refused(
-                "verify/no-model",
+                "verify/no-fidelity",
                 "there is no cell to judge a layout by",
                 "ask for at least one fidelity",
             )

@@ -103,20 +103,20 @@ impl WaveError {
     /// Identity of the error, `subject/cause`: the text may change, the identity stays.
     pub fn id(&self) -> &'static str {
         match self {
-            Self::Window { .. } => "wave/window",
-            Self::Fade { .. } => "wave/fade",
-            Self::Wave { .. } => "wave/wave",
-            Self::Lattice { .. } => "wave/lattice",
-            Self::Band { .. } => "wave/band",
-            Self::Shape { .. } => "wave/shape",
-            Self::Count { .. } => "wave/count",
-            Self::Width { .. } => "wave/width",
-            Self::Rings { .. } => "wave/rings",
-            Self::Incidence { .. } => "wave/incidence",
+            Self::Window { .. } => "wave/window-out-of-range",
+            Self::Fade { .. } => "wave/fade-out-of-range",
+            Self::Wave { .. } => "wave/wavelength-not-planned",
+            Self::Lattice { .. } => "wave/lattice-differs",
+            Self::Band { .. } => "wave/band-without-weight",
+            Self::Shape { .. } => "wave/shape-differs",
+            Self::Count { .. } => "wave/count-differs",
+            Self::Width { .. } => "wave/width-beyond-table",
+            Self::Rings { .. } => "wave/rings-out-of-range",
+            Self::Incidence { .. } => "wave/no-incident-light",
             Self::MissesSensor { .. } => "wave/misses-sensor",
-            Self::Pixels { .. } => "wave/pixels",
-            Self::Samples => "wave/samples",
-            Self::Map { .. } => "wave/map",
+            Self::Pixels { .. } => "wave/pixels-outside-window",
+            Self::Samples => "wave/samples-differ",
+            Self::Map { .. } => "wave/map-out-of-range",
         }
     }
 
@@ -166,7 +166,7 @@ mod tests {
             last_nm: 288,
         };
         let at_border = metalith_core::Error::from(error);
-        assert_eq!(at_border.id(), "wave/width");
+        assert_eq!(at_border.id(), "wave/width-beyond-table");
         insta::assert_snapshot!(at_border, @"
             a pillar is 300 nm wide, the table of the cell ends at 288 nm
               help: make the table up to the widest pillar of the layout

@@ -298,7 +298,7 @@ fn check_memory<M: Measurements>(model: &Model<'_, M>, nodes: &[Vec<f64>], smoot
         return Ok(());
     }
     Err(Error::refused(
-        "calibrate/memory",
+        "calibrate/too-much-memory",
         format!(
             "the predictions of these measurements for {simulated} points in parameters take about {:.0} GB of memory, and a search \
              as much again; at most {:.0} GB are taken for them",

@@ -65,7 +65,7 @@ impl DiffuserSpec {
                 ..Self::standard()
             }),
             false => Err(Error::refused(
-                "diffusercam/geometry",
+                "diffusercam/geometry-out-of-range",
                 format!("a rough surface of grain {grain_um} um at {distance_um} um with an opening of {opening}"),
                 "give a distance from 1, a grain from 5 to 100000 um, an opening from 0.01 to 2",
             )),

@@ -34,7 +34,7 @@ impl MaskSpec {
                 distance_um,
             }),
             false => Err(Error::refused(
-                "flatcam/geometry",
+                "flatcam/geometry-out-of-range",
                 format!("a mask with openings of {feature_um} um at {distance_um} um"),
                 "give lengths from 1 to 100000 um",
             )),

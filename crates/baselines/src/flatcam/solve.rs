@@ -30,7 +30,7 @@ impl Factor {
         });
         let svd = (&own * &root).thin_svd().map_err(|e| {
             Error::refused(
-                "flatcam/singular-values",
+                "flatcam/svd-failed",
                 format!("no singular values of a mask: {e:?}"),
                 "use another size of the scene",
             )

@@ -67,7 +67,7 @@ impl SteeredStudy {
 pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Vec<SteeredStudy>> {
     if design.mapping.table.is_some() {
         return Err(Error::refused(
-            "cells/steered-table",
+            "cells/steered-without-polynomial",
             "mappings of steered elements start from the polynomial of the design, which has a table instead",
             "give `coefficients` in [mapping]",
         ));
@@ -77,7 +77,7 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
     design.radial_phase(who)?;
     if !design.array.placed.is_empty() {
         return Err(Error::refused(
-            "cells/steered-places",
+            "cells/elements-not-on-grid",
             format!("{who} tells elements by their steps on a grid, and those of the design are placed one by one"),
             "use `elements`, `spacing_um` and `steering_deg` of [array] in place of [[element]]",
         ));
@@ -349,6 +349,6 @@ mod tests {
             let (head, rest) = text.split_once("[[phase.term]]").unwrap();
             format!("{head}[array]{}", rest.split_once("[array]").unwrap().1)
         };
-        assert_eq!(refused(&changed("hologram", placed)), "cells/steered-places");
+        assert_eq!(refused(&changed("hologram", placed)), "cells/elements-not-on-grid");
     }
 }

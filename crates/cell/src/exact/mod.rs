@@ -58,7 +58,7 @@ impl MappingTable {
             .collect();
         let Some(&first) = allowed.first() else {
             return Err(Error::refused(
-                "mapping/no-width-left",
+                "mapping/all-widths-avoided",
                 "a mapping that avoids every width",
                 "lower the threshold below which a width is avoided",
             ));

@@ -208,7 +208,7 @@ impl RealRow {
         let lattice = SiteLattice::of_grating(turns, pillars)?;
         if lattice.len() != pillars {
             return Err(Error::refused(
-                "supercell/direction",
+                "supercell/direction-off-axes",
                 format!("a row of {pillars} pillars in the direction {:?}", self.direction),
                 "use a direction along an axis or a diagonal, such as (1, 0) or (-1, 1)",
             ));

@@ -173,7 +173,7 @@ fn a_file_of_another_kind_is_said_to_be_one() {
         (&layout[..], "file/not-text"),
         (b"%SEMI-OASIS\r\n\x01\xff", "file/not-text"),
         (b"\x89PNG\r\n\x1a\n", "file/not-text"),
-        (b"\xff\xfe", "table/format"),
+        (b"\xff\xfe", "table/malformed"),
     ] {
         std::fs::write(&path, bytes).unwrap();
         let error = super::load(&path).unwrap_err();

@@ -162,7 +162,7 @@ impl MappingIdentity {
         {
             let line = places.get(first.key).or(places.values().next());
             return Err(Error::refused(
-                "mapping/another-cell",
+                "mapping/cell-differs",
                 format!(
                     "{}, line {}: {}",
                     file.display(),
@@ -182,18 +182,18 @@ impl MappingIdentity {
         let unknown = (!self.is_stated && self.accept.is_none()).then(|| {
             let cell = own.to_toml().replacen('\n', " ", 1).replace('\n', "; ");
             Warning::new(
-                "mapping/unknown-cell",
+                "mapping/cell-not-stated",
                 "the mapping does not say which cell it is for: no one has compared it with [cell]",
                 format!("make it anew by `metalith cells`, or if it is for this cell, say so: {cell}"),
             )
         });
         let other = (!self.differences.is_empty()).then(|| match &self.accept {
             Some(reason) => Warning::new(
-                "mapping/accepted",
+                "mapping/difference-accepted",
                 format!("{differences}; accepted: {reason}"),
                 "`metalith cells` finds a mapping for this cell",
             ),
-            None => Warning::new("mapping/another-cell", differences, MappedCell::REMEDY),
+            None => Warning::new("mapping/cell-differs", differences, MappedCell::REMEDY),
         });
         unknown.into_iter().chain(other)
     }

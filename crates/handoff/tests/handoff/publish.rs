@@ -124,9 +124,12 @@ fn links_and_other_files_in_the_way_are_left_alone() {
     let elsewhere = parent.path().join("elsewhere");
     fs::create_dir(&elsewhere).unwrap();
     std::os::unix::fs::symlink(&elsewhere, &out).unwrap();
-    assert_eq!(handoff(&options(&out), &Silent).unwrap_err().id(), "handoff/no-folder");
+    assert_eq!(
+        handoff(&options(&out), &Silent).unwrap_err().id(),
+        "handoff/not-a-folder"
+    );
     fs::remove_file(&out).unwrap();
     fs::create_dir(parent.path().join("kit.zip")).unwrap();
-    assert_eq!(handoff(&options(&out), &Silent).unwrap_err().id(), "handoff/no-file");
+    assert_eq!(handoff(&options(&out), &Silent).unwrap_err().id(), "handoff/not-a-file");
     assert_eq!(names(parent.path()), ["elsewhere", "kit.zip"]);
 }

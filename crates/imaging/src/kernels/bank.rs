@@ -65,7 +65,7 @@ impl BankSpec {
             return Ok(());
         }
         Err(Error::refused(
-            "imaging/memory",
+            "camera/too-much-memory",
             format!(
                 "images of points at {places} places of elements, in {channels} channels and {bases} spectra of {} x {} pixels, would take {} MB",
                 self.window,

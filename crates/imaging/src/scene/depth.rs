@@ -18,7 +18,7 @@ impl SceneImage {
         let (rows, columns) = depth_um.dim();
         if (rows, columns) != (self.view.rows, self.view.columns) {
             return Err(Error::refused(
-                "imaging/depth-size",
+                "scene/depth-map-size-differs",
                 format!(
                     "the depth map has {columns} x {rows} pixels, the scene {} x {}",
                     self.view.columns, self.view.rows
@@ -40,7 +40,7 @@ pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
     let bytes = read_at_most(path, LONGEST, "a depth map")?;
     let fault = |what: &str| {
         Error::refused(
-            "imaging/depth-unreadable",
+            "scene/depth-map-unreadable",
             format!("{}: {what}", path.display()),
             "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances of a millimetre and more, in millimetres; `inf` in an NPY is far away",
         )

@@ -325,7 +325,7 @@ impl CellBank {
 
     fn outside(what: String) -> Error {
         Error::refused(
-            "study/outside-tables",
+            "study/tables-too-narrow",
             format!("the tables of cells hold no {what}"),
             "plan the study again; a shard makes no tables of its own",
         )

@@ -187,7 +187,7 @@ fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     let (geometry, cell) = (&model.perturbation.geometry, &model.perturbation.cell);
     if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
         return Err(Error::refused(
-            "model/transmission-of-rectangles",
+            "model/transmission-with-rectangles",
             "the pillars are rectangles, and the transmission of the model goes by one width",
             "give a model without `transmission` and `transmission_phase_rad`: rectangles are told by no one width",
         ));
@@ -205,7 +205,7 @@ fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     });
     match by_width {
         Some(term) => Err(Error::refused(
-            "model/declared-width-of-rectangles",
+            "model/declared-width-with-rectangles",
             format!(
                 "the declared width `{}` goes by the drawn width `w`, of rectangles",
                 term.name

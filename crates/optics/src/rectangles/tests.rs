@@ -152,7 +152,7 @@ fn upright_rectangles_between_the_nodes_are_those_solved_exactly_along_both_axes
     assert_eq!(found.along.map(|along| along[0]), exact);
     // Of a size that was not drawn when the bank was made.
     let refused = tables(&banked, &[class(1, 0.0)]).unwrap_err();
-    assert_eq!(refused.id(), "study/outside-tables");
+    assert_eq!(refused.id(), "study/tables-too-narrow");
     insta::assert_snapshot!(refused, @"
     the tables of cells hold no pillar of 100 x 100 nm whose edges are off by 0 nm
       help: plan the study again; a shard makes no tables of its own
@@ -227,8 +227,8 @@ fn what_rectangles_have_no_meaning_for_is_refused_with_a_reason() {
         let id = |change: &dyn Fn(&mut crate::Perturbation)| refused(pillars, light, change).id();
         assert_eq!(id(&|of| of.cell.corner_rounding_nm = 5.0), "model/rounded-rectangles");
         let transmission = id(&|of| of.geometry.transmission = vec![0.1]);
-        assert_eq!(transmission, "model/transmission-of-rectangles");
-        assert_eq!(id(&by_width), "model/declared-width-of-rectangles");
+        assert_eq!(transmission, "model/transmission-with-rectangles");
+        assert_eq!(id(&by_width), "model/declared-width-with-rectangles");
     }
     assert_eq!(refused(UPRIGHT.into(), HAND, &nothing).id(), "light/not-focused");
     let other = refused(ROTATED.into(), ALONG_X, &nothing);

@@ -54,7 +54,7 @@ impl Deconvolution {
         if angles == 0 || views.channels == 0 || lengths < 2 * views.channels || !views.window.pixels.is_multiple_of(2)
         {
             return Err(Error::refused(
-                "optimise/shapes",
+                "optimise/views-unsuitable",
                 format!(
                     "{lengths} wavelengths in {} channels at {angles} angles",
                     views.channels
@@ -92,7 +92,7 @@ impl Deconvolution {
                         let so_far = used.fetch_add(bytes, std::sync::atomic::Ordering::Relaxed) + bytes;
                         if so_far > memory_bytes {
                             return Err(Error::refused(
-                                "optimise/memory",
+                                "optimise/too-much-memory",
                                 format!(
                                     "the kernels of {} views take more than {memory_bytes} bytes",
                                     angles * lengths

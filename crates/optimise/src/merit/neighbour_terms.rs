@@ -70,7 +70,7 @@ impl NeighbourTerms {
         let bytes = (24 * numbers + 8 * (lens.rings.len() + of_width + 1)) as u64 * rows as u64;
         if bytes > memory_bytes {
             return Err(Error::refused(
-                "optimise/memory",
+                "optimise/too-much-memory",
                 format!(
                     "neighbours of {} rings at {rows} wavelengths take {bytes} bytes, more than {memory_bytes}",
                     lens.rings.len()
@@ -85,7 +85,7 @@ impl NeighbourTerms {
             let wavelength_um = condition.wavelength_um;
             if condition.cell != 0 || condition.width_bias_nm != 0.0 {
                 return Err(Error::refused(
-                    "optimise/errors-among-neighbours",
+                    "optimise/errors-with-neighbours",
                     "errors of fabrication among unlike neighbours",
                     "leave out [optimise.robust], or optimise with the cell `rigorous`",
                 ));

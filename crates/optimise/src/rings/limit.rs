@@ -29,7 +29,7 @@ impl StepLimit {
             return Ok(Self { waves });
         }
         Err(Error::refused(
-            "optimise/phase-step",
+            "optimise/phase-step-out-of-range",
             format!("a limit of {waves} waves on the phase step"),
             "give more than 0 and at most 0.5 waves; 0.5 is no limit",
         ))

@@ -48,7 +48,7 @@ impl OptimiseTask {
                 let problem = self.field_problem(&self.spec.merit, cells)?;
                 let problem = problem.ok_or_else(|| {
                     Error::refused(
-                        "optimise/nothing-to-exchange",
+                        "optimise/no-merit-weight",
                         "exchange has no merit to gain",
                         "give sum, log or side_lobes a weight",
                     )

@@ -64,7 +64,7 @@ impl Pupil {
         let size = fft_size(needed);
         if size > 8192 {
             return Err(Error::refused(
-                "optimise/window",
+                "optimise/window-too-large",
                 format!(
                     "a window of {} um needs a transform of {size} points an axis",
                     window.side_um()
