@@ -23,7 +23,7 @@ pub(crate) struct CalibrateArgs {
     #[arg(required = true)]
     sets: Vec<PathBuf>,
 
-    /// Folder for the results, created if need be, with a folder for each set if there are several; `out/calibrate/`
+    /// Folder for the results, created if it does not exist, with a folder for each set if there are several; `out/calibrate/`
     /// and the set's name if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -41,8 +41,8 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, conflicts_with = "validate")]
     adopt: bool,
 
-    /// Validate the calibration itself instead, on synthetic sets like this one: without effects, with each effect at
-    /// three sizes, with pairs, and with effects that are not listed. Takes about an hour of CPU time. Writes
+    /// Validate the calibration instead, on synthetic sets like this one: without effects, with each effect at three sizes,
+    /// with pairs of effects, and with effects that are not in the list. Takes about an hour of CPU time. Writes
     /// validation.html, validation.json, validation.txt and, set by set, validation_trials.jsonl.
     #[arg(long, alias = "proof")]
     validate: bool,
@@ -64,8 +64,8 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, value_name = "N", requires = "validate", default_value_t = 0)]
     seed: u32,
 
-    /// Use sets without noise and fit only the effects that are present: the errors of values are then those of the
-    /// model itself.
+    /// Use sets without noise and fit only the effects that are present; the remaining errors of values are errors of the
+    /// model.
     #[arg(long, requires = "validate")]
     noiseless: bool,
 

@@ -41,14 +41,14 @@ pub(crate) struct CellsArgs {
     #[arg(long, value_name = "T", default_value_t = 0.01)]
     tolerance: f64,
 
-    /// Also find a mapping for each distinct steered element with the coupled model. Each takes a search, and a table
-    /// for each wavelength of `compared_nm` in [mapping] (of [verify] if that is left out): with four wavelengths about
-    /// six CPU minutes an element the first time.
+    /// Also find a mapping for each distinct steered element with the coupled model. It solves a table for each element and
+    /// each wavelength of `compared_nm` in [mapping] (of [verify] if that is left out). With four wavelengths an element takes
+    /// about six CPU minutes the first time.
     #[arg(long)]
     steered: bool,
 
-    /// Put the best mapping into the design file: its coefficients, or the name of a table that is written beside it. All else of the
-    /// file stays as it is.
+    /// Put the best mapping into the design file: its coefficients, or the name of a table that is written to the same folder.
+    /// The rest of the file does not change.
     #[arg(long)]
     write: bool,
 

@@ -12,7 +12,8 @@ use super::verify::FidelityArg;
 /// Design that a layout is compared with.
 #[derive(Args)]
 pub(crate) struct CompensatedFor {
-    /// `metalith layout --compensate MODEL` made the layout: its pillars are compared with the compensated design.
+    /// Model that the layout was compensated with by `metalith layout --compensate MODEL`: pillars are compared with the
+    /// compensated design.
     #[arg(id = "compensated", long, value_name = "MODEL", requires = "design")]
     pub model: Option<PathBuf>,
 }

@@ -23,7 +23,7 @@ pub(crate) struct DenoiseArgs {
     /// The picture: PNG, JPEG or NPY.
     picture: PathBuf,
 
-    /// Standard deviation of the noise, in steps of a scale of 255.
+    /// Standard deviation of the noise, in levels of a scale from 0 to 255.
     #[arg(long, value_name = "LEVELS", value_parser = noise)]
     noise: f32,
 

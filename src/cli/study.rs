@@ -28,7 +28,7 @@ pub(crate) struct StudyArgs {
 enum Step {
     /// Plan a study: write the layout, solve the tables of cells, time the first draw, and cut the work into shards.
     Plan(PlanArgs),
-    /// Make one shard, or all missing ones. Existing shards stay.
+    /// Make one shard, or all missing ones. Existing shards are kept.
     Run(RunArgs),
     /// List existing and missing shards.
     Status(StatusArgs),
@@ -43,7 +43,7 @@ struct PlanArgs {
     /// Tolerance file: what varies, the limits, and the number of draws.
     tolerance: PathBuf,
 
-    /// Folder of the study, created if need be.
+    /// Folder of the study, created if it does not exist.
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
 
@@ -85,7 +85,7 @@ struct SubmitArgs {
     /// Folder of the study.
     study: PathBuf,
 
-    /// File with what jobs need: partition, time, memory, size of arrays.
+    /// File with the settings of the jobs: partition, time, memory, size of arrays.
     #[arg(long, value_name = "FILE")]
     slurm: PathBuf,
 
@@ -104,7 +104,7 @@ struct MergeArgs {
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Number of worst draws to simulate again, to show their PSFs.
+    /// Number of worst draws that are simulated again to show their PSFs.
     #[arg(long, value_name = "N", default_value_t = 3)]
     psfs: usize,
 }

@@ -100,7 +100,7 @@ impl Comparison {
             return Err(Error::refused(
                 "compare/no-camera",
                 "no camera to compare",
-                "give --design, --rivals or both",
+                "give --design, --baselines or both",
             ));
         }
         let methods = self.methods.iter().map(|m| m.parse()).collect::<Result<_>>()?;
