@@ -183,7 +183,7 @@ fn check<'a>(report: &'a Value, key: &str) -> &'a Value {
     checks.find(|check| check["key"] == key).unwrap()
 }
 
-/// Whether a report finds a limit held.
+/// True if a report finds a limit held.
 fn holds(report: &Value, key: &str) -> bool {
     let check = check(report, key);
     let [reached, limit] = ["reached", "limit"].map(|name| check[name].as_f64().unwrap());

@@ -66,7 +66,7 @@ impl Term {
     }
 }
 
-/// What the first two terms change together and neither alone: the product of their parameters, on one pattern.
+/// Change by the first two terms together and by neither alone: the product of their parameters, on one pattern.
 #[derive(Clone, Copy)]
 pub(crate) struct Product {
     pub periods: [u32; 2],

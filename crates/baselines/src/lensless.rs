@@ -173,7 +173,7 @@ impl LenslessBench {
         })
     }
 
-    /// Same bench with the exposure that suits the light of a white scene.
+    /// This bench with the exposure that suits the light of a white scene.
     ///
     /// # Errors
     /// If none of it reaches the sensor.

@@ -1,4 +1,4 @@
-//! Before measuring: which measurements tell which effects apart, and the session that takes them.
+//! Plan of a session before it is measured: the measurements that distinguish the effects.
 //!
 //! ```text
 //! design, layout, bench -> candidates -> what each tells -> the fewest that do -> set folder, check list
@@ -87,28 +87,28 @@ pub struct PlannedMeasurement {
     pub window_centre_um: [f64; 2],
     pub frames: u32,
     pub scale_dn: f64,
-    /// Of the brightest pixel (DN), black level included.
+    /// Value of the brightest pixel (DN), black level included.
     pub brightest_dn: f64,
 }
 
-/// What is planned, and where it goes.
+/// Subject of the plan, and its folder.
 pub struct PlanRequest<'a> {
     pub design: &'a Design,
     pub bench: &'a BenchFile,
     /// The layout that is or will be written.
     pub layout: &'a Path,
-    /// Its path as the set names it.
+    /// Path as the set names it.
     pub layout_in_set: String,
     /// Folder of the set.
     pub folder: &'a Path,
     /// Plan for these effects alone; for all if empty.
     pub only: Vec<String>,
-    /// Where tables of cells are kept from one run to the next.
+    /// Folder of cached tables of cells.
     pub cache: Option<PathBuf>,
 }
 
 impl MeasurementPlan {
-    /// Whether every effect that this bench can see at all is found at its wanted size.
+    /// True if every effect that this bench can see at all is found at its wanted size.
     pub fn finds_all(&self) -> bool {
         self.effects.iter().all(|e| e.detected)
     }

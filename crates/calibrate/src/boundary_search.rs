@@ -24,7 +24,7 @@ const ROUNDS: usize = 2;
 /// An answer, with its evidence where there was enough to search in.
 pub(crate) type Found = (Diagnosis, Option<Evidence>);
 
-/// What is made of an answer, and of the session that it is of.
+/// Result that is made of an answer and of its session.
 type Conclude<'c, T> = dyn Fn(&Session<'_>, &Simulations, Found) -> Result<T> + 'c;
 
 /// Diagnose a session with its simulations, and conclude: about a boundary where one is found that nobody stated.

@@ -40,7 +40,7 @@ pub const WIDEST_GAP_WAVES: f64 = 0.2;
 /// Least share of the light that the mapping of a cell sends to the first order.
 pub const LEAST_LIGHT: f64 = 0.3;
 
-/// What a cell is wanted for.
+/// Purpose of a cell.
 #[derive(Clone, Debug)]
 pub struct CellRequest {
     pub film: Material,
@@ -71,7 +71,7 @@ pub struct ChosenCell {
     pub nyquist_nm: f64,
     /// Number of cells that were tried.
     pub tried: usize,
-    /// Its mapping, as it is solved for the design.
+    /// Mapping, as it is solved for the design.
     pub mapping: SolvedMapping,
 }
 

@@ -67,11 +67,11 @@ impl StudyOptions {
 #[derive(Clone, Debug, Serialize)]
 pub struct MappingStudy {
     pub name: &'static str,
-    /// Against rigorous phase at the wavelength of the mapping.
+    /// Error against the rigorous phase at the wavelength of the mapping.
     pub phase: MappingError,
     /// Orders at the wavelengths of [`CellStudy::compared_um`].
     pub led: Vec<RampOrders>,
-    /// Over the band.
+    /// Error over the band.
     pub band: Vec<RampOrders>,
     /// Coefficients, of a mapping that is a polynomial.
     pub coefficients: Option<Vec<f64>>,

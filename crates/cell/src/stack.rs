@@ -30,7 +30,7 @@ pub struct CellStack {
     /// Unstructured layers between substrate and pillar, from the substrate upwards: a spacer, what the etch left of the film.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub under: Vec<UniformLayer>,
-    /// Around and above the pillar.
+    /// Medium around and above the pillar.
     pub ambient: Material,
     /// Angle of the walls from upright (rad). The width is that of the top; positive is wider at the foot.
     pub taper: f64,

@@ -1,4 +1,4 @@
-//! What a design may be and easily is by mistake.
+//! Properties of a design that are allowed and easily are mistakes.
 
 use metalith_core::{Result, Warning};
 use metalith_pillars::{PillarShape, Steepness};

@@ -33,7 +33,7 @@ pub(super) struct Sources {
 
 /// One input as it was read.
 struct InputCopy {
-    /// Its file name with a prefix for its kind; not yet unique.
+    /// File name with a prefix for its kind; not yet unique.
     name: String,
     purpose: &'static str,
     bytes: Vec<u8>,

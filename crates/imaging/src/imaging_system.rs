@@ -68,7 +68,7 @@ pub struct ImagingSystem {
 const TOGETHER: f64 = 2.0;
 
 impl ImagingSystem {
-    /// Same system with the gain of each channel that the exposure of the camera asks for.
+    /// This system with the gain of each channel that the exposure of the camera asks for.
     pub(crate) fn exposed(mut self) -> Result<Self> {
         let operator = self.restoration();
         let white = operator.apply(&operator.white());

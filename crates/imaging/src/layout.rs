@@ -21,7 +21,7 @@ pub struct PillarCount {
     pub others: u64,
     /// Shapes on the layer of the pillars that are none of the design's.
     pub foreign: u64,
-    /// Why, in words.
+    /// Reason, in words.
     pub why: String,
 }
 

@@ -88,7 +88,7 @@ impl ClassTable {
             .sum()
     }
 
-    /// Same sites with all light multiplied by this.
+    /// These sites with all light multiplied by this.
     #[must_use]
     pub fn scaled(mut self, by: f32) -> Self {
         self.t.iter_mut().for_each(|t| *t *= by);

@@ -87,7 +87,7 @@ impl OptimiseTask {
         self.limit
     }
 
-    /// Same task without errors of fabrication.
+    /// This task without errors of fabrication.
     pub fn regardless_of_errors(&self) -> Self {
         let mut plain = self.clone();
         plain.spec.robust = None;

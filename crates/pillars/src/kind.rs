@@ -1,4 +1,4 @@
-//! What a kind of pillar answers to the rest of the program: one trait, one file for each kind.
+//! Interface of a kind of pillar for the rest of the program: one trait, one file for each kind.
 
 use serde::Serialize;
 

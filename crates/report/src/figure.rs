@@ -38,7 +38,7 @@ impl Figure {
         }
     }
 
-    /// Same drawing with a caption after its title.
+    /// This drawing with a caption after its title.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self

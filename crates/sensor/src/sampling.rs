@@ -163,7 +163,7 @@ impl ChannelSampling {
 /// A narrow part of a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChannelPart {
-    /// Its ends (nm).
+    /// Ends (nm).
     pub nm: [f64; 2],
     /// Weight of its light in the channel, in any scale: photons times efficiency.
     pub weight: f64,

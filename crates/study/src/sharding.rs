@@ -31,7 +31,7 @@ pub struct Sharding {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     pub number: u64,
-    /// Its parts: from the first up to the one before `end`.
+    /// Parts: from the first up to the one before `end`.
     pub first: u64,
     pub end: u64,
 }

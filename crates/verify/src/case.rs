@@ -35,7 +35,7 @@ impl<'a> SimulationCases<'a> {
         Ok(Self::judged_by(judge.as_ref()).with_cells(beside))
     }
 
-    /// Same cases with these cells besides.
+    /// These cases with these cells besides.
     #[must_use]
     pub fn with_cells(mut self, cells: &'a [Box<dyn CellModel>]) -> Self {
         self.beside

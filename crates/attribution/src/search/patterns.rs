@@ -22,7 +22,7 @@ const STEPS: usize = 6;
 /// A quantity with a value of its own in each group.
 #[derive(Clone, Debug)]
 pub struct Pattern {
-    /// Its parameter.
+    /// Parameter.
     pub slot: usize,
     /// The number of the grouping in [`Measurements::groupings`].
     pub by: usize,

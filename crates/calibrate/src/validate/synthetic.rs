@@ -62,7 +62,7 @@ impl<'a> Synthesizer<'a> {
         Self::with_orders(like, settings, ORDERS)
     }
 
-    /// Same synthesizer with cells solved with so many orders along an axis.
+    /// This synthesizer with cells solved with so many orders along an axis.
     ///
     /// # Errors
     /// As [`Synthesizer::new`].

@@ -23,7 +23,7 @@ const JUDGED: usize = 24;
 /// One pillar of a library.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LibraryPillar {
-    /// Its number among the pillars of the design.
+    /// Number among the pillars of the design.
     pub number: u16,
     /// Phase of light along x and along y (turns), each but for a constant that all pillars share.
     pub turns: [f64; 2],

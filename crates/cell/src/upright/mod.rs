@@ -132,7 +132,7 @@ impl UprightCell {
         }
     }
 
-    /// Same cell, whose answers for single wavelengths are cached in a folder from one run to the next.
+    /// This cell, whose answers for single wavelengths are cached in a folder from one run to the next.
     #[must_use]
     pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
         self.folder = folder.map(Path::to_owned);

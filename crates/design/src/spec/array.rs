@@ -40,7 +40,7 @@ pub struct PlacedSpec {
     /// Rotation of the phase of its lens about its middle, from x towards y (degrees); the steering is not rotated.
     #[serde(skip_serializing_if = "is_zero")]
     pub rotation_deg: f64,
-    /// Its own lens, in place of that all share.
+    /// Own lens, in place of that all share.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens: Option<LensSpec>,
 }

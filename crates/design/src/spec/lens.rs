@@ -209,7 +209,7 @@ impl LensSpec {
             })
     }
 
-    /// Its phases over the radius, in the middle of the lens or elsewhere, of light along x and along y.
+    /// Phases over the radius, in the middle of the lens or elsewhere, of light along x and along y.
     pub(crate) fn radial_phases(&self) -> impl Iterator<Item = &RadialPhase> {
         let along_y = self.along_y.iter().map(|y| (&y.phase, &y.terms));
         std::iter::once((&self.phase, &self.terms))

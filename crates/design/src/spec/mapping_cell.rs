@@ -65,7 +65,7 @@ fn lattice_word(lattice: LatticeKind) -> &'static str {
 }
 
 impl MappingIdentity {
-    /// What `[mapping]`, whose section is `s`, says of the cell that it is for; another cell than that of the design is a fault
+    /// Cell that `[mapping]`, whose section is `s`, states; another cell than that of the design is a fault
     /// for who needs the mapping and does not accept it.
     pub(super) fn read(
         s: &Section<'_, '_>,

@@ -24,7 +24,7 @@ const PARTS: i64 = 8;
 #[derive(Clone, Debug)]
 struct Tile {
     pillars: u64,
-    /// Around all centres; beyond the tile if those of a placed cell are counted here together.
+    /// Box around all centres; beyond the tile if those of a placed cell are counted here together.
     low: (i32, i32),
     high: (i32, i32),
     /// Parts that are occupied, row by row; not known of what was placed.
@@ -115,7 +115,7 @@ impl TileMap {
         self.tiles[tile].1.pillars
     }
 
-    /// Around the centres in a tile (half nm).
+    /// Box around the centres in a tile (half nm).
     pub(crate) fn bounds(&self, tile: usize) -> Rect {
         let (key, tile) = &self.tiles[tile];
         let corner = self.corner(*key);

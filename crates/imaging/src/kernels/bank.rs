@@ -115,7 +115,7 @@ pub struct TurnedKernel<'a> {
 }
 
 impl TurnedKernel<'_> {
-    /// Its values, row by row, as it is turned.
+    /// Values, row by row, as it is turned.
     pub fn turned(&self) -> Cow<'_, [f32]> {
         if self.back == Symmetry::IDENTITY {
             return Cow::Borrowed(self.values);

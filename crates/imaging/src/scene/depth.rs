@@ -10,7 +10,7 @@ use super::SceneImage;
 use super::read::{LONGEST, array, png_values};
 
 impl SceneImage {
-    /// Same scene with the distances of its pixels (um).
+    /// This scene with the distances of its pixels (um).
     ///
     /// # Errors
     /// If there is not one for each pixel.

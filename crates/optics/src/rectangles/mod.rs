@@ -26,7 +26,7 @@ use metalith_pillars::{PillarShape, PolarisationBasis, Rectangles, RotatedRectan
 /// A class of rectangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RectangleClass {
-    /// Its number; zero is a site without pillar.
+    /// Number; zero is a site without pillar.
     pub number: u16,
     /// Error of both edges (nm).
     pub bias_nm: f64,
@@ -90,7 +90,7 @@ impl MadeRectangles {
         })
     }
 
-    /// Same rectangles, whose solved rows are cached in a folder from one run to the next.
+    /// These rectangles, whose solved rows are cached in a folder from one run to the next.
     pub(crate) fn kept_in(mut self, folder: Option<&Path>) -> Self {
         if let RowSource::Solved(solved) = &mut self.source {
             solved.folder = folder.map(Path::to_owned);
@@ -98,7 +98,7 @@ impl MadeRectangles {
         self
     }
 
-    /// Same rectangles with all rows from a bank of the same pillars.
+    /// These rectangles with all rows from a bank of the same pillars.
     pub(crate) fn of_bank(self, bank: &Arc<CellBank>) -> Self {
         Self {
             source: RowSource::Bank(Arc::clone(bank)),

@@ -131,7 +131,7 @@ impl FieldProblem {
         })
     }
 
-    /// Same merit with the coupled model: of rows that are all of the focus, without errors of fabrication.
+    /// This merit with the coupled model: of rows that are all of the focus, without errors of fabrication.
     ///
     /// # Errors
     /// If it takes more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with

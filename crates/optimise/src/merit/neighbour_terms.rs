@@ -33,11 +33,11 @@ pub(crate) struct NeighbourTerms {
 
 /// All that a ring's width is multiplied with.
 pub struct RingContext {
-    /// Its own factors: `[product][row]`.
+    /// Own factors: `[product][row]`.
     around: Planes,
-    /// Its factors as a neighbour of others: `[product of one distance][row]`.
+    /// Factors as a neighbour of others: `[product of one distance][row]`.
     reverse: Planes,
-    /// Its links to itself.
+    /// Links to itself.
     same: [Option<usize>; DISTANCES],
 }
 

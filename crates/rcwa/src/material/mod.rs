@@ -178,7 +178,7 @@ impl Material {
         }
     }
 
-    /// Its name, or that of its file.
+    /// Name, or that of its file.
     pub fn name(&self) -> &str {
         &self.name
     }

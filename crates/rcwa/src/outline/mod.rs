@@ -16,7 +16,7 @@ pub struct Outline(Form);
 enum Form {
     /// Outline that both axes mirror and whose sides are along them.
     Upright(Steps),
-    /// Its sides are not along the axes.
+    /// Sides are not along the axes.
     Slanted(SlantedForm),
 }
 

@@ -65,7 +65,7 @@ impl PillarRule {
         }
     }
 
-    /// Same rule for the phase of light along an axis; only upright rectangles have a difference.
+    /// This rule for the phase of light along an axis; only upright rectangles have a difference.
     #[must_use]
     pub fn along(self, axis: PolarisationAxis) -> Self {
         match self {
