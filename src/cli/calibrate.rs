@@ -101,18 +101,18 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
         return Err(Error::refused(
             "calibrate/same-output-folder",
             format!(
-                "{} and a set before it would be answered in {}",
+                "the results of {} and of another set would go to the same folder, {}",
                 args.sets[k].display(),
                 outs[k].display()
             ),
-            "calibrate sets whose folders have one name by one command each, with --out",
+            "calibrate sets whose folders have the same name with one command each, and different --out",
         ));
     }
     if args.validate && args.sets.len() > 1 {
         return Err(Error::refused(
             "calibrate/several-sets-to-validate",
-            "a validation of several sets",
-            "validate one at a time: synthetic sets are made like one",
+            "--validate is given with several sets",
+            "validate one set at a time",
         ));
     }
     let settings = Settings {

@@ -45,7 +45,7 @@ pub(crate) fn distance_um(distance_mm: Option<f64>) -> Result<f64> {
         Some(mm) if mm > 0.0 => Ok(mm * 1e3),
         Some(_) => Err(Error::refused(
             "option/out-of-range",
-            "a scene at no distance",
+            "the distance of the scene is not positive",
             "give a positive --distance-mm",
         )),
     }

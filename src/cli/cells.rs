@@ -63,7 +63,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.write && args.design.as_os_str() == "-" {
         return Err(Error::refused(
             "cells/write-to-standard-input",
-            "a mapping to be written into a design of standard input",
+            "--write needs a file, and the design comes from standard input",
             "name the design file, or leave --write out",
         ));
     }
@@ -77,8 +77,8 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(_) if args.steered => {
             return Err(Error::refused(
                 "cells/steered-without-squares",
-                "mappings of steered elements for rectangles",
-                "leave out --steered: unlike neighbours are known of squares alone",
+                "--steered does not support rectangles",
+                "leave out --steered: the coupled model is made of squares only",
             ));
         }
         Some(PolarisationBasis::Circular) => return rotations(args, &design, &folder, terminal),

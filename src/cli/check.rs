@@ -78,7 +78,7 @@ impl CheckArgs {
         if printed.len() + usize::from(self.json) > 1 {
             return Err(Error::refused(
                 "option/two-on-standard-output",
-                "two results for standard output",
+                "two results go to standard output",
                 "give `-` to one of --lyrdb, --junit and --sarif, without --json",
             ));
         }

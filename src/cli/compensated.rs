@@ -47,7 +47,7 @@ pub(crate) fn judged_as_made(option: &str, model: Option<&Path>, fidelity: Optio
     }
     Err(Error::refused(
         "option/fidelity-with-compensated",
-        "`--fidelity` describes pillars as drawn, and a compensated layout is judged as it is made",
+        "`--fidelity` simulates pillars as drawn, and a compensated layout is simulated as fabricated",
         format!("leave out `--fidelity`, or `{option}` for the layout as designed"),
     ))
 }

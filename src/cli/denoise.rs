@@ -67,8 +67,8 @@ pub(crate) fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.out.is_none() && !args.add {
         return Err(Error::refused(
             "denoise/no-output",
-            "nothing would come of this",
-            "name a file with --out, or hold the result against the picture with --add",
+            "there is no output",
+            "name a file with --out, or compare the result with the picture by --add",
         ));
     }
     if let Some(out) = &args.out {

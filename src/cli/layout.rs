@@ -101,7 +101,7 @@ impl FormatArgs {
         match (self.format, self.oasis) {
             (Some(FormatArg::Gds), Some(_)) => Err(metalith::Error::refused(
                 "option/two-formats",
-                "--oasis and --format gds",
+                "--oasis and --format gds exclude each other",
                 "leave one of them out",
             )),
             (Some(FormatArg::Gds), None) => Ok(Some(LayoutFormat::Gds)),

@@ -121,7 +121,7 @@ impl PictureArgs {
         let idle = |option: &str, what: &str| {
             Err(Error::refused(
                 "option/not-for-scene",
-                format!("{option} says nothing of `{}`: it is of {what}", self.scene),
+                format!("{option} does not apply to `{}`: it is for {what}", self.scene),
                 format!("leave {option} out, or give another scene"),
             ))
         };

@@ -1,4 +1,4 @@
-//! `metalith plan`: from a design and a bench to the measurements that tell effects apart.
+//! `metalith plan`: from a design and a bench to the measurements that distinguish effects.
 
 use std::path::{Path, PathBuf};
 

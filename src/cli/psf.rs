@@ -271,19 +271,18 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
     Ok(())
 }
 
-/// Light of a polarisation is simulated where pillars tell polarisations apart, and a circular analyser for light of both hands must be
+/// Light of a polarisation is simulated where pillars distinguish polarisations, and a circular analyser for light of both hands must be
 /// told which it passes.
 fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if found.shape.basis().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
         return Err(Error::refused(
             "light/polarisation-without-rectangles",
             format!(
-                "{}: light of a polarisation for {}",
+                "{}: a polarisation is given, and the pillars are {}",
                 args.layout.display(),
                 found.shape.plural()
             ),
-            "leave out --arriving and --analyser: they count for rectangles alone, others are simulated in light that is not \
-             polarised",
+            "leave out --arriving and --analyser: they are for rectangles only. Other pillars are simulated in unpolarised light",
         ));
     }
     if found.shape.basis() == Some(PolarisationBasis::Linear)
@@ -295,7 +294,7 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
                 "{}: its pillars are upright rectangles, which focus linear light, and {} was asked for",
                 args.layout.display(),
                 match args.focused {
-                    Some(_) => "a hand by --focused",
+                    Some(_) => "a handedness by --focused",
                     None => "a circular analyser",
                 }
             ),
@@ -309,10 +308,10 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
         return Err(Error::refused(
             "light/handedness-missing",
             format!(
-                "a circular analyser in light that arrives {}",
+                "a circular analyser needs the focused handedness, and light arrives {}",
                 args.arriving(found.shape)
             ),
-            "say which hand the layout focuses by --focused left or right: the analyser passes what that is converted to",
+            "name the handedness that the layout focuses by --focused left or right: the analyser passes what it is converted to",
         ));
     }
     Ok(())

@@ -69,7 +69,7 @@ impl ShippedDesign {
             if path.exists() && !is_it() {
                 return Err(Error::refused(
                     "new/exists",
-                    format!("{} exists and is another file", path.display()),
+                    format!("{} exists and has other contents", path.display()),
                     "write the design to another folder, or move the file away",
                 ));
             }

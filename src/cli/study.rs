@@ -149,7 +149,7 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
         return Err(Error::refused(
             "study/shard-unusable",
             format!("{} cannot be used: {why}", path.display()),
-            "remove it first",
+            "remove it, then run again",
         ));
     }
     match args.jobs {
@@ -160,7 +160,7 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     tell(&work)
 }
 
-/// Each shard by a process of its own, so many at a time.
+/// Each shard by a separate process, so many at a time.
 fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Terminal) -> Result<()> {
     let program = super::program()?;
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
@@ -198,8 +198,8 @@ fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Termina
     }
     Err(Error::refused(
         "study/shards-not-made",
-        format!("{} shards were not made, the first is {}", failed.len(), failed[0]),
-        "their messages stand above; run again with --missing",
+        format!("{} shards failed, the first is {}", failed.len(), failed[0]),
+        "their messages are above; run again with --missing",
     ))
 }
 
@@ -273,8 +273,8 @@ fn without_table(args: &MergeArgs) -> Result<()> {
         None => Ok(()),
         Some(_) => Err(Error::refused(
             "study/no-table",
-            "this work has no table of draws",
-            "leave --out out: files are written into the folder of the plan",
+            "--out is for a table of draws, and this work has none",
+            "leave out --out: the files are written into the folder of the plan",
         )),
     }
 }

@@ -129,8 +129,8 @@ impl TrainArgs {
         let open = comparison.open()?;
         Stacks::check(comparison.photographs.len(), open.size(), spec.piece)?;
         let cache = KernelCache::of_user();
-        let (stacks, taught) = open.training_stacks(0, kind, &beside(out, ".pictures"), &cache, terminal)?;
-        let stacks = Stacks::new(stacks, taught, spec.piece)?;
+        let (stacks, trained) = open.training_stacks(0, kind, &beside(out, ".pictures"), &cache, terminal)?;
+        let stacks = Stacks::new(stacks, trained, spec.piece)?;
         train_post_processor(&stacks, spec, out, state, terminal)
     }
 }
@@ -161,7 +161,7 @@ pub(crate) fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         None if !args.bare.is_standard() => {
             return Err(Error::refused(
                 "train/option-without-stage",
-                "numbers of a mask or of a rough surface, and no last stage to teach",
+                "options of a mask or of a rough surface are given, and no last stage",
                 "give --stage flatnet or --stage unrolled-diffuser, or leave them out",
             ));
         }

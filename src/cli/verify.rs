@@ -184,7 +184,7 @@ impl Judging {
             _ if camera.is_some() => {
                 return Err(Error::refused(
                     "verify/picture-too-large",
-                    "a picture of a layout whose elements are too large to be held in full",
+                    "the elements are too large for a picture: they do not fit into memory",
                     "leave out --picture, or allow more memory with --memory-mb",
                 ));
             }

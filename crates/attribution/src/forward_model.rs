@@ -18,7 +18,7 @@ pub struct SmoothTerm {
     pub by_group: bool,
 }
 
-/// Groups of measurements in which some smooth terms have coefficients of their own.
+/// Groups of measurements in which some smooth terms have their own coefficients.
 #[derive(Clone, Debug)]
 pub struct SmoothGroups {
     /// Group of each measurement.
@@ -125,7 +125,7 @@ pub trait ForwardModel: Send + Sync {
     /// Smooth terms that stand for no effect, those of no kind first; none where there are no such terms.
     fn smooth_terms(&self) -> Vec<SmoothTerm>;
 
-    /// Groups of measurements in which smooth terms may have coefficients of their own.
+    /// Groups of measurements in which smooth terms may have their own coefficients.
     fn smooth_groups(&self) -> SmoothGroups;
 
     /// Error of the model.

@@ -122,7 +122,7 @@ fn inverse_of_first(gram: &DMatrix<f64>, own: usize) -> DMatrix<f64> {
     a.try_inverse().unwrap_or_else(|| DMatrix::zeros(own, own))
 }
 
-/// A value that another instrument measured, which the forward model predicts without nuisances of its own.
+/// A value that another instrument measured, which the forward model predicts without its own nuisances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceValue {
     /// Measured less stated.

@@ -139,7 +139,7 @@ impl LenslessBench {
         if rows.min(columns) < 2 {
             return Err(Error::refused(
                 "lensless/sensor-too-small",
-                format!("a sensor of {columns} x {rows} pixels behind a camera without a lens"),
+                format!("the sensor has {columns} x {rows} pixels, too few for a camera without a lens"),
                 "give a sensor of at least 2 x 2 pixels: each colour has its own in a square of these",
             ));
         }
@@ -148,15 +148,15 @@ impl LenslessBench {
         if !colours.has_colours() {
             return Err(Error::refused(
                 "lensless/sensor-without-colours",
-                format!("camera `{}` tells no three colours apart", camera.name),
-                "compare cameras without a lens behind a camera of colours",
+                format!("camera `{}` does not record three colours", camera.name),
+                "give a camera file with three colour channels",
             ));
         }
         if view.distance_um.is_finite() {
             return Err(Error::refused(
                 "lensless/scene-too-near",
-                "a scene near to a camera without a lens",
-                "compare such cameras on scenes that are far away",
+                "the scene is at a finite distance, which cameras without a lens are not simulated for",
+                "leave out the distance of the scene",
             ));
         }
         let falloff = Array2::from_shape_fn((view.rows, view.columns), |(y, x)| {

@@ -1,4 +1,4 @@
-//! Learnt last stages of cameras: which there are, what they see, and which camera each was taught for.
+//! Learnt last stages of cameras: which there are, what they see, and which camera each was trained for.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -70,7 +70,7 @@ impl FromStr for StageKind {
         Self::ALL.into_iter().find(|k| k.name() == text).ok_or_else(|| {
             Error::refused(
                 "compare/unknown-stage",
-                format!("`{text}` is no learnt last stage"),
+                format!("there is no last stage `{text}`"),
                 "use flatnet, unrolled-diffuser, multi-wiener or blending",
             )
         })
@@ -105,7 +105,7 @@ impl Stage {
     /// One picture of those that were restored from a frame, all linear sRGB `[row, column, colour]`.
     ///
     /// # Errors
-    /// If there are more or fewer than it was taught by.
+    /// If there are more or fewer than it was trained by.
     pub fn finish(&self, pictures: &[Array3<f64>]) -> Result<Array3<f64>> {
         let shown: Vec<Array3<f32>> = pictures.iter().map(encoded).collect();
         let found = self.post_processor.finish(&shown)?;

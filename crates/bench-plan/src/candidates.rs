@@ -57,8 +57,8 @@ pub(crate) fn candidates(
     if measurements.is_empty() {
         return Err(Error::refused(
             "plan/no-measurement-with-light",
-            "no measurement of this bench would see light",
-            "name angles in `field_deg` that the elements look at",
+            "no measurement of this bench receives light",
+            "name angles in `field_deg` of the bench that are viewing directions of the elements",
         ));
     }
     Ok(Candidates {

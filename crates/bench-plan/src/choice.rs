@@ -2,7 +2,7 @@
 //!
 //! What a set tells of a parameter is the Schur complement of its normal equations: the chi-square that an effect of the
 //! wanted size adds and that nuisances, and one other effect, cannot take up. Per pixel this is the gain by which a
-//! calibration judges, so an effect counts as detected or told apart if it is [`NEEDED`].
+//! calibration judges, so an effect counts as detected or distinguished if it is [`NEEDED`].
 //!
 //! The choice is greedy by the worst detection: at each step the measurement that raises the sum of the logarithms of all
 //! margins that are still below one. Then measurements without which all margins stay are taken out again, and the rest gets

@@ -49,16 +49,16 @@ pub struct Confusion {
     /// At this size of each of its parameters, in its own unit.
     pub at: Vec<f64>,
     pub looks_like_unit: String,
-    /// Gain in reduced chi-square per pixel by which measurements tell them apart, and what is asked for.
+    /// Gain in reduced chi-square per pixel by which measurements distinguish them, and what is asked for.
     pub gain: f64,
     pub needed: f64,
-    /// True if other measurements of this bench would tell them apart.
+    /// True if other measurements of this bench would distinguish them.
     pub measurements_could: bool,
     /// Increase of chi-square by the widths by SEM, if the bench offers them.
     pub sem_chi2: Option<f64>,
     /// True if that decides.
     pub sem_decides: bool,
-    /// The measurement that would tell them apart, as far as one is known.
+    /// The measurement that would distinguish them, as far as one is known.
     pub separate_by: Option<String>,
 }
 

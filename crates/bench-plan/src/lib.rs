@@ -12,7 +12,7 @@
 //! | `wanted` | what is asked of them |
 //! | `information` | normal equations of each, by the simulator and the noise |
 //! | `choice` | the fewest measurements |
-//! | `judgement` | what they find, and what they cannot tell apart |
+//! | `judgement` | what they find, and what they cannot distinguish |
 //! | `begun` | a folder whose plan is not to be overwritten |
 //! | `files`, `page` | the set folder, and the check list |
 
@@ -70,7 +70,7 @@ pub struct MeasurementPlan {
     pub candidates: usize,
     pub measurements: Vec<PlannedMeasurement>,
     pub effects: Vec<PlannedEffect>,
-    /// Pairs that the measurements cannot tell apart.
+    /// Pairs that the measurements cannot distinguish.
     pub confusions: Vec<Confusion>,
     /// SHA-256 in hexadecimal of the files that a person fills in, as they were written.
     pub written: BTreeMap<String, String>,

@@ -101,7 +101,7 @@ fn about<T>(
 fn tell(boundary: &FieldBoundary, progress: &dyn Progress) {
     let [x, y] = boundary.at_um;
     progress.note(&format!(
-        "write fields that meet at x = {x:.1} um or y = {y:.1} um of every lens would explain {:.0} % of what is left",
+        "write fields that meet at x = {x:.1} um or y = {y:.1} um of every lens would explain {:.0} % of the residual",
         100.0 * boundary.removes
     ));
 }

@@ -30,7 +30,7 @@ pub struct Settings {
     pub only: Vec<String>,
     /// Effects that are tried beside those of the library.
     pub declared: Vec<DeclaredEffect>,
-    /// Try the effects that are proposed for what is left as well.
+    /// Try the effects that are proposed for the residual as well.
     pub adopt: bool,
     /// Compare the three fidelities of the cell first.
     pub compare_fidelities: bool,

@@ -17,7 +17,7 @@ const SIDE: usize = 96;
 /// Points of each curve of transmission.
 const CURVE_POINTS: u32 = 41;
 
-/// Smooth shapes fitted to what is left; everything found and every nuisance is projected out.
+/// Smooth shapes fitted to the residual; everything found and every nuisance is projected out.
 pub(crate) struct SmoothResidual {
     /// Optical path over the lens (nm), common to colours and elements; NaN outside. Shape `[SIDE, SIDE]`, row
     /// index along +y.

@@ -56,8 +56,8 @@ impl StudyOptions {
             true => Ok(()),
             false => Err(Error::refused(
                 "cells/threshold-out-of-range",
-                format!("widths are bad below a zero order of {}", self.threshold),
-                "give a share of the incident power, such as 0.3",
+                format!("the limit of the zeroth order is {}", self.threshold),
+                "give a share of the incident power from 0 to 1, such as 0.3",
             )),
         }
     }

@@ -97,7 +97,7 @@ impl FromStr for Fidelity {
         Self::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| {
             Error::refused(
                 "cell/unknown-fidelity",
-                format!("`{text}` is not a fidelity of the cell"),
+                format!("there is no simulation model `{text}`"),
                 "use published, fitted, rigorous or neighbours",
             )
         })

@@ -90,7 +90,7 @@ impl CellStack {
         if self.corner_radius_nm > 0.0 {
             return Err(Error::refused(
                 "cell/rounded-rectangles",
-                "rectangles with rounded corners",
+                "the cell has rectangles with rounded corners",
                 "leave the corner radius at 0: rectangles are solved with sharp corners",
             ));
         }

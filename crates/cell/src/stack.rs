@@ -106,7 +106,7 @@ impl CellStack {
         if !self.shape.has_width() {
             return Err(Error::refused(
                 "cell/rectangles-unsupported",
-                "rectangular pillars, where those of a width are asked for",
+                "the pillars are rectangles, and a pillar with one width is needed here",
                 "use squares or circles here: calibration knows no rectangles, `optimise` no upright ones; the other commands do",
             ));
         }
@@ -228,7 +228,10 @@ impl CellStack {
         if above.is_nan() || above <= 0.0 {
             return Err(Error::refused(
                 "light/evanescent",
-                format!("light at sines of {:.4}, {:.4} leaves no pillar", sines[0], sines[1]),
+                format!(
+                    "light at sines of {:.4}, {:.4} is evanescent behind the pillars",
+                    sines[0], sines[1]
+                ),
                 "use an angle of less than 90 degrees in air",
             ));
         }
@@ -340,14 +343,14 @@ impl CellStack {
         if lean.is_nan() || lean >= MOST_TAPER {
             return Err(Error::refused(
                 "cell/side-wall-out-of-range",
-                format!("walls that lean by {} degrees", self.taper.to_degrees()),
-                "use an angle from upright below 45 degrees",
+                format!("the side walls lean by {} degrees", self.taper.to_degrees()),
+                "use an angle below 45 degrees from upright",
             ));
         }
         if !(self.height_nm.is_finite() && self.height_nm > 0.0) {
             return Err(Error::refused(
                 "cell/height-out-of-range",
-                format!("pillars {} nm high", self.height_nm),
+                format!("the pillars are {} nm high", self.height_nm),
                 "give a positive height",
             ));
         }

@@ -54,7 +54,7 @@ pub enum Error {
         id: &'static str,
         what: String,
         hint: String,
-        /// The error of the crate that found it, which can be matched on, if it has errors of its own.
+        /// The error of the crate that found it, which can be matched on, if it has its own errors.
         source: Option<Cause>,
     },
 

@@ -300,7 +300,7 @@ impl LayoutError {
             Self::NoCells => "is this the right file?".into(),
             Self::NoSuchCell { tops, .. } => format!("cells at the top: {}", tops.join(", ")),
             Self::SeveralTops { .. } => {
-                "write the one to be read to a file of its own, or name it where a command takes --top".into()
+                "write the one to be read to a separate file, or name it where a command takes --top".into()
             }
             Self::Limit { limit, .. } => limit.remedy().into(),
         }

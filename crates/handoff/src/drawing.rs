@@ -222,7 +222,7 @@ impl Drawing {
     }
 
     /// Add the pillars of a lens as a cell of this name, folded by its symmetries. Squares are drawn where they are; other
-    /// outlines, which have more corners, once each in a cell of their own.
+    /// outlines, which have more corners, once each in a separate cell.
     pub(crate) fn add_lens(&mut self, name: &str, layer: LayerPair, class: &Class, form: PillarForm) {
         let own = |number: u16| format!("{name}_{}", form.cell_name(number));
         if !form.is_square() {

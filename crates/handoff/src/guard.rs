@@ -88,7 +88,7 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
             Ok(_) => {
                 return Err(Error::refused(
                     id,
-                    format!("{} is there and is no {kind}", path.display()),
+                    format!("{} exists and is not a {kind}", path.display()),
                     hint,
                 ));
             }
@@ -105,7 +105,7 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
     if !handed_off && archive.exists() && !zip::is_packed_here(archive, &name)? {
         return Err(Error::refused(
             "handoff/foreign-archive",
-            format!("{} is there, and is not the archive of a hand-off", archive.display()),
+            format!("{} exists and is not the archive of a hand-off", archive.display()),
             hint,
         ));
     }
@@ -120,7 +120,10 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
         None => Ok(()),
         Some(name) => Err(Error::refused(
             "handoff/foreign-file",
-            format!("{} holds {name}, which no hand-off put there", folder.display()),
+            format!(
+                "{} contains {name}, which is not a file of a hand-off",
+                folder.display()
+            ),
             hint,
         )),
     }

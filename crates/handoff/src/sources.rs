@@ -111,7 +111,7 @@ impl Sources {
         &found.expect("all decks of the process are read").1
     }
 
-    /// Write all inputs as they were read, each under a name of its own.
+    /// Write all inputs as they were read, each under a separate name.
     ///
     /// # Errors
     /// If one cannot be written.

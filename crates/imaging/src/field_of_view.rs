@@ -74,7 +74,7 @@ pub(crate) fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Cam
     if !seen(0.5 * last_row, 0.5 * last_column) {
         return Err(Error::refused(
             "camera/sensor-misplaced",
-            "the camera does not see the chip: the middle of the scene falls beside the sensor",
+            "the middle of the scene is imaged outside of the sensor",
             "check `offset_um`, `columns` and `rows` of the sensor",
         ));
     }
@@ -88,7 +88,7 @@ pub(crate) fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Cam
         return Err(Error::refused(
             "scene/field-too-wide",
             format!(
-                "the scene is wider than the array sees: no element sees its border at ({:.1}, {:.1}) degrees and has it on the sensor",
+                "the scene is wider than the field of view of the array: no element images its border at ({:.1}, {:.1}) degrees onto the sensor",
                 tx.atan().to_degrees(),
                 ty.atan().to_degrees()
             ),
@@ -185,8 +185,7 @@ mod tests {
             check_windows(&stray_light, 2, &channels, &spec)
         };
         assert!(with(0.3).is_ok());
-        let error = with(0.005).unwrap_err().to_string();
-        assert!(error.contains("too small"), "{error}");
+        assert_eq!(with(0.005).unwrap_err().id(), "camera/window-too-small");
     }
 
     #[test]
@@ -226,7 +225,7 @@ mod tests {
         let edge = 2.0 * (40.0f64 / 144.0).atan().to_degrees();
         assert!((edge - 2.0..=edge + 1.0).contains(&alone), "{alone} {edge}");
         camera.sensor.offset_um = [9000.0, 0.0];
-        let error = widest_field_deg(&design, &camera, 512, 80).unwrap_err().to_string();
-        assert!(error.contains("does not see the chip"), "{error}");
+        let error = widest_field_deg(&design, &camera, 512, 80).unwrap_err();
+        assert_eq!(error.id(), "camera/sensor-misplaced");
     }
 }

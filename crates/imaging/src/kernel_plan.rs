@@ -286,7 +286,7 @@ pub(crate) fn averaging(given: &SceneView, view: &SceneView) -> Option<String> {
     let size = |v: &SceneView| format!("{} x {}", v.columns, v.rows);
     (given != view).then(|| {
         format!(
-            "the scene of {} pixels is averaged to {}: the pixels of the sensor tell no finer ones apart",
+            "the scene of {} pixels is averaged to {}: the pixels of the sensor do not resolve finer ones",
             size(given),
             size(view)
         )

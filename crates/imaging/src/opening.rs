@@ -100,7 +100,7 @@ impl ImagingSystem {
             return Err(Error::refused(
                 "dataset/kernels-missing",
                 format!("{} does not hold the kernels of this camera", folder.display()),
-                "plan the set again; a shard makes no kernels of its own",
+                "plan the set again; shards make no kernels",
             ));
         }
         let read = || {

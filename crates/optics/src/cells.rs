@@ -146,7 +146,7 @@ impl RealisedCells {
     pub(super) fn along_normal_alone() -> Error {
         Error::refused(
             "study/oblique-unsupported",
-            "tables of cells are for light along the normal",
+            "the tables of cells are for normal incidence",
             "leave out `incidence = \"oblique\"`",
         )
     }

@@ -66,7 +66,7 @@ impl AsBuiltChip {
             return Err(Error::refused(
                 "model/impossible-values",
                 all.join("\n"),
-                "correct the calibrated model",
+                "correct these values of the calibrated model",
             ));
         }
         let perturbation = &model.perturbation;

@@ -20,7 +20,7 @@ pub struct ClassTable {
     sites: Option<Arc<[u16]>>,
 }
 
-/// Steps of the real and of the imaginary part from the least to the largest where each site has a number of its own: what
+/// Steps of the real and of the imaginary part from the least to the largest where each site has its own number: what
 /// rounding scatters is 5e-5 of the largest |t|^2.
 const STEPS: u16 = 127;
 

@@ -125,10 +125,10 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
         return Err(Error::refused(
             "optimise/too-few-wavelengths",
             format!(
-                "a table of unlike neighbours at one wavelength alone, for a band {}",
+                "the table of the coupled model has one wavelength, and the band is {}",
                 words(band)
             ),
-            "name more in [verify] wavelengths_nm: the others of the band are taken from these",
+            "name at least two in [verify] wavelengths_nm: the band is interpolated between them",
         ));
     }
     if band.0 < first || band.1 > last {

@@ -99,8 +99,8 @@ impl OptimiseTask {
         if cells.iter().any(|cell| cell.fidelity() == Fidelity::Neighbours) {
             return Err(Error::refused(
                 "optimise/errors-with-neighbours",
-                "errors of fabrication among unlike neighbours",
-                "judge them with the cell `rigorous`",
+                "errors of fabrication are not supported with the coupled model",
+                "simulate them with the cell `rigorous`",
             ));
         }
         let widths = self.widths_nm(waves);

@@ -53,7 +53,7 @@ impl OptimiseTask {
     /// The task that a design sets.
     ///
     /// # Errors
-    /// If its lens has no rings or a phase over the plane, or elements have lenses of their own.
+    /// If its lens has no rings or a phase over the plane, or elements have their own lenses.
     pub fn of(design: &Design) -> Result<Self> {
         check_shape(design)?;
         design.one_lens("the optimiser")?;

@@ -89,7 +89,7 @@ impl NetworkDenoiser {
             return Err(Error::refused(
                 "denoise/sizes-differ",
                 format!(
-                    "values of shape {:?}, deviations of shape {:?}",
+                    "the picture has the shape {:?}, the deviations of its noise have {:?}",
                     picture.dim(),
                     deviation.dim()
                 ),

@@ -54,7 +54,7 @@ pub fn piled(pictures: &[Array3<f32>], size: (usize, usize, usize)) -> Result<Ar
     if pictures.is_empty() || pictures.iter().any(|p| p.dim() != size) || size.2 != COLOURS {
         return Err(Error::refused(
             "stage/sizes-differ",
-            "pictures of one frame that differ in size, or none",
+            "the pictures of one frame differ in size, or there are none",
             "give pictures in colour of the size of the scene",
         ));
     }

@@ -100,7 +100,7 @@ impl Camera {
             Some(channel) => Err(Error::refused(
                 "camera/channel-without-light",
                 format!(
-                    "{}: channel `{}` counts none of the light of the illuminant",
+                    "{}: channel `{}` receives no light of the illuminant",
                     path.display(),
                     channel.name
                 ),
@@ -266,7 +266,7 @@ fn read_channels(
             s.fault(
                 "name",
                 format!("a second channel `{name}`"),
-                "give each channel a name of its own",
+                "give each channel its own name",
             );
         }
         channels.push((name, read_response(s)));

@@ -194,7 +194,10 @@ impl Sampler {
         }
         Err(Error::refused(
             "study/distribution-out-of-range",
-            format!("`{}` is hardly ever within what a chip can have", quantity.name),
+            format!(
+                "the distribution of `{}` is almost entirely outside of the physical range",
+                quantity.name
+            ),
             "give a distribution that overlaps with the physical range of the effect",
         ))
     }

@@ -102,7 +102,7 @@ pub(crate) fn another_plan(folder: &Path) -> Error {
     Error::refused(
         "study/plan-differs",
         format!(
-            "{} holds another plan, or a file of it has changed since, or another version of the program planned it",
+            "{} contains another plan, or a file of the plan has changed, or another version of the program planned it",
             folder.display()
         ),
         "plan into another folder with --out, or remove this one",

@@ -242,7 +242,7 @@ impl Sharding {
             return Err(Error::refused(
                 "study/draws-twice",
                 format!(
-                    "{} {}s are there twice, the first is {k}: in {} and in {}",
+                    "{} {}s exist twice, the first is {k}: in {} and in {}",
                     twice.len(),
                     self.part,
                     files[*a].display(),

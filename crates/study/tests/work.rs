@@ -88,7 +88,7 @@ fn pairs_of_shards_are_those_of_one_run() {
     let refused = work.merge(&Silent).unwrap_err();
     assert_eq!(refused.id(), "study/damaged-pairs");
     insta::assert_snapshot!(metalith_testing::without_folder(refused, folder.path()), @r"
-    files of 1 of 5 pairs are damaged or not there: 2
+    files of 1 of 5 pairs are damaged or missing: 2
       help: remove the files of their shards (1; the first is parts/shards/000001.jsonl), then make them again by `metalith study run parts --missing`
     ");
     fs::remove_file(work.cut().path(1)).unwrap();

@@ -140,7 +140,7 @@ impl Stacks {
         }
         Err(Error::refused(
             "train/too-few-photographs",
-            format!("{photographs} photographs of {columns} x {rows} pixels are too few or too small to learn from"),
+            format!("{photographs} photographs of {columns} x {rows} pixels are too few or too small for training"),
             format!("give at least two of {piece} x {piece} pixels or more, or a smaller --piece"),
         ))
     }

@@ -28,8 +28,8 @@ impl<'a> SimulationCases<'a> {
         let (judge, beside) = cells.split_first().ok_or_else(|| {
             Error::refused(
                 "verify/no-fidelity",
-                "there is no cell to judge a layout by",
-                "ask for at least one fidelity",
+                "no simulation model is given",
+                "give at least one `fidelity`",
             )
         })?;
         Ok(Self::judged_by(judge.as_ref()).with_cells(beside))

@@ -224,7 +224,7 @@ impl PsfArgs {
         if !(self.wedge_wavelength_nm > 0.0 && sines[0].hypot(sines[1]) < 1.0) {
             return Err(Error::refused(
                 "option/wedge-out-of-range",
-                "a wedge that steers beyond the horizon or at no wavelength",
+                "the wedge steers beyond 90 degrees, or its wavelength is not positive",
                 "give smaller --wedge-x-deg and --wedge-y-deg, and a positive --wedge-wavelength-nm",
             ));
         }

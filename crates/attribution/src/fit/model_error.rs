@@ -3,7 +3,7 @@
 //! Two correct programs do not predict the same. They differ by smooth functions, and in what an effect changes, by a small
 //! share of it. A fit takes such a difference for its parameters, the more so the more alike these are: it makes some of
 //! two effects of it that almost cancel. The difference is therefore added to the intervals: the smooth terms of the model,
-//! each kind with a standard deviation of its own, are propagated through the fit; and a share of what was found.
+//! each kind with its own standard deviation, are propagated through the fit; and a share of what was found.
 
 use nalgebra::DVector;
 

@@ -18,7 +18,7 @@ use crate::surrogate::Surrogate;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 4;
 
-/// A single effect explains what is left if it gains this share of it; else something may that is not tried.
+/// A single effect explains the residual if it gains this share of it; else something may that is not tried.
 const MOST_OF_IT: f64 = 0.5;
 
 /// The outcome of a search.

@@ -58,7 +58,7 @@ impl<M: Measurements> Evidence<M> {
         problem_of(model, &self.data, &self.used, &self.finding)
     }
 
-    /// Quantities that remove most of what is left if they are free in each group of measurements; best first.
+    /// Quantities that remove most of the residual if they are free in each group of measurements; best first.
     pub fn patterns(&self, model: &Model<'_, M>) -> &[Pattern] {
         let made = || patterns(&self.problem(model), &self.finding.after);
         self.patterns.get_or_init(made)

@@ -1,4 +1,4 @@
-//! Exchange: another effect in the place of one that was found, where with it one more explains what is left.
+//! Exchange: another effect in the place of one that was found, where with it one more explains the residual.
 //!
 //! Of two effects that are much alike, such as a wavefront as a path and as a phase, the wrong one can be taken while a third
 //! is still hidden. Alone, the right one is no better in its place; with the third it is.

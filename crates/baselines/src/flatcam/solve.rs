@@ -31,7 +31,7 @@ impl Factor {
         let svd = (&own * &root).thin_svd().map_err(|e| {
             Error::refused(
                 "flatcam/svd-failed",
-                format!("no singular values of a mask: {e:?}"),
+                format!("the singular values of the mask were not found: {e:?}"),
                 "use another size of the scene",
             )
         })?;

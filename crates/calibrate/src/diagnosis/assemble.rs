@@ -183,7 +183,7 @@ fn reported_widths(parts: &[IntervalParts]) -> Vec<WidthParts> {
     parts.iter().map(WidthParts::from).collect()
 }
 
-/// Ambiguities that measurements of few elements or of one colour leave: distances of their own would do as well as a tilt of the sensor, and
+/// Ambiguities that measurements of few elements or of one colour leave: their own distances would do as well as a tilt of the sensor, and
 /// effects that differ by colour alone may be taken for one another.
 fn remarks(simulator: &Simulator<'_>, evidence: &Evidence, verdict: SetVerdict) -> Vec<String> {
     let (set, finding) = (simulator.bench.set(), &evidence.finding);

@@ -125,9 +125,9 @@ pub struct Diagnosis {
     pub ranking: Vec<Ranked>,
     /// Candidates on top of each effect that was taken.
     pub later_rankings: Vec<Vec<Ranked>>,
-    /// Quantities that explain most of what is left if they differ by element, colour, distance or angle; best first.
+    /// Quantities that explain most of the residual if they differ by element, colour, distance or angle; best first.
     pub patterns: Vec<FreePattern>,
-    /// Effects that are proposed for what is left; none where nothing stands out.
+    /// Effects that are proposed for the residual; none where nothing stands out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proposal: Option<Proposal>,
     /// Share of the error above noise that is left.
@@ -160,7 +160,7 @@ impl Proposal {
         let names = self.effects.join(", ");
         let Some(without) = self.held_out_without else {
             return format!(
-                "proposed for what is left: {names} in {}; --adopt tries them, --declare with an edited copy as well",
+                "proposed for the residual: {names} in {}; --adopt tries them, --declare with an edited copy as well",
                 self.file
             );
         };
@@ -172,7 +172,7 @@ impl Proposal {
             .collect();
         let [without, with] = [without, diagnosis.error.after.held_out].map(|error| metalith_report::sig(error, 4));
         if taken.is_empty() {
-            format!("proposed for what is left, tried and not taken: {names}")
+            format!("proposed for the residual, tried and not taken: {names}")
         } else {
             format!(
                 "adopted: {}; error on measurements left out {without} without, {with} with",

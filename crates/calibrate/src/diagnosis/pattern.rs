@@ -8,7 +8,7 @@ use crate::set::{MeasuredSet, MeasurementIndex};
 use crate::simulator::Simulator;
 use crate::statistics::{LinearTrend, Pattern};
 
-/// A quantity that was fitted free for each element, colour, distance or angle, where this removes most of what is left.
+/// A quantity that was fitted free for each element, colour, distance or angle, where this removes most of the residual.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreePattern {
     /// The effect whose parameter it is, with the number of the parameter if it has several.
@@ -133,7 +133,7 @@ impl FreePattern {
             remark: (trend.degrees_of_freedom == 0).then(|| {
                 match by == Grouping::Element && self.quantity == "defocus" {
                     true => untold_tilt(self.values.len()),
-                    false => untold(self.values.len(), &self.by, "a slope", "a value of its own"),
+                    false => untold(self.values.len(), &self.by, "a slope", "its own value"),
                 }
             }),
         }
@@ -195,23 +195,25 @@ impl PatternTrend {
     }
 }
 
-/// What values cannot tell apart of which there are as many as numbers: `count` of them, one for each element, colour, distance
+/// What values cannot distinguish of which there are as many as numbers: `count` of them, one for each element, colour, distance
 /// or angle.
 fn untold(count: usize, by: &str, slope: &str, own: &str) -> String {
     match count {
-        1 => format!("Of one {by}, {slope} and {own} cannot be told apart; measurements of another {by} would tell."),
+        1 => format!(
+            "Of one {by}, {slope} and {own} cannot be distinguished; measurements of another {by} would distinguish them."
+        ),
         2 => format!(
-            "Of two, {slope} and {own} for each {by} cannot be told apart: two values are always on a line; measurements of a third {by} would tell."
+            "Of two, {slope} and {own} for each {by} cannot be distinguished: two values are always on a line; measurements of a third {by} would tell."
         ),
         _ => format!(
-            "Of three that are not in line, {slope} with another value in the middle and {own} for each {by} cannot be told apart: three values are always on a plane; measurements of a fourth {by} would tell."
+            "Of three that are not in line, {slope} with another value in the middle and {own} for each {by} cannot be distinguished: three values are always on a plane; measurements of a fourth {by} would tell."
         ),
     }
 }
 
 /// Statement that so many elements do not distinguish a tilt of the sensor from individual distances.
 pub(super) fn untold_tilt(elements: usize) -> String {
-    untold(elements, "element", "a tilt of the sensor", "a distance of its own")
+    untold(elements, "element", "a tilt of the sensor", "its own distance")
 }
 
 /// Statement that one colour does not distinguish effects that differ by colour alone.

@@ -41,7 +41,7 @@ const MOST_SHARE: f64 = 0.5;
 /// Error of the place of a proposed ghost (pixels).
 const ROOM_PIXELS: i32 = 4;
 
-/// The displaced copy that removes most of what is left.
+/// The displaced copy that removes most of the residual.
 pub(super) struct Ghost {
     /// Light over that of the image.
     share: f64,
@@ -197,7 +197,7 @@ fn strongest_of(frames: &[Frame], blur: f64, places: &[[i32; 2]], progress: &dyn
 }
 
 impl Ghost {
-    /// Effect to be fitted: a copy with a spot of its own, a Gaussian whose variance may be zero. One form serves sharp
+    /// Effect to be fitted: a copy with its own spot, a Gaussian whose variance may be zero. One form serves sharp
     /// and blurred copies, so that no two proposals compete for the same light.
     pub(crate) fn declared(&self, pixel_um: f64) -> DeclaredEffect {
         let place = |name: &str, at: i32| {

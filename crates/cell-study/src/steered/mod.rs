@@ -62,13 +62,13 @@ impl SteeredStudy {
 /// Find a mapping for each distinct steered element of a design; tables of neighbours are kept in the folder `cache`.
 ///
 /// # Errors
-/// If the common mapping is a table, the lens has a phase over the plane, elements have lenses of their own or are placed one by
+/// If the common mapping is a table, the lens has a phase over the plane, elements have their own lenses or are placed one by
 /// one, a cell cannot be solved, or the user stopped it.
 pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Vec<SteeredStudy>> {
     if design.mapping.table.is_some() {
         return Err(Error::refused(
             "cells/steered-without-polynomial",
-            "mappings of steered elements start from the polynomial of the design, which has a table instead",
+            "mappings of steered elements start from a polynomial, and the design has a table",
             "give `coefficients` in [mapping]",
         ));
     }
@@ -78,7 +78,7 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
     if !design.array.placed.is_empty() {
         return Err(Error::refused(
             "cells/elements-not-on-grid",
-            format!("{who} tells elements by their steps on a grid, and those of the design are placed one by one"),
+            format!("{who} needs elements on a grid, and the design places them one by one"),
             "use `elements`, `spacing_um` and `steering_deg` of [array] in place of [[element]]",
         ));
     }

@@ -59,7 +59,7 @@ impl MappingTable {
         let Some(&first) = allowed.first() else {
             return Err(Error::refused(
                 "mapping/all-widths-avoided",
-                "a mapping that avoids every width",
+                "the mapping avoids every width",
                 "lower the threshold below which a width is avoided",
             ));
         };

@@ -113,7 +113,7 @@ fn too_few(curve: &PhaseCurve) -> Error {
     Error::refused(
         "fit/no-inverse-polynomial",
         format!(
-            "no polynomial of this degree maps a turn to the widths of the cell at {} um",
+            "no polynomial of this degree maps a full wave of phase to the widths of the cell at {} um",
             curve.wavelength_um
         ),
         "widen the range of widths, lower the threshold, or change the degree",

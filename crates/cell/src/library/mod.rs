@@ -71,8 +71,8 @@ impl PillarLibrary {
         if pillars.is_empty() {
             return Err(Error::refused(
                 "library/empty",
-                "a library without pillars",
-                "give at least one: `metalith cells` makes one of a design",
+                "the library has no pillars",
+                "give at least one pillar: `metalith cells` writes the library of a design",
             ));
         }
         let fields: Vec<_> = pillars.iter().map(LibraryPillar::fields).collect();

@@ -217,7 +217,7 @@ impl RealRow {
         if counted.is_empty() {
             return Err(Error::refused(
                 "supercell/not-periodic",
-                format!("a row of {pillars} pillars that does not repeat"),
+                format!("a row of {pillars} pillars is too short to be periodic"),
                 {
                     let ends = self.ends(grid);
                     format!("give more than {}: {ends} at either end do not count", 2 * ends)

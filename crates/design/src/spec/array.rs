@@ -11,7 +11,7 @@ use metalith_core::document::{Limits, Section};
 /// Wavelength at which the wedges of the paper steer by their angles (nm).
 const PAPER_WEDGE_NM: f64 = 550.0;
 
-/// Elements of one lens, each with a wedge of its own: on a grid, or wherever each is said to be.
+/// Elements of one lens, each with its own wedge: on a grid, or wherever each is said to be.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArraySpec {
     /// Number of elements of the grid along x and y.

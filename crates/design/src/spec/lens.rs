@@ -12,7 +12,7 @@ use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
 use metalith_pillars::{Lattice, PolarisationBasis};
 
-/// The lens that all elements of the array share, or that an element has of its own.
+/// The lens that all elements of the array share, or that one element alone has.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LensSpec {
     /// Pillars stand where their centre is within this diameter (nm).

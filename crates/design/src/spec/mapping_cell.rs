@@ -183,8 +183,8 @@ impl MappingIdentity {
             let cell = own.to_toml().replacen('\n', " ", 1).replace('\n', "; ");
             Warning::new(
                 "mapping/cell-not-stated",
-                "the mapping does not say which cell it is for: no one has compared it with [cell]",
-                format!("make it anew by `metalith cells`, or if it is for this cell, say so: {cell}"),
+                "the mapping does not state the cell that it is for, so it cannot be compared with [cell]",
+                format!("make it again with `metalith cells`. If it is for this cell, state it: {cell}"),
             )
         });
         let other = (!self.differences.is_empty()).then(|| match &self.accept {

@@ -246,7 +246,7 @@ impl TileMap {
                 sum.include(tile.low.0, tile.low.1);
                 sum.include(tile.high.0, tile.high.1);
             }
-            // In turn: where each kind stands on places of its own, both tell the pitch.
+            // In turn: where each kind stands on separate places, both tell the pitch.
             let (mine, theirs) = (self.samples[own], other.samples[number]);
             let counts = [sum.sampled, tile.sampled].map(usize::from);
             let in_turn =

@@ -149,7 +149,7 @@ impl TurnedKernel<'_> {
 }
 
 impl KernelBank {
-    /// Index of the unique node of an element at a node of its own, and what turns that into this.
+    /// Index of the unique node of an element at one of its nodes, and what turns that into this.
     fn unique(&self, element: usize, row: usize, column: usize) -> (usize, usize, Symmetry) {
         let (base, turn) = self.elements[element];
         let (row, column) = self.turned_node(turn.inverse(), row, column);

@@ -78,8 +78,8 @@ impl MadeRectangles {
         let (true, PillarShape::Rectangle(pillars)) = (fits, stated.shape) else {
             return Err(Error::refused(
                 "light/not-focused",
-                "light of a polarisation that these pillars do not focus",
-                "say circular light of rotated rectangles, linear light of upright ones, and none of others",
+                "the light has a polarisation that these pillars do not focus",
+                "give circular polarisation for rotated rectangles, linear polarisation for upright ones, and none for other pillars",
             ));
         };
         model.check_shape(stated.shape)?;
@@ -188,8 +188,8 @@ fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
         return Err(Error::refused(
             "model/transmission-with-rectangles",
-            "the pillars are rectangles, and the transmission of the model goes by one width",
-            "give a model without `transmission` and `transmission_phase_rad`: rectangles are told by no one width",
+            "the pillars are rectangles, and the transmission of the model depends on one width",
+            "give a model without `transmission` and `transmission_phase_rad`: rectangles have two edges",
         ));
     }
     if cell.corner_rounding_nm != 0.0 {
@@ -207,10 +207,10 @@ fn check_rectangles(model: &CalibratedModel) -> Result<()> {
         Some(term) => Err(Error::refused(
             "model/declared-width-with-rectangles",
             format!(
-                "the declared width `{}` goes by the drawn width `w`, of rectangles",
+                "the declared width `{}` depends on the drawn width `w`, which rectangles do not have",
                 term.name
             ),
-            "declare it by `fill` and places alone: rectangles are told by no one width",
+            "declare it by `fill` and places only: rectangles have two edges",
         )),
         None => Ok(()),
     }

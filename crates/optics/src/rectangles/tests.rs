@@ -155,12 +155,12 @@ fn upright_rectangles_between_the_nodes_are_those_solved_exactly_along_both_axes
     assert_eq!(refused.id(), "study/tables-too-narrow");
     insta::assert_snapshot!(refused, @"
     the tables of cells hold no pillar of 100 x 100 nm whose edges are off by 0 nm
-      help: plan the study again; a shard makes no tables of its own
+      help: plan the study again; shards make no tables
     ");
 }
 
 /// Cached rows are taken in place of what would be solved, to the last bit; what is damaged is made anew, and other
-/// pillars, biases and stacks have files of their own.
+/// pillars, biases and stacks have their own files.
 #[test]
 fn rows_that_are_kept_are_those_that_were_solved() {
     let folder = tempfile::tempdir().unwrap();
@@ -235,7 +235,7 @@ fn what_rectangles_have_no_meaning_for_is_refused_with_a_reason() {
     assert_eq!(other.id(), "light/not-focused");
     // Which light each of them focuses.
     insta::assert_snapshot!(other, @"
-    light of a polarisation that these pillars do not focus
-      help: say circular light of rotated rectangles, linear light of upright ones, and none of others
+    the light has a polarisation that these pillars do not focus
+      help: give circular polarisation for rotated rectangles, linear polarisation for upright ones, and none for other pillars
     ");
 }

@@ -166,7 +166,7 @@ impl Deconvolution {
         (decibel(mean), errors.into_iter().map(decibel).collect())
     }
 
-    /// Mean square error of one channel: each wavelength with a filter of its own, and all with one.
+    /// Mean square error of one channel: each wavelength with its own filter, and all with one.
     pub(crate) fn error(&self, blurs: &[&[Complex32]], scale: f64, mut slopes: Option<&mut [Vec<Complex64>]>) -> f64 {
         let shared = self.views.shared_filter;
         let own = (1.0 - shared) / blurs.len() as f64;

@@ -81,7 +81,7 @@ impl FieldProblem {
             return Err(Error::refused(
                 "optimise/row-lengths-differ",
                 "the rows of a merit are empty or differ in the number of rings",
-                "give every row one number a ring",
+                "give every row one number for each ring",
             ));
         }
         let mut layout = Vec::new();

@@ -86,14 +86,14 @@ impl NeighbourTerms {
             if condition.cell != 0 || condition.width_bias_nm != 0.0 {
                 return Err(Error::refused(
                     "optimise/errors-with-neighbours",
-                    "errors of fabrication among unlike neighbours",
+                    "errors of fabrication are not supported with the coupled model",
                     "leave out [optimise.robust], or optimise with the cell `rigorous`",
                 ));
             }
             let unlike = PairResponse::of(cell, wavelength_um, widths.iter().copied())?.ok_or_else(|| {
                 Error::refused(
                     "optimise/no-neighbour-model",
-                    format!("the cell `{}` takes neighbours for equals", cell.fidelity()),
+                    format!("the cell `{}` has no terms for neighbours", cell.fidelity()),
                     "optimise with the cell `neighbours`",
                 )
             })?;

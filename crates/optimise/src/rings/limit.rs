@@ -30,7 +30,7 @@ impl StepLimit {
         }
         Err(Error::refused(
             "optimise/phase-step-out-of-range",
-            format!("a limit of {waves} waves on the phase step"),
+            format!("the limit of the phase step is {waves} waves"),
             "give more than 0 and at most 0.5 waves; 0.5 is no limit",
         ))
     }

@@ -113,7 +113,7 @@ mod tests {
             ");
     }
 
-    /// Refusals of what the exchange of rings cannot do with the coupled model, each in a fault of its own.
+    /// Refusals of what the exchange of rings cannot do with the coupled model, each in a separate fault.
     #[test]
     fn what_unlike_neighbours_are_not_known_to_is_refused() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/broadband_3x3.toml");

@@ -66,7 +66,7 @@ impl Pupil {
             return Err(Error::refused(
                 "optimise/window-too-large",
                 format!(
-                    "a window of {} um needs a transform of {size} points an axis",
+                    "a window of {} um needs a transform of {size} points along each axis, which is too large",
                     window.side_um()
                 ),
                 "use a smaller window or lens",
