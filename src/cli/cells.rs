@@ -141,7 +141,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     if let Some(best) = study.best() {
         print_line!(
-            "best, by the light in the first order: {} with {} ({} straight on, {} rad rms)",
+            "best, by the light in the first order: {} with {} ({} in the zeroth order, {} rad rms)",
             best.name,
             fixed(best.compared(), 3),
             fixed(

@@ -29,7 +29,7 @@ impl OptimiseSpec {
             if wrong {
                 s.fault(
                     "cell",
-                    format!("{what} among unlike neighbours"),
+                    format!("{what} with the coupled model"),
                     "use `exchange` for `log` and `sum` without [optimise.robust], or the cell `rigorous`",
                 );
             }
@@ -143,10 +143,10 @@ mod tests {
         }
         // Which of them it is is in the words.
         insta::assert_snapshot!(said.join("\n"), @"
-            the merit `deconvolution` among unlike neighbours
-            the merit `side_lobes` among unlike neighbours
-            errors of fabrication among unlike neighbours
-            the solver `adam` among unlike neighbours
+            the merit `deconvolution` with the coupled model
+            the merit `side_lobes` with the coupled model
+            errors of fabrication with the coupled model
+            the solver `adam` with the coupled model
             ");
     }
 }
