@@ -1,4 +1,4 @@
-//! What an optimisation of the 1 mm lens costs: the kernel, a sweep of exchange, a step of Adam, a view of
+//! Cost of an optimisation of the 1 mm lens: the kernel, a sweep of exchange, a step of Adam, a view of
 //! the expected image error. The published cell, so that no table is needed.
 
 use criterion::{Criterion, criterion_group, criterion_main};

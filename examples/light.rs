@@ -1,4 +1,4 @@
-//! Where the pillars of a written layout send the light: `cargo run --release --example light -- DESIGN LAYOUT`.
+//! Directions into which the pillars of a written layout send light: `cargo run --release --example light -- DESIGN LAYOUT`.
 //!
 //! Each pillar that is read back from the layout passes its rigorous transmission; the order m of an
 //! element is the share that has m times the phase of the design there. The first order makes the image,

@@ -1,4 +1,4 @@
-//! What is in a layout from anywhere: `cargo run --release --example read_layout -- FILE.gds [LAYER/DATATYPE]`
+//! Contents of a layout from any program: `cargo run --release --example read_layout -- FILE.gds [LAYER/DATATYPE]`
 
 use metalith::gds::LayerNumber;
 use metalith::{ExtractionPlan, Layout, Silent, extract};

@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 # Per cent of all doc comments.
-LIMIT = 5.0
+LIMIT = 2.5
 # Words that begin a clause, a phrase about a subject that stands elsewhere, or a pronoun for it.
 WITHOUT_SUBJECT = re.compile(
     r"""
@@ -31,7 +31,7 @@ WITHOUT_SUBJECT = re.compile(
     re.X,
 )
 # Phrases that begin so and are nouns or verbs all the same.
-WITH_SUBJECT = re.compile(r"(In|Out|Up|At)-\w|Like-|Per cent|Not-a-number|At (least|most) one ", re.I)
+WITH_SUBJECT = re.compile(r"(In|Out|Up|At)-\w|Like-|Per cent|Not-a-number|At (least|most) one |Also (compare|compute|find|restore|try) |With the learnt prior, draw", re.I)
 
 
 def first_lines(path: Path) -> list[tuple[int, str]]:

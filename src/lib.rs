@@ -26,7 +26,7 @@
 //! Beside the line stand [`optimise`], which finds the radial phase; [`drc`], [`mod@diff`] and [`handoff`], which
 //! start from layouts too; [`calibrate`], which learns from captures what the model lacks; and [`compensate`],
 //! which draws what comes out as meant on the line that was so measured. [`cell`] holds supercells of unlike
-//! pillars too; layouts of the cell of the paper are judged by its cell of pillars among unlike neighbours, unless a design says
+//! pillars too; layouts of the cell of the paper are simulated with the coupled model, unless a design says
 //! otherwise. The names at the root are those that the line itself needs; each room has its own.
 //!
 //! # Conventions

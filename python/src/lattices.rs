@@ -14,7 +14,7 @@ pub fn kind_of(word: &str) -> Result<LatticeKind> {
     let known = LatticeKind::CHOICES.iter().find(|(name, _)| *name == word);
     known.map(|(_, kind)| *kind).ok_or_else(|| {
         Error::refused(
-            "lattice/unknown",
+            "lattice/unknown-kind",
             format!("there is no lattice `{word}`"),
             "use square or hexagonal",
         )
@@ -25,7 +25,7 @@ pub fn kind_of(word: &str) -> Result<LatticeKind> {
 pub fn lattice_of(kind: LatticeKind, pitch_nm: u32, (rows, columns): (usize, usize), what: &str) -> Result<Lattice> {
     if rows != columns {
         return Err(Error::refused(
-            "lattice/sites",
+            "lattice/not-square",
             format!("a {what} of {rows} x {columns} places"),
             "give a square one: pad it with zeros, which are places without pillars",
         ));
@@ -37,7 +37,7 @@ pub fn lattice_of(kind: LatticeKind, pitch_nm: u32, (rows, columns): (usize, usi
 pub fn check_shape(kind: LatticeKind, shape: PillarShape) -> Result<()> {
     match kind.refusal(shape) {
         Some(what) => Err(Error::refused(
-            "lattice/squares-on-hexagons",
+            "lattice/squares-on-hexagonal",
             what,
             "say that they are circles (`shape=\"circle\"`), or use the square lattice",
         )),

@@ -1,7 +1,7 @@
 //! metalith from Python: the native half of the package. What it is for people stands in `metalith/*.py`, which is
 //! written against these functions; their types are in `metalith/_native.pyi`.
 //!
-//! Every call that takes longer than a moment runs on a thread of its own without the interpreter's lock, while the
+//! Every call that takes longer than a moment runs on a separate thread without the interpreter's lock, while the
 //! caller's thread looks for Ctrl-C and reports progress: see [`work`].
 
 mod arrays;

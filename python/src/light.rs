@@ -148,7 +148,7 @@ pub fn cell<'py>(
     let shape = shape_of(shape).map_err(error)?;
     if !shape.has_width() {
         return Err(error(Error::refused(
-            "cell/rectangle-by-width",
+            "cell/rectangles-unsupported",
             "the transmission of rectangles by their width",
             "give squares or circles: rectangles are told by numbers, and `metalith.psf` simulates them",
         )));

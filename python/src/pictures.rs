@@ -159,14 +159,14 @@ impl ImagingSystem {
         let view = self.system.given;
         if rgb.dim() != (view.rows, view.columns, 3) {
             return Err(Error::refused(
-                "imaging/scene-shape",
+                "scene/size-differs",
                 format!("a scene of shape {:?}", rgb.dim()),
                 format!("give one of shape ({}, {}, 3)", view.rows, view.columns),
             ));
         }
         if !rgb.iter().all(|v| v.is_finite() && *v >= 0.0) {
             return Err(Error::refused(
-                "imaging/scene-values",
+                "scene/not-numbers",
                 "a scene with light that is negative or no number",
                 "give finite values from zero, white being one",
             ));

@@ -49,7 +49,7 @@ fn within(what: &str, um: Option<f64>, range: &std::ops::RangeInclusive<f64>) ->
 /// An element to simulate.
 struct Lit {
     name: String,
-    /// Its place on the chip (nm).
+    /// Place on the chip (nm).
     centre_nm: [i64; 2],
     /// Radius of the opening in the metal around it (um); that of the circle around the pillars if none is given.
     aperture_radius_um: Option<f64>,

@@ -55,7 +55,7 @@ fn upright(shortest_nm: u16, step_nm: u16, lengths: u16) -> Result<UprightRectan
     let most = UprightRectangles::MOST_LENGTHS;
     if !even(shortest_nm) || !even(step_nm) || !(1..=most).contains(&lengths) {
         return Err(Error::refused(
-            "pillars/upright-rectangles",
+            "pillars/widths-out-of-range",
             format!("upright rectangles of {lengths} widths from {shortest_nm} nm in steps of {step_nm} nm"),
             format!("give an even width and step, so that edges are on the 1 nm grid, and 1 to {most} widths"),
         ));
@@ -125,14 +125,14 @@ pub fn upright_widths<'py>(
 fn rectangles(width_nm: u16, length_nm: u16, steps: u16) -> Result<RotatedRectangles> {
     if !even(width_nm) || !even(length_nm) || width_nm >= length_nm {
         return Err(Error::refused(
-            "pillars/rectangle-size",
+            "pillars/edges-out-of-range",
             format!("rectangles of {width_nm} x {length_nm} nm"),
             "give even edges, so that the corners of an upright pillar are on the 1 nm grid, the width below the length",
         ));
     }
     if !(1..=MOST_STEPS).contains(&steps) {
         return Err(Error::refused(
-            "pillars/rotations",
+            "pillars/rotations-out-of-range",
             format!("{steps} rotations in half a turn"),
             format!("give 1 to {MOST_STEPS} steps"),
         ));

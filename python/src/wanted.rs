@@ -43,7 +43,7 @@ fn fidelity(word: &str) -> Result<Fidelity> {
         "fitted" => Ok(Fidelity::Fitted),
         "published" => Ok(Fidelity::Published),
         _ => Err(Error::refused(
-            "cell/unknown-model",
+            "cell/unknown-fidelity",
             format!("there is no fidelity `{word}`"),
             "use rigorous, neighbours, fitted or published",
         )),
@@ -61,21 +61,21 @@ pub fn polarised(arriving: Option<&str>, analyser: Option<&str>, shape: PillarSh
     let usual = arriving == own && analyser.is_none();
     if shape.basis() == Some(PolarisationBasis::Linear) && analyser == Some(Analyser::Circular) {
         return Err(Error::refused(
-            "light/analyser",
+            "light/not-focused",
             "a circular analyser behind upright rectangles, which focus no hand",
             "give `analyser` x, y or an angle",
         ));
     }
     if shape.basis().is_none() && !usual {
         return Err(Error::refused(
-            "light/polarisation-of-pillars",
+            "light/polarisation-without-rectangles",
             format!("light of a polarisation for {}", shape.plural()),
             "leave out `arriving` and `analyser`: they count for rectangles alone",
         ));
     }
     if analyser == Some(Analyser::Circular) && !matches!(arriving, Polarisation::Circular(_)) {
         return Err(Error::refused(
-            "light/analyser",
+            "light/handedness-missing",
             format!("a circular analyser in light that arrives {arriving}"),
             "give an array of a design, which says what the pillars focus: the analyser passes what that is converted to",
         ));
@@ -102,7 +102,7 @@ pub fn refuse(wanted: Fidelity, shape: PillarShape, kind: LatticeKind) -> Result
     // Its polynomials are of squares.
     if shape.outline() == OutlineForm::Circle && wanted == Fidelity::Published {
         return Err(Error::refused(
-            "cell/model-not-for-pillar",
+            "cell/fidelity-not-for-pillars",
             format!("{} by the `{wanted}` cell", shape.plural()),
             "use rigorous, neighbours or fitted",
         ));

@@ -38,7 +38,7 @@ impl Progress for Watched {
     }
 }
 
-/// Run `f` on a thread of its own. `progress` is called with what is done, the steps that are done and all of them.
+/// Run `f` on a separate thread. `progress` is called with what is done, the steps that are done and all of them.
 ///
 /// # Errors
 /// As [`MetalithError`]; `KeyboardInterrupt`, or what the callback raised, once the work has stopped.

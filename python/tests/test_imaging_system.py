@@ -103,13 +103,13 @@ def test_a_frame_from_elsewhere_is_restored_as_one_that_was_simulated(system: ml
     assert again.saturated == frame.saturated
     assert np.array_equal(system.restore(again), system.restore(frame))
     plane = frame.planes[0]
-    with pytest.raises(ml.MetalithError, match="2 planes of a frame, and the camera gives 1"):
+    with pytest.raises(ml.MetalithError, match="the frame has 2 planes, and the camera gives 1"):
         system.frame([plane, plane])
     with pytest.raises(ml.MetalithError, match="another camera"):
         system.frame([plane[:-2]])
     with pytest.raises(ml.MetalithError, match=r"`planes` of shape \(3,\)"):
         system.frame([[1.0, 2.0, 3.0]])
-    with pytest.raises(ml.MetalithError, match="no numbers"):
+    with pytest.raises(ml.MetalithError, match="not numbers"):
         system.frame([plane * np.nan])
 
 

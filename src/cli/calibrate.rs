@@ -23,7 +23,7 @@ pub(crate) struct CalibrateArgs {
     #[arg(required = true)]
     sets: Vec<PathBuf>,
 
-    /// Folder for the results, created if need be, with a folder for each set if there are several; `out/calibrate/`
+    /// Folder for the results, created if it does not exist, with a folder for each set if there are several; `out/calibrate/`
     /// and the set's name if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -41,8 +41,8 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, conflicts_with = "validate")]
     adopt: bool,
 
-    /// Validate the calibration itself instead, on synthetic sets like this one: without effects, with each effect at
-    /// three sizes, with pairs, and with effects that are not listed. Takes about an hour of CPU time. Writes
+    /// Validate the calibration instead, on synthetic sets like this one: without effects, with each effect at three sizes,
+    /// with pairs of effects, and with effects that are not in the list. Takes about an hour of CPU time. Writes
     /// validation.html, validation.json, validation.txt and, set by set, validation_trials.jsonl.
     #[arg(long, alias = "proof")]
     validate: bool,
@@ -64,8 +64,8 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, value_name = "N", requires = "validate", default_value_t = 0)]
     seed: u32,
 
-    /// Use sets without noise and fit only the effects that are present: the errors of values are then those of the
-    /// model itself.
+    /// Use sets without noise and fit only the effects that are present; the remaining errors of values are errors of the
+    /// model.
     #[arg(long, requires = "validate")]
     noiseless: bool,
 
@@ -99,20 +99,20 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
     };
     if let Some(k) = (1..outs.len()).find(|&k| outs[..k].contains(&outs[k])) {
         return Err(Error::refused(
-            "calibrate/same-answer",
+            "calibrate/same-output-folder",
             format!(
-                "{} and a set before it would be answered in {}",
+                "the results of {} and of another set would go to the same folder, {}",
                 args.sets[k].display(),
                 outs[k].display()
             ),
-            "calibrate sets whose folders have one name by one command each, with --out",
+            "calibrate sets whose folders have the same name with one command each, and different --out",
         ));
     }
     if args.validate && args.sets.len() > 1 {
         return Err(Error::refused(
-            "calibrate/several-sets",
-            "a validation of several sets",
-            "validate one at a time: synthetic sets are made like one",
+            "calibrate/several-sets-to-validate",
+            "--validate is given with several sets",
+            "validate one set at a time",
         ));
     }
     let settings = Settings {

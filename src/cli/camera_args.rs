@@ -44,8 +44,8 @@ pub(crate) fn distance_um(distance_mm: Option<f64>) -> Result<f64> {
         None => Ok(f64::INFINITY),
         Some(mm) if mm > 0.0 => Ok(mm * 1e3),
         Some(_) => Err(Error::refused(
-            "option/scene-distance",
-            "a scene at no distance",
+            "option/out-of-range",
+            "the distance of the scene is not positive",
             "give a positive --distance-mm",
         )),
     }

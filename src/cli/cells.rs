@@ -41,14 +41,14 @@ pub(crate) struct CellsArgs {
     #[arg(long, value_name = "T", default_value_t = 0.01)]
     tolerance: f64,
 
-    /// Also find a mapping for each distinct steered element with the coupled model. Each takes a search, and a table
-    /// for each wavelength of `compared_nm` in [mapping] (of [verify] if that is left out): with four wavelengths about
-    /// six CPU minutes an element the first time.
+    /// Also find a mapping for each distinct steered element with the coupled model. It solves a table for each element and
+    /// each wavelength of `compared_nm` in [mapping] (of [verify] if that is left out). With four wavelengths an element takes
+    /// about six CPU minutes the first time.
     #[arg(long)]
     steered: bool,
 
-    /// Put the best mapping into the design file: its coefficients, or the name of a table that is written beside it. All else of the
-    /// file stays as it is.
+    /// Put the best mapping into the design file: its coefficients, or the name of a table that is written to the same folder.
+    /// The rest of the file does not change.
     #[arg(long)]
     write: bool,
 
@@ -63,7 +63,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.write && args.design.as_os_str() == "-" {
         return Err(Error::refused(
             "cells/write-to-standard-input",
-            "a mapping to be written into a design of standard input",
+            "--write needs a file, and the design comes from standard input",
             "name the design file, or leave --write out",
         ));
     }
@@ -76,9 +76,9 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     match design.cell.shape.basis() {
         Some(_) if args.steered => {
             return Err(Error::refused(
-                "cells/steered-rectangles",
-                "mappings of steered elements for rectangles",
-                "leave out --steered: unlike neighbours are known of squares alone",
+                "cells/steered-without-squares",
+                "--steered does not support rectangles",
+                "leave out --steered: the coupled model is made of squares only",
             ));
         }
         Some(PolarisationBasis::Circular) => return rotations(args, &design, &folder, terminal),
@@ -141,7 +141,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     if let Some(best) = study.best() {
         print_line!(
-            "best, by the light in the first order: {} with {} ({} straight on, {} rad rms)",
+            "best, by the light in the first order: {} with {} ({} in the zeroth order, {} rad rms)",
             best.name,
             fixed(best.compared(), 3),
             fixed(

@@ -16,7 +16,7 @@ use super::{Outcome, Terminal, print_line, standard_input};
 #[derive(Args)]
 #[command(
     after_help = "Exit codes: 0 clean or all waived, 1 violations, 2 bad input, 3 a rule did not run.\n\
-    Example:\n  metalith check out/mini_3x3/mini_3x3_pillars.gds --design designs/mini_3x3.toml --sarif check.sarif"
+    Example:\n  metalith check out/mini_3x3/mini_3x3_pillars.gds \\\n    --design designs/mini_3x3.toml --sarif check.sarif"
 )]
 pub(crate) struct CheckArgs {
     /// The layout, in any hierarchy, of any program; `-` for standard input.
@@ -27,7 +27,7 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "RULES.toml")]
     rules: Option<PathBuf>,
 
-    /// Another layout on the same glass, such as the pillars under the apertures to check.
+    /// Another layout on the same substrate, such as the pillars when apertures are checked.
     #[arg(long, value_name = "FILE.gds")]
     with: Vec<PathBuf>,
 
@@ -50,7 +50,8 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     json: bool,
 
-    /// Write the result for KLayout's marker browser. `-` prints it instead of the summary; so do --junit and --sarif.
+    /// Write the result for KLayout's marker browser. With `-` it is printed instead of the summary. --junit and --sarif also
+    /// take `-`.
     #[arg(long, value_name = "FILE.lyrdb")]
     lyrdb: Option<PathBuf>,
 
@@ -77,7 +78,7 @@ impl CheckArgs {
         if printed.len() + usize::from(self.json) > 1 {
             return Err(Error::refused(
                 "option/two-on-standard-output",
-                "two results for standard output",
+                "two results go to standard output",
                 "give `-` to one of --lyrdb, --junit and --sarif, without --json",
             ));
         }

@@ -22,7 +22,7 @@ use super::{Outcome, Terminal, images, output, print_json, print_line};
 /// noise. The table is Markdown; `compare.html` shows the first photograph through each camera.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  metalith compare photographs --camera cameras/gt1930.toml --field-deg 80 \\\n    --design log=designs/prototype_3x3.toml --design designs/robust_3x3.toml:robust.gds \\\n    --rivals flatcam,diffusercam --method tikhonov,tv --separate --assume paper --out out/compare\n\n\
+    after_help = "Example:\n  metalith compare photographs --camera cameras/gt1930.toml --field-deg 80 \\\n    --design log=designs/prototype_3x3.toml --design designs/robust_3x3.toml:robust.gds \\\n    --baselines flatcam,diffusercam --method tikhonov,tv --separate --assume paper --out out/compare\n\n\
     Without `:LAYOUT` the layout is the one that `metalith layout` and `metalith run` write by default. A design with its own \
     camera, such as one behind a relay, names camera and field after the layout:\n  \
     --design nano=designs/neural_nano_optics.toml::cameras/gt1930_relay.toml:28.9"
@@ -36,24 +36,24 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "[NAME=]DESIGN[:LAYOUT]")]
     design: Vec<ComparedDesign>,
 
-    /// Camera file: sensor, light, exposure and noise of all cameras that name no other.
+    /// Camera file: sensor, light, exposure and noise of every camera without a camera file.
     #[arg(long)]
     camera: PathBuf,
 
     /// Baseline cameras without a lens: flatcam, diffusercam, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',')]
-    rivals: Vec<Rival>,
+    baselines: Vec<BaselineKind>,
 
     /// Restorations for designs, separated by commas, as in `metalith picture`. Baseline cameras have their own.
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
-    /// Restore arrays by each element alone too, and blend.
+    /// Also restore arrays from each element alone, and blend these pictures.
     #[arg(long)]
     separate: bool,
 
-    /// Also compare each design with simplifications: `paper`, those of the paper that the prototype follows. Baseline
-    /// cameras then also have one wavelength a colour.
+    /// Also compare each design with simplifications: `paper`, those of the paper that the prototype follows. Baseline cameras
+    /// then also have one wavelength for each colour.
     #[arg(long, value_name = "WHOSE")]
     assume: Option<Assume>,
 
@@ -90,13 +90,13 @@ pub(crate) struct CompareArgs {
     #[arg(long)]
     json: bool,
 
-    /// Only plan the comparison into --out, as shards of one camera each for any number of machines: `metalith study
-    /// run`, `submit`, `status` and `merge` take the folder.
+    /// Only plan the comparison into --out, as shards of one camera each that any number of machines can run. `metalith study
+    /// run`, `submit`, `status` and `merge` work on the folder.
     #[arg(long, conflicts_with = "json")]
     plan: bool,
 }
 
-/// What stands before the sensor of a camera without a lens.
+/// Optical element in front of the sensor of a camera without a lens.
 #[derive(Args)]
 pub(crate) struct LenslessArgs {
     /// Distance of the mask of `flatcam` from the sensor (um).
@@ -111,7 +111,7 @@ pub(crate) struct LenslessArgs {
     #[arg(long, default_value_t = DiffuserSpec::standard().distance_um, value_name = "UM")]
     diffuser_distance_um: f64,
 
-    /// Spacing of the random numbers that define this surface (um); bumps are about twice as wide.
+    /// Spacing of the random numbers that define this surface (um); its bumps are about twice as wide.
     #[arg(long, default_value_t = DiffuserSpec::standard().grain_um, value_name = "UM")]
     diffuser_grain_um: f64,
 
@@ -133,10 +133,10 @@ impl LenslessArgs {
     ///
     /// # Errors
     /// If a length is out of its range.
-    pub(crate) fn camera(&self, rival: Rival) -> Result<Lensless> {
-        Ok(match rival {
-            Rival::Flatcam => Lensless::FlatCam(MaskSpec::new(self.mask_feature_um, self.mask_distance_um)?),
-            Rival::Diffusercam => Lensless::DiffuserCam(DiffuserSpec::new(
+    pub(crate) fn camera(&self, kind: BaselineKind) -> Result<Lensless> {
+        Ok(match kind {
+            BaselineKind::Flatcam => Lensless::FlatCam(MaskSpec::new(self.mask_feature_um, self.mask_distance_um)?),
+            BaselineKind::Diffusercam => Lensless::DiffuserCam(DiffuserSpec::new(
                 self.diffuser_distance_um,
                 self.diffuser_grain_um,
                 self.diffuser_opening,
@@ -147,7 +147,7 @@ impl LenslessArgs {
 
 /// A camera without a lens.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-pub(crate) enum Rival {
+pub(crate) enum BaselineKind {
     /// A mask that is a product of two sequences.
     Flatcam,
     /// A rough surface.
@@ -235,7 +235,7 @@ impl CompareArgs {
             camera: self.camera.clone(),
             designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
             lensless: self
-                .rivals
+                .baselines
                 .iter()
                 .map(|r| self.bare.camera(*r))
                 .collect::<Result<_>>()?,

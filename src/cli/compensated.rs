@@ -12,7 +12,8 @@ use super::verify::FidelityArg;
 /// Design that a layout is compared with.
 #[derive(Args)]
 pub(crate) struct CompensatedFor {
-    /// `metalith layout --compensate MODEL` made the layout: its pillars are compared with the compensated design.
+    /// Model that the layout was compensated with by `metalith layout --compensate MODEL`: pillars are compared with the
+    /// compensated design.
     #[arg(id = "compensated", long, value_name = "MODEL", requires = "design")]
     pub model: Option<PathBuf>,
 }
@@ -45,8 +46,8 @@ pub(crate) fn judged_as_made(option: &str, model: Option<&Path>, fidelity: Optio
         return Ok(());
     }
     Err(Error::refused(
-        "option/fidelity-of-compensated",
-        "`--fidelity` describes pillars as drawn, and a compensated layout is judged as it is made",
+        "option/fidelity-with-compensated",
+        "`--fidelity` simulates pillars as drawn, and a compensated layout is simulated as fabricated",
         format!("leave out `--fidelity`, or `{option}` for the layout as designed"),
     ))
 }

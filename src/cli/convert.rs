@@ -24,7 +24,7 @@ pub(crate) struct ConvertArgs {
     /// The layout to write, in OASIS if its name ends in .oas.
     to: PathBuf,
 
-    /// Format to write, whatever the name of the file.
+    /// Format to write; if left out, the ending of the name decides.
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
 }

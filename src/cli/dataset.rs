@@ -14,8 +14,8 @@ use super::{Outcome, Terminal, print_line};
 
 /// Simulate the frame of every image of a folder, for learning: frames, pictures of an ideal camera, and a manifest.
 ///
-/// Images are taken in the order of their names and must have one size; all are read before any work. The noise of each
-/// follows from its bytes and the seed. Undamaged pairs of the same image, seed, chip and camera are reused, so an
+/// Images are used in the order of their names. They must have one size; all are checked before the work begins. The noise of
+/// an image depends only on its bytes and the seed. Undamaged pairs of the same image, seed, chip and camera are reused, so an
 /// interrupted run continues.
 #[derive(Args)]
 #[command(
@@ -40,8 +40,8 @@ pub(crate) struct DatasetArgs {
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
 
-    /// Only plan the set, as shards for any number of machines: `metalith study run`, `submit`, `status` and `merge`
-    /// take the folder.
+    /// Only plan the set, as shards that any number of machines can run. `metalith study run`, `submit`, `status` and `merge`
+    /// work on the folder.
     #[arg(long)]
     plan: bool,
 
@@ -84,7 +84,7 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     if is_planned(&args.out) {
         return Err(Error::refused(
-            "dataset/folder-of-plan",
+            "dataset/folder-holds-plan",
             format!("{} holds a plan, which is carried out in shards", args.out.display()),
             "make them by `metalith study run FOLDER --missing`, or name another folder with --out",
         ));

@@ -23,7 +23,7 @@ pub(crate) struct DenoiseArgs {
     /// The picture: PNG, JPEG or NPY.
     picture: PathBuf,
 
-    /// Standard deviation of the noise, in steps of a scale of 255.
+    /// Standard deviation of the noise, in levels of a scale from 0 to 255.
     #[arg(long, value_name = "LEVELS", value_parser = noise)]
     noise: f32,
 
@@ -66,9 +66,9 @@ fn noise(text: &str) -> std::result::Result<f32, String> {
 pub(crate) fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.out.is_none() && !args.add {
         return Err(Error::refused(
-            "denoise/nothing-to-do",
-            "nothing would come of this",
-            "name a file with --out, or hold the result against the picture with --add",
+            "denoise/no-output",
+            "there is no output",
+            "name a file with --out, or compare the result with the picture by --add",
         ));
     }
     if let Some(out) = &args.out {

@@ -26,8 +26,7 @@ pub(crate) struct HandoffArgs {
     #[arg(required_unless_present = "verify", conflicts_with = "verify")]
     design: Option<PathBuf>,
 
-    /// Process file: writer, resist, doses, currents, overheads. If left out a shipped one, which is then stored in
-    /// `inputs/`.
+    /// Process file: writer, resist, doses, currents, overheads. If left out, a shipped one is used and stored in `inputs/`.
     #[arg(long, value_name = "FILE")]
     process: Option<PathBuf>,
 

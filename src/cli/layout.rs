@@ -23,8 +23,8 @@ pub(crate) struct LayoutArgs {
     #[command(flatten)]
     target: Target,
 
-    /// Draw pillars that are as intended after fabrication, by the `model.toml` of `metalith calibrate`. The files are
-    /// named NAME_compensated and have a report.
+    /// Draw pillars that have the intended size after fabrication, as the `model.toml` of `metalith calibrate` predicts it. The
+    /// files are named NAME_compensated and have a report.
     #[arg(long, value_name = "MODEL")]
     compensate: Option<PathBuf>,
 
@@ -33,10 +33,10 @@ pub(crate) struct LayoutArgs {
     json: bool,
 }
 
-/// Where files go and how they are nested.
+/// Folder of the files, and the nesting of their geometry.
 #[derive(Args)]
 pub(crate) struct Target {
-    /// Folder for the files, created if need be; `out/NAME` of the design if left out.
+    /// Folder for the files, created if it does not exist; `out/NAME` of the design if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
@@ -64,7 +64,7 @@ pub(crate) struct FormatArgs {
 pub enum FormatArg {
     /// GDSII: every mask writer reads it.
     Gds,
-    /// OASIS: a hundredth of the size.
+    /// OASIS: files of about 1 % of the size.
     Oasis,
 }
 
@@ -101,7 +101,7 @@ impl FormatArgs {
         match (self.format, self.oasis) {
             (Some(FormatArg::Gds), Some(_)) => Err(metalith::Error::refused(
                 "option/two-formats",
-                "--oasis and --format gds",
+                "--oasis and --format gds exclude each other",
                 "leave one of them out",
             )),
             (Some(FormatArg::Gds), None) => Ok(Some(LayoutFormat::Gds)),
@@ -120,7 +120,7 @@ pub(crate) struct Files {
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum HierarchyArg {
-    /// Each part that symmetry leaves unique, once; copies by rotated and mirrored references.
+    /// Each unique part once; its symmetric copies as rotated and mirrored references.
     Folded,
     /// One reference for each pillar.
     Sref,

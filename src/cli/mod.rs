@@ -119,7 +119,7 @@ enum Command {
 /// Command by which the program is started again, if it was started by another name than its file's.
 static STARTED_AS: OnceLock<PathBuf> = OnceLock::new();
 
-/// The program as a process of its own can be started.
+/// The program as a separate process can be started.
 ///
 /// # Errors
 /// If the system does not say.
@@ -270,7 +270,7 @@ mod tests {
 
     use super::Arguments;
 
-    /// A terminal breaks lines where it ends: a sentence that holds breaks of its own is broken twice.
+    /// A terminal breaks lines where it ends: a sentence that holds its own breaks is broken twice.
     #[test]
     fn sentences_below_a_help_are_not_broken() {
         let commands = Arguments::command();

@@ -16,7 +16,7 @@ use metalith::{Design, Hierarchy, PillarArray, Result, write_pillars};
 use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
-/// Find the phase of every ring that is best over the whole band, and report the gain.
+/// Find the best phase of every ring over the whole band, and report the gain.
 #[derive(Args)]
 #[command(
     after_help = "The section [optimise] of the design sets merit, time and simulation model.\n\
@@ -48,8 +48,8 @@ pub(crate) struct OptimiseArgs {
     #[arg(long)]
     json: bool,
 
-    /// Only plan this number of starts with other random numbers, as shards for any number of machines: `metalith study
-    /// run`, `submit`, `status` and `merge` take the folder. `merge` writes the best phase.
+    /// Only plan this number of starts, each with its own seed, as shards that any number of machines can run. `metalith study
+    /// run`, `submit`, `status` and `merge` work on the folder; `merge` writes the best phase.
     #[arg(long, value_name = "STARTS", value_parser = clap::value_parser!(u64).range(1..=1_000_000), conflicts_with_all = ["phase", "fresh", "no_report", "json"])]
     plan: Option<u64>,
 

@@ -23,7 +23,7 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[command(
     after_help = "Example:\n  metalith picture out/prototype_3x3/prototype_3x3_pillars.gds --camera cameras/gt1930.toml \\\n    --design designs/prototype_3x3.toml scene.png --out out/picture\n\n\
     The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in \
-    scenes chart, star and edge; a scene with pixels finer than half a sensor pixel is averaged. Kernels are cached."
+    scenes chart, star and edge. Pixels of the scene that are finer than half a sensor pixel are averaged. Kernels are cached."
 )]
 pub(crate) struct PictureArgs {
     /// The pillar layout; `-` for standard input.
@@ -66,7 +66,7 @@ pub(crate) struct PictureArgs {
     #[arg(long)]
     no_forecast: bool,
 
-    /// Restore by each element alone too, and blend.
+    /// Also restore from each element alone, and blend these pictures.
     #[arg(long)]
     separate: bool,
 
@@ -75,7 +75,7 @@ pub(crate) struct PictureArgs {
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
 
-    /// Sample this number of pictures that the frame may show, with the learnt prior: their mean, and an uncertainty
+    /// With the learnt prior, draw this number of pictures that agree with the frame, and write their mean and an uncertainty
     /// map.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=64))]
     samples: Option<u8>,
@@ -97,7 +97,7 @@ pub(crate) struct PictureArgs {
 /// Pixels an axis of a built-in scene, if nothing else is said.
 const PIXELS: u16 = 800;
 
-/// Whose assumptions are compared with the physics.
+/// Source of the assumptions that are compared with the physics.
 #[derive(Clone, Copy, clap::ValueEnum)]
 pub(crate) enum Assume {
     Paper,
@@ -120,8 +120,8 @@ impl PictureArgs {
         let built_in = self.scene.parse::<BuiltIn>().ok();
         let idle = |option: &str, what: &str| {
             Err(Error::refused(
-                "option/not-of-scene",
-                format!("{option} says nothing of `{}`: it is of {what}", self.scene),
+                "option/not-for-scene",
+                format!("{option} does not apply to `{}`: it is for {what}", self.scene),
                 format!("leave {option} out, or give another scene"),
             ))
         };
@@ -327,10 +327,10 @@ mod tests {
         assert_eq!(scene(&["star"]).unwrap(), 800);
         assert_eq!(scene(&["edge", "--pixels", "33"]).unwrap(), 33);
         for (of, id) in [
-            (&["star", "--wavelengths-nm", "400,500"][..], "option/not-of-scene"),
-            (&["scene.png", "--pixels", "64"], "option/not-of-scene"),
+            (&["star", "--wavelengths-nm", "400,500"][..], "option/not-for-scene"),
+            (&["scene.png", "--pixels", "64"], "option/not-for-scene"),
             (&[&small], "score/too-small"),
-            (&[&tiny], "table/format"),
+            (&[&tiny], "table/malformed"),
         ] {
             let error = scene(of).unwrap_err();
             assert_eq!(error.id(), id, "{error}");

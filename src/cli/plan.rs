@@ -1,4 +1,4 @@
-//! `metalith plan`: from a design and a bench to the measurements that tell effects apart.
+//! `metalith plan`: from a design and a bench to the measurements that distinguish effects.
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "FILE")]
     layout: Option<PathBuf>,
 
-    /// Folder of the session, created if need be; `out/NAME_session` of the design if left out.
+    /// Folder of the session, created if it does not exist; `out/NAME_session` of the design if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
 

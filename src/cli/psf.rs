@@ -27,8 +27,8 @@ use super::{Outcome, Terminal, print_line};
 #[derive(Args, Clone)]
 #[command(
     after_help = "Example:\n  metalith psf lens.gds --layer 1/0 --distance-um 2400 --wavelength-nm 530 --out out/lens\n\n\
-    Light has normal incidence unless --angle-x-deg, --angle-y-deg say otherwise. The window is about the element's axis \
-    unless --at-x-um, --at-y-um say otherwise. A steered element sends light of normal incidence far off its axis."
+    Without --angle-x-deg and --angle-y-deg, incidence is normal. Without --at-x-um and --at-y-um, the axis of the element \
+    is in the middle of the window. A steered element sends light of normal incidence far from its axis."
 )]
 pub(crate) struct PsfArgs {
     /// The layout, of any program; `-` for standard input.
@@ -59,11 +59,11 @@ pub(crate) struct PsfArgs {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-STEEPEST_DEG, STEEPEST_DEG))]
     angle_y_deg: f64,
 
-    /// Middle of the PSF window from the element's axis (um).
+    /// Distance along x from the axis of the element to the middle of the PSF window (um).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-1e6, 1e6))]
     at_x_um: f64,
 
-    /// Middle of the PSF window from the element's axis (um).
+    /// Distance along y from the axis of the element to the middle of the PSF window (um).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-1e6, 1e6))]
     at_y_um: f64,
 
@@ -71,8 +71,9 @@ pub(crate) struct PsfArgs {
     #[arg(long, default_value_t = 256, value_parser = samples)]
     samples: usize,
 
-    /// The pillar and what surrounds it, for all cells but the published one: a file with a section [cell] as in a design, or a whole
-    /// design. Pitch and lattice must be the layout's. Silicon nitride 700 nm high on fused silica in air if left out.
+    /// The pillar and the materials around it, for every model except `published`: a file with a section [cell] as in a design,
+    /// or a whole design. Pitch and lattice must be the same as in the layout. Silicon nitride 700 nm high on fused silica in
+    /// air if left out.
     #[arg(long, value_name = "FILE")]
     cell: Option<PathBuf>,
 
@@ -97,8 +98,8 @@ pub(crate) struct PsfArgs {
     #[arg(long, value_parser = between(0.1, 1e5))]
     aperture_um: Option<f64>,
 
-    /// Solve the unit cell at oblique incidence, the angle at which light arrives, for both polarisations; else at
-    /// normal incidence.
+    /// Solve the unit cell for the angle at which light arrives (oblique incidence) and for both polarisations. If left out,
+    /// the cell is solved for normal incidence.
     #[arg(long)]
     oblique: bool,
 
@@ -106,12 +107,12 @@ pub(crate) struct PsfArgs {
     #[arg(long)]
     fast: bool,
 
-    /// Add polychromatic figures for the camera of this file: all wavelengths from the angle of incidence.
+    /// Add polychromatic figures for the camera of this file; all wavelengths arrive at the same angle.
     #[arg(long, value_name = "CAMERA")]
     camera: Option<PathBuf>,
 
-    /// Angle in the x-z plane by which the elements steer at --wedge-wavelength-nm (degrees). With --camera it decides
-    /// where each wavelength lands; a layout does not say it.
+    /// Angle in the x-z plane by which the elements steer at --wedge-wavelength-nm (degrees). With --camera it decides where
+    /// each wavelength lands. A layout does not contain this angle.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, requires = "camera")]
     wedge_x_deg: f64,
 
@@ -135,8 +136,8 @@ pub(crate) struct PsfArgs {
     #[arg(long, value_name = "ANALYSER", allow_negative_numbers = true, value_parser = analyser)]
     analyser: Option<Analyser>,
 
-    /// Circular polarisation of the light that the layout focuses, which decides what a circular --analyser passes; if left out
-    /// `arriving` of --cell, where its pillars are rotated rectangles, else that of --arriving.
+    /// Circular polarisation that the layout focuses; it decides what a circular --analyser passes. If left out: `arriving` of
+    /// --cell if its pillars are rotated rectangles, else --arriving.
     #[arg(long, value_enum, requires = "analyser")]
     focused: Option<CircularArg>,
 
@@ -220,7 +221,7 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
         return Ok(());
     }
     Err(Error::refused(
-        "psf/not-pillars",
+        "psf/mostly-other-shapes",
         format!(
             "{}: only {} of {} shapes on layer {} are {} on a lattice",
             args.layout.display(),
@@ -262,7 +263,7 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
         && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))
     {
         return Err(Error::refused(
-            "psf/kinds-of-pillars",
+            "cell/fidelity-not-for-pillars",
             format!("{}: {what}", args.layout.display()),
             hint,
         ));
@@ -270,19 +271,18 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
     Ok(())
 }
 
-/// Light of a polarisation is simulated where pillars tell polarisations apart, and a circular analyser for light of both hands must be
+/// Light of a polarisation is simulated where pillars distinguish polarisations, and a circular analyser for light of both hands must be
 /// told which it passes.
 fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     if found.shape.basis().is_none() && (args.arriving.is_some() || args.analyser.is_some()) {
         return Err(Error::refused(
-            "light/polarisation-of-pillars",
+            "light/polarisation-without-rectangles",
             format!(
-                "{}: light of a polarisation for {}",
+                "{}: a polarisation is given, and the pillars are {}",
                 args.layout.display(),
                 found.shape.plural()
             ),
-            "leave out --arriving and --analyser: they count for rectangles alone, others are simulated in light that is not \
-             polarised",
+            "leave out --arriving and --analyser: they are for rectangles only. Other pillars are simulated in unpolarised light",
         ));
     }
     if found.shape.basis() == Some(PolarisationBasis::Linear)
@@ -294,7 +294,7 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
                 "{}: its pillars are upright rectangles, which focus linear light, and {} was asked for",
                 args.layout.display(),
                 match args.focused {
-                    Some(_) => "a hand by --focused",
+                    Some(_) => "a handedness by --focused",
                     None => "a circular analyser",
                 }
             ),
@@ -306,12 +306,12 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     }
     if args.analyser == Some(Analyser::Circular) && args.hand().is_none() {
         return Err(Error::refused(
-            "light/analyser",
+            "light/handedness-missing",
             format!(
-                "a circular analyser in light that arrives {}",
+                "a circular analyser needs the focused handedness, and light arrives {}",
                 args.arriving(found.shape)
             ),
-            "say which hand the layout focuses by --focused left or right: the analyser passes what that is converted to",
+            "name the handedness that the layout focuses by --focused left or right: the analyser passes what it is converted to",
         ));
     }
     Ok(())

@@ -8,8 +8,9 @@ use clap::error::{ContextKind, ContextValue};
 const CELL: &str = "give --cell FILE.toml with [cell]: the keys of the pillar and what surrounds it, as in a design";
 
 /// An option, the commands that had it, and what to do.
-const RENAMED: [(&str, &[&str], &str); 9] = [
+const RENAMED: [(&str, &[&str], &str); 10] = [
     ("--as-lit", &["run", "verify", "psf"], "it is now called --oblique"),
+    ("--rivals", &["compare"], "it is now called --baselines"),
     ("--height-nm", &["psf"], CELL),
     ("--pillar-material", &["psf"], CELL),
     ("--substrate-material", &["psf"], CELL),

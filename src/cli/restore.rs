@@ -47,7 +47,7 @@ pub(crate) struct RestoreArgs {
     #[arg(long)]
     distance_mm: Option<f64>,
 
-    /// Pixels of the picture along an axis.
+    /// Pixels of the picture along each axis.
     #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u16).range(64..=4096))]
     pixels: u16,
 
@@ -55,7 +55,7 @@ pub(crate) struct RestoreArgs {
     #[arg(long, value_delimiter = ',', default_value = "tikhonov")]
     method: Vec<String>,
 
-    /// Restore by each element alone too, and blend.
+    /// Also restore from each element alone, and blend these pictures.
     #[arg(long)]
     separate: bool,
 

@@ -68,8 +68,8 @@ impl ShippedDesign {
             let is_it = || is_as_long() && std::fs::read(path).is_ok_and(|found| found == *bytes);
             if path.exists() && !is_it() {
                 return Err(Error::refused(
-                    "new/another-file",
-                    format!("{} exists and is another file", path.display()),
+                    "new/exists",
+                    format!("{} exists and has other contents", path.display()),
                     "write the design to another folder, or move the file away",
                 ));
             }

@@ -29,9 +29,9 @@ pub(crate) fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()>
     match paths.into_iter().any(is_standard_input) {
         false => Ok(()),
         true => Err(Error::refused(
-            "option/plan-of-standard-input",
-            "a plan of a file from standard input",
-            "name the file: shards read it again",
+            "option/plan-from-standard-input",
+            "a plan cannot use a file from standard input",
+            "name the file: each shard reads it again",
         )),
     }
 }
@@ -42,7 +42,7 @@ fn take() -> Result<io::StdinLock<'static>> {
     if TAKEN.swap(true, Ordering::Relaxed) {
         return Err(Error::refused(
             "option/two-on-standard-input",
-            "standard input is given for two files",
+            "`-` (standard input) is given for two files",
             "give one of them as `-`, and the others by their names",
         ));
     }

@@ -28,7 +28,7 @@ pub(crate) struct StudyArgs {
 enum Step {
     /// Plan a study: write the layout, solve the tables of cells, time the first draw, and cut the work into shards.
     Plan(PlanArgs),
-    /// Make one shard, or all missing ones. Existing shards stay.
+    /// Make one shard, or all missing ones. Existing shards are kept.
     Run(RunArgs),
     /// List existing and missing shards.
     Status(StatusArgs),
@@ -43,7 +43,7 @@ struct PlanArgs {
     /// Tolerance file: what varies, the limits, and the number of draws.
     tolerance: PathBuf,
 
-    /// Folder of the study, created if need be.
+    /// Folder of the study, created if it does not exist.
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
 
@@ -85,7 +85,7 @@ struct SubmitArgs {
     /// Folder of the study.
     study: PathBuf,
 
-    /// File with what jobs need: partition, time, memory, size of arrays.
+    /// File with the settings of the jobs: partition, time, memory, size of arrays.
     #[arg(long, value_name = "FILE")]
     slurm: PathBuf,
 
@@ -104,7 +104,7 @@ struct MergeArgs {
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Number of worst draws to simulate again, to show their PSFs.
+    /// Number of worst draws that are simulated again to show their PSFs.
     #[arg(long, value_name = "N", default_value_t = 3)]
     psfs: usize,
 }
@@ -147,9 +147,9 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let found = work.cut().status()?;
     if let Some((path, why)) = found.unusable.first() {
         return Err(Error::refused(
-            "study/tables-unreadable",
+            "study/shard-unusable",
             format!("{} cannot be used: {why}", path.display()),
-            "remove it first",
+            "remove it, then run again",
         ));
     }
     match args.jobs {
@@ -160,7 +160,7 @@ fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     tell(&work)
 }
 
-/// Each shard by a process of its own, so many at a time.
+/// Each shard by a separate process, so many at a time.
 fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Terminal) -> Result<()> {
     let program = super::program()?;
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
@@ -198,8 +198,8 @@ fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Termina
     }
     Err(Error::refused(
         "study/shards-not-made",
-        format!("{} shards were not made, the first is {}", failed.len(), failed[0]),
-        "their messages stand above; run again with --missing",
+        format!("{} shards failed, the first is {}", failed.len(), failed[0]),
+        "their messages are above; run again with --missing",
     ))
 }
 
@@ -243,7 +243,7 @@ fn submit(args: &SubmitArgs) -> Result<Outcome> {
             .map_err(Error::io("start sbatch for", &submission.script))?;
         if !answer.status.success() {
             return Err(Error::refused(
-                "study/sbatch",
+                "study/sbatch-failed",
                 format!(
                     "sbatch refused {}: {}",
                     submission.script.display(),
@@ -273,8 +273,8 @@ fn without_table(args: &MergeArgs) -> Result<()> {
         None => Ok(()),
         Some(_) => Err(Error::refused(
             "study/no-table",
-            "this work has no table of draws",
-            "leave --out out: files are written into the folder of the plan",
+            "--out is for a table of draws, and this work has none",
+            "leave out --out: the files are written into the folder of the plan",
         )),
     }
 }

@@ -10,7 +10,7 @@ use metalith::imaging::scene::read_picture;
 use metalith::training::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_post_processor};
 use metalith::{Error, Result};
 
-use super::compare::{ComparedDesign, LenslessArgs, Rival};
+use super::compare::{BaselineKind, ComparedDesign, LenslessArgs};
 use super::paths::{apart, writable};
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -25,8 +25,8 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  metalith train photographs --out denoiser.safetensors --steps 9000\n  \
-    metalith train photographs --stage flatnet --camera cameras/gt1930.toml --field-deg 80 --pixels 512 --steps 1200 \\\n    \
-    --out flatnet.safetensors"
+    metalith train photographs --stage flatnet --camera cameras/gt1930.toml --field-deg 80 \\\n    \
+    --pixels 512 --steps 1200 --out flatnet.safetensors"
 )]
 pub(crate) struct TrainArgs {
     /// Folder of PNG, JPEG or NPY photographs.
@@ -92,10 +92,10 @@ impl TrainArgs {
 
     /// The camera that a last stage is for.
     fn comparison(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Comparison> {
-        let wrong = |what: &str, hint: &str| Err(Error::refused("train/stage-camera", what, hint));
+        let wrong = |what: &str, hint: &str| Err(Error::refused("train/stage-not-for-camera", what, hint));
         let lensless = match (kind, &self.design) {
-            (StageKind::FlatNet, None) => vec![self.bare.camera(Rival::Flatcam)?],
-            (StageKind::UnrolledDiffuser, None) => vec![self.bare.camera(Rival::Diffusercam)?],
+            (StageKind::FlatNet, None) => vec![self.bare.camera(BaselineKind::Flatcam)?],
+            (StageKind::UnrolledDiffuser, None) => vec![self.bare.camera(BaselineKind::Diffusercam)?],
             (_, Some(_)) if kind.is_of_design() => Vec::new(),
             (_, Some(_)) => return wrong("a camera without a lens has no design", "leave --design out"),
             (_, None) => return wrong("this last stage is of the array of a design", "name it by --design"),
@@ -129,8 +129,8 @@ impl TrainArgs {
         let open = comparison.open()?;
         Stacks::check(comparison.photographs.len(), open.size(), spec.piece)?;
         let cache = KernelCache::of_user();
-        let (stacks, taught) = open.training_stacks(0, kind, &beside(out, ".pictures"), &cache, terminal)?;
-        let stacks = Stacks::new(stacks, taught, spec.piece)?;
+        let (stacks, trained) = open.training_stacks(0, kind, &beside(out, ".pictures"), &cache, terminal)?;
+        let stacks = Stacks::new(stacks, trained, spec.piece)?;
         train_post_processor(&stacks, spec, out, state, terminal)
     }
 }
@@ -160,8 +160,8 @@ pub(crate) fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(kind) => args.stage(kind, files, &spec, [&out, &state], terminal)?,
         None if !args.bare.is_standard() => {
             return Err(Error::refused(
-                "train/no-stage",
-                "numbers of a mask or of a rough surface, and no last stage to teach",
+                "train/option-without-stage",
+                "options of a mask or of a rough surface are given, and no last stage",
                 "give --stage flatnet or --stage unrolled-diffuser, or leave them out",
             ));
         }

@@ -43,15 +43,15 @@ pub(crate) struct VerifyArgs {
     judging: Judging,
 }
 
-/// How a layout is judged.
+/// Settings of the simulation of a layout.
 #[derive(Args, Clone)]
 pub(crate) struct Judging {
     /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
     #[arg(long)]
     fast: bool,
 
-    /// Simulation model of the pillars; `fidelity` in [verify] of the design if left out. Without it, `neighbours` for
-    /// the published cell, else `rigorous`.
+    /// Simulation model of the pillars; `fidelity` in [verify] of the design if left out. If the design names none:
+    /// `neighbours` for the published cell, else `rigorous`.
     #[arg(long, value_enum)]
     fidelity: Option<FidelityArg>,
 
@@ -60,19 +60,19 @@ pub(crate) struct Judging {
     #[arg(long, value_name = "MODEL", conflicts_with = "fidelity")]
     model: Option<PathBuf>,
 
-    /// Solve the unit cells at oblique incidence, the angles at which light arrives, for both polarisations, like
-    /// `incidence = "oblique"` in [verify] of the design; else at normal incidence.
+    /// Solve the unit cells for the angles at which light arrives (oblique incidence) and for both polarisations. Same as
+    /// `incidence = "oblique"` in [verify] of the design. If left out, the cells are solved for normal incidence.
     #[arg(long)]
     oblique: bool,
 
-    /// Memory for reading back and simulating (MB). Larger layouts are simulated in parts, which takes more time, and
-    /// without other models for comparison. If that does not suffice, all pillars are compared with the design and
-    /// nothing is simulated.
+    /// Memory for reading back and simulating (MB). Larger layouts are simulated in parts, which takes more time, and without
+    /// other models for comparison. If a part is still too large, all pillars are compared with the design and nothing is
+    /// simulated.
     #[arg(long, value_name = "MB", default_value_t = 8000.0)]
     memory_mb: f64,
 
-    /// Show on the page the picture that the camera of this file takes of a test chart. Its kernels cost minutes of CPU
-    /// time the first time, then they are cached.
+    /// Add to the page the picture of a test chart that the camera of this file takes. Its kernels take minutes of CPU time
+    /// once; then they are cached.
     #[arg(long, value_name = "CAMERA")]
     picture: Option<PathBuf>,
 
@@ -183,8 +183,8 @@ impl Judging {
             Simulation::Whole => {}
             _ if camera.is_some() => {
                 return Err(Error::refused(
-                    "verify/too-large",
-                    "a picture of a layout whose elements are too large to be held in full",
+                    "verify/picture-too-large",
+                    "the elements are too large for a picture: they do not fit into memory",
                     "leave out --picture, or allow more memory with --memory-mb",
                 ));
             }

@@ -1,4 +1,4 @@
-//! How files are damaged.
+//! Damage to files.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;

@@ -22,7 +22,7 @@ use metalith_testing::{design, root};
 
 use super::images;
 
-/// What may be damaged in a file.
+/// Part of a file that may be damaged.
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
     Bytes,
@@ -35,7 +35,7 @@ pub(crate) enum Kind {
 /// One format.
 pub(crate) struct Format {
     pub name: &'static str,
-    /// Where a file of it is put to be read.
+    /// Path at which a file of it is read.
     pub file: PathBuf,
     pub kind: Kind,
     /// Files that are read.
@@ -370,7 +370,7 @@ fn measured(folder: &Path) -> Vec<Format> {
     ]
 }
 
-/// What the program itself has left: manifests, checkpoints, weights.
+/// Files that the program itself wrote: manifests, checkpoints, weights.
 fn kept(folder: &Path) -> Vec<Format> {
     let handed = folder.join("handoff");
     fs::create_dir_all(&handed).unwrap();

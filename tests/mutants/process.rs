@@ -1,4 +1,4 @@
-//! What the process has taken, as the kernel counts it.
+//! Memory and time of the process, as the kernel counts them.
 
 use std::fs;
 

@@ -15,6 +15,9 @@ fn sets_whose_answers_would_be_in_one_folder_are_refused() {
         std::fs::create_dir_all(folder.path().join(set)).unwrap();
     }
     let [monday, tuesday, other] = ["monday/lens", "tuesday/lens", "tuesday/other"].map(path);
-    refused(&[&monday, &tuesday, "--out", &path("out")], "calibrate/same-answer");
-    refused(&["--validate", &monday, &other], "calibrate/several-sets");
+    refused(
+        &[&monday, &tuesday, "--out", &path("out")],
+        "calibrate/same-output-folder",
+    );
+    refused(&["--validate", &monday, &other], "calibrate/several-sets-to-validate");
 }

@@ -37,14 +37,14 @@ fn what_cannot_be_compared_is_refused() {
     let other = photograph(&folder.path().join("other.png"), 40);
     let out = folder.path().join("out").display().to_string();
     let camera = ["--camera", "cameras/gt1930.toml"];
-    let flatcam = ["--rivals", "flatcam"];
+    let flatcam = ["--baselines", "flatcam"];
     let cases: [(&[&str], &str); 9] = [
         (&[&one], "error[compare/no-camera]"),
         (
             &[&one, &other, flatcam[0], flatcam[1]],
             "error[compare/photographs-differ-in-size]",
         ),
-        (&[&one, "--rivals", "pinhole"], "'--rivals <"),
+        (&[&one, "--baselines", "pinhole"], "'--baselines <"),
         (&[&one, "--design", "a=b:c:d:e:f"], "'--design <"),
         (&[&one, "--design", "designs/tio2_532.toml"], "error[compare/no-layout]"),
         (
@@ -53,15 +53,15 @@ fn what_cannot_be_compared_is_refused() {
         ),
         (
             &[&one, flatcam[0], flatcam[1], "--mask-distance-um", "0"],
-            "error[flatcam/geometry]",
+            "error[flatcam/geometry-out-of-range]",
         ),
         (
-            &[&one, "--rivals", "diffusercam", "--diffuser-opening", "9"],
-            "error[diffusercam/geometry]",
+            &[&one, "--baselines", "diffusercam", "--diffuser-opening", "9"],
+            "error[diffusercam/geometry-out-of-range]",
         ),
         (
             &[&one, flatcam[0], flatcam[1], "--lpips", "cameras/gt1930.toml"],
-            "error[table/format]: cameras/gt1930.toml",
+            "error[table/malformed]: cameras/gt1930.toml",
         ),
     ];
     for (arguments, id) in cases {
@@ -83,7 +83,7 @@ fn a_table_comes_out_of_photographs() {
         &photographs,
         "--camera",
         "cameras/gt1930.toml",
-        "--rivals",
+        "--baselines",
         "flatcam",
         "--field-deg",
         "60",
@@ -139,7 +139,7 @@ fn a_perceptual_distance_fills_its_column() {
     let camera = ["--camera", "cameras/gt1930.toml", "--field-deg", "60"];
     compare(
         &[
-            &[stripes.as_str(), "--rivals", "flatcam", "--lpips", &weights],
+            &[stripes.as_str(), "--baselines", "flatcam", "--lpips", &weights],
             &camera[..],
         ]
         .concat(),
@@ -171,7 +171,7 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     train("blending")
         .assert()
         .code(2)
-        .stderr(contains(refusal("train/stage-camera")));
+        .stderr(contains(refusal("train/stage-not-for-camera")));
     train("magic").assert().code(2).stderr(contains("'--stage <"));
     train("flatnet").assert().success().stdout(contains("weights"));
     let whole = fs::read(at("stage.safetensors")).unwrap();
@@ -183,7 +183,7 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     assert_eq!(fs::metadata(&kept).unwrap().modified().unwrap(), before);
     assert!(fs::read(at("stage.safetensors")).unwrap() == whole);
 
-    let learnt = ["--rivals", "flatcam", "--learnt", &at("stage.safetensors")];
+    let learnt = ["--baselines", "flatcam", "--learnt", &at("stage.safetensors")];
     compare(
         &[&[photographs.as_str()], &camera[..], &learnt].concat(),
         &at("compare"),
@@ -205,7 +205,7 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     .code(2)
     .stderr(contains(format!(
         "{}{}",
-        refusal("table/format"),
+        refusal("table/malformed"),
         at("stage.safetensors")
     )));
 }

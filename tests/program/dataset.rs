@@ -34,7 +34,7 @@ fn bad_images_and_planned_folders_are_refused_before_any_work() {
     let ways: [&[&str]; 2] = [&[], &["--plan"]];
     for plan in ways {
         dataset(&images, &out, plan).code(2).stderr(
-            contains(refusal("imaging/unusable-images"))
+            contains(refusal("scene/images-unusable"))
                 .and(contains("c.png: "))
                 .and(contains("64 x 64"))
                 .and(contains("d.png: ")),
@@ -49,5 +49,5 @@ fn bad_images_and_planned_folders_are_refused_before_any_work() {
     fs::write(out.join("plan.json"), "{}").unwrap();
     dataset(&images, &out, &[])
         .code(2)
-        .stderr(contains(refusal("dataset/folder-of-plan")));
+        .stderr(contains(refusal("dataset/folder-holds-plan")));
 }

@@ -30,7 +30,11 @@ fn the_program_says_so_by_its_exit_code() {
     fs::write(received.join("tone.svg"), "<svg/>").unwrap();
     verify().code(1).stdout(predicates::str::contains("altered: tone.svg"));
     fs::remove_file(received.join("manifest.json")).unwrap();
-    let gone = format!("{}cannot read {}", super::refusal("file/system"), received.display());
+    let gone = format!(
+        "{}cannot read {}",
+        super::refusal("file/operation-failed"),
+        received.display()
+    );
     verify().code(2).stderr(predicates::str::contains(gone));
 }
 

@@ -249,7 +249,7 @@ fn unlike_neighbours_are_refused_before_a_layout_is_written() {
     let (code, said) = run(&design("hexagonal_1550"), &["--fidelity", "neighbours"]);
     assert_eq!(code, Some(2), "{said}");
     assert!(
-        said.contains(&super::refusal("cell/model-not-for-pillar")) && !out.exists(),
+        said.contains(&super::refusal("cell/fidelity-not-for-pillars")) && !out.exists(),
         "{said}"
     );
     let silent = changed(&folder, &[("fidelity = \"rigorous\"", "")]);
@@ -408,7 +408,7 @@ fn a_hexagonal_lens_is_optimised() {
     let refused = asked(&how("published"));
     assert_eq!(refused.status.code(), Some(2));
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(said.contains("error[cell/model-not-for-pillar]"), "{said}");
+    assert!(said.contains("error[cell/fidelity-not-for-pillars]"), "{said}");
     let path = how("fitted");
     let output = asked(&path);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();

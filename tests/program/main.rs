@@ -20,7 +20,7 @@ mod run;
 mod study;
 mod train;
 
-/// What the program prints before the words of a refusal with this identity.
+/// Text that the program prints before the words of a refusal with this identity.
 fn refusal(id: &str) -> String {
     format!("error[{id}]: ")
 }

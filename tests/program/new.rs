@@ -196,7 +196,7 @@ fn a_new_design_like_another_replaces_no_file() {
     let mapping = folder.path().join("mappings/tio2_532.csv");
     fs::create_dir_all(mapping.parent().unwrap()).unwrap();
     fs::write(&mapping, "mine").unwrap();
-    new(&["mine.toml", "--like", "tio2_532"]).stderr(contains(refusal("new/another-file")));
+    new(&["mine.toml", "--like", "tio2_532"]).stderr(contains(refusal("new/exists")));
     assert_eq!(fs::read_to_string(&mapping).unwrap(), "mine");
     assert!(!folder.path().join("mine.toml").exists());
     new(&["mine.toml", "--like", "tio2"]).stderr(contains("tio2_532"));

@@ -42,13 +42,16 @@ fn what_cannot_be_pictured_is_refused() {
     );
     let gt = "cameras/gt1930.toml";
     let cases: [(&[&str], &str); 7] = [
-        (&["--camera", &beside], "error[imaging/sensor-misplaced]"),
-        (&["--camera", &dark], "error[camera/no-light]"),
-        (&["--camera", gt, "--field-deg", "150"], "error[imaging/scene-too-wide]"),
+        (&["--camera", &beside], "error[camera/sensor-misplaced]"),
+        (&["--camera", &dark], "error[camera/channel-without-light]"),
+        (&["--camera", gt, "--field-deg", "150"], "error[scene/field-too-wide]"),
         (&["--camera", gt, "--method", "magic"], "error[restore/unknown-method]"),
-        (&["--camera", gt, "--distance-mm", "0"], "error[option/scene-distance]"),
-        (&["--camera", gt, "--field-deg", "NaN"], "error[imaging/field-of-view]"),
-        (&["--camera", "cameras/none.toml"], "error[file/system]"),
+        (&["--camera", gt, "--distance-mm", "0"], "error[option/out-of-range]"),
+        (
+            &["--camera", gt, "--field-deg", "NaN"],
+            "error[scene/field-out-of-range]",
+        ),
+        (&["--camera", "cameras/none.toml"], "error[file/operation-failed]"),
     ];
     for (arguments, id) in cases {
         let out = folder.path().join("out").display().to_string();
@@ -83,7 +86,7 @@ fn files_that_are_not_what_they_seem_are_refused() {
     at("designs/array_2x4.toml", "star")
         .assert()
         .code(2)
-        .stderr(contains(refusal("imaging/element-not-in-layout")));
+        .stderr(contains(refusal("layout/element-not-found")));
     let whole = folder.path().join("whole.npy");
     let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (40, 40), }\n";
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -94,7 +97,7 @@ fn files_that_are_not_what_they_seem_are_refused() {
     at(DESIGN, &whole.display().to_string())
         .assert()
         .code(2)
-        .stderr(contains(format!("{}{}", refusal("table/format"), whole.display())));
+        .stderr(contains(format!("{}{}", refusal("table/malformed"), whole.display())));
     assert!(!Path::new(&out).exists());
 }
 
@@ -117,9 +120,13 @@ fn frames_that_cannot_be_restored_are_refused() {
     let out = folder.path().join("out").display().to_string();
     let mut said = Vec::new();
     for (frame, more, id) in [
-        (&small, &[][..], "error[table/format]"),
-        (&whole, &[], "error[table/format]"),
-        (&whole, &["--white", "20", "--black-level", "20"], "error[table/format]"),
+        (&small, &[][..], "error[table/malformed]"),
+        (&whole, &[], "error[table/malformed]"),
+        (
+            &whole,
+            &["--white", "20", "--black-level", "20"],
+            "error[table/malformed]",
+        ),
         (
             &whole,
             &["--white", "4095", "--method", "magic"],
@@ -140,11 +147,11 @@ fn frames_that_cannot_be_restored_are_refused() {
     // Which of the three is wrong with a frame is in the words.
     let folder = folder.path();
     insta::assert_snapshot!(metalith_testing::without_folder(said[..3].concat().trim_end(), folder), @"
-    error[table/format]: small.png: the frame is of another camera: it has 64 x 64 pixels, and the camera gives 1936 x 1216
+    error[table/malformed]: small.png: the frame is of another camera: it has 64 x 64 pixels, and the camera gives 1936 x 1216
       help: give the camera that it was recorded with, and the whole frame
-    error[table/format]: whole.png: a frame of 16 bits does not say which number is full scale
+    error[table/malformed]: whole.png: a frame of 16 bits does not say which number is full scale
       help: add --white, such as 4095 of 12 bits or 65520 where these are shifted up, and --black-level if no signal has another number than 0
-    error[table/format]: whole.png: full scale is 20, and no signal 20
+    error[table/malformed]: whole.png: full scale is 20, and no signal 20
       help: give a --white above --black-level
     ");
 }

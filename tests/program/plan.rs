@@ -51,5 +51,5 @@ fn what_no_set_can_say_is_refused_before_a_layout_is_written() {
     std::fs::write(&bench, format!("{text}[wanted]\nfilm_height = 710\n")).unwrap();
     plan(&bench, &["--out", &path("out")])
         .code(2)
-        .stderr(contains(refusal("plan/beyond-bench")));
+        .stderr(contains(refusal("plan/size-out-of-range")));
 }

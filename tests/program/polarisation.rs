@@ -94,7 +94,7 @@ fn a_design_and_options_name_the_same_light() {
     assert_eq!(metalith(&words, &[&path, &layout]).status.code(), Some(0));
     assert_eq!(metalith(&words, &[&other, &layout]).status.code(), Some(2));
     let said = psf(&layout, &["--arriving", "45", "--analyser", "circular"]).unwrap_err();
-    assert!(said.contains(&refusal("light/analyser")), "{said}");
+    assert!(said.contains(&refusal("light/handedness-missing")), "{said}");
     let said = psf(&layout, &["--arriving", "diagonal"]).unwrap_err();
     assert!(said.contains("'--arriving <"), "{said}");
     assert!(psf(&layout, &["--focused", "left"]).is_err());

@@ -183,7 +183,7 @@ fn check<'a>(report: &'a Value, key: &str) -> &'a Value {
     checks.find(|check| check["key"] == key).unwrap()
 }
 
-/// Whether a report finds a limit held.
+/// True if a report finds a limit held.
 fn holds(report: &Value, key: &str) -> bool {
     let check = check(report, key);
     let [reached, limit] = ["reached", "limit"].map(|name| check[name].as_f64().unwrap());
@@ -405,7 +405,7 @@ fn what_cannot_be_read_is_bad_input() {
     let output = metalith(&["psf"], &[&junk]);
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let place = format!("{}{}, byte 0: ", super::refusal("layout/format"), junk.display());
+    let place = format!("{}{}, byte 0: ", super::refusal("layout/malformed"), junk.display());
     assert!(said.contains(&place), "{said}");
     let output = metalith(&["run"], &[&folder.path().join("nowhere.toml")]);
     assert_eq!(output.status.code(), Some(2));
@@ -436,7 +436,7 @@ fn an_error_of_the_mapping_is_a_limit() {
     let output = run("--quiet");
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!((output.status.code(), said.lines().count()), (Some(1), 1), "{said}");
-    assert!(said.starts_with("FAILS: rms phase error of the mapping"), "{said}");
+    assert!(said.starts_with("FAILS: "), "{said}");
     assert!(output.stderr.is_empty());
     let found = report(folder.path());
     assert_eq!(found["checks"][0]["key"], "mapping_phase_rms_max_rad");
@@ -445,7 +445,7 @@ fn an_error_of_the_mapping_is_a_limit() {
     assert!(page.contains("phase 540 nm; mapping 532 nm"));
     let said = String::from_utf8(run("--threads=2").stderr).unwrap();
     assert!(
-        said.starts_with("warning: parts of the design are for different wavelengths"),
+        said.starts_with("warning: ") && said.contains("[design/wavelengths-differ]"),
         "{said}"
     );
 }

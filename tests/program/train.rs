@@ -46,9 +46,9 @@ fn what_cannot_be_learnt_is_refused_before_any_work() {
     ];
     let odd = [&stage[..], &["--piece", "36"]].concat();
     let cases: [(&[&str], &str); 3] = [
-        (&odd, "train/piece"),
+        (&odd, "train/piece-out-of-range"),
         (&stage, "train/too-few-photographs"),
-        (&["--piece", "32", "--batch", "0"], "train/nothing-to-learn"),
+        (&["--piece", "32", "--batch", "0"], "train/steps-out-of-range"),
     ];
     for (arguments, id) in cases {
         train(&photographs, &out, arguments)

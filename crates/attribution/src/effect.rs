@@ -12,7 +12,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// With physical limits and a typical magnitude; zero is sound.
+    /// Parameter with physical limits and a typical magnitude; zero is sound.
     pub const fn new(low: f64, high: f64, typical: f64) -> Self {
         Self {
             range: (low, high),

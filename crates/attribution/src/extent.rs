@@ -1,9 +1,9 @@
-//! What places in the plane span.
+//! Extent of places in the plane.
 
 /// Places are in one line if none is farther off than this share of its length.
 const IN_LINE: f64 = 1e-3;
 
-/// What places span, in their own unit.
+/// Extent of places, in their unit.
 #[derive(Clone, Debug)]
 pub struct Extent {
     /// Middle of the box around them.
@@ -15,7 +15,7 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Of some places; none of a single one.
+    /// Extent of some places; none for a single place.
     pub fn of(at: &[[f64; 2]]) -> Option<Self> {
         let ends = [0, 1].map(|axis| {
             let along = at.iter().map(|p| p[axis]);
@@ -31,7 +31,7 @@ impl Extent {
         Some(own)
     }
 
-    /// How far a place is from the middle in a direction.
+    /// Distance of a place from the middle in a direction.
     pub fn along(&self, place: &[f64; 2], direction: &[f64; 2]) -> f64 {
         (place[0] - self.middle[0]) * direction[0] + (place[1] - self.middle[1]) * direction[1]
     }

@@ -1,4 +1,4 @@
-//! What the statistics need of a simulator: parameters in, predictions and reference values out.
+//! Interface of a simulator for the statistics: parameters in, predictions and reference values out.
 
 use metalith_core::{Progress, Result};
 
@@ -14,11 +14,11 @@ pub struct SmoothTerm {
     /// The kind of error of the model that it is, a number of [`ModelError::sizes`]; none of a term that stands for
     /// nothing, which null tests are made of.
     pub kind: Option<usize>,
-    /// Whether its coefficient is another in each group of [`SmoothGroups`].
+    /// True if its coefficient is another in each group of [`SmoothGroups`].
     pub by_group: bool,
 }
 
-/// Groups of measurements in which some smooth terms have coefficients of their own.
+/// Groups of measurements in which some smooth terms have their own coefficients.
 #[derive(Clone, Debug)]
 pub struct SmoothGroups {
     /// Group of each measurement.
@@ -27,7 +27,7 @@ pub struct SmoothGroups {
     pub count: usize,
 }
 
-/// What the model errs by, as one standard deviation.
+/// Error of the model, as one standard deviation.
 #[derive(Clone, Debug)]
 pub struct ModelError {
     /// Size of the coefficient of each smooth term of each kind.
@@ -37,14 +37,14 @@ pub struct ModelError {
     /// Shapes that the error of what effects change is spread over: the fewer, the more of it looks like an effect. No
     /// fewer than the smooth terms.
     pub shapes: f64,
-    /// Whether an effect is seen beside the smooth terms where these were simulated, at the stated parameters, and what is
+    /// True if an effect is seen beside the smooth terms where these were simulated, at the stated parameters, and what is
     /// known of the values of each effect counts. If not, the effect is seen as it is where it was found: a prediction
     /// far from what was stated and the change of a stated one do not belong together, and are more alike than they
     /// should be.
     pub by_effect: bool,
 }
 
-/// Where a forward model is evaluated.
+/// Place at which a forward model is evaluated.
 #[derive(Clone, Debug)]
 pub struct ParameterPoint {
     /// Value of each parameter, by slot.
@@ -54,12 +54,12 @@ pub struct ParameterPoint {
 }
 
 impl ParameterPoint {
-    /// Without a smooth term.
+    /// Place without a smooth term.
     pub fn new(theta: Vec<f64>) -> Self {
         Self { theta, smooth: None }
     }
 
-    /// With a smooth term.
+    /// Place with a smooth term.
     pub fn with(theta: &[f64], term: usize) -> Self {
         Self {
             theta: theta.to_vec(),
@@ -73,7 +73,7 @@ pub type Model<'a, M> = dyn ForwardModel<Prediction = <M as Measurements>::Predi
 
 /// A simulator of measurements whose parameters belong to effects.
 pub trait ForwardModel: Send + Sync {
-    /// What is predicted of one measurement.
+    /// Prediction of one measurement.
     type Prediction;
 
     /// Number of effects.
@@ -85,21 +85,21 @@ pub trait ForwardModel: Send + Sync {
     /// All parameters of all effects.
     fn slots(&self) -> &[Slot];
 
-    /// Whether predictions have a kink where the parameters of an effect are zero, so that one side tells nothing
+    /// True if predictions have a kink where the parameters of an effect are zero, so that one side tells nothing
     /// of the other.
     fn kinked(&self, effect: usize) -> bool;
 
-    /// Whether some parameters of an effect change nothing while all are zero.
+    /// True if some parameters of an effect change nothing while all are zero.
     fn dormant(&self, _effect: usize) -> bool {
         false
     }
 
-    /// By how much the change of a prediction by an effect may be wrong, relative: what correct programs differ by.
+    /// Relative error that the change of a prediction by an effect may have: the difference of correct programs.
     fn error_share(&self, _effect: usize) -> f64 {
         0.0
     }
 
-    /// What the value that is found for an effect may be wrong by, beside noise and the smooth terms.
+    /// Error of the value that is found for an effect, besides noise and the smooth terms.
     fn value_error(&self, _effect: usize) -> ValueError {
         ValueError::NONE
     }
@@ -108,16 +108,16 @@ pub trait ForwardModel: Send + Sync {
     /// stored; none where every value costs the same.
     fn cheap_step(&self, slot: usize) -> Option<f64>;
 
-    /// Whether simulating other values of a parameter beside those in `about` is so dear that its changes are
+    /// True if simulating other values of a parameter beside those in `about` is so dear that its changes are
     /// rather taken to add to theirs.
     fn is_dear_beside(&self, about: &[f64], slot: usize) -> bool;
 
-    /// What the predictions of all measurements take at one point, about (bytes).
+    /// Approximate memory of the predictions of all measurements at one point (bytes).
     fn prediction_bytes(&self) -> f64 {
         0.0
     }
 
-    /// What takes less memory, for a person.
+    /// Advice to the user on how to need less memory.
     fn memory_hint(&self) -> String {
         "give fewer or smaller measurements, or try fewer effects".into()
     }
@@ -125,13 +125,13 @@ pub trait ForwardModel: Send + Sync {
     /// Smooth terms that stand for no effect, those of no kind first; none where there are no such terms.
     fn smooth_terms(&self) -> Vec<SmoothTerm>;
 
-    /// Groups of measurements in which smooth terms may have coefficients of their own.
+    /// Groups of measurements in which smooth terms may have their own coefficients.
     fn smooth_groups(&self) -> SmoothGroups;
 
-    /// What the model errs by.
+    /// Error of the model.
     fn model_error(&self) -> ModelError;
 
-    /// What the model may err by at most: a claim must stand against it.
+    /// Largest error of the model: a claim must hold in spite of it.
     fn cautious_model_error(&self) -> ModelError {
         self.model_error()
     }
@@ -146,7 +146,7 @@ pub trait ForwardModel: Send + Sync {
         progress: &dyn Progress,
     ) -> Result<Vec<PerMeasurement<Self::Prediction>>>;
 
-    /// What the parameters add to each value that another instrument measured; none of a value that the model does not
+    /// Change by the parameters of each value that another instrument measured; none of a value that the model does not
     /// predict.
     fn reference_values(&self, theta: &[f64]) -> Vec<Option<f64>>;
 

@@ -66,7 +66,7 @@ impl Term {
     }
 }
 
-/// What the first two terms change together and neither alone: the product of their parameters, on one pattern.
+/// Change by the first two terms together and by neither alone: the product of their parameters, on one pattern.
 #[derive(Clone, Copy)]
 pub(crate) struct Product {
     pub periods: [u32; 2],
@@ -376,7 +376,7 @@ impl LinearModel {
         Surrogate::simulate(self, &vec![0.0; self.slots.len()], true, &Silent).unwrap()
     }
 
-    /// Noise-free data, each measurement with parameters of its own; `noise` is a seed.
+    /// Noise-free data, each measurement with its own parameters; `noise` is a seed.
     pub(crate) fn data(&self, theta: impl Fn(usize) -> Vec<f64>, noise: Option<u64>) -> Samples {
         let mut rng = ChaCha8Rng::seed_from_u64(noise.unwrap_or(0));
         let sigma = if noise.is_some() { SIGMA } else { 0.0 };

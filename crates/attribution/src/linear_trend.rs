@@ -11,22 +11,22 @@ const OFF_SHARE: f64 = 0.1;
 /// Values that are put as linear over a plane or a line.
 #[derive(Clone, Debug)]
 pub struct LinearTrend {
-    /// What the coordinates span, in their unit.
+    /// Extent of the coordinates, in their unit.
     pub extent: Extent,
     /// Slope along each direction, with its standard deviation.
     pub slopes: Vec<(f64, f64)>,
     /// Value in the middle, with its standard deviation.
     pub at_middle: (f64, f64),
-    /// How far the farthest value is from this.
+    /// Distance of the farthest value from this.
     pub off: f64,
-    /// Whether the values are linear, to what they are known to.
+    /// True if the values are linear, to what they are known to.
     pub is_linear: bool,
     /// Values beyond as many as determine the trend: with none, any values are linear.
     pub degrees_of_freedom: usize,
 }
 
 impl LinearTrend {
-    /// Of values, each with its standard deviation, at these coordinates; none of a single place.
+    /// Trend of values, each with its standard deviation, at these coordinates; none for a single place.
     pub fn new(at: &[[f64; 2]], values: &[(f64, f64)]) -> Option<Self> {
         let extent = Extent::of(at)?;
         let directions = &extent.directions;

@@ -1,4 +1,4 @@
-//! What the statistics need of measurements: residuals, derivatives and nuisances as normal equations, and groups.
+//! Interface of measurements for the statistics: residuals, derivatives and nuisances as normal equations, and groups.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use crate::index::{MeasurementIndex, PerMeasurement};
 /// equations. Those that measurements share (a gain, an offset) stand first in all normal equations. A prediction is what
 /// the forward model says of one measurement before any nuisance acts: an element of a vector space.
 pub trait Measurements: Clone + Send + Sync {
-    /// What the forward model says of one measurement.
+    /// Result of the forward model for one measurement.
     type Prediction: Clone + Send + Sync;
     /// The values of all nuisances.
     type Nuisances: Clone + Send + Sync;
@@ -50,7 +50,7 @@ pub trait Measurements: Clone + Send + Sync {
         used: &PerMeasurement<bool>,
     ) -> Self::Nuisances;
 
-    /// What is known of the shared nuisances beforehand, as normal equations of `size` columns about the present values.
+    /// Prior knowledge of the shared nuisances, as normal equations of `size` columns about the present values.
     fn prior(&self, nuisances: &Self::Nuisances, size: usize) -> DMatrix<f64>;
 
     /// The normal equations of a measurement with this prediction; `derivatives` are those of the prediction by further
@@ -122,7 +122,7 @@ fn inverse_of_first(gram: &DMatrix<f64>, own: usize) -> DMatrix<f64> {
     a.try_inverse().unwrap_or_else(|| DMatrix::zeros(own, own))
 }
 
-/// A value that another instrument measured, which the forward model predicts without nuisances of its own.
+/// A value that another instrument measured, which the forward model predicts without its own nuisances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceValue {
     /// Measured less stated.

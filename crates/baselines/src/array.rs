@@ -43,7 +43,7 @@ impl<'a> ArrayCamera<'a> {
         }
     }
 
-    /// Same camera with learnt last stages, each a further method.
+    /// This camera with learnt last stages, each a further method.
     #[must_use]
     pub fn with_stages(mut self, stages: Vec<Stage>) -> Self {
         self.stages = stages;

@@ -69,8 +69,8 @@ pub trait BaselineCamera {
 /// Error that a camera has no such last stage.
 pub(crate) fn no_stage<T>(kind: StageKind, camera: &str) -> Result<T> {
     Err(metalith_core::Error::refused(
-        "compare/stage-of-another-camera",
-        format!("the last stage `{}` is not for {camera}", kind.name()),
+        "compare/stage-not-for-camera",
+        format!("the last stage `{}` cannot be used with {camera}", kind.name()),
         "flatnet is for FlatCam, unrolled-diffuser for DiffuserCam, multi-wiener and blending for arrays",
     ))
 }

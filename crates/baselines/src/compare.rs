@@ -88,9 +88,13 @@ pub fn compare(
     perceptual: Option<&PerceptualDistance>,
     progress: &dyn Progress,
 ) -> Result<ComparedCamera> {
-    let first = photographs
-        .first()
-        .ok_or_else(|| Error::refused("compare/no-photographs", "no photographs", "give at least one"))?;
+    let first = photographs.first().ok_or_else(|| {
+        Error::refused(
+            "compare/no-photographs",
+            "there are no photographs",
+            "give at least one photograph",
+        )
+    })?;
     let limits = camera.limits();
     if let Some(limits) = &limits {
         progress.warn(&format!("{name}: {limits}"));

@@ -39,7 +39,7 @@ pub struct Comparison {
     /// Photographs are cut to the square of so many pixels in their middle.
     #[serde(default)]
     pub pixels: Option<usize>,
-    /// Weights of learnt last stages, each behind the cameras that it was taught for.
+    /// Weights of learnt last stages, each behind the cameras that it was trained for.
     #[serde(default)]
     pub learnt: Vec<PathBuf>,
     /// Weights of the learned perceptual distance, if pictures are judged by it.
@@ -100,7 +100,7 @@ impl Comparison {
             return Err(Error::refused(
                 "compare/no-camera",
                 "no camera to compare",
-                "give --design, --rivals or both",
+                "give --design, --baselines or both",
             ));
         }
         let methods = self.methods.iter().map(|m| m.parse()).collect::<Result<_>>()?;
@@ -113,8 +113,8 @@ impl Comparison {
         let Some(first) = photographs.first().map(|p| p.view) else {
             return Err(Error::refused(
                 "compare/no-photographs",
-                "no photographs",
-                "give at least one",
+                "there are no photographs",
+                "give at least one photograph",
             ));
         };
         if let Some(other) = photographs.iter().find(|p| p.view != first) {
@@ -323,7 +323,7 @@ impl OpenComparison<'_> {
     ) -> Result<()> {
         let view = self.photographs[0].view;
         let (camera, stage, [kind, light]) = match as_the_paper {
-            // Last stages were taught with all light of a channel.
+            // Last stages were trained with all light of a channel.
             true => (
                 of_one_wavelength(&self.camera)?,
                 None,

@@ -130,7 +130,7 @@ impl LenslessBench {
     pub fn new(camera: &Camera, view: SceneView, step_nm: f64) -> Result<Self> {
         if !(view.field_deg > 0.0 && view.field_deg < WIDEST_DEG) {
             return Err(Error::refused(
-                "lensless/field-of-view",
+                "scene/field-out-of-range",
                 format!("a field of {} degrees", view.field_deg),
                 format!("give a field of more than 0 and less than {WIDEST_DEG} degrees"),
             ));
@@ -138,8 +138,8 @@ impl LenslessBench {
         let [rows, columns] = [camera.sensor.rows, camera.sensor.columns];
         if rows.min(columns) < 2 {
             return Err(Error::refused(
-                "lensless/sensor-size",
-                format!("a sensor of {columns} x {rows} pixels behind a camera without a lens"),
+                "lensless/sensor-too-small",
+                format!("the sensor has {columns} x {rows} pixels, too few for a camera without a lens"),
                 "give a sensor of at least 2 x 2 pixels: each colour has its own in a square of these",
             ));
         }
@@ -147,16 +147,16 @@ impl LenslessBench {
         let colours = ChannelColours::of(&sampling.channels);
         if !colours.has_colours() {
             return Err(Error::refused(
-                "lensless/colours",
-                format!("camera `{}` tells no three colours apart", camera.name),
-                "compare cameras without a lens behind a camera of colours",
+                "lensless/sensor-without-colours",
+                format!("camera `{}` does not record three colours", camera.name),
+                "give a camera file with three colour channels",
             ));
         }
         if view.distance_um.is_finite() {
             return Err(Error::refused(
-                "lensless/near-scene",
-                "a scene near to a camera without a lens",
-                "compare such cameras on scenes that are far away",
+                "lensless/scene-too-near",
+                "the scene is at a finite distance, which cameras without a lens are not simulated for",
+                "leave out the distance of the scene",
             ));
         }
         let falloff = Array2::from_shape_fn((view.rows, view.columns), |(y, x)| {
@@ -173,7 +173,7 @@ impl LenslessBench {
         })
     }
 
-    /// Same bench with the exposure that suits the light of a white scene.
+    /// This bench with the exposure that suits the light of a white scene.
     ///
     /// # Errors
     /// If none of it reaches the sensor.
@@ -281,7 +281,7 @@ impl LenslessBench {
         match scene.view == self.view {
             true => Ok(()),
             false => Err(Error::refused(
-                "compare/scenes-differ",
+                "scene/views-differ",
                 format!("the scene `{}` has another size or field than the first", scene.name),
                 "give scenes of one size and field at a time",
             )),

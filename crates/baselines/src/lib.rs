@@ -12,7 +12,7 @@
 //! | what cameras without a lens have in common | `lensless` |
 //! | a mask that is a product of two sequences | `flatcam/` |
 //! | the caustic of a random surface | `diffusercam/` |
-//! | learnt last stages, what they are taught by, and pictures by Wiener filters for one of them | `stage`, `provenance`, `training_stacks` (feature `training`), `wiener` |
+//! | learnt last stages, what they are trained by, and pictures by Wiener filters for one of them | `stage`, `provenance`, `training_stacks` (feature `training`), `wiener` |
 //! | which cameras, from their files | `comparison` |
 //! | scores of all photographs | `compare` |
 //! | the table, the page | `table`, `page` |

@@ -1,4 +1,4 @@
-//! Learnt last stages in a comparison: which camera each was taught for.
+//! Learnt last stages in a comparison: which camera each was trained for.
 
 use std::collections::HashSet;
 
@@ -93,8 +93,8 @@ impl OpenComparison<'_> {
                 false => "for none of these cameras at this size and field of photographs",
             };
             return refused(
-                format!("the last stage `{kind}` was taught {why}"),
-                "compare the camera that it was taught for, or teach it by `metalith train --stage`",
+                format!("the last stage `{kind}` was trained {why}"),
+                "compare the camera that it was trained for, or train it by `metalith train --stage`",
             );
         }
         Ok(())
@@ -108,14 +108,14 @@ impl OpenComparison<'_> {
         all.filter(|(stage, _)| silent(stage))
             .map(|(_, path)| {
                 format!(
-                    "{}: taught before the digest of the design's materials and cell was kept; these are taken to be as they were",
+                    "{}: trained before the digest of the design's materials and cell was kept; these are taken to be as they were",
                     path.display()
                 )
             })
             .collect()
     }
 
-    /// The stages that were taught for camera `k`, of those without assumptions.
+    /// The stages that were trained for camera `k`, of those without assumptions.
     pub(crate) fn stages_of(&self, k: usize) -> Result<Vec<Stage>> {
         if self.stages.is_empty() {
             return Ok(Vec::new());
@@ -132,7 +132,7 @@ mod tests {
 
     use super::*;
 
-    /// Weights are of the camera whose layout does to light what they were taught with; those that came before this was kept, such
+    /// Weights are of the camera whose layout does to light what they were trained with; those that came before this was kept, such
     /// as the shipped ones, go by the layout alone.
     #[test]
     fn last_stages_know_what_their_layout_does_to_light() {

@@ -1,4 +1,4 @@
-//! Learnt last stages of cameras: which there are, what they see, and which camera each was taught for.
+//! Learnt last stages of cameras: which there are, what they see, and which camera each was trained for.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -70,7 +70,7 @@ impl FromStr for StageKind {
         Self::ALL.into_iter().find(|k| k.name() == text).ok_or_else(|| {
             Error::refused(
                 "compare/unknown-stage",
-                format!("`{text}` is no learnt last stage"),
+                format!("there is no last stage `{text}`"),
                 "use flatnet, unrolled-diffuser, multi-wiener or blending",
             )
         })
@@ -105,7 +105,7 @@ impl Stage {
     /// One picture of those that were restored from a frame, all linear sRGB `[row, column, colour]`.
     ///
     /// # Errors
-    /// If there are more or fewer than it was taught by.
+    /// If there are more or fewer than it was trained by.
     pub fn finish(&self, pictures: &[Array3<f64>]) -> Result<Array3<f64>> {
         let shown: Vec<Array3<f32>> = pictures.iter().map(encoded).collect();
         let found = self.post_processor.finish(&shown)?;
@@ -122,6 +122,6 @@ pub(crate) fn encoded(picture: &Array3<f64>) -> Array3<f32> {
 pub(crate) fn camera_digest(optics: &impl Serialize, camera: &Camera, view: &SceneView) -> Result<String> {
     let field = [view.rows as f64, view.columns as f64, view.field_deg];
     let text = serde_json::to_vec(&(optics, camera, field))
-        .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+        .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
     Ok(hex(&Sha256::digest(text)))
 }

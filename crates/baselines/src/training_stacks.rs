@@ -1,4 +1,4 @@
-//! Pictures that a last stage is taught by.
+//! Pictures that a last stage is trained by.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::provenance::Followed;
 use crate::stage::{StageKind, encoded};
 
 impl OpenComparison<'_> {
-    /// Pictures of all photographs by camera `k` for a last stage, each with its scene, and what is taught by them. Each is kept in a file
+    /// Pictures of all photographs by camera `k` for a last stage, each with its scene, and what is trained by them. Each is kept in a file
     /// of a folder, and taken from there if it is of the same camera, photograph and noise. Camera `k` is counted without assumptions.
     ///
     /// # Errors

@@ -81,7 +81,7 @@ mod tests {
         std::fs::create_dir(folder.path().join("captures")).unwrap();
         assert!(check_not_begun(folder.path()).is_ok());
         write(folder.path().join("captures/one.png"), "").unwrap();
-        let error = check_not_begun(folder.path()).unwrap_err().to_string();
-        assert!(error.contains("frames"), "{error}");
+        let error = check_not_begun(folder.path()).unwrap_err();
+        assert_eq!(error.id(), "plan/folder-in-use");
     }
 }

@@ -47,7 +47,7 @@ pub(crate) fn candidates(
     let maps = reader.pillars(layout, layer, design.cell.shape, &sites, progress)?;
     if let Some(empty) = maps.iter().zip(&sites).find(|(map, _)| map.pillars() == 0) {
         return Err(Error::refused(
-            "measured-set/element-not-in-layout",
+            "layout/element-not-found",
             format!("the layout has no pillars of element {}", empty.1.name),
             "give the layout that was written from this design",
         ));
@@ -56,9 +56,9 @@ pub(crate) fn candidates(
     let (measurements, unseen) = measurements(design, bench, &set, &chosen);
     if measurements.is_empty() {
         return Err(Error::refused(
-            "plan/no-light",
-            "no measurement of this bench would see light",
-            "name angles in `field_deg` that the elements look at",
+            "plan/no-measurement-with-light",
+            "no measurement of this bench receives light",
+            "name angles in `field_deg` of the bench that are viewing directions of the elements",
         ));
     }
     Ok(Candidates {

@@ -1,8 +1,8 @@
-//! Which measurements to take: the fewest that detect every effect at its wanted size and tell it from every other.
+//! Choice of measurements: the fewest that detect every effect at its wanted size and distinguish it from every other.
 //!
 //! What a set tells of a parameter is the Schur complement of its normal equations: the chi-square that an effect of the
 //! wanted size adds and that nuisances, and one other effect, cannot take up. Per pixel this is the gain by which a
-//! calibration judges, so an effect counts as detected or told apart if it is [`NEEDED`].
+//! calibration judges, so an effect counts as detected or distinguished if it is [`NEEDED`].
 //!
 //! The choice is greedy by the worst detection: at each step the measurement that raises the sum of the logarithms of all
 //! margins that are still below one. Then measurements without which all margins stay are taken out again, and the rest gets
@@ -20,7 +20,7 @@ pub(crate) const NEEDED: f64 = 2.0 * LEAST_GAIN;
 /// Least margin that is told from nothing.
 const NOTHING: f64 = 1e-9;
 
-/// What a missing group costs, as a margin would that is below one by this logarithm: a second colour, element and distance,
+/// Cost of a missing group, equal to that of a margin which is below one by this logarithm: a second colour, element and distance,
 /// and beams, are what a calibration holds its fits against.
 const MISSING_GROUP: f64 = 3.0;
 
@@ -35,13 +35,13 @@ const SAME: f64 = 1e-9;
 pub(crate) struct Requirement {
     /// Number of the parameter.
     pub slot: usize,
-    /// Its wanted size.
+    /// Wanted size.
     pub size: f64,
     /// The parameters of the effect that it is to be told from; none where it is only to be detected.
     pub beside: Vec<usize>,
 }
 
-/// Where a candidate stands: groups that a calibration leaves out in turn.
+/// Groups of a candidate that a calibration leaves out in turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Place {
     pub element: usize,
@@ -50,7 +50,7 @@ pub(crate) struct Place {
     pub distance_um: f64,
 }
 
-/// What is weighed.
+/// Quantities that are weighed.
 pub(crate) struct Choice<'a> {
     pub information: &'a Information,
     pub places: Vec<Place>,
@@ -136,7 +136,7 @@ impl Choice<'_> {
             )
     }
 
-    /// Whether any measurements of the bench meet each requirement: all of them, those of one colour, element, distance or angle,
+    /// True if any measurements of the bench meet each requirement: all of them, those of one colour, element, distance or angle,
     /// or one alone. Measurements that show nothing of an effect dilute its gain, so that all are not always the best.
     pub(crate) fn reachable(&self) -> Vec<bool> {
         let all: Vec<usize> = (0..self.places.len()).collect();

@@ -1,4 +1,4 @@
-//! What each candidate measurement tells of each parameter: its normal equations by the simulator and the noise of the bench.
+//! Information of each candidate measurement on each parameter: its normal equations by the simulator and the noise of the bench.
 
 use metalith_core::{Progress, Result};
 use nalgebra::DMatrix;
@@ -20,7 +20,7 @@ const TOGETHER: usize = 12;
 
 /// A measurement, exposed as it would be, and what it tells.
 pub(crate) struct Told {
-    /// With its scale set to the exposure, and what it would show.
+    /// Candidate with its scale set to the exposure, and its predicted frame.
     pub measurement: Measurement,
     /// Inner products of flux of each LED, black level, every parameter, and the residual, as
     /// [`metalith_attribution::NormalEquations`] has them.
@@ -29,12 +29,12 @@ pub(crate) struct Told {
     pub pixels: f64,
 }
 
-/// What all candidates tell.
+/// Information of all candidates.
 pub(crate) struct Information {
     pub told: Vec<Told>,
-    /// What is known of flux and black level beforehand.
+    /// Prior knowledge of flux and black level.
     pub prior: DMatrix<f64>,
-    /// What the widths by SEM tell, where the bench offers them.
+    /// Information of the widths by SEM, if the bench offers them.
     pub widths: Option<DMatrix<f64>>,
     /// Number of shared nuisances, which stand first.
     pub shared: usize,

@@ -1,4 +1,4 @@
-//! How well a chosen session would do: the gain of each effect at its wanted size, the interval that a calibration would
+//! Forecast for a chosen session: the gain of each effect at its wanted size, the interval that a calibration would
 //! give it, and what could be taken for it.
 
 use metalith_core::{Progress, Result};
@@ -19,21 +19,21 @@ const ENOUGH: f64 = 1.0 - 1e-6;
 /// An effect as the planned session would see it.
 #[derive(Clone, Debug, Serialize)]
 pub struct PlannedEffect {
-    /// With its axis or number where it has several.
+    /// Name, with its axis or number where an effect has several.
     pub name: String,
     pub unit: String,
     /// Size that is to be found, in `unit`: a change from what is stated, or the distance of a source.
     pub wanted: f64,
-    /// What a calibration would report for it: of the height of the film and of widths and sizes of the light the whole.
+    /// Value that a calibration would report for it: of the height of the film and of widths and sizes of the light the whole.
     pub reported: f64,
     /// Gain in reduced chi-square per pixel at this size, and what is asked for.
     pub gain: f64,
     pub needed: f64,
     /// Half of the 95 % interval that a calibration would give it there, in `unit`, if it is the only one.
     pub half_interval: f64,
-    /// Whether it is found: gain enough, and an interval without zero.
+    /// True if it is found: gain enough, and an interval without zero.
     pub detected: bool,
-    /// Whether any measurements of this bench could find it.
+    /// True if any measurements of this bench could find it.
     pub reachable: bool,
 }
 
@@ -41,24 +41,24 @@ pub struct PlannedEffect {
 #[derive(Clone, Debug, Serialize)]
 pub struct Confusion {
     pub effect: String,
-    /// Its size, and its unit.
+    /// Size, and its unit.
     pub size: f64,
     pub unit: String,
-    /// What it looks like.
+    /// Effect that it resembles.
     pub looks_like: String,
     /// At this size of each of its parameters, in its own unit.
     pub at: Vec<f64>,
     pub looks_like_unit: String,
-    /// Gain in reduced chi-square per pixel by which measurements tell them apart, and what is asked for.
+    /// Gain in reduced chi-square per pixel by which measurements distinguish them, and what is asked for.
     pub gain: f64,
     pub needed: f64,
-    /// Whether other measurements of this bench would tell them apart.
+    /// True if other measurements of this bench would distinguish them.
     pub measurements_could: bool,
-    /// By how much the widths by SEM raise chi-square, where the bench offers them.
+    /// Increase of chi-square by the widths by SEM, if the bench offers them.
     pub sem_chi2: Option<f64>,
-    /// Whether that decides.
+    /// True if that decides.
     pub sem_decides: bool,
-    /// The measurement that would tell them apart, as far as one is known.
+    /// The measurement that would distinguish them, as far as one is known.
     pub separate_by: Option<String>,
 }
 
@@ -124,7 +124,8 @@ pub(crate) fn effects(
     Ok(out)
 }
 
-/// What the chosen measurements cannot tell apart: pairs of effects that are both found, by the worst direction of each pair.
+/// Pairs that the chosen measurements cannot distinguish: pairs of effects that are both found, by the worst direction of each
+/// pair.
 pub(crate) fn confusions(
     simulator: &Simulator<'_>,
     set: &MeasuredSet,
@@ -177,7 +178,7 @@ pub(crate) fn confusions(
 }
 
 impl Confusion {
-    /// What to do about it, for a person.
+    /// Advice to the user.
     pub fn remedy(&self) -> String {
         let sem = match (self.sem_chi2, self.sem_decides) {
             (Some(chi2), true) => Some(format!(

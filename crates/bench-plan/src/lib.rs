@@ -1,4 +1,4 @@
-//! Before measuring: which measurements tell which effects apart, and the session that takes them.
+//! Plan of a session before it is measured: the measurements that distinguish the effects.
 //!
 //! ```text
 //! design, layout, bench -> candidates -> what each tells -> the fewest that do -> set folder, check list
@@ -12,7 +12,7 @@
 //! | `wanted` | what is asked of them |
 //! | `information` | normal equations of each, by the simulator and the noise |
 //! | `choice` | the fewest measurements |
-//! | `judgement` | what they find, and what they cannot tell apart |
+//! | `judgement` | what they find, and what they cannot distinguish |
 //! | `begun` | a folder whose plan is not to be overwritten |
 //! | `files`, `page` | the set folder, and the check list |
 
@@ -70,7 +70,7 @@ pub struct MeasurementPlan {
     pub candidates: usize,
     pub measurements: Vec<PlannedMeasurement>,
     pub effects: Vec<PlannedEffect>,
-    /// Pairs that the measurements cannot tell apart.
+    /// Pairs that the measurements cannot distinguish.
     pub confusions: Vec<Confusion>,
     /// SHA-256 in hexadecimal of the files that a person fills in, as they were written.
     pub written: BTreeMap<String, String>,
@@ -87,28 +87,28 @@ pub struct PlannedMeasurement {
     pub window_centre_um: [f64; 2],
     pub frames: u32,
     pub scale_dn: f64,
-    /// Of the brightest pixel (DN), black level included.
+    /// Value of the brightest pixel (DN), black level included.
     pub brightest_dn: f64,
 }
 
-/// What is planned, and where it goes.
+/// Subject of the plan, and its folder.
 pub struct PlanRequest<'a> {
     pub design: &'a Design,
     pub bench: &'a BenchFile,
     /// The layout that is or will be written.
     pub layout: &'a Path,
-    /// Its path as the set names it.
+    /// Path as the set names it.
     pub layout_in_set: String,
     /// Folder of the set.
     pub folder: &'a Path,
     /// Plan for these effects alone; for all if empty.
     pub only: Vec<String>,
-    /// Where tables of cells are kept from one run to the next.
+    /// Folder of cached tables of cells.
     pub cache: Option<PathBuf>,
 }
 
 impl MeasurementPlan {
-    /// Whether every effect that this bench can see at all is found at its wanted size.
+    /// True if every effect that this bench can see at all is found at its wanted size.
     pub fn finds_all(&self) -> bool {
         self.effects.iter().all(|e| e.detected)
     }

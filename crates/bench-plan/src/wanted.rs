@@ -57,7 +57,7 @@ fn beyond(effect: &dyn Effect, wanted: f64, parameter: &Parameter, set: &Measure
     };
     let [low, high] = ends.map(|end| sig(end, 3));
     let what = format!("`{name} = {wanted}` of [wanted]: it may be {low} to {high} {unit}");
-    Error::refused("plan/beyond-bench", what.trim_end(), hint)
+    Error::refused("plan/size-out-of-range", what.trim_end(), hint)
 }
 
 /// Each parameter of each effect is to be detected, and to be told from each other effect. Parameters that change nothing

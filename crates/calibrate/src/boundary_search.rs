@@ -24,7 +24,7 @@ const ROUNDS: usize = 2;
 /// An answer, with its evidence where there was enough to search in.
 pub(crate) type Found = (Diagnosis, Option<Evidence>);
 
-/// What is made of an answer, and of the session that it is of.
+/// Result that is made of an answer and of its session.
 type Conclude<'c, T> = dyn Fn(&Session<'_>, &Simulations, Found) -> Result<T> + 'c;
 
 /// Diagnose a session with its simulations, and conclude: about a boundary where one is found that nobody stated.
@@ -101,7 +101,7 @@ fn about<T>(
 fn tell(boundary: &FieldBoundary, progress: &dyn Progress) {
     let [x, y] = boundary.at_um;
     progress.note(&format!(
-        "write fields that meet at x = {x:.1} um or y = {y:.1} um of every lens would explain {:.0} % of what is left",
+        "write fields that meet at x = {x:.1} um or y = {y:.1} um of every lens would explain {:.0} % of the residual",
         100.0 * boundary.removes
     ));
 }

@@ -18,7 +18,7 @@ pub struct Rung {
     pub fidelity: String,
     /// Reduced chi-square per pixel of the fit.
     pub fit: f64,
-    /// The same on measurements left out.
+    /// Error on measurements left out.
     pub held_out: f64,
     /// Residual of each measurement (sigma), nuisances fitted; for pictures.
     #[serde(skip)]

@@ -4,7 +4,7 @@ use metalith_attribution::{LinearTrend, Pattern};
 
 use crate::set::{MeasuredSet, MeasurementIndex};
 
-/// What measurements have in common that share a value.
+/// Quantity that measurements of one group share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Grouping {
     Element,
@@ -22,7 +22,7 @@ impl Grouping {
         Self::ALL[pattern.by]
     }
 
-    /// As a word.
+    /// Name of the quantity.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Element => "element",
@@ -32,7 +32,7 @@ impl Grouping {
         }
     }
 
-    /// What measurements of one group have in common: the place of the element (um), the centre of the LED (nm), the distance (um),
+    /// Value that measurements of one group share: the place of the element (um), the centre of the LED (nm), the distance (um),
     /// or the angle of incidence (degrees).
     pub(crate) fn coordinates(self, set: &MeasuredSet, measurement: MeasurementIndex) -> [f64; 2] {
         let own = &set.measurements[measurement];
@@ -45,7 +45,7 @@ impl Grouping {
     }
 }
 
-/// What the values of a pattern are like over what its groups differ in; none where that is a single place.
+/// Trend of the values of a pattern over the coordinate of its groups; none if it has a single value.
 pub(crate) fn linear_trend(pattern: &Pattern, set: &MeasuredSet) -> Option<LinearTrend> {
     let by = Grouping::of(pattern);
     let at: Vec<[f64; 2]> = pattern.groups.iter().map(|&c| by.coordinates(set, c)).collect();

@@ -12,7 +12,7 @@
 //! | `data`, `screening`, `speckle`, `grouping` | measurements, nuisances and noise as `metalith-attribution` needs them | `bench` |
 //! | `simulator_model`, `smooth_shape`, `cell_error` | the simulated bench as its forward model | `data` |
 //! | `statistics` | the types of `metalith-attribution` for these measurements | `data` |
-//! | `proposal` | effects for what is left | `statistics`, `session` |
+//! | `proposal` | effects for the residual | `statistics`, `session` |
 //! | `session`, `diagnosis`, `boundary_search`, `page`, `run` | a set from its files to its answer | all above |
 //! | `validate` | the calibration judged on synthetic sets | all above |
 

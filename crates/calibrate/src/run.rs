@@ -70,10 +70,10 @@ pub fn calibrate(
     Ok(done)
 }
 
-/// Times that what is left is looked at for effects of its own where these are adopted: a strong one hides a weak one.
+/// Rounds in which the residual is searched for further effects where these are adopted: a strong one hides a weak one.
 const ADOPTIONS: usize = 2;
 
-/// Propose effects for what is left, adopt them if that is wanted and explains more, and write the answer.
+/// Propose effects for the residual, adopt them if that is wanted and explains more, and write the answer.
 ///
 /// # Errors
 /// As [`calibrate`].

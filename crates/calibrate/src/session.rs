@@ -20,17 +20,17 @@ use crate::speckle::DefectNoise;
 use crate::statistics::{EndsSearch, Evidence, Fit, FitProblem, Surrogate, attribute_set, fit_of, half_widths};
 use crate::width_parts::WidthParts;
 
-/// How a set is worked on.
+/// Settings of the work on a set.
 #[derive(Clone, Debug)]
 pub struct Settings {
     pub sampling: BenchSampling,
-    /// Where tables of cells are kept from one run to the next; nowhere if none.
+    /// Folder of cached tables of cells; no cache if none.
     pub cache: Option<PathBuf>,
     /// Try these effects alone; all if empty.
     pub only: Vec<String>,
     /// Effects that are tried beside those of the library.
     pub declared: Vec<DeclaredEffect>,
-    /// Try the effects that are proposed for what is left as well.
+    /// Try the effects that are proposed for the residual as well.
     pub adopt: bool,
     /// Compare the three fidelities of the cell first.
     pub compare_fidelities: bool,
@@ -63,7 +63,7 @@ pub struct Simulations {
     pub defects: Option<(usize, DefectNoise)>,
 }
 
-/// Which measurements can be used.
+/// Measurements that can be used.
 pub struct Screening {
     pub used: PerMeasurement<bool>,
     pub unusable: Vec<UnusableMeasurement>,
@@ -72,7 +72,7 @@ pub struct Screening {
 }
 
 impl Screening {
-    /// Whether more than half of the measurements cannot be used, or one alone can: what is fitted to it has nothing to be judged by.
+    /// True if more than half of the measurements cannot be used, or one alone can: what is fitted to it has nothing to be judged by.
     pub fn is_data_unfit(&self) -> bool {
         2 * self.unusable.len() > self.used.len() || self.used.iter().filter(|used| **used).count() < 2
     }

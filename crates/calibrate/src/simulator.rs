@@ -63,7 +63,7 @@ impl<'a> Simulator<'a> {
             .collect()
     }
 
-    /// What the numbers mean together.
+    /// Meaning of the numbers together.
     pub fn perturbation(&self, theta: &[f64]) -> Perturbation {
         let mut perturbation = Perturbation::default();
         for (e, effect) in self.effects.iter().enumerate() {
@@ -73,7 +73,7 @@ impl<'a> Simulator<'a> {
         perturbation
     }
 
-    /// What each measurement should show under each of `perturbations`; those that differ in lamps and camera alone
+    /// Predicted frame of each measurement under each of `perturbations`; those that differ in lamps and camera alone
     /// share their light.
     ///
     /// # Errors

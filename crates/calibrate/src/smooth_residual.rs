@@ -1,4 +1,4 @@
-//! What the effects leave, as smooth shapes that stand for no effect: a path, a transmission, a blur.
+//! Residual of the effects, as smooth shapes that belong to no effect: a path, a transmission, a blur.
 
 use ndarray::Array2;
 
@@ -17,12 +17,12 @@ const SIDE: usize = 96;
 /// Points of each curve of transmission.
 const CURVE_POINTS: u32 = 41;
 
-/// Smooth shapes fitted to what is left; everything found and every nuisance is projected out.
+/// Smooth shapes fitted to the residual; everything found and every nuisance is projected out.
 pub(crate) struct SmoothResidual {
     /// Optical path over the lens (nm), common to colours and elements; NaN outside. Shape `[SIDE, SIDE]`, row
     /// index along +y.
     pub path_nm: Array2<f64>,
-    /// Its root mean square over the lens (nm), and that of its noise.
+    /// Root mean square over the lens (nm), and that of its noise.
     pub path_rms_nm: (f64, f64),
     /// Half the edge of the map (um).
     pub radius_um: f64,

@@ -36,7 +36,7 @@ impl SmoothShape {
         }
     }
 
-    /// As the statistics see it. A cell errs by amplitude and phase, in each LED by its own.
+    /// Shape in the form of the statistics. A cell errs by amplitude and phase, in each LED by its own.
     pub(crate) fn term(self) -> SmoothTerm {
         let kind = match self {
             Self::Path(_) => None,

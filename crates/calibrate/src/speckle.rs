@@ -41,7 +41,7 @@ pub struct DefectNoise {
 }
 
 impl DefectNoise {
-    /// From draws of the places of missing pillars, whose share is parameter `slot`, about the values `about`.
+    /// Speckle from draws of the places of missing pillars, whose share is parameter `slot`, about the values `about`.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.

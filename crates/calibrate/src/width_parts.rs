@@ -1,9 +1,9 @@
-//! What intervals are made of, as it is reported.
+//! Parts of intervals, in the form of the report.
 
 use metalith_attribution::IntervalParts;
 use serde::Serialize;
 
-/// What a 95 % half-width is made of: what it would be by each cause alone.
+/// Parts of a 95 % half-width: its size by each cause alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WidthParts {
     /// Noise, and that groups of measurements do not agree.
@@ -11,9 +11,9 @@ pub struct WidthParts {
     /// The transmission of the stated cell: its amplitude, and its phase.
     pub cell_amplitude: f64,
     pub cell_phase: f64,
-    /// What the effects that were found change.
+    /// Change by the effects that were found.
     pub change: f64,
-    /// What is known of values of this effect.
+    /// Known error of values of this effect.
     pub value: f64,
     /// How far another estimate of the same number is, where there is one: no half-width is less.
     pub least: f64,
@@ -25,7 +25,7 @@ impl WidthParts {
         self.parts().half_width()
     }
 
-    /// What the model errs by.
+    /// Error of the model.
     pub fn of_model(&self) -> f64 {
         self.parts().of_model()
     }

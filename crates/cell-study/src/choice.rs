@@ -40,7 +40,7 @@ pub const WIDEST_GAP_WAVES: f64 = 0.2;
 /// Least share of the light that the mapping of a cell sends to the first order.
 pub const LEAST_LIGHT: f64 = 0.3;
 
-/// What a cell is wanted for.
+/// Purpose of a cell.
 #[derive(Clone, Debug)]
 pub struct CellRequest {
     pub film: Material,
@@ -71,7 +71,7 @@ pub struct ChosenCell {
     pub nyquist_nm: f64,
     /// Number of cells that were tried.
     pub tried: usize,
-    /// Its mapping, as it is solved for the design.
+    /// Mapping, as it is solved for the design.
     pub mapping: SolvedMapping,
 }
 
@@ -135,7 +135,7 @@ impl CellRequest {
         let even_below = |pitch: f64| 2.0 * ((pitch - 1e-9) / 2.0).floor();
         if self.sine() >= 1.0 {
             return Err(Error::refused(
-                "new/aperture",
+                "new/aperture-too-high",
                 format!(
                     "a numerical aperture of {:.3} and steering by a sine of {:.3}: no lattice carries more than 1 together",
                     self.numerical_aperture, self.steering_sine
@@ -149,7 +149,7 @@ impl CellRequest {
         let (film, substrate) = (self.index(&self.film)?, self.index(&self.substrate)?);
         if film <= 1.2 {
             return Err(Error::refused(
-                "new/index",
+                "new/index-too-low",
                 format!(
                     "{} has an index of {film:.3} at {nm:.1} nm, hardly more than air",
                     self.film
@@ -175,7 +175,7 @@ impl CellRequest {
         }
         if pitch_nm > nyquist_nm {
             return Err(Error::refused(
-                "new/pitch-aperture",
+                "new/pitch-too-coarse",
                 format!(
                     "a pitch of {pitch_nm} nm samples the phase at the rim by more than half a wave: a numerical aperture of {:.3} needs {nyquist_nm:.1} \
                      nm or less",
@@ -287,7 +287,7 @@ impl CellRequest {
             ),
             None => "take another material, or leave the pitch out".into(),
         };
-        Error::refused("new/height", what, hint)
+        Error::refused("new/no-usable-height", what, hint)
     }
 
     /// Narrowest and widest pillar and the step (nm) on a pitch.
@@ -449,11 +449,9 @@ mod tests {
             height_nm: Some(200.0),
             ..request()
         };
-        let error = low.choose(None, &Silent).unwrap_err().to_string();
-        assert!(
-            error.contains("200 nm high") && error.contains("--pillar-height-nm "),
-            "{error}"
-        );
+        let error = low.choose(None, &Silent).unwrap_err();
+        assert_eq!(error.id(), "new/no-usable-height");
+        assert!(error.to_string().contains("--pillar-height-nm "), "{error}");
         assert!(request().choose(None, &Silent).unwrap().mapping.light.first > 0.7);
     }
 }

@@ -42,7 +42,7 @@ impl LibraryStudy {
     pub fn new(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Self> {
         let pillars = design.cell.shape.upright().ok_or_else(|| {
             Error::refused(
-                "cells/kind-of-pillar",
+                "cells/wrong-pillar-shape",
                 format!("the pillars of {} are {}", design.name, design.cell.shape.plural()),
                 "this study is of upright rectangles",
             )

@@ -50,7 +50,7 @@ impl RotationStudy {
     pub fn new(design: &Design, progress: &dyn Progress) -> Result<Self> {
         let pillars = design.cell.shape.rotated().ok_or_else(|| {
             Error::refused(
-                "cells/kind-of-pillar",
+                "cells/wrong-pillar-shape",
                 format!("the pillars of {} are {}", design.name, design.cell.shape.plural()),
                 "this study is of rotated rectangles",
             )

@@ -55,9 +55,9 @@ impl StudyOptions {
         match (0.0..1.0).contains(&self.threshold) {
             true => Ok(()),
             false => Err(Error::refused(
-                "cells/bad-zero-order",
-                format!("widths are bad below a zero order of {}", self.threshold),
-                "give a share of the incident power, such as 0.3",
+                "cells/threshold-out-of-range",
+                format!("the limit of the zeroth order is {}", self.threshold),
+                "give a share of the incident power from 0 to 1, such as 0.3",
             )),
         }
     }
@@ -67,11 +67,11 @@ impl StudyOptions {
 #[derive(Clone, Debug, Serialize)]
 pub struct MappingStudy {
     pub name: &'static str,
-    /// Against rigorous phase at the wavelength of the mapping.
+    /// Error against the rigorous phase at the wavelength of the mapping.
     pub phase: MappingError,
     /// Orders at the wavelengths of [`CellStudy::compared_um`].
     pub led: Vec<RampOrders>,
-    /// Over the band.
+    /// Error over the band.
     pub band: Vec<RampOrders>,
     /// Coefficients, of a mapping that is a polynomial.
     pub coefficients: Option<Vec<f64>>,

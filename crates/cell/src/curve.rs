@@ -56,7 +56,7 @@ impl PhaseCurve {
         let (Some(&widest), true) = (widths_nm.last(), widths_nm.len() > 1) else {
             return Err(Error::refused(
                 "cell/curve-too-short",
-                "a phase curve over fewer than two widths",
+                "the phase curve has fewer than two widths",
                 "widen the range of widths of the cell",
             ));
         };

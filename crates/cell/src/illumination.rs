@@ -67,7 +67,7 @@ impl Illumination<'_> {
         }
     }
 
-    /// Same light at one of many wavelengths of a band.
+    /// This light at one of many wavelengths of a band.
     #[must_use]
     pub fn in_band(self) -> Self {
         Self {
@@ -76,7 +76,7 @@ impl Illumination<'_> {
         }
     }
 
-    /// Same light on cells that are solved for its direction.
+    /// This light on cells that are solved for its direction.
     #[must_use]
     pub fn oblique(self) -> Self {
         Self {

@@ -238,7 +238,7 @@ impl CacheEntry {
         }
     }
 
-    /// Same table, which may be shipped with the program: `find` gives the bytes of a file by its name. These count
+    /// This table, which may be shipped with the program: `find` gives the bytes of a file by its name. These count
     /// before those of the folder, so that every machine has the same.
     #[must_use]
     pub fn or_shipped(mut self, find: impl FnOnce(&str) -> Option<&'static [u8]>) -> Self {

@@ -67,7 +67,7 @@ impl Fidelity {
     /// If they cannot.
     pub fn check(self, shape: PillarShape, lattice: LatticeKind) -> Result<()> {
         match self.refusal(shape, lattice) {
-            Some((what, hint)) => Err(Error::refused("cell/model-not-for-pillar", what, hint)),
+            Some((what, hint)) => Err(Error::refused("cell/fidelity-not-for-pillars", what, hint)),
             None => Ok(()),
         }
     }
@@ -96,8 +96,8 @@ impl FromStr for Fidelity {
     fn from_str(text: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| {
             Error::refused(
-                "cell/unknown-model",
-                format!("`{text}` is not a fidelity of the cell"),
+                "cell/unknown-fidelity",
+                format!("there is no simulation model `{text}`"),
                 "use published, fitted, rigorous or neighbours",
             )
         })

@@ -61,7 +61,7 @@ impl PointwiseCell {
         }
     }
 
-    /// Same cell, whose answers along the normal are cached in a folder from one run to the next.
+    /// This cell, whose answers along the normal are cached in a folder from one run to the next.
     #[must_use]
     pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
         self.folder = folder.map(Path::to_owned);
@@ -170,7 +170,7 @@ impl CellModel for PointwiseCell {
     }
 }
 
-/// What is solved for each width (nm) at a wavelength (um), with progress.
+/// Solution for each width (nm) at a wavelength (um), with progress.
 fn solve_widths<T: Send>(
     widths_nm: &[u16],
     solve: impl Fn(u16) -> Result<T> + Sync,

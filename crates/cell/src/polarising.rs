@@ -1,4 +1,4 @@
-//! Cells of pillars that give each polarisation a phase of its own.
+//! Cells of pillars that give each polarisation its own phase.
 
 use std::path::Path;
 

@@ -58,9 +58,9 @@ impl CellModel for PublishedCell {
         let (short, long) = PUBLISHED_UM;
         if !(short - ROUNDING_UM..=long + ROUNDING_UM).contains(&wavelength_um) {
             return Err(Error::refused(
-                "cell/published-wavelength",
+                "cell/wavelength-out-of-band",
                 format!(
-                    "the `published` cell at {} nm: its polynomials are of {} to {} nm",
+                    "the `published` cell is known from {1} to {2} nm, not at {0} nm",
                     (wavelength_um * 1e4).round() / 10.0,
                     short * 1e3,
                     long * 1e3

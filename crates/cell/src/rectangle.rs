@@ -69,7 +69,7 @@ impl CellStack {
         } = *pillar;
         if ![width_nm, length_nm, rotation].iter().all(|v| v.is_finite()) {
             return Err(Error::refused(
-                "cell/rectangle-does-not-fit",
+                "cell/edges-out-of-range",
                 format!("a pillar of {width_nm} x {length_nm} nm, rotated by {rotation} rad"),
                 "give both edges in nm and the angle in rad",
             ));
@@ -89,8 +89,8 @@ impl CellStack {
     pub(super) fn check_sharp(&self) -> Result<()> {
         if self.corner_radius_nm > 0.0 {
             return Err(Error::refused(
-                "cell/rounded-rectangle",
-                "rectangles with rounded corners",
+                "cell/rounded-rectangles",
+                "the cell has rectangles with rounded corners",
                 "leave the corner radius at 0: rectangles are solved with sharp corners",
             ));
         }
@@ -125,7 +125,7 @@ pub const OBLIQUE_RECTANGLES: [&str; 2] = [
 /// Error for cells of rectangles in light that arrives at an angle.
 pub fn oblique_refused() -> Error {
     let [what, hint] = OBLIQUE_RECTANGLES;
-    Error::refused("cell/oblique-not-possible", what, hint)
+    Error::refused("cell/oblique-rectangles", what, hint)
 }
 
 #[cfg(test)]
@@ -197,13 +197,13 @@ pub(super) mod tests {
             corner_radius_nm: 10.0,
             ..titania()
         };
-        refused(round, rotated(0.0), "cell/rounded-rectangle");
-        refused(titania(), rotated(f64::NAN), "cell/rectangle-does-not-fit");
+        refused(round, rotated(0.0), "cell/rounded-rectangles");
+        refused(titania(), rotated(f64::NAN), "cell/edges-out-of-range");
         let long = RotatedRectangle {
             length_nm: 400.0,
             ..rotated(30.0)
         };
         let error = titania().jones(&long, 0.532, [0.0; 2], Orders::new(3).unwrap());
-        assert_eq!(error.unwrap_err().id(), "rcwa/width");
+        assert_eq!(error.unwrap_err().id(), "rcwa/width-out-of-range");
     }
 }

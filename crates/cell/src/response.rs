@@ -49,8 +49,8 @@ impl CellResponse {
             Self::Jones(JonesTables::Polarised(tables)) => Ok(tables.own().to_vec()),
             Self::Jones(JonesTables::Oblique(_)) | Self::Neighbours(_) => Err(Error::refused(
                 "cell/several-transmissions",
-                "one transmission for each pillar, of a cell that has more",
-                "ask for light along the normal, of lattices of equal pillars",
+                "a pillar of this cell has more than one transmission",
+                "use normal incidence and a model of equal pillars",
             )),
         }
     }

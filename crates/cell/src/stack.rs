@@ -30,7 +30,7 @@ pub struct CellStack {
     /// Unstructured layers between substrate and pillar, from the substrate upwards: a spacer, what the etch left of the film.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub under: Vec<UniformLayer>,
-    /// Around and above the pillar.
+    /// Medium around and above the pillar.
     pub ambient: Material,
     /// Angle of the walls from upright (rad). The width is that of the top; positive is wider at the foot.
     pub taper: f64,
@@ -105,8 +105,8 @@ impl CellStack {
     pub fn layers(&self, width_nm: f64, wavelength_um: f64) -> Result<LayerStack> {
         if !self.shape.has_width() {
             return Err(Error::refused(
-                "cell/rectangle-by-width",
-                "rectangular pillars, where those of a width are asked for",
+                "cell/rectangles-unsupported",
+                "the pillars are rectangles, and a pillar with one width is needed here",
                 "use squares or circles here: calibration knows no rectangles, `optimise` no upright ones; the other commands do",
             ));
         }
@@ -228,7 +228,10 @@ impl CellStack {
         if above.is_nan() || above <= 0.0 {
             return Err(Error::refused(
                 "light/evanescent",
-                format!("light at sines of {:.4}, {:.4} leaves no pillar", sines[0], sines[1]),
+                format!(
+                    "light at sines of {:.4}, {:.4} is evanescent behind the pillars",
+                    sines[0], sines[1]
+                ),
                 "use an angle of less than 90 degrees in air",
             ));
         }
@@ -339,29 +342,29 @@ impl CellStack {
         let lean = self.taper.abs();
         if lean.is_nan() || lean >= MOST_TAPER {
             return Err(Error::refused(
-                "cell/side-wall",
-                format!("walls that lean by {} degrees", self.taper.to_degrees()),
-                "use an angle from upright below 45 degrees",
+                "cell/side-wall-out-of-range",
+                format!("the side walls lean by {} degrees", self.taper.to_degrees()),
+                "use an angle below 45 degrees from upright",
             ));
         }
         if !(self.height_nm.is_finite() && self.height_nm > 0.0) {
             return Err(Error::refused(
-                "cell/height",
-                format!("pillars {} nm high", self.height_nm),
+                "cell/height-out-of-range",
+                format!("the pillars are {} nm high", self.height_nm),
                 "give a positive height",
             ));
         }
         let sound = |v: f64| v.is_finite() && v >= 0.0;
         if let Some(under) = self.under.iter().find(|u| !sound(u.height_nm)) {
             return Err(Error::refused(
-                "cell/residual-film",
+                "cell/residual-film-out-of-range",
                 format!("{} nm of {} under the pillars", under.height_nm, under.material),
                 "give a thickness of zero or more",
             ));
         }
         if !sound(self.corner_radius_nm) || !sound(self.mask_height_nm) {
             return Err(Error::refused(
-                "cell/corner-radius",
+                "cell/corner-radius-out-of-range",
                 format!(
                     "a corner radius of {} nm with {} nm of mask",
                     self.corner_radius_nm, self.mask_height_nm
@@ -478,9 +481,14 @@ pub(super) mod tests {
             },
             100.0,
             0.5,
-            "cell/height",
+            "cell/height-out-of-range",
         );
-        refused(CellStack { taper: 1.0, ..paper() }, 100.0, 0.5, "cell/side-wall");
+        refused(
+            CellStack { taper: 1.0, ..paper() },
+            100.0,
+            0.5,
+            "cell/side-wall-out-of-range",
+        );
         refused(
             CellStack {
                 corner_radius_nm: -1.0,
@@ -488,10 +496,15 @@ pub(super) mod tests {
             },
             100.0,
             0.5,
-            "cell/corner-radius",
+            "cell/corner-radius-out-of-range",
         );
-        refused(CellStack { taper: 0.1, ..paper() }, 330.0, 0.5, "rcwa/width");
-        refused(paper(), 100.0, 0.25, "rcwa/out-of-range");
+        refused(
+            CellStack { taper: 0.1, ..paper() },
+            330.0,
+            0.5,
+            "rcwa/width-out-of-range",
+        );
+        refused(paper(), 100.0, 0.25, "rcwa/material-out-of-range");
         for width in [f64::NAN, f64::INFINITY, -5.0, -1e9] {
             refused(paper(), width, 0.5, "cell/width-out-of-range");
             let oblique = paper().oblique(width, 0.5, [0.1, 0.0], orders);

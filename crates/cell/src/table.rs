@@ -69,8 +69,8 @@ impl TableSpec {
         let (short, long) = self.band_um;
         if !(short > 0.0 && long > short && long - short <= WIDEST_BAND_UM) {
             return Err(Error::refused(
-                "cell/band",
-                format!("a band from {short} to {long} um"),
+                "cell/band-out-of-range",
+                format!("the band is from {short} to {long} um"),
                 format!("give two rising, positive wavelengths at most {WIDEST_BAND_UM} um apart"),
             ));
         }
@@ -78,22 +78,22 @@ impl TableSpec {
         let pitch = self.stack.pitch_nm;
         if !(1.0..=LARGEST_PITCH_NM).contains(&pitch) {
             return Err(Error::refused(
-                "cell/pitch",
-                format!("a table of a cell with a pitch of {pitch} nm"),
+                "cell/pitch-out-of-range",
+                format!("the cell has a pitch of {pitch} nm"),
                 format!("use a pitch from 1 to {LARGEST_PITCH_NM} nm"),
             ));
         }
         if low == 0 || low > high || f64::from(high) > pitch {
             return Err(Error::refused(
-                "cell/width-range",
+                "cell/width-range-invalid",
                 format!("pillars from {low} to {high} nm wide on a pitch of {pitch} nm"),
                 "give a range of widths above zero that fits into the pitch",
             ));
         }
         if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
             return Err(Error::refused(
-                "cell/tolerance",
-                format!("a tolerance of {} in t", self.tolerance),
+                "cell/tolerance-out-of-range",
+                format!("the tolerance of the transmission is {}", self.tolerance),
                 "give a positive number, such as 0.01",
             ));
         }
@@ -298,15 +298,15 @@ mod tests {
     fn tables_reach_as_far_as_designs() {
         assert!(spec(6000.0, (8.0, 13.0)).check().is_ok());
         let wide = spec(6000.0, (0.2, 20.3)).check().unwrap_err();
-        assert_eq!(wide.id(), "cell/band");
+        assert_eq!(wide.id(), "cell/band-out-of-range");
         insta::assert_snapshot!(wide, @"
-            a band from 0.2 to 20.3 um
+            the band is from 0.2 to 20.3 um
               help: give two rising, positive wavelengths at most 20 um apart
             ");
         let large = spec(20_002.0, (8.0, 13.0)).check().unwrap_err();
-        assert_eq!(large.id(), "cell/pitch");
+        assert_eq!(large.id(), "cell/pitch-out-of-range");
         insta::assert_snapshot!(large, @"
-            a table of a cell with a pitch of 20002 nm
+            the cell has a pitch of 20002 nm
               help: use a pitch from 1 to 20000 nm
             ");
     }

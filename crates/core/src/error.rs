@@ -54,7 +54,7 @@ pub enum Error {
         id: &'static str,
         what: String,
         hint: String,
-        /// The error of the crate that found it, which can be matched on, if it has errors of its own.
+        /// The error of the crate that found it, which can be matched on, if it has its own errors.
         source: Option<Cause>,
     },
 
@@ -86,9 +86,9 @@ impl Error {
         match self {
             #[cfg(feature = "documents")]
             Self::Text(_) => "text/mistakes",
-            Self::Layout { .. } => "layout/format",
-            Self::Io { .. } => "file/system",
-            Self::Table { .. } => "table/format",
+            Self::Layout { .. } => "layout/malformed",
+            Self::Io { .. } => "file/operation-failed",
+            Self::Table { .. } => "table/malformed",
             Self::Invalid { id, .. } => id,
             Self::Interrupted => "run/interrupted",
         }

@@ -173,8 +173,8 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 Fidelity::Neighbours => Ok(Box::new(neighbour_cell(design, cache_folder())?)),
                 Fidelity::Calibrated => Err(Error::refused(
                     "cell/no-calibrated-model",
-                    "a calibrated cell without the model it is calibrated by",
-                    "read the model that `metalith calibrate` wrote and make a `AsBuiltChip` of it",
+                    "the cell is calibrated, and its model is missing",
+                    "read the model that `metalith calibrate` wrote and make an `AsBuiltChip` of it",
                 )),
                 Fidelity::Fitted => {
                     let stack = design.cell_stack()?;

@@ -279,7 +279,7 @@ impl Design {
             return Err(Error::refused(
                 "design/individual-lenses",
                 format!(
-                    "{who} knows one lens for all elements, and elements of the design have their own, or rotated ones"
+                    "{who} supports one lens for all elements, and elements of the design have individual or rotated lenses"
                 ),
                 "make a design of the elements that share a lens: without `diameter_um`, `aperture`, `focal_length_um`, \
                  `rotation_deg` and [element.phase]",
@@ -288,7 +288,7 @@ impl Design {
         if self.lens.outline.is_some() {
             return Err(Error::refused(
                 "design/polygonal-aperture",
-                format!("{who} knows round lenses alone, and the aperture of the design is a polygon"),
+                format!("{who} supports round lenses only, and the aperture of the design is a polygon"),
                 "leave `aperture` of [lens] out: simulate the round lens about it",
             ));
         }
@@ -304,7 +304,7 @@ impl Design {
             return Err(Error::refused(
                 "design/two-phases",
                 format!(
-                    "{who} knows one phase for all light, and {} has another in [phase.y]",
+                    "{who} supports one phase for both polarisations, and {} has another in [phase.y]",
                     self.path.display()
                 ),
                 "leave [phase.y] out",
@@ -316,7 +316,7 @@ impl Design {
         Err(Error::refused(
             "design/phase-not-radial",
             format!(
-                "{who} knows phases over the radius alone, and {} adds {} over the plane by [[phase.term]]",
+                "{who} supports radial phases only, and {} adds {} over the plane by [[phase.term]]",
                 self.path.display(),
                 self.lens.terms.len()
             ),

@@ -13,9 +13,9 @@ use metalith_pillars::LatticeKind;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Medium {
-    /// Over the pillars, towards the sensor.
+    /// Orders above the pillars, towards the sensor.
     Ambient,
-    /// Under them, where light comes from.
+    /// Orders below the pillars, where light comes from.
     Substrate,
 }
 

@@ -304,7 +304,7 @@ fn mistakes_are_said() {
             "[array]\nelements = [1, 1]\n",
             "array.elements/inconsistent",
         ),
-        ("hologram", "pitch_um = 0.35", "pitch_um = 0.2", "table/format"),
+        ("hologram", "pitch_um = 0.35", "pitch_um = 0.2", "table/malformed"),
         (
             "hologram",
             "source = \"map\"",

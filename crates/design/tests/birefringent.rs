@@ -179,7 +179,7 @@ fn what_cannot_be_is_told_with_its_place() {
             "width_step_nm = 2",
             "cell.width_step_nm/inconsistent",
         ),
-        ("width_max_nm = 280", "width_max_nm = 270", "table/format"),
+        ("width_max_nm = 280", "width_max_nm = 270", "table/malformed"),
         (
             "width_max_nm = 280",
             "width_max_nm = 400",

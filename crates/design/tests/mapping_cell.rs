@@ -59,17 +59,17 @@ fn a_table_of_another_wavelength_is_refused_with_its_line() {
         ],
     );
     let error = parse("tio2_532", &other).unwrap_err();
-    assert_eq!(error.id(), "mapping/another-cell");
+    assert_eq!(error.id(), "mapping/cell-differs");
     let said = error.to_string();
     assert!(
         said.contains("tio2_532.csv, line 7") && said.contains("= 532`") && said.contains("= 540`"),
         "{said}"
     );
     let accepted = parse("tio2_532", &accepting(&other)).unwrap();
-    assert_eq!(ids(&accepted), ["mapping/accepted"]);
+    assert_eq!(ids(&accepted), ["mapping/difference-accepted"]);
     // Who makes a mapping needs none of this cell.
     let made = Design::parse_without_library(&design("tio2_532"), &other).unwrap();
-    assert_eq!(ids(&made), ["mapping/another-cell"]);
+    assert_eq!(ids(&made), ["mapping/cell-differs"]);
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn a_mapping_that_states_no_cell_is_a_warning() {
     let (head, rest) = all.split_once("[mapping.cell]").unwrap();
     let (_, tail) = rest.split_once("[layout]").unwrap();
     let old = parse("asi_940", &format!("{head}[layout]{tail}")).unwrap();
-    assert_eq!(ids(&old), ["mapping/unknown-cell"]);
+    assert_eq!(ids(&old), ["mapping/cell-not-stated"]);
     // What the warning says to write is what the design has.
     assert!(old.mapping_warnings()[0].hint.contains("pillar_height_nm = 550; "));
     // The layout is the same.

@@ -44,7 +44,7 @@ impl Body<'_> {
         }
     }
 
-    /// Its corners, closed.
+    /// Corners, closed.
     pub(crate) fn ring(&self) -> Vec<Point> {
         match self {
             Self::Rect(r) => ring_of(r).to_vec(),

@@ -196,11 +196,7 @@ fn read_rule(s: &Section<'_, '_>, context: &Context, ids: &mut BTreeSet<String>)
         );
     }
     if !ids.insert(id.clone()) {
-        s.fault(
-            "id",
-            format!("a second rule `{id}`"),
-            "give every rule an id of its own",
-        );
+        s.fault("id", format!("a second rule `{id}`"), "give every rule its own id");
     }
     let severities = [
         ("error", Severity::Error),

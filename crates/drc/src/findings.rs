@@ -29,7 +29,7 @@ pub(super) struct Findings {
     unit_nm: f64,
     most: usize,
     waivers: Vec<Waiver>,
-    /// Their numbers in that list by hash: the first of equal ones.
+    /// Numbers of them in that list by hash: the first of equal ones.
     by_hash: HashMap<String, usize>,
     /// Places covered by each of those waivers.
     pub matched: Vec<u64>,

@@ -26,9 +26,9 @@ pub enum Status {
     Run,
     /// There was nothing to run it on: not clean.
     Skipped(String),
-    /// It is about something that such a layout does not have: clean.
+    /// Rule about something that such a layout does not have: clean.
     NotApplicable(String),
-    /// It could not be run: not clean.
+    /// Rule that could not be run: not clean.
     Failed(String),
     /// The deck applies it only when a design is given, and none was.
     NotInForce,
@@ -52,9 +52,9 @@ impl Status {
 pub(super) enum NotRun {
     /// There was nothing to run it on.
     Skipped(String),
-    /// It is about something that such a layout does not have.
+    /// Rule about something that such a layout does not have.
     NotApplicable(String),
-    /// It could not be run.
+    /// Rule that could not be run.
     Failed(String),
     /// The user asked to stop.
     Interrupted,

@@ -152,7 +152,7 @@ impl Rule for WidthBound {
             sides = [circle.width() as f64 * outline.unit_nm; 2];
         }
         let [a, b] = sides;
-        // Without area there is no width; that has a rule of its own.
+        // Without area there is no width; that has its own rule.
         if outline.twice_area() == 0 {
             return;
         }

@@ -46,7 +46,7 @@ impl Allowance {
 /// Reason why work ended early.
 #[derive(Debug, PartialEq)]
 pub(super) enum Stop {
-    /// Over a limit; the text says which one.
+    /// Work over a limit; the text says which one.
     TooMuch(String),
     Interrupted,
 }

@@ -8,7 +8,7 @@ use metalith_core::LayerNumber;
 pub struct LayoutCell {
     /// Printable: see [`metalith_core::text::printable_bytes`].
     pub name: String,
-    /// Its bytes in the file, from BGNSTR to behind ENDSTR. In OASIS from its record CELL, or the CBLOCK that has it,
+    /// Bytes in the file, from BGNSTR to behind ENDSTR. In OASIS from its record CELL, or the CBLOCK that has it,
     /// to the next cell or CBLOCK.
     pub bytes: std::ops::Range<u64>,
     /// Shapes drawn in it, by layer, in the order of first use.
@@ -76,7 +76,7 @@ pub struct LayerTally {
     pub text_bytes: u64,
     pub nodes: u64,
     pub vertices: u64,
-    /// Around the areas, in the cell's coordinates.
+    /// Box around the areas, in the cell's coordinates.
     pub bounds: Rect,
 }
 

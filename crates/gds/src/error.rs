@@ -300,7 +300,7 @@ impl LayoutError {
             Self::NoCells => "is this the right file?".into(),
             Self::NoSuchCell { tops, .. } => format!("cells at the top: {}", tops.join(", ")),
             Self::SeveralTops { .. } => {
-                "write the one to be read to a file of its own, or name it where a command takes --top".into()
+                "write the one to be read to a separate file, or name it where a command takes --top".into()
             }
             Self::Limit { limit, .. } => limit.remedy().into(),
         }
@@ -311,12 +311,12 @@ impl ExtractionError {
     /// Identity of the error, `subject/cause`: the text may change, the identity stays.
     pub fn id(&self) -> &'static str {
         match self {
-            Self::Sites { .. } => "extract/sites",
+            Self::Sites { .. } => "extract/too-many-sites",
             Self::NoElements { .. } => "extract/no-elements",
-            Self::Groups { .. } => "extract/groups",
-            Self::Scattered { .. } => "extract/scattered",
-            Self::Sparse { .. } => "extract/sparse",
-            Self::Lattice { .. } => "extract/lattice",
+            Self::Groups { .. } => "extract/too-many-groups",
+            Self::Scattered { .. } => "extract/shapes-scattered",
+            Self::Sparse { .. } => "extract/sites-mostly-empty",
+            Self::Lattice { .. } => "extract/pitch-out-of-range",
         }
     }
 
@@ -385,11 +385,11 @@ impl From<Error> for metalith_core::Error {
                 };
             }
             Error::NotAFile { .. } => (
-                "file/not-ordinary",
+                "file/not-regular",
                 error.to_string(),
                 "name a GDSII or OASIS file".into(),
             ),
-            Error::Changed { .. } => ("file/replaced-meanwhile", error.to_string(), BEING_WRITTEN.into()),
+            Error::Changed { .. } => ("file/changed-meanwhile", error.to_string(), BEING_WRITTEN.into()),
             Error::Extraction { ref cause, .. } => (cause.id(), error.to_string(), cause.remedy()),
         };
         Self::Invalid {

@@ -75,7 +75,7 @@ impl Rect {
         }
     }
 
-    /// Same rectangle, farther by a step.
+    /// This rectangle, farther by a step.
     #[inline]
     pub(super) fn moved(&self, by: Point) -> Self {
         Self {
@@ -86,7 +86,7 @@ impl Rect {
         }
     }
 
-    /// Its corners, counter-clockwise, the last the first again.
+    /// Corners, counter-clockwise, the last the first again.
     pub(super) fn outline(&self) -> [Point; 5] {
         let corner = Point::new;
         let first = corner(self.x0, self.y0);
@@ -144,7 +144,7 @@ impl<'a> Outline<'a> {
         }
     }
 
-    /// Same outline, whose points have this number in the layout.
+    /// This outline, whose points have this number in the layout.
     #[inline]
     pub(super) fn numbered(self, number: u32) -> Self {
         Self {

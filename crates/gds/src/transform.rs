@@ -55,7 +55,7 @@ impl Transform {
         })
     }
 
-    /// Same transform, farther by a step.
+    /// This transform, farther by a step.
     pub(super) fn moved(self, by: Point) -> Self {
         match self {
             Self::Square { orientation, dx, dy } => Self::Square {

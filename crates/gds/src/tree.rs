@@ -1,4 +1,4 @@
-//! Who refers to whom: circles, dangling names, and how often everything stands in the layout, computed
+//! References of cells: circles, dangling names, and how often everything stands in the layout, computed
 //! before anything is expanded.
 
 use super::cell::LayoutCell;

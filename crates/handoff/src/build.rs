@@ -195,8 +195,8 @@ fn seal(files: &Listing, sources: &Sources, options: &HandoffOptions, progress: 
     if let Some(first) = differ.first() {
         return Err(Error::refused(
             "handoff/folder-changed",
-            format!("{first} was added or removed while the hand-off was made"),
-            "let nothing else write into its folder, and try again",
+            format!("{first} was added or removed while the hand-off was written"),
+            "make sure that no other program writes into its folder, and try again",
         ));
     }
     let mut digests = std::collections::BTreeMap::new();

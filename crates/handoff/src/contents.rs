@@ -31,7 +31,7 @@ pub struct HandoffCheck {
     pub verdict: Verdict,
     /// The result in one sentence.
     pub words: String,
-    /// Its own report, in the folder.
+    /// Own report, in the folder.
     pub report: Option<String>,
 }
 

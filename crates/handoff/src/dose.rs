@@ -35,7 +35,7 @@ impl Beam {
             })
             .ok_or_else(|| {
                 Error::refused(
-                    "handoff/beam-current",
+                    "handoff/beam-current-too-high",
                     format!(
                         "{current_na} nA is too much for a dose of {dose_uc_cm2} uC/cm2 at {} MHz",
                         writer.clock_max_mhz

@@ -222,7 +222,7 @@ impl Drawing {
     }
 
     /// Add the pillars of a lens as a cell of this name, folded by its symmetries. Squares are drawn where they are; other
-    /// outlines, which have more corners, once each in a cell of their own.
+    /// outlines, which have more corners, once each in a separate cell.
     pub(crate) fn add_lens(&mut self, name: &str, layer: LayerPair, class: &Class, form: PillarForm) {
         let own = |number: u16| format!("{name}_{}", form.cell_name(number));
         if !form.is_square() {
@@ -277,7 +277,7 @@ impl Drawing {
         let mut bytes = Vec::new();
         self.tree.write(&mut bytes).map_err(|e| {
             Error::refused(
-                "layout/encoding",
+                "layout/encoding-failed",
                 format!("{} cannot be encoded: {e:?}", path.display()),
                 "please report this with the design and the process file",
             )

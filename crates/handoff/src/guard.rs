@@ -14,7 +14,7 @@ use metalith_design::Design;
 pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     if !process.exposes_pillars() {
         return Err(Error::refused(
-            "handoff/tone",
+            "handoff/tone-inverted",
             format!(
                 "with this resist and transfer {}: the pillars of the layout would become holes",
                 process.exposed_becomes()
@@ -25,7 +25,7 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
     let film = design.cell.pillar_material.as_str();
     if !process.transfer.etches(film) {
         return Err(Error::refused(
-            "handoff/film-material",
+            "handoff/film-material-differs",
             format!(
                 "the film of the design is \"{film}\", but the process etches {}: {}",
                 process.transfer.films.join(", "),
@@ -39,7 +39,7 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
         process.transfer.film_nm,
     ) {
         return Err(Error::refused(
-            "handoff/film-thickness",
+            "handoff/film-thickness-differs",
             format!(
                 "the film of the design is {} nm thick, but the etch and the rules of {} are for {low} to {high} nm",
                 design.cell.pillar_height_nm, process.name
@@ -80,15 +80,15 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
 pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
     let hint = "choose another folder with --out, or move it away";
     for (path, kind, id) in [
-        (folder, "folder", "handoff/no-folder"),
-        (archive, "file", "handoff/no-file"),
+        (folder, "folder", "handoff/not-a-folder"),
+        (archive, "file", "handoff/not-a-file"),
     ] {
         match std::fs::symlink_metadata(path) {
             Ok(found) if (kind == "folder" && found.is_dir()) || (kind == "file" && found.is_file()) => {}
             Ok(_) => {
                 return Err(Error::refused(
                     id,
-                    format!("{} is there and is no {kind}", path.display()),
+                    format!("{} exists and is not a {kind}", path.display()),
                     hint,
                 ));
             }
@@ -105,7 +105,7 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
     if !handed_off && archive.exists() && !zip::is_packed_here(archive, &name)? {
         return Err(Error::refused(
             "handoff/foreign-archive",
-            format!("{} is there, and is not the archive of a hand-off", archive.display()),
+            format!("{} exists and is not the archive of a hand-off", archive.display()),
             hint,
         ));
     }
@@ -120,7 +120,10 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
         None => Ok(()),
         Some(name) => Err(Error::refused(
             "handoff/foreign-file",
-            format!("{} holds {name}, which no hand-off put there", folder.display()),
+            format!(
+                "{} contains {name}, which is not a file of a hand-off",
+                folder.display()
+            ),
             hint,
         )),
     }

@@ -19,7 +19,7 @@ use metalith_verify::compensate::compensate;
 /// The files that were written.
 pub(super) struct Layouts {
     pub array: PillarArray,
-    /// The design with one hyperbolic lens on a chip of its own, and its pillars.
+    /// The design with one hyperbolic lens on a separate chip, and its pillars.
     pub reference: Design,
     pub reference_array: PillarArray,
     pub blocks: Vec<DoseBlock>,
@@ -157,7 +157,7 @@ pub(super) fn write(
 /// Distance from the opening over the reference lens to the edge of its chip (nm): rule decks require a margin there.
 const BESIDE_REFERENCE: i64 = 50_000;
 
-/// The design with one hyperbolic lens on a chip of its own, at full size.
+/// The design with one hyperbolic lens on a separate chip, at full size.
 fn reference_design(design: &Design, process: &Process) -> Design {
     let mut reference = matrix::hyperbolic(design, process.reference_wavelength_nm(design));
     reference.name = "reference_lens".into();

@@ -138,7 +138,7 @@ impl PadPillar {
         }
     }
 
-    /// Its size and direction in words.
+    /// Size and direction in words.
     pub(crate) fn words(&self) -> String {
         let drawn = self.drawn();
         match (drawn.length_nm, drawn.rotation_deg) {

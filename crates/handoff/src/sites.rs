@@ -211,7 +211,7 @@ fn around(map: &PillarMap, shape: PillarShape, ix: usize, iy: usize) -> Option<(
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cross {
     pub set: String,
-    /// Its name for the writer: P and Q for the global pair, M1 to M4 for those of the chip.
+    /// Name for the writer: P and Q for the global pair, M1 to M4 for those of the chip.
     pub role: String,
     pub x_um: f64,
     pub y_um: f64,

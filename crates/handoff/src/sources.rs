@@ -33,7 +33,7 @@ pub(super) struct Sources {
 
 /// One input as it was read.
 struct InputCopy {
-    /// Its file name with a prefix for its kind; not yet unique.
+    /// File name with a prefix for its kind; not yet unique.
     name: String,
     purpose: &'static str,
     bytes: Vec<u8>,
@@ -111,7 +111,7 @@ impl Sources {
         &found.expect("all decks of the process are read").1
     }
 
-    /// Write all inputs as they were read, each under a name of its own.
+    /// Write all inputs as they were read, each under a separate name.
     ///
     /// # Errors
     /// If one cannot be written.
@@ -167,7 +167,7 @@ fn read_design(path: &Path) -> Result<(Design, Vec<InputCopy>)> {
     for ((path, ..), bytes) in named.iter().zip(&before) {
         if !same_files || read_at_most(path, LONGEST, "an input of a hand-off")? != *bytes {
             return Err(Error::refused(
-                "file/replaced-meanwhile",
+                "file/changed-meanwhile",
                 format!("{} changed while it was read", path.display()),
                 "try again when nothing writes to it",
             ));

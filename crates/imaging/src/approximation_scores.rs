@@ -112,7 +112,7 @@ pub fn worth_of_assumptions(
 }
 
 impl ImagingSystem {
-    /// Same system with other assumptions, and the exposure that suits them.
+    /// This system with other assumptions, and the exposure that suits them.
     ///
     /// # Errors
     /// If no light reaches the sensor.

@@ -60,8 +60,8 @@ fn file_of(folder: &Path, kind: &str, inputs: &[u8]) -> std::path::PathBuf {
 const PIECE: usize = 1 << 14;
 
 fn write(file: &Path, magic: [u8; 8], inputs: &[u8], head: &impl Serialize, numbers: &[&[f32]]) -> Result<()> {
-    let head =
-        serde_json::to_vec(head).map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+    let head = serde_json::to_vec(head)
+        .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
     let mut kept = KeptWriter::create(file, magic, inputs)?;
     kept.add(&(head.len() as u32).to_le_bytes())?;
     kept.add(&head)?;

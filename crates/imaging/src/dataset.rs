@@ -73,7 +73,7 @@ impl DatasetOrigin {
     pub fn of(design: &Design, layout: &Path, camera: &Camera, model: Option<&Path>) -> Result<Self> {
         let digest = |file: &Path| file_digest(file).map(|d| hex(&d));
         let camera = serde_json::to_vec(camera)
-            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+            .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
         Ok(Self {
             design_sha256: design.simulation_digest()?,
             layout_sha256: digest(layout)?,

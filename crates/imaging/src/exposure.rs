@@ -62,7 +62,7 @@ pub fn gains(camera: &Camera, sensitivity: &[f64], white: &[Array2<f32>]) -> Res
         .fold(0.0, f64::max);
     if brightest <= 0.0 {
         return Err(Error::refused(
-            "imaging/no-light",
+            "scene/no-light-on-sensor",
             "no light of the scene reaches the sensor",
             "check `offset_um`, `columns` and `rows` of the sensor against the chip, and the field of the scene",
         ));
@@ -137,7 +137,7 @@ impl Frame {
             return Ok(());
         }
         Err(Error::refused(
-            "restore/frame-of-another-camera",
+            "restore/camera-differs",
             format!(
                 "the frame is of another camera: it has {own_columns} x {own_rows} pixels and {} channels, the camera {columns} x {rows} and {channels}",
                 self.gain.len()
@@ -327,8 +327,7 @@ mod tests {
         let (light, inverse_variance) = frame.light(&camera, &OperatorError::none(3));
         assert!(frame.is_of([40, 40], 3).is_ok());
         for (size, channels) in [([40, 41], 3), ([40, 40], 1)] {
-            let error = frame.is_of(size, channels).unwrap_err().to_string();
-            assert!(error.contains("another camera"), "{error}");
+            assert_eq!(frame.is_of(size, channels).unwrap_err().id(), "restore/camera-differs");
         }
         assert!(
             light[0][[1, 1]] > 0.1

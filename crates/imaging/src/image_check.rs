@@ -49,7 +49,7 @@ pub fn check_images(images: &[PathBuf], progress: &dyn Progress) -> Result<()> {
         bad.push(format!("\n  and {} more", count - NAMED));
     }
     Err(Error::refused(
-        "imaging/unusable-images",
+        "scene/images-unusable",
         format!("{count} of {} images cannot be used:{}", images.len(), bad.concat()),
         "remove or replace them: PNG (8 or 16 bits, opaque), JPEG or NPY, all of one size",
     ))

@@ -64,11 +64,11 @@ pub struct ImagingSystem {
 /// Times what the operator errs by that Tikhonov's method by all elements counts. A wrong kernel errs alike at pixels next to
 /// one another, and trust in pixels that are taken to err each for itself is too high. Of 1, 2 and 3 two photographs of
 /// 800 x 800 have 20.62, 20.65 and 20.56 dB with all of the physics, and 25.19, 25.91 and 26.28 dB under the paper's
-/// assumptions. What starts from such a picture and has a prior of its own does better with 1 (`prior` 22.33 and 22.14 dB).
+/// assumptions. What starts from such a picture and has its own prior does better with 1 (`prior` 22.33 and 22.14 dB).
 const TOGETHER: f64 = 2.0;
 
 impl ImagingSystem {
-    /// Same system with the gain of each channel that the exposure of the camera asks for.
+    /// This system with the gain of each channel that the exposure of the camera asks for.
     pub(crate) fn exposed(mut self) -> Result<Self> {
         let operator = self.restoration();
         let white = operator.apply(&operator.white());
@@ -156,7 +156,7 @@ impl ImagingSystem {
         let scene = self.simulated(scene);
         if scene.view != self.view || scene.basis[..] != self.basis[..self.scene_spectra] {
             return Err(Error::refused(
-                "imaging/scenes-differ",
+                "scene/views-differ",
                 format!(
                     "the scene `{}` has another size, field or spectra than the first",
                     scene.name
@@ -283,7 +283,7 @@ impl ImagingSystem {
             true => Ok([light, inverse_variance]),
             false => Err(Error::refused(
                 "restore/all-saturated",
-                "nothing is known of the scene: every pixel that counts light is at full scale",
+                "the frame has no information on the scene: every pixel is at full scale",
                 "give a scene of which white is 1, or a lower `white` in [exposure] of the camera",
             )),
         }

@@ -51,7 +51,7 @@ impl BankSpec {
         }
     }
 
-    /// Same specification with the nodes that light of a camera asks for, by how images follow from those at its
+    /// This specification with the nodes that light of a camera asks for, by how images follow from those at its
     /// wavelengths ([`Sampling::blend`](metalith_sensor::Sampling)).
     pub fn in_light(self, blend: Blend) -> Self {
         match blend {
@@ -200,7 +200,8 @@ impl<'a> KernelPlan<'a> {
             scene_distance_um: self.scene.view.distance_um.min(f64::MAX),
             cubic_nm: self.cubic_nm.as_deref(),
         };
-        serde_json::to_vec(&inputs).map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))
+        serde_json::to_vec(&inputs)
+            .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))
     }
 
     pub(crate) fn chip<'c>(
@@ -213,13 +214,13 @@ impl<'a> KernelPlan<'a> {
         ChipInLight::new(self.design, extraction, case, self.camera, distance_um, progress)
     }
 
-    /// Same plan with so many nodes whatever the light, and linear between them.
+    /// This plan with so many nodes whatever the light, and linear between them.
     pub(crate) fn with_nodes(mut self, nodes: usize) -> Self {
         (self.spec.nodes, self.between, self.fewer_nodes) = (nodes, BetweenNodes::Linear, None);
         self
     }
 
-    /// Same plan as in light of wide bands, for one wavelength that stands for such a band.
+    /// This plan as in light of wide bands, for one wavelength that stands for such a band.
     pub(crate) fn for_wide_bands(self) -> Self {
         self.with_nodes(NODES)
     }
@@ -285,7 +286,7 @@ pub(crate) fn averaging(given: &SceneView, view: &SceneView) -> Option<String> {
     let size = |v: &SceneView| format!("{} x {}", v.columns, v.rows);
     (given != view).then(|| {
         format!(
-            "the scene of {} pixels is averaged to {}: the pixels of the sensor tell no finer ones apart",
+            "the scene of {} pixels is averaged to {}: the pixels of the sensor do not resolve finer ones",
             size(given),
             size(view)
         )

@@ -21,7 +21,7 @@ pub struct PillarCount {
     pub others: u64,
     /// Shapes on the layer of the pillars that are none of the design's.
     pub foreign: u64,
-    /// Why, in words.
+    /// Reason, in words.
     pub why: String,
 }
 
@@ -50,7 +50,7 @@ pub(crate) fn check_elements(design: &Design, extraction: &Extraction) -> Result
         format!(" ({}), the first about ({x:.1}, {y:.1}) um", why(foreign))
     });
     Err(Error::refused(
-        "imaging/element-not-in-layout",
+        "layout/element-not-found",
         format!(
             "element {} of `{}` at ({x}, {y}) um has no pillar in this layout{others}: on layer {} stand {} pillars on sites of elements, and {} other shapes{where_first}",
             first.label(),
@@ -200,9 +200,9 @@ mod tests {
         let eight = read(&design, |array| {
             array.placed.pop();
         });
-        let error = check_elements(&design, &eight).unwrap_err().to_string();
-        assert!(error.contains(&format!("element {last} of `mini_3x3`")), "{error}");
-        assert!(error.contains("and 0 other shapes"), "{error}");
+        let error = check_elements(&design, &eight).unwrap_err();
+        assert_eq!(error.id(), "layout/element-not-found");
+        assert!(error.to_string().starts_with(&format!("element {last} of `mini_3x3`")));
         // All of them elsewhere: what was found is said, and where.
         let moved = read(&design, |array| {
             array

@@ -98,9 +98,9 @@ impl ImagingSystem {
         ) = (cache, from_cache)
         {
             return Err(Error::refused(
-                "imaging/kernels-missing",
+                "dataset/kernels-missing",
                 format!("{} does not hold the kernels of this camera", folder.display()),
-                "plan the set again; a shard makes no kernels of its own",
+                "plan the set again; shards make no kernels",
             ));
         }
         let read = || {

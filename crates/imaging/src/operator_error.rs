@@ -62,7 +62,7 @@ impl OperatorError {
         error
     }
 
-    /// Same errors, so many times as large.
+    /// These errors, so many times as large.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         Self {

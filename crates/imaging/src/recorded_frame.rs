@@ -56,15 +56,15 @@ impl ImagingSystem {
         let planes = planes_of(&self.camera);
         if signals.len() != planes {
             return Err(Error::refused(
-                "restore/planes",
-                format!("{} planes of a frame, and the camera gives {planes}", signals.len()),
+                "restore/plane-count-differs",
+                format!("the frame has {} planes, and the camera gives {planes}", signals.len()),
                 "give one for a sensor with a colour filter array, else one for each channel",
             ));
         }
         if signals.iter().flatten().any(|v| !v.is_finite()) {
             return Err(Error::refused(
                 "restore/not-numbers",
-                "a frame with signals that are no numbers",
+                "the frame has values that are not numbers",
                 "give finite signals, full scale being one",
             ));
         }

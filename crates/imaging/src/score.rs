@@ -78,7 +78,7 @@ fn psnr_of(error: f64) -> Result<f64> {
         false => Ok((-10.0 * error.log10()).min(MOST_DB)),
         true => Err(Error::refused(
             "score/not-numbers",
-            "a picture whose values are no numbers",
+            "the picture has values that are not numbers",
             "look at its frame: where next to no pixel is below full scale nothing can be restored; if that is not so, report this",
         )),
     }
@@ -118,8 +118,8 @@ pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScor
     let (rows, columns, colours) = truth.dim();
     if picture.dim() != truth.dim() || colours != 3 {
         return Err(Error::refused(
-            "score/shapes",
-            format!("pictures of shapes {:?} and {:?}", picture.dim(), truth.dim()),
+            "score/sizes-differ",
+            format!("the pictures have the shapes {:?} and {:?}", picture.dim(), truth.dim()),
             "give two of one shape, (rows, columns, 3)",
         ));
     }
@@ -167,8 +167,7 @@ mod tests {
         assert!((at(Zone::Corner).psnr_linear_db + 10.0 * (0.01f64 / 12.0).log10()).abs() < 1e-9);
         assert!(at(Zone::Corner).ssim < at(Zone::Edge).ssim);
         wrong[[3, 3, 0]] = f64::NAN;
-        let error = scores(&wrong, &truth).unwrap_err().to_string();
-        assert!(error.contains("no numbers"), "{error}");
+        assert_eq!(scores(&wrong, &truth).unwrap_err().id(), "score/not-numbers");
     }
 
     /// Scores of equal pictures go through a file, also of one that has nothing in place of infinity.

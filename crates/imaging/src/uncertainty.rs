@@ -9,9 +9,9 @@ use metalith_core::{Result, srgb};
 /// Statistics of samples.
 #[derive(Clone, Debug)]
 pub struct Uncertainty {
-    /// Their mean, linear sRGB `[row, column, colour]`.
+    /// Mean of the pictures, linear sRGB `[row, column, colour]`.
     pub mean: Array3<f64>,
-    /// Their deviation from it, root mean square over the colours, of sRGB values `[row, column]`.
+    /// Deviation of the pictures from it, root mean square over the colours, of sRGB values `[row, column]`.
     pub spread: Array2<f64>,
     pub samples: usize,
 }

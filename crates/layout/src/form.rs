@@ -29,7 +29,7 @@ impl PillarForm {
         }
     }
 
-    /// Same chord error for pillars of another shape.
+    /// This chord error for pillars of another shape.
     #[must_use]
     pub fn with_shape(self, shape: PillarShape) -> Self {
         Self { shape, ..self }

@@ -38,7 +38,7 @@ pub fn write_free(
     if !free.shape.has_width() && array.shape != free.shape {
         return Err(Error::refused(
             "layout/rectangles-without-design",
-            "rectangles without a design",
+            "rectangles cannot be written without a design",
             "write squares or circles, or give a design with `shape = \"rectangle\"` or `\"upright_rectangle\"`",
         ));
     }

@@ -240,7 +240,7 @@ fn polygon(layer: &LayoutLayer, corners: &[(i64, i64)]) -> GdsElement {
 /// Error for what gds21 refuses to encode: a mistake of this program, which is reported, not hidden.
 fn encoding(error: impl std::fmt::Debug) -> Error {
     Error::refused(
-        "layout/encoding",
+        "layout/encoding-failed",
         format!("the layout cannot be encoded: {error:?}"),
         "please report this with the design file",
     )

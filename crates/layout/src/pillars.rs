@@ -185,7 +185,7 @@ impl<'a> PillarWriter<'a> {
         Ok(cells.into_iter().collect())
     }
 
-    /// Write a cell for each width and one reference a pillar, each element a cell of its own.
+    /// Write a cell for each width and one reference a pillar, each element its own cell.
     pub(crate) fn referenced(&mut self, array: &PillarArray) -> Result<()> {
         let template = Template::References(self.width_cells(array)?);
         for (k, placed) in array.placed.iter().enumerate() {

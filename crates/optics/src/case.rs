@@ -109,7 +109,7 @@ pub struct Placement {
 
 /// An element whose light is asked for.
 pub trait ElementOptics: Sync {
-    /// Its fields in a light.
+    /// Fields in a light.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
@@ -157,7 +157,7 @@ enum Source<'a> {
 }
 
 impl<'a> CaseOptics<'a> {
-    /// Same optics with at most so many bytes of spectra for a thread at a time, if that is given.
+    /// These optics with at most so many bytes of spectra for a thread at a time, if that is given.
     #[must_use]
     pub fn within(self, part_bytes: Option<usize>) -> Self {
         Self { part_bytes, ..self }

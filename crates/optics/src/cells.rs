@@ -145,8 +145,8 @@ impl RealisedCells {
     /// Error that a bank has no answer.
     pub(super) fn along_normal_alone() -> Error {
         Error::refused(
-            "study/oblique",
-            "tables of cells are for light along the normal",
+            "study/oblique-unsupported",
+            "the tables of cells are for normal incidence",
             "leave out `incidence = \"oblique\"`",
         )
     }

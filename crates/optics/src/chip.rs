@@ -64,9 +64,9 @@ impl AsBuiltChip {
         if !faults.is_empty() {
             let all: Vec<String> = faults.iter().map(ToString::to_string).collect();
             return Err(Error::refused(
-                "model/refused",
+                "model/impossible-values",
                 all.join("\n"),
-                "correct the calibrated model",
+                "correct these values of the calibrated model",
             ));
         }
         let perturbation = &model.perturbation;
@@ -91,7 +91,7 @@ impl AsBuiltChip {
         })
     }
 
-    /// Same chip, whose rectangles, which take longer to solve than pillars of one width, are cached in a folder from
+    /// This chip, whose rectangles, which take longer to solve than pillars of one width, are cached in a folder from
     /// one run to the next: see [`metalith_cell::cache_folder`].
     #[must_use]
     pub fn kept_in(self, folder: Option<&Path>) -> Self {
@@ -101,7 +101,7 @@ impl AsBuiltChip {
         }
     }
 
-    /// Same chip with all cells from a bank of the stated pillar: nothing is solved.
+    /// This chip with all cells from a bank of the stated pillar: nothing is solved.
     #[must_use]
     pub fn from_bank(self, bank: &Arc<CellBank>) -> Self {
         Self {

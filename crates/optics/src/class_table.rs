@@ -20,7 +20,7 @@ pub struct ClassTable {
     sites: Option<Arc<[u16]>>,
 }
 
-/// Steps of the real and of the imaginary part from the least to the largest where each site has a number of its own: what
+/// Steps of the real and of the imaginary part from the least to the largest where each site has its own number: what
 /// rounding scatters is 5e-5 of the largest |t|^2.
 const STEPS: u16 = 127;
 
@@ -88,7 +88,7 @@ impl ClassTable {
             .sum()
     }
 
-    /// Same sites with all light multiplied by this.
+    /// These sites with all light multiplied by this.
     #[must_use]
     pub fn scaled(mut self, by: f32) -> Self {
         self.t.iter_mut().for_each(|t| *t *= by);

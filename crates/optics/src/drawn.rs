@@ -156,8 +156,8 @@ pub(crate) fn coupled<'e>(
 /// directions.
 pub(crate) fn not_held() -> Error {
     Error::refused(
-        "verify/too-large",
-        "an element whose pillars are too many to be held is judged as made, or among its unlike neighbours",
-        "judge it by the cell of a lattice of equal pillars, as drawn",
+        "verify/element-too-large",
+        "the element has too many pillars for a simulation as fabricated or with the coupled model",
+        "simulate it as drawn, with the model `rigorous`, `fitted` or `published`",
     )
 }

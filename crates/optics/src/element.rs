@@ -49,13 +49,13 @@ impl<'a> DrawnElement<'a> {
         }
     }
 
-    /// Same element with its centre at a place on the chip (um), instead of on the chip's axis.
+    /// This element with its centre at a place on the chip (um), instead of on the chip's axis.
     #[must_use]
     pub fn placed(self, centre_um: [f64; 2]) -> Self {
         Self { centre_um, ..self }
     }
 
-    /// Same element with pillars of another shape, on which the area that they fill depends.
+    /// This element with pillars of another shape, on which the area that they fill depends.
     #[must_use]
     pub fn of_shape(self, shape: PillarShape) -> Self {
         Self { shape, ..self }
@@ -252,7 +252,7 @@ impl AsBuiltElement {
         })
     }
 
-    /// Same element with the missing pillars gone from random places instead of counted with their mean.
+    /// This element with the missing pillars gone from random places instead of counted with their mean.
     #[must_use]
     pub fn with_pillars_removed(mut self, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

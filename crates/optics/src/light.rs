@@ -12,7 +12,7 @@ use metalith_wave::kernels::cis;
 /// A plane or spherical wave of unit amplitude on the axis of an element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrivingLight {
-    /// Its direction at the axis, the tilt of the chip counted in.
+    /// Direction at the axis, the tilt of the chip counted in.
     pub plane: PlaneWave,
     /// One over the distance of the source (1/m); zero for a plane wave.
     pub source_per_m: f64,

@@ -57,8 +57,8 @@ impl<'a> NeighbourPillars<'a> {
         if count > MOST_WIDTHS {
             return Err(Error::refused(
                 "neighbours/too-many-widths",
-                format!("an element with pillars of {count} widths"),
-                format!("at most {MOST_WIDTHS} can have neighbours; judge it by another fidelity"),
+                format!("the element has pillars of {count} widths, more than {MOST_WIDTHS}"),
+                format!("simulate it with another `fidelity`: the coupled model supports {MOST_WIDTHS} widths"),
             ));
         }
         let last = drawn.last().copied().unwrap_or(0);

@@ -10,9 +10,9 @@ use super::Perturbation;
 /// A quantity of a model file that a command does not apply, with the reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct NotApplied {
-    /// Its key in the model file.
+    /// Key in the model file.
     pub quantity: &'static str,
-    /// Its value there.
+    /// Value there.
     pub value: String,
     pub because: &'static str,
 }
@@ -20,9 +20,9 @@ pub struct NotApplied {
 /// A quantity of a model file that is applied.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Applied {
-    /// Its key in the model file.
+    /// Key in the model file.
     pub quantity: String,
-    /// Its value there, to five digits.
+    /// Value there, to five digits.
     pub value: String,
 }
 

@@ -1,7 +1,7 @@
 //! Rational functions through values at nodes: what transmissions are between them.
 //!
 //! A guided-mode resonance is a pole beside the real axis, of the size of a pillar as of its height or index. A cubic follows it where nodes are a
-//! fraction of its width apart; a quotient of two polynomials has poles of its own, and takes some nodes for each resonance, however narrow.
+//! fraction of its width apart; a quotient of two polynomials has its own poles, and takes some nodes for each resonance, however narrow.
 
 use std::ops::Range;
 

@@ -123,12 +123,12 @@ fn among_neighbours(design: &Design, cache: Option<&Path>, progress: &dyn Progre
     let words = |(a, b): (f64, f64)| format!("from {:.0} to {:.0} nm", a * 1e3, b * 1e3);
     if first >= last {
         return Err(Error::refused(
-            "optimise/neighbours-one-wavelength",
+            "optimise/too-few-wavelengths",
             format!(
-                "a table of unlike neighbours at one wavelength alone, for a band {}",
+                "the table of the coupled model has one wavelength, and the band is {}",
                 words(band)
             ),
-            "name more in [verify] wavelengths_nm: the others of the band are taken from these",
+            "name at least two in [verify] wavelengths_nm: the band is interpolated between them",
         ));
     }
     if band.0 < first || band.1 > last {
@@ -151,7 +151,7 @@ pub(crate) fn check_shape(design: &Design) -> Result<()> {
     match design.cell.shape.basis() {
         None | Some(PolarisationBasis::Circular) => Ok(()),
         Some(PolarisationBasis::Linear) => Err(Error::refused(
-            "optimise/upright-rectangles",
+            "optimise/rectangles-with-two-phases",
             "the pillars are upright rectangles, which have a phase for each polarisation",
             "use squares, circles or rotated rectangles: the optimiser finds one phase for all light",
         )),

@@ -98,9 +98,9 @@ impl OptimiseTask {
     ) -> Result<Vec<f64>> {
         if cells.iter().any(|cell| cell.fidelity() == Fidelity::Neighbours) {
             return Err(Error::refused(
-                "optimise/errors-among-neighbours",
-                "errors of fabrication among unlike neighbours",
-                "judge them with the cell `rigorous`",
+                "optimise/errors-with-neighbours",
+                "errors of fabrication are not supported with the coupled model",
+                "simulate them with the cell `rigorous`",
             ));
         }
         let widths = self.widths_nm(waves);

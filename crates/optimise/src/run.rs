@@ -53,7 +53,7 @@ impl OptimiseTask {
     /// The task that a design sets.
     ///
     /// # Errors
-    /// If its lens has no rings or a phase over the plane, or elements have lenses of their own.
+    /// If its lens has no rings or a phase over the plane, or elements have their own lenses.
     pub fn of(design: &Design) -> Result<Self> {
         check_shape(design)?;
         design.one_lens("the optimiser")?;
@@ -87,7 +87,7 @@ impl OptimiseTask {
         self.limit
     }
 
-    /// Same task without errors of fabrication.
+    /// This task without errors of fabrication.
     pub fn regardless_of_errors(&self) -> Self {
         let mut plain = self.clone();
         plain.spec.robust = None;
@@ -127,7 +127,7 @@ impl OptimiseTask {
             StartSpec::Previous => Start::Previous(self.own_waves.clone()),
             StartSpec::Log => {
                 return Err(Error::refused(
-                    "optimise/log-from-itself",
+                    "optimise/start-needs-own-result",
                     "the merit `log` cannot begin with its own result",
                     "use start = \"all\" or \"log_asphere\"; \"log\" is for Adam, and for the merit `deconvolution`",
                 ));

@@ -1,4 +1,4 @@
-//! What a kind of pillar answers to the rest of the program: one trait, one file for each kind.
+//! Interface of a kind of pillar for the rest of the program: one trait, one file for each kind.
 
 use serde::Serialize;
 
@@ -33,7 +33,7 @@ pub enum OutlineForm {
     Polygon,
 }
 
-/// Polarisations that pillars give a phase of its own.
+/// Polarisations that pillars give a separate phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PolarisationBasis {
     /// Circular ones: the phase is geometric, twice the rotation of the pillar.
@@ -78,7 +78,7 @@ pub trait PillarKind {
     /// Outline, as formats, rules and drawings take it.
     fn outline(&self) -> OutlineForm;
 
-    /// Polarisations that have a phase of their own; none if all light has one phase.
+    /// Polarisations that have their own phase; none if all light has one phase.
     fn basis(&self) -> Option<PolarisationBasis> {
         None
     }

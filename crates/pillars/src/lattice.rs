@@ -105,16 +105,16 @@ impl Lattice {
         }
         if sites == 0 || sites > 1 << 20 {
             return Err(Error::refused(
-                "lattice/sites",
-                format!("a lattice of {sites} sites an axis"),
-                "use between 1 and 1,048,576 sites an axis",
+                "lattice/site-count-out-of-range",
+                format!("the lattice has {sites} sites along an axis"),
+                "use 1 to 1,048,576 sites along an axis",
             ));
         }
         if kind == LatticeKind::Hexagonal && sites.is_multiple_of(2) {
             return Err(Error::refused(
-                "lattice/sites",
-                format!("a hexagonal lattice of {sites} places an axis"),
-                "use an odd number: one is in the centre",
+                "lattice/even-site-count",
+                format!("the hexagonal lattice has {sites} places along an axis, an even number"),
+                "use an odd number: one place is in the centre",
             ));
         }
         Ok(Self { kind, pitch_nm, sites })

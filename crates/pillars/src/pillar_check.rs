@@ -85,7 +85,7 @@ impl PillarCheck {
         }
     }
 
-    /// Same check for pillars of this shape.
+    /// This check for pillars of this shape.
     #[must_use]
     pub fn of_shape(self, shape: PillarShape) -> Self {
         Self {

@@ -87,9 +87,9 @@ impl NetworkDenoiser {
         let (rows, columns, colours) = picture.dim();
         if colours != COLOURS || rows == 0 || columns == 0 || deviation.dim() != picture.dim() {
             return Err(Error::refused(
-                "denoise/shapes",
+                "denoise/sizes-differ",
                 format!(
-                    "values of shape {:?}, deviations of shape {:?}",
+                    "the picture has the shape {:?}, the deviations of its noise have {:?}",
                     picture.dim(),
                     deviation.dim()
                 ),

@@ -122,7 +122,7 @@ impl PerceptualDistance {
         let (rows, columns, colours) = a.dim();
         if a.dim() != b.dim() || colours != 3 || rows.min(columns) < LEAST_PIXELS {
             return Err(Error::refused(
-                "score/shapes",
+                "score/sizes-differ",
                 format!(
                     "pictures of {:?} and {:?} have no perceptual distance",
                     a.shape(),

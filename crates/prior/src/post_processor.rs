@@ -29,12 +29,12 @@ pub struct Provenance {
     /// Pictures of a frame.
     pub pictures: usize,
     /// Digest of what the camera's layout does to light: materials, cell, band. None for cameras without one, and in weights that
-    /// were taught before it was kept.
+    /// were trained before it was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub optics: Option<String>,
 }
 
-/// A network that was taught for one camera and one kind of pictures.
+/// A network that was trained for one camera and one kind of pictures.
 #[derive(Clone, Debug)]
 pub struct PostProcessor {
     network: Network,
@@ -67,20 +67,20 @@ impl PostProcessor {
     }
 
     /// The picture that is expected of a scene, `[row, column, colour]` in sRGB values, from pictures of one frame of it in the
-    /// order in which it was taught by them.
+    /// order in which it was trained by them.
     ///
     /// # Errors
     /// If there are more or fewer of them, or they differ in size.
     pub fn finish(&self, pictures: &[Array3<f32>]) -> Result<Array3<f32>> {
         if pictures.len() != self.provenance.pictures {
             return Err(metalith_core::Error::refused(
-                "stage/number-of-pictures",
+                "stage/picture-count-differs",
                 format!(
-                    "{} pictures of a frame for a network that was taught by {}",
+                    "the network was trained with {1} pictures of a frame, and {0} are given",
                     pictures.len(),
                     self.provenance.pictures
                 ),
-                "give the weights that were taught for this camera",
+                "give the weights that were trained for this camera",
             ));
         }
         Ok(self.corrected(&piled(pictures, pictures[0].dim())?))

@@ -53,8 +53,8 @@ pub fn cut<T: Copy>(planes: &Array3<T>, place: [usize; 2], size: [usize; 3]) -> 
 pub fn piled(pictures: &[Array3<f32>], size: (usize, usize, usize)) -> Result<Array3<f32>> {
     if pictures.is_empty() || pictures.iter().any(|p| p.dim() != size) || size.2 != COLOURS {
         return Err(Error::refused(
-            "stage/shapes",
-            "pictures of one frame that differ in size, or none",
+            "stage/sizes-differ",
+            "the pictures of one frame differ in size, or there are none",
             "give pictures in colour of the size of the scene",
         ));
     }

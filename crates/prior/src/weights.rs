@@ -40,7 +40,7 @@ pub(crate) fn read_described<T>(
     let training = header.metadata().as_ref().and_then(|words| words.get(TRAINING));
     let (about, size) = training
         .and_then(|text| described(&serde_json::from_str(text).ok()?))
-        .ok_or_else(|| fault(path, "it does not say which camera its network was taught for".into()))?;
+        .ok_or_else(|| fault(path, "it does not say which camera its network was trained for".into()))?;
     Ok((about, parse(&bytes, path, &Plan::new(size))?))
 }
 
@@ -78,7 +78,7 @@ pub fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training: &str) 
         (layer.name.clone(), view)
     });
     let bytes = safetensors::serialize(views, Some(about))
-        .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+        .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
     AtomicFile::write(path, &bytes)
 }
 

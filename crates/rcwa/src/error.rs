@@ -13,14 +13,14 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    #[error("light of a wavelength of {wavelength_um} um")]
+    #[error("the wavelength is {wavelength_um} um")]
     Wavelength { wavelength_um: f64 },
-    #[error("an angle of incidence that is not a number")]
+    #[error("the angle of incidence is not a number")]
     Angle,
     /// The wave is evanescent in the half-space that it comes from, or that absorbs.
     #[error("no wave arrives at a sine of {sine:.4} through a medium of index {} + {} i", index.re, index.im)]
     NoIncidentWave { sine: f64, index: Complex64 },
-    #[error("{along_axis} diffraction orders along an axis")]
+    #[error("there are {along_axis} diffraction orders along an axis")]
     Orders { along_axis: usize },
     #[error("{along_axis} x {along_axis} orders without symmetry are {unknowns} unknowns")]
     TooLarge {
@@ -28,9 +28,9 @@ pub enum Error {
         unknowns: usize,
         most: usize,
     },
-    #[error("a supercell of {sites} sites")]
+    #[error("the supercell has {sites} sites")]
     Sites { sites: usize },
-    #[error("{cells} cells on a lattice of {sites} sites")]
+    #[error("there are {cells} cells for {sites} sites")]
     CellCount { cells: usize, sites: usize },
     /// Cells are counted from one.
     #[error("cell {cell} of a supercell differs from the first in pitch, in heights or in materials")]
@@ -43,9 +43,9 @@ pub enum Error {
         sites: usize,
     },
     /// Sites are counted from one.
-    #[error("a rotated rectangle on site {site} of a supercell")]
+    #[error("site {site} of the supercell has a rotated rectangle")]
     RotatedSite { site: usize },
-    #[error("diffraction orders up to {highest} for each cell of a supercell")]
+    #[error("the diffraction orders go up to {highest} for each cell of the supercell")]
     SupercellOrders { highest: usize },
     #[error("{sites} sites with orders up to {highest} for each are {unknowns} unknowns")]
     SupercellTooLarge {
@@ -54,21 +54,21 @@ pub enum Error {
         unknowns: usize,
         most: usize,
     },
-    #[error("a lattice with a pitch of {pitch_nm} nm")]
+    #[error("the pitch of the lattice is {pitch_nm} nm")]
     Pitch { pitch_nm: f64 },
-    #[error("rows {row_nm} nm apart")]
+    #[error("the rows are {row_nm} nm apart")]
     Row { row_nm: f64 },
     /// Layers count from one, the lowest.
     #[error("layer {layer} of a cell of staggered rows has a pillar that is no circle")]
     StaggeredOutline { layer: usize },
-    #[error("a medium with the index {} + {} i", index.re, index.im)]
+    #[error("a medium has the index {} + {} i", index.re, index.im)]
     Index { index: Complex64 },
     /// Layers count from one, the lowest.
     #[error("layer {layer} of the cell is {height_nm} nm thick")]
     Height { layer: usize, height_nm: f64 },
     #[error("a pillar {width_nm} nm wide on a lattice with a pitch of {pitch_nm} nm")]
     Width { width_nm: f64, pitch_nm: f64 },
-    #[error("a cell whose transmission depends on polarisation")]
+    #[error("the transmission of the cell depends on polarisation")]
     Polarising,
     /// The eigenvalue problem of a layer was not solved.
     #[error("the modes of a layer were not found ({reason})")]
@@ -82,7 +82,7 @@ pub enum Error {
 
     #[error("no material is called \"{}\"", metalith_core::text::quoted(name))]
     UnknownMaterial { name: String, known: Vec<&'static str> },
-    #[error("a material of index {n} + {k} i")]
+    #[error("a material has the index {n} + {k} i")]
     MaterialIndex { n: f64, k: f64 },
     #[error("{material} is known from {from_um} to {to_um} um, not at {wavelength_um} um")]
     OutOfRange {
@@ -118,7 +118,7 @@ pub enum TableError {
     NoWavelengths { header: String },
     #[error("no column n in \"{header}\"")]
     NoIndex { header: String },
-    #[error("nothing is known of a column \"{name}\" there, or it is there twice")]
+    #[error("the column \"{name}\" is unknown or occurs twice")]
     UnknownColumn { name: String },
     #[error("a value is missing")]
     Missing,
@@ -126,11 +126,11 @@ pub enum TableError {
     NotANumber { text: String },
     #[error("\"{text}\" is not a finite number")]
     NotFinite { text: String },
-    #[error("a wavelength, n or k that is not physical")]
+    #[error("a wavelength, n or k is not physical")]
     NotPhysical,
     #[error("the wavelengths do not rise")]
     NotRising,
-    #[error("fewer than two rows")]
+    #[error("the table has fewer than two rows")]
     TooFewRows,
     #[error("{what}")]
     NotOfDatabase { what: String },
@@ -145,32 +145,32 @@ impl Error {
     /// Identity of the error, `subject/cause`: the text may change, the identity stays.
     pub fn id(&self) -> &'static str {
         match self {
-            Self::Wavelength { .. } => "rcwa/wavelength",
-            Self::Angle => "rcwa/angle",
+            Self::Wavelength { .. } => "rcwa/wavelength-out-of-range",
+            Self::Angle => "rcwa/angle-not-a-number",
             Self::NoIncidentWave { .. } => "rcwa/no-incident-wave",
-            Self::Orders { .. } => "rcwa/orders",
-            Self::TooLarge { .. } => "rcwa/too-large",
-            Self::Sites { .. } => "rcwa/sites",
-            Self::CellCount { .. } => "rcwa/cell-count",
-            Self::UnlikeCells { .. } => "rcwa/unlike-cells",
-            Self::OutlineCount { .. } => "rcwa/outline-count",
-            Self::RotatedSite { .. } => "rcwa/rotated-site",
-            Self::SupercellOrders { .. } => "rcwa/supercell-orders",
-            Self::SupercellTooLarge { .. } => "rcwa/supercell-too-large",
-            Self::Pitch { .. } => "rcwa/pitch",
-            Self::Row { .. } => "rcwa/row",
-            Self::StaggeredOutline { .. } => "rcwa/staggered-outline",
-            Self::Index { .. } => "rcwa/index",
-            Self::Height { .. } => "rcwa/height",
-            Self::Width { .. } => "rcwa/width",
-            Self::Polarising => "rcwa/polarising",
-            Self::NoModes { .. } => "rcwa/no-modes",
-            Self::Cutoff => "rcwa/cutoff",
+            Self::Orders { .. } => "rcwa/orders-out-of-range",
+            Self::TooLarge { .. } => "rcwa/too-many-unknowns",
+            Self::Sites { .. } => "rcwa/site-count-out-of-range",
+            Self::CellCount { .. } => "rcwa/cell-count-differs",
+            Self::UnlikeCells { .. } => "rcwa/cells-differ",
+            Self::OutlineCount { .. } => "rcwa/outline-count-differs",
+            Self::RotatedSite { .. } => "rcwa/rotated-rectangle",
+            Self::SupercellOrders { .. } => "rcwa/supercell-orders-out-of-range",
+            Self::SupercellTooLarge { .. } => "rcwa/supercell-too-many-unknowns",
+            Self::Pitch { .. } => "rcwa/pitch-out-of-range",
+            Self::Row { .. } => "rcwa/row-distance-out-of-range",
+            Self::StaggeredOutline { .. } => "rcwa/staggered-without-circles",
+            Self::Index { .. } => "rcwa/index-out-of-range",
+            Self::Height { .. } => "rcwa/height-out-of-range",
+            Self::Width { .. } => "rcwa/width-out-of-range",
+            Self::Polarising => "rcwa/polarising-cell",
+            Self::NoModes { .. } => "rcwa/modes-not-found",
+            Self::Cutoff => "rcwa/field-lost-at-cutoff",
             Self::UnknownMaterial { .. } => "rcwa/unknown-material",
-            Self::MaterialIndex { .. } => "rcwa/material-index",
-            Self::OutOfRange { .. } => "rcwa/out-of-range",
-            Self::Io { .. } => "file/system",
-            Self::Table { .. } => "rcwa/material-table",
+            Self::MaterialIndex { .. } => "rcwa/material-index-out-of-range",
+            Self::OutOfRange { .. } => "rcwa/material-out-of-range",
+            Self::Io { .. } => "file/operation-failed",
+            Self::Table { .. } => "rcwa/material-table-malformed",
         }
     }
 
@@ -196,7 +196,7 @@ impl Error {
                 "give each layer one outline for each site, an empty one where nothing stands".into()
             }
             Self::RotatedSite { .. } => {
-                "solve it in a cell of its own: supercells know pillars that both axes mirror".into()
+                "solve it in a separate cell: supercells know pillars that both axes mirror".into()
             }
             Self::SupercellOrders { .. } => format!("use at most {}", Orders::MOST / 2),
             Self::SupercellTooLarge { most, .. } => {

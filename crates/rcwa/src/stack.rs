@@ -147,7 +147,7 @@ impl Orders {
 }
 
 impl LayerStack {
-    /// Same stack seen from the other side.
+    /// This stack seen from the other side.
     pub(super) fn flipped(&self) -> Self {
         Self {
             pitch_nm: self.pitch_nm,

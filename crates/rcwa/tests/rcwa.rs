@@ -373,16 +373,28 @@ fn what_cannot_be_is_refused_with_its_reason() {
         let error = transmit(&stack, wavelength_um, Side::Below, orders(3)).unwrap_err();
         assert_eq!(error.id(), id, "{error}");
     };
-    refused(&|s| s.layers[0].outline = Outline::square(351.0), 0.5, "rcwa/width");
-    refused(&|s| s.layers[0].height_nm = 0.0, 0.5, "rcwa/height");
-    refused(&|s| s.layers[0].height_nm = f64::NAN, 0.5, "rcwa/height");
-    refused(&|s| s.layers[0].inside = index(f64::NAN), 0.5, "rcwa/index");
-    refused(&|s| s.layers[0].outline = Outline::square(f64::NAN), 0.5, "rcwa/width");
-    refused(&|s| s.pitch_nm = 0.0, 0.5, "rcwa/pitch");
-    refused(&|_| (), -0.5, "rcwa/wavelength");
+    refused(
+        &|s| s.layers[0].outline = Outline::square(351.0),
+        0.5,
+        "rcwa/width-out-of-range",
+    );
+    refused(&|s| s.layers[0].height_nm = 0.0, 0.5, "rcwa/height-out-of-range");
+    refused(&|s| s.layers[0].height_nm = f64::NAN, 0.5, "rcwa/height-out-of-range");
+    refused(
+        &|s| s.layers[0].inside = index(f64::NAN),
+        0.5,
+        "rcwa/index-out-of-range",
+    );
+    refused(
+        &|s| s.layers[0].outline = Outline::square(f64::NAN),
+        0.5,
+        "rcwa/width-out-of-range",
+    );
+    refused(&|s| s.pitch_nm = 0.0, 0.5, "rcwa/pitch-out-of-range");
+    refused(&|_| (), -0.5, "rcwa/wavelength-out-of-range");
     refused(&|s| s.below = Complex64::new(1.5, 0.1), 0.5, "rcwa/no-incident-wave");
     for n in [0, 4, 129] {
-        assert_eq!(Orders::new(n).unwrap_err().id(), "rcwa/orders");
+        assert_eq!(Orders::new(n).unwrap_err().id(), "rcwa/orders-out-of-range");
     }
 }
 

@@ -59,7 +59,7 @@ impl Axis {
             };
         }
         if self.logarithmic {
-            // Twelve decades are as many as a reader can tell apart.
+            // Twelve decades are as many as a reader can distinguish.
             low = low.max(high * 1e-12);
         }
         let mut fitted = Fitted {

@@ -38,13 +38,13 @@ impl Figure {
         }
     }
 
-    /// Same drawing with a caption after its title.
+    /// This drawing with a caption after its title.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
     }
 
-    /// Write the drawing as an SVG file of its own.
+    /// Write the drawing as a separate SVG file.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -52,7 +52,7 @@ impl Figure {
         AtomicFile::write(path, self.to_svg().as_bytes())
     }
 
-    /// The drawing as an SVG file of its own, styles included.
+    /// The drawing as a separate SVG file, styles included.
     pub fn to_svg(&self) -> String {
         let mut svg = self.svg.clone();
         let backdrop = Rectangle::new()

@@ -16,14 +16,14 @@ use metalith_core::{Error, Result};
 pub fn write_json(path: &Path, report: &str, numbers: &impl Serialize) -> Result<()> {
     let fields = serde_json::to_value(numbers).map_err(|e| {
         Error::refused(
-            "internal/serialisation",
+            "internal/serialisation-failed",
             format!("numbers of {report} have no JSON: {e}"),
             "report this as a bug",
         )
     })?;
     let Value::Object(fields) = fields else {
         return Err(Error::refused(
-            "internal/serialisation",
+            "internal/serialisation-failed",
             format!("numbers of {report} are not a map of fields"),
             "report this as a bug",
         ));

@@ -66,7 +66,7 @@ impl FromStr for RestorationMethod {
         Self::ALL.into_iter().find(known).ok_or_else(|| {
             Error::refused(
                 "restore/unknown-method",
-                format!("`{text}` is no way to restore a picture"),
+                format!("there is no method `{text}` of restoration"),
                 "use tikhonov (or wiener, which is the same here), tv, richardson-lucy, hqs or prior",
             )
         })

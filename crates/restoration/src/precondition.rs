@@ -125,7 +125,7 @@ impl Preconditioner {
     }
 
     /// The inverse of the prior between two powers of the light of each place. The two are in one unit where a place
-    /// counts most; each plane has a filter of its own.
+    /// counts most; each plane has its own filter.
     pub(crate) fn apply(&self, right: &[Array2<f32>], filters: &[Vec<f32>]) -> Planes {
         right
             .par_iter()

@@ -68,7 +68,7 @@ fn same_shape(image: &[usize], reference: &[usize]) -> Result<()> {
         return Ok(());
     }
     Err(Error::refused(
-        "score/shapes",
+        "score/sizes-differ",
         format!(
             "an image of shape {:?} where {:?} is needed",
             plane(image),

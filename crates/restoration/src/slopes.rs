@@ -116,7 +116,7 @@ pub enum SlopeLength {
     Anisotropic,
 }
 
-/// The slopes of a picture as a variable of their own, by the alternating direction method of multipliers (Boyd et al.,
+/// The slopes of a picture as a separate variable, by the alternating direction method of multipliers (Boyd et al.,
 /// Foundations and Trends in Machine Learning 3, 1 (2011), section 6.4).
 ///
 /// A round has three steps: the split slopes, the dual variable, and the picture that comes nearest to the goal for its

@@ -98,9 +98,9 @@ impl Camera {
         match dark {
             None => Ok(self),
             Some(channel) => Err(Error::refused(
-                "camera/no-light",
+                "camera/channel-without-light",
                 format!(
-                    "{}: channel `{}` counts none of the light of the illuminant",
+                    "{}: channel `{}` receives no light of the illuminant",
                     path.display(),
                     channel.name
                 ),
@@ -266,7 +266,7 @@ fn read_channels(
             s.fault(
                 "name",
                 format!("a second channel `{name}`"),
-                "give each channel a name of its own",
+                "give each channel its own name",
             );
         }
         channels.push((name, read_response(s)));

@@ -143,7 +143,7 @@ impl PixelGrid {
         rows.sum()
     }
 
-    /// Same image seen from a window that is off by so much (x, y) (um).
+    /// This image seen from a window that is off by so much (x, y) (um).
     pub fn moved(mut self, [x, y]: [f64; 2]) -> Self {
         if x == 0.0 && y == 0.0 {
             return self;
@@ -158,7 +158,7 @@ impl PixelGrid {
         self
     }
 
-    /// Its derivative by the shift along x (0) or y (1) (1/um).
+    /// Derivative by the shift along x (0) or y (1) (1/um).
     pub fn slope(&self, axis: usize) -> Self {
         let middle = (self.re.ncols() / 2) as f32;
         let omega = (std::f64::consts::TAU * self.cycle) as f32;

@@ -163,7 +163,7 @@ impl ChannelSampling {
 /// A narrow part of a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChannelPart {
-    /// Its ends (nm).
+    /// Ends (nm).
     pub nm: [f64; 2],
     /// Weight of its light in the channel, in any scale: photons times efficiency.
     pub weight: f64,
@@ -230,7 +230,7 @@ impl Camera {
             if kept <= 0.0 {
                 let [short, long] = range_nm.map(|nm| (nm * 10.0).round() / 10.0);
                 return Err(Error::refused(
-                    "camera/no-light",
+                    "camera/channel-without-light",
                     format!(
                         "channel `{}` of the camera counts no light from {short} to {long} nm",
                         channel.name

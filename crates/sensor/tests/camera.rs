@@ -134,7 +134,7 @@ fn what_does_not_fit_together_is_said() {
         (
             "source = \"equal_energy\"",
             "source = \"leds\"\n[[illuminant.led]]\ncentre_nm = 900\nwidth_nm = 10",
-            "camera/no-light",
+            "camera/channel-without-light",
         ),
         // 4095 steps of one electron are 0.41 of the well.
         ("bits = 12", "bits = 12\ngain_e = 1", "sensor.gain_e/inconsistent"),
@@ -157,7 +157,7 @@ fn what_does_not_fit_together_is_said() {
           help: known here: led, source
         camera.toml:18:8: `file` is of no use with this source
           help: remove it, or change `source`
-        camera.toml: channel `mono` counts none of the light of the illuminant
+        camera.toml: channel `mono` receives no light of the illuminant
           help: let the efficiency of each channel and the illuminant overlap in wavelength
         camera.toml:9:10: most of a picture would be at its limit: a white surface has 0.9 of full scale, 9000 electrons, and pixel values end at 4095
           help: give a smaller `white`, or a `gain_e` of 2.1978 electrons a step and more

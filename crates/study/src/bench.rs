@@ -85,8 +85,8 @@ impl StudyBench {
         };
         if base.declared().next().is_some() {
             return Err(Error::refused(
-                "study/declared-effects",
-                "a model with declared effects: how wide their pillars become is not known before they are drawn",
+                "study/declared-effects-unsupported",
+                "the model has declared effects, and a study cannot know the widths of their pillars before they are drawn",
                 "give a model without declared effects",
             ));
         }
@@ -165,8 +165,8 @@ impl StudyBench {
         let design = self.tolerance.design(number)?;
         if design.verify.incidence == CellIncidence::Oblique {
             return Err(Error::refused(
-                "study/oblique",
-                "a study takes the cells along the normal, and the design asks for them as they are lit",
+                "study/oblique-unsupported",
+                "a study uses cells at normal incidence, and the design asks for oblique incidence",
                 "leave out `incidence = \"oblique\"` in [verify] of the design of the study",
             ));
         }
@@ -289,15 +289,15 @@ fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Res
     }
     if made.changes.iter().any(|change| change.corner_rounding_nm != 0.0) {
         return Err(Error::refused(
-            "study/corner-rounding",
-            "`corner_rounding` of rectangles",
+            "study/rounded-rectangles",
+            "`corner_rounding` is not supported for rectangles",
             "leave it out of the study and of its model: rectangles are solved with sharp corners",
         ));
     }
     if has_picture {
         return Err(Error::refused(
-            "study/pictures-of-rectangles",
-            "pictures of rectangles in a study",
+            "study/pictures-with-rectangles",
+            "a study does not simulate pictures of rectangles",
             "leave out [picture]; `metalith picture` takes the picture of the chip as drawn",
         ));
     }

@@ -70,7 +70,7 @@ pub(crate) fn columns(result: &StudyResult) -> Vec<Column> {
         };
         columns.push(column(head, values));
     }
-    // Designs of a grid may have figures of their own.
+    // Designs of a grid may have their own figures.
     let figures: BTreeSet<&String> = draws.iter().flat_map(|d| d.figures.keys()).collect();
     for key in figures {
         let values = draws.iter().map(|d| d.figures.get(key).copied().flatten());

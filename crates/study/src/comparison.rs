@@ -108,7 +108,7 @@ fn key(comparison: &Comparison) -> Result<String> {
     // What is asked for, with the names of the files; what they say follows.
     hash.update(
         serde_json::to_vec(comparison)
-            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?,
+            .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?,
     );
     let mut files = Camera::read(&comparison.camera)?.files;
     for listed in &comparison.designs {

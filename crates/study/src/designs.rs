@@ -59,7 +59,7 @@ impl Tolerance {
             return Design::read(&self.design);
         }
         let text = with_values(&load(&self.design)?, &self.setting(number))
-            .map_err(|NoPlace { what, hint, .. }| Error::refused("study/design-key", what, hint))?;
+            .map_err(|NoPlace { what, hint, .. }| Error::refused("study/key-not-in-design", what, hint))?;
         Design::parse(&self.design, &text)
     }
 }

@@ -193,8 +193,11 @@ impl Sampler {
             }
         }
         Err(Error::refused(
-            "study/amount-impossible",
-            format!("`{}` is hardly ever within what a chip can have", quantity.name),
+            "study/distribution-out-of-range",
+            format!(
+                "the distribution of `{}` is almost entirely outside of the physical range",
+                quantity.name
+            ),
             "give a distribution that overlaps with the physical range of the effect",
         ))
     }

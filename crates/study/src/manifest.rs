@@ -32,7 +32,7 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
         let mut found: Self = read(folder)?;
         if !found.is_known() {
             return Err(Error::refused(
-                "study/another-version",
+                "study/version-differs",
                 format!(
                     "{} is a manifest of another version of the program",
                     folder.join(MANIFEST).display()
@@ -100,9 +100,9 @@ fn fault(folder: &Path, what: String) -> Error {
 /// Error for a folder whose plan is not the plan of these files.
 pub(crate) fn another_plan(folder: &Path) -> Error {
     Error::refused(
-        "study/another-plan",
+        "study/plan-differs",
         format!(
-            "{} holds another plan, or a file of it has changed since, or another version of the program planned it",
+            "{} contains another plan, or a file of the plan has changed, or another version of the program planned it",
             folder.display()
         ),
         "plan into another folder with --out, or remove this one",

@@ -173,7 +173,7 @@ impl PairsPlan {
         Err(Error::refused(
             "study/damaged-pairs",
             format!(
-                "files of {} of {} pairs are damaged or not there: {}",
+                "files of {} of {} pairs are damaged or missing: {}",
                 bad.len(),
                 pairs.len(),
                 ranges(&bad)
@@ -224,8 +224,13 @@ impl PairsRequest {
         let camera = Camera::read(&self.camera)?;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let first = self.images.first();
-        let first =
-            first.ok_or_else(|| Error::refused("study/no-images", "no images", "give a folder with at least one"))?;
+        let first = first.ok_or_else(|| {
+            Error::refused(
+                "scene/no-images",
+                "the folder has no images",
+                "give a folder with at least one image",
+            )
+        })?;
         ImagingSystem::open_cached(
             &design,
             &self.layout,

@@ -20,7 +20,7 @@ use crate::columns::{Column, Values};
 pub(crate) fn write(columns: &[Column], to: &mut (impl Write + Send)) -> Result<()> {
     let told = |error: ParquetError| {
         Error::refused(
-            "study/parquet",
+            "study/parquet-failed",
             format!("the Parquet file cannot be written: {error}"),
             "name a file that ends in .csv, .json or .jsonl",
         )

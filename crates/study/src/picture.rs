@@ -46,7 +46,7 @@ pub enum SceneChoice {
     File(PathBuf),
 }
 
-/// Whose kernels the restoration knows.
+/// Chip whose kernels the restoration uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KnownKernels {
     /// Kernels of the draw: every camera is calibrated.

@@ -153,7 +153,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
         return Ok(known);
     }
     let designs = tolerance.designs();
-    // Where each design would keep tables of its own.
+    // Where each design would keep its own tables.
     let own = (0..designs).map(|d| folder.join(named("cells", "bank", d, designs)));
     let files = Files {
         layouts: paths,

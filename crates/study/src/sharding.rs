@@ -31,7 +31,7 @@ pub struct Sharding {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     pub number: u64,
-    /// Its parts: from the first up to the one before `end`.
+    /// Parts: from the first up to the one before `end`.
     pub first: u64,
     pub end: u64,
 }
@@ -170,7 +170,7 @@ impl Sharding {
         match self.own_header(first_line) {
             Err((id, why)) => Some((id, why.into())),
             Ok(header) if header != self.header(shard) => Some((
-                "study/shard-cut-otherwise",
+                "study/shard-range-differs",
                 format!(
                     "holds {}s {} to {} as shard {}, of a plan that was cut otherwise",
                     self.part,
@@ -242,7 +242,7 @@ impl Sharding {
             return Err(Error::refused(
                 "study/draws-twice",
                 format!(
-                    "{} {}s are there twice, the first is {k}: in {} and in {}",
+                    "{} {}s exist twice, the first is {k}: in {} and in {}",
                     twice.len(),
                     self.part,
                     files[*a].display(),

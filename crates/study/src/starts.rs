@@ -113,8 +113,8 @@ impl StartsPlan {
         if let Some(gone) = self.cells.iter().map(|name| folder.join(name)).find(|p| !p.is_file()) {
             return Err(Error::refused(
                 "study/input-missing",
-                format!("{} is not there", gone.display()),
-                "plan the starts again; a shard makes no tables of its own",
+                format!("{} is missing", gone.display()),
+                "plan the starts again; shards make no tables",
             ));
         }
         let cells = TaskCells::of(&design, false, Some(&folder), &Quiet(progress))?;

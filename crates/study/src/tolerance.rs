@@ -309,7 +309,7 @@ at_least = 0.6
         Tolerance::read(&path)
     }
 
-    /// What does not fit at a key.
+    /// Fault at a key.
     fn fault(error: &Error, key: &str) -> String {
         let Error::Text(faults) = error else {
             panic!("{error}");

@@ -149,8 +149,8 @@ fn what_rectangles_have_no_meaning_for_is_told() {
     );
     let corners = "[[grid]]\neffect = \"corner_rounding\"\nvalues = [0, 10]\n";
     let each = [
-        (corners, "study/corner-rounding"),
-        (&picture, "study/pictures-of-rectangles"),
+        (corners, "study/rounded-rectangles"),
+        (&picture, "study/pictures-with-rectangles"),
     ];
     for (small, (varied, id)) in [rotated(), upright()].iter().flat_map(|s| each.map(|e| (s, e))) {
         let folder = tempfile::tempdir().unwrap();

@@ -221,7 +221,7 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
     let double = refusal(merge(&made, 0, &Silent).map(|_| ()));
     assert_eq!(double.id(), "study/draws-twice");
     insta::assert_snapshot!(metalith_testing::without_folder(double, folder.path()), @r"
-    2 draws are there twice, the first is 0: in study/shards/000000.jsonl and in study/shards/000007.jsonl
+    2 draws exist twice, the first is 0: in study/shards/000000.jsonl and in study/shards/000007.jsonl
       help: remove one of the two files
     ");
     fs::remove_file(&twice).unwrap();
@@ -245,7 +245,7 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
     let text = fs::read_to_string(&design).unwrap();
     fs::write(&design, text.replace("window_samples = 32", "window_samples = 34")).unwrap();
     let changed = refusal(Run::open(&made).map(|_| ()));
-    assert_eq!(changed.id(), "study/another-plan");
+    assert_eq!(changed.id(), "study/plan-differs");
     assert!(plan(&path, &study, PlanSettings::default(), &Silent).is_err());
 }
 

@@ -67,7 +67,7 @@ fn pairs_of_shards_are_those_of_one_run() {
     ");
     // Shards make no kernels of their own.
     fs::rename(at("parts/kernels"), at("aside")).unwrap();
-    assert_eq!(run(&[1]).unwrap_err().id(), "imaging/kernels-missing");
+    assert_eq!(run(&[1]).unwrap_err().id(), "dataset/kernels-missing");
     fs::rename(at("aside"), at("parts/kernels")).unwrap();
     let kept = fs::read(&images[3]).unwrap();
     fs::copy(&images[0], &images[3]).unwrap();
@@ -88,7 +88,7 @@ fn pairs_of_shards_are_those_of_one_run() {
     let refused = work.merge(&Silent).unwrap_err();
     assert_eq!(refused.id(), "study/damaged-pairs");
     insta::assert_snapshot!(metalith_testing::without_folder(refused, folder.path()), @r"
-    files of 1 of 5 pairs are damaged or not there: 2
+    files of 1 of 5 pairs are damaged or missing: 2
       help: remove the files of their shards (1; the first is parts/shards/000001.jsonl), then make them again by `metalith study run parts --missing`
     ");
     fs::remove_file(work.cut().path(1)).unwrap();
@@ -97,13 +97,13 @@ fn pairs_of_shards_are_those_of_one_run() {
     let old = fs::read_to_string(at("parts/plan.json")).unwrap();
     fs::create_dir(at("old")).unwrap();
     fs::write(at("old/plan.json"), old.replacen("\"schema\": 2", "\"schema\": 1", 1)).unwrap();
-    assert_eq!(Work::open(&at("old")).err().unwrap().id(), "study/another-version");
+    assert_eq!(Work::open(&at("old")).err().unwrap().id(), "study/version-differs");
     let bad = PairsRequest {
         images: [&images[..], &[at("camera.toml")]].concat(),
         ..request.clone()
     };
     let refused = plan_pairs(&bad, &at("bad"), None, &Silent).unwrap_err();
-    assert_eq!(refused.id(), "imaging/unusable-images");
+    assert_eq!(refused.id(), "scene/images-unusable");
     assert!(
         refused.to_string().contains(&*at("camera.toml").to_string_lossy()),
         "{refused}"
@@ -186,7 +186,7 @@ fn starts_of_the_optimiser_are_runs_with_their_seeds() {
     fs::write(&path, text).unwrap();
     assert!(work.run(&[0], &Silent).is_ok(), "what is there needs no design");
     fs::remove_file(planned.cut().path(0)).unwrap();
-    assert_eq!(work.run(&[0], &Silent).unwrap_err().id(), "study/another-plan");
+    assert_eq!(work.run(&[0], &Silent).unwrap_err().id(), "study/plan-differs");
 }
 
 /// Cameras of shards have the scores of one run, and the page its pictures.
@@ -269,5 +269,5 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     }
     fs::remove_file(planned.cut().path(1)).unwrap();
     fs::copy(&comparison.photographs[0], &comparison.photographs[1]).unwrap();
-    assert_eq!(work.run(&[1], &Silent).unwrap_err().id(), "study/another-plan");
+    assert_eq!(work.run(&[1], &Silent).unwrap_err().id(), "study/plan-differs");
 }

@@ -40,14 +40,14 @@ pub fn rotated() -> Small {
 }
 
 impl Small {
-    /// Same design in this light: the value of `polarisation` of `[verify]`, and more keys.
+    /// This design in this light: the value of `polarisation` of `[verify]`, and more keys.
     #[must_use]
     pub fn in_light(mut self, light: &str) -> Self {
         light.clone_into(&mut self.light);
         self
     }
 
-    /// Same design with both edges of all pillars wider, and all higher (nm).
+    /// This design with both edges of all pillars wider, and all higher (nm).
     #[must_use]
     pub fn changed(&self, wider_nm: i32, higher_nm: i32) -> Self {
         Self {

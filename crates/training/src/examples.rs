@@ -59,7 +59,7 @@ impl Photographs {
         };
         if pictures.len() < 2 {
             return Err(invalid(format!(
-                "{} photographs are too few to learn from",
+                "{} photographs are too few for training",
                 pictures.len()
             )));
         }

@@ -92,16 +92,16 @@ impl TrainingSpec {
         let fault = |id, what: &str, hint: &str| Err(Error::refused(id, what, hint));
         if !self.piece.is_multiple_of(8) || !(32..=512).contains(&self.piece) {
             return fault(
-                "train/piece",
-                "pieces of this size cannot be learnt from",
+                "train/piece-out-of-range",
+                "this size of a piece is not possible",
                 "give a multiple of 8 from 32 to 512",
             );
         }
         if self.steps == 0 || !(1..=256).contains(&self.batch) {
             return fault(
-                "train/nothing-to-learn",
-                "nothing to learn",
-                "give at least one step, and 1 to 256 pieces a step",
+                "train/steps-out-of-range",
+                "the numbers of steps and of pieces in a step are out of range",
+                "give at least one step, and 1 to 256 pieces in a step",
             );
         }
         Ok(())
@@ -149,7 +149,7 @@ pub(crate) fn learn(
         if !loss.is_finite() {
             return Err(Error::refused(
                 "train/diverged",
-                format!("learning went astray at step {}", at.step),
+                format!("the loss diverged at step {}", at.step),
                 "use another --seed or more pieces a step, and report this",
             ));
         }

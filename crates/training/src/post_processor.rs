@@ -94,8 +94,10 @@ mod tests {
             post_processor.finish(&[odd.clone(), odd.clone()]).unwrap().dim(),
             odd.dim()
         );
-        let error = post_processor.finish(&[odd]).unwrap_err().to_string();
-        assert!(error.contains("taught by 2"), "{error}");
+        assert_eq!(
+            post_processor.finish(&[odd]).unwrap_err().id(),
+            "stage/picture-count-differs"
+        );
     }
 
     #[test]
@@ -119,7 +121,7 @@ mod tests {
             refused(&bytes)
         };
         assert!(replaced("\\\"pictures\\\":2", "\\\"pictures\\\":3").contains("has the shape"));
-        assert!(replaced("stage", "stags").contains("taught for"));
+        assert!(replaced("stage", "stags").contains("trained for"));
         // Not a number, in the last weight.
         let mut bytes = whole.clone();
         let n = bytes.len();
@@ -132,7 +134,7 @@ mod tests {
                 .map(|_| ())
                 .unwrap_err()
                 .to_string()
-                .contains("taught for")
+                .contains("trained for")
         );
     }
 }

@@ -60,7 +60,7 @@ impl Stack {
             (*name, view)
         });
         let file = safetensors::serialize(views, Some(about))
-            .map_err(|e| Error::refused("internal/serialisation", e.to_string(), "report this"))?;
+            .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
         AtomicFile::write(path, &file)
     }
 
@@ -140,7 +140,7 @@ impl Stacks {
         }
         Err(Error::refused(
             "train/too-few-photographs",
-            format!("{photographs} photographs of {columns} x {rows} pixels are too few or too small to learn from"),
+            format!("{photographs} photographs of {columns} x {rows} pixels are too few or too small for training"),
             format!("give at least two of {piece} x {piece} pixels or more, or a smaller --piece"),
         ))
     }
@@ -154,7 +154,7 @@ impl Stacks {
         Self::check(stacks.len(), [least(0), least(1)], piece)?;
         if let Some(other) = stacks.iter().find(|s| s.pictures() != provenance.pictures) {
             return Err(Error::refused(
-                "stage/number-of-pictures",
+                "stage/picture-count-differs",
                 format!(
                     "{} pictures of a frame, and {} of others",
                     other.pictures(),

@@ -6,7 +6,7 @@ use metalith_report::{fixed, sig};
 
 use super::Verification;
 
-/// Its rows of the table of assumptions: what, its size for the design, and how it is known.
+/// Rows of the table of assumptions: what, its size for the design, and how it is known.
 pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Verification) {
     let axis = design.axis();
     let focused = FocusedLight::Linear(axis);

@@ -27,15 +27,15 @@ impl<'a> SimulationCases<'a> {
     pub fn of_cells(cells: &'a [Box<dyn CellModel>]) -> Result<Self> {
         let (judge, beside) = cells.split_first().ok_or_else(|| {
             Error::refused(
-                "verify/no-model",
-                "there is no cell to judge a layout by",
-                "ask for at least one fidelity",
+                "verify/no-fidelity",
+                "no simulation model is given",
+                "give at least one `fidelity`",
             )
         })?;
         Ok(Self::judged_by(judge.as_ref()).with_cells(beside))
     }
 
-    /// Same cases with these cells besides.
+    /// These cases with these cells besides.
     #[must_use]
     pub fn with_cells(mut self, cells: &'a [Box<dyn CellModel>]) -> Self {
         self.beside

@@ -25,7 +25,7 @@ pub(super) type AskedAngle = (FieldAngle, Option<CopyAngle>);
 
 /// An element that is simulated.
 pub(super) struct Chosen {
-    /// Its number in the array.
+    /// Number in the array.
     pub index: usize,
     pub element: Element,
     /// Number of elements that it stands for, itself among them.

@@ -1,4 +1,4 @@
-//! What the lens does, in a few lines: the numbers that papers on metalenses give.
+//! Figures of the lens in a few lines: the numbers that papers on metalenses give.
 
 use metalith_design::Design;
 use metalith_report::{Cell, Column, sig};

@@ -112,7 +112,7 @@ pub struct DistinctElement {
 pub struct Verification {
     pub design: String,
     pub design_digest: String,
-    /// What of the design is allowed and easily a mistake.
+    /// Warnings on the design.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Warning>,
     /// The cell that the layout is judged by.

@@ -12,7 +12,7 @@ use super::Verification;
 /// Thickness of a substrate that its loss is said for (um).
 const MILLIMETRE_UM: f64 = 1000.0;
 
-/// Their rows of the table of assumptions: what, its size for the design, and how it is known.
+/// Rows of the table of assumptions: what, its size for the design, and how it is known.
 pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, found: &Verification) {
     let sentences = LatticeOrders::summary(&found.lattice_orders);
     let known = match found.fidelity {

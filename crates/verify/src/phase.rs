@@ -79,7 +79,7 @@ impl PhaseErrors {
 /// A pillar as read, with the phase of its site (turns, 0 to 1).
 #[derive(Clone, Copy, Debug)]
 struct Pillar {
-    /// Its place, counted row by row.
+    /// Place, counted row by row.
     site: usize,
     width_nm: u16,
     design_turns: f64,

@@ -138,7 +138,7 @@ mod tests {
         const PART_NM: f64 = 1.0;
         assert!((sampled("gt1930", [450.0, 5504.0]).unwrap().0 - 450.0).abs() <= PART_NM);
         let error = sampled("swir", [310.0, 760.0]).unwrap_err();
-        assert_eq!(error.id(), "camera/no-light");
+        assert_eq!(error.id(), "camera/channel-without-light");
         insta::assert_snapshot!(error, @"
         channel `swir` of the camera counts no light from 310 to 760 nm
           help: use a channel or an illuminant in that range: it is the band of the design (`band_nm` of [cell], or about its wavelengths), as far as its materials are known

@@ -189,7 +189,7 @@ impl Point {
         }
     }
 
-    /// Its light of one wavelength.
+    /// Light of one wavelength.
     pub(crate) fn wave(&self, wavelength_um: f64) -> PlaneWave {
         PlaneWave {
             wavelength_um,

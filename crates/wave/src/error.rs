@@ -14,13 +14,13 @@ pub type Result<T, E = WaveError> = std::result::Result<T, E>;
 pub enum WaveError {
     /// A window without a size, place or distance.
     #[error(
-        "no field can be had at {wavelength_um} um on {0} x {0} samples of {1} um about {2:?} um, {3} um away",
+        "no field can be computed at {wavelength_um} um on {0} x {0} samples of {1} um about {2:?} um, {3} um away",
         window.samples, window.step_um, window.centre_um, window.distance_um
     )]
     Window { wavelength_um: f64, window: Window },
 
     /// A fade that does not end after it begins, or a period that no memory holds.
-    #[error("a fade from {full_um} to {zero_um} um and {} x {} bins", bins[0], bins[1])]
+    #[error("the fade goes from {full_um} to {zero_um} um, with {} x {} bins", bins[0], bins[1])]
     Fade {
         bins: [usize; 2],
         full_um: f64,
@@ -35,11 +35,13 @@ pub enum WaveError {
     Wave { wave: PlaneWave, planned_um: f64 },
 
     /// An aperture on another lattice than the propagator's.
-    #[error("an aperture on {given:?}, planned for {planned:?}")]
+    #[error("the aperture is on {given:?}, and the propagator is planned for {planned:?}")]
     Lattice { given: Lattice, planned: Lattice },
 
     /// A band of wavelengths without light.
-    #[error("no PSF of a band can be had from {samples} wavelengths and {parts} parts: one of them must have a weight")]
+    #[error(
+        "no PSF of a band can be computed from {samples} wavelengths and {parts} parts: one of them must have a weight"
+    )]
     Band { samples: usize, parts: usize },
 
     /// An array of another shape than it must have, or with rows that are not contiguous.
@@ -51,7 +53,7 @@ pub enum WaveError {
     },
 
     /// Another number of values than there are places for them.
-    #[error("{given} {what} where {needed} are needed")]
+    #[error("{given} {what} are given, and {needed} are needed")]
     Count {
         what: &'static str,
         given: usize,
@@ -63,12 +65,12 @@ pub enum WaveError {
     Width { width_nm: usize, last_nm: usize },
 
     /// Rings without a radius or an area, or a wavelength or distance that is not positive.
-    #[error("{radii} radii and {areas} areas of rings")]
+    #[error("the rings have {radii} radii and {areas} areas")]
     Rings { radii: usize, areas: usize },
 
     /// A field angle from which no light arrives.
     #[error(
-        "no light arrives at ({}, {}) degrees from where an element looks, sines {}, {}",
+        "no light arrives at ({}, {}) degrees from the viewing direction of an element, sines {}, {}",
         degrees(field_rad[0]), degrees(field_rad[1]), looks_at[0] + 0.0, looks_at[1] + 0.0
     )]
     Incidence { field_rad: [f64; 2], looks_at: [f64; 2] },
@@ -103,20 +105,20 @@ impl WaveError {
     /// Identity of the error, `subject/cause`: the text may change, the identity stays.
     pub fn id(&self) -> &'static str {
         match self {
-            Self::Window { .. } => "wave/window",
-            Self::Fade { .. } => "wave/fade",
-            Self::Wave { .. } => "wave/wave",
-            Self::Lattice { .. } => "wave/lattice",
-            Self::Band { .. } => "wave/band",
-            Self::Shape { .. } => "wave/shape",
-            Self::Count { .. } => "wave/count",
-            Self::Width { .. } => "wave/width",
-            Self::Rings { .. } => "wave/rings",
-            Self::Incidence { .. } => "wave/incidence",
+            Self::Window { .. } => "wave/window-out-of-range",
+            Self::Fade { .. } => "wave/fade-out-of-range",
+            Self::Wave { .. } => "wave/wavelength-not-planned",
+            Self::Lattice { .. } => "wave/lattice-differs",
+            Self::Band { .. } => "wave/band-without-weight",
+            Self::Shape { .. } => "wave/shape-differs",
+            Self::Count { .. } => "wave/count-differs",
+            Self::Width { .. } => "wave/width-beyond-table",
+            Self::Rings { .. } => "wave/rings-out-of-range",
+            Self::Incidence { .. } => "wave/no-incident-light",
             Self::MissesSensor { .. } => "wave/misses-sensor",
-            Self::Pixels { .. } => "wave/pixels",
-            Self::Samples => "wave/samples",
-            Self::Map { .. } => "wave/map",
+            Self::Pixels { .. } => "wave/pixels-outside-window",
+            Self::Samples => "wave/samples-differ",
+            Self::Map { .. } => "wave/map-out-of-range",
         }
     }
 
@@ -166,7 +168,7 @@ mod tests {
             last_nm: 288,
         };
         let at_border = metalith_core::Error::from(error);
-        assert_eq!(at_border.id(), "wave/width");
+        assert_eq!(at_border.id(), "wave/width-beyond-table");
         insta::assert_snapshot!(at_border, @"
             a pillar is 300 nm wide, the table of the cell ends at 288 nm
               help: make the table up to the widest pillar of the layout
@@ -179,6 +181,6 @@ mod tests {
             field_rad: [95.3_f64, -0.0].map(f64::to_radians),
             looks_at: [-0.0, 0.25],
         };
-        insta::assert_snapshot!(error, @"no light arrives at (95.3, 0) degrees from where an element looks, sines 0, 0.25");
+        insta::assert_snapshot!(error, @"no light arrives at (95.3, 0) degrees from the viewing direction of an element, sines 0, 0.25");
     }
 }

@@ -170,7 +170,7 @@ impl NewArgs {
         let numbers = [nm, self.diameter_um(), focal_length_um];
         if !(numbers.iter().all(|n| n.is_finite() && *n > 0.0) && self.steering_deg().abs() < 90.0) {
             return Err(Error::refused(
-                "new/numbers",
+                "new/out-of-range",
                 format!(
                     "a lens of {} um, f = {focal_length_um} um, for {nm} nm",
                     self.diameter_um()

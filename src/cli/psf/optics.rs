@@ -223,8 +223,8 @@ impl PsfArgs {
         let sines = [self.wedge_x_deg, self.wedge_y_deg].map(|deg| deg.to_radians().sin());
         if !(self.wedge_wavelength_nm > 0.0 && sines[0].hypot(sines[1]) < 1.0) {
             return Err(Error::refused(
-                "option/wedge",
-                "a wedge that steers beyond the horizon or at no wavelength",
+                "option/wedge-out-of-range",
+                "the wedge steers beyond 90 degrees, or its wavelength is not positive",
                 "give smaller --wedge-x-deg and --wedge-y-deg, and a positive --wedge-wavelength-nm",
             ));
         }

@@ -17,7 +17,7 @@ use crate::measurements::Measurements;
 const UNINFORMED: f64 = 1e-3;
 
 /// Least share of what all measurements say of a parameter that they say of it beside the others (rounding of
-/// single-precision predictions): combinations that no measurement tells apart are no matter of which is left out.
+/// single-precision predictions): combinations that no measurement distinguishes are no matter of which is left out.
 const TOLD_APART: f64 = 1e-7;
 
 /// Draws of a bootstrap; enough for the ends of a 95 % interval.
@@ -40,7 +40,7 @@ pub struct Gain {
 }
 
 /// The group of each measurement in each of the ways in which measurements are left out. Where all are alike in these, each
-/// measurement is a group of its own.
+/// measurement is a separate group.
 fn partitions<M: Measurements>(data: &M) -> Vec<PerMeasurement<usize>> {
     let mut ways = data.folds();
     let differs = |way: &PerMeasurement<usize>| way.iter().min() != way.iter().max();

@@ -35,7 +35,7 @@ fn widths_with<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>, error
     .collect()
 }
 
-/// By the bootstrap and the noise.
+/// Covariance by the bootstrap and the noise.
 fn sampled_half_widths<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>) -> Vec<f64> {
     let shared = problem.shared();
     let all: Vec<usize> = (0..fit.equations.size() - 1).collect();

@@ -1,9 +1,9 @@
-//! What the model's own error does to the numbers that are found.
+//! Effect of the model's own error on the numbers that are found.
 //!
 //! Two correct programs do not predict the same. They differ by smooth functions, and in what an effect changes, by a small
 //! share of it. A fit takes such a difference for its parameters, the more so the more alike these are: it makes some of
 //! two effects of it that almost cancel. The difference is therefore added to the intervals: the smooth terms of the model,
-//! each kind with a standard deviation of its own, are propagated through the fit; and a share of what was found.
+//! each kind with its own standard deviation, are propagated through the fit; and a share of what was found.
 
 use nalgebra::DVector;
 
@@ -13,16 +13,16 @@ use crate::effect::Slot;
 use crate::forward_model::ModelError;
 use crate::measurements::Measurements;
 
-/// What a 95 % half-width is made of: what it would be by each cause alone.
+/// Parts of a 95 % half-width: its size by each cause alone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct IntervalParts {
     /// Noise, and that clusters of measurements do not agree.
     pub noise: f64,
     /// The error of the model, by the kinds that [`ModelError::sizes`] lists.
     pub model: Vec<f64>,
-    /// What the effects that were found change.
+    /// Change by the effects that were found.
     pub change: f64,
-    /// What is known of values of this effect.
+    /// Known error of values of this effect.
     pub value: f64,
     /// How far another estimate of the same number is, where there is one: no half-width is less.
     pub least: f64,
@@ -35,7 +35,7 @@ impl IntervalParts {
         if all.is_nan() { all } else { all.max(self.least) }
     }
 
-    /// What the model errs by.
+    /// Error of the model.
     pub fn of_model(&self) -> f64 {
         let all = self.model.iter().copied().chain([self.change, self.value]);
         all.fold(0.0, f64::hypot)

@@ -30,9 +30,9 @@ pub struct FitProblem<'a, M: Measurements> {
     pub model: &'a Model<'a, M>,
     pub surrogate: Surrogate<M>,
     pub data: &'a M,
-    /// Whether each measurement counts.
+    /// True if each measurement counts.
     pub used: PerMeasurement<bool>,
-    /// What a full simulation adds to the surrogate; none where the surrogate is used alone.
+    /// Difference of a full simulation from the surrogate; none where the surrogate is used alone.
     pub correction: Option<PerMeasurement<M::Prediction>>,
 }
 
@@ -64,7 +64,7 @@ impl<M: Measurements> Fit<M> {
         places.map(|k| values[k].clone()).collect()
     }
 
-    /// Whether one of some parameters is farther from zero than its half-width; these are given for all active parameters.
+    /// True if one of some parameters is farther from zero than its half-width; these are given for all active parameters.
     pub fn clears_zero(&self, slots: &[usize], half_widths: &[f64]) -> bool {
         let mut places = slots.iter().filter_map(|&s| Some((s, self.position(s)?)));
         places.any(|(s, k)| self.theta[s].abs() > half_widths[k])

@@ -53,7 +53,7 @@ pub(crate) fn drop_redundant<M: Measurements>(
     }
 }
 
-/// Whether the interval of each number of an effect includes zero.
+/// True if the interval of each number of an effect includes zero.
 fn includes_zero<M: Measurements>(now: &SearchState<'_, M>, effect: usize) -> bool {
     let widths = half_widths(&now.problem, &now.fit);
     let widths: Vec<f64> = widths.iter().map(IntervalParts::half_width).collect();
@@ -132,7 +132,7 @@ struct Substitute<'a, M: Measurements> {
 }
 
 impl<'a, M: Measurements> Substitute<'a, M> {
-    /// With an effect in the place of one that is `removed`; `set` are all effects then.
+    /// Fit with an effect in the place of one that is `removed`; `set` are all effects then.
     fn new(now: &SearchState<'a, M>, removed: usize, effect: usize, set: &[usize]) -> Self {
         Self {
             effect,
@@ -150,7 +150,7 @@ impl<'a, M: Measurements> Substitute<'a, M> {
         self.state.fit.equations.references_chi2()
     }
 
-    /// Whether measurements left out cannot distinguish it from the best.
+    /// True if measurements left out cannot distinguish it from the best.
     fn is_as_good(&self, best: &Self) -> bool {
         let (own, best) = (&self.state, &best.state);
         !best.surely_leaves_less_than(own) && own.error() < best.error() + ALIKE_WITHIN

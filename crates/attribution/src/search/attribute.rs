@@ -1,4 +1,4 @@
-//! From a residual to names: score every effect, fit the leaders, keep what predicts measurements that were not
+//! Selection of effects for a residual: score every effect, fit the leaders, keep what predicts measurements that were not
 //! fitted, and say which effects cannot be distinguished.
 
 use metalith_core::{Progress, Result};
@@ -18,14 +18,14 @@ use crate::surrogate::Surrogate;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 4;
 
-/// A single effect explains what is left if it gains this share of it; else something may that is not tried.
+/// A single effect explains the residual if it gains this share of it; else something may that is not tried.
 const MOST_OF_IT: f64 = 0.5;
 
 /// The outcome of a search.
 pub struct Finding<M: Measurements> {
     /// Effects, strongest first.
     pub chosen: Vec<usize>,
-    /// What else would explain as much, for each of them.
+    /// Alternatives that explain as much, for each of them.
     pub alternatives: Vec<Vec<Alternative>>,
     pub before: Fit<M>,
     pub after: Fit<M>,
@@ -34,14 +34,14 @@ pub struct Finding<M: Measurements> {
     /// The error that random smooth terms would leave on measurements left out.
     pub null_held_out: f64,
     pub ranking: Vec<TriedEffect>,
-    /// What was tried on top of each effect that was taken.
+    /// Effects that were tried in addition to each effect that was taken.
     pub later: Vec<Vec<TriedEffect>>,
     /// 95 % half-widths of the active parameters of `after`.
     pub half_widths: Vec<IntervalParts>,
     /// The surrogate that `after` is based on, and its correction by a full simulation.
     pub surrogate: Surrogate<M>,
     pub correction: Option<PerMeasurement<M::Prediction>>,
-    /// Whether it was ended before all was tried.
+    /// True if it was ended before all was tried.
     pub was_ended: bool,
 }
 
@@ -56,12 +56,12 @@ struct SearchHistory<M: Measurements> {
     runners_up: Vec<Vec<usize>>,
     /// For each effect: those that gained nearly as much when it was taken.
     alike: Vec<Vec<TriedEffect>>,
-    /// Whether pairs were tried where nothing was found yet.
+    /// True if pairs were tried where nothing was found yet.
     pairs_tried_from_start: bool,
 }
 
 impl<M: Measurements> SearchHistory<M> {
-    /// Nothing is found yet.
+    /// Start of the search, with no effect found.
     fn start(start: &SearchState<'_, M>) -> Self {
         Self {
             chosen: Vec::new(),

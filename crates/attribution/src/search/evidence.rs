@@ -32,7 +32,7 @@ pub trait RandomNoise<M: Measurements> {
     /// The amount that the residual of a fit asks for.
     fn amount(&self, problem: &FitProblem<'_, M>, fit: &Fit<M>) -> f64;
 
-    /// Whether an amount is an estimate, and not the end of what was searched.
+    /// True if an amount is an estimate, and not the end of what was searched.
     fn is_estimate(&self, amount: f64) -> bool;
 
     /// The data with the noise of an amount of the effect added to theirs.
@@ -44,7 +44,7 @@ pub struct Evidence<M: Measurements> {
     pub finding: Finding<M>,
     /// With the noise of a random effect, if there is any.
     pub data: M,
-    /// Whether each measurement counts.
+    /// True if each measurement counts.
     pub used: PerMeasurement<bool>,
     /// Amount of the random effect by its noise, where that counts as noise.
     pub amount_by_noise: Option<f64>,
@@ -58,7 +58,7 @@ impl<M: Measurements> Evidence<M> {
         problem_of(model, &self.data, &self.used, &self.finding)
     }
 
-    /// Quantities that remove most of what is left if they are free in each group of measurements; best first.
+    /// Quantities that remove most of the residual if they are free in each group of measurements; best first.
     pub fn patterns(&self, model: &Model<'_, M>) -> &[Pattern] {
         let made = || patterns(&self.problem(model), &self.finding.after);
         self.patterns.get_or_init(made)

@@ -1,4 +1,4 @@
-//! Exchange: another effect in the place of one that was found, where with it one more explains what is left.
+//! Exchange: another effect in the place of one that was found, where with it one more explains the residual.
 //!
 //! Of two effects that are much alike, such as a wavefront as a path and as a phase, the wrong one can be taken while a third
 //! is still hidden. Alone, the right one is no better in its place; with the third it is.
@@ -20,10 +20,10 @@ const MAY_LEAVE: f64 = 0.25;
 
 /// An exchange that explains what was left.
 pub(crate) struct Exchange<'a, M: Measurements> {
-    /// Which of the effects found is replaced, and by which.
+    /// Effect that is replaced, and the one that replaces it.
     pub place: usize,
     pub effect: usize,
-    /// What was tried beside it, and the one that was taken.
+    /// Effects that were tried besides it, and the one that was taken.
     pub tried: Vec<TriedEffect>,
     pub taken: TriedEffect,
     pub leaders: Vec<usize>,
@@ -94,7 +94,7 @@ pub(crate) fn find_exchange<'a, M: Measurements>(
     Ok(best)
 }
 
-/// With another effect in the place of one that is removed, simulated anew about the values that it had when it was tried: a
+/// Fit with another effect in the place of one that is removed, simulated anew about the values that it had when it was tried: a
 /// surrogate about the one that is removed says little of it.
 fn replaced<'a, M: Measurements>(
     now: &SearchState<'a, M>,

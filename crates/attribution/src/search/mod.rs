@@ -1,4 +1,4 @@
-//! Which effects explain a residual: stepwise selection, pair search, refinement and alternatives.
+//! Search for the effects that explain a residual: stepwise selection, pair search, refinement and alternatives.
 
 mod alternatives;
 mod attribute;

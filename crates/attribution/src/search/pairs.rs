@@ -36,7 +36,7 @@ pub(crate) struct FoundTogether<'a, M: Measurements> {
     pub runners_up: Vec<usize>,
 }
 
-/// The pair that explains most of what is left on top of those in `chosen`, if one explains all but little. With `full`, pairs are
+/// The pair that explains most of the residual on top of those in `chosen`, if one explains all but little. With `full`, pairs are
 /// refined with full simulations before they are compared.
 ///
 /// # Errors

@@ -19,10 +19,10 @@ const REPORTED: usize = 3;
 /// Gauss-Newton steps of a pattern.
 const STEPS: usize = 6;
 
-/// A quantity with a value of its own in each group.
+/// A quantity with its own value in each group.
 #[derive(Clone, Debug)]
 pub struct Pattern {
-    /// Its parameter.
+    /// Parameter.
     pub slot: usize,
     /// The number of the grouping in [`Measurements::groupings`].
     pub by: usize,

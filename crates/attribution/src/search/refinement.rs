@@ -21,7 +21,7 @@ const CONVERGED: f64 = 2e-2;
 const ROUNDING: f64 = 1e-9;
 
 impl<M: Measurements> FitProblem<'_, M> {
-    /// Whether a fit left the simulated range.
+    /// True if a fit left the simulated range.
     pub fn extrapolates(&self, fit: &Fit<M>) -> bool {
         fit.active.iter().any(|&s| self.is_beyond(s, fit.theta[s]))
     }

@@ -1,4 +1,4 @@
-//! When what is left counts as a residual: the search goes on above it, and the verdict is by it.
+//! Limit above which a misfit counts as a residual: the search continues above it, and the verdict uses it.
 
 use crate::fit::{Fit, FitProblem, change_energy};
 use crate::measurements::Measurements;

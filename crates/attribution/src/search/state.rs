@@ -1,4 +1,4 @@
-//! Where a search stands.
+//! State of a search.
 
 use metalith_core::{Progress, Result};
 
@@ -33,7 +33,7 @@ pub struct SearchState<'a, M: Measurements> {
 }
 
 impl<'a, M: Measurements> SearchState<'a, M> {
-    /// At a fit.
+    /// State at a fit.
     pub fn new(problem: FitProblem<'a, M>, fit: Fit<M>) -> Self {
         let held_out = held_out(&problem, &fit.equations, &fit);
         Self { problem, fit, held_out }
@@ -49,7 +49,7 @@ impl<'a, M: Measurements> SearchState<'a, M> {
         self.error() > 1.0 + share.max(CHANCE_SIGMAS * (2.0 / self.problem.points().max(1.0)).sqrt())
     }
 
-    /// Whether more is left than the search stops at.
+    /// True if more is left than the search stops at.
     pub fn leaves_a_residual(&self) -> bool {
         self.error() > may_leave(&self.problem, &self.fit)
     }

@@ -32,24 +32,24 @@ pub struct TriedEffect {
     pub score: f64,
     /// Gain of a full fit on measurements left out; none where it was not fitted.
     pub gain: Option<Gain>,
-    /// Its parameters.
+    /// Parameters.
     pub values: Vec<f64>,
-    /// Why it was not taken; none if it was.
+    /// Reason why it was not taken; none if it was.
     pub rejected: Option<Rejection>,
 }
 
-/// Why a candidate is not taken.
+/// Reason why a candidate is not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rejection {
     /// Others explain more; it was not fitted.
     Screened,
-    /// Its gain is within the error of the forward model.
+    /// Gain is within the error of the forward model.
     Little(f64),
     /// The confidence interval of its gain includes zero.
     Unsure,
     /// It removes only this share of the error above noise.
     Part(f64),
-    /// Its value is at the end of the physical range.
+    /// Value is at the end of the physical range.
     Unphysical,
     /// The confidence interval of its value includes zero.
     Nothing,
@@ -60,7 +60,7 @@ pub enum Rejection {
 }
 
 impl Rejection {
-    /// In a few words, for a chart.
+    /// Reason in a few words, for a chart.
     pub fn remark(self) -> String {
         match self {
             Self::Screened => "not fitted".into(),
@@ -74,7 +74,7 @@ impl Rejection {
         }
     }
 
-    /// In full.
+    /// Reason in full.
     pub fn sentence(self) -> String {
         match self {
             Self::Screened => "explains less of the residual than others".into(),
@@ -238,7 +238,7 @@ const LEAST_ERROR: f64 = 1e-6;
 /// A parameter this near to an end of its range, relative to the range, is at the end.
 const AT_END: f64 = 1e-6;
 
-/// Whether the parameters lie within their physical ranges, not at the ends; an end that is a sound value counts as within.
+/// True if the parameters lie within their physical ranges, not at the ends; an end that is a sound value counts as within.
 pub(crate) fn physical<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>, slots: &[usize]) -> bool {
     slots.iter().all(|&s| {
         let Parameter {
@@ -348,7 +348,7 @@ impl<M: Measurements> Candidate<M> {
         self.tried.gain.map_or(f64::MIN, |g| g.value)
     }
 
-    /// Why it cannot be taken, whatever others do.
+    /// Reason why it cannot be taken, whatever others do.
     pub(crate) fn fault(&self, problem: &FitProblem<'_, M>, errors_now: &HeldOutErrors) -> Option<Rejection> {
         let Gain {
             value,

@@ -1,4 +1,4 @@
-//! How one parameter changes every prediction: a polynomial through the simulated values.
+//! Change of every prediction by one parameter: a polynomial through the simulated values.
 
 use std::sync::Arc;
 
@@ -52,12 +52,12 @@ impl<M: Measurements> Curve<M> {
         Self::new(0.0, Vec::new(), [], false)
     }
 
-    /// Whether offsets are from this value.
+    /// True if offsets are from this value.
     pub(crate) fn is_about(&self, value: f64) -> bool {
         self.about == value
     }
 
-    /// Whether it was simulated at any offset.
+    /// True if it was simulated at any offset.
     pub(crate) fn is_simulated(&self) -> bool {
         !self.nodes.is_empty()
     }
@@ -84,7 +84,7 @@ impl<M: Measurements> Curve<M> {
             .map(move |(changes, w)| (&changes[measurement], w as f32))
     }
 
-    /// Its derivative by the offset.
+    /// Derivative by the offset.
     pub(crate) fn slope(&self, u: f64, measurement: MeasurementIndex) -> impl Iterator<Item = (&M::Prediction, f32)> {
         self.changes
             .iter()
@@ -146,7 +146,7 @@ impl<M: Measurements> Curve<M> {
             .collect()
     }
 
-    /// Whether a node counts at `u`.
+    /// True if a node counts at `u`.
     fn counts(&self, node: f64, u: f64) -> bool {
         !self.kinked || (node > 0.0) == (u >= 0.0)
     }
@@ -212,7 +212,7 @@ mod tests {
         vec![Waves::new(0.0, waves)].into()
     }
 
-    /// Through the changes u * odd + u^2 * even at offsets of -1 and 1.
+    /// Curve through the changes u * odd + u^2 * even at offsets of -1 and 1.
     fn both_sides(odd: f64, even: f64) -> Curve<Samples> {
         let at = |u: f64| changes(&[([2, 3], u * odd), ([5, 4], u * u * even)]);
         Curve::new(0.0, vec![-1.0, 1.0], [at(-1.0), at(1.0)], false)

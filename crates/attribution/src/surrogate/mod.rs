@@ -32,7 +32,7 @@ const BESIDE_ONE_SIDED: [f64; 2] = [0.8, 2.2];
 /// 0.4 GB so, and 0.5 to 0.8 GB in all: a search holds predictions about what it finds too.
 const MOST_BYTES: f64 = 1.2e10;
 
-/// How far a fit may extrapolate, as a multiple of the simulated range.
+/// Limit of extrapolation by a fit, as a multiple of the simulated range.
 const EXTRAPOLATION: f64 = 1.6;
 
 /// Predictions at a base point, and how every parameter changes them.
@@ -48,9 +48,9 @@ pub struct Surrogate<M: Measurements> {
     smooth: Arc<Vec<SmoothChange<M>>>,
     /// The surrogate that smooth terms were simulated with, where this one was centred elsewhere since.
     stated: Option<Arc<Surrogate<M>>>,
-    /// Whether all parameters that are not dear were simulated about the base point.
+    /// True if all parameters that are not dear were simulated about the base point.
     renewed: bool,
-    /// What another search of the same measurements simulated: it is not simulated again about the same point.
+    /// Simulations of another search of the same measurements: they are not repeated about the same point.
     elsewhere: Option<Arc<Elsewhere<M>>>,
 }
 
@@ -233,7 +233,7 @@ impl<M: Measurements> Surrogate<M> {
         M::combine(&parts)
     }
 
-    /// Its derivative by one of the parameters.
+    /// Derivative by one of the parameters.
     pub fn derivative(&self, theta: &[f64], slot: usize, measurement: MeasurementIndex) -> M::Prediction {
         let parts: Vec<_> = self.curves[slot]
             .slope(theta[slot] - self.about[slot], measurement)
@@ -298,7 +298,7 @@ fn check_memory<M: Measurements>(model: &Model<'_, M>, nodes: &[Vec<f64>], smoot
         return Ok(());
     }
     Err(Error::refused(
-        "calibrate/memory",
+        "calibrate/too-much-memory",
         format!(
             "the predictions of these measurements for {simulated} points in parameters take about {:.0} GB of memory, and a search \
              as much again; at most {:.0} GB are taken for them",
@@ -339,7 +339,7 @@ fn offsets<M: Measurements>(
     ends.into_iter().filter(|o| *o != 0.0).collect()
 }
 
-/// How one parameter changes the predictions of a base point: the next of `predictions` are those at its `nodes`.
+/// Change of the predictions of a base point by one parameter: the next of `predictions` are those at its `nodes`.
 fn curve<M: Measurements>(
     model: &Model<'_, M>,
     (about, s): (&[f64], usize),

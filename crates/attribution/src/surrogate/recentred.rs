@@ -119,7 +119,7 @@ impl<M: Measurements> Surrogate<M> {
     }
 }
 
-/// Whether the derivative by a parameter jumps at the base.
+/// True if the derivative by a parameter jumps at the base.
 fn is_kinked<M: Measurements>(model: &Model<'_, M>, about: &[f64], s: usize) -> bool {
     model.kinked(model.slots()[s].effect) && about[s] == 0.0
 }

@@ -65,9 +65,11 @@ impl DiffuserSpec {
                 ..Self::standard()
             }),
             false => Err(Error::refused(
-                "diffusercam/geometry",
-                format!("a rough surface of grain {grain_um} um at {distance_um} um with an opening of {opening}"),
-                "give a distance from 1, a grain from 5 to 100000 um, an opening from 0.01 to 2",
+                "diffusercam/geometry-out-of-range",
+                format!(
+                    "the rough surface has a grain of {grain_um} um, a distance of {distance_um} um and an opening of {opening}: one is out of range"
+                ),
+                "give a distance from 1 to 100000 um, a grain from 5 to 100000 um and an opening from 0.01 to 2",
             )),
         }
     }
@@ -115,7 +117,7 @@ impl DiffuserCam {
         if places > MOST_PLACES {
             return Err(Error::refused(
                 "diffusercam/too-large",
-                format!("a scene and a caustic of {places} places along an axis, more than {MOST_PLACES}"),
+                format!("scene and caustic need {places} samples along an axis, more than {MOST_PLACES}"),
                 "bring the rough surface nearer to the sensor, make its grain finer, or give a narrower field",
             ));
         }
@@ -165,7 +167,7 @@ impl DiffuserCam {
         Ok(camera)
     }
 
-    /// Same camera with a learnt last stage behind it.
+    /// This camera with a learnt last stage behind it.
     #[must_use]
     pub fn with_stage(mut self, stage: Option<Stage>) -> Self {
         self.stage = stage;

@@ -34,8 +34,10 @@ impl MaskSpec {
                 distance_um,
             }),
             false => Err(Error::refused(
-                "flatcam/geometry",
-                format!("a mask with openings of {feature_um} um at {distance_um} um"),
+                "flatcam/geometry-out-of-range",
+                format!(
+                    "the mask has openings of {feature_um} um at a distance of {distance_um} um: one is out of range"
+                ),
                 "give lengths from 1 to 100000 um",
             )),
         }
@@ -56,7 +58,7 @@ impl MaskSpec {
             count if count <= MOST_SAMPLES => Ok(()),
             count => Err(Error::refused(
                 "flatcam/too-large",
-                format!("a shadow of {count} samples along an axis, more than {MOST_SAMPLES}"),
+                format!("the shadow of the mask needs {count} samples along an axis, more than {MOST_SAMPLES}"),
                 "give wider openings, a nearer mask or a narrower field",
             )),
         }

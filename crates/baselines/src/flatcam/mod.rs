@@ -117,7 +117,7 @@ impl FlatCam {
         Ok(camera)
     }
 
-    /// Same camera with a learnt last stage behind it.
+    /// This camera with a learnt last stage behind it.
     #[must_use]
     pub fn with_stage(mut self, stage: Option<Stage>) -> Self {
         self.stage = stage;

@@ -30,8 +30,8 @@ impl Factor {
         });
         let svd = (&own * &root).thin_svd().map_err(|e| {
             Error::refused(
-                "flatcam/singular-values",
-                format!("no singular values of a mask: {e:?}"),
+                "flatcam/svd-failed",
+                format!("the singular values of the mask were not found: {e:?}"),
                 "use another size of the scene",
             )
         })?;

@@ -20,7 +20,7 @@ use metalith_wave::{Aperture, PlaneWave};
 /// of 1 mm.
 const MADE_BYTES: usize = 1_200_000_000;
 
-/// What an element on a lattice takes as it is made (bytes).
+/// Memory of an element on a lattice while it is made (bytes).
 fn made_bytes(lattice: Lattice) -> usize {
     AsBuiltElement::MOST_BYTES_PER_SITE * lattice.sites() * lattice.sites()
 }

@@ -77,7 +77,7 @@ impl RigorousCells {
         }
     }
 
-    /// Same cells with other orders, and no correction for upright pillars: for synthetic sets, which must not share
+    /// These cells with other orders, and no correction for upright pillars: for synthetic sets, which must not share
     /// the truncation error of the fits. Tapered walls take six layers, and fewer orders.
     pub fn with_orders(mut self, fine: usize, leaning: usize) -> Self {
         (self.fine, self.coarse, self.leaning) = (fine, fine, leaning);

@@ -84,7 +84,7 @@ fn a_change_solved_with_few_orders_is_that_with_many() {
     }
 }
 
-/// What few orders do to transmission as a smooth function of width, in the mean of the spectrum of an LED: coefficients of
+/// Error of transmission by few orders as a smooth function of width, in the mean of the spectrum of an LED: coefficients of
 /// the polynomials that intervals count with, root mean square over LEDs and polynomials, of amplitude and of phase.
 fn smooth_error(cells: &RigorousCells, few: usize, many: usize, leds: &[Vec<f64>]) -> [f64; 2] {
     use crate::smooth_shape::TRANSMISSION_TERMS;

@@ -18,14 +18,14 @@ const AXES: usize = 2;
 #[derive(Clone)]
 pub struct FrameEquations {
     gram: DMatrix<f64>,
-    /// How far further parameters make the window follow the image, for a unit of each (um).
+    /// Shift of the window that follows the image, for a unit of each further parameter (um).
     follows_um: Vec<[f64; 2]>,
 }
 
 impl FrameEquations {
-    /// For a measurement whose predicted image is `grid`; `more` are the derivatives of the image by further
-    /// parameters. Where the window of a prediction follows the image, the window of the bench, which stands still, is expected to be
-    /// as much off the other way.
+    /// Equations of a measurement whose predicted image is `grid`; `more` are the derivatives of the image by further
+    /// parameters. Where the window of a prediction follows the image, the window of the bench, which stands still, is expected
+    /// to be as much off the other way.
     pub fn new(data: &Data, c: MeasurementIndex, now: &Nuisances, grid: &PixelGrid, more: &[PixelGrid]) -> Self {
         let reading = Reading::new(more.iter().chain([grid]), now.shift_um[c]);
         let lines = reading.with_slopes(grid);
@@ -81,7 +81,7 @@ impl FrameEquations {
         [step[0], step[1]]
     }
 
-    /// How far such a step of the others makes the window follow the image (um).
+    /// Shift of the window that follows the image after such a step of the others (um).
     pub fn following(&self, step: &DVector<f64>) -> [f64; 2] {
         let first = step.len().saturating_sub(self.follows_um.len());
         let mut out = [0.0; 2];

@@ -10,7 +10,7 @@ use super::Data;
 use crate::optics::PixelGrid;
 use crate::set::{MeasurementIndex, PerLed, PerMeasurement};
 
-/// How far the black level may be off (DN), one standard deviation: sensors drift by less over a session.
+/// Error of the black level (DN), one standard deviation: sensors drift by less over a session.
 pub(crate) const BLACK_SIGMA_DN: f64 = 0.5;
 
 /// The nuisances of a set.

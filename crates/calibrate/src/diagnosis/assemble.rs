@@ -1,4 +1,4 @@
-//! From the evidence of a search to the diagnosis.
+//! Diagnosis from the evidence of a search.
 
 use std::collections::BTreeSet;
 
@@ -31,7 +31,7 @@ const MOSTLY_LEFT: f64 = 0.4;
 const LEAST_ABOVE_NOISE: f64 = 1e-9;
 
 impl Diagnosis {
-    /// From the evidence of a search.
+    /// Diagnosis from the evidence of a search.
     pub fn new(
         simulator: &Simulator<'_>,
         evidence: &Evidence,
@@ -89,7 +89,7 @@ impl Diagnosis {
         }
     }
 
-    /// Of a set most of whose measurements cannot be used; `error` is that of the nuisances alone.
+    /// Diagnosis of a set most of whose measurements cannot be used; `error` is that of the nuisances alone.
     pub fn data_unfit(set: &MeasuredSet, error: f64, unusable: &[UnusableMeasurement]) -> Self {
         let pair = ErrorPair {
             fit: error,
@@ -150,7 +150,7 @@ fn verdict(error: &ErrorReport, finding: &Finding, (unexplained_share, may_be_le
     }
 }
 
-/// What is claimed: the effects that were chosen, and their alternatives where the set cannot distinguish them.
+/// Claims: the effects that were chosen, and their alternatives where the set cannot distinguish them.
 fn found_effects(simulator: &Simulator<'_>, finding: &Finding, verdict: SetVerdict) -> Vec<FoundEffect> {
     let mut effects = Vec::new();
     if verdict == SetVerdict::Unexplained {
@@ -183,7 +183,7 @@ fn reported_widths(parts: &[IntervalParts]) -> Vec<WidthParts> {
     parts.iter().map(WidthParts::from).collect()
 }
 
-/// Ambiguities that measurements of few elements or of one colour leave: distances of their own would do as well as a tilt of the sensor, and
+/// Ambiguities that measurements of few elements or of one colour leave: their own distances would do as well as a tilt of the sensor, and
 /// effects that differ by colour alone may be taken for one another.
 fn remarks(simulator: &Simulator<'_>, evidence: &Evidence, verdict: SetVerdict) -> Vec<String> {
     let (set, finding) = (simulator.bench.set(), &evidence.finding);
@@ -221,7 +221,7 @@ fn left_out(set: &MeasuredSet, unusable: &[UnusableMeasurement]) -> Vec<LeftOut>
 }
 
 impl Ranked {
-    /// As it was tried in a step, counted from one.
+    /// Candidate as it was tried in a step, counted from one.
     fn new(simulator: &Simulator<'_>, finding: &Finding, tried: &TriedEffect, step: usize) -> Self {
         let rejection = rejection(finding, tried);
         Self {
@@ -251,7 +251,7 @@ fn taken_words(later: &[Vec<TriedEffect>], tried: &TriedEffect, step: usize) -> 
     }
 }
 
-/// Why a candidate was not taken, if it is not among what was found in the end.
+/// Reason why a candidate was not taken, if it is not among what was found in the end.
 fn rejection(finding: &Finding, tried: &TriedEffect) -> Option<Rejection> {
     tried.rejected.filter(|_| !finding.chosen.contains(&tried.effect))
 }
@@ -265,7 +265,7 @@ fn reported(simulator: &Simulator<'_>, effect: usize, values: &[f64]) -> Vec<f64
 }
 
 impl FoundEffect {
-    /// With the parameters of an effect and what half of their intervals is made of; `others` would do as well.
+    /// Claim with the parameters of an effect and the parts of their half-widths; `others` explain as much.
     pub(crate) fn new(
         simulator: &Simulator<'_>,
         effect: usize,

@@ -1,4 +1,4 @@
-//! What `calibrate` answers: `diagnosis.json`.
+//! Diagnosis of `calibrate`: `diagnosis.json`.
 
 mod assemble;
 mod pattern;
@@ -33,7 +33,7 @@ pub enum SetVerdict {
 }
 
 impl SetVerdict {
-    /// Whether there is something that no effect which was found explains.
+    /// True if there is something that no effect which was found explains.
     pub fn leaves_a_residual(self) -> bool {
         matches!(self, Self::Partly | Self::Unexplained)
     }
@@ -43,19 +43,19 @@ impl SetVerdict {
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundEffect {
     pub name: String,
-    /// In `unit`; a list for an effect along two axes.
+    /// Value in `unit`; a list for an effect along two axes.
     pub value: Value,
     pub unit: String,
     /// 95 % interval; a list of them for an effect along two axes.
     pub interval: Value,
-    /// What half of the interval of each value is made of.
+    /// Parts of the half-width of each value.
     pub interval_from: Vec<WidthParts>,
     pub confounded_with: Vec<String>,
     pub separate_by: Option<String>,
 }
 
 impl FoundEffect {
-    /// Its values, each with the ends of its interval.
+    /// Values, each with the ends of its interval.
     pub fn numbers(&self) -> Vec<(f64, [f64; 2])> {
         let pair = |value: &Value, interval: &Value| {
             let ends = interval.as_array()?;
@@ -67,7 +67,7 @@ impl FoundEffect {
         values.iter().zip(intervals).filter_map(|(v, i)| pair(v, i)).collect()
     }
 
-    /// Whether the interval of an effect with one value contains this value; none for an effect along two axes.
+    /// True if the interval of an effect with one value contains this value; none for an effect along two axes.
     pub fn holds(&self, value: f64) -> Option<bool> {
         let ends = self.interval.as_array()?;
         Some((ends.first()?.as_f64()?..=ends.get(1)?.as_f64()?).contains(&value))
@@ -119,15 +119,15 @@ pub struct Diagnosis {
     pub set: String,
     pub verdict: SetVerdict,
     pub effects: Vec<FoundEffect>,
-    /// What these measurements cannot tell of them, beside other effects.
+    /// Properties of them that these measurements cannot determine, besides other effects.
     pub remarks: Vec<String>,
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
     /// Candidates on top of each effect that was taken.
     pub later_rankings: Vec<Vec<Ranked>>,
-    /// Quantities that explain most of what is left if they differ by element, colour, distance or angle; best first.
+    /// Quantities that explain most of the residual if they differ by element, colour, distance or angle; best first.
     pub patterns: Vec<FreePattern>,
-    /// Effects that are proposed for what is left; none where nothing stands out.
+    /// Effects that are proposed for the residual; none where nothing stands out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proposal: Option<Proposal>,
     /// Share of the error above noise that is left.
@@ -148,7 +148,7 @@ pub struct Proposal {
     pub file: String,
     /// Names of the effects in it.
     pub effects: Vec<String>,
-    /// What each was seen by, with its name.
+    /// Evidence of each, with its name.
     pub reasons: Vec<String>,
     /// The error on measurements left out without them, where they were tried.
     pub held_out_without: Option<f64>,
@@ -160,7 +160,7 @@ impl Proposal {
         let names = self.effects.join(", ");
         let Some(without) = self.held_out_without else {
             return format!(
-                "proposed for what is left: {names} in {}; --adopt tries them, --declare with an edited copy as well",
+                "proposed for the residual: {names} in {}; --adopt tries them, --declare with an edited copy as well",
                 self.file
             );
         };
@@ -172,7 +172,7 @@ impl Proposal {
             .collect();
         let [without, with] = [without, diagnosis.error.after.held_out].map(|error| metalith_report::sig(error, 4));
         if taken.is_empty() {
-            format!("proposed for what is left, tried and not taken: {names}")
+            format!("proposed for the residual, tried and not taken: {names}")
         } else {
             format!(
                 "adopted: {}; error on measurements left out {without} without, {with} with",

@@ -8,7 +8,7 @@ use crate::set::{MeasuredSet, MeasurementIndex};
 use crate::simulator::Simulator;
 use crate::statistics::{LinearTrend, Pattern};
 
-/// A quantity that was fitted free for each element, colour, distance or angle, where this removes most of what is left.
+/// A quantity that was fitted free for each element, colour, distance or angle, where this removes most of the residual.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreePattern {
     /// The effect whose parameter it is, with the number of the parameter if it has several.
@@ -21,7 +21,7 @@ pub struct FreePattern {
     /// Reduced chi-square per pixel without and with it.
     pub before: f64,
     pub after: f64,
-    /// What the values are like over the place of the element, the wavelength, the distance or the angle.
+    /// Trend of the values over the place of the element, the wavelength, the distance or the angle.
     pub linear_trend: Option<PatternTrend>,
 }
 
@@ -37,26 +37,26 @@ pub struct GroupValue {
 /// Values put as linear in what the groups differ in.
 #[derive(Clone, Debug, Serialize)]
 pub struct PatternTrend {
-    /// In words: the place of the element, the wavelength, the distance, the angle of incidence.
+    /// Coordinate in words: the place of the element, the wavelength, the distance, the angle of incidence.
     pub of: String,
-    /// Whether they are linear in it, to what they are known to.
+    /// True if they are linear in it, to what they are known to.
     pub is_linear: bool,
     /// Middle of what the groups span: um on the chip, nm, um, or degrees.
     pub middle: [f64; 2],
     /// Value there, with its standard deviation.
     pub at_middle: [f64; 2],
     pub slopes: Vec<Slope>,
-    /// How far the farthest value is from that.
+    /// Distance of the farthest value from that.
     pub off: f64,
     /// Values beyond as many as determine the trend: with none, any values are linear.
     pub degrees_of_freedom: usize,
-    /// What it comes from if they are linear.
+    /// Cause if they are linear.
     pub means: Option<String>,
-    /// What these groups cannot tell apart.
+    /// Effects that these groups cannot distinguish.
     pub remark: Option<String>,
 }
 
-/// How fast values rise along one direction.
+/// Slope of the values along one direction.
 #[derive(Clone, Debug, Serialize)]
 pub struct Slope {
     /// Unit vector.
@@ -67,7 +67,7 @@ pub struct Slope {
     pub unit: String,
 }
 
-/// What groups differ in: in words, the unit that slopes are given per, and how many of the unit of the coordinates that is.
+/// Difference of the groups: in words, the unit that slopes are given per, and how many of the unit of the coordinates that is.
 fn trend_of(by: Grouping) -> (&'static str, &'static str, f64) {
     match by {
         Grouping::Element => ("place of the element", "mm", 1e3),
@@ -78,7 +78,7 @@ fn trend_of(by: Grouping) -> (&'static str, &'static str, f64) {
 }
 
 impl FreePattern {
-    /// As it is reported.
+    /// Pattern in the form of the report.
     pub fn new(simulator: &Simulator<'_>, pattern: &Pattern) -> Self {
         let (set, by) = (simulator.bench.set(), Grouping::of(pattern));
         let slot = simulator.slots[pattern.slot];
@@ -133,7 +133,7 @@ impl FreePattern {
             remark: (trend.degrees_of_freedom == 0).then(|| {
                 match by == Grouping::Element && self.quantity == "defocus" {
                     true => untold_tilt(self.values.len()),
-                    false => untold(self.values.len(), &self.by, "a slope", "a value of its own"),
+                    false => untold(self.values.len(), &self.by, "a slope", "its own value"),
                 }
             }),
         }
@@ -195,26 +195,28 @@ impl PatternTrend {
     }
 }
 
-/// What values cannot tell apart of which there are as many as numbers: `count` of them, one for each element, colour, distance
+/// What values cannot distinguish of which there are as many as numbers: `count` of them, one for each element, colour, distance
 /// or angle.
 fn untold(count: usize, by: &str, slope: &str, own: &str) -> String {
     match count {
-        1 => format!("Of one {by}, {slope} and {own} cannot be told apart; measurements of another {by} would tell."),
+        1 => format!(
+            "Of one {by}, {slope} and {own} cannot be distinguished; measurements of another {by} would distinguish them."
+        ),
         2 => format!(
-            "Of two, {slope} and {own} for each {by} cannot be told apart: two values are always on a line; measurements of a third {by} would tell."
+            "Of two, {slope} and {own} for each {by} cannot be distinguished: two values are always on a line; measurements of a third {by} would tell."
         ),
         _ => format!(
-            "Of three that are not in line, {slope} with another value in the middle and {own} for each {by} cannot be told apart: three values are always on a plane; measurements of a fourth {by} would tell."
+            "Of three that are not in line, {slope} with another value in the middle and {own} for each {by} cannot be distinguished: three values are always on a plane; measurements of a fourth {by} would tell."
         ),
     }
 }
 
-/// That so many elements do not tell a tilt of the sensor from distances of their own.
+/// Statement that so many elements do not distinguish a tilt of the sensor from individual distances.
 pub(super) fn untold_tilt(elements: usize) -> String {
-    untold(elements, "element", "a tilt of the sensor", "a distance of its own")
+    untold(elements, "element", "a tilt of the sensor", "its own distance")
 }
 
-/// That one colour does not tell effects apart that differ by colour alone.
+/// Statement that one colour does not distinguish effects that differ by colour alone.
 pub(super) fn untold_colours() -> String {
     let widths = untold(1, "colour", "an index or a height of the film", "a bias of widths");
     widths + " So it is with the centre of a lamp and a defocus."

@@ -11,7 +11,7 @@ pub(crate) struct Aberration {
     pub value_error: ValueError,
 }
 
-/// Aberrations through third order; tilts are registration, defocus is an effect of its own.
+/// Aberrations through third order; tilts are registration, defocus is a separate effect.
 pub(crate) const ABERRATIONS: [Aberration; 4] = [
     Aberration {
         name: "astigmatism",

@@ -19,13 +19,13 @@ const LARGEST: f64 = 1e6;
 /// One parameter of a declared effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeclaredParameter {
-    /// Its name in the expression.
+    /// Name in the expression.
     pub name: String,
     /// Physical limits.
     pub range: (f64, f64),
     /// A typical distance from its start.
     pub prior: f64,
-    /// Its value where there is no effect.
+    /// Value where there is no effect.
     pub start: f64,
 }
 
@@ -40,7 +40,7 @@ pub struct DeclaredEffect {
     pub parameters: Vec<DeclaredParameter>,
 }
 
-/// Where an expression acts, by the word of the file.
+/// Stage at which an expression acts, by the word of the file.
 const STAGES: [(&str, Stage); 5] = [
     ("pupil", Stage::Geometry),
     ("width", Stage::Geometry),
@@ -242,7 +242,7 @@ fn tried(variable: &str) -> &'static [f64] {
 /// Places at which an expression is tried: all ways in which five, seven, three and four values meet.
 const PLACES: usize = 420;
 
-/// What an expression does where its parameters start, and what to do about it; none where it does nothing at any place that is
+/// Fault of an expression at the start of its parameters, and its remedy; none where it changes nothing at any place that is
 /// tried. Changes are counted from there: they would begin with a jump.
 fn does_something(term: &CompiledTerm) -> Option<(String, String)> {
     let (nothing, example) = match term.quantity {

@@ -23,10 +23,10 @@ use super::set::MeasuredSet;
 use metalith_core::{Error, Result};
 use metalith_optics::{DeclaredQuantity, Perturbation};
 
-/// Where in the model an effect acts.
+/// Stage of the model at which an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Where pillars and apertures are, and how wide.
+    /// Places and widths of pillars and apertures.
     Geometry,
     /// The pillar itself: its cell has to be solved again.
     Stack,
@@ -46,28 +46,28 @@ pub trait Effect: Send + Sync {
     /// Unit of the value that is reported.
     fn unit(&self) -> &str;
 
-    /// Where it acts.
+    /// Stage at which it acts.
     fn stage(&self) -> Stage;
 
-    /// Its parameters; zero for each is no effect.
+    /// Parameters; zero for each is no effect.
     fn parameters(&self) -> Vec<Parameter>;
 
-    /// Whether its derivative jumps at zero, so that the derivative for one sign does not hold for the other.
+    /// True if its derivative jumps at zero, so that the derivative for one sign does not hold for the other.
     fn kinked(&self) -> bool {
         false
     }
 
-    /// Whether some of its parameters change nothing while all are zero.
+    /// True if some of its parameters change nothing while all are zero.
     fn dormant(&self) -> bool {
         false
     }
 
-    /// Whether it acts on single pillars at random, so that its parameters do not determine the measurement.
+    /// True if it acts on single pillars at random, so that its parameters do not determine the measurement.
     fn random(&self) -> bool {
         false
     }
 
-    /// What a file declares for a unit of one of its parameters: the quantity, and its expression. None where no quantity that
+    /// Declaration of a unit of one of its parameters in a file: the quantity, and its expression. None where no quantity that
     /// can be declared does the same.
     fn declared_form(&self, _parameter: usize) -> Option<(DeclaredQuantity, String)> {
         None
@@ -78,12 +78,12 @@ pub trait Effect: Send + Sync {
         None
     }
 
-    /// What is so if it is linear in the place of the element, in words.
+    /// Conclusion in words if it is linear in the place of the element.
     fn as_gradient(&self) -> Option<&'static str> {
         None
     }
 
-    /// What its values err by besides noise and the cell: as measured, or what those that were not measured of its stage are
+    /// Error of its values besides noise and the cell: as measured, or what those that were not measured of its stage are
     /// given.
     fn value_error(&self) -> ValueError {
         value_error_of(self.stage())

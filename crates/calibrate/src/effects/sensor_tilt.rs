@@ -16,7 +16,7 @@ pub(crate) struct SensorTilt {
 }
 
 impl SensorTilt {
-    /// For the elements of a set; none if all of them are in one place.
+    /// Tilt for the elements of a set; none if all of them are in one place.
     pub(crate) fn of(set: &MeasuredSet) -> Option<Self> {
         let at: Vec<[f64; 2]> = set.elements.iter().map(|e| e.centre_um).collect();
         Some(Self {

@@ -17,7 +17,7 @@ const TYPICAL: f64 = 0.02;
 pub(crate) struct StitchedFields {
     /// Axis that the boundary is across.
     axis: usize,
-    /// Its stated place from the middle of a lens (um).
+    /// Stated place from the middle of a lens (um).
     at_um: f64,
     diameter_um: f64,
 }

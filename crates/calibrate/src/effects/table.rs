@@ -23,33 +23,33 @@ pub(crate) struct TableEffect {
     pub name: &'static str,
     /// Unit of the value that is reported.
     pub unit: &'static str,
-    /// Where it acts.
+    /// Stage at which it acts.
     pub stage: Stage,
-    /// Its parameters: physical range and a size that is not unusual.
+    /// Parameters: physical range and a size that is not unusual.
     pub parameters: &'static [Parameter],
     /// Set its parameters.
     pub apply: fn(&[f64], &mut Perturbation),
     /// Effects that this kind of data cannot distinguish from it, each with the measurement that can.
     pub confusions: &'static [(&'static str, &'static str)],
-    /// What its values err by; by its stage if none.
+    /// Error of its values; if none, the error of its stage.
     pub value_error: Option<ValueError>,
-    /// Whether its derivative jumps at zero.
+    /// True if its derivative jumps at zero.
     pub kinked: bool,
-    /// Whether it acts on single pillars at random.
+    /// True if it acts on single pillars at random.
     pub random: bool,
-    /// What a file declares for a unit of its parameter.
+    /// Declaration of a unit of its parameter in a file.
     pub declared_form: Option<(DeclaredQuantity, &'static str)>,
-    /// What is so if it is linear in the place of the element.
+    /// Conclusion if it is linear in the place of the element.
     pub as_gradient: Option<&'static str>,
     /// The parameter of an amount.
     pub parameter: fn(f64) -> f64,
     /// The value that is reported for a parameter.
     pub value: fn(f64, &MeasuredSet) -> f64,
-    /// Where several parameters make one value: that value.
+    /// Value of several parameters together.
     pub reported: Option<Reported>,
 }
 
-/// What a record has where it says nothing: the parameter is reported as it is.
+/// Defaults of a record: the parameter is reported unchanged.
 const PLAIN: TableEffect = TableEffect {
     name: "",
     unit: "",

@@ -1,4 +1,4 @@
-//! What the values of effects err by besides the cell, as it was measured.
+//! Errors of the values of effects besides the cell, as measured.
 //!
 //! Those of effects are root mean square errors in sets without noise whose cells are solved with 15 orders and whose spectra,
 //! layouts and planes are sampled otherwise than in fits, of no effect and of one of 0.8 and 1.5 typical sizes: `metalith calibrate
@@ -8,7 +8,7 @@ use metalith_attribution::ValueError;
 
 use super::Stage;
 
-/// Of effects that were not measured one by one, relative to the value: taper, index and rim of the stack in the sets of a
+/// Error of effects that were not measured one by one, relative to the value: taper, index and rim of the stack in the sets of a
 /// validation, and the largest of all others but the aperture and stray light.
 const OF_STACK: f64 = 4e-3;
 const OF_OTHERS: f64 = 2e-3;

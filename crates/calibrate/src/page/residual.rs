@@ -1,4 +1,4 @@
-//! What the effects leave, which effects are hard to distinguish, and the nuisances.
+//! Residual of the effects, effects that are hard to distinguish, and the nuisances.
 
 use crate::data::Nuisances;
 use crate::session::{Session, Simulations};

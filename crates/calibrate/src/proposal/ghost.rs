@@ -27,7 +27,7 @@ const BLURS: [f64; 9] = [0.0, 0.35, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6];
 /// Largest blur of a proposed ghost (pixels): beyond, it is a veil.
 const MOST_BLUR_PIXELS: f64 = 8.0;
 
-/// How far a blur may be off, as a share of its variance, and at the least (pixels^2): the step between those that are
+/// Error of a blur, as a share of its variance, and at the least (pixels^2): the step between those that are
 /// tried, and the one from none.
 const BLUR_OFF: f64 = 0.6;
 const LEAST_BLUR_OFF: f64 = 0.12;
@@ -38,18 +38,18 @@ const POINT_PIXELS: f64 = 0.15;
 /// Largest share of a ghost: beyond, it is the image.
 const MOST_SHARE: f64 = 0.5;
 
-/// How far the place of a proposed ghost may be off (pixels).
+/// Error of the place of a proposed ghost (pixels).
 const ROOM_PIXELS: i32 = 4;
 
-/// The displaced copy that removes most of what is left.
+/// The displaced copy that removes most of the residual.
 pub(super) struct Ghost {
-    /// Its light over that of the image.
+    /// Light over that of the image.
     share: f64,
     /// Displacement along x and y (pixels).
     at: [i32; 2],
     /// Blur over that of the image: standard deviation (pixels).
     blur: f64,
-    /// By how much it lowers chi-square.
+    /// Decrease of chi-square.
     pub removed: f64,
 }
 
@@ -99,7 +99,7 @@ impl Frame {
         }
     }
 
-    /// The same with its image blurred.
+    /// Ghost with its image blurred.
     fn blurred(&self, pixels: f64) -> Self {
         let mut image = self.model.mapv(f64::from);
         blur(&mut image, pixels);
@@ -170,7 +170,7 @@ pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit, progress: &dyn Prog
     Ok(Some(best))
 }
 
-/// Of copies that are blurred so much (pixels) and displaced to these places, the one that removes most.
+/// Copy that removes most, of copies that are blurred so much (pixels) and displaced to these places.
 fn strongest_of(frames: &[Frame], blur: f64, places: &[[i32; 2]], progress: &dyn Progress) -> Result<Option<Ghost>> {
     progress.begin("looking for a second image", places.len() as u64);
     let tried: Vec<Option<Ghost>> = places
@@ -197,7 +197,7 @@ fn strongest_of(frames: &[Frame], blur: f64, places: &[[i32; 2]], progress: &dyn
 }
 
 impl Ghost {
-    /// As an effect to be fitted: a copy with a spot of its own, a Gaussian whose variance may be zero. One form serves sharp
+    /// Effect to be fitted: a copy with its own spot, a Gaussian whose variance may be zero. One form serves sharp
     /// and blurred copies, so that no two proposals compete for the same light.
     pub(crate) fn declared(&self, pixel_um: f64) -> DeclaredEffect {
         let place = |name: &str, at: i32| {

@@ -1,4 +1,4 @@
-//! What is left, put as effects that a file could declare: candidates for what the list lacks.
+//! Residual, put as effects that a file could declare: candidates that the list lacks.
 //!
 //! A proposal is a guess with a place to start from. It becomes a finding only where the search takes it: fitted,
 //! cross-validated and held against all other effects like these.
@@ -23,7 +23,7 @@ pub(crate) const WORTH_PROPOSING: f64 = 0.3;
 #[derive(Clone, Debug)]
 pub struct Proposed {
     pub effect: DeclaredEffect,
-    /// What it was seen by, for a person.
+    /// Evidence for it, for the user.
     pub reason: String,
 }
 

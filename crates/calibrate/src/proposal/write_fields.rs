@@ -1,4 +1,4 @@
-//! Where a boundary of write fields in every lens would explain most of what is left.
+//! Place of a boundary of write fields in every lens that explains most of the residual.
 
 use crate::optics::PixelGrid;
 use crate::session::Session;

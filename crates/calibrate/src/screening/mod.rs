@@ -23,7 +23,7 @@ const MOST_SIGMAS: f64 = 8.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnusableMeasurement {
     pub measurement: MeasurementIndex,
-    /// Why, for people.
+    /// Reason, for people.
     pub reason: String,
 }
 

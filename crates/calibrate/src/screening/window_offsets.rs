@@ -1,4 +1,4 @@
-//! Which windows were moved: how far each is off from what an effect of the light would do to all of them.
+//! Windows that were moved: the distance of each from the shift that an effect of the light gives all of them.
 //!
 //! Light that is tilted moves all images alike, and a sensor that is nearer or farther under an element moves its images in
 //! proportion to the slope of their chief rays. What is left of a shift is of the window alone.
@@ -15,19 +15,19 @@ const ROUNDS: usize = 30;
 /// Differences are alike below this (um).
 const LEAST_UM: f64 = 0.02;
 
-/// How far the sensor may be from where it is stated to be under an element, one standard deviation (um).
+/// Error of the stated place of the sensor under an element, one standard deviation (um).
 const DISTANCE_UM: f64 = 30.0;
 
-/// Where an image was found, and where its light comes from.
+/// Place where an image was found, and the origin of its light.
 struct Placed {
     element: usize,
-    /// Where the window seems to be, from its stated place (um).
+    /// Apparent place of the window, from its stated place (um).
     shift_um: [f64; 2],
     /// Slopes of the chief ray: how far the image moves as the sensor does.
     slopes: [f64; 2],
 }
 
-/// How far each window is off by itself, along the worse axis (pixels).
+/// Error of the place of each window alone, along the worse axis (pixels).
 pub(super) fn window_offsets(set: &MeasuredSet, nuisances: &Nuisances) -> Vec<f64> {
     let measurements = set.measurements.iter().zip(&nuisances.shift_um);
     let placed: Vec<Placed> = measurements
@@ -41,7 +41,7 @@ pub(super) fn window_offsets(set: &MeasuredSet, nuisances: &Nuisances) -> Vec<f6
     off.into_iter().map(|um| um / set.camera.pixel_um).collect()
 }
 
-/// What no shift of all and no distance of an element explains, along the worse axis (um).
+/// Part that no shift of all and no distance of an element explains, along the worse axis (um).
 fn off_um(placed: &[Placed], elements: usize) -> Vec<f64> {
     // Shifts of all along x and y, then a distance for each element.
     let size = 2 + elements;

@@ -18,7 +18,7 @@ use metalith_sensor::{Colour, RelayCamera};
 /// One bench session, read and checked.
 #[derive(Clone, Debug)]
 pub struct MeasuredSet {
-    /// Where `measurement.toml` is.
+    /// Path of `measurement.toml`.
     pub path: PathBuf,
     /// One line for people.
     pub title: String,
@@ -31,7 +31,7 @@ pub struct MeasuredSet {
     pub leds: PerLed<BenchLed>,
     pub elements: PerElement<MeasuredElement>,
     pub measurements: PerMeasurement<Measurement>,
-    /// Where a boundary of write fields runs across x and across y, from the middle of every lens (um), if the lab says so.
+    /// Place of a boundary of write fields across x and across y, from the middle of every lens (um), if it is stated.
     pub field_boundary_um: Option<[f64; 2]>,
     /// Widths seen from above; empty where none were taken.
     pub sem: Vec<SemSite>,
@@ -56,7 +56,7 @@ impl MeasuredSet {
         })
     }
 
-    /// Whether two sessions have one plan: all is equal but light levels, noise and frames.
+    /// True if two sessions have one plan: all is equal but light levels, noise and frames.
     pub fn same_plan(&self, other: &Self) -> bool {
         let camera = |c: &RelayCamera| (c.pixel_um, c.rows, c.cols, c.relay_blur_um);
         let measurements = |set: &Self| -> Vec<_> {
@@ -88,7 +88,7 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// Whether it is the cell of the published polynomials, whatever its film was measured to be.
+    /// True if it is the cell of the published polynomials, whatever its film was measured to be.
     pub fn is_of_the_paper(&self) -> bool {
         self.cell.is_of_the_paper()
     }
@@ -142,7 +142,7 @@ pub struct Measurement {
     pub led: LedIndex,
     /// Angle of incidence in air along x and y (rad).
     pub aoi_rad: [f64; 2],
-    /// From the pillar tops to the sensor (um).
+    /// Distance from the pillar tops to the sensor (um).
     pub distance_um: f64,
     /// Middle of the window from the element's axis (um).
     pub window_centre_um: [f64; 2],

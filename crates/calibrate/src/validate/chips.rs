@@ -93,7 +93,8 @@ pub(crate) fn of_each_effect(effects: &[&dyn Effect]) -> Vec<SyntheticChip> {
 /// # Errors
 /// If the text has another form, an effect is not among these, or a size lies outside of what physics allows.
 pub(crate) fn of_text(effects: &[&dyn Effect], text: &str) -> Result<SyntheticChip> {
-    let wrong = |what: String, hint: String| Error::refused("calibrate/trial", format!("trial `{text}`: {what}"), hint);
+    let wrong =
+        |what: String, hint: String| Error::refused("calibrate/invalid-trial", format!("trial `{text}`: {what}"), hint);
     let mut parts: Vec<AppliedEffect> = Vec::new();
     let mut first = None;
     for part in text.split('+').map(str::trim) {

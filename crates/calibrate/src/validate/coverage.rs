@@ -1,4 +1,4 @@
-//! Whether intervals are as wide as they should be: errors of what was claimed, in standard deviations of its interval.
+//! True if intervals are as wide as they should be: errors of what was claimed, in standard deviations of its interval.
 
 use serde::Serialize;
 
@@ -11,16 +11,16 @@ use metalith_report::sig;
 #[derive(Clone, Debug, Serialize)]
 pub struct ClaimedNumber {
     pub effect: String,
-    /// Which number of the effect, from zero.
+    /// Number of the value of the effect, from zero.
     pub number: usize,
-    /// As it is reported, in the unit of the effect.
+    /// Value that is reported, in the unit of the effect.
     pub truth: f64,
     pub found: f64,
     /// Ends of the 95 % interval.
     pub interval: [f64; 2],
     /// Error in standard deviations: half of the side of the interval that faces the truth is one.
     pub sigmas: f64,
-    /// What half of the interval is made of.
+    /// Parts of the half-width.
     pub made_of: WidthParts,
 }
 
@@ -52,19 +52,19 @@ impl ClaimedNumber {
             .collect()
     }
 
-    /// Whether the interval holds the truth.
+    /// True if the interval holds the truth.
     pub fn is_inside(&self) -> bool {
         (self.interval[0]..=self.interval[1]).contains(&self.truth)
     }
 }
 
-/// How good the intervals of some numbers are.
+/// Quality of the intervals of some numbers.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Coverage {
     /// The effect; empty for all of them.
     pub effect: String,
     pub numbers: usize,
-    /// How many intervals hold the truth.
+    /// Number of intervals that hold the truth.
     pub inside: usize,
     /// Root mean square of the errors in standard deviations: one where intervals are as wide as errors are, less where they are too
     /// wide.
@@ -74,7 +74,7 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Of these numbers.
+    /// Coverage of these numbers.
     pub fn of(effect: &str, numbers: &[&ClaimedNumber]) -> Self {
         let rms = |values: Vec<f64>| {
             let n = values.len().max(1) as f64;
@@ -90,7 +90,7 @@ impl Coverage {
         }
     }
 
-    /// Of each effect by itself, in the order in which they appear.
+    /// Coverage of each effect, in the order in which they appear.
     pub fn by_effect(numbers: &[&ClaimedNumber]) -> Vec<Self> {
         let mut names: Vec<&str> = Vec::new();
         for c in numbers {
@@ -113,7 +113,7 @@ impl Coverage {
         100.0 * self.inside as f64 / self.numbers.max(1) as f64
     }
 
-    /// In words.
+    /// Coverage in words.
     pub fn sentence(&self) -> String {
         format!(
             "{} of {} intervals hold the true value ({} %, 95 promised); errors are {} of their standard deviations (rms, 1 if intervals are as wide as errors)",

@@ -45,21 +45,21 @@ const SEEDS_APART: u64 = 1_000_000;
 /// One synthetic set and its diagnosis.
 #[derive(Clone, Debug, Serialize)]
 pub struct ValidationTrial {
-    /// What differed; `nothing` for a set without effect.
+    /// Effects that differed; `nothing` for a set without effect.
     pub truth: String,
     /// Effects with their numbers, each in the unit of its parameter.
     pub parts: Vec<AppliedEffect>,
-    /// Whether it is no known effect.
+    /// True if it is no known effect.
     pub off_list: bool,
-    /// Whether it is two effects at once.
+    /// True if it is two effects at once.
     pub pair: bool,
-    /// Its size in typical sizes.
+    /// Size in typical sizes.
     pub size: f64,
     pub seed: u64,
     pub verdict: SetVerdict,
     /// What was claimed.
     pub found: Vec<String>,
-    /// Whether the true effect (both of two) is among the effects found, alone or as one of several alternatives.
+    /// True if the true effect (both of two) is among the effects found, alone or as one of several alternatives.
     pub named: bool,
     /// What was claimed and is neither there nor an alternative to what is there.
     pub not_there: Vec<String>,
@@ -102,14 +102,14 @@ pub struct ValidationPlan {
     pub threshold_nulls: u64,
     /// Effects that sets are made with; all if empty.
     pub effects: Vec<String>,
-    /// Whether effects that are not listed are tried.
+    /// True if effects that are not listed are tried.
     pub off_list: bool,
     /// Chips in the place of one for each effect, size and pair: effects with their sizes in typical sizes, as in
     /// `cd_bias=1+film_index=-0.5`.
     pub trials: Vec<String>,
     /// So many chips with one or two effects of random sizes, in the place of one for each effect, size and pair.
     pub random: u64,
-    /// Which chips are drawn at random, and which noise and bench all sets that are judged have.
+    /// Chips that are drawn at random, and noise and bench of all sets that are judged.
     pub seed: u32,
     /// Sets without noise, in which the effects that are there are fitted and no others are looked for: what their values err by is
     /// the model's own error, which intervals count with.

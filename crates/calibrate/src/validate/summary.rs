@@ -26,7 +26,7 @@ pub struct Validation {
     pub least_gain: f64,
     /// Names of the columns of `confusion`.
     pub claimed: Vec<String>,
-    /// For each truth: shares of its trials in which each column was claimed.
+    /// Rows for each truth: shares of its trials in which each column was claimed.
     pub confusion: Vec<(String, Vec<f64>)>,
     pub limits: Vec<DetectionLimit>,
     /// Sets with one listed effect or two, in how many of them all of these were named, and in how many something was claimed that
@@ -109,7 +109,7 @@ impl Validation {
         }
     }
 
-    /// As text: shares, then one line for each trial.
+    /// Summary as text: shares, then one line for each trial.
     pub fn text(&self) -> String {
         let mut text = format!(
             "{} false claims in {} sets without effect\n",
@@ -180,7 +180,7 @@ impl ValidationTrial {
         value.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
     }
 
-    /// How much of this trial counts for a column: effects that cannot be distinguished share it.
+    /// Share of this trial that counts for a column: effects that cannot be distinguished share it.
     fn share(&self, column: &str) -> f64 {
         if self.found.is_empty() {
             let said = if self.verdict == SetVerdict::NoResidual {

@@ -62,7 +62,7 @@ impl<'a> Synthesizer<'a> {
         Self::with_orders(like, settings, ORDERS)
     }
 
-    /// Same synthesizer with cells solved with so many orders along an axis.
+    /// This synthesizer with cells solved with so many orders along an axis.
     ///
     /// # Errors
     /// As [`Synthesizer::new`].
@@ -145,8 +145,8 @@ impl<'a> Synthesizer<'a> {
                     CellSource::Model(_) => {
                         return Err(Error::refused(
                             "calibrate/no-rigorous-cells",
-                            "no rigorous cells",
-                            "synthetic sets are made with rigorous cells",
+                            "the set is not simulated with rigorous cells",
+                            "give a set whose cell is rigorous: synthetic sets need it",
                         ));
                     }
                 };

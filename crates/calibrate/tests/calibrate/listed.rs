@@ -113,7 +113,7 @@ fn a_tilt_of_the_sensor_is_found() {
     let d = session.diagnose(&simulations, &Silent).unwrap().0;
     assert_eq!(names(&d), ["sensor_tilt_x"], "{}", d.sentence());
     assert_eq!(d.effects[0].holds(TILT_MRAD), Some(true), "{}", d.sentence());
-    assert!(d.remarks[0].contains("cannot be told apart"), "{:?}", d.remarks);
+    assert!(d.remarks[0].contains("cannot be distinguished"), "{:?}", d.remarks);
     // Without the tilt in the list, the page says that the defocus differs by element.
     let session = Session::new(&set, with_effects(&["defocus", "tilt", "cd_bias"])).unwrap();
     let (d, evidence) = session.diagnose(&session.simulate(&Silent).unwrap(), &Silent).unwrap();
@@ -124,7 +124,7 @@ fn a_tilt_of_the_sensor_is_found() {
     assert!((apart_um / 6.0 - 1.0).abs() < 0.05, "{}", pattern.sentence());
     // Two values are always on a line: that is said, and nothing is proposed for it.
     assert!(
-        pattern.sentence().contains("cannot be told apart"),
+        pattern.sentence().contains("cannot be distinguished"),
         "{}",
         pattern.sentence()
     );

@@ -41,8 +41,10 @@ pub(super) fn judge(
     if rows.is_empty() {
         return Err(Error::refused(
             "cells/lens-too-small",
-            format!("a lens of {half_um:.1} um radius has no row of pillars to be solved"),
-            "choose mappings for a larger one",
+            format!(
+                "a lens with a radius of {half_um:.1} um is too small: it has no row of pillars that can be solved"
+            ),
+            "choose mappings for a larger lens",
         ));
     }
     let widths = rows.iter().flat_map(|r| &r.row.widths_nm);

@@ -62,13 +62,13 @@ impl SteeredStudy {
 /// Find a mapping for each distinct steered element of a design; tables of neighbours are kept in the folder `cache`.
 ///
 /// # Errors
-/// If the common mapping is a table, the lens has a phase over the plane, elements have lenses of their own or are placed one by
+/// If the common mapping is a table, the lens has a phase over the plane, elements have their own lenses or are placed one by
 /// one, a cell cannot be solved, or the user stopped it.
 pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progress) -> Result<Vec<SteeredStudy>> {
     if design.mapping.table.is_some() {
         return Err(Error::refused(
-            "cells/steered-table",
-            "mappings of steered elements start from the polynomial of the design, which has a table instead",
+            "cells/steered-without-polynomial",
+            "mappings of steered elements start from a polynomial, and the design has a table",
             "give `coefficients` in [mapping]",
         ));
     }
@@ -77,8 +77,8 @@ pub fn study_steered(design: &Design, cache: Option<&Path>, progress: &dyn Progr
     design.radial_phase(who)?;
     if !design.array.placed.is_empty() {
         return Err(Error::refused(
-            "cells/steered-places",
-            format!("{who} tells elements by their steps on a grid, and those of the design are placed one by one"),
+            "cells/elements-not-on-grid",
+            format!("{who} needs elements on a grid, and the design places them one by one"),
             "use `elements`, `spacing_um` and `steering_deg` of [array] in place of [[element]]",
         ));
     }
@@ -349,6 +349,6 @@ mod tests {
             let (head, rest) = text.split_once("[[phase.term]]").unwrap();
             format!("{head}[array]{}", rest.split_once("[array]").unwrap().1)
         };
-        assert_eq!(refused(&changed("hologram", placed)), "cells/steered-places");
+        assert_eq!(refused(&changed("hologram", placed)), "cells/elements-not-on-grid");
     }
 }

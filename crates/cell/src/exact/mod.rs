@@ -58,8 +58,8 @@ impl MappingTable {
             .collect();
         let Some(&first) = allowed.first() else {
             return Err(Error::refused(
-                "mapping/no-width-left",
-                "a mapping that avoids every width",
+                "mapping/all-widths-avoided",
+                "the mapping avoids every width",
                 "lower the threshold below which a width is avoided",
             ));
         };

@@ -48,7 +48,7 @@ impl FittedCell {
         ))
     }
 
-    /// Its phase.
+    /// Phase.
     pub fn forward(&self) -> &ForwardPolynomial {
         &self.forward
     }

@@ -65,7 +65,11 @@ pub fn fit_forward(curves: &[PhaseCurve], pitch_nm: f64, degree: usize) -> Resul
     if points.len() < 2 * powers.len() {
         return Err(Error::refused(
             "fit/too-few-points",
-            format!("{} points for a polynomial of {} terms", points.len(), powers.len()),
+            format!(
+                "a polynomial of {1} terms cannot be fitted to {0} points",
+                points.len(),
+                powers.len()
+            ),
             "give more wavelengths and widths, or a lower degree",
         ));
     }

@@ -111,9 +111,9 @@ fn rising(curve: &PhaseCurve, threshold: f64) -> Vec<usize> {
 
 fn too_few(curve: &PhaseCurve) -> Error {
     Error::refused(
-        "fit/degree-too-high",
+        "fit/no-inverse-polynomial",
         format!(
-            "no polynomial of this degree maps a turn to the widths of the cell at {} um",
+            "no polynomial of this degree maps a full wave of phase to the widths of the cell at {} um",
             curve.wavelength_um
         ),
         "widen the range of widths, lower the threshold, or change the degree",

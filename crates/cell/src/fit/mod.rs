@@ -53,7 +53,7 @@ fn check_degree(degree: usize) -> Result<()> {
         return Ok(());
     }
     Err(Error::refused(
-        "fit/degree",
+        "fit/degree-out-of-range",
         format!("a polynomial of degree {degree}"),
         format!("use a degree from 1 to {HIGHEST_DEGREE}"),
     ))

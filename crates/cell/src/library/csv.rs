@@ -95,7 +95,7 @@ impl PillarLibrary {
         });
         let read = read.collect::<Result<Vec<_>>>()?;
         if read.is_empty() {
-            return Err(fault(None, "a library without pillars".into()));
+            return Err(fault(None, "the library has no pillars".into()));
         }
         Self::new(read)
     }

@@ -23,7 +23,7 @@ const JUDGED: usize = 24;
 /// One pillar of a library.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LibraryPillar {
-    /// Its number among the pillars of the design.
+    /// Number among the pillars of the design.
     pub number: u16,
     /// Phase of light along x and along y (turns), each but for a constant that all pillars share.
     pub turns: [f64; 2],
@@ -71,8 +71,8 @@ impl PillarLibrary {
         if pillars.is_empty() {
             return Err(Error::refused(
                 "library/empty",
-                "a library without pillars",
-                "give at least one: `metalith cells` makes one of a design",
+                "the library has no pillars",
+                "give at least one pillar: `metalith cells` writes the library of a design",
             ));
         }
         let fields: Vec<_> = pillars.iter().map(LibraryPillar::fields).collect();

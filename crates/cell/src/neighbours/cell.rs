@@ -41,7 +41,7 @@ impl NeighbourCell {
         }
     }
 
-    /// Same cell, which knows bands by the tables of these wavelengths (um).
+    /// This cell, which knows bands by the tables of these wavelengths (um).
     #[must_use]
     pub fn tabulated_at(mut self, wavelengths_um: &[f64]) -> Self {
         self.tabulated_um = wavelengths_um.to_vec();

@@ -57,7 +57,7 @@ impl<'a> CoarseCell<'a> {
         let (low, high) = widths_nm;
         if !(low > 0.0 && low <= high) {
             return Err(Error::refused(
-                "grating/width-range",
+                "cell/width-range-invalid",
                 format!("pillars from {low} to {high} nm wide"),
                 "give the narrowest and the widest width in nm, both positive",
             ));

@@ -123,7 +123,7 @@ impl Sums {
         linear::solve(matrix, &mut self.right, f64::MIN_POSITIVE).ok_or_else(|| {
             Error::refused(
                 "neighbours/singular",
-                "supercells that do not tell their pillars apart",
+                "the supercells do not distinguish their pillars",
                 "give a mapping that draws several widths",
             )
         })?;

@@ -15,7 +15,7 @@ pub(crate) fn solve<const N: usize>(
     if !pivots.iter().all(|pivot| pivot.abs() >= least_pivot) {
         return None;
     }
-    // Real and imaginary parts are columns of their own.
+    // Real and imaginary parts are separate columns.
     let columns = DMatrix::from_fn(right.len(), 2 * N, |row, column| {
         let value = right[row][column / 2];
         if column % 2 == 0 { value.re } else { value.im }

@@ -59,7 +59,7 @@ impl Mapping {
         if up_to == 0 {
             return Err(Error::refused(
                 "neighbours/no-pillars",
-                "a layout without pillars",
+                "the layout has no pillars",
                 "name the layer of the pillars",
             ));
         }

@@ -208,7 +208,7 @@ impl RealRow {
         let lattice = SiteLattice::of_grating(turns, pillars)?;
         if lattice.len() != pillars {
             return Err(Error::refused(
-                "supercell/direction",
+                "supercell/direction-off-axes",
                 format!("a row of {pillars} pillars in the direction {:?}", self.direction),
                 "use a direction along an axis or a diagonal, such as (1, 0) or (-1, 1)",
             ));
@@ -217,7 +217,7 @@ impl RealRow {
         if counted.is_empty() {
             return Err(Error::refused(
                 "supercell/not-periodic",
-                format!("a row of {pillars} pillars that does not repeat"),
+                format!("a row of {pillars} pillars is too short to be periodic"),
                 {
                     let ends = self.ends(grid);
                     format!("give more than {}: {ends} at either end do not count", 2 * ends)

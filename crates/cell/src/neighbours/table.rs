@@ -111,7 +111,7 @@ fn check(spec: &NeighbourTableSpec, mappings: &[Mapping]) -> Result<()> {
     let numbers = [spec.wavelength_um, spec.sines[0], spec.sines[1]];
     if mappings.is_empty() || !numbers.iter().all(|v| v.is_finite()) {
         return Err(Error::refused(
-            "neighbours/table-spec",
+            "neighbours/table-not-numbers",
             format!("a table of neighbours for {spec:?} and {} mappings", mappings.len()),
             "give finite numbers and a mapping",
         ));

@@ -17,7 +17,7 @@ pub enum FocusedLight {
 }
 
 impl FocusedLight {
-    /// Its polarisation.
+    /// Polarisation.
     pub fn polarisation(self) -> Polarisation {
         match self {
             Self::Circular(hand) => Polarisation::Circular(hand),

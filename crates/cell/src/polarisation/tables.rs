@@ -60,7 +60,7 @@ impl PolarisedTables {
             return self.passed(light);
         };
         if let Self::Axes(_) = self {
-            // Each polarisation has a phase of its own.
+            // Each polarisation has its own phase.
             let parts = self.leaving(light).into_iter().flatten();
             let alone = parts.map(|part| PassedTable {
                 order: part.2,

@@ -54,7 +54,7 @@ impl CellStack {
         let [x, y] = edges_nm;
         if edges_nm.iter().any(|edge| !(edge.is_finite() && *edge > 0.0)) {
             return Err(Error::refused(
-                "cell/rectangle-does-not-fit",
+                "cell/edges-out-of-range",
                 format!("a pillar of {x} x {y} nm"),
                 "give both edges in nm, above zero",
             ));
@@ -132,7 +132,7 @@ impl UprightCell {
         }
     }
 
-    /// Same cell, whose answers for single wavelengths are cached in a folder from one run to the next.
+    /// This cell, whose answers for single wavelengths are cached in a folder from one run to the next.
     #[must_use]
     pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
         self.folder = folder.map(Path::to_owned);
@@ -295,7 +295,7 @@ mod tests {
             assert_eq!((table, axis), (tables.along[axis.index()].clone(), tables.focused));
         }
         let error = titania().birefringent([100.0, -1.0], 0.532, Orders::new(3).unwrap());
-        assert_eq!(error.unwrap_err().id(), "cell/rectangle-does-not-fit");
+        assert_eq!(error.unwrap_err().id(), "cell/edges-out-of-range");
     }
 
     /// A table that is kept is read again, to the bit; one that is damaged or of another stack is not.

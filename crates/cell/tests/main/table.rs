@@ -139,11 +139,11 @@ fn tables_that_cannot_be_are_refused() {
         let error = CellTable::compute(&spec, &Silent).unwrap_err();
         assert_eq!(error.id(), id, "{error}");
     };
-    refused(&|s| s.band_um = (0.6, 0.5), "cell/band");
-    refused(&|s| s.band_um = (0.2, 0.5), "rcwa/out-of-range");
-    refused(&|s| s.widths_nm = (0, 100), "cell/width-range");
-    refused(&|s| s.widths_nm = (100, 400), "cell/width-range");
-    refused(&|s| s.tolerance = 0.0, "cell/tolerance");
-    refused(&|s| s.orders = 0, "rcwa/orders");
-    refused(&|s| s.stack.height_nm = 0.0, "cell/height");
+    refused(&|s| s.band_um = (0.6, 0.5), "cell/band-out-of-range");
+    refused(&|s| s.band_um = (0.2, 0.5), "rcwa/material-out-of-range");
+    refused(&|s| s.widths_nm = (0, 100), "cell/width-range-invalid");
+    refused(&|s| s.widths_nm = (100, 400), "cell/width-range-invalid");
+    refused(&|s| s.tolerance = 0.0, "cell/tolerance-out-of-range");
+    refused(&|s| s.orders = 0, "rcwa/orders-out-of-range");
+    refused(&|s| s.stack.height_nm = 0.0, "cell/height-out-of-range");
 }

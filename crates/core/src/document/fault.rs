@@ -92,7 +92,7 @@ pub struct Faults {
     single: Vec<Mark>,
 }
 
-/// One fault as a diagnostic of its own, shown with the text around it.
+/// One fault as a separate diagnostic, shown with the text around it.
 #[derive(Debug)]
 struct Mark {
     id: String,

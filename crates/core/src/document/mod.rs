@@ -50,7 +50,7 @@ pub fn load(path: &Path) -> Result<String> {
     load_text(path).map_err(|error| match crate::file::binary_kind(path) {
         Some(kind) => Error::refused(
             "file/not-text",
-            format!("{} is {kind}, and a text is asked for here", path.display()),
+            format!("{} is {kind}, and a text file is needed here", path.display()),
             "check which file is given where: `--help` says the order",
         ),
         None => error,

@@ -173,7 +173,7 @@ fn a_file_of_another_kind_is_said_to_be_one() {
         (&layout[..], "file/not-text"),
         (b"%SEMI-OASIS\r\n\x01\xff", "file/not-text"),
         (b"\x89PNG\r\n\x1a\n", "file/not-text"),
-        (b"\xff\xfe", "table/format"),
+        (b"\xff\xfe", "table/malformed"),
     ] {
         std::fs::write(&path, bytes).unwrap();
         let error = super::load(&path).unwrap_err();
@@ -182,11 +182,11 @@ fn a_file_of_another_kind_is_said_to_be_one() {
     }
     // The kind of file is in the words.
     insta::assert_snapshot!(said.join("\n"), @"
-        lens.gds is a layout in GDSII, and a text is asked for here
+        lens.gds is a layout in GDSII, and a text file is needed here
           help: check which file is given where: `--help` says the order
-        lens.gds is a layout in OASIS, and a text is asked for here
+        lens.gds is a layout in OASIS, and a text file is needed here
           help: check which file is given where: `--help` says the order
-        lens.gds is a picture (PNG), and a text is asked for here
+        lens.gds is a picture (PNG), and a text file is needed here
           help: check which file is given where: `--help` says the order
         lens.gds, line 1: this is not UTF-8 text
           help: save the file as UTF-8

@@ -156,7 +156,7 @@ impl Places {
     fn of(target: &Path, archive: &Path) -> Result<Self> {
         let Some(name) = target.file_name() else {
             return Err(Error::refused(
-                "file/folder-name",
+                "file/no-folder-name",
                 format!("{} is not the name of a folder", target.display()),
                 "name a folder with --out",
             ));

@@ -30,7 +30,7 @@ pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
         Err(Error::refused(id, format!("{} {why}", path.display()), hint))
     };
     if !found.is_file() {
-        return refused("file/not-ordinary", "is not an ordinary file".into());
+        return refused("file/not-regular", "is not an ordinary file".into());
     }
     if found.len() > most {
         return refused("file/too-large", format!("is {} bytes long", found.len()));
@@ -82,7 +82,7 @@ impl AtomicFile {
         }
         let name = target.file_name().ok_or_else(|| {
             Error::refused(
-                "file/file-name",
+                "file/no-file-name",
                 format!("{} is not the name of a file", target.display()),
                 "name a file, not a folder",
             )
@@ -124,7 +124,7 @@ impl AtomicFile {
         file.sync_all().map_err(Error::io("write", &self.target))?;
         if !part::is_at(file, &self.part).map_err(Error::io("read", &self.part))? {
             return Err(Error::refused(
-                "file/replaced-meanwhile",
+                "file/changed-meanwhile",
                 format!("{} was replaced while it was written", self.part.display()),
                 "let one program at a time write into this folder, and try again",
             ));

@@ -82,7 +82,7 @@ fn busy(target: &Path) -> Error {
 
 fn not_ordinary(part: &Path) -> Error {
     Error::refused(
-        "file/not-ordinary",
+        "file/not-regular",
         format!("{} is not an ordinary file", part.display()),
         "remove it: a file of this name is made while a file is being written",
     )

@@ -170,7 +170,7 @@ fn a_run_that_lost_its_file_leaves_that_of_another_alone() {
         let mut second = AtomicFile::create(&target).unwrap();
         second.write_all(b"second").unwrap();
         if commits {
-            assert_eq!(first.commit().unwrap_err().id(), "file/replaced-meanwhile");
+            assert_eq!(first.commit().unwrap_err().id(), "file/changed-meanwhile");
         } else {
             drop(first);
         }
@@ -191,14 +191,14 @@ fn links_are_not_followed() {
     std::fs::write(&other, b"precious").unwrap();
     symlink(&other, &part).unwrap();
     let refused = || AtomicFile::write(&target, b"new").unwrap_err().id();
-    assert_eq!(refused(), "file/not-ordinary");
+    assert_eq!(refused(), "file/not-regular");
     std::fs::remove_file(&part).unwrap();
     symlink(folder.path().join("nowhere"), &part).unwrap();
-    assert_eq!(refused(), "file/not-ordinary");
+    assert_eq!(refused(), "file/not-regular");
     assert!(!folder.path().join("nowhere").exists());
     std::fs::remove_file(&part).unwrap();
     std::fs::hard_link(&other, &part).unwrap();
-    assert_eq!(refused(), "file/not-ordinary");
+    assert_eq!(refused(), "file/not-regular");
     assert_eq!(std::fs::read(&other).unwrap(), b"precious");
     assert!(!target.exists());
 }
@@ -211,14 +211,14 @@ fn pipes_and_folders_are_refused() {
     let part = part_of(&target);
     assert!(Command::new("mkfifo").arg(&part).status().unwrap().success());
     let refused = || AtomicFile::create(&target).map(|_| ()).unwrap_err().id();
-    assert_eq!(refused(), "file/not-ordinary");
+    assert_eq!(refused(), "file/not-regular");
     // With a reader the pipe can be opened, and is refused all the same.
     let reader = std::fs::File::options().read(true).write(true).open(&part).unwrap();
-    assert_eq!(refused(), "file/not-ordinary");
+    assert_eq!(refused(), "file/not-regular");
     drop(reader);
     std::fs::remove_file(&part).unwrap();
     std::fs::create_dir(&part).unwrap();
-    assert_eq!(refused(), "file/not-ordinary");
+    assert_eq!(refused(), "file/not-regular");
     std::fs::remove_dir(&part).unwrap();
     // Where the file itself is to stand, before any of it is written.
     std::fs::create_dir(&target).unwrap();

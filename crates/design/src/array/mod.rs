@@ -114,7 +114,7 @@ impl PillarArray {
             }
             if centre_nm.0.abs().max(centre_nm.1.abs()) > FARTHEST_NM {
                 return Err(Error::refused(
-                    "array/off-grid",
+                    "array/element-out-of-range",
                     format!("element {k} at ({}, {}) nm", centre_nm.0, centre_nm.1),
                     "place elements within 1 m of the middle",
                 ));

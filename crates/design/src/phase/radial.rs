@@ -45,7 +45,7 @@ pub enum RadialPhase {
     },
 }
 
-/// How the file of a table is read.
+/// Settings of reading the file of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TableReading {
     /// True if its phases are known up to whole waves, false if they are not; found if nothing says so.

@@ -11,7 +11,7 @@ use metalith_core::document::{Limits, Section};
 /// Wavelength at which the wedges of the paper steer by their angles (nm).
 const PAPER_WEDGE_NM: f64 = 550.0;
 
-/// Elements of one lens, each with a wedge of its own: on a grid, or wherever each is said to be.
+/// Elements of one lens, each with its own wedge: on a grid, or wherever each is said to be.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArraySpec {
     /// Number of elements of the grid along x and y.
@@ -40,7 +40,7 @@ pub struct PlacedSpec {
     /// Rotation of the phase of its lens about its middle, from x towards y (degrees); the steering is not rotated.
     #[serde(skip_serializing_if = "is_zero")]
     pub rotation_deg: f64,
-    /// Its own lens, in place of that all share.
+    /// Own lens, in place of that all share.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens: Option<LensSpec>,
 }

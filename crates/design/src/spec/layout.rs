@@ -31,7 +31,7 @@ pub struct LayoutLayer {
 }
 
 impl LayoutLayer {
-    /// Its number as readers of layouts know it.
+    /// Number as readers of layouts know it.
     pub fn number(&self) -> LayerNumber {
         // Both are 0 to 255, checked when the design was read.
         LayerNumber::new(self.layer as u16, self.datatype as u16)

@@ -12,7 +12,7 @@ use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
 use metalith_pillars::{Lattice, PolarisationBasis};
 
-/// The lens that all elements of the array share, or that an element has of its own.
+/// The lens that all elements of the array share, or that one element alone has.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LensSpec {
     /// Pillars stand where their centre is within this diameter (nm).
@@ -209,7 +209,7 @@ impl LensSpec {
             })
     }
 
-    /// Its phases over the radius, in the middle of the lens or elsewhere, of light along x and along y.
+    /// Phases over the radius, in the middle of the lens or elsewhere, of light along x and along y.
     pub(crate) fn radial_phases(&self) -> impl Iterator<Item = &RadialPhase> {
         let along_y = self.along_y.iter().map(|y| (&y.phase, &y.terms));
         std::iter::once((&self.phase, &self.terms))

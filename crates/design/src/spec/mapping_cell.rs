@@ -65,7 +65,7 @@ fn lattice_word(lattice: LatticeKind) -> &'static str {
 }
 
 impl MappingIdentity {
-    /// What `[mapping]`, whose section is `s`, says of the cell that it is for; another cell than that of the design is a fault
+    /// Cell that `[mapping]`, whose section is `s`, states; another cell than that of the design is a fault
     /// for who needs the mapping and does not accept it.
     pub(super) fn read(
         s: &Section<'_, '_>,
@@ -162,7 +162,7 @@ impl MappingIdentity {
         {
             let line = places.get(first.key).or(places.values().next());
             return Err(Error::refused(
-                "mapping/another-cell",
+                "mapping/cell-differs",
                 format!(
                     "{}, line {}: {}",
                     file.display(),
@@ -182,18 +182,18 @@ impl MappingIdentity {
         let unknown = (!self.is_stated && self.accept.is_none()).then(|| {
             let cell = own.to_toml().replacen('\n', " ", 1).replace('\n', "; ");
             Warning::new(
-                "mapping/unknown-cell",
-                "the mapping does not say which cell it is for: no one has compared it with [cell]",
-                format!("make it anew by `metalith cells`, or if it is for this cell, say so: {cell}"),
+                "mapping/cell-not-stated",
+                "the mapping does not state the cell that it is for, so it cannot be compared with [cell]",
+                format!("make it again with `metalith cells`. If it is for this cell, state it: {cell}"),
             )
         });
         let other = (!self.differences.is_empty()).then(|| match &self.accept {
             Some(reason) => Warning::new(
-                "mapping/accepted",
+                "mapping/difference-accepted",
                 format!("{differences}; accepted: {reason}"),
                 "`metalith cells` finds a mapping for this cell",
             ),
-            None => Warning::new("mapping/another-cell", differences, MappedCell::REMEDY),
+            None => Warning::new("mapping/cell-differs", differences, MappedCell::REMEDY),
         });
         unknown.into_iter().chain(other)
     }

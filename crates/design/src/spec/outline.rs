@@ -135,7 +135,7 @@ impl LensOutline {
         is_inside(sides(&self.corners_nm), x, y)
     }
 
-    /// Its sides by the rows of a lattice.
+    /// Sides by the rows of a lattice.
     pub(crate) fn rows(&self, lattice: &Lattice) -> OutlineRows {
         let reached = |iy| {
             let y = lattice.place_nm(1, iy);

@@ -16,7 +16,7 @@ pub(super) const MOST_SIDES: usize = 1 << 21;
 struct End {
     /// Direction of the line, without common factor, to the right or straight up.
     direction: (i64, i64),
-    /// Its distance from the origin times the length of the direction.
+    /// Distance from the origin times the length of the direction.
     offset: i128,
     /// Place on the line.
     at: Point,

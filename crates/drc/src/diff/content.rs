@@ -49,7 +49,7 @@ pub(super) struct Content {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct TextCopy {
     pub layer: LayerNumber,
-    /// Its string, by its number in [`Strings`].
+    /// String, by its number in [`Strings`].
     pub string: u32,
     /// Place in the common unit.
     pub at: Point,

@@ -106,7 +106,7 @@ fn both(first: PillarShape, second: PillarShape) -> Result<PillarShape> {
     let united = UprightRectangles::of_lengths(a.lengths_nm().chain(b.lengths_nm()));
     let united = united.ok_or_else(|| {
         Error::refused(
-            "diff/kinds-differ",
+            "diff/too-many-edge-lengths",
             format!(
                 "upright rectangles with edges of {} to {} nm in steps of {} nm, and of {} to {} nm in steps of {} nm",
                 a.shortest_nm,

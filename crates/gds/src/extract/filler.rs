@@ -66,7 +66,7 @@ impl Filler {
         }
     }
 
-    /// Same filler, which may hold this many sites.
+    /// This filler, which may hold this many sites.
     #[must_use]
     pub fn holding(mut self, most: u64) -> Self {
         self.most = most;

@@ -24,7 +24,7 @@ pub(super) struct Cluster<'a> {
 }
 
 impl Cluster<'_> {
-    /// Its lattice, and how far its pillars reach; none if it is too small to be an element.
+    /// Lattice, and how far its pillars reach; none if it is too small to be an element.
     pub(crate) fn element(&self) -> Result<Option<ElementSite>, ExtractionError> {
         let pillars: u64 = self.members.iter().map(|&k| self.tiles.pillars(k)).sum();
         if pillars < FEWEST {
@@ -78,7 +78,7 @@ impl Cluster<'_> {
         }))
     }
 
-    /// Around all centres (half nm).
+    /// Box around all centres (half nm).
     fn bounds(&self) -> Rect {
         let mut bounds = Rect::EMPTY;
         self.members.iter().for_each(|&k| bounds.unite(&self.tiles.bounds(k)));
@@ -112,7 +112,7 @@ impl Cluster<'_> {
         self.members.iter().filter(between).count() * ROWS_BETWEEN >= self.members.len()
     }
 
-    /// Its hexagonal lattice, if most centres are a pitch or half of one apart along x, and along y as far as its
+    /// Hexagonal lattice, if most centres are a pitch or half of one apart along x, and along y as far as its
     /// rows, or twice as far with rows between them. Samples of a tile may be of one row alone, or of every other one where two
     /// arrays make the lattice.
     fn hexagonal(&self, pillars: u64, steps: &[BTreeMap<i64, u64>; 2]) -> Result<Option<ElementSite>, ExtractionError> {

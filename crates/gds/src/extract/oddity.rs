@@ -11,7 +11,7 @@ pub enum Why {
     OffLattice,
     /// An upright rectangle with unequal sides.
     UnequalSides,
-    /// Neither an upright rectangle nor a circle, or not a whole number of nanometres wide.
+    /// Outline that is neither an upright rectangle nor a circle, or not a whole number of nanometres wide.
     OddShape,
     /// A second pillar on a site that has one.
     DuplicateSite,
@@ -55,7 +55,7 @@ pub struct UnrecognisedShape {
     pub why: Why,
     /// Middle of its bounding box in the layout (nm).
     pub centre_nm: [f64; 2],
-    /// Its bounding box (nm).
+    /// Bounding box (nm).
     pub size_nm: [f64; 2],
     /// Place in the file of its element, or of the reference that placed it.
     pub offset: u64,

@@ -85,7 +85,7 @@ impl Places {
         if self.scattered {
             return;
         }
-        // What comes with placements of its own is turned by other than quarter turns.
+        // What comes with its own placements is turned by other than quarter turns.
         if !self.placements.is_empty() && placements[0].is_square() {
             if let Some(centre) = centre(&Transform::IDENTITY) {
                 self.own.add(centre.at, centre.even, &mut self.guesses[0]);

@@ -45,7 +45,7 @@ impl ExtractionPlan {
         }
     }
 
-    /// Same plan for pillars of this shape.
+    /// This plan for pillars of this shape.
     #[must_use]
     pub fn of_shape(self, shape: PillarShape) -> Self {
         Self {

@@ -24,7 +24,7 @@ const PARTS: i64 = 8;
 #[derive(Clone, Debug)]
 struct Tile {
     pillars: u64,
-    /// Around all centres; beyond the tile if those of a placed cell are counted here together.
+    /// Box around all centres; beyond the tile if those of a placed cell are counted here together.
     low: (i32, i32),
     high: (i32, i32),
     /// Parts that are occupied, row by row; not known of what was placed.
@@ -115,7 +115,7 @@ impl TileMap {
         self.tiles[tile].1.pillars
     }
 
-    /// Around the centres in a tile (half nm).
+    /// Box around the centres in a tile (half nm).
     pub(crate) fn bounds(&self, tile: usize) -> Rect {
         let (key, tile) = &self.tiles[tile];
         let corner = self.corner(*key);
@@ -246,7 +246,7 @@ impl TileMap {
                 sum.include(tile.low.0, tile.low.1);
                 sum.include(tile.high.0, tile.high.1);
             }
-            // In turn: where each kind stands on places of its own, both tell the pitch.
+            // In turn: where each kind stands on separate places, both tell the pitch.
             let (mine, theirs) = (self.samples[own], other.samples[number]);
             let counts = [sum.sampled, tile.sampled].map(usize::from);
             let in_turn =

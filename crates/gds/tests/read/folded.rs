@@ -136,7 +136,7 @@ fn a_lens_too_large_to_be_held_is_held_folded() {
     assert_eq!(found.elements[0].widths.number(sites / 2 + 1, sites - 1), 130);
     let alone = file(&[(octant, &ALL), (&[(7, 9, 100)], &ALL[..1])], true);
     let error = metalith_core::Error::from(extract_folded(&alone, &plan, &Silent).unwrap_err());
-    assert_eq!(error.id(), "extract/sites");
+    assert_eq!(error.id(), "extract/too-many-sites");
     insta::assert_snapshot!(error, @"
         test.gds: 1 elements with 2195672164 lattice sites together
           help: up to 2147483648 sites are held at a time, an eighth of an element that is folded by all eight symmetries: a smaller lens, or fewer elements in one layout

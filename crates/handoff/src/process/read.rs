@@ -194,7 +194,7 @@ fn metrology(s: &Section<'_, '_>) -> MetrologySpec {
     }
 }
 
-/// The decks: those for squares in the section itself, those for other shapes in sections of their own.
+/// The decks: those for squares in the section itself, those for other shapes in separate sections.
 fn checks(s: &Section<'_, '_>, standard: bool) -> CheckSpec {
     let file = |s: &Section<'_, '_>, key: &str| {
         if standard {

@@ -44,7 +44,7 @@ pub(super) struct Structures {
     pub frame: RectNm,
     /// Place where borders of fields are crossed on purpose (nm).
     pub field_border: (i64, i64),
-    /// Pillars that have a cell of their own.
+    /// Pillars that have their own cell.
     pillars: Vec<PadPillar>,
     top: Sheet,
     step2: Sheet,
@@ -159,7 +159,7 @@ impl Structures {
     }
 }
 
-/// The middle of the hyperbolic reference lens, which is a file of its own with its origin there.
+/// The middle of the hyperbolic reference lens, which is a separate file with its origin there.
 pub(super) fn middle_of_reference() -> Structure {
     const LEVEL: &str = "the phase of a hyperbola is level in its middle, and so all pillars there are about as wide";
     Structure {

@@ -423,7 +423,7 @@ fn a_process_that_cannot_make_pillars_is_refused() {
     fs::write(&process, text.replace("\"lift_off\"", "\"direct_etch\"")).unwrap();
     let mut wrong = options(&folder.path().join("out"));
     wrong.process = Some(process.clone());
-    assert_eq!(handoff(&wrong, &Silent).unwrap_err().id(), "handoff/tone");
+    assert_eq!(handoff(&wrong, &Silent).unwrap_err().id(), "handoff/tone-inverted");
     fs::write(&process, text.replace("layer = 20", "layer = 1")).unwrap();
     assert_eq!(handoff(&wrong, &Silent).unwrap_err().id(), "handoff/layer-taken");
     assert!(!folder.path().join("out").exists());

@@ -52,7 +52,7 @@ fn what_others_do_in_the_meantime_is_seen() {
     let error = handoff(&options(&out), &add).unwrap_err();
     assert_eq!(error.id(), "handoff/foreign-file");
     insta::assert_snapshot!(metalith_testing::without_folder(error, parent.path()), @"
-    kit holds notes.txt, which no hand-off put there
+    kit contains notes.txt, which is not a file of a hand-off
       help: choose another folder with --out, or move it away
     ");
     assert_eq!(fs::read_to_string(&notes).unwrap(), "measured today");
@@ -67,8 +67,8 @@ fn what_others_do_in_the_meantime_is_seen() {
     let error = handoff(&options(&out), &add).unwrap_err();
     assert_eq!(error.id(), "handoff/folder-changed");
     insta::assert_snapshot!(error, @"
-    more.txt was added or removed while the hand-off was made
-      help: let nothing else write into its folder, and try again
+    more.txt was added or removed while the hand-off was written
+      help: make sure that no other program writes into its folder, and try again
     ");
     assert_eq!(names(parent.path()), ["kit", "kit.zip"]);
     assert_eq!(fs::read(out.join("manifest.json")).unwrap(), first);
@@ -124,9 +124,12 @@ fn links_and_other_files_in_the_way_are_left_alone() {
     let elsewhere = parent.path().join("elsewhere");
     fs::create_dir(&elsewhere).unwrap();
     std::os::unix::fs::symlink(&elsewhere, &out).unwrap();
-    assert_eq!(handoff(&options(&out), &Silent).unwrap_err().id(), "handoff/no-folder");
+    assert_eq!(
+        handoff(&options(&out), &Silent).unwrap_err().id(),
+        "handoff/not-a-folder"
+    );
     fs::remove_file(&out).unwrap();
     fs::create_dir(parent.path().join("kit.zip")).unwrap();
-    assert_eq!(handoff(&options(&out), &Silent).unwrap_err().id(), "handoff/no-file");
+    assert_eq!(handoff(&options(&out), &Silent).unwrap_err().id(), "handoff/not-a-file");
     assert_eq!(names(parent.path()), ["elsewhere", "kit.zip"]);
 }

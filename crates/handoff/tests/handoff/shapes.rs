@@ -248,7 +248,7 @@ fn a_process_for_another_thickness_is_refused() {
         waivers: None,
     };
     let error = handoff(&options, &Silent).unwrap_err();
-    assert_eq!(error.id(), "handoff/film-thickness");
+    assert_eq!(error.id(), "handoff/film-thickness-differs");
     insta::assert_snapshot!(error, @"
     the film of the design is 900 nm thick, but the etch and the rules of jbx6300_asi are for 400 to 700 nm
       help: use a process file for this thickness; if its etch and its rules are right for it, change `film_nm` in [transfer]

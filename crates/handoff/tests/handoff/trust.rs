@@ -83,7 +83,7 @@ fn film_and_process_must_agree() {
         ],
     );
     let error = handoff(&options, &Silent).unwrap_err();
-    assert_eq!(error.id(), "handoff/film-material");
+    assert_eq!(error.id(), "handoff/film-material-differs");
     insta::assert_snapshot!(error, @r#"
     the film of the design is "alumina_malitson_dodge_1972", but the process etches sin_luke_2015, sin_philipp_1973: reactive ion etch of silicon nitride, stopped on fused silica
       help: use a process file for this film, or, if its etch is right for it, add the film to `films` in [transfer]
@@ -153,7 +153,7 @@ fn a_manifest_is_an_ordinary_file_of_bounded_length() {
     let manifest = folder.path().join("manifest.json");
     std::os::unix::fs::symlink("/dev/zero", &manifest).unwrap();
     let refused = || verify_handoff(folder.path(), &Silent).unwrap_err().id();
-    assert_eq!(refused(), "file/not-ordinary");
+    assert_eq!(refused(), "file/not-regular");
     fs::remove_file(&manifest).unwrap();
     let long = fs::File::create(&manifest).unwrap();
     long.set_len(1 << 40).unwrap();

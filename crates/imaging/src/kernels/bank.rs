@@ -65,7 +65,7 @@ impl BankSpec {
             return Ok(());
         }
         Err(Error::refused(
-            "imaging/memory",
+            "camera/too-much-memory",
             format!(
                 "images of points at {places} places of elements, in {channels} channels and {bases} spectra of {} x {} pixels, would take {} MB",
                 self.window,
@@ -115,7 +115,7 @@ pub struct TurnedKernel<'a> {
 }
 
 impl TurnedKernel<'_> {
-    /// Its values, row by row, as it is turned.
+    /// Values, row by row, as it is turned.
     pub fn turned(&self) -> Cow<'_, [f32]> {
         if self.back == Symmetry::IDENTITY {
             return Cow::Borrowed(self.values);
@@ -149,7 +149,7 @@ impl TurnedKernel<'_> {
 }
 
 impl KernelBank {
-    /// Index of the unique node of an element at a node of its own, and what turns that into this.
+    /// Index of the unique node of an element at one of its nodes, and what turns that into this.
     fn unique(&self, element: usize, row: usize, column: usize) -> (usize, usize, Symmetry) {
         let (base, turn) = self.elements[element];
         let (row, column) = self.turned_node(turn.inverse(), row, column);

@@ -7,7 +7,7 @@ use metalith_sensor::lagrange;
 /// Rule by which the kernel at a place of an element's field follows from the kernels of the nodes about it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BetweenNodes {
-    /// Along each axis a mean of the two next to it.
+    /// Linear interpolation along each axis.
     #[default]
     Linear,
     /// Along each axis the polynomial through the six next to it, or through all where they are fewer. For images without

@@ -23,7 +23,7 @@ pub(crate) struct PixelGrid {
 }
 
 impl PixelGrid {
-    /// Its rows and columns that lie on a frame of so many, and where the first of them lies there.
+    /// Rows and columns that lie on a frame of so many, and where the first of them lies there.
     fn on(&self, axis: usize, length: usize) -> (std::ops::Range<usize>, usize) {
         let (origin, step) = (self.origin[axis], self.step as i64);
         let first = (-origin).max(0).div_euclid(step) + i64::from((-origin).max(0) % step != 0);

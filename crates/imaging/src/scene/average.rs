@@ -10,7 +10,7 @@ use crate::geometry::SceneView;
 const ROUNDING: f64 = 1e-9;
 
 impl SceneView {
-    /// Same view in as many pixels as are at least so wide (tangent); itself if its own are, or if its shorter side
+    /// This view in as many pixels as are at least so wide (tangent); itself if its own are, or if its shorter side
     /// would have fewer than the 33 that pictures of it must have to be scored. Rows that are no whole pixel are left
     /// out, half of them on each side.
     #[must_use]
@@ -30,7 +30,7 @@ impl SceneView {
 }
 
 impl SceneImage {
-    /// Same scene in the larger pixels of a view that [`SceneView::no_finer`] made of its own: means of linear light,
+    /// This scene in the larger pixels of a view that [`SceneView::no_finer`] made of its own: means of linear light,
     /// and of one over the distance.
     #[must_use]
     pub fn averaged(&self, view: &SceneView) -> Self {

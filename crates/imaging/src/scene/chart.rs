@@ -27,7 +27,7 @@ impl FromStr for BuiltIn {
             "star" => Ok(Self::Star),
             "edge" => Ok(Self::Edge),
             _ => Err(Error::refused(
-                "imaging/unknown-scene",
+                "scene/unknown",
                 format!("`{text}` is not a built-in scene"),
                 "use chart, star or edge, or the path of an image",
             )),

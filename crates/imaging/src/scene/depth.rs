@@ -10,7 +10,7 @@ use super::SceneImage;
 use super::read::{LONGEST, array, png_values};
 
 impl SceneImage {
-    /// Same scene with the distances of its pixels (um).
+    /// This scene with the distances of its pixels (um).
     ///
     /// # Errors
     /// If there is not one for each pixel.
@@ -18,7 +18,7 @@ impl SceneImage {
         let (rows, columns) = depth_um.dim();
         if (rows, columns) != (self.view.rows, self.view.columns) {
             return Err(Error::refused(
-                "imaging/depth-size",
+                "scene/depth-map-size-differs",
                 format!(
                     "the depth map has {columns} x {rows} pixels, the scene {} x {}",
                     self.view.columns, self.view.rows
@@ -40,7 +40,7 @@ pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
     let bytes = read_at_most(path, LONGEST, "a depth map")?;
     let fault = |what: &str| {
         Error::refused(
-            "imaging/depth-unreadable",
+            "scene/depth-map-unreadable",
             format!("{}: {what}", path.display()),
             "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances of a millimetre and more, in millimetres; `inf` in an NPY is far away",
         )
@@ -90,11 +90,7 @@ mod tests {
         let scene = SceneImage::of_rgb("", &ndarray::Array3::zeros((16, 17, 3)), 60.0, f64::INFINITY);
         assert!(scene.with_depth(depth).is_err());
         std::fs::write(&path, npy_bytes("(8, 8)", &[500.0; 64])).unwrap();
-        let error = read_depth(&path).unwrap_err().to_string();
-        assert!(
-            error.contains("8 x 8 pixels") && error.contains("distances of a millimetre"),
-            "{error}"
-        );
+        assert_eq!(read_depth(&path).unwrap_err().id(), "scene/depth-map-unreadable");
         let mut values = [500.0; 256];
         values[17] = f64::INFINITY;
         write(&values);

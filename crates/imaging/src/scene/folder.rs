@@ -18,7 +18,7 @@ pub fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     images.sort();
     if images.is_empty() {
         return Err(Error::refused(
-            "imaging/no-images",
+            "scene/no-images",
             format!("{} holds no image", folder.display()),
             "give a folder of PNG, JPEG or NPY files",
         ));

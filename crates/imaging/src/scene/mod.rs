@@ -70,7 +70,7 @@ impl SceneImage {
         }
     }
 
-    /// Same scene, white everywhere.
+    /// This scene, white everywhere.
     pub fn white(&self) -> Self {
         let shape = (self.view.rows, self.view.columns);
         let mut white = Self::of_rgb(

@@ -63,7 +63,7 @@ impl StrayLight {
             return Ok(());
         }
         Err(Error::refused(
-            "imaging/memory",
+            "camera/too-much-memory",
             format!(
                 "a sensor of {} x {} pixels: light beside the images would take {} MB",
                 sensor.columns,

@@ -140,7 +140,7 @@ impl<R: Read + Seek> Input<R> {
                 most: limits.points as u64,
             }));
         }
-        // Alternating lists of a polygon close by a corner of their own.
+        // Alternating lists of a polygon close by one more corner.
         let fewest = if closed { 2 } else { 1 };
         if found < fewest || (closed && list < 2 && !found.is_multiple_of(2)) {
             return Err(self.fault(OasisFault::Points { kind, found }));

@@ -143,7 +143,7 @@ impl CellBank {
             Error::refused(
                 "study/tables-unreadable",
                 format!("the tables of cells in {} cannot be used: {why}", path.display()),
-                "plan the study again into another folder; a shard makes no tables of its own",
+                "plan the study again into another folder; shards make no tables",
             )
         };
         let content = kept::open(&bytes, MAGIC, &bank.inputs()).map_err(|e| unusable(e.to_string()))?;
@@ -325,9 +325,9 @@ impl CellBank {
 
     fn outside(what: String) -> Error {
         Error::refused(
-            "study/outside-tables",
+            "study/tables-too-narrow",
             format!("the tables of cells hold no {what}"),
-            "plan the study again; a shard makes no tables of its own",
+            "plan the study again; shards make no tables",
         )
     }
 

@@ -112,7 +112,7 @@ fn sizes_between_the_nodes_are_those_solved_and_few_are_solved() {
     }
 }
 
-/// Sizes are each solved once where no bias varies, and where little does, sizes far apart have nodes of their own.
+/// Sizes are each solved once where no bias varies, and where little does, sizes far apart have their own nodes.
 #[test]
 fn sizes_that_no_bias_joins_are_solved_by_themselves() {
     let numbers: Vec<u16> = (1..=UPRIGHT.count()).collect();

@@ -26,7 +26,7 @@ use metalith_pillars::{PillarShape, PolarisationBasis, Rectangles, RotatedRectan
 /// A class of rectangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RectangleClass {
-    /// Its number; zero is a site without pillar.
+    /// Number; zero is a site without pillar.
     pub number: u16,
     /// Error of both edges (nm).
     pub bias_nm: f64,
@@ -78,8 +78,8 @@ impl MadeRectangles {
         let (true, PillarShape::Rectangle(pillars)) = (fits, stated.shape) else {
             return Err(Error::refused(
                 "light/not-focused",
-                "light of a polarisation that these pillars do not focus",
-                "say circular light of rotated rectangles, linear light of upright ones, and none of others",
+                "the light has a polarisation that these pillars do not focus",
+                "give circular polarisation for rotated rectangles, linear polarisation for upright ones, and none for other pillars",
             ));
         };
         model.check_shape(stated.shape)?;
@@ -90,7 +90,7 @@ impl MadeRectangles {
         })
     }
 
-    /// Same rectangles, whose solved rows are cached in a folder from one run to the next.
+    /// These rectangles, whose solved rows are cached in a folder from one run to the next.
     pub(crate) fn kept_in(mut self, folder: Option<&Path>) -> Self {
         if let RowSource::Solved(solved) = &mut self.source {
             solved.folder = folder.map(Path::to_owned);
@@ -98,7 +98,7 @@ impl MadeRectangles {
         self
     }
 
-    /// Same rectangles with all rows from a bank of the same pillars.
+    /// These rectangles with all rows from a bank of the same pillars.
     pub(crate) fn of_bank(self, bank: &Arc<CellBank>) -> Self {
         Self {
             source: RowSource::Bank(Arc::clone(bank)),
@@ -187,9 +187,9 @@ fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     let (geometry, cell) = (&model.perturbation.geometry, &model.perturbation.cell);
     if !geometry.transmission.is_empty() || !geometry.transmission_phase_rad.is_empty() {
         return Err(Error::refused(
-            "model/transmission-of-rectangles",
-            "the pillars are rectangles, and the transmission of the model goes by one width",
-            "give a model without `transmission` and `transmission_phase_rad`: rectangles are told by no one width",
+            "model/transmission-with-rectangles",
+            "the pillars are rectangles, and the transmission of the model depends on one width",
+            "give a model without `transmission` and `transmission_phase_rad`: rectangles have two edges",
         ));
     }
     if cell.corner_rounding_nm != 0.0 {
@@ -205,12 +205,12 @@ fn check_rectangles(model: &CalibratedModel) -> Result<()> {
     });
     match by_width {
         Some(term) => Err(Error::refused(
-            "model/declared-width-of-rectangles",
+            "model/declared-width-with-rectangles",
             format!(
-                "the declared width `{}` goes by the drawn width `w`, of rectangles",
+                "the declared width `{}` depends on the drawn width `w`, which rectangles do not have",
                 term.name
             ),
-            "declare it by `fill` and places alone: rectangles are told by no one width",
+            "declare it by `fill` and places only: rectangles have two edges",
         )),
         None => Ok(()),
     }

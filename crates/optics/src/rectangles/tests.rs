@@ -152,15 +152,15 @@ fn upright_rectangles_between_the_nodes_are_those_solved_exactly_along_both_axes
     assert_eq!(found.along.map(|along| along[0]), exact);
     // Of a size that was not drawn when the bank was made.
     let refused = tables(&banked, &[class(1, 0.0)]).unwrap_err();
-    assert_eq!(refused.id(), "study/outside-tables");
+    assert_eq!(refused.id(), "study/tables-too-narrow");
     insta::assert_snapshot!(refused, @"
     the tables of cells hold no pillar of 100 x 100 nm whose edges are off by 0 nm
-      help: plan the study again; a shard makes no tables of its own
+      help: plan the study again; shards make no tables
     ");
 }
 
 /// Cached rows are taken in place of what would be solved, to the last bit; what is damaged is made anew, and other
-/// pillars, biases and stacks have files of their own.
+/// pillars, biases and stacks have their own files.
 #[test]
 fn rows_that_are_kept_are_those_that_were_solved() {
     let folder = tempfile::tempdir().unwrap();
@@ -227,15 +227,15 @@ fn what_rectangles_have_no_meaning_for_is_refused_with_a_reason() {
         let id = |change: &dyn Fn(&mut crate::Perturbation)| refused(pillars, light, change).id();
         assert_eq!(id(&|of| of.cell.corner_rounding_nm = 5.0), "model/rounded-rectangles");
         let transmission = id(&|of| of.geometry.transmission = vec![0.1]);
-        assert_eq!(transmission, "model/transmission-of-rectangles");
-        assert_eq!(id(&by_width), "model/declared-width-of-rectangles");
+        assert_eq!(transmission, "model/transmission-with-rectangles");
+        assert_eq!(id(&by_width), "model/declared-width-with-rectangles");
     }
     assert_eq!(refused(UPRIGHT.into(), HAND, &nothing).id(), "light/not-focused");
     let other = refused(ROTATED.into(), ALONG_X, &nothing);
     assert_eq!(other.id(), "light/not-focused");
     // Which light each of them focuses.
     insta::assert_snapshot!(other, @"
-    light of a polarisation that these pillars do not focus
-      help: say circular light of rotated rectangles, linear light of upright ones, and none of others
+    the light has a polarisation that these pillars do not focus
+      help: give circular polarisation for rotated rectangles, linear polarisation for upright ones, and none for other pillars
     ");
 }

@@ -54,7 +54,7 @@ impl Deconvolution {
         if angles == 0 || views.channels == 0 || lengths < 2 * views.channels || !views.window.pixels.is_multiple_of(2)
         {
             return Err(Error::refused(
-                "optimise/shapes",
+                "optimise/views-unsuitable",
                 format!(
                     "{lengths} wavelengths in {} channels at {angles} angles",
                     views.channels
@@ -92,7 +92,7 @@ impl Deconvolution {
                         let so_far = used.fetch_add(bytes, std::sync::atomic::Ordering::Relaxed) + bytes;
                         if so_far > memory_bytes {
                             return Err(Error::refused(
-                                "optimise/memory",
+                                "optimise/too-much-memory",
                                 format!(
                                     "the kernels of {} views take more than {memory_bytes} bytes",
                                     angles * lengths
@@ -166,7 +166,7 @@ impl Deconvolution {
         (decibel(mean), errors.into_iter().map(decibel).collect())
     }
 
-    /// Mean square error of one channel: each wavelength with a filter of its own, and all with one.
+    /// Mean square error of one channel: each wavelength with its own filter, and all with one.
     pub(crate) fn error(&self, blurs: &[&[Complex32]], scale: f64, mut slopes: Option<&mut [Vec<Complex64>]>) -> f64 {
         let shared = self.views.shared_filter;
         let own = (1.0 - shared) / blurs.len() as f64;

@@ -79,9 +79,9 @@ impl FieldProblem {
             .unwrap_or(0);
         if rings == 0 || blocks.iter().flat_map(|b| &b.2).any(|r| r.kernel.len() != rings) {
             return Err(Error::refused(
-                "optimise/shapes",
+                "optimise/row-lengths-differ",
                 "the rows of a merit are empty or differ in the number of rings",
-                "give every row one number a ring",
+                "give every row one number for each ring",
             ));
         }
         let mut layout = Vec::new();
@@ -102,7 +102,7 @@ impl FieldProblem {
         let bytes = 8 * (rings as u64 + widths as u64) * rows as u64;
         if bytes > memory_bytes {
             return Err(Error::refused(
-                "optimise/memory",
+                "optimise/too-much-memory",
                 format!("the kernel of {rows} rows by {rings} rings takes {bytes} bytes, more than {memory_bytes}"),
                 "take fewer wavelengths, errors or window points, or raise `memory_mb`",
             ));
@@ -131,7 +131,7 @@ impl FieldProblem {
         })
     }
 
-    /// Same merit with the coupled model: of rows that are all of the focus, without errors of fabrication.
+    /// This merit with the coupled model: of rows that are all of the focus, without errors of fabrication.
     ///
     /// # Errors
     /// If it takes more than `memory_bytes` with the kernel of the rings, rows are of pillars that are made with

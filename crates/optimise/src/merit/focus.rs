@@ -131,8 +131,8 @@ impl Lens {
         if widths.lattice != self.rings.lattice() {
             return Err(Error::refused(
                 "optimise/lattices-differ",
-                "the layout is on another lattice than the lens",
-                "judge it with the design that it was made from",
+                "the lattice of the layout differs from the lattice of the lens",
+                "compare it with the design that it was made from",
             ));
         }
         let drawn: Vec<u16> = (1..)

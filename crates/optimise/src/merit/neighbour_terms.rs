@@ -33,11 +33,11 @@ pub(crate) struct NeighbourTerms {
 
 /// All that a ring's width is multiplied with.
 pub struct RingContext {
-    /// Its own factors: `[product][row]`.
+    /// Own factors: `[product][row]`.
     around: Planes,
-    /// Its factors as a neighbour of others: `[product of one distance][row]`.
+    /// Factors as a neighbour of others: `[product of one distance][row]`.
     reverse: Planes,
-    /// Its links to itself.
+    /// Links to itself.
     same: [Option<usize>; DISTANCES],
 }
 
@@ -70,7 +70,7 @@ impl NeighbourTerms {
         let bytes = (24 * numbers + 8 * (lens.rings.len() + of_width + 1)) as u64 * rows as u64;
         if bytes > memory_bytes {
             return Err(Error::refused(
-                "optimise/memory",
+                "optimise/too-much-memory",
                 format!(
                     "neighbours of {} rings at {rows} wavelengths take {bytes} bytes, more than {memory_bytes}",
                     lens.rings.len()
@@ -85,15 +85,15 @@ impl NeighbourTerms {
             let wavelength_um = condition.wavelength_um;
             if condition.cell != 0 || condition.width_bias_nm != 0.0 {
                 return Err(Error::refused(
-                    "optimise/errors-among-neighbours",
-                    "errors of fabrication among unlike neighbours",
+                    "optimise/errors-with-neighbours",
+                    "errors of fabrication are not supported with the coupled model",
                     "leave out [optimise.robust], or optimise with the cell `rigorous`",
                 ));
             }
             let unlike = PairResponse::of(cell, wavelength_um, widths.iter().copied())?.ok_or_else(|| {
                 Error::refused(
                     "optimise/no-neighbour-model",
-                    format!("the cell `{}` takes neighbours for equals", cell.fidelity()),
+                    format!("the cell `{}` has no terms for neighbours", cell.fidelity()),
                     "optimise with the cell `neighbours`",
                 )
             })?;

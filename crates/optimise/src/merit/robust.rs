@@ -8,7 +8,7 @@ use metalith_cell::{CellStack, CellTable, RigorousCell, TableSpec};
 use metalith_core::{Progress, Result};
 use metalith_design::RobustSpec;
 
-/// Film heights that have a table of their own, in standard deviations; draws go to the nearest. The
+/// Film heights that have their own table, in standard deviations; draws go to the nearest. The
 /// nominal one is the cell that a design is optimised with, the first.
 const HEIGHTS: [f64; 5] = [0.0, -2.0, -1.0, 1.0, 2.0];
 

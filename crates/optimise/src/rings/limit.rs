@@ -29,8 +29,8 @@ impl StepLimit {
             return Ok(Self { waves });
         }
         Err(Error::refused(
-            "optimise/phase-step",
-            format!("a limit of {waves} waves on the phase step"),
+            "optimise/phase-step-out-of-range",
+            format!("the limit of the phase step is {waves} waves"),
             "give more than 0 and at most 0.5 waves; 0.5 is no limit",
         ))
     }

@@ -41,7 +41,7 @@ pub struct Checkpoint {
 pub struct Chain {
     pub sweep: u32,
     pub waves: ExactNumbers,
-    /// Its blocks, if its sweeps are done.
+    /// Blocks, if its sweeps are done.
     pub blocks: Option<BlockState>,
 }
 

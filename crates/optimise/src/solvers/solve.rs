@@ -48,9 +48,9 @@ impl OptimiseTask {
                 let problem = self.field_problem(&self.spec.merit, cells)?;
                 let problem = problem.ok_or_else(|| {
                     Error::refused(
-                        "optimise/nothing-to-exchange",
-                        "exchange has no merit to gain",
-                        "give sum, log or side_lobes a weight",
+                        "optimise/no-merit-weight",
+                        "the exchange has no merit: all weights are zero",
+                        "give `sum`, `log` or `side_lobes` a weight above zero",
                     )
                 })?;
                 let starts = (0..chains).map(|i| self.start(i)).collect::<Result<Vec<_>>>()?;
@@ -97,8 +97,8 @@ impl OptimiseTask {
             .ok_or_else(|| {
                 Error::refused(
                     "optimise/no-chains",
-                    "an exchange without chains",
-                    "use chains = 1 or more",
+                    "the exchange has no chains",
+                    "use `chains = 1` or more",
                 )
             })?;
         Ok(found.optimised(starts[at].name(), interrupted))

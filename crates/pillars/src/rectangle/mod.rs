@@ -14,7 +14,7 @@ pub use upright::UprightRectangles;
 pub enum Rectangles {
     /// Rectangles of one size, by their rotation: geometric phase.
     Rotated(RotatedRectangles),
-    /// Upright, by their edges along x and y: a phase of its own for light polarised along each.
+    /// Upright, by their edges along x and y: a separate phase for light polarised along each.
     Upright(UprightRectangles),
 }
 

@@ -178,7 +178,7 @@ impl Material {
         }
     }
 
-    /// Its name, or that of its file.
+    /// Name, or that of its file.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn out_of_range_says_the_range() {
         let error = Material::named("sin_philipp_1973").unwrap().index(1.5).unwrap_err();
-        assert_eq!(error.id(), "rcwa/out-of-range");
+        assert_eq!(error.id(), "rcwa/material-out-of-range");
         insta::assert_snapshot!(error, @"sin_philipp_1973 is known from 0.207 to 1.24 um, not at 1.5 um");
         match Material::named("glass").unwrap_err() {
             Error::UnknownMaterial { name, known } => {

@@ -16,7 +16,7 @@ pub struct Outline(Form);
 enum Form {
     /// Outline that both axes mirror and whose sides are along them.
     Upright(Steps),
-    /// Its sides are not along the axes.
+    /// Sides are not along the axes.
     Slanted(SlantedForm),
 }
 
@@ -110,7 +110,7 @@ impl Outline {
 
     /// A centred rectangle, `width_nm` along a direction that is turned by `rotation` (rad) from x towards y, and `length_nm`
     /// across. One rule for products holds at all angles, so that answers change smoothly with them; at whole quarters
-    /// [`Outline::rectangle`] has a rule of its own and converges from the other side.
+    /// [`Outline::rectangle`] has its own rule and converges from the other side.
     pub fn rotated_rectangle(width_nm: f64, length_nm: f64, rotation: f64) -> Self {
         Self(Form::Slanted(SlantedForm::Rectangle {
             halves_nm: [0.5 * width_nm, 0.5 * length_nm],

@@ -138,7 +138,7 @@ impl Supercell {
         })
     }
 
-    /// Same supercell seen from the other side.
+    /// This supercell seen from the other side.
     fn flipped(&self) -> Self {
         Self {
             below: self.above,

@@ -22,7 +22,7 @@ pub struct SupercellResponse {
 /// One order of a supercell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupercellOrder {
-    /// Its wave vector less that of the incident wave, by the turns over both steps of a [`SiteLattice`](crate::SiteLattice), in parts
+    /// Wave vector less that of the incident wave, by the turns over both steps of a [`SiteLattice`](crate::SiteLattice), in parts
     /// of the number of sites: (1, 0) is one turn over the length of a row. On a square lattice these are its components along x and
     /// y in units of 2 pi / (pitch times the number of sites).
     pub wave: [i32; 2],

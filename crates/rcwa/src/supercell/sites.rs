@@ -178,7 +178,7 @@ mod tests {
             assert_eq!(
                 seen.len(),
                 lattice.len(),
-                "{turns:?} / {n}: every site has a phase of its own"
+                "{turns:?} / {n}: every site has its own phase"
             );
             for (x, y) in [(17, 0), (3, 8), (0, 11)] {
                 let [a, b] = lattice.site(lattice.index(x, y));

@@ -51,7 +51,7 @@ impl Line {
             return Err(Error::refused(
                 "compensate/copies-differ",
                 format!(
-                    "widths as declared by `{}` differ between copies of an element",
+                    "the widths that `{}` declares differ between copies of an element",
                     directed.join("`, `")
                 ),
                 "compensate for widths that depend on `w`, `fill` and `r` alone, or take the term out of the model",

@@ -25,7 +25,7 @@ pub(super) struct Tiling {
 /// elements and three wavelengths) and by 8, 13 and 25 % at 24 degrees where tiles are bent for the axis; bent by [`OBLIQUE`],
 /// those of 125 and 180 um by 3.7 and 2.7 %, and by 7 and 8 %.
 const BEST_EDGE: f64 = 5.0;
-/// Fewer places would not distinguish directions, more would be a block of their own.
+/// Fewer places would not distinguish directions, more would be a separate block.
 const SIDES: [f64; 2] = [16.0, 512.0];
 /// Over the distance of the plane, the distance that the light of a tile is bent for: the way to the plane of light that leaves at
 /// 17 degrees (cosine to the power of -3), between the axis and the end of the field of a lens of 60 degrees.

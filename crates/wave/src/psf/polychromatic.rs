@@ -42,7 +42,7 @@ pub struct BandPart {
     pub weight: f64,
     /// Places where the chief ray lands at its shortest and at its longest wavelength (um).
     pub landing_um: [[f64; 2]; 2],
-    /// Its place among the samples: at `i + s`, with `s` between 0 and 1, the PSF is that of sample `i` times 1 - s
+    /// Place among the samples: at `i + s`, with `s` between 0 and 1, the PSF is that of sample `i` times 1 - s
     /// and that of sample `i + 1` times s. Beyond the ends the first and the last are in force.
     pub place: f64,
 }

@@ -20,7 +20,7 @@ use ndarray::Array2;
 /// Version of the format that is read.
 const SCHEMA: i64 = 1;
 
-/// What a set may say of its cells and lenses, and of where measurements were taken.
+/// Facts that a set may state of its cells and lenses, and of the places of its measurements.
 pub const PITCH_NM: Limits = Limits::new(50.0..=20_000.0, "nm");
 pub const HEIGHT_NM: Limits = Limits::new(10.0..=TALLEST_NM, "nm");
 pub const AMBIENT_INDEX: Limits = Limits::new(1.0..=3.0, "");
@@ -206,7 +206,7 @@ fn resolved(text: &str, folder: &Path) -> Result<Material> {
     Ok(Material::resolve(text, folder)?)
 }
 
-/// Where write fields meet in every lens, if that is stated.
+/// Place where write fields meet in every lens, if it is stated.
 pub fn field_boundary(root: &Section<'_, '_>) -> Option<[f64; 2]> {
     let s = root.optional_section("writer")?;
     let place = s.array("field_boundary_um", Limits::new(-1000.0..=1000.0, "um"));
@@ -258,7 +258,7 @@ fn check_flat(s: &Section<'_, '_>, camera: &RelayCamera, frames: &SensorFrames) 
     }
 }
 
-/// Whether the dark frame of a camera is that of any exposure, by what it is said to hold for.
+/// True if the dark frame of a camera is that of any exposure, by what it is said to hold for.
 const DARK_HOLDS_FOR: [(&str, bool); 2] = [("its_exposure", false), ("any_exposure", true)];
 
 /// A frame of the sensor by itself, and of how many it is the mean, by the keys of both; none where it is not named.
@@ -306,7 +306,7 @@ pub fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
     (camera, frames)
 }
 
-/// What is wrong with a lamp whose spectrum reaches beyond what is known of the materials of a cell, and what to do.
+/// Fault of a lamp whose spectrum reaches beyond what is known of the materials of a cell, and what to do.
 pub fn beyond_tables(led: &BenchLed, cell: &CellStack) -> Option<(String, &'static str)> {
     let (film, all) = (cell.film.range_um(), cell.range_um());
     let half = SPECTRUM_SIGMAS * led.sigma_nm();

@@ -39,7 +39,7 @@ pub struct Section<'d, 't> {
     document: &'d Document<'t>,
     table: &'d DeTable<'t>,
     name: String,
-    /// Its place from the top of the file: the name, and a number where several sections have it.
+    /// Place from the top of the file: the name, and a number where several sections have it.
     path: String,
     span: Range<usize>,
     asked: RefCell<BTreeSet<String>>,

@@ -65,7 +65,7 @@ impl PillarRule {
         }
     }
 
-    /// Same rule for the phase of light along an axis; only upright rectangles have a difference.
+    /// This rule for the phase of light along an axis; only upright rectangles have a difference.
     #[must_use]
     pub fn along(self, axis: PolarisationAxis) -> Self {
         match self {
@@ -123,7 +123,7 @@ impl PillarRule {
     }
 
     /// Width or number of a sample of the mapping, of so many whose phases are evenly spaced over a turn: see
-    /// [`PillarRule::phase_of_sample`]. Where light along the other axis has a phase of its own, it is any.
+    /// [`PillarRule::phase_of_sample`]. Where light along the other axis has its own phase, it is any.
     pub fn sample(&self, k: usize, samples: usize) -> u16 {
         let own = Self::phase_of_sample(k, samples);
         match self {

@@ -27,7 +27,7 @@ struct Surface<'t> {
     data: Vec<f64>,
     /// The line that bends it.
     bent: Option<(usize, &'t str)>,
-    /// Its other lines with their numbers.
+    /// Other lines with their numbers.
     lines: Vec<(usize, &'t str)>,
 }
 

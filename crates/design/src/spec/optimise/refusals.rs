@@ -29,7 +29,7 @@ impl OptimiseSpec {
             if wrong {
                 s.fault(
                     "cell",
-                    format!("{what} among unlike neighbours"),
+                    format!("{what} with the coupled model"),
                     "use `exchange` for `log` and `sum` without [optimise.robust], or the cell `rigorous`",
                 );
             }
@@ -113,7 +113,7 @@ mod tests {
             ");
     }
 
-    /// Refusals of what the exchange of rings cannot do with the coupled model, each in a fault of its own.
+    /// Refusals of what the exchange of rings cannot do with the coupled model, each in a separate fault.
     #[test]
     fn what_unlike_neighbours_are_not_known_to_is_refused() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/broadband_3x3.toml");
@@ -143,10 +143,10 @@ mod tests {
         }
         // Which of them it is is in the words.
         insta::assert_snapshot!(said.join("\n"), @"
-            the merit `deconvolution` among unlike neighbours
-            the merit `side_lobes` among unlike neighbours
-            errors of fabrication among unlike neighbours
-            the solver `adam` among unlike neighbours
+            the merit `deconvolution` with the coupled model
+            the merit `side_lobes` with the coupled model
+            errors of fabrication with the coupled model
+            the solver `adam` with the coupled model
             ");
     }
 }

@@ -64,9 +64,9 @@ impl Pupil {
         let size = fft_size(needed);
         if size > 8192 {
             return Err(Error::refused(
-                "optimise/window",
+                "optimise/window-too-large",
                 format!(
-                    "a window of {} um needs a transform of {size} points an axis",
+                    "a window of {} um needs a transform of {size} points along each axis, which is too large",
                     window.side_um()
                 ),
                 "use a smaller window or lens",

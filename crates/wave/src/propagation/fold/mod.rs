@@ -119,7 +119,7 @@ impl FoldedPropagator {
         &self.band.fade
     }
 
-    /// Same plan, holding spectra of columns of at most so many bytes at a time, but at least of a few columns. The
+    /// This plan, holding spectra of columns of at most so many bytes at a time, but at least of a few columns. The
     /// field is the same to the last bit; the rows of the aperture are transformed once for each part.
     #[must_use]
     pub fn within(mut self, bytes: usize) -> Self {
