@@ -71,7 +71,7 @@ pub struct Discovered {
 /// [`ElementSite::widen`].
 ///
 /// # Errors
-/// If there is no element on these layers or more than [`MOST_ELEMENTS`], or if the layout cannot be read.
+/// If there is no element on these layers or there are too many, or if the layout cannot be read.
 pub fn discover(
     layout: &Layout,
     from: &Selection,
