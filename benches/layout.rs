@@ -22,7 +22,7 @@ fn layout(criterion: &mut Criterion) {
     let rule = PillarRule::new(&design.cell, &design.mapping);
     let wedge = design.elements()[0].wedge;
     group.bench_function("widths", |b| {
-        b.iter(|| rule.widths(&ElementPhase::new(&lens, &wedge), None))
+        b.iter(|| rule.widths(&ElementPhase::new(&lens, &wedge), None));
     });
     for (name, hierarchy) in [
         ("folded", Hierarchy::Folded),

@@ -184,7 +184,7 @@ def disturb(bench: Bench, times: int, rng: random.Random) -> tuple[int, int, lis
     standing = 0
     while kills < times:
         before = kills
-        for calls, when in [(c, w) for c, count in points.items() for w in spread(count, times // len(CALLS), rng)]:
+        for calls, when in [(c, w) for c, count in points.items() for w in spread(count, max(times // len(CALLS), 1), rng)]:
             for fault in ("kill", FAULTS.get(calls)):
                 if fault is None:
                     continue

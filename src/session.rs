@@ -29,18 +29,15 @@ pub fn plan_session(
 ) -> Result<MeasurementPlan> {
     check_plannable(design, bench)?;
     check_not_begun(folder)?;
-    let (layout, layout_in_set) = match layout {
-        Some(file) => {
-            let whole = std::fs::canonicalize(file).map_err(Error::io("find", file))?;
-            let name = whole.display().to_string();
-            (whole, name)
-        }
-        None => {
-            let file = folder.join(LAYOUT);
-            let array = PillarArray::build(design, progress)?;
-            write_pillars(design, &array, design.layout.hierarchy, &file, progress)?;
-            (file, LAYOUT.to_owned())
-        }
+    let (layout, layout_in_set) = if let Some(file) = layout {
+        let whole = std::fs::canonicalize(file).map_err(Error::io("find", file))?;
+        let name = whole.display().to_string();
+        (whole, name)
+    } else {
+        let file = folder.join(LAYOUT);
+        let array = PillarArray::build(design, progress)?;
+        write_pillars(design, &array, design.layout.hierarchy, &file, progress)?;
+        (file, LAYOUT.to_owned())
     };
     let request = PlanRequest {
         design,

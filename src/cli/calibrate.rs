@@ -132,9 +132,10 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
     };
     if args.validate {
         let (set, out) = (MeasuredSet::read(&args.sets[0], &GdsPillars, terminal)?, &outs[0]);
-        let base = match args.trial.is_empty() && args.random == 0 {
-            true => ValidationPlan::default(),
-            false => ValidationPlan::only(args.trial.clone(), args.random),
+        let base = if args.trial.is_empty() && args.random == 0 {
+            ValidationPlan::default()
+        } else {
+            ValidationPlan::only(args.trial.clone(), args.random)
         };
         let plan = ValidationPlan {
             nulls: args.nulls.unwrap_or(base.nulls),

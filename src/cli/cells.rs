@@ -115,9 +115,10 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         "at {} nm the widths span {} waves; {} errs by {} rad rms",
         sig(study.mapping_um * 1e3, 4),
         fixed(study.span_waves, 2),
-        match design.mapping.from_cells {
-            true => "the mapping that is solved from the cell",
-            false => "the mapping of the design",
+        if design.mapping.from_cells {
+            "the mapping that is solved from the cell"
+        } else {
+            "the mapping of the design"
         },
         fixed(study.design_round_trip.rms_rad, 3)
     );

@@ -276,13 +276,12 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     let take = |k| open.take(k, &cache, terminal);
     let comparison = open.comparison((0..comparison.count()).map(take).collect::<Result<_>>()?);
     terminal.clear();
-    match args.json {
-        true => {
-            write_comparison(&comparison, &args.out)?;
-            print_json(&comparison);
-            Ok(Outcome::Fine)
-        }
-        false => tell(&comparison, &args.out),
+    if args.json {
+        write_comparison(&comparison, &args.out)?;
+        print_json(&comparison);
+        Ok(Outcome::Fine)
+    } else {
+        tell(&comparison, &args.out)
     }
 }
 

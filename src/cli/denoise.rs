@@ -93,9 +93,10 @@ pub(crate) fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let deviation = args.noise / 255.0;
     let single = given.mapv(|v| v as f32);
-    let noisy = match args.add {
-        true => with_noise(&single, deviation, args.seed),
-        false => single,
+    let noisy = if args.add {
+        with_noise(&single, deviation, args.seed)
+    } else {
+        single
     };
     let clean = denoiser.denoise_even(&noisy, deviation)?;
     let values = |p: &Array3<f32>| p.mapv(|v| f64::from(v.clamp(0.0, 1.0)));

@@ -75,17 +75,16 @@ pub(crate) fn run(args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
 
 fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
     judged_as_made("--compensate", args.compensate.as_deref(), args.fidelity)?;
-    let out = match &args.out {
-        Some(out) => out.clone(),
-        None => {
-            let design = Design::read_with(design, terminal)?.name;
-            let name = if args.compensate.is_some() {
-                compensated_name(&design)
-            } else {
-                design
-            };
-            PathBuf::from("out").join(format!("{name}_handoff"))
-        }
+    let out = if let Some(out) = &args.out {
+        out.clone()
+    } else {
+        let design = Design::read_with(design, terminal)?.name;
+        let name = if args.compensate.is_some() {
+            compensated_name(&design)
+        } else {
+            design
+        };
+        PathBuf::from("out").join(format!("{name}_handoff"))
     };
     let options = HandoffOptions {
         design: design.to_owned(),

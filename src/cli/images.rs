@@ -18,9 +18,10 @@ use metalith::imaging::scene::images_in;
 pub(crate) fn of_all(given: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut all = Vec::new();
     for path in given {
-        match path.is_dir() {
-            true => all.extend(images_in(path)?),
-            false => all.push(path.clone()),
+        if path.is_dir() {
+            all.extend(images_in(path)?);
+        } else {
+            all.push(path.clone());
         }
     }
     Ok(all)

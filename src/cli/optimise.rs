@@ -163,9 +163,10 @@ fn findings(
         Ok(judged)
     };
     let (before, mut after) = (judge(&task.reference_waves)?, judge(&found.waves)?);
-    let own = match task.own_waves == task.reference_waves {
-        true => Vec::new(),
-        false => judge(&task.own_waves)?,
+    let own = if task.own_waves == task.reference_waves {
+        Vec::new()
+    } else {
+        judge(&task.own_waves)?
     };
     let alone = lens_alone(design, phase)?;
     let array = PillarArray::build(&alone, terminal)?;

@@ -244,9 +244,12 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         print_json(&report);
         return Ok(Outcome::Fine);
     }
-    let score = |whole: &ZoneScore| match frame.is_lost() {
-        true => "no score, most pixels are at full scale".to_owned(),
-        false => format!("PSNR {}, SSIM {:.3}", psnr_words(whole.psnr_db), whole.ssim),
+    let score = |whole: &ZoneScore| {
+        if frame.is_lost() {
+            "no score, most pixels are at full scale".to_owned()
+        } else {
+            format!("PSNR {}, SSIM {:.3}", psnr_words(whole.psnr_db), whole.ssim)
+        }
     };
     for restoration in &report.restorations {
         let way = if restoration.joint {

@@ -330,9 +330,10 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     mostly_pillars(args, &found)?;
     one_kind(args, &found)?;
     known_light(args, &found)?;
-    let light = match args.extract_only {
-        true => None,
-        false => Some(args.light(&found)?),
+    let light = if args.extract_only {
+        None
+    } else {
+        Some(args.light(&found)?)
     };
     let assumptions = args.assumptions(&found, light.as_ref());
     let made = match &args.model {
@@ -405,9 +406,10 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             sig(site.centre_nm[0] as f64 * 1e-3, 8),
             sig(site.centre_nm[1] as f64 * 1e-3, 8),
             count(element.widths.pillars()),
-            match lattice.is_square() {
-                true => format!("{0} x {0} sites of {1} nm", lattice.sites(), lattice.pitch_nm()),
-                false => format!("a {} lattice of {} nm", lattice.kind(), lattice.pitch_nm()),
+            if lattice.is_square() {
+                format!("{0} x {0} sites of {1} nm", lattice.sites(), lattice.pitch_nm())
+            } else {
+                format!("a {} lattice of {} nm", lattice.kind(), lattice.pitch_nm())
             },
         );
     }

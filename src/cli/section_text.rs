@@ -68,12 +68,11 @@ pub(crate) fn with_keys(text: &str, head: &str, nth: usize, keys: &[(&str, Optio
     let others: String = others
         .filter_map(|((key, value), _)| Some(format!("{key} = {}\n", (*value)?)))
         .collect();
-    match after_head {
-        Some(at) => out.insert_str(at, &others),
-        None => {
-            let end = if out.ends_with('\n') { "" } else { "\n" };
-            out += &format!("{end}\n{head}\n{others}");
-        }
+    if let Some(at) = after_head {
+        out.insert_str(at, &others);
+    } else {
+        let end = if out.ends_with('\n') { "" } else { "\n" };
+        out += &format!("{end}\n{head}\n{others}");
     }
     out
 }

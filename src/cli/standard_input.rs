@@ -26,13 +26,14 @@ fn is_standard_input(path: &Path) -> bool {
 /// # Errors
 /// If one of these is `-`.
 pub(crate) fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()> {
-    match paths.into_iter().any(is_standard_input) {
-        false => Ok(()),
-        true => Err(Error::refused(
+    if paths.into_iter().any(is_standard_input) {
+        Err(Error::refused(
             "option/plan-from-standard-input",
             "a plan cannot use a file from standard input",
             "name the file: each shard reads it again",
-        )),
+        ))
+    } else {
+        Ok(())
     }
 }
 

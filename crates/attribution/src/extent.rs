@@ -58,9 +58,10 @@ fn directions(at: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
         let [x, y] = apart(p);
         (x * line[1] - y * line[0]).abs() <= IN_LINE * whole
     };
-    Some(match at.iter().all(is_in_line) {
-        true => vec![line],
-        false => vec![[1.0, 0.0], [0.0, 1.0]],
+    Some(if at.iter().all(is_in_line) {
+        vec![line]
+    } else {
+        vec![[1.0, 0.0], [0.0, 1.0]]
     })
 }
 

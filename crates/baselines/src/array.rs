@@ -120,16 +120,13 @@ impl BaselineCamera for ArrayCamera<'_> {
     }
 
     fn restore(&self, frame: &Frame, way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
-        match way.checked_sub(self.ways.len()) {
-            Some(k) => {
-                let stage = &self.stages[k];
-                stage.finish(&self.pictures(frame, stage.kind, progress)?)
-            }
-            None => {
-                let (method, joint) = self.ways[way];
-                self.system
-                    .restore(&self.restoration, &self.error, frame, method, joint, progress)
-            }
+        if let Some(k) = way.checked_sub(self.ways.len()) {
+            let stage = &self.stages[k];
+            stage.finish(&self.pictures(frame, stage.kind, progress)?)
+        } else {
+            let (method, joint) = self.ways[way];
+            self.system
+                .restore(&self.restoration, &self.error, frame, method, joint, progress)
         }
     }
 

@@ -133,9 +133,12 @@ impl Comparison {
         };
         let designs: Vec<(Design, Camera)> = self.designs.iter().map(own).collect::<Result<_>>()?;
         let view = self.simulated_view(&designs, first);
-        let averaged = |photograph: SceneImage| match view == first {
-            true => photograph,
-            false => photograph.averaged(&view),
+        let averaged = |photograph: SceneImage| {
+            if view == first {
+                photograph
+            } else {
+                photograph.averaged(&view)
+            }
         };
         let open = OpenComparison {
             of: self,
@@ -235,9 +238,10 @@ impl OpenComparison<'_> {
     /// # Errors
     /// As [`OpenComparison::take`].
     pub fn prepare(&self, k: usize, cache: &KernelCache, progress: &dyn Progress) -> Result<()> {
-        match k < self.designs.len() * self.of.kinds() {
-            true => self.ready(k, cache, progress, &mut |_, _, _| Ok(())),
-            false => Ok(()),
+        if k < self.designs.len() * self.of.kinds() {
+            self.ready(k, cache, progress, &mut |_, _, _| Ok(()))
+        } else {
+            Ok(())
         }
     }
 
@@ -322,18 +326,19 @@ impl OpenComparison<'_> {
         then: &mut Ready<'_>,
     ) -> Result<()> {
         let view = self.photographs[0].view;
-        let (camera, stage, [kind, light]) = match as_the_paper {
+        let (camera, stage, [kind, light]) = if as_the_paper {
             // Last stages were trained with all light of a channel.
-            true => (
+            (
                 of_one_wavelength(&self.camera)?,
                 None,
                 [", no dispersion", ", one wavelength a colour"],
-            ),
-            false => (
+            )
+        } else {
+            (
                 self.camera.clone(),
                 self.stages_of(self.designs.len() + k)?.pop(),
                 [""; 2],
-            ),
+            )
         };
         match &self.of.lensless[k] {
             Lensless::FlatCam(mask) => {

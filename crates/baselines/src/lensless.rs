@@ -82,12 +82,11 @@ impl<T: Lensless> BaselineCamera for T {
 
     fn restore(&self, frame: &Frame, way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
         let bench = self.bench();
-        match self.stage().filter(|_| way > 0) {
-            Some(stage) => stage.finish(&self.pictures(frame, stage.kind, progress)?),
-            None => {
-                frame.is_of(bench.frame(), bench.channels())?;
-                Ok(bench.picture(&self.sent(frame, progress)?))
-            }
+        if let Some(stage) = self.stage().filter(|_| way > 0) {
+            stage.finish(&self.pictures(frame, stage.kind, progress)?)
+        } else {
+            frame.is_of(bench.frame(), bench.channels())?;
+            Ok(bench.picture(&self.sent(frame, progress)?))
         }
     }
 
@@ -278,13 +277,14 @@ impl LenslessBench {
     /// # Errors
     /// If it has another size or field.
     pub fn sees(&self, scene: &SceneImage) -> Result<()> {
-        match scene.view == self.view {
-            true => Ok(()),
-            false => Err(Error::refused(
+        if scene.view == self.view {
+            Ok(())
+        } else {
+            Err(Error::refused(
                 "scene/views-differ",
                 format!("the scene `{}` has another size or field than the first", scene.name),
                 "give scenes of one size and field at a time",
-            )),
+            ))
         }
     }
 

@@ -86,11 +86,10 @@ impl OpenComparison<'_> {
             if followed.iter().any(|f| f.is_of(stage.kind, stage.provenance())) {
                 continue;
             }
-            let why = match followed.iter().any(|f| f.is_like(stage.kind, stage.provenance())) {
-                true => {
-                    "for this layout with other materials, another cell, polarisation, analyser or wavelengths of its design"
-                }
-                false => "for none of these cameras at this size and field of photographs",
+            let why = if followed.iter().any(|f| f.is_like(stage.kind, stage.provenance())) {
+                "for this layout with other materials, another cell, polarisation, analyser or wavelengths of its design"
+            } else {
+                "for none of these cameras at this size and field of photographs"
             };
             return refused(
                 format!("the last stage `{kind}` was trained {why}"),

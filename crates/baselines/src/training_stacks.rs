@@ -44,16 +44,15 @@ impl OpenComparison<'_> {
                 let light = optics.as_deref().unwrap_or_default();
                 let of = format!("{} {camera} {light} {} {seed}", kind.name(), hex(&file_digest(path)?));
                 let file = folder.join(format!("{i:06}.safetensors"));
-                let stack = match Stack::kept(&file, &of) {
-                    Some(stack) => stack,
-                    None => {
-                        let frame = ready.record(scene, seed)?;
-                        let made = ready.pictures(&frame, kind, &Silent)?;
-                        let shown: Vec<_> = made.iter().map(encoded).collect();
-                        let stack = Stack::new(&shown, &encoded(&ready.truth(scene)))?;
-                        stack.write(&file, &of)?;
-                        stack
-                    }
+                let stack = if let Some(stack) = Stack::kept(&file, &of) {
+                    stack
+                } else {
+                    let frame = ready.record(scene, seed)?;
+                    let made = ready.pictures(&frame, kind, &Silent)?;
+                    let shown: Vec<_> = made.iter().map(encoded).collect();
+                    let stack = Stack::new(&shown, &encoded(&ready.truth(scene)))?;
+                    stack.write(&file, &of)?;
+                    stack
                 };
                 pictures = stack.pictures();
                 stacks.push(stack);

@@ -153,9 +153,10 @@ impl<'a> Tiles<'a> {
             let element = usize::from(self.nearest[[y, x]]);
             let at = [y, x].map(|v| v as i64);
             let at = [0, 1].map(|a| at[a] - self.first[element][a]);
-            match at.iter().all(|v| (0..n as i64).contains(v)) {
-                true => squares[element][at[0] as usize * n + at[1] as usize],
-                false => 0.0,
+            if at.iter().all(|v| (0..n as i64).contains(v)) {
+                squares[element][at[0] as usize * n + at[1] as usize]
+            } else {
+                0.0
             }
         })
     }

@@ -127,9 +127,10 @@ pub(crate) fn lens_diameter_um(design: &Design) -> f64 {
 
 /// Distances at which an element of this focal length is looked at (um), to a tenth of a micrometre.
 pub(crate) fn distances_um(bench: &BenchFile, focal_um: f64) -> Vec<f64> {
-    let all = match bench.distances_um.is_empty() {
-        true => vec![focal_um * (1.0 - DEFOCUS), focal_um, focal_um * (1.0 + DEFOCUS)],
-        false => bench.distances_um.clone(),
+    let all = if bench.distances_um.is_empty() {
+        vec![focal_um * (1.0 - DEFOCUS), focal_um, focal_um * (1.0 + DEFOCUS)]
+    } else {
+        bench.distances_um.clone()
     };
     without_repeats(all.into_iter().map(|d| (d * 10.0).round() / 10.0).collect())
 }

@@ -125,9 +125,10 @@ fn effects(page: &mut Page, plan: &MeasurementPlan) {
     .caption("Wanted sizes are changes from the stated values. If a calibration reports the whole value instead, it is in brackets. Gain: decrease of the reduced chi-square per pixel when the effect is fitted. The interval is for the effect alone and includes the error of the model.");
     for e in &plan.effects {
         let with_unit = |v: f64| format!("{} {}", sig(v, 3), e.unit).trim_end().to_owned();
-        let wanted = match (e.reported - e.wanted).abs() > SAME * e.wanted {
-            true => format!("{} (reported as {})", with_unit(e.wanted), with_unit(e.reported)),
-            false => with_unit(e.wanted),
+        let wanted = if (e.reported - e.wanted).abs() > SAME * e.wanted {
+            format!("{} (reported as {})", with_unit(e.wanted), with_unit(e.reported))
+        } else {
+            with_unit(e.wanted)
         };
         let words = match (e.detected, e.reachable, e.gain >= e.needed) {
             (true, _, _) => "yes".to_owned(),

@@ -17,7 +17,7 @@ use ndarray::Array2;
 fn small_bench() -> String {
     let bench = session::bench();
     format!(
-        r#"schema = 1
+        r"schema = 1
 
 {bench}
 [captures]
@@ -33,7 +33,7 @@ edge_offset_nm = 1.0
 [wanted]
 defocus = 2.0
 cd_bias = 6.0
-"#
+"
     )
 }
 

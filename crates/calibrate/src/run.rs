@@ -85,7 +85,7 @@ fn conclude(
     progress: &dyn Progress,
 ) -> Result<Calibration> {
     let _turn = FolderLock::wait(out, progress, || {
-        progress.warn("another run writes into this folder: waiting for it")
+        progress.warn("another run writes into this folder: waiting for it");
     })?;
     // This run may find none, and those of another must not stand beside its answer.
     AtomicFile::discard(&out.join(MODEL))?;

@@ -52,13 +52,14 @@ impl StudyOptions {
     /// # Errors
     /// If the threshold is not a share of power.
     pub fn check(&self) -> Result<()> {
-        match (0.0..1.0).contains(&self.threshold) {
-            true => Ok(()),
-            false => Err(Error::refused(
+        if (0.0..1.0).contains(&self.threshold) {
+            Ok(())
+        } else {
+            Err(Error::refused(
                 "cells/threshold-out-of-range",
                 format!("the limit of the zeroth order is {}", self.threshold),
                 "give a share of the incident power from 0 to 1, such as 0.3",
-            )),
+            ))
         }
     }
 }

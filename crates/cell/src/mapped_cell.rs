@@ -179,9 +179,10 @@ impl MappedCell {
     fn lines(&self) -> impl Iterator<Item = String> {
         let line = |key: MappedKey| {
             let always = matches!(key.name, "shape" | "lattice" | "substrate_material");
-            let value = match always {
-                true => self.value(&key),
-                false => self.0.get(key.name).cloned(),
+            let value = if always {
+                self.value(&key)
+            } else {
+                self.0.get(key.name).cloned()
             };
             Some(format!("{} = {}", key.name, value?))
         };
@@ -226,9 +227,8 @@ impl MappedCell {
             let Some(comment) = text.strip_prefix('#') else {
                 if text.is_empty() {
                     continue;
-                } else {
-                    break;
-                };
+                }
+                break;
             };
             let Some((name, value)) = comment.split_once('=') else {
                 continue;
@@ -319,7 +319,7 @@ mod tests {
         ] {
             match read(text) {
                 Err(Error::Table { line, what, .. }) => {
-                    assert!(line == Some(at) && what.contains(word), "{text}: {what}")
+                    assert!(line == Some(at) && what.contains(word), "{text}: {what}");
                 }
                 other => panic!("{text}: {other:?}"),
             }

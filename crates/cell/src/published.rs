@@ -31,13 +31,14 @@ impl PublishedCell {
     /// # Errors
     /// If the pillars are others.
     pub fn of_stack(stack: &CellStack) -> Result<Self> {
-        match stack.is_of_the_paper() {
-            true => Ok(Self::new(stack.pitch_nm as u32)),
-            false => Err(Error::refused(
+        if stack.is_of_the_paper() {
+            Ok(Self::new(stack.pitch_nm as u32))
+        } else {
+            Err(Error::refused(
                 "cell/published-for-other-cell",
                 Self::OTHERS,
                 Self::ANOTHER_CELL,
-            )),
+            ))
         }
     }
 

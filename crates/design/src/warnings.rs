@@ -269,9 +269,10 @@ fn missed(lens: &LensSpec, wavelength_um: f64) -> f64 {
             (turns(inner_um + width_um) - turns(inner_um)) / width_um,
         );
         let sine = wavelength_um * slope;
-        let lands_um = match sine.abs() < 1.0 {
-            true => (r + lens.focal_length_um * sine / (1.0 - sine * sine).sqrt()).abs(),
-            false => radius_um,
+        let lands_um = if sine.abs() < 1.0 {
+            (r + lens.focal_length_um * sine / (1.0 - sine * sine).sqrt()).abs()
+        } else {
+            radius_um
         };
         sum += r * lands_um.min(radius_um);
         area += r;

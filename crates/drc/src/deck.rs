@@ -145,12 +145,11 @@ fn read(root: &Section<'_, '_>) -> DeckContents {
             layers.insert(key.clone(), number(&key, &section.text(&key)));
         }
     }
-    match pillars.first() {
-        Some(&first) => drop(layers.insert("pillars".into(), first)),
-        None => {
-            section.text("pillars");
-            pillars.extend(layers.get("pillars"));
-        }
+    if let Some(&first) = pillars.first() {
+        layers.insert("pillars".into(), first);
+    } else {
+        section.text("pillars");
+        pillars.extend(layers.get("pillars"));
     }
     section.finish();
     let height_nm = root.float("pillar_height_nm", Limits::new(1.0..=100_000.0, "nm"));

@@ -109,9 +109,10 @@ impl Against {
                 for (column, (&w, &wanted)) in there.iter().zip(wanted).enumerate() {
                     // Missing and additional pillars are a matter of count.
                     if w != wanted && w != 0 && wanted != 0 {
-                        found.rect(&flat.pillar(k, row, column), || match flat.shape.has_width() {
-                            true => format!("{w} nm wide, {wanted} nm designed"),
-                            false => {
+                        found.rect(&flat.pillar(k, row, column), || {
+                            if flat.shape.has_width() {
+                                format!("{w} nm wide, {wanted} nm designed")
+                            } else {
                                 let words = |number| flat.shape.words(PillarId(number));
                                 format!("{}, designed {}", words(w), words(wanted))
                             }

@@ -67,7 +67,7 @@ impl FieldRule {
     /// pitch wide, and on a hexagonal lattice more lines than the nearest are within half of that.
     fn reaching(&self, flat: &FlatLayout<'_>, element: usize, axis: usize) -> Vec<(usize, f64)> {
         let lattice = flat.elements[element].site.lattice;
-        self.lines(flat, element, axis, if lattice.is_square() { 0 } else { 1 })
+        self.lines(flat, element, axis, i64::from(!lattice.is_square()))
     }
 
     /// Rows or columns nearest to boundaries, and so many on either side, with the boundary's distance from them.

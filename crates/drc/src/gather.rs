@@ -259,9 +259,10 @@ impl Gather<'_, '_> {
     /// If that is too much work.
     #[inline]
     fn show_ring(&mut self, shape: &Shape<'_>, around: &Rect, placements: &[Transform]) -> Result<()> {
-        match shape.outline.has_number() {
-            true => self.remembered(shape, placements, |own| own.ring_passes(shape, around, placements)),
-            false => self.ring_passes(shape, around, placements).map(|_| ()),
+        if shape.outline.has_number() {
+            self.remembered(shape, placements, |own| own.ring_passes(shape, around, placements))
+        } else {
+            self.ring_passes(shape, around, placements).map(|_| ())
         }
     }
 

@@ -86,7 +86,7 @@ impl Rule for LayerRule {
                     return Err(NotRun::Skipped("nothing is drawn on the layer of the frame".into()));
                 };
                 let out = |r: &Rect| r.x0 < area.x0 || r.y0 < area.y0 || r.x1 > area.x1 || r.y1 > area.y1;
-                for layer in layers.iter() {
+                for layer in layers {
                     for r in flat
                         .loose(*layer)
                         .into_iter()

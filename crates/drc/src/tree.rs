@@ -100,7 +100,7 @@ impl TreeRule {
             Self::References(most) => {
                 let count: u64 = layout.cells().iter().map(metalith_gds::LayoutCell::references).sum();
                 found.facts.push((format!("references in {file}"), count as f64));
-                if count as i128 > i128::from(*most) {
+                if i128::from(count) > i128::from(*most) {
                     found.plain(&format!("{count}"), || {
                         format!("{count} references in {file}, at most {most}")
                     });

@@ -112,6 +112,7 @@ impl Waivers {
 
 impl Waivers {
     /// These and those of another file.
+    #[must_use]
     pub fn and(mut self, other: &Self) -> Self {
         self.list.extend(other.list.iter().cloned());
         self.list.iter_mut().enumerate().for_each(|(k, w)| w.index = k);

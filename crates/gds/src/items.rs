@@ -138,20 +138,19 @@ impl<C: CellConsumer> Pass<'_, C> {
                     _ => None,
                 };
                 // OASIS has half widths, and no pen has an area where it does not move.
-                match extensions.filter(|_| distinct && width % 2 == 0) {
-                    Some(extensions) => CellItem::Line {
+                if let Some(extensions) = extensions.filter(|_| distinct && width % 2 == 0) {
+                    CellItem::Line {
                         layer,
                         points: &element.points,
                         width,
                         extensions,
-                    },
-                    None => {
-                        let (ends, points) = (element.extensions, &element.points);
-                        outline(points, width, element.path_type, ends, &mut self.outline);
-                        CellItem::Area {
-                            layer,
-                            points: &self.outline,
-                        }
+                    }
+                } else {
+                    let (ends, points) = (element.extensions, &element.points);
+                    outline(points, width, element.path_type, ends, &mut self.outline);
+                    CellItem::Area {
+                        layer,
+                        points: &self.outline,
                     }
                 }
             }

@@ -22,7 +22,7 @@ impl WriteFields {
         }
     }
 
-    /// WriteFields of a rectangle for which `holds` is true of the field's own rectangle.
+    /// Write fields of a rectangle for which `holds` is true of the field's own rectangle.
     fn touch(&mut self, r: RectNm, holds: impl Fn(RectNm) -> bool) {
         let index = |v: i64, o: i64| (v - o).div_euclid(self.edge);
         for i in index(r.x0, self.origin.0)..=index(r.x1 - 1, self.origin.0) {
@@ -41,7 +41,7 @@ impl WriteFields {
     }
 }
 
-/// WriteFields that the pillar layout of a design touches: its lenses and the marks of the first step, on a
+/// Write fields that the pillar layout of a design touches: its lenses and the marks of the first step, on a
 /// grid from the lower left corner of the chip.
 pub(super) fn of_design(design: &Design, process: &Process) -> u64 {
     let (w, h) = design.layout.chip.size_nm;
@@ -65,7 +65,7 @@ pub(super) fn of_design(design: &Design, process: &Process) -> u64 {
     fields.touched.len() as u64
 }
 
-/// WriteFields of a layout that fills its bounds.
+/// Write fields of a layout that fills its bounds.
 pub(super) fn of_bounds(bounds_um: [f64; 4], process: &Process) -> u64 {
     let edge = process.writer.field_used_um;
     let across = |a: f64, b: f64| ((b - a) / edge).ceil().max(1.0) as u64;

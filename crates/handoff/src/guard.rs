@@ -52,9 +52,10 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
         return Err(Error::refused(
             "handoff/no-rules-for-pillars",
             format!("the pillars of the design are {shapes}, and the process has no decks of rules for them"),
-            match design.cell.shape.is_square() {
-                true => "add `pillar_rules`, `dose_rules` and `test_rules` to [checks]".to_owned(),
-                false => format!("add a section [checks.{shapes}] with `pillar_rules`, `dose_rules` and `test_rules`"),
+            if design.cell.shape.is_square() {
+                "add `pillar_rules`, `dose_rules` and `test_rules` to [checks]".to_owned()
+            } else {
+                format!("add a section [checks.{shapes}] with `pillar_rules`, `dose_rules` and `test_rules`")
             },
         ));
     }
@@ -96,9 +97,10 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
             Err(error) => return Err(Error::io("read", path)(error)),
         }
     }
-    let there = match folder.exists() {
-        true => Some(files_below(folder)?),
-        false => None,
+    let there = if folder.exists() {
+        Some(files_below(folder)?)
+    } else {
+        None
     };
     let handed_off = there.as_ref().is_some_and(|t| t.files.contains_key(manifest::NAME));
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
@@ -110,9 +112,10 @@ pub(super) fn replaceable(folder: &Path, archive: &Path) -> Result<()> {
         ));
     }
     let Some(there) = there else { return Ok(()) };
-    let known = match handed_off {
-        true => manifest::listed(folder)?,
-        false => BTreeSet::new(),
+    let known = if handed_off {
+        manifest::listed(folder)?
+    } else {
+        BTreeSet::new()
     };
     let listed = |name: &str| name == manifest::NAME || known.contains(name);
     let strange = there.files.keys().find(|name| !listed(name));

@@ -53,12 +53,11 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
         job_name(design),
         process.job.substrate_inch
     );
-    text.push_str(match crosses.is_empty() {
-        true => ";\n; The design has no crosses.\n",
-        false => {
-            ";\n; Global marks: cross centres on the substrate [um]. The first exposure makes them and does not\n\
-             ; look for them; keep these lines for any exposure that has to find them again.\n"
-        }
+    text.push_str(if crosses.is_empty() {
+        ";\n; The design has no crosses.\n"
+    } else {
+        ";\n; Global marks: cross centres on the substrate [um]. The first exposure makes them and does not\n\
+         ; look for them; keep these lines for any exposure that has to find them again.\n"
     });
     if let (Some(p), Some(q)) = (place("P"), place("Q")) {
         let _ = writeln!(text, "GLMPOS P={p},Q={q}");

@@ -159,12 +159,11 @@ pub(super) fn dose_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
         number,
         by_size: !design.cell.shape.has_one_size(),
     };
-    match standing_for_all(design, &DOSE_ROTATIONS_DEG) {
-        Some(numbers) => numbers.into_iter().map(pad).collect(),
-        None => {
-            let widths = process.dose_matrix.pad_widths_nm.iter();
-            widths.map(|&w| PadPillar::of_width(design, w)).collect()
-        }
+    if let Some(numbers) = standing_for_all(design, &DOSE_ROTATIONS_DEG) {
+        numbers.into_iter().map(pad).collect()
+    } else {
+        let widths = process.dose_matrix.pad_widths_nm.iter();
+        widths.map(|&w| PadPillar::of_width(design, w)).collect()
     }
 }
 
@@ -244,9 +243,10 @@ pub(super) fn test_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
 
 /// Width of a line to measure (nm), nearest to one that is asked for: one that pillars may have, or for rectangles any even one.
 pub(super) fn line_width(design: &Design, width_nm: f64) -> i64 {
-    match design.cell.shape.has_width() {
-        false => (width_nm / 2.0).round() as i64 * 2,
-        true => i64::from(legal_width(design, width_nm)),
+    if design.cell.shape.has_width() {
+        i64::from(legal_width(design, width_nm))
+    } else {
+        (width_nm / 2.0).round() as i64 * 2
     }
 }
 

@@ -31,16 +31,13 @@ pub(super) fn chip(design: &Design) -> Figure {
         let radius = design.lens_of(&element).radius_um();
         let (x, y) = (element.centre_nm.0 as f64 * 1e-3, element.centre_nm.1 as f64 * 1e-3);
         let shifted = |&(dx, dy): &(i64, i64)| (x + dx as f64 * 1e-3, y + dy as f64 * 1e-3);
-        match design.outline_of(&element) {
-            Some(outline) => {
-                let opening = outline.grown(design.layout.apertures.margin_nm);
-                plan.polygon(openings, opening.iter().map(shifted));
-                plan.polygon(lenses, outline.corners_nm().iter().map(shifted));
-            }
-            None => {
-                plan.circle(openings, x, y, radius + margin);
-                plan.circle(lenses, x, y, radius);
-            }
+        if let Some(outline) = design.outline_of(&element) {
+            let opening = outline.grown(design.layout.apertures.margin_nm);
+            plan.polygon(openings, opening.iter().map(shifted));
+            plan.polygon(lenses, outline.corners_nm().iter().map(shifted));
+        } else {
+            plan.circle(openings, x, y, radius + margin);
+            plan.circle(lenses, x, y, radius);
         }
         plan.label(x, y - radius - margin - 0.022e-3 * h as f64, element.label());
     }
@@ -135,7 +132,11 @@ pub(super) fn tone(design: &Design, process: &Process) -> Figure {
     };
     let top = height + resist_um;
     for k in 0..4 {
-        plan.rectangle(glass, (k as f64 * panel, -0.25 * scale), (k as f64 * panel + end, 0.0));
+        plan.rectangle(
+            glass,
+            (f64::from(k) * panel, -0.25 * scale),
+            (f64::from(k) * panel + end, 0.0),
+        );
     }
     plan.rectangle(film, (0.0, 0.0), (end, height));
     plan.rectangle(resist, (0.0, height), (end, top));

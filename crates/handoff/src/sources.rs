@@ -90,11 +90,11 @@ impl Sources {
             }
         };
         Ok(Self {
-            model,
             design,
             process,
             decks,
             waivers,
+            model,
             kept,
         })
     }

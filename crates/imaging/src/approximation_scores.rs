@@ -117,9 +117,10 @@ impl ImagingSystem {
     /// # Errors
     /// If no light reaches the sensor.
     pub fn assuming(&self, assumed: ApproximationSet) -> Result<Self> {
-        let stray_light = match assumed.no_stray_light {
-            true => StrayLight::none(&self.camera.sensor, self.channels.len(), self.bank.bases),
-            false => self.stray_light.clone(),
+        let stray_light = if assumed.no_stray_light {
+            StrayLight::none(&self.camera.sensor, self.channels.len(), self.bank.bases)
+        } else {
+            self.stray_light.clone()
         };
         let mut other = self.clone();
         (other.assumed, other.stray_light) = (assumed, stray_light);

@@ -213,19 +213,18 @@ impl<'a> PairWriter<'a> {
             let bytes = read_at_most(file, png16::LONGEST, "a picture of the set").ok()?;
             png16::source_of(&bytes).is_some_and(|s| s == of).then_some(bytes)
         };
-        let pair = match (kept(&frame_file, &of_frame), kept(&truth_file, &of_truth)) {
-            (Some(frame), Some(truth)) => [frame, truth],
-            _ => {
-                let scene = read(image)?;
-                let scene = self.system.simulated(&scene);
-                let recorded = self.system.record(self.operator, &scene, own_seed)?;
-                let ideal = self.system.truth(&scene).mapv(srgb::encoded);
-                let frame = png16::grey(&recorded.planes, self.black, &of_frame);
-                let truth = png16::colour(&ideal, Some(&of_truth));
-                AtomicFile::write(&frame_file, &frame)?;
-                AtomicFile::write(&truth_file, &truth)?;
-                [frame, truth]
-            }
+        let pair = if let (Some(frame), Some(truth)) = (kept(&frame_file, &of_frame), kept(&truth_file, &of_truth)) {
+            [frame, truth]
+        } else {
+            let scene = read(image)?;
+            let scene = self.system.simulated(&scene);
+            let recorded = self.system.record(self.operator, &scene, own_seed)?;
+            let ideal = self.system.truth(&scene).mapv(srgb::encoded);
+            let frame = png16::grey(&recorded.planes, self.black, &of_frame);
+            let truth = png16::colour(&ideal, Some(&of_truth));
+            AtomicFile::write(&frame_file, &frame)?;
+            AtomicFile::write(&truth_file, &truth)?;
+            [frame, truth]
         };
         let [frame_sha256, truth_sha256] = pair.map(|bytes| hex(&Sha256::digest(bytes)));
         Ok(DatasetPair {

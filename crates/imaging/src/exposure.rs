@@ -197,9 +197,12 @@ impl Frame {
         let names = camera.channel_names();
         let of = |(channel, gain): (usize, &f64)| {
             let plane = self.plane(channel);
-            Array2::from_shape_fn(plane.dim(), |(y, x)| match self.counts(channel, &names, y, x) {
-                true => (f64::from(plane[[y, x]]) / gain) as f32,
-                false => 0.0,
+            Array2::from_shape_fn(plane.dim(), |(y, x)| {
+                if self.counts(channel, &names, y, x) {
+                    (f64::from(plane[[y, x]]) / gain) as f32
+                } else {
+                    0.0
+                }
             })
         };
         self.gain.iter().enumerate().map(of).collect()

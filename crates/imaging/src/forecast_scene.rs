@@ -42,9 +42,10 @@ impl ForecastScene {
         });
         let light = simulation.apply(&scene.planes);
         drop(simulation);
-        let known = match restoration.sees_colours() {
-            true => restoration.apply(&scene.planes),
-            false => restoration.apply(&ChannelColours::ideal(&system.channels, &scene)),
+        let known = if restoration.sees_colours() {
+            restoration.apply(&scene.planes)
+        } else {
+            restoration.apply(&ChannelColours::ideal(&system.channels, &scene))
         };
         let names = system.camera.channel_names();
         let filter = system.camera.sensor.filter;

@@ -124,9 +124,10 @@ impl ImagingSystem {
     /// distinguishes no colours sees grey.
     pub fn restoration(&self) -> FrameOperator<'_> {
         let primaries = self.primaries();
-        let inputs = match self.colours.has_colours() {
-            true => SceneInputs::Spectra(primaries),
-            false => SceneInputs::Channels(primaries),
+        let inputs = if self.colours.has_colours() {
+            SceneInputs::Spectra(primaries)
+        } else {
+            SceneInputs::Channels(primaries)
         };
         self.operator(Detail {
             node_step: self.restored_step,
@@ -142,9 +143,10 @@ impl ImagingSystem {
 
     /// A scene in the pixels that it is simulated in: the same scene, unless its own are finer than the sensor tells.
     pub fn simulated<'s>(&self, scene: &'s SceneImage) -> Cow<'s, SceneImage> {
-        match scene.view == self.given && self.given != self.view {
-            true => Cow::Owned(scene.averaged(&self.view)),
-            false => Cow::Borrowed(scene),
+        if scene.view == self.given && self.given != self.view {
+            Cow::Owned(scene.averaged(&self.view))
+        } else {
+            Cow::Borrowed(scene)
         }
     }
 
@@ -209,9 +211,10 @@ impl ImagingSystem {
             _ => self.known(operator, error, frame)?,
         };
         let recorded = self.recorded(operator, &light, &inverse_variance);
-        let planes = match joint {
-            true => restore_joint(&recorded, method, progress)?,
-            false => restore_separate(&recorded, method, progress)?,
+        let planes = if joint {
+            restore_joint(&recorded, method, progress)?
+        } else {
+            restore_separate(&recorded, method, progress)?
         };
         Ok(self.picture(operator, &planes))
     }
@@ -279,23 +282,25 @@ impl ImagingSystem {
     ) -> Result<[Vec<Array2<f32>>; 2]> {
         frame.is_of(operator.frame(), self.gain.len())?;
         let (light, inverse_variance) = frame.light(&self.camera, error);
-        match inverse_variance.iter().flatten().any(|t| *t > 0.0) {
-            true => Ok([light, inverse_variance]),
-            false => Err(Error::refused(
+        if inverse_variance.iter().flatten().any(|t| *t > 0.0) {
+            Ok([light, inverse_variance])
+        } else {
+            Err(Error::refused(
                 "restore/all-saturated",
                 "the frame has no information on the scene: every pixel is at full scale",
                 "give a scene of which white is 1, or a lower `white` in [exposure] of the camera",
-            )),
+            ))
         }
     }
 
     /// Planes of a restoration in linear sRGB `[row, column, colour]`.
     pub fn picture(&self, operator: &FrameOperator<'_>, planes: &[Array2<f32>]) -> Array3<f64> {
-        match operator.sees_colours() {
-            true => Array3::from_shape_fn((self.view.rows, self.view.columns, 3), |(y, x, c)| {
+        if operator.sees_colours() {
+            Array3::from_shape_fn((self.view.rows, self.view.columns, 3), |(y, x, c)| {
                 f64::from(planes[c][[y, x]])
-            }),
-            false => self.colours.rgb(planes),
+            })
+        } else {
+            self.colours.rgb(planes)
         }
     }
 

@@ -53,6 +53,7 @@ impl BankSpec {
 
     /// This specification with the nodes that light of a camera asks for, by how images follow from those at its
     /// wavelengths ([`Sampling::blend`](metalith_sensor::Sampling)).
+    #[must_use]
     pub fn in_light(self, blend: Blend) -> Self {
         match blend {
             Blend::Linear => self,
@@ -134,9 +135,10 @@ impl<'a> KernelPlan<'a> {
         let elements = element_views(design, camera);
         let given = scene.view;
         let view = simulated_view(design, camera, &given);
-        let scene = match view == given {
-            true => Cow::Borrowed(scene),
-            false => Cow::Owned(scene.averaged(&view)),
+        let scene = if view == given {
+            Cow::Borrowed(scene)
+        } else {
+            Cow::Owned(scene.averaged(&view))
         };
         let mut basis = scene.basis.clone();
         let primaries = if basis == rgb_basis() { 0 } else { basis.len() };

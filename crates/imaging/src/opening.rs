@@ -130,25 +130,21 @@ impl ImagingSystem {
                 };
                 let models;
                 let made;
-                let case = match model {
-                    Some(model) => {
-                        made = AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
-                        SimulationCase::from(&made)
-                    }
-                    None => {
-                        models = cell_models(design, &[design.verify.fidelity])?;
-                        models[0].as_ref().into()
-                    }
+                let case = if let Some(model) = model {
+                    made = AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
+                    SimulationCase::from(&made)
+                } else {
+                    models = cell_models(design, &[design.verify.fidelity])?;
+                    models[0].as_ref().into()
                 };
                 let chip = plan.chip(&extraction, case, progress)?;
-                let bank = match bank {
-                    Some(bank) => bank,
-                    None => {
-                        let bank = plan.bank(&chip, progress)?;
-                        let write = |folder: &Path| cache_file::cache_bank(folder, &inputs, &bank);
-                        cache.keep("the kernels are", write, progress)?;
-                        bank
-                    }
+                let bank = if let Some(bank) = bank {
+                    bank
+                } else {
+                    let bank = plan.bank(&chip, progress)?;
+                    let write = |folder: &Path| cache_file::cache_bank(folder, &inputs, &bank);
+                    cache.keep("the kernels are", write, progress)?;
+                    bank
                 };
                 let stray_light = plan.stray_light(&chip, &bank, progress)?;
                 let write = |folder: &Path| cache_file::cache_stray_light(folder, &stray_light_inputs, &stray_light);
@@ -157,8 +153,8 @@ impl ImagingSystem {
             }
         };
         Ok(Self {
-            from_cache,
             pillars,
+            from_cache,
             ..plan.system(bank, stray_light)?
         })
     }

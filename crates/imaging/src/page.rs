@@ -111,9 +111,12 @@ fn page(pages: &PicturePages<'_>) -> Page {
     let first = &report.restorations[0];
     let whole = &first.scores[0];
     // Of a frame that is all white the picture is white, as the scene seems to be.
-    let score = |words: String| match pages.frame.is_lost() {
-        true => "says nothing: the frame is lost".into(),
-        false => words,
+    let score = |words: String| {
+        if pages.frame.is_lost() {
+            "says nothing: the frame is lost".into()
+        } else {
+            words
+        }
     };
     let linear = fixed(whole.psnr_linear_db, 1);
     let of_linear_light = match first.forecast_db.first() {
@@ -243,11 +246,10 @@ fn scores(page: &mut Page, report: &PictureReport) {
             table.row(row);
         }
     }
-    let forecasts = match report.restorations.iter().any(|r| !r.forecast_db.is_empty()) {
-        true => {
-            "The forecasts come from a random scene. It shows the share of detail of each size that is lost in each zone. One forecast is for the mean over photographs (GB82), the other for the detail of this scene in each zone. Single photographs differ from the mean by some 3 dB. "
-        }
-        false => "",
+    let forecasts = if report.restorations.iter().any(|r| !r.forecast_db.is_empty()) {
+        "The forecasts come from a random scene. It shows the share of detail of each size that is lost in each zone. One forecast is for the mean over photographs (GB82), the other for the detail of this scene in each zone. Single photographs differ from the mean by some 3 dB. "
+    } else {
+        ""
     };
     page.table(table.caption(format!(
         "{forecasts}The restoration uses a coarser operator than the simulation. On a random scene its error is {} of the light of a pixel (root mean square), channel by channel. This error counts as noise.",

@@ -111,9 +111,12 @@ fn signals<'a>(
     let range = f64::from(white) - f64::from(black);
     let largest = camera.sensor.largest_signal();
     let full = recorded(camera, f64::INFINITY);
-    Ok(Box::new(move |number| match number >= white {
-        true => full,
-        false => (largest * (f64::from(number) - f64::from(black)) / range) as f32,
+    Ok(Box::new(move |number| {
+        if number >= white {
+            full
+        } else {
+            (largest * (f64::from(number) - f64::from(black)) / range) as f32
+        }
     }))
 }
 
@@ -146,9 +149,10 @@ fn read_grey(path: &Path, [rows, columns]: [usize; 2]) -> Result<Grey> {
         return Err(fault(path, "its size is not that of its pixels", SAVE));
     }
     reader.next_frame(&mut data).map_err(wrong)?;
-    let numbers = match is_deep {
-        true => data.as_chunks().0.iter().map(|b| u16::from_be_bytes(*b)).collect(),
-        false => data.iter().map(|b| u16::from(*b)).collect(),
+    let numbers = if is_deep {
+        data.as_chunks().0.iter().map(|b| u16::from_be_bytes(*b)).collect()
+    } else {
+        data.iter().map(|b| u16::from(*b)).collect()
     };
     Ok(Grey {
         numbers,

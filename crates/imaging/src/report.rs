@@ -173,7 +173,7 @@ impl Assumption {
             what: "calibrated model".into(),
             value: format!("of {}: {}", model.set, model.finding),
         };
-        let applied = model.applied.iter().map(|q| of(&q.quantity, q.value.to_string()));
+        let applied = model.applied.iter().map(|q| of(&q.quantity, q.value.clone()));
         let not_applied = model.not_applied.iter().map(|q| {
             let value = format!("{} there, not applied: {}", q.value, q.because);
             of(q.quantity, value)
@@ -374,9 +374,10 @@ fn place_of_sensor(design: &Design, camera: &Camera) -> String {
             "; {} of {} elements have another focal length ({}) and are out of focus",
             off.len(),
             design.elements().len(),
-            match least == most {
-                true => format!("{least} um"),
-                false => format!("{least} to {most} um"),
+            if least == most {
+                format!("{least} um")
+            } else {
+                format!("{least} to {most} um")
             }
         ),
         _ => String::new(),
@@ -388,9 +389,10 @@ fn place_of_sensor(design: &Design, camera: &Camera) -> String {
 fn polarised(focused: FocusedLight, light: PolarisedLight) -> String {
     let arriving = light.arriving_at(focused);
     let own = focused.polarisation();
-    let source = match arriving == own {
-        true => format!("all light arrives {arriving}, as behind a filter"),
-        false => format!("all light arrives {arriving}, and pillars focus light that arrives {own}"),
+    let source = if arriving == own {
+        format!("all light arrives {arriving}, as behind a filter")
+    } else {
+        format!("all light arrives {arriving}, and pillars focus light that arrives {own}")
     };
     format!("{source}; {}, in image and stray light", light.detector(focused))
 }
@@ -474,7 +476,7 @@ mod tests {
         };
         let points = |bend: f64| -> Vec<_> {
             (0..49)
-                .map(|k| [(k % 7) as f64 / 6.0 - 0.5, (k / 7) as f64 / 6.0 - 0.5])
+                .map(|k| [f64::from(k % 7) / 6.0 - 0.5, f64::from(k / 7) / 6.0 - 0.5])
                 .map(|t| (t, map(t, bend)))
                 .collect()
         };

@@ -74,21 +74,23 @@ fn decibels<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<f64, D::E
 
 /// PSNR of a mean squared error (dB).
 fn psnr_of(error: f64) -> Result<f64> {
-    match error.is_nan() {
-        false => Ok((-10.0 * error.log10()).min(MOST_DB)),
-        true => Err(Error::refused(
+    if error.is_nan() {
+        Err(Error::refused(
             "score/not-numbers",
             "the picture has values that are not numbers",
             "look at its frame: where next to no pixel is below full scale nothing can be restored; if that is not so, report this",
-        )),
+        ))
+    } else {
+        Ok((-10.0 * error.log10()).min(MOST_DB))
     }
 }
 
 /// PSNR in words.
 pub fn psnr_words(db: f64) -> String {
-    match db < MOST_DB {
-        true => format!("{db:.2} dB"),
-        false => "without an error".into(),
+    if db < MOST_DB {
+        format!("{db:.2} dB")
+    } else {
+        "without an error".into()
     }
 }
 

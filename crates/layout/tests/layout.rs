@@ -191,7 +191,7 @@ fn an_unfinished_file_replaces_nothing() {
     let path = folder.path().join("kept.gds");
     fs::write(&path, "old").unwrap();
     let mut file = AtomicFile::create(&path).unwrap();
-    file.write_all(&[0; 3_000_000]).unwrap();
+    file.write_all(&vec![0; 3_000_000]).unwrap();
     assert!(AtomicFile::create(&path).is_err(), "two writers of one file");
     drop(file);
     assert_eq!(fs::read(&path).unwrap(), b"old");
@@ -285,7 +285,7 @@ fn count_oasis(bytes: &[u8]) -> u64 {
                 }
             }
             OasisItem::Name(entry) if entry.table == NameTable::Cells && entry.name == b"MINI_3X3" => {
-                top = entry.number
+                top = entry.number;
             }
             OasisItem::End => return squares_below(&cells, top),
             _ => {}

@@ -23,14 +23,13 @@ fn main() {
         rng.set_stream(n);
         let bytes = oasis::mutant(&mut rng, &corpus);
         let began = Instant::now();
-        match std::panic::catch_unwind(|| oasis::survives(&bytes)) {
-            Ok(whole) => read += u64::from(whole),
-            Err(_) => {
-                let path = format!("mutant-{seed}-{n}.oas");
-                std::fs::write(&path, &bytes).expect("a writable folder");
-                eprintln!("mutant {n} of seed {seed} makes the reader panic; written to {path}");
-                std::process::exit(1);
-            }
+        if let Ok(whole) = std::panic::catch_unwind(|| oasis::survives(&bytes)) {
+            read += u64::from(whole);
+        } else {
+            let path = format!("mutant-{seed}-{n}.oas");
+            std::fs::write(&path, &bytes).expect("a writable folder");
+            eprintln!("mutant {n} of seed {seed} makes the reader panic; written to {path}");
+            std::process::exit(1);
         }
         slowest = slowest.max(began.elapsed());
         assert!(slowest < LONGEST, "mutant {n} of seed {seed} took {slowest:?}");

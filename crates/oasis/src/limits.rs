@@ -36,7 +36,7 @@ impl Default for OasisLimits {
             points: 1 << 20,
             list_places: 1 << 24,
             values: 1 << 16,
-            farthest: i32::MAX as i64,
+            farthest: i64::from(i32::MAX),
             short_file_unpacked: 1 << 26,
             unpacked_per_byte: 512,
         }

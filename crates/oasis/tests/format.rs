@@ -309,7 +309,7 @@ fn a_sum_of_bytes_is_a_checksum_too() {
     let end = bytes.len();
     // Four bytes less of padding, and a scheme with four bytes behind it.
     bytes.truncate(end - 243);
-    bytes.extend([0x80 | (236 & 0x7F), 1]);
+    bytes.extend([0x80 | (0xEC & 0x7F), 1]);
     bytes.extend([0; 236]);
     bytes.push(2);
     let sum: u32 = bytes.iter().map(|&b| u32::from(b)).sum();

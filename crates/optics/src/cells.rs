@@ -163,9 +163,10 @@ impl RealisedCells {
     /// If a cell cannot be solved, or the user stopped it.
     pub fn solve(&self, widths_nm: &[f64], light: &Illumination<'_>, progress: &dyn Progress) -> Result<SolvedWidths> {
         let (wavelength_um, sines) = (light.wavelength_um, light.cell_sines());
-        let orders = match sines == [0.0; 2] {
-            true => light.spectral.choose(ORDERS, BAND_ORDERS),
-            false => light.spectral.choose(OBLIQUE_ORDERS, OBLIQUE_BAND_ORDERS),
+        let orders = if sines == [0.0; 2] {
+            light.spectral.choose(ORDERS, BAND_ORDERS)
+        } else {
+            light.spectral.choose(OBLIQUE_ORDERS, OBLIQUE_BAND_ORDERS)
         };
         let (mut solved, columns) = self.solve_columns(orders, widths_nm, wavelength_um, sines, None, progress)?;
         if let Some((cells, higher_nm)) = &self.rim {

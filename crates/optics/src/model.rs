@@ -73,9 +73,10 @@ impl CalibratedModel {
         let numbers = counts.into_iter().flat_map(drawn);
         let edges = numbers.flat_map(|number| stack.shape.edges_nm(PillarId(number as u16)).map(f64::from));
         let [least, most] = edges.fold([f64::INFINITY, 0.0], |[least, most], nm| [nm.min(least), nm.max(most)]);
-        match most > 0.0 {
-            true => self.check_bias([least, most], stack.lattice.nearest_nm(stack.pitch_nm)),
-            false => Ok(()),
+        if most > 0.0 {
+            self.check_bias([least, most], stack.lattice.nearest_nm(stack.pitch_nm))
+        } else {
+            Ok(())
         }
     }
 
@@ -87,9 +88,10 @@ impl CalibratedModel {
         if narrowest > 0.0 && widest < nearest_nm {
             return Ok(());
         }
-        let what = match narrowest > 0.0 {
-            true => format!("makes pillars of {widest} nm, {nearest_nm} nm from one to the next"),
-            false => format!("leaves nothing of pillars drawn {} nm wide", edges_nm[0]),
+        let what = if narrowest > 0.0 {
+            format!("makes pillars of {widest} nm, {nearest_nm} nm from one to the next")
+        } else {
+            format!("leaves nothing of pillars drawn {} nm wide", edges_nm[0])
         };
         Err(Error::refused(
             "model/bias-out-of-range",
@@ -140,9 +142,10 @@ impl CalibratedModel {
         }
         let faults = model.perturbation.faults();
         if !faults.is_empty() {
-            let section = match text.contains("[perturbation") {
-                true => "perturbation",
-                false => "departure",
+            let section = if text.contains("[perturbation") {
+                "perturbation"
+            } else {
+                "departure"
             };
             let placed = |fault: PerturbationFault| (format!("{section}.{}", fault.key), fault.what, fault.hint);
             let faults = faults.into_iter().map(placed).collect();

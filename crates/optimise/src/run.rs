@@ -88,6 +88,7 @@ impl OptimiseTask {
     }
 
     /// This task without errors of fabrication.
+    #[must_use]
     pub fn regardless_of_errors(&self) -> Self {
         let mut plain = self.clone();
         plain.spec.robust = None;

@@ -46,7 +46,7 @@ impl EighthMap {
         let (n, mut room) = (map.lattice.sites(), Vec::new());
         for iy in n / 2..n {
             // Up to the diagonal, which is at the same column as row.
-            for (ix, &width) in (n / 2..iy + 1).zip(rows.row(iy, n / 2..iy + 1, &mut room)) {
+            for (ix, &width) in ((n / 2)..=iy).zip(rows.row(iy, n / 2..iy + 1, &mut room)) {
                 *map.at(ix, iy) = width;
             }
         }

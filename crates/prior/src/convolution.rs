@@ -281,7 +281,7 @@ mod tests {
     /// One output by its definition.
     fn direct(shape: Shape, weights: &[f32], input: &Features, [o, y, x]: [usize; 3]) -> f32 {
         let mut sum = 0.0;
-        let reach = if shape.taps == 9 { 1 } else { 0 };
+        let reach = isize::from(shape.taps == 9);
         for i in 0..shape.inputs {
             let mut t = 0;
             for dy in -reach..=reach {

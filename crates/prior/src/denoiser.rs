@@ -38,9 +38,10 @@ impl NetworkDenoiser {
     /// # Errors
     /// If the file cannot be read or is of another network.
     pub fn read(path: &Path) -> Result<Self> {
-        match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("onnx")) {
-            true => Self::read_onnx(path),
-            false => Ok(Self::of_weights(&read_weights(path)?)),
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("onnx")) {
+            Self::read_onnx(path)
+        } else {
+            Ok(Self::of_weights(&read_weights(path)?))
         }
     }
 

@@ -96,6 +96,7 @@ impl Features {
     }
 
     /// Each square of 2 x 2 pixels as four channels of one: half as many rows and columns. Both must be even.
+    #[must_use]
     pub fn unshuffled(&self) -> Self {
         let mut out = Self::zero(4 * self.channels, self.rows / 2, self.columns / 2);
         for c in 0..self.channels {
@@ -111,6 +112,7 @@ impl Features {
     }
 
     /// The inverse of [`Features::unshuffled`].
+    #[must_use]
     pub fn shuffled(&self) -> Self {
         let mut out = Self::zero(self.channels / 4, 2 * self.rows, 2 * self.columns);
         for c in 0..out.channels {

@@ -108,9 +108,10 @@ impl PerceptualDistance {
                 }
             })
             .collect();
-        match faults.is_empty() {
-            true => Ok(Self { layers }),
-            false => Err(fault(faults.join("; "))),
+        if faults.is_empty() {
+            Ok(Self { layers })
+        } else {
+            Err(fault(faults.join("; ")))
         }
     }
 
@@ -164,9 +165,10 @@ fn values(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> std::result::R
             .collect(),
         other => return Err(format!("`{name}` is of {other:?}, neither F32 nor F16")),
     };
-    match values.iter().all(|v| v.is_finite()) {
-        true => Ok(values),
-        false => Err(format!("`{name}` has values that are no numbers")),
+    if values.iter().all(|v| v.is_finite()) {
+        Ok(values)
+    } else {
+        Err(format!("`{name}` has values that are no numbers"))
     }
 }
 
@@ -222,12 +224,11 @@ impl Layer {
                         let line = &source[(y * stride + ky - margin) * columns..][..columns];
                         let to = &mut plane[y * across..][xs.clone()];
                         let begin = xs.start * stride + kx - margin;
-                        match stride {
-                            1 => to.iter_mut().zip(&line[begin..]).for_each(|(o, v)| *o += weight * v),
-                            _ => {
-                                let every = line[begin..].iter().step_by(stride);
-                                to.iter_mut().zip(every).for_each(|(o, v)| *o += weight * v);
-                            }
+                        if stride == 1 {
+                            to.iter_mut().zip(&line[begin..]).for_each(|(o, v)| *o += weight * v);
+                        } else {
+                            let every = line[begin..].iter().step_by(stride);
+                            to.iter_mut().zip(every).for_each(|(o, v)| *o += weight * v);
                         }
                     }
                 }

@@ -50,6 +50,9 @@ pub fn cut<T: Copy>(planes: &Array3<T>, place: [usize; 2], size: [usize; 3]) -> 
 }
 
 /// Pictures behind one another: `[row, column, colour]`.
+///
+/// # Errors
+/// If there is none, or if one is not in colour or not of this size.
 pub fn piled(pictures: &[Array3<f32>], size: (usize, usize, usize)) -> Result<Array3<f32>> {
     if pictures.is_empty() || pictures.iter().any(|p| p.dim() != size) || size.2 != COLOURS {
         return Err(Error::refused(

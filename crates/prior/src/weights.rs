@@ -63,6 +63,9 @@ fn shape(layer: &Layer) -> Vec<usize> {
 }
 
 /// Write weights in half precision, with what they were learnt from.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_weights(path: &Path, plan: &Plan, weights: &[f32], training: &str) -> Result<()> {
     let about = HashMap::from([(TRAINING.to_owned(), training.to_owned())]);
     let halves: Vec<Vec<u8>> = plan

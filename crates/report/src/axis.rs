@@ -32,6 +32,7 @@ impl Axis {
     }
 
     /// Show this range; without it, the axis covers its data.
+    #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
         self
@@ -182,10 +183,10 @@ impl Fitted {
         let step = self.step();
         let largest = self.low.abs().max(self.high.abs());
         // A common power of ten moves to the title, so that labels stay short.
-        let scale = if !(1e-3..1e5).contains(&largest) {
-            (largest.log10() / 3.0).floor() as i32 * 3
-        } else {
+        let scale = if (1e-3..1e5).contains(&largest) {
             0
+        } else {
+            (largest.log10() / 3.0).floor() as i32 * 3
         };
         let unit = 10f64.powi(scale);
         let decimals = (-(step / unit * 1.0001).log10().floor()).max(0.0) as usize;

@@ -124,12 +124,14 @@ impl Chart {
     }
 
     /// Width and height of the drawing; 560 by 340 else. In a row of figures, smaller reads better.
+    #[must_use]
     pub fn size(mut self, width: f64, height: f64) -> Self {
         self.size = (width.max(200.0), height.max(150.0));
         self
     }
 
     /// Name lines at their right ends instead of in a legend: for a few lines that end apart.
+    #[must_use]
     pub fn direct_labels(mut self) -> Self {
         self.direct = true;
         self

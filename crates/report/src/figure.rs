@@ -39,6 +39,7 @@ impl Figure {
     }
 
     /// This drawing with a caption after its title.
+    #[must_use]
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self

@@ -47,54 +47,63 @@ impl HeatMap {
     }
 
     /// Name and unit of what the colours mean.
+    #[must_use]
     pub fn values(mut self, name: impl Into<String>, unit: impl Into<String>) -> Self {
         self.scale = (name.into(), unit.into());
         self
     }
 
     /// Values at the ends of the colour bar; else those of the data.
+    #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
         self
     }
 
     /// Colours by ratio instead of by difference.
+    #[must_use]
     pub fn log(mut self) -> Self {
         self.logarithmic = true;
         self
     }
 
     /// Colours away from zero in both directions, the range made symmetric: for residuals.
+    #[must_use]
     pub fn diverging(mut self) -> Self {
         self.map = ColourMap::Diverging;
         self
     }
 
     /// Colours that come round, for phases: give it the range of one turn.
+    #[must_use]
     pub fn cyclic(mut self) -> Self {
         self.map = ColourMap::Cyclic;
         self
     }
 
     /// Equal lengths along both axes, for maps of a place: the height follows from the width.
+    #[must_use]
     pub fn to_scale(mut self) -> Self {
         self.to_scale = true;
         self
     }
 
     /// Width and height of the drawing; 560 by 400 else.
+    #[must_use]
     pub fn size(mut self, width: f64, height: f64) -> Self {
         self.size = (width.max(240.0), height.max(160.0));
         self
     }
 
     /// A line over the map, in the units of the axes; NaN lifts the pen.
+    #[must_use]
     pub fn contour(mut self, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         self.contours.push(points.into_iter().collect());
         self
     }
 
     /// A ring over the map at a place, with a few words or none.
+    #[must_use]
     pub fn mark(mut self, x: f64, y: f64, label: impl Into<String>) -> Self {
         self.marks.push((x, y, label.into()));
         self

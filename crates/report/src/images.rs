@@ -45,36 +45,42 @@ impl ImageGrid {
     }
 
     /// Size of a pixel (um): draws a scale bar.
+    #[must_use]
     pub fn pixel_um(mut self, pixel_um: f64) -> Self {
         self.pixel_um = Some(pixel_um).filter(|p| p.is_finite() && *p > 0.0);
         self
     }
 
     /// Name and unit of what the colours mean.
+    #[must_use]
     pub fn values(mut self, name: impl Into<String>, unit: impl Into<String>) -> Self {
         self.scale = (name.into(), unit.into());
         self
     }
 
     /// Values at the ends of the colour bar; else those of all the images.
+    #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
         self
     }
 
     /// A logarithmic scale over a given number of decades below the highest value of all images.
+    #[must_use]
     pub fn log(mut self, decades: f64) -> Self {
         self.decades = Some(decades);
         self
     }
 
     /// Colours away from zero in both directions: for residuals.
+    #[must_use]
     pub fn diverging(mut self) -> Self {
         self.map = ColourMap::Diverging;
         self
     }
 
     /// Width of one image in the drawing; 220 else.
+    #[must_use]
     pub fn side(mut self, side: f64) -> Self {
         self.side = side.max(60.0);
         self

@@ -27,6 +27,7 @@ impl Matrix {
     }
 
     /// Meaning of columns and rows.
+    #[must_use]
     pub fn axes(mut self, across: impl Into<String>, down: impl Into<String>) -> Self {
         (self.across, self.down) = (across.into(), down.into());
         self

@@ -56,9 +56,10 @@ impl Page {
         self.body.push_str("<dl class=\"facts\">\n");
         for (name, value) in facts {
             // Words instead of a number would shout in the type of numbers.
-            let class = match value.chars().count() > LONGEST_FACT {
-                true => " class=\"words\"",
-                false => "",
+            let class = if value.chars().count() > LONGEST_FACT {
+                " class=\"words\""
+            } else {
+                ""
             };
             self.body.push_str(&format!(
                 "<div><dt>{}</dt><dd{class}>{}</dd></div>\n",
@@ -162,9 +163,10 @@ impl Page {
             "\n<figure style=\"--width:{}px\">\n{}\n<figcaption>{}{}</figcaption></figure>",
             figure.width.round(),
             figure.svg,
-            match figure.title == figure.caption {
-                true => String::new(),
-                false => format!("<b>{}.</b> ", inline(figure.title.trim_end_matches('.'))),
+            if figure.title == figure.caption {
+                String::new()
+            } else {
+                format!("<b>{}.</b> ", inline(figure.title.trim_end_matches('.')))
             },
             inline(&figure.caption)
         ));

@@ -89,7 +89,7 @@ fn picture_address(bytes: &Array3<u8>) -> String {
     let (rows, columns, _) = bytes.dim();
     let pixels: Vec<u8> = bytes.iter().copied().collect();
     address((rows, columns), &pixels, &[0; 3], |encoder| {
-        encoder.set_color(png::ColorType::Rgb)
+        encoder.set_color(png::ColorType::Rgb);
     })
 }
 

@@ -106,6 +106,7 @@ impl Plan {
     }
 
     /// Width of the drawing; 620 else.
+    #[must_use]
     pub fn width(mut self, width: f64) -> Self {
         self.width = width.max(240.0);
         self

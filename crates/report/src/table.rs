@@ -183,6 +183,7 @@ impl Table {
     }
 
     /// Words above the table; words between back quotes are set as code.
+    #[must_use]
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self

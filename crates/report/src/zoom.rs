@@ -55,6 +55,7 @@ impl PillarZoom {
     }
 
     /// Draw pillars of this shape; squares else.
+    #[must_use]
     pub fn shape(mut self, shape: PillarShape) -> Self {
         self.shape = shape;
         self
@@ -82,6 +83,7 @@ impl PillarZoom {
     }
 
     /// Width of the square in the drawing; 380 else.
+    #[must_use]
     pub fn side(mut self, side: f64) -> Self {
         self.side = side.max(100.0);
         self

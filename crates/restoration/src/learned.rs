@@ -60,7 +60,7 @@ impl LearnedDenoiser {
         seed: u64,
     ) -> Result<Planes> {
         by_colours(picture, near, |p, n| {
-            self.colours(p, n, deviation, |values, noise| {
+            Self::colours(p, n, deviation, |values, noise| {
                 self.network.sample(values, noise, seed)
             })
         })
@@ -68,7 +68,6 @@ impl LearnedDenoiser {
 
     /// Three planes as red, green and blue, made clean in values of sRGB.
     fn colours(
-        &self,
         picture: [&Array2<f32>; COLOURS],
         near: [&Array2<f32>; COLOURS],
         deviation: f64,
@@ -97,12 +96,11 @@ fn by_colours(
     clean: impl Fn([&Array2<f32>; COLOURS], [&Array2<f32>; COLOURS]) -> Result<[Array2<f32>; COLOURS]>,
 ) -> Result<Planes> {
     let smooth: Planes;
-    let near = match near {
-        Some(near) => near,
-        None => {
-            smooth = picture.iter().map(local_mean).collect();
-            &smooth
-        }
+    let near = if let Some(near) = near {
+        near
+    } else {
+        smooth = picture.iter().map(local_mean).collect();
+        &smooth
     };
     if let ([r, g, b], [nr, ng, nb]) = (picture, near) {
         return Ok(clean([r, g, b], [nr, ng, nb])?.into());
@@ -117,7 +115,7 @@ fn by_colours(
 impl Denoiser for LearnedDenoiser {
     fn denoise(&self, picture: &[Array2<f32>], near: Option<&[Array2<f32>]>, deviation: f64) -> Result<Planes> {
         by_colours(picture, near, |p, n| {
-            self.colours(p, n, deviation, |values, noise| self.network.denoise(values, noise))
+            Self::colours(p, n, deviation, |values, noise| self.network.denoise(values, noise))
         })
     }
 

@@ -84,17 +84,16 @@ pub(crate) fn restore_elements(
     stray_light: bool,
     progress: &dyn Progress,
 ) -> Result<Planes> {
-    match method {
-        RestorationMethod::RichardsonLucy => richardson_lucy::restore(recorded, elements, stray_light, progress),
-        _ => {
-            let system = NormalSystem::new(recorded, elements, stray_light);
-            let independent = match method {
-                RestorationMethod::Tikhonov => tikhonov::restore(&system, progress),
-                RestorationMethod::TotalVariation => total_variation::restore(&system, progress),
-                RestorationMethod::LearnedPrior => half_quadratic::restore(&system, recorded.prior, progress),
-                _ => half_quadratic::restore(&system, &SlopeDenoiser::new(system.statistics()), progress),
-            };
-            Ok(system.statistics().picture(&independent?))
-        }
+    if method == RestorationMethod::RichardsonLucy {
+        richardson_lucy::restore(recorded, elements, stray_light, progress)
+    } else {
+        let system = NormalSystem::new(recorded, elements, stray_light);
+        let independent = match method {
+            RestorationMethod::Tikhonov => tikhonov::restore(&system, progress),
+            RestorationMethod::TotalVariation => total_variation::restore(&system, progress),
+            RestorationMethod::LearnedPrior => half_quadratic::restore(&system, recorded.prior, progress),
+            _ => half_quadratic::restore(&system, &SlopeDenoiser::new(system.statistics()), progress),
+        };
+        Ok(system.statistics().picture(&independent?))
     }
 }

@@ -57,9 +57,10 @@ impl<'a> NormalSystem<'a> {
         let most = light.iter().copied().fold(0.0f32, f32::max).max(f32::MIN_POSITIVE);
         let weight: Planes = recorded.inverse_variance.iter().map(|t| t.mapv(|v| v / most)).collect();
         let products: Planes = weight.iter().zip(recorded.light).map(|(w, s)| w * s).collect();
-        let statistics = match operator.sees_colours() {
-            true => SceneStatistics::colours(),
-            false => SceneStatistics::grey(operator.inputs()),
+        let statistics = if operator.sees_colours() {
+            SceneStatistics::colours()
+        } else {
+            SceneStatistics::grey(operator.inputs())
         };
         let share = light.mapv(|v| (v / most).max(LEAST_SHARE));
         let term = DataTerm {

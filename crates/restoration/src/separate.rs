@@ -50,7 +50,7 @@ pub(crate) fn restore(recorded: &Recorded<'_>, method: RestorationMethod, progre
     let operator = recorded.operator;
     let mut blend = Blend::new(operator.picture_shape(), operator.inputs());
     restore_each(recorded, method, progress, &mut |_, picture, inverse_variance| {
-        blend.add(picture, inverse_variance)
+        blend.add(picture, inverse_variance);
     })?;
     Ok(blend.finished())
 }

@@ -37,9 +37,10 @@ impl Exposure {
         let (white, full_e, largest) = (exposure.white, sensor.full_scale_e(), sensor.largest_signal());
         // A step of slack: the last one of a sensor whose steps are the whole of its well is below full scale.
         if white > largest + sensor.step() && s.sound(&SIGNAL) {
-            let (section, key) = match s.has("white") {
-                true => (s, "white"),
-                false => (sensor_section, "gain_e"),
+            let (section, key) = if s.has("white") {
+                (s, "white")
+            } else {
+                (sensor_section, "gain_e")
             };
             section.fault(
                 key,

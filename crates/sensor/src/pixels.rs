@@ -144,6 +144,7 @@ impl PixelGrid {
     }
 
     /// This image seen from a window that is off by so much (x, y) (um).
+    #[must_use]
     pub fn moved(mut self, [x, y]: [f64; 2]) -> Self {
         if x == 0.0 && y == 0.0 {
             return self;
@@ -159,6 +160,7 @@ impl PixelGrid {
     }
 
     /// Derivative by the shift along x (0) or y (1) (1/um).
+    #[must_use]
     pub fn slope(&self, axis: usize) -> Self {
         let middle = (self.re.ncols() / 2) as f32;
         let omega = (std::f64::consts::TAU * self.cycle) as f32;
@@ -176,6 +178,7 @@ impl PixelGrid {
     }
 
     /// Change by a blur, for a unit of its covariance between two axes (1/um^2).
+    #[must_use]
     pub fn blur(&self, [a, b]: [usize; 2]) -> Self {
         let half = if a == b { 0.5 } else { 1.0 };
         Self::combine(&[(&self.slope(a).slope(b), half)])
@@ -297,7 +300,7 @@ mod tests {
             let x = (col as f64 - 15.5) * 0.7 + shift[0];
             let y = (row as f64 - 19.5) * 0.7 + shift[1];
             let fine = (0..40 * 40).map(|k| {
-                let (a, b) = ((k % 40) as f64, (k / 40) as f64);
+                let (a, b) = (f64::from(k % 40), f64::from(k / 40));
                 let off = |v: f64| ((v + 0.5) / 40.0 - 0.5) * 0.7;
                 gauss(total.sqrt(), x + off(a), y + off(b)) * sigma * sigma / total / 1600.0
             });

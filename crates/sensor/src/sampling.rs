@@ -211,9 +211,10 @@ impl Camera {
         for channel in &self.channels {
             let all = channel.parts(&self.illuminant);
             let total: f64 = all.iter().map(|p| p.weight).sum();
-            let left_out = match width_nm(&all) < STEPS_IN_A_BAND * step_nm {
-                true => LEFT_OUT_OF_NARROW,
-                false => LEFT_OUT,
+            let left_out = if width_nm(&all) < STEPS_IN_A_BAND * step_nm {
+                LEFT_OUT_OF_NARROW
+            } else {
+                LEFT_OUT
             };
             let mut before = 0.0;
             let mut parts = Vec::new();
@@ -247,10 +248,7 @@ impl Camera {
         }
         let narrowest = channels.iter().map(|c| width_nm(&c.parts)).fold(f64::MAX, f64::min);
         let closer = (narrowest / STEPS_IN_A_BAND).max(CLOSEST_NM);
-        let blend = match closer < step_nm {
-            true => Blend::Cubic,
-            false => Blend::Linear,
-        };
+        let blend = if closer < step_nm { Blend::Cubic } else { Blend::Linear };
         let first_nm = channels.iter().filter_map(|c| c.parts.first()).map(|p| p.nm[0]);
         let of_image_nm = match blend {
             Blend::Cubic => steps.narrow_nm(first_nm.fold(f64::MAX, f64::min)),

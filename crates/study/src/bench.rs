@@ -1,4 +1,4 @@
-//! StudyBench that judges draws: the designs, their layouts as read back, and tables of cells.
+//! Bench that judges draws: the designs, their layouts as read back, and tables of cells.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -77,7 +77,7 @@ struct MadeRange {
 }
 
 impl StudyBench {
-    /// StudyBench for a tolerance that was read. `key`: of the random numbers.
+    /// Bench for a tolerance that was read. `key`: of the random numbers.
     pub(crate) fn new(tolerance: Tolerance, key: [u8; 32], files: Files) -> Result<Self> {
         let base = match &tolerance.model {
             Some(path) => CalibratedModel::read(path)?.perturbation,
@@ -192,7 +192,7 @@ impl StudyBench {
         let bank = Arc::new(bank(&design.cell_stack()?, range)?);
         let known = match &self.picture {
             Some(picture) if picture.knows_design() => {
-                let model = self.model("as designed".into(), self.drawer.base().clone());
+                let model = Self::model("as designed".into(), self.drawer.base().clone());
                 let chip = chip_of(&design, &bank, &model)?;
                 Some(picture.known(&design, layout.extraction(), &chip, &Quiet(progress))?)
             }
@@ -222,7 +222,7 @@ impl StudyBench {
         let number = self.drawer.design_of(k);
         let subject = self.subject(number, progress)?;
         let drawn = self.drawer.draw(self.key, k)?;
-        let model = self.model(format!("draw {k}"), self.drawer.perturbation(&drawn));
+        let model = Self::model(format!("draw {k}"), self.drawer.perturbation(&drawn));
         let chip = chip_of(&subject.design, &subject.bank, &model)?;
         let cases = SimulationCases::judged_by(&chip);
         let accuracy = self.tolerance.accuracy;
@@ -260,7 +260,7 @@ impl StudyBench {
         Ok(JudgedDraw { record, found, picture })
     }
 
-    fn model(&self, set: String, perturbation: Perturbation) -> CalibratedModel {
+    fn model(set: String, perturbation: Perturbation) -> CalibratedModel {
         CalibratedModel::new(set, "drawn".into(), perturbation)
     }
 
@@ -349,12 +349,13 @@ impl MadeRange {
         drawn.extend(library.map(|pillar| pillar.number));
         let (least, most) = design.cell.width_range_nm;
         // Rectangles are told by numbers that are no widths.
-        let (narrow, wide) = match design.cell.shape.has_width() {
-            false => (0.0, 0.0),
-            true => (
+        let (narrow, wide) = if design.cell.shape.has_width() {
+            (
                 f64::from(drawn.first().map_or(least, |w| least.min(*w))),
                 f64::from(drawn.last().map_or(most, |w| most.max(*w))),
-            ),
+            )
+        } else {
+            (0.0, 0.0)
         };
         let numbers = match design.focused() {
             Some(FocusedLight::Linear(_)) => drawn.into_iter().collect(),

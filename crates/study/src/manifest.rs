@@ -54,9 +54,10 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
             return Ok(None);
         }
         let known = Self::open_in(folder)?;
-        match known.key() == key {
-            true => Ok(Some(known)),
-            false => Err(another_plan(folder)),
+        if known.key() == key {
+            Ok(Some(known))
+        } else {
+            Err(another_plan(folder))
         }
     }
 

@@ -62,18 +62,17 @@ pub(crate) fn picture_spec(s: &Section<'_, '_>) -> PictureSpec {
         *SCORED_SIDES.start() as i64..=*SCORED_SIDES.end() as i64,
         "pixels",
     );
-    let scene = match s.text("scene").parse() {
-        Ok(kind) => SceneChoice::BuiltIn(kind, pixels.unwrap_or(PIXELS) as usize),
-        Err(_) => {
-            if pixels.is_some() {
-                s.fault(
-                    "pixels",
-                    "an image has its own number of pixels",
-                    "leave it out, or name a built-in scene: chart, star, edge",
-                );
-            }
-            SceneChoice::File(s.file("scene"))
+    let scene = if let Ok(kind) = s.text("scene").parse() {
+        SceneChoice::BuiltIn(kind, pixels.unwrap_or(PIXELS) as usize)
+    } else {
+        if pixels.is_some() {
+            s.fault(
+                "pixels",
+                "an image has its own number of pixels",
+                "leave it out, or name a built-in scene: chart, star, edge",
+            );
         }
+        SceneChoice::File(s.file("scene"))
     };
     let nodes = s.optional_integer("nodes", 3..=65, "places");
     if nodes.is_some_and(|n| n % 2 == 0) {
@@ -134,7 +133,7 @@ pub struct TakenPicture {
 }
 
 impl PictureBench {
-    /// StudyBench with the camera and the scene that are named.
+    /// Bench with the camera and the scene that are named.
     ///
     /// # Errors
     /// If one of them cannot be read, or the scene is too small to be scored.

@@ -229,12 +229,11 @@ impl Plan {
             Ok(bank)
         };
         bench.take(design, &bank, progress)?;
-        match shared.get() {
-            Some(k) => self.cells.push(self.cells[k].clone()),
-            None => {
-                self.stacks += bench.stacks();
-                self.cells.push(name);
-            }
+        if let Some(k) = shared.get() {
+            self.cells.push(self.cells[k].clone());
+        } else {
+            self.stacks += bench.stacks();
+            self.cells.push(name);
         }
         progress.begin("timing the first draw", 1);
         let begun = Instant::now();

@@ -115,9 +115,12 @@ pub fn corpus() -> Vec<Vec<u8>> {
 /// A damaged file: records changed, and then in a CBLOCK or not; or a file changed as it is.
 pub fn mutant<R: Rng>(rng: &mut R, corpus: &[Vec<u8>]) -> Vec<u8> {
     let compressed = rng.random_range(0..4) == 0;
-    let file = |records: &[u8]| match compressed {
-        true => around(&block(records)),
-        false => around(records),
+    let file = |records: &[u8]| {
+        if compressed {
+            around(&block(records))
+        } else {
+            around(records)
+        }
     };
     if rng.random_range(0..4) == 0 {
         let whole: Vec<Vec<u8>> = corpus.iter().map(|records| file(records)).collect();

@@ -111,9 +111,10 @@ impl Photographs {
             let turn = random.random_range(1..3);
             order = std::array::from_fn(|c| (c + turn) % COLOURS);
         }
-        let light = match random.random_bool(DARKENED) {
-            true => random.random_range(DARKEST..1.0),
-            false => 1.0,
+        let light = if random.random_bool(DARKENED) {
+            random.random_range(DARKEST..1.0)
+        } else {
+            1.0
         };
         let last = piece - 1;
         let clean = Array3::from_shape_fn((piece, piece, COLOURS), |(y, x, c)| {

@@ -56,7 +56,7 @@ const GROWING: f64 = 300.0;
 const LOOK: u64 = 500;
 const KEEP: u64 = 250;
 /// Longest time between two states: what a process that is ended loses.
-const KEEP_TIME: Duration = Duration::from_secs(60);
+const KEEP_TIME: Duration = Duration::from_mins(1);
 /// Layers that are added to something begin with this share of their size.
 const ADDED: f32 = 0.1;
 

@@ -165,9 +165,10 @@ impl Stacks {
         }
         let (mut learnt, mut held_out) = (Vec::new(), Vec::new());
         for (i, stack) in stacks.into_iter().enumerate() {
-            match is_held_out(i) {
-                true => held_out.push(stack),
-                false => learnt.push(stack),
+            if is_held_out(i) {
+                held_out.push(stack);
+            } else {
+                learnt.push(stack);
             }
         }
         Ok(Self {

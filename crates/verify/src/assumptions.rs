@@ -205,17 +205,18 @@ fn polarised(
         shares("is not converted", |o| o.unconverted),
     ];
     let arriving = light.arriving_at(focused);
-    let (what, whose) = match arriving == focused.polarisation() {
-        true => (
+    let (what, whose) = if arriving == focused.polarisation() {
+        (
             "pillars convert it to the other handedness with twice their rotation as phase".into(),
             "light of the other handedness, half of unpolarised light, diverges; `polarisation` in [verify] states the light",
-        ),
-        false => (
+        )
+    } else {
+        (
             format!(
                 "pillars convert each handedness to the other with twice their rotation as phase, and focus light that arrives {hand} circularly polarised"
             ),
             "Strehl ratios and shares are of all light that arrives; the target focuses all of it",
-        ),
+        )
     };
     row(
         &format!("Light arrives {arriving}; {what}"),

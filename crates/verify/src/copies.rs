@@ -208,7 +208,7 @@ mod tests {
     /// Two lenses with x^2 + x^3 of which one is rotated: from 8 degrees along x the rotated one is the other from another side.
     #[test]
     fn a_rotated_lens_is_asked_for_its_own_light() {
-        let elements = r#"
+        let elements = r"
 [[element]]
 x_um = -80
 y_um = 0
@@ -220,7 +220,7 @@ rotation_deg = 90
 x_um = 0
 y_um = 120
 steering_x_deg = 0.000000001
-"#;
+";
         let term = "[[phase.term]]\nsource = \"polynomial\"\npowers_x = [2, 3]\npowers_y = [0, 0]\n\
                     coefficients_rad = [6.0, 5.0]\n\n[array]";
         let (design, array) = read(

@@ -9,9 +9,10 @@ pub(super) fn write(page: &mut Page, model: &ModelStatement) {
         "Pillars, apertures, light and sensor follow the calibrated model of {}: {}. {}",
         model.set,
         model.finding,
-        match model.applied.is_empty() {
-            true => "The model changes nothing that is simulated here.",
-            false => "The model adds these changes to the stated values, by the keys of the model file:",
+        if model.applied.is_empty() {
+            "The model changes nothing that is simulated here."
+        } else {
+            "The model adds these changes to the stated values, by the keys of the model file:"
         }
     ));
     if !model.applied.is_empty() {

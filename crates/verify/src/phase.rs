@@ -115,7 +115,7 @@ impl Sums {
     }
 }
 
-/// FoldedPropagator each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
+/// Fold each row on whatever thread; the caller adds the rows in order, so that sums do not depend on
 /// the number of threads.
 fn per_row<T: Send>(
     widths: &dyn PillarRows,

@@ -40,9 +40,10 @@ pub(super) fn channels(
 ) {
     page.paragraph(format!(
         "{}Camera: {}; illuminant: {}; pixels of {} um.",
-        match channels.iter().any(|c| c.spread_direction_deg.is_some()) {
-            true => "A wedge sends each wavelength to another place. ",
-            false => "",
+        if channels.iter().any(|c| c.spread_direction_deg.is_some()) {
+            "A wedge sends each wavelength to another place. "
+        } else {
+            ""
         },
         camera.name,
         camera.illuminant,

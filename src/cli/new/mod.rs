@@ -236,10 +236,7 @@ impl NewArgs {
             ("{verify}", cell.verify.clone()),
             (
                 "{mapping_limit}",
-                match self.is_for_colour() {
-                    true => "mapping_phase_rms_max_rad = 0.6   # the published polynomial errs by 0.57 rad rms against RCWA at 452 nm\n",
-                    false => "",
-                }
+                if self.is_for_colour() { "mapping_phase_rms_max_rad = 0.6   # the published polynomial errs by 0.57 rad rms against RCWA at 452 nm\n" } else { "" }
                 .to_owned(),
             ),
             ("{film_word}", cell.film_word.clone()),

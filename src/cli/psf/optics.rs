@@ -58,9 +58,10 @@ impl PsfArgs {
         );
         for layer in &cell.under {
             let height = exact(layer.height_nm);
-            words += &match layer.material == cell.pillar_material {
-                true => format!("; {height} nm of the film left between them"),
-                false => format!("; a spacer of {height} nm of {} below the film", layer.material),
+            words += &if layer.material == cell.pillar_material {
+                format!("; {height} nm of the film left between them")
+            } else {
+                format!("; a spacer of {height} nm of {} below the film", layer.material)
             };
         }
         words += &match &cell.ambient_material {
@@ -77,7 +78,7 @@ impl PsfArgs {
                 "pitch, as found",
                 match Self::lattice_kind(found) {
                     LatticeKind::Square => format!("{} nm", Self::pitch_nm(found)),
-                    kind => format!("{} nm, of a {kind} lattice", Self::pitch_nm(found)),
+                    kind @ LatticeKind::Hexagonal => format!("{} nm, of a {kind} lattice", Self::pitch_nm(found)),
                 },
             ),
             (

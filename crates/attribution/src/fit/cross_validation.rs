@@ -233,9 +233,10 @@ pub fn cluster_groups<M: Measurements>(problem: &FitProblem<'_, M>) -> Vec<Vec<M
             None => groups.push(vec![c]),
         }
     }
-    match groups.len() < LEAST_GROUPS {
-        true => counted().map(|c| vec![c]).collect(),
-        false => groups,
+    if groups.len() < LEAST_GROUPS {
+        counted().map(|c| vec![c]).collect()
+    } else {
+        groups
     }
 }
 

@@ -131,12 +131,13 @@ pub(crate) fn model_half_widths<M: Measurements>(
             // Numbers along two axes are of one effect: what the larger one errs by, the smaller one may.
             let sizes = problem.model.slots_of(effect).into_iter();
             let sizes = sizes.map(|s| fit.theta[s].abs() / slots[s].parameter.typical);
-            let value = match error.by_effect {
-                true => problem
+            let value = if error.by_effect {
+                problem
                     .model
                     .value_error(effect)
-                    .sigma(sizes.fold(0.0, f64::max) * parameter.typical, parameter.typical),
-                false => 0.0,
+                    .sigma(sizes.fold(0.0, f64::max) * parameter.typical, parameter.typical)
+            } else {
+                0.0
             };
             IntervalParts {
                 model: model.into_iter().map(|v: f64| SIGMAS_95 * v.sqrt()).collect(),

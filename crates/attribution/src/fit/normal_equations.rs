@@ -40,6 +40,7 @@ impl NormalEquations {
     }
 
     /// The forms over other columns: each new column is a combination of old ones, the columns of `mix`.
+    #[must_use]
     pub fn mixed(&self, mix: &DMatrix<f64>) -> Self {
         let mixed = |f: &DMatrix<f64>| mix.transpose() * f * mix;
         Self {

@@ -212,12 +212,13 @@ fn add_effects<M: Measurements>(
                 break;
             }
             history.pairs_tried_from_start |= history.chosen.is_empty();
-            let together = match history.chosen.len() + 2 <= MOST_EFFECTS {
-                true => match find_pair(now, &history.chosen, full, progress)? {
+            let together = if history.chosen.len() + 2 <= MOST_EFFECTS {
+                match find_pair(now, &history.chosen, full, progress)? {
                     None if full => follow_leaders_anew(now, &history.chosen, progress)?,
                     pair => pair,
-                },
-                false => None,
+                }
+            } else {
+                None
             };
             if let Some(found) = together {
                 for tried in &found.tried {

@@ -117,9 +117,10 @@ impl<M: Measurements> Surrogate<M> {
             let changes = change::<M>(&predictions, &base, 1.0 / term.step as f32);
             let kind = term.kind;
             let expanded = |changes| SmoothChange { kind, changes };
-            match term.by_group {
-                false => terms.push(expanded(changes.into_iter().map(Some).collect())),
-                true => terms.extend(by_group::<M>(&changes, &groups).map(expanded)),
+            if term.by_group {
+                terms.extend(by_group::<M>(&changes, &groups).map(expanded));
+            } else {
+                terms.push(expanded(changes.into_iter().map(Some).collect()));
             }
         }
         Ok(Self {
@@ -167,6 +168,7 @@ impl<M: Measurements> Surrogate<M> {
 
     /// The same, which knows what `other` simulated about its base, if all was simulated there; `known` are its parameters, by slot of
     /// this one.
+    #[must_use]
     pub fn knowing(self, other: &Self, known: &[Option<usize>]) -> Self {
         let curves = known
             .iter()
@@ -203,6 +205,7 @@ impl<M: Measurements> Surrogate<M> {
     }
 
     /// About the values at which smooth terms were simulated.
+    #[must_use]
     pub fn stated(&self) -> Self {
         self.stated
             .as_ref()

@@ -85,9 +85,10 @@ impl FineGrid {
                 let [rows, columns] = self.frame;
                 Array2::from_shape_fn((rows, columns), |(y, x)| {
                     let at = [y as i64 + self.first[0], x as i64 + self.first[1]];
-                    match at.iter().all(|v| (0..n).contains(v)) {
-                        true => whole[[at[0] as usize, at[1] as usize]],
-                        false => 0.0,
+                    if at.iter().all(|v| (0..n).contains(v)) {
+                        whole[[at[0] as usize, at[1] as usize]]
+                    } else {
+                        0.0
                     }
                 })
             })
@@ -220,9 +221,12 @@ fn half_of(view: &SceneView, step: f64) -> [usize; 2] {
 
 /// Between its pixels a plane changes linearly; beyond its border there is no light.
 fn sampled(plane: &Array2<f32>, view: &SceneView, half: [usize; 2], step: f64) -> Array2<f32> {
-    let at = |y: i64, x: i64| match y >= 0 && x >= 0 && y < view.rows as i64 && x < view.columns as i64 {
-        true => plane[[y as usize, x as usize]],
-        false => 0.0,
+    let at = |y: i64, x: i64| {
+        if y >= 0 && x >= 0 && y < view.rows as i64 && x < view.columns as i64 {
+            plane[[y as usize, x as usize]]
+        } else {
+            0.0
+        }
     };
     Array2::from_shape_fn((2 * half[0] + 1, 2 * half[1] + 1), |(i, j)| {
         let tangent = |k: usize, a: usize| (k as f64 - half[a] as f64) * step;

@@ -57,20 +57,21 @@ impl DiffuserSpec {
     /// If the lengths are not from 1 to 100 000 um, the opening not from 0.01 to 2, or the grain finer than 5 um.
     pub fn new(distance_um: f64, grain_um: f64, opening: f64) -> Result<Self> {
         let lengths = (1.0..=1e5).contains(&distance_um) && (5.0..=1e5).contains(&grain_um);
-        match lengths && (0.01..=2.0).contains(&opening) {
-            true => Ok(Self {
+        if lengths && (0.01..=2.0).contains(&opening) {
+            Ok(Self {
                 distance_um,
                 grain_um,
                 opening,
                 ..Self::standard()
-            }),
-            false => Err(Error::refused(
+            })
+        } else {
+            Err(Error::refused(
                 "diffusercam/geometry-out-of-range",
                 format!(
                     "the rough surface has a grain of {grain_um} um, a distance of {distance_um} um and an opening of {opening}: one is out of range"
                 ),
                 "give a distance from 1 to 100000 um, a grain from 5 to 100000 um and an opening from 0.01 to 2",
-            )),
+            ))
         }
     }
 }

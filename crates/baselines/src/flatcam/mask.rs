@@ -28,18 +28,19 @@ impl MaskSpec {
     /// # Errors
     /// If one of them is not from 1 to 100 000 um.
     pub fn new(feature_um: f64, distance_um: f64) -> Result<Self> {
-        match [feature_um, distance_um].iter().all(|um| (1.0..=1e5).contains(um)) {
-            true => Ok(Self {
+        if [feature_um, distance_um].iter().all(|um| (1.0..=1e5).contains(um)) {
+            Ok(Self {
                 feature_um,
                 distance_um,
-            }),
-            false => Err(Error::refused(
+            })
+        } else {
+            Err(Error::refused(
                 "flatcam/geometry-out-of-range",
                 format!(
                     "the mask has openings of {feature_um} um at a distance of {distance_um} um: one is out of range"
                 ),
                 "give lengths from 1 to 100000 um",
-            )),
+            ))
         }
     }
 
@@ -88,9 +89,10 @@ impl MaskSpec {
             };
             let kx = std::f64::consts::TAU * turns / (count as f64 * step_um);
             let kz2 = k * k - kx * kx;
-            *v *= match kz2 > 0.0 {
-                true => Complex64::from_polar(1.0 / count as f64, kz2.sqrt() * self.distance_um),
-                false => Complex64::ZERO,
+            *v *= if kz2 > 0.0 {
+                Complex64::from_polar(1.0 / count as f64, kz2.sqrt() * self.distance_um)
+            } else {
+                Complex64::ZERO
             };
         }
         planner.plan_fft_inverse(count).process(&mut field);

@@ -249,16 +249,16 @@ impl<'a> Bench<'a> {
     /// Images of the two radii of the source disc on the sensor (um).
     fn disc_um(&self, group: &FocusSeries, z: f64, perturbation: &Perturbation) -> [[f64; 2]; 2] {
         let radius = 0.5 * self.set.divergence_rad * (1.0 + perturbation.light.source_size);
-        let [x, y] = self.landing_um(group, z);
+        let [x, y] = Self::landing_um(group, z);
         [x.map(|v| v * radius), y.map(|v| v * radius)]
     }
 
     /// Shift of the image for a tilt of the incident light by one radian about each axis (um).
-    fn landing_um(&self, group: &FocusSeries, z: f64) -> [[f64; 2]; 2] {
+    fn landing_um(group: &FocusSeries, z: f64) -> [[f64; 2]; 2] {
         let [cx, cy] = group.centre_um;
         let r = (cx * cx + cy * cy + z * z).sqrt();
         let (sx, sy, sz) = (cx / r, cy / r, z / r);
-        // SensorIrradiance is z s / sz; sines of incidence change by the cosine of the angle on each axis.
+        // Light lands at z s / sz; sines of incidence change by the cosine of the angle on each axis.
         let [ax, ay] = group.aoi_rad.map(f64::cos);
         let cross = sx * sy / sz.powi(3);
         [
@@ -272,7 +272,7 @@ impl<'a> Bench<'a> {
         if !self.follows {
             return [0.0; 2];
         }
-        let [x, y] = self.landing_um(group, z);
+        let [x, y] = Self::landing_um(group, z);
         let [tx, ty] = perturbation.path.tilt_mrad.map(|t| t * 1e-3);
         [0, 1].map(|axis| x[axis] * tx + y[axis] * ty)
     }

@@ -77,7 +77,7 @@ impl Lenses {
         for (led, [centre_nm, fwhm_nm]) in set.leds.iter_mut().zip(LAMPS) {
             (led.centre_nm, led.fwhm_nm) = (centre_nm, fwhm_nm);
         }
-        for measurement in set.measurements.iter_mut() {
+        for measurement in &mut set.measurements {
             let nm = LAMPS[usize::from(measurement.led)][0];
             let arriving = measurement.aoi_rad[0].sin();
             let sine = if arriving == 0.0 {

@@ -79,6 +79,7 @@ impl RigorousCells {
 
     /// These cells with other orders, and no correction for upright pillars: for synthetic sets, which must not share
     /// the truncation error of the fits. Tapered walls take six layers, and fewer orders.
+    #[must_use]
     pub fn with_orders(mut self, fine: usize, leaning: usize) -> Self {
         (self.fine, self.coarse, self.leaning) = (fine, fine, leaning);
         self
@@ -213,16 +214,15 @@ impl RigorousCells {
             let bytes = fs::read(path).ok()?;
             PillarTable::from_bytes(&bytes, solver, wavelengths, count, self.first_nm(), STEP_NM)
         };
-        let table = match path.as_deref().and_then(load) {
-            Some(table) => table,
-            None => {
-                let table = make()?;
-                if let Some(path) = &path {
-                    // A cache that cannot be written costs time, not correctness.
-                    let _ = AtomicFile::write(path, &table.bytes(solver));
-                }
-                table
+        let table = if let Some(table) = path.as_deref().and_then(load) {
+            table
+        } else {
+            let table = make()?;
+            if let Some(path) = &path {
+                // A cache that cannot be written costs time, not correctness.
+                let _ = AtomicFile::write(path, &table.bytes(solver));
             }
+            table
         };
         let table = Arc::new(table);
         self.made

@@ -29,6 +29,7 @@ impl Nuisances {
 
     /// Fit to the measurements in `used`, starting from here. The registration of other measurements is fitted too, but
     /// they do not affect what is shared.
+    #[must_use]
     pub fn fit(&self, data: &Data, images: &PerMeasurement<PixelGrid>, used: &PerMeasurement<bool>) -> Self {
         let mut now = self.clone();
         let shared = data.leds + 1;

@@ -54,9 +54,10 @@ impl Diagnosis {
         let unexplained_share = unexplained_share(&error, finding);
         let may_be_left = may_leave(&evidence.problem(simulator), &finding.after);
         let verdict = verdict(&error, finding, (unexplained_share, may_be_left));
-        let patterns = match verdict.leaves_a_residual() {
-            true => evidence.patterns(simulator),
-            false => &[],
+        let patterns = if verdict.leaves_a_residual() {
+            evidence.patterns(simulator)
+        } else {
+            &[]
         };
         let ranked = |step: usize, tried: &[TriedEffect]| -> Vec<Ranked> {
             let of_step = tried.iter().map(|t| Ranked::new(simulator, finding, t, step));

@@ -84,9 +84,10 @@ impl FreePattern {
         let slot = simulator.slots[pattern.slot];
         let effect = &simulator.effects[slot.effect];
         // Some effects report another number than the one that is fitted.
-        let unit = match effect.value(1.0, set) == 1.0 {
-            true => effect.unit(),
-            false => "of its parameter",
+        let unit = if effect.value(1.0, set) == 1.0 {
+            effect.unit()
+        } else {
+            "of its parameter"
         };
         let values = pattern.groups.iter().zip(&pattern.values);
         let mut out = Self {
@@ -131,9 +132,10 @@ impl FreePattern {
             degrees_of_freedom: trend.degrees_of_freedom,
             means: gradient.filter(|_| trend.is_linear).map(str::to_owned),
             remark: (trend.degrees_of_freedom == 0).then(|| {
-                match by == Grouping::Element && self.quantity == "defocus" {
-                    true => untold_tilt(self.values.len()),
-                    false => untold(self.values.len(), &self.by, "a slope", "its own value"),
+                if by == Grouping::Element && self.quantity == "defocus" {
+                    untold_tilt(self.values.len())
+                } else {
+                    untold(self.values.len(), &self.by, "a slope", "its own value")
                 }
             }),
         }
@@ -171,19 +173,20 @@ impl PatternTrend {
         };
         let slopes: Vec<String> = self.slopes.iter().map(slope).collect();
         let [middle, sigma] = self.at_middle;
-        let mut text = match self.is_linear {
-            true => format!(
+        let mut text = if self.is_linear {
+            format!(
                 " It is linear in the {}: {}, {} +- {} {unit} in the middle.",
                 self.of,
                 slopes.join(" and "),
                 sig(middle, 3),
                 sig(sigma, 1)
-            ),
-            false => format!(
+            )
+        } else {
+            format!(
                 " It is not linear in the {}: the farthest value is {} {unit} off.",
                 self.of,
                 sig(self.off, 3)
-            ),
+            )
         };
         if let Some(means) = &self.means {
             text.push_str(&format!(" That is {means}."));

@@ -40,7 +40,7 @@ impl Effect for Aberration {
         self.name.into()
     }
 
-    fn unit(&self) -> &str {
+    fn unit(&self) -> &'static str {
         "nm"
     }
 

@@ -147,17 +147,16 @@ fn declared(s: &Section<'_, '_>) -> DeclaredEffect {
         .filter(|(_, q)| stage_word(*q) == stage)
         .map(|(key, _)| *key)
         .collect();
-    let (key, quantity) = match keys.as_slice() {
-        [(key, quantity)] => (*key, *quantity),
-        _ => {
-            let what = format!("an effect has one expression, this one has {}", keys.len());
-            s.fault(
-                "name",
-                what,
-                format!("for the stage `{stage}`, give {}", own.join(" or ")),
-            );
-            keys.first().map_or(("opd_nm", DeclaredQuantity::OpdNm), |k| **k)
-        }
+    let (key, quantity) = if let [(key, quantity)] = keys.as_slice() {
+        (*key, *quantity)
+    } else {
+        let what = format!("an effect has one expression, this one has {}", keys.len());
+        s.fault(
+            "name",
+            what,
+            format!("for the stage `{stage}`, give {}", own.join(" or ")),
+        );
+        keys.first().map_or(("opd_nm", DeclaredQuantity::OpdNm), |k| **k)
     };
     if !keys.is_empty() && stage_word(quantity) != stage {
         s.fault(
@@ -270,10 +269,7 @@ fn does_something(term: &CompiledTerm) -> Option<(String, String)> {
         }
         let used = variables.iter().zip(&values).filter(|(name, _)| term.uses(name));
         let place: Vec<String> = used.map(|(name, v)| format!("{name} = {}", sig(*v, 4))).collect();
-        let at = match place.is_empty() {
-            true => String::new(),
-            false => format!(" at {}", place.join(", ")),
-        };
+        let at = if place.is_empty() { String::new() } else { format!(" at {}", place.join(", ")) };
         Some((
             format!("with all parameters at their `start` the expression is {}{at}, not {nothing}", sig(value, 4)),
             format!(

@@ -16,7 +16,7 @@ impl Effect for LedCentre {
         self.name.clone()
     }
 
-    fn unit(&self) -> &str {
+    fn unit(&self) -> &'static str {
         "nm"
     }
 

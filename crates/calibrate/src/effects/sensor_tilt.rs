@@ -35,7 +35,7 @@ impl Effect for SensorTilt {
         }
     }
 
-    fn unit(&self) -> &str {
+    fn unit(&self) -> &'static str {
         "mrad"
     }
 

@@ -47,7 +47,7 @@ impl Effect for StitchedFields {
         Self::NAMES[self.axis].into()
     }
 
-    fn unit(&self) -> &str {
+    fn unit(&self) -> &'static str {
         "nm, nm, um"
     }
 

@@ -39,9 +39,12 @@ pub fn boundary_of_fields(
     let first = best_of([PLACES.to_vec(), PLACES.to_vec()], (session, problem, fit), progress)?;
     let about = first.map(|(_, place)| NEARER.map(|step| place + step).to_vec());
     let nearer = best_of(about, (session, problem, fit), progress)?;
-    let better = |axis: usize| match nearer[axis].0 < first[axis].0 {
-        true => nearer[axis],
-        false => first[axis],
+    let better = |axis: usize| {
+        if nearer[axis].0 < first[axis].0 {
+            nearer[axis]
+        } else {
+            first[axis]
+        }
     };
     let best = [0, 1].map(better);
     let left = best[0].0.min(best[1].0);

@@ -179,9 +179,10 @@ pub(crate) fn at_random(effects: &[&dyn Effect], count: u64, seed: u64) -> Vec<S
                 continue;
             }
             is_solved |= own;
-            let size = match own {
-                true => SIZES[rng.random_range(0..SIZES.len())],
-                false => least * (most / least).powf(rng.random()),
+            let size = if own {
+                SIZES[rng.random_range(0..SIZES.len())]
+            } else {
+                least * (most / least).powf(rng.random())
             };
             if parts.is_empty() {
                 first = size;

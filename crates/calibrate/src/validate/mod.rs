@@ -217,9 +217,10 @@ pub fn validate(
     let mut trials = work
         .into_par_iter()
         .map(|(exposed, mut trial, parts)| {
-            let set = match plan.noiseless {
-                true => synthesizer.draw_noiseless(exposed, trial.seed),
-                false => synthesizer.draw(exposed, trial.seed),
+            let set = if plan.noiseless {
+                synthesizer.draw_noiseless(exposed, trial.seed)
+            } else {
+                synthesizer.draw(exposed, trial.seed)
             };
             let own = Session::new(&set, settings.clone())?;
             if plan.noiseless {

@@ -19,9 +19,10 @@ impl ValidationTrial {
         let place = |name: &String| simulator.effects.iter().position(|e| e.name() == *name);
         let own: Vec<usize> = parts.iter().filter_map(|(name, _)| place(name)).collect();
         // Of a chip without effect each effect by itself: it is found as what the stated cell errs by.
-        let fits: Vec<Vec<usize>> = match own.is_empty() {
-            true => (0..simulator.effects.len()).map(|effect| vec![effect]).collect(),
-            false => vec![own],
+        let fits: Vec<Vec<usize>> = if own.is_empty() {
+            (0..simulator.effects.len()).map(|effect| vec![effect]).collect()
+        } else {
+            vec![own]
         };
         self.verdict = SetVerdict::Explained;
         self.named = !parts.is_empty();

@@ -27,9 +27,10 @@ pub(super) fn judge(
     let half_um = lens.lattice().sites() as f64 * lens.lattice().steps_um()[0] / 2.0;
     let grid = SiteGrid::of(stack);
     let wedge_sines = [wedge.sin_x, wedge.sin_y];
-    let directions = match grid.is_square() {
-        true => RealRow::directions(wedge_sines),
-        false => RealRow::axes(wedge_sines),
+    let directions = if grid.is_square() {
+        RealRow::directions(wedge_sines)
+    } else {
+        RealRow::axes(wedge_sines)
     };
     let rows = ElementRow::of_element(
         grid,

@@ -22,10 +22,7 @@ const COARSE_OF_HEXAGONAL: usize = 3;
 
 /// Highest order of a single cell that supercells keep along each axis on such a lattice.
 pub(crate) fn coarse(grid: SiteGrid) -> usize {
-    match grid.is_square() {
-        true => COARSE,
-        false => COARSE_OF_HEXAGONAL,
-    }
+    if grid.is_square() { COARSE } else { COARSE_OF_HEXAGONAL }
 }
 
 /// Orders along an axis of the single cells that coarse ones are compared with. Their error is about 0.005 rad.

@@ -264,7 +264,7 @@ mod tests {
         {
             let t = [0, 1].map(|pol| {
                 let each = cell.widths_nm.iter().enumerate();
-                each.map(|(i, w)| Complex64::cis(w * (0.02 + 0.01 * pol as f64) + i as f64))
+                each.map(|(i, w)| Complex64::cis(w * (0.02 + 0.01 * f64::from(pol)) + i as f64))
                     .collect()
             });
             all.extend(samples(SiteGrid::SQUARE, number, cell, &t));

@@ -181,9 +181,10 @@ impl RealRow {
 
     /// Pillars at either end that do not count, where the row does not repeat.
     fn ends(&self, grid: SiteGrid) -> usize {
-        match self.direction[1] == 0 && !grid.is_square() {
-            true => ENDS_OF_HALVES,
-            false => ENDS,
+        if self.direction[1] == 0 && !grid.is_square() {
+            ENDS_OF_HALVES
+        } else {
+            ENDS
         }
     }
 

@@ -166,9 +166,10 @@ impl UprightCell {
         if let Some(solved) = known().get(&key) {
             return Ok(Arc::clone(solved));
         }
-        let solved = Arc::new(match of_band {
-            true => self.solve(wavelength_um, Orders::new(BAND_ORDERS)?, &Silent)?,
-            false => self.along(wavelength_um, progress)?,
+        let solved = Arc::new(if of_band {
+            self.solve(wavelength_um, Orders::new(BAND_ORDERS)?, &Silent)?
+        } else {
+            self.along(wavelength_um, progress)?
         });
         known().insert(key, Arc::clone(&solved));
         Ok(solved)
@@ -187,7 +188,7 @@ impl UprightCell {
     }
 
     /// Table of light along one axis, up to a number.
-    fn table(&self, of: &Along, axis: PolarisationAxis, last: u16) -> Vec<Complex64> {
+    fn table(of: &Along, axis: PolarisationAxis, last: u16) -> Vec<Complex64> {
         let own = &of[axis.index()];
         let at = |number: u16| own.get(usize::from(number)).copied().unwrap_or(Complex64::ZERO);
         (0..=last).map(at).collect()
@@ -197,7 +198,7 @@ impl UprightCell {
         let solved = self.solved(wavelength_um, of_band, progress)?;
         Ok(PolarisedTables::Axes(AxisTables {
             focused: self.focused,
-            along: PolarisationAxis::ALL.map(|axis| self.table(&solved, axis, last)),
+            along: PolarisationAxis::ALL.map(|axis| Self::table(&solved, axis, last)),
         }))
     }
 }

@@ -55,17 +55,16 @@ impl CellModel for Solved {
         let wavelength_um = light.wavelength_um;
         // Even widths from 100 to 300 nm; what is narrower or odd is not looked at below.
         let mut known = self.1.lock().unwrap();
-        let t = match known.get(&wavelength_um.to_bits()) {
-            Some(t) => t,
-            None => {
-                let widths: Vec<f64> = (100..=300).step_by(2).map(f64::from).collect();
-                let solved = self.0.transmissions(&widths, &[wavelength_um], Orders::new(13)?)?;
-                let mut t = vec![Complex64::ZERO; 301];
-                for (width, value) in widths.iter().zip(&solved) {
-                    t[*width as usize] = *value;
-                }
-                known.entry(wavelength_um.to_bits()).or_insert(t)
+        let t = if let Some(t) = known.get(&wavelength_um.to_bits()) {
+            t
+        } else {
+            let widths: Vec<f64> = (100..=300).step_by(2).map(f64::from).collect();
+            let solved = self.0.transmissions(&widths, &[wavelength_um], Orders::new(13)?)?;
+            let mut t = vec![Complex64::ZERO; 301];
+            for (width, value) in widths.iter().zip(&solved) {
+                t[*width as usize] = *value;
             }
+            known.entry(wavelength_um.to_bits()).or_insert(t)
         };
         Ok(CellResponse::Scalar(t[..=usize::from(widest_nm)].to_vec()))
     }

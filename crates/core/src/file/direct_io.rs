@@ -179,6 +179,9 @@ impl Ahead {
     /// The block that holds `place`, where it begins, and how many bytes of it are there: fewer than there is
     /// room for at the end of the file only. `done` is the block before, if any, which is filled anew once
     /// `keep` has taken from it what it needs.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
     pub fn next(
         &mut self,
         place: u64,

@@ -91,13 +91,7 @@ impl ComputedWidths {
         SymmetryGroup::of_those(|s| s.keeps(shape) && self.maps(s, self))
     }
 
-    fn fill<'r>(
-        &self,
-        iy: usize,
-        columns: Range<usize>,
-        room: &'r mut Vec<u16>,
-        width: impl Fn(usize, usize) -> u16,
-    ) -> &'r [u16] {
+    fn fill(iy: usize, columns: Range<usize>, room: &mut Vec<u16>, width: impl Fn(usize, usize) -> u16) -> &[u16] {
         room.clear();
         room.extend(columns.map(|ix| width(ix, iy)));
         room
@@ -117,12 +111,12 @@ impl PillarRows for ComputedWidths {
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         let (phase, along_y) = (self.phase(), self.phase_along_y());
         let width = |ix, iy| self.rule.pillar(&phase, along_y.as_ref(), ix, iy);
-        self.fill(iy, columns, room, width)
+        Self::fill(iy, columns, room, width)
     }
 
     fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         let phase = self.phase();
-        self.fill(iy, columns, room, |ix, iy| u16::from(phase.holds(ix, iy)))
+        Self::fill(iy, columns, room, |ix, iy| u16::from(phase.holds(ix, iy)))
     }
 }
 

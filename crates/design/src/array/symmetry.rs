@@ -97,6 +97,7 @@ impl Symmetry {
     }
 
     /// Inverse of this symmetry: a mirror undoes itself, however it is turned.
+    #[must_use]
     pub fn inverse(self) -> Self {
         Self {
             quarter_turns: if self.mirrored {
@@ -109,6 +110,7 @@ impl Symmetry {
     }
 
     /// This symmetry after another one.
+    #[must_use]
     pub fn after(self, first: Self) -> Self {
         let turns = if self.mirrored {
             4 - first.quarter_turns

@@ -22,9 +22,10 @@ impl OpenAreas {
         let lens_um2 = shared.open_um2();
         let of_element = |element: &Element| {
             let phase = ElementPhase::of(&lens, element);
-            match phase.is_of_lens(&shared) {
-                true => lens_um2,
-                false => phase.open_um2(),
+            if phase.is_of_lens(&shared) {
+                lens_um2
+            } else {
+                phase.open_um2()
             }
         };
         Self {

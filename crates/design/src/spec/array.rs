@@ -91,9 +91,10 @@ impl ArraySpec {
         mapping_um: f64,
         placed: &[Section<'_, '_>],
     ) -> Self {
-        let default_um = match cell.is_of_the_paper() {
-            true => PAPER_WEDGE_NM * 1e-3,
-            false => lens.focused_um().unwrap_or(mapping_um),
+        let default_um = if cell.is_of_the_paper() {
+            PAPER_WEDGE_NM * 1e-3
+        } else {
+            lens.focused_um().unwrap_or(mapping_um)
         };
         let wedge_wavelength_um = s
             .optional_float("wedge_wavelength_nm", WAVELENGTH)
@@ -145,9 +146,10 @@ impl ArraySpec {
                 &["lens.diameter_um", "cell.pitch_nm", "array.elements"],
                 "spacing_um",
                 "neighbouring lenses overlap, or the boxes about their pillars do",
-                match x == y {
-                    true => format!("use at least {} um: the lens with its lattice", um(x)),
-                    false => format!("use at least [{}, {}] um: the lens with its lattice", um(x), um(y)),
+                if x == y {
+                    format!("use at least {} um: the lens with its lattice", um(x))
+                } else {
+                    format!("use at least [{}, {}] um: the lens with its lattice", um(x), um(y))
                 },
             );
         }

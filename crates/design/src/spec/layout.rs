@@ -144,8 +144,8 @@ impl LayoutSpec {
         let marks = marks.collect();
         Self {
             hierarchy,
-            timestamp,
             circle_chord_error_nm,
+            timestamp,
             layers,
             apertures,
             chip,
@@ -345,9 +345,10 @@ impl MarkSpec {
                     beside(element.centre_nm.0, at.0, x),
                     beside(element.centre_nm.1, at.1, y),
                 ];
-                match is_round {
-                    true => off[0].hypot(off[1]) < reach[0] as f64,
-                    false => off[0] < reach[0] as f64 && off[1] < reach[1] as f64,
+                if is_round {
+                    off[0].hypot(off[1]) < reach[0] as f64
+                } else {
+                    off[0] < reach[0] as f64 && off[1] < reach[1] as f64
                 }
             })
         };

@@ -73,9 +73,10 @@ impl LensSpec {
         if phase.is_none() && !sized && !s.has("focal_length_um") {
             return None;
         }
-        let (diameter_nm, outline) = match sized {
-            true => outline::read(s, cell),
-            false => (shared.diameter_nm, shared.outline.clone()),
+        let (diameter_nm, outline) = if sized {
+            outline::read(s, cell)
+        } else {
+            (shared.diameter_nm, shared.outline.clone())
         };
         let mut own = Self {
             diameter_nm,

@@ -150,9 +150,10 @@ impl MappingSpec {
             s.fault(
                 "coefficients",
                 "a mapping of no coefficients gives no width",
-                match cell.is_of_the_paper() {
-                    true => "list those of u^0, u^1, ..., or leave `coefficients` out for the published ones",
-                    false => "list those of u^0, u^1, ...",
+                if cell.is_of_the_paper() {
+                    "list those of u^0, u^1, ..., or leave `coefficients` out for the published ones"
+                } else {
+                    "list those of u^0, u^1, ..."
                 },
             );
         }
@@ -244,9 +245,10 @@ impl MappingSpec {
                 Vec::new()
             },
         };
-        let identity = match from_cells {
-            true => MappingIdentity::of_this_cell(),
-            false => MappingIdentity::read(s, cell, &polynomial, library),
+        let identity = if from_cells {
+            MappingIdentity::of_this_cell()
+        } else {
+            MappingIdentity::read(s, cell, &polynomial, library)
         };
         s.finish();
         Self {
@@ -290,7 +292,7 @@ impl MappingSpec {
                 (Ok(read), _) => self.pillar_library = Some(Arc::new(read)),
                 (Err(error), LibraryFile::Needed) => return Err(error),
                 (Err(error), LibraryFile::ToBeMade) if file.exists() => {
-                    self.pillar_library_refused = Some(error.to_string())
+                    self.pillar_library_refused = Some(error.to_string());
                 }
                 (Err(_), LibraryFile::ToBeMade) => {}
             }

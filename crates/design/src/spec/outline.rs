@@ -146,6 +146,7 @@ impl LensOutline {
     }
 
     /// The outline turned from x towards y about the middle; exact for quarter turns.
+    #[must_use]
     pub fn rotated(&self, deg: f64) -> Self {
         let rotation = crate::phase::Rotation::of_deg(deg);
         let turn = |&(x, y): &(i64, i64)| {

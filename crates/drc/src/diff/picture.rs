@@ -65,13 +65,12 @@ fn shapes(diff: &LayoutDiff) -> metalith_report::Figure {
     let close = |b: &[f64; 4]| (b[0] - near[0]).abs() < SPAN_NM && (b[1] - near[1]).abs() < SPAN_NM;
     let mut drawn = 0;
     for c in diff.listed.iter().filter(|c| close(&c.bounds_nm)).take(DRAWN) {
-        let layer = match layers.iter().find(|(what, _)| *what == c.what) {
-            Some((_, layer)) => *layer,
-            None => {
-                let layer = plan.layer(c.what);
-                layers.push((c.what, layer));
-                layer
-            }
+        let layer = if let Some((_, layer)) = layers.iter().find(|(what, _)| *what == c.what) {
+            *layer
+        } else {
+            let layer = plan.layer(c.what);
+            layers.push((c.what, layer));
+            layer
         };
         let b = c.bounds_nm.map(|v| v * 1e-3);
         plan.rectangle(layer, (b[0], b[1]), (b[2], b[3]));

@@ -49,17 +49,20 @@ impl Sweep {
         let sides: Vec<SweepEdge> = ring
             .windows(2)
             .filter(|s| s[0] != s[1])
-            .map(|s| match s[0] < s[1] {
-                true => SweepEdge {
-                    left: s[0],
-                    right: s[1],
-                    turn: 1,
-                },
-                false => SweepEdge {
-                    left: s[1],
-                    right: s[0],
-                    turn: -1,
-                },
+            .map(|s| {
+                if s[0] < s[1] {
+                    SweepEdge {
+                        left: s[0],
+                        right: s[1],
+                        turn: 1,
+                    }
+                } else {
+                    SweepEdge {
+                        left: s[1],
+                        right: s[0],
+                        turn: -1,
+                    }
+                }
             })
             .collect();
         let n = sides.len();

@@ -193,10 +193,10 @@ type Outline = (&'static str, fn(&mut Gds));
 /// the marks of the deck.
 const OUTLINES: &[Outline] = &[
     ("outline.doubled_vertex", |g| {
-        mark(g, &[(0, 0), (0, 0), (40, 0), (40, 30), (0, 30), (0, 0)])
+        mark(g, &[(0, 0), (0, 0), (40, 0), (40, 30), (0, 30), (0, 0)]);
     }),
     ("outline.self_crossing", |g| {
-        mark(g, &[(0, 0), (30, 0), (30, 40), (40, 40), (40, 5), (0, 5), (0, 0)])
+        mark(g, &[(0, 0), (30, 0), (30, 40), (40, 40), (40, 5), (0, 5), (0, 0)]);
     }),
     ("outline.acute", |g| mark(g, &[(0, 0), (40, 0), (0, 40), (0, 0)])),
     ("outline.vertices", |g| {

@@ -95,7 +95,7 @@ fn rules_see_the_edges_of_upright_rectangles() {
         gds.polygon(1, &[&points[..], &points[..1]].concat());
     };
     let edges = |column: i32, row: i32| match (column, row) {
-        (5, 5) | (6, 5) => [260, 100],
+        (5 | 6, 5) => [260, 100],
         _ => [100 + 20 * (column * 5 % 7) as u16, 120 + 20 * (row * 3 % 6) as u16],
     };
     let found = |rules: &[(&str, &str)]| {

@@ -69,6 +69,9 @@ pub struct Discovered {
 
 /// Find the elements of a layout whose pillars are on these layers, each with the ends of its pillars: see
 /// [`ElementSite::widen`].
+///
+/// # Errors
+/// If there is no element on these layers or there are too many, or if the layout cannot be read.
 pub fn discover(
     layout: &Layout,
     from: &Selection,
@@ -156,10 +159,13 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     let places = match rectangles {
         None => map.pillars,
         // All of them are at their places already.
-        Some(found) if map.sizes.all_are(&found, squares) => match found.with_squares {
-            false => map.tilted,
-            true => map.tilted.united(map.pillars),
-        },
+        Some(found) if map.sizes.all_are(&found, squares) => {
+            if found.with_squares {
+                map.tilted.united(map.pillars)
+            } else {
+                map.tilted
+            }
+        }
         Some(_) => {
             let mut search = Search {
                 scale,
@@ -239,9 +245,12 @@ impl Visitor for Map {
             placements.iter().map(each).fold(None, Option::or)
         };
         if let Some(around) = around {
-            let centre = |placement: &Transform| match placement.is_square() {
-                true => Centre::of(&placement.apply_rect(&around)?, scale),
-                false => Centre::of(&Rect::around(&shape.outline.placed(placement)), scale),
+            let centre = |placement: &Transform| {
+                if placement.is_square() {
+                    Centre::of(&placement.apply_rect(&around)?, scale)
+                } else {
+                    Centre::of(&Rect::around(&shape.outline.placed(placement)), scale)
+                }
             };
             self.tilted.add(placements, centre);
             return Ok(());

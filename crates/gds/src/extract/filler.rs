@@ -247,6 +247,9 @@ impl Filler {
 
     /// Variant of [`Filler::put`] for a pillar that its corners may identify: `takes` is called for pillars that their
     /// width identifies.
+    ///
+    /// # Errors
+    /// As [`Filler::put`].
     pub fn put_drawn(
         &mut self,
         pillar: &DrawnPillar,
@@ -293,7 +296,10 @@ impl Filler {
     }
 
     /// Put an upright rectangle of the layout on its site if `takes` its width in database units, and say
-    /// whether it was taken, or why it has no site.
+    /// whether it was taken.
+    ///
+    /// # Errors
+    /// The reason why it has no site.
     #[inline]
     pub fn put(&mut self, r: &Rect, placement: usize, takes: impl Fn(i64) -> bool) -> Result<bool, Why> {
         let mut guess = self.guesses[placement];

@@ -16,6 +16,10 @@ pub struct Scale {
 const REACH: i64 = 1 << 40;
 
 impl Scale {
+    /// Scale of the database unit of a layout.
+    ///
+    /// # Errors
+    /// If the unit is no ratio of whole numbers to a nanometre, as with units of an inch.
     pub fn of(layout: &Layout) -> Result<Self> {
         let (num, den) = layout.unit_ratio_nm()?;
         Ok(Self { num, den })

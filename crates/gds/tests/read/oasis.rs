@@ -40,9 +40,10 @@ fn file(cells: &[(&str, &[u8])], in_one_block: bool) -> Vec<u8> {
         records.extend(name.bytes());
         records.extend_from_slice(bytes);
     }
-    match in_one_block {
-        true => oasis::around(&oasis::block(&records)),
-        false => oasis::around(&records),
+    if in_one_block {
+        oasis::around(&oasis::block(&records))
+    } else {
+        oasis::around(&records)
     }
 }
 

@@ -174,9 +174,10 @@ pub(super) fn stack(page: &mut Page, c: &Contents<'_>) {
         p.transfer.mask_thickness_nm.to_string().into(),
         "on the pillars until it is stripped".into(),
     ]);
-    let (film, becomes) = match design.cell.pillar_material == design.cell.substrate_material {
-        true => ("pillars", "etched into the substrate"),
-        false => ("film", "becomes the pillars"),
+    let (film, becomes) = if design.cell.pillar_material == design.cell.substrate_material {
+        ("pillars", "etched into the substrate")
+    } else {
+        ("film", "becomes the pillars")
     };
     table.row([
         film.into(),
@@ -187,9 +188,10 @@ pub(super) fn stack(page: &mut Page, c: &Contents<'_>) {
     // From above: what the etch left of the film first.
     for layer in design.cell.under.iter().rev() {
         let residual = layer.material == design.cell.pillar_material;
-        let (name, note) = match residual {
-            true => ("residual film", "the etch stops before its end"),
-            false => ("spacer", "under the film; not etched"),
+        let (name, note) = if residual {
+            ("residual film", "the etch stops before its end")
+        } else {
+            ("spacer", "under the film; not etched")
         };
         table.row([
             name.into(),

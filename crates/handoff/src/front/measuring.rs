@@ -63,8 +63,8 @@ pub(super) fn metrology(page: &mut Page, c: &Contents<'_>) {
             s.place.as_str().into(),
             Cell::fixed(s.x_um, 3),
             Cell::fixed(s.y_um, 3),
-            s.element_x_um.map(|x| Cell::fixed(x, 3)).unwrap_or(Cell::none()),
-            s.element_y_um.map(|y| Cell::fixed(y, 3)).unwrap_or(Cell::none()),
+            s.element_x_um.map_or(Cell::none(), |x| Cell::fixed(x, 3)),
+            s.element_y_um.map_or(Cell::none(), |y| Cell::fixed(y, 3)),
             u64::from(s.drawn.width_nm).into(),
         ];
         cells.extend(s.drawn.length_nm.map(|nm| Cell::from(u64::from(nm))));

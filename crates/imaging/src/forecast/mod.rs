@@ -49,9 +49,10 @@ impl Exposed {
     /// Variance of the noise of a scene that is so many times as bright, over that of the random scene.
     fn against(&self, brighter: f64) -> f64 {
         let own = self.noise.variance(self.signal);
-        match own > 0.0 {
-            true => self.noise.variance(self.signal * brighter) / own,
-            false => 1.0,
+        if own > 0.0 {
+            self.noise.variance(self.signal * brighter) / own
+        } else {
+            1.0
         }
     }
 }

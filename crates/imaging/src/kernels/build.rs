@@ -199,9 +199,10 @@ impl Builder<'_> {
             samples: side * within,
             distance_um: view.distance_um(landing),
         };
-        let accuracy = match self.spec.accurate || lit.radius_um() < SMALL_UM {
-            true => Accuracy::Accurate,
-            false => Accuracy::Fast,
+        let accuracy = if self.spec.accurate || lit.radius_um() < SMALL_UM {
+            Accuracy::Accurate
+        } else {
+            Accuracy::Fast
         };
         let psf = lit.psf(window, accuracy, &[], scratch)?;
         let share = window.step_um.powi(2) / self.light.arriving_um2(wavelength);

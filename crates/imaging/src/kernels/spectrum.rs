@@ -275,7 +275,7 @@ mod tests {
                 .iter()
                 .map(|p| {
                     let points = (0..400).map(|k| {
-                        let (a, b) = ((k % 20) as f64, (k / 20) as f64);
+                        let (a, b) = (f64::from(k % 20), f64::from(k / 20));
                         gauss(
                             x + (a + 0.5) / 20.0 - 0.5 - p.offset[0],
                             y + (b + 0.5) / 20.0 - 0.5 - p.offset[1],

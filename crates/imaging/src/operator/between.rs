@@ -37,13 +37,14 @@ impl BetweenNodes {
             Self::Linear => hat(place[a] - node[a] as f32),
             Self::Sixfold => {
                 let about = self.nodes_about(place[a], n);
-                match about.contains(&node[a]) {
-                    true => lagrange(
+                if about.contains(&node[a]) {
+                    lagrange(
                         node[a] - about.start,
                         about.len(),
                         f64::from(place[a]) - about.start as f64,
-                    ) as f32,
-                    false => 0.0,
+                    ) as f32
+                } else {
+                    0.0
                 }
             }
         };

@@ -160,7 +160,7 @@ impl<'a> ElementOperator<'a> {
     }
 
     /// Light that is cut out of the sampled light for a node: weights of its inputs, at one of their points.
-    pub(super) fn lights(&self, node: &NodePlan, inputs: usize, points: usize) -> Vec<Light> {
+    pub(super) fn lights(node: &NodePlan, inputs: usize, points: usize) -> Vec<Light> {
         if !node.kernels.is_empty() {
             let all = node.kernels.mixtures().iter();
             return all
@@ -227,9 +227,10 @@ pub(super) struct Light {
 impl NodePlan {
     /// Weights over its rectangle for light of a warp: those that are kept, or made now.
     pub(crate) fn weights(&self, warp: &Warp, source: &KernelSource<'_>) -> Cow<'_, [f32]> {
-        match self.weights.is_empty() {
-            true => Cow::Owned(self.weights_of(warp, source.between, source.spec.nodes)),
-            false => Cow::Borrowed(&self.weights),
+        if self.weights.is_empty() {
+            Cow::Owned(self.weights_of(warp, source.between, source.spec.nodes))
+        } else {
+            Cow::Borrowed(&self.weights)
         }
     }
 

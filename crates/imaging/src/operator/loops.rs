@@ -28,9 +28,10 @@ impl<const CONJUGATE: bool> WithSimd for Products<'_, CONJUGATE> {
         let (first, a) = S::as_simd_c32s(self.a);
         let (second, b) = S::as_simd_c32s(self.b);
         for ((s, a), b) in sums.iter_mut().zip(first).zip(second) {
-            *s = match CONJUGATE {
-                true => simd.conj_mul_add_e_c32s(*b, *a, *s),
-                false => simd.mul_add_e_c32s(*a, *b, *s),
+            *s = if CONJUGATE {
+                simd.conj_mul_add_e_c32s(*b, *a, *s)
+            } else {
+                simd.mul_add_e_c32s(*a, *b, *s)
             };
         }
         for ((s, a), b) in sum.iter_mut().zip(a).zip(b) {

@@ -47,7 +47,7 @@ impl ElementOperator<'_> {
                 let [cut, spread] = rectangles(node, warps[0].shape[1], reach);
                 let mut weights: Vec<Option<Cow<'_, [f32]>>> = vec![None; warps.len()];
                 let mut lit = false;
-                for (k, light) in self.lights(node, inputs.len(), warps.len()).iter().enumerate() {
+                for (k, light) in Self::lights(node, inputs.len(), warps.len()).iter().enumerate() {
                     let own = sampled[light.point].iter().zip(&light.weights);
                     let own = own.filter(|(image, weight)| **weight != 0.0 && cut.is_lit(image));
                     let own: Vec<(&[f32], f32)> = own.map(|(image, weight)| (&image[..], *weight)).collect();
@@ -115,7 +115,7 @@ impl ElementOperator<'_> {
                     spread.copy(image, &mut square, size);
                     plan.fft.forward(&mut square, spread.shape[0], spectrum, scratch);
                 }
-                for (k, light) in self.lights(node, own.len(), warps.len()).iter().enumerate() {
+                for (k, light) in Self::lights(node, own.len(), warps.len()).iter().enumerate() {
                     product.fill(Complex32::ZERO);
                     for (phase, spectrum) in spectra.iter().enumerate() {
                         let kernel = self.kernel(channel, plan, node, (k, warps.len()), phase, scratch);

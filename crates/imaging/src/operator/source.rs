@@ -81,9 +81,10 @@ impl<'a> KernelSource<'a> {
             statistics: detail.statistics.clone(),
             spec: BankSpec {
                 // One kernel for the whole field needs no places between which it would change.
-                nodes: match detail.assumed.fixed_kernels {
-                    true => 1,
-                    false => steps / detail.node_step + 1,
+                nodes: if detail.assumed.fixed_kernels {
+                    1
+                } else {
+                    steps / detail.node_step + 1
                 },
                 ..bank.spec
             },

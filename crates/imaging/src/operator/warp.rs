@@ -73,12 +73,13 @@ impl Warp {
         let patch_um = assumed
             .patch_pixels
             .map_or(f64::INFINITY, |n| 0.5 * f64::from(n) * spec.pixel_um);
-        let brightness = |place: [f64; 2]| match assumed.butterworth {
-            true => {
+        let brightness = |place: [f64; 2]| {
+            if assumed.butterworth {
                 let tangent = place[0].hypot(place[1]) / element.sensor_um;
                 element.flux_per_um2([0.0; 2]) * butterworth(tangent)
+            } else {
+                element.flux_per_um2(place)
             }
-            false => element.flux_per_um2(place),
         };
         let pixel = spec.pixel_um;
         // Row and column of the element's axis.
@@ -98,10 +99,11 @@ impl Warp {
         });
         let beside = ends.iter().any(|[first, last]| first > last);
         let first = ends.map(|[first, _]| first);
-        let shape = match beside {
+        let shape = if beside {
             // One dark cell stands for a field that is beside the sensor.
-            true => [1, 1],
-            false => ends.map(|[first, last]| (last - first + 1) as usize),
+            [1, 1]
+        } else {
+            ends.map(|[first, last]| (last - first + 1) as usize)
         };
         let mut warp = Self {
             origin: first,

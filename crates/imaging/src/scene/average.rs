@@ -18,13 +18,14 @@ impl SceneView {
         let shorter = self.rows.min(self.columns).max(1);
         let fitting = (self.columns as f64 * self.pixel() / tangent + ROUNDING).floor() as usize;
         let columns = fitting.max((SCORED_SIDES.start() * self.columns).div_ceil(shorter));
-        match columns < self.columns {
-            true => Self {
+        if columns < self.columns {
+            Self {
                 rows: self.rows * columns / self.columns,
                 columns,
                 ..*self
-            },
-            false => *self,
+            }
+        } else {
+            *self
         }
     }
 }

@@ -71,6 +71,7 @@ impl SceneImage {
     }
 
     /// This scene, white everywhere.
+    #[must_use]
     pub fn white(&self) -> Self {
         let shape = (self.view.rows, self.view.columns);
         let mut white = Self::of_rgb(

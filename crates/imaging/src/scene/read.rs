@@ -86,9 +86,10 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
             })
         }
         (None, _) => {
-            let rgb = match is_npy {
-                true => grey_or_colour(path, light(path, &bytes)?)?,
-                false => values(path, &bytes)?.mapv(srgb::linear),
+            let rgb = if is_npy {
+                grey_or_colour(path, light(path, &bytes)?)?
+            } else {
+                values(path, &bytes)?.mapv(srgb::linear)
             };
             Ok(SceneImage::of_rgb(&name, &rgb, file.field_deg, file.distance_um))
         }
@@ -244,16 +245,18 @@ fn orientation(exif: &[u8]) -> u16 {
     let little = exif.starts_with(b"II");
     let word = |at: usize| {
         let bytes = exif.get(at..at.checked_add(2)?)?.try_into().ok()?;
-        Some(match little {
-            true => u16::from_le_bytes(bytes),
-            false => u16::from_be_bytes(bytes),
+        Some(if little {
+            u16::from_le_bytes(bytes)
+        } else {
+            u16::from_be_bytes(bytes)
         })
     };
     let said = || {
         let halves = [word(4)?, word(6)?].map(usize::from);
-        let first = match little {
-            true => halves[0] | halves[1] << 16,
-            false => halves[0] << 16 | halves[1],
+        let first = if little {
+            halves[0] | halves[1] << 16
+        } else {
+            halves[0] << 16 | halves[1]
         };
         let mut entries = (0..usize::from(word(first)?)).map(|k| first + 2 + k * ENTRY[0]);
         word(entries.find(|at| word(*at) == Some(TAG))? + ENTRY[1])

@@ -112,6 +112,7 @@ impl StrayLight {
     }
 
     /// The stray light of a surface whose spectrum is the sum of some of the basis, in each channel.
+    #[must_use]
     pub fn grey(&self, spectra: std::ops::Range<usize>) -> Self {
         let size = SCENE_CELLS * SCENE_CELLS * self.cells[0] * self.cells[1];
         let mut values = vec![0.0f32; self.channels * size];

@@ -92,12 +92,11 @@ impl CellConsumer for Target<'_> {
 
     fn item(&mut self, item: &CellItem<'_>, repetition: Option<&Repetition>) -> Result<()> {
         match *item {
-            CellItem::Area { layer, points } => match rectangle_of(points) {
-                Some(r) => {
+            CellItem::Area { layer, points } => {
+                if let Some(r) = rectangle_of(points) {
                     let size = [r.width(), r.height()];
                     self.records.rectangle(numbers(layer), [r.x0, r.y0], size, repetition);
-                }
-                None => {
+                } else {
                     self.corners.clear();
                     self.corners.extend(points.iter().map(|&p| pair(p)));
                     self.corners.dedup();
@@ -109,7 +108,7 @@ impl CellConsumer for Target<'_> {
                         self.records.polygon(numbers(layer), &self.corners, repetition);
                     }
                 }
-            },
+            }
             CellItem::Line {
                 layer,
                 points,

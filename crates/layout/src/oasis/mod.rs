@@ -325,9 +325,9 @@ impl Elements<'_, '_> {
         let encoding = match self.encoding {
             // Where many symmetries hold, phase and rings agree with strips: lists are always near the best there.
             OasisEncoding::Compact if pillars.has_many_symmetries() => pillars.lists(),
-            OasisEncoding::Compact => self.lists_or(PillarEncoding::Outlines, MUCH_LESS, pillars),
+            OasisEncoding::Compact => Self::lists_or(PillarEncoding::Outlines, MUCH_LESS, pillars),
             OasisEncoding::Plain => PillarEncoding::Outlines,
-            OasisEncoding::Smallest => self.lists_or(PillarEncoding::References, SURE, pillars),
+            OasisEncoding::Smallest => Self::lists_or(PillarEncoding::References, SURE, pillars),
         };
         pillars.width_cells = self.numbers_of_widths(pillars.widths, encoding);
         let largest = pillars.largest();
@@ -349,7 +349,7 @@ impl Elements<'_, '_> {
     }
 
     /// Lists, but another encoding where it takes less than a share of their bytes, as a part of the pillars tells.
-    fn lists_or(&self, other: PillarEncoding, share: f64, pillars: &mut ElementPillars<'_>) -> PillarEncoding {
+    fn lists_or(other: PillarEncoding, share: f64, pillars: &mut ElementPillars<'_>) -> PillarEncoding {
         // Any numbers will do to see how small it gets.
         pillars.width_cells = (0..=u64::from(u16::MAX)).collect();
         let candidates = [pillars.lists(), other];

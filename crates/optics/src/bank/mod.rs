@@ -415,9 +415,12 @@ fn upright_s(etched: &[CellStack], orders: usize) -> f64 {
         });
         etched[k].slices() == 1 && before.as_ref() == Some(&etched[k])
     };
-    let sections = (0..etched.len()).map(|k| match is_known(k) {
-        true => KNOWN_SHARE,
-        false => etched[k].slices() as f64,
+    let sections = (0..etched.len()).map(|k| {
+        if is_known(k) {
+            KNOWN_SHARE
+        } else {
+            etched[k].slices() as f64
+        }
     });
     // Of a matrix as wide as there are orders over the plane, its cube.
     let share = orders as f64 / UPRIGHT_ORDERS as f64;

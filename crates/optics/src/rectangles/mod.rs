@@ -175,9 +175,10 @@ impl CalibratedModel {
     /// # Errors
     /// If they are rectangles and it says what counts for one width alone.
     pub fn check_shape(&self, shape: PillarShape) -> Result<()> {
-        match shape.has_width() {
-            false => check_rectangles(self),
-            true => Ok(()),
+        if shape.has_width() {
+            Ok(())
+        } else {
+            check_rectangles(self)
         }
     }
 }

@@ -94,9 +94,10 @@ impl SolvedRectangles {
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let of_all = [0];
         // Pillars of one size are solved together, whatever their rotation.
-        let numbers = match PillarShape::from(self.pillars).has_one_size() {
-            true => &of_all,
-            false => numbers,
+        let numbers = if PillarShape::from(self.pillars).has_one_size() {
+            &of_all
+        } else {
+            numbers
         };
         let missing: Vec<u16> = {
             let known = known();

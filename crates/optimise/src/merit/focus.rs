@@ -110,12 +110,11 @@ impl Lens {
             .par_iter()
             .map(|&wavelength_um| {
                 let field = RingField::new(&self.rings, wavelength_um, self.distance_um);
-                let sum = match PairResponse::of(cell, wavelength_um, widths_nm.iter().copied())? {
-                    Some(unlike) => unlike.on_axis(&self.rings, &field, widths_nm),
-                    None => {
-                        let t = among_equals(widths_nm, cell, wavelength_um)?;
-                        t.iter().enumerate().map(|(ring, t)| field.on_axis(ring) * t).sum()
-                    }
+                let sum = if let Some(unlike) = PairResponse::of(cell, wavelength_um, widths_nm.iter().copied())? {
+                    unlike.on_axis(&self.rings, &field, widths_nm)
+                } else {
+                    let t = among_equals(widths_nm, cell, wavelength_um)?;
+                    t.iter().enumerate().map(|(ring, t)| field.on_axis(ring) * t).sum()
                 };
                 Ok((sum / (field.matched() * cell.full_transmission(wavelength_um)?)).norm_sqr())
             })

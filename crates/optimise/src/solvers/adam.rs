@@ -56,6 +56,7 @@ impl Adam {
     }
 
     /// Go on from a checkpoint: the same result as if never interrupted.
+    #[must_use]
     pub fn resume(mut self, step: u32, waves: Vec<f64>, mean: Vec<f64>, square: Vec<f64>) -> Self {
         (self.step, self.waves, self.mean, self.square) = (step, waves, mean, square);
         self

@@ -73,6 +73,7 @@ impl<'p> BlockExchange<'p> {
 
     /// Go on after `block` blocks with these [`BlockExchange::shares`]: the same result as if never
     /// interrupted. Shares of another number of kinds are left aside.
+    #[must_use]
     pub fn resume(mut self, block: u32, shares: &[f64]) -> Self {
         self.block = block;
         if let Ok(shares) = shares.try_into() {

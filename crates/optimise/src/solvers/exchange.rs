@@ -70,6 +70,7 @@ impl<'p> Exchange<'p> {
     }
 
     /// Go on after `sweep` sweeps: the same result as if never interrupted.
+    #[must_use]
     pub fn resume(mut self, sweep: u32) -> Self {
         self.sweep = sweep;
         self
@@ -95,7 +96,7 @@ impl<'p> Exchange<'p> {
         self.problem.mapping().widths_of(&self.choices)
     }
 
-    /// RingContext every ring once, in random order. The generator depends on the seed and the sweep alone.
+    /// Visit every ring once, in random order. The generator depends on the seed and the sweep alone.
     pub fn sweep_once(&mut self) {
         let temperature = self.schedule.temperature_of(self.sweep);
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);

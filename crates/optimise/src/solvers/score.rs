@@ -15,14 +15,13 @@ impl FieldProblem {
         widths_nm: &[u16],
         scores: &mut [f64],
     ) {
-        pulp::Arch::new().dispatch(|| match visit {
-            None => {
+        pulp::Arch::new().dispatch(|| {
+            if visit.is_none() {
                 let kernel = self.kernel_of(ring);
                 for (score, &width) in scores.iter_mut().zip(widths_nm) {
                     *score = self.score_of(kernel, self.transmission_of(width), fields);
                 }
-            }
-            Some(_) => {
+            } else {
                 let one = vec![1.0; self.rows()];
                 let none = vec![0.0; self.rows()];
                 let mut own = Planes::zeros(self.rows());

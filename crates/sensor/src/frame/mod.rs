@@ -42,9 +42,10 @@ impl Recorded {
     /// Variance that rounding to whole numbers adds (DN^2) if this is the mean of so many frames: means that are stored as whole
     /// numbers were rounded afterwards, and the read noise of the camera does not have that in it.
     pub fn rounding_dn2(&self, frames: u32) -> f64 {
-        match self.whole && frames > self.pages {
-            true => OF_ROUNDING / f64::from(self.pages),
-            false => 0.0,
+        if self.whole && frames > self.pages {
+            OF_ROUNDING / f64::from(self.pages)
+        } else {
+            0.0
         }
     }
 }
@@ -55,7 +56,10 @@ const OF_ROUNDING: f64 = 1.0 / 12.0;
 /// Read frames of exactly `rows` x `cols` finite numbers, whose values are DN: NPY, grey PNG, or grey TIFF. NPY of three axes
 /// and TIFF of several pages are stacks: what comes back is their mean, and pixels that are saturated in any frame
 /// have `saturation_dn`, which a mean would hide. Files that end below `saturation_dn` must not be full. The first row of the file
-/// is row 0. What is wrong comes back in words.
+/// is row 0.
+///
+/// # Errors
+/// What is wrong with the file, in words.
 pub fn read(path: &Path, rows: usize, cols: usize, saturation_dn: f64) -> Result<Recorded, String> {
     let is = |endings: &[&str]| {
         let ending = path.extension().and_then(|e| e.to_str());

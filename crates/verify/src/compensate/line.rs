@@ -178,13 +178,14 @@ fn along_axes(
 
 /// Succeeds if another pillar of a design may come out as the intended one.
 fn check_shape(shape: PillarShape) -> Result<()> {
-    match shape.has_one_size() {
-        true => Err(Error::refused(
+    if shape.has_one_size() {
+        Err(Error::refused(
             "compensate/rotated-rectangles",
             "the pillars are rotated rectangles of one size: no other of them is nearer to what was intended",
             "draw edges that come out as intended: `width_nm` and `length_nm` of [cell], less the bias of the model; `metalith run --model` \
-             judges the chip that they give",
-        )),
-        false => Ok(()),
+         judges the chip that they give",
+        ))
+    } else {
+        Ok(())
     }
 }

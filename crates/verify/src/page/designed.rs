@@ -103,9 +103,12 @@ fn elements(design: &Design) -> String {
     );
     let all = design.elements();
     let is_steered = all.iter().any(|e| e.wedge.sin_x != 0.0 || e.wedge.sin_y != 0.0);
-    let steered = |how: String| match is_steered {
-        true => how + &at(design.array.wedge_wavelength_um),
-        false => String::new(),
+    let steered = |how: String| {
+        if is_steered {
+            how + &at(design.array.wedge_wavelength_um)
+        } else {
+            String::new()
+        }
     };
     let one_by_one = || format!("placed one by one{}", steered(", steered".into()));
     match (all.len(), design.array.spacing_words()) {
@@ -169,15 +172,12 @@ fn chip(design: &Design) -> Plan {
         let (cx, cy) = (um(element.centre_nm.0), um(element.centre_nm.1));
         let radius = design.lens_of(&element).radius_um();
         let shifted = |(x, y): &(i64, i64)| (cx + um(*x), cy + um(*y));
-        match design.outline_of(&element) {
-            Some(outline) => {
-                plan.polygon(openings, outline.grown(layout.apertures.margin_nm).iter().map(shifted));
-                plan.polygon(pillars, outline.corners_nm().iter().map(shifted));
-            }
-            None => {
-                plan.circle(openings, cx, cy, radius + um(layout.apertures.margin_nm));
-                plan.circle(pillars, cx, cy, radius);
-            }
+        if let Some(outline) = design.outline_of(&element) {
+            plan.polygon(openings, outline.grown(layout.apertures.margin_nm).iter().map(shifted));
+            plan.polygon(pillars, outline.corners_nm().iter().map(shifted));
+        } else {
+            plan.circle(openings, cx, cy, radius + um(layout.apertures.margin_nm));
+            plan.circle(pillars, cx, cy, radius);
         }
         plan.label(cx, cy, element.label());
     }

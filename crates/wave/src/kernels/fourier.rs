@@ -42,18 +42,18 @@ impl Fourier {
     /// Spectrum of an image.
     pub(crate) fn of_image(&self, image: &Array2<f64>) -> Array2<Complex64> {
         let mut plane = image.map(|v| Complex64::from(*v));
-        self.run(&self.forward, &mut plane);
+        Self::run(&self.forward, &mut plane);
         plane
     }
 
     /// The image of a spectrum.
     pub(crate) fn to_image(&self, mut spectrum: Array2<Complex64>) -> Array2<f64> {
-        self.run(&self.inverse, &mut spectrum);
+        Self::run(&self.inverse, &mut spectrum);
         let scale = 1.0 / (self.size[0] * self.size[1]) as f64;
         spectrum.map(|v| v.re * scale)
     }
 
-    fn run(&self, plans: &[Arc<dyn Fft<f64>>; 2], plane: &mut Array2<Complex64>) {
+    fn run(plans: &[Arc<dyn Fft<f64>>; 2], plane: &mut Array2<Complex64>) {
         plans[1].process(plane.as_slice_mut().expect("made in standard layout"));
         let mut turned = plane.t().as_standard_layout().into_owned();
         plans[0].process(turned.as_slice_mut().expect("standard layout"));

@@ -103,7 +103,7 @@ impl Hankel {
     /// # Errors
     /// If there is not one transmission for each ring.
     pub fn field(&self, transmission: &[Complex64], rho_um: &[f64]) -> Result<Vec<Complex64>> {
-        self.check("transmissions", transmission.len(), self.radii_um.len())?;
+        Self::check("transmissions", transmission.len(), self.radii_um.len())?;
         Ok(rho_um
             .iter()
             .map(|&rho| self.kernel(rho).iter().zip(transmission).map(|(k, t)| k * t).sum())
@@ -115,7 +115,7 @@ impl Hankel {
     /// # Errors
     /// If there is not one value for each point.
     pub fn adjoint(&self, values: &[Complex64], rho_um: &[f64]) -> Result<Vec<Complex64>> {
-        self.check("values", values.len(), rho_um.len())?;
+        Self::check("values", values.len(), rho_um.len())?;
         let mut rings = vec![Complex64::ZERO; self.radii_um.len()];
         for (value, &rho) in values.iter().zip(rho_um) {
             for (ring, k) in rings.iter_mut().zip(self.kernel(rho)) {
@@ -144,7 +144,7 @@ impl Hankel {
         (inner + (at(0.0) + at(std::f64::consts::PI)) * 0.5) / steps as f64
     }
 
-    fn check(&self, what: &'static str, got: usize, need: usize) -> Result<()> {
+    fn check(what: &'static str, got: usize, need: usize) -> Result<()> {
         if got == need {
             return Ok(());
         }

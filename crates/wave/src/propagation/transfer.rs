@@ -68,7 +68,7 @@ impl Transfer<'_> {
     }
 
     /// Factor from the transfer function to one distance to the one for a distance that is `step_um` farther.
-    pub(crate) fn step(&self, step_um: f64, faded: &FadedColumn, out: &mut [Complex32]) {
+    pub(crate) fn step(step_um: f64, faded: &FadedColumn, out: &mut [Complex32]) {
         pulp::Arch::new().dispatch(|| {
             for (out, fz) in out.iter_mut().zip(&faded.axial) {
                 *out = cis(step_um * fz);

@@ -30,7 +30,7 @@ mod tests {
         let n = 4096;
         let ramp = |scale: f64| -> Vec<Complex64> {
             (0..n)
-                .map(|i| 1.2 * Complex64::cis(TAU * scale * (i as f64 + 0.5) / n as f64))
+                .map(|i| 1.2 * Complex64::cis(TAU * scale * (f64::from(i) + 0.5) / f64::from(n)))
                 .collect()
         };
         let perfect = order_shares(&ramp(1.0), 1.2, &[0, 1, 2]);

@@ -24,24 +24,30 @@ pub(super) fn measurements(
     for s in root.sections("capture") {
         let index = whole(&s, "element", Limits::new(-1000.0..=1000.0, ""));
         let known = elements.iter_enumerated().find(|(_, e)| e.index == index);
-        let element = known.map(|(e, _)| e).unwrap_or_else(|| {
-            s.fault(
-                "element",
-                format!("no [[element]] has the index {index:?}"),
-                "add it, or correct the index",
-            );
-            ElementIndex::from(0)
-        });
+        let element = known.map_or_else(
+            || {
+                s.fault(
+                    "element",
+                    format!("no [[element]] has the index {index:?}"),
+                    "add it, or correct the index",
+                );
+                ElementIndex::from(0)
+            },
+            |(e, _)| e,
+        );
         let led_nm = s.float("led_nm", Limits::new(200.0..=20_000.0, "nm"));
         let known = leds.iter_enumerated().find(|(_, l)| l.centre_nm == led_nm);
-        let led = known.map(|(l, _)| l).unwrap_or_else(|| {
-            s.fault(
-                "led_nm",
-                format!("no [[led]] has its centre at {led_nm} nm"),
-                "add it, or correct the wavelength",
-            );
-            LedIndex::from(0)
-        });
+        let led = known.map_or_else(
+            || {
+                s.fault(
+                    "led_nm",
+                    format!("no [[led]] has its centre at {led_nm} nm"),
+                    "add it, or correct the wavelength",
+                );
+                LedIndex::from(0)
+            },
+            |(l, _)| l,
+        );
         let aoi_deg: [f64; 2] = s.array("aoi_deg", Limits::new(-80.0..=80.0, "degrees"));
         let distance_um = s.float("distance_um", DISTANCE_UM);
         let window_centre_um = s.array("window_centre_um", WINDOW_CENTRE_UM);

@@ -153,6 +153,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A table that must be there.
+    #[must_use]
     pub fn section(&self, key: &str) -> Section<'d, 't> {
         self.optional_section(key).unwrap_or_else(|| {
             self.missing_unless_present(key, &format!("a section [{}]", self.path_of(key)));
@@ -161,6 +162,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A table that may be left out, where it then has no keys and no faults.
+    #[must_use]
     pub fn section_or_none(&self, key: &str) -> Section<'d, 't> {
         self.optional_section(key).unwrap_or_else(|| self.vacant(key))
     }
@@ -168,16 +170,13 @@ impl<'d, 't> Section<'d, 't> {
     /// A table that may be left out.
     pub fn optional_section(&self, key: &str) -> Option<Section<'d, 't>> {
         let value = self.get(key)?;
-        match value.get_ref() {
-            DeValue::Table(table) => {
-                let mut section = Self::new(self.document, table, self.path_of(key), self.span_of(key));
-                section.path = self.place_of(key);
-                Some(section)
-            }
-            _ => {
-                self.wrong_type(key, value, &format!("a section [{}]", self.path_of(key)));
-                None
-            }
+        if let DeValue::Table(table) = value.get_ref() {
+            let mut section = Self::new(self.document, table, self.path_of(key), self.span_of(key));
+            section.path = self.place_of(key);
+            Some(section)
+        } else {
+            self.wrong_type(key, value, &format!("a section [{}]", self.path_of(key)));
+            None
         }
     }
 
@@ -191,13 +190,12 @@ impl<'d, 't> Section<'d, 't> {
         items
             .iter()
             .enumerate()
-            .filter_map(|(k, item)| match item.get_ref() {
-                DeValue::Table(table) => {
+            .filter_map(|(k, item)| {
+                if let DeValue::Table(table) = item.get_ref() {
                     let mut section = Self::new(self.document, table, self.path_of(key), item.span());
                     section.path = format!("{}#{k}", self.place_of(key));
                     Some(section)
-                }
-                _ => {
+                } else {
                     self.wrong_type(key, item, &format!("a section [[{}]]", self.path_of(key)));
                     None
                 }

@@ -14,12 +14,11 @@ use crate::text::{first_unprintable, quoted};
 impl<'t> Section<'_, 't> {
     /// A number that must be there.
     pub fn float(&self, key: &str, limits: Limits) -> f64 {
-        match self.optional_float(key, limits.clone()) {
-            Some(value) => value,
-            None => {
-                self.missing_unless_present(key, &format!("a number{}", describe(&limits)));
-                *limits.range.start()
-            }
+        if let Some(value) = self.optional_float(key, limits.clone()) {
+            value
+        } else {
+            self.missing_unless_present(key, &format!("a number{}", describe(&limits)));
+            *limits.range.start()
         }
     }
 
@@ -35,12 +34,11 @@ impl<'t> Section<'_, 't> {
 
     /// A whole number that must be there.
     pub fn integer(&self, key: &str, range: RangeInclusive<i64>, unit: &'static str) -> i64 {
-        match self.optional_integer(key, range.clone(), unit) {
-            Some(value) => value,
-            None => {
-                self.missing_unless_present(key, "a whole number");
-                *range.start()
-            }
+        if let Some(value) = self.optional_integer(key, range.clone(), unit) {
+            value
+        } else {
+            self.missing_unless_present(key, "a whole number");
+            *range.start()
         }
     }
 
@@ -64,24 +62,22 @@ impl<'t> Section<'_, 't> {
 
     /// A text that must be there.
     pub fn text(&self, key: &str) -> String {
-        match self.optional_text(key) {
-            Some(text) => text,
-            None => {
-                self.missing_unless_present(key, "a text in quotes");
-                String::new()
-            }
+        if let Some(text) = self.optional_text(key) {
+            text
+        } else {
+            self.missing_unless_present(key, "a text in quotes");
+            String::new()
         }
     }
 
     /// A text that may be left out.
     pub fn optional_text(&self, key: &str) -> Option<String> {
         let value = self.get(key)?;
-        match value.get_ref() {
-            DeValue::String(s) => Some(self.one_line(key, value.span(), s)),
-            _ => {
-                self.wrong_type(key, value, "a text in quotes");
-                Some(String::new())
-            }
+        if let DeValue::String(s) = value.get_ref() {
+            Some(self.one_line(key, value.span(), s))
+        } else {
+            self.wrong_type(key, value, "a text in quotes");
+            Some(String::new())
         }
     }
 
@@ -108,9 +104,10 @@ impl<'t> Section<'_, 't> {
             self.wrong_type(key, value, "a list of texts in quotes");
             return Vec::new();
         };
-        let text = |item: &Spanned<DeValue<'t>>| match item.get_ref() {
-            DeValue::String(s) => Some(self.one_line(key, item.span(), s)),
-            _ => {
+        let text = |item: &Spanned<DeValue<'t>>| {
+            if let DeValue::String(s) = item.get_ref() {
+                Some(self.one_line(key, item.span(), s))
+            } else {
                 self.wrong_type(key, item, "a list of texts in quotes");
                 None
             }
@@ -186,9 +183,10 @@ impl<'t> Section<'_, 't> {
         };
         items
             .iter()
-            .map(|item| match number(item.get_ref()) {
-                Some(v) => self.limited(item.span(), key, v, &limits),
-                None => {
+            .map(|item| {
+                if let Some(v) = number(item.get_ref()) {
+                    self.limited(item.span(), key, v, &limits)
+                } else {
                     self.wrong_type(key, item, &format!("a list of numbers{}", describe(&limits)));
                     *limits.range.start()
                 }
@@ -217,12 +215,11 @@ impl<'t> Section<'_, 't> {
 
     /// Exactly `N` numbers that must be there, each within the limits.
     pub fn array<const N: usize>(&self, key: &str, limits: Limits) -> [f64; N] {
-        match self.optional_array(key, limits.clone()) {
-            Some(values) => values,
-            None => {
-                self.missing_unless_present(key, &format!("a list of {N} numbers"));
-                [*limits.range.start(); N]
-            }
+        if let Some(values) = self.optional_array(key, limits.clone()) {
+            values
+        } else {
+            self.missing_unless_present(key, &format!("a list of {N} numbers"));
+            [*limits.range.start(); N]
         }
     }
 

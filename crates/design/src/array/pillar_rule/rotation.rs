@@ -50,9 +50,10 @@ impl RotationRule {
     /// turn of phase.
     pub fn unrounded(&self, u: f64) -> f64 {
         let steps = self.steps();
-        let added = match self.mapping.is_half() {
-            true => 0.0,
-            false => self.mapping.added(TAU * u) / PI * steps,
+        let added = if self.mapping.is_half() {
+            0.0
+        } else {
+            self.mapping.added(TAU * u) / PI * steps
         };
         let number = match self.arriving {
             Handedness::Left => u * steps + added,

@@ -335,9 +335,10 @@ impl<'a> ElementPhase<'a> {
         if slanted && !lattice.is_square() {
             return None;
         }
-        let steps = match lattice.is_square() {
-            true => radius_um / lattice.pitch_um() / f64::from(dx).hypot(f64::from(dy)),
-            false => radius_um / lattice.steps_um()[usize::from(dx == 0)],
+        let steps = if lattice.is_square() {
+            radius_um / lattice.pitch_um() / f64::from(dx).hypot(f64::from(dy))
+        } else {
+            radius_um / lattice.steps_um()[usize::from(dx == 0)]
         };
         let middle = lattice.sites() as i32 / 2;
         let [x, y] = direction.map(|d| middle + (steps * f64::from(d)) as i32);

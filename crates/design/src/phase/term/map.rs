@@ -202,13 +202,14 @@ fn read_text(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<npy::Arr
         (rows, columns) = (rows + 1, own);
     }
     let shape = vec![rows as u64, columns as u64];
-    match takes(&shape) {
-        true => Ok(npy::Array {
+    if takes(&shape) {
+        Ok(npy::Array {
             shape,
             values,
             whole: false,
-        }),
-        false => Err(fault(None, format!("a table of {rows} rows and {columns} columns"))),
+        })
+    } else {
+        Err(fault(None, format!("a table of {rows} rows and {columns} columns")))
     }
 }
 

@@ -29,7 +29,7 @@ pub(crate) struct Scratch {
     field: Vec<Complex32>,
 }
 
-/// BufferPool that nobody is in.
+/// Buffers that nobody uses.
 #[derive(Default)]
 pub(crate) struct BufferPool(Mutex<Vec<Scratch>>);
 

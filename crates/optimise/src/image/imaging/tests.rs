@@ -13,7 +13,7 @@ const WINDOW: PixelWindow = PixelWindow {
     pixel_um: 2.5,
 };
 
-impl<'p> Imaging<'p> {
+impl Imaging<'_> {
     /// Intensity at each sample, `[x][y]` with y from 0 to half the size, x from the middle of the window on
     /// and around its end. Their sum over all y is the share of the incident power.
     fn intensity(&mut self, t_re: &[f32], t_im: &[f32]) -> Vec<f32> {

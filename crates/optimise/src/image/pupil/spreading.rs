@@ -44,7 +44,7 @@ impl Spreading {
         (first as i32, weights)
     }
 
-    /// RingContext every cell at y >= 0 that a site and its mirror image touch.
+    /// Visit every cell at y >= 0 that a site and its mirror image touch.
     pub(super) fn spread(
         &self,
         site: &SitePair,

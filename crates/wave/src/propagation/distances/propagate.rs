@@ -58,7 +58,7 @@ impl DistancesPlan {
             // From one distance to the next; equal steps, as those of a focus series are, are worked out once.
             for (d, step) in steps.iter().enumerate() {
                 if d == 0 || (step - steps[d - 1]).abs() > EQUAL_UM {
-                    transfer.step(*step, &scratch.column, &mut scratch.step);
+                    Transfer::step(*step, &scratch.column, &mut scratch.step);
                 }
                 let (known, next) = scratch.transfer.split_at_mut((d + 1) * kx * ky);
                 let known = &known[(d * kx + k) * ky..][..ky];

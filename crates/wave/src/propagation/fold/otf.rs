@@ -83,7 +83,7 @@ impl FoldedPropagator {
         let mut correlation = Correlation::new(shifts, self.band.count[1]);
         let mut values = Array2::zeros([self.window.samples; 2]);
         let power_um2 = self.field_observed(aperture, wave, scratch, values.view_mut(), &mut |column| {
-            correlation.add(column)
+            correlation.add(column);
         })?;
         let transform_um2 = [0, 1].map(|axis| {
             let of = |shift: usize| correlation.sum(axis, shift) * period_um[0] * period_um[1];
