@@ -19,7 +19,7 @@ use metalith_calibrate::{Simulator, WIDTH_ROOM_NM};
 const TOGETHER: usize = 12;
 
 /// A measurement, exposed as it would be, and what it tells.
-pub(crate) struct Told {
+pub(crate) struct MeasurementInformation {
     /// With its scale set to the exposure, and what it would show.
     pub measurement: Measurement,
     /// Inner products of flux of each LED, black level, every parameter, and the residual, as
@@ -31,7 +31,7 @@ pub(crate) struct Told {
 
 /// What all candidates tell.
 pub(crate) struct Information {
-    pub told: Vec<Told>,
+    pub told: Vec<MeasurementInformation>,
     /// What is known of flux and black level beforehand.
     pub prior: DMatrix<f64>,
     /// What the widths by SEM tell, where the bench offers them.
@@ -93,7 +93,7 @@ pub(crate) fn information(
             out.widths = bench.sem.map(|_| fit.equations.references.clone());
         }
         for ((c, measurement), form) in exposed.measurements.iter_enumerated().zip(&fit.equations.measurements) {
-            out.told.push(Told {
+            out.told.push(MeasurementInformation {
                 measurement: measurement.clone(),
                 form: form.clone(),
                 pixels: data.points(c) as f64,

@@ -7,16 +7,17 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::cells::{RealisedCells, SolvedWidths};
+use super::etched_stack::to_middle_tops;
 use super::light::wave_of;
-use super::rectangles::MadeRectangles;
-use super::stack::to_middle_tops;
+use super::realised_cells::{RealisedCells, SolvedWidths};
+use super::rectangles::AsBuiltRectangles;
 use super::{
     Applied, ArrivingLight, AsBuiltElement, CalibratedModel, CellBank, CellChange, ClassTable, DrawnElement,
     IncoherentFields, NotApplied, Perturbation, RectangleClass, cell_direction, mixed, realised_nm,
 };
 use metalith_cell::{
-    CellResponse, CellStack, Illumination, Incidence, JonesTables, LitStack, PassedTable, PolarisedTables, Spectral,
+    CellResponse, CellStack, FocusingStack, Illumination, Incidence, JonesTables, PassedTable, PolarisedTables,
+    Spectral,
 };
 use metalith_core::{Error, Progress, Result};
 use metalith_pillars::PillarMap;
@@ -26,7 +27,7 @@ pub struct AsBuiltChip {
     model: CalibratedModel,
     cells: RealisedCells,
     /// Rectangles, which stand for the cells where pillars are rectangles.
-    rectangles: Option<MadeRectangles>,
+    rectangles: Option<AsBuiltRectangles>,
 }
 
 /// Statement in a report of the model that it rests on.
@@ -81,9 +82,9 @@ impl AsBuiltChip {
     ///
     /// # Errors
     /// As [`AsBuiltChip::new`]; also if the pillars are no rectangles that focus this, or the model has what rectangles have no meaning for.
-    pub fn in_light(stated: &LitStack, model: &CalibratedModel) -> Result<Self> {
+    pub fn in_light(stated: &FocusingStack, model: &CalibratedModel) -> Result<Self> {
         let made = Self::new(&stated.stack, model)?;
-        let of = |focused| MadeRectangles::new(&stated.stack, model, focused);
+        let of = |focused| AsBuiltRectangles::new(&stated.stack, model, focused);
         let rectangles = stated.focused.map(of);
         Ok(Self {
             rectangles: rectangles.transpose()?,
@@ -94,9 +95,9 @@ impl AsBuiltChip {
     /// Same chip, whose rectangles, which take longer to solve than pillars of one width, are cached in a folder from
     /// one run to the next: see [`metalith_cell::cache_folder`].
     #[must_use]
-    pub fn kept_in(self, folder: Option<&Path>) -> Self {
+    pub fn cached_in(self, folder: Option<&Path>) -> Self {
         Self {
-            rectangles: self.rectangles.map(|rectangles| rectangles.kept_in(folder)),
+            rectangles: self.rectangles.map(|rectangles| rectangles.cached_in(folder)),
             ..self
         }
     }
@@ -200,7 +201,7 @@ impl AsBuiltChip {
     /// Part of the light behind the classes of rectangles that `leaving` takes.
     fn through(
         &self,
-        rectangles: &MadeRectangles,
+        rectangles: &AsBuiltRectangles,
         element: &AsBuiltElement,
         light: &Illumination<'_>,
         leaving: &dyn Fn(&PolarisedTables) -> Vec<PassedTable>,
@@ -209,7 +210,7 @@ impl AsBuiltChip {
         let of = |change: &CellChange| -> Result<SolvedWidths> {
             let colour = (light.wavelength_um, light.spectral);
             let tables = rectangles.tables(change, element.rectangles(), colour, progress)?;
-            Ok(MadeRectangles::solved(leaving(&tables)))
+            Ok(AsBuiltRectangles::solved(leaving(&tables)))
         };
         let change = &self.perturbation().cell;
         let mut solved = of(&change.in_the_middle())?;

@@ -363,8 +363,8 @@ impl AsBuiltElement {
     }
 
     /// The element as an aperture at one wavelength (um), without the wave that arrives.
-    pub fn aperture<'a>(&'a self, table: &'a ClassTable, wavelength_um: f64) -> MadeAperture<'a> {
-        MadeAperture {
+    pub fn aperture<'a>(&'a self, table: &'a ClassTable, wavelength_um: f64) -> AsBuiltAperture<'a> {
+        AsBuiltAperture {
             element: self,
             table,
             wavelength_um,
@@ -373,8 +373,8 @@ impl AsBuiltElement {
     }
 
     /// Aperture with the curvature of the wave that arrives, for propagators that know plane waves alone.
-    pub fn lit_aperture<'a>(&'a self, table: &'a ClassTable, light: &ArrivingLight) -> MadeAperture<'a> {
-        MadeAperture {
+    pub fn lit_aperture<'a>(&'a self, table: &'a ClassTable, light: &ArrivingLight) -> AsBuiltAperture<'a> {
+        AsBuiltAperture {
             sphere: light.sphere(self.lattice),
             ..self.aperture(table, light.plane.wavelength_um)
         }
@@ -404,7 +404,7 @@ fn too_many() -> Error {
 }
 
 /// A made element at one wavelength, row by row.
-pub struct MadeAperture<'a> {
+pub struct AsBuiltAperture<'a> {
     element: &'a AsBuiltElement,
     table: &'a ClassTable,
     wavelength_um: f64,
@@ -412,7 +412,7 @@ pub struct MadeAperture<'a> {
     sphere: Option<[Vec<Complex32>; 2]>,
 }
 
-impl Aperture for MadeAperture<'_> {
+impl Aperture for AsBuiltAperture<'_> {
     fn lattice(&self) -> Lattice {
         self.element.lattice
     }
@@ -451,7 +451,7 @@ impl Aperture for MadeAperture<'_> {
     }
 }
 
-impl MadeAperture<'_> {
+impl AsBuiltAperture<'_> {
     /// Take what sites of a row transmit in the middle of the lens to their radius. Amplitude and phase of a pillar change
     /// in proportion to its height, but beside resonances.
     fn towards_rim(&self, iy: usize, classes: &[u16], row: &mut [Complex32]) {

@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 
 use crate::CellChange;
-use crate::cells::lagrange;
-use crate::rational::{around, rational};
+use crate::rational_interpolation::{around, rational};
+use crate::realised_cells::lagrange;
 
 /// Nodes of an axis at the least: a cubic takes four.
 const FEWEST: usize = 4;

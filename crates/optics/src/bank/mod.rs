@@ -17,10 +17,10 @@ pub(crate) use self::grid::Axis;
 use self::grid::StackGrid;
 use self::sizes::{Along, SizeTables, Sizes};
 use self::widths::{Colour, between, coarse, merged};
+use super::etched_stack::{off_cutoff, perturbed, possible_width_nm};
 use super::rectangles::{RowsOfBiases, bare_row, row_length, solve_rotated, solve_upright};
-use super::stack::{off_cutoff, perturbed, possible_width_nm};
 use super::{CellChange, SolvedWidths};
-use metalith_cell::{CellStack, UPRIGHT_ORDERS, kept};
+use metalith_cell::{CellStack, UPRIGHT_ORDERS, cache_file};
 use metalith_core::{Error, Progress, Result};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
@@ -146,7 +146,7 @@ impl CellBank {
                 "plan the study again into another folder; a shard makes no tables of its own",
             )
         };
-        let content = kept::open(&bytes, MAGIC, &bank.inputs()).map_err(|e| unusable(e.to_string()))?;
+        let content = cache_file::open(&bytes, MAGIC, &bank.inputs()).map_err(|e| unusable(e.to_string()))?;
         let numbers: Vec<f64> = content
             .chunks_exact(8)
             .map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes")))
@@ -188,7 +188,7 @@ impl CellBank {
                 .flat_map(f64::to_le_bytes)
                 .collect(),
         };
-        kept::write(path, MAGIC, &self.inputs(), &bytes)
+        cache_file::write(path, MAGIC, &self.inputs(), &bytes)
     }
 
     /// Number of stacks that are solved at every wavelength.
@@ -390,7 +390,7 @@ impl CellBank {
     fn inputs(&self) -> Vec<u8> {
         let known = format!(
             "{} {:?} {:?}",
-            kept::solver_of(self.stated.shape),
+            cache_file::solver_of(self.stated.shape),
             self.stated,
             self.range
         );

@@ -11,7 +11,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::widths::complex;
-use crate::rational::{around, rational};
+use crate::rational_interpolation::{around, rational};
 use metalith_core::{Error, Progress, Result};
 use metalith_pillars::UprightRectangles;
 

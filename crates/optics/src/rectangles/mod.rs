@@ -1,6 +1,6 @@
 //! Rectangles as fabricated: light of both polarisations that they distinguish, and what of it reaches the sensor.
 
-mod kept;
+mod cache;
 mod rows;
 mod solved;
 
@@ -14,11 +14,11 @@ use rows::RowOrders;
 pub(crate) use rows::{bare_row, row_length, solve_rotated, solve_upright};
 
 use self::solved::SolvedRectangles;
-use super::cells::SolvedWidths;
+use super::realised_cells::SolvedWidths;
 use super::{CalibratedModel, CellBank, CellChange, DeclaredQuantity};
 use metalith_cell::{
-    AxisTables, BAND_ORDERS, CellStack, FocusedLight, HandTables, Handedness, ORDERS, PassedTable, PolarisationAxis,
-    PolarisedTables, RotationSamples, Spectral, UPRIGHT_ORDERS,
+    BAND_ORDERS, CellStack, CircularTables, FocusedLight, Handedness, LinearTables, ORDERS, PassedTable,
+    PolarisationAxis, PolarisedTables, RotationSamples, Spectral, UPRIGHT_ORDERS,
 };
 use metalith_core::{Error, Progress, Result};
 use metalith_pillars::{PillarShape, PolarisationBasis, Rectangles, RotatedRectangles};
@@ -62,13 +62,13 @@ enum RowSource {
 }
 
 /// The rectangles of a chip.
-pub(super) struct MadeRectangles {
+pub(super) struct AsBuiltRectangles {
     pillars: Rectangles,
     focused: FocusedLight,
     source: RowSource,
 }
 
-impl MadeRectangles {
+impl AsBuiltRectangles {
     /// Rectangles of a stack, which focus `focused`; solved where they are needed.
     ///
     /// # Errors
@@ -91,7 +91,7 @@ impl MadeRectangles {
     }
 
     /// Same rectangles, whose solved rows are cached in a folder from one run to the next.
-    pub(crate) fn kept_in(mut self, folder: Option<&Path>) -> Self {
+    pub(crate) fn cached_in(mut self, folder: Option<&Path>) -> Self {
         if let RowSource::Solved(solved) = &mut self.source {
             solved.folder = folder.map(Path::to_owned);
         }
@@ -235,9 +235,9 @@ impl Found<'_> {
         room
     }
 
-    fn hands(&self, pillars: RotatedRectangles, focused: Handedness) -> HandTables {
+    fn hands(&self, pillars: RotatedRectangles, focused: Handedness) -> CircularTables {
         let bare = RotationSamples::of_numbers(self.bare).hands(pillars, &[0], focused);
-        let mut all = HandTables {
+        let mut all = CircularTables {
             focused,
             converted: bare.converted.each_ref().map(|t| self.room(t[0], Complex64::ZERO)),
             unconverted: bare.unconverted.each_ref().map(|t| self.room(t[0], Complex64::ONE)),
@@ -254,7 +254,7 @@ impl Found<'_> {
         all
     }
 
-    fn axes(&self, focused: PolarisationAxis) -> AxisTables {
+    fn axes(&self, focused: PolarisationAxis) -> LinearTables {
         let along = PolarisationAxis::ALL.map(|axis| {
             let mut table = self.room(self.bare.first().copied().unwrap_or_default(), Complex64::ONE);
             for (row, members) in self.rows.iter().zip(self.members) {
@@ -265,7 +265,7 @@ impl Found<'_> {
             }
             table
         });
-        AxisTables { focused, along }
+        LinearTables { focused, along }
     }
 }
 

@@ -4,7 +4,7 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use crate::stack::{off_cutoff, possible_width_nm};
+use crate::etched_stack::{off_cutoff, possible_width_nm};
 use metalith_cell::{CellStack, RotationSamples, UPRIGHT_ORDERS, birefringent_pillars, birefringent_stacks};
 use metalith_core::{Progress, Result};
 use metalith_pillars::{PillarId, PillarKind, PillarShape, Rectangles, RotatedRectangles};

@@ -6,13 +6,13 @@ use std::sync::{Mutex, PoisonError};
 
 use num_complex::Complex64;
 
-use super::kept;
+use super::cache;
 use super::rows::{RowOrders, bare_row, row_length, solve_row};
 use super::{Colour, RowsOfBiases};
 use crate::bank::Axis;
-use crate::rational::{around, rational};
+use crate::rational_interpolation::{around, rational};
 use crate::{CellChange, perturbed};
-use metalith_cell::kept::bytes_of;
+use metalith_cell::cache_file::bytes_of;
 use metalith_cell::{BAND_ORDERS, CellStack};
 use metalith_core::{Progress, Result};
 use metalith_pillars::{PillarShape, Rectangles};
@@ -129,8 +129,8 @@ impl SolvedRectangles {
     ) -> Result<Vec<Complex64>> {
         let length = row_length(self.pillars, numbers.len());
         let folder = self.folder.as_deref();
-        let table = kept::table(folder, etched, self.pillars, numbers, bias_nm, (um, orders));
-        if let Some(row) = table.read(|content| kept::decode(content, length), progress) {
+        let table = cache::table(folder, etched, self.pillars, numbers, bias_nm, (um, orders));
+        if let Some(row) = table.read(|content| cache::decode(content, length), progress) {
             return Ok(row);
         }
         let row = solve_row(etched, self.pillars, numbers, bias_nm, um, orders, progress)?;

@@ -62,15 +62,15 @@ fn model() -> CalibratedModel {
     CalibratedModel::new(String::new(), String::new(), crate::Perturbation::default())
 }
 
-fn made(pillars: Rectangles, focused: FocusedLight) -> MadeRectangles {
-    MadeRectangles::new(&stack(pillars), &model(), focused).unwrap()
+fn made(pillars: Rectangles, focused: FocusedLight) -> AsBuiltRectangles {
+    AsBuiltRectangles::new(&stack(pillars), &model(), focused).unwrap()
 }
 
 fn class(number: u16, bias_nm: f64) -> RectangleClass {
     RectangleClass { number, bias_nm }
 }
 
-fn tables(of: &MadeRectangles, classes: &[RectangleClass]) -> Result<PolarisedTables> {
+fn tables(of: &AsBuiltRectangles, classes: &[RectangleClass]) -> Result<PolarisedTables> {
     of.tables(&of_height(1.3), classes, (UM, Spectral::InBand), &Silent)
 }
 
@@ -98,7 +98,7 @@ fn rotated_rectangles_between_the_nodes_are_those_solved_exactly_in_the_light_th
         }
         // Without a pillar nothing is converted, and all that passes is in the other table; so is light that sees none.
         let found = PolarisedTables::Hands(found);
-        let all = MadeRectangles::solved(found.passed(PolarisedLight::default()));
+        let all = AsBuiltRectangles::solved(found.passed(PolarisedLight::default()));
         assert_eq!(all.pillars.len(), 2);
         assert_eq!([all.bare[0], all.unseen[0]], [Complex64::ZERO; 2]);
         assert_eq!([all.pillars[1][1], all.unseen[1]], [all.bare[1], Complex64::ONE]);
@@ -107,7 +107,10 @@ fn rotated_rectangles_between_the_nodes_are_those_solved_exactly_in_the_light_th
             arriving: Some(Polarisation::Circular(Handedness::Left)),
             analyser: Some(Analyser::Circular),
         };
-        assert_eq!(MadeRectangles::solved(found.passed(behind)).pillars, all.pillars[..1]);
+        assert_eq!(
+            AsBuiltRectangles::solved(found.passed(behind)).pillars,
+            all.pillars[..1]
+        );
     }
     assert!(tables(&banked, &[class(1, 20.0)]).is_err());
 }
@@ -136,7 +139,7 @@ fn upright_rectangles_between_the_nodes_are_those_solved_exactly_along_both_axes
             arriving: Some(Polarisation::Unpolarised),
             analyser: None,
         };
-        let all = MadeRectangles::solved(PolarisedTables::Axes(found).passed(both));
+        let all = AsBuiltRectangles::solved(PolarisedTables::Axes(found).passed(both));
         assert_eq!((all.pillars.len(), all.bare.len()), (2, 2));
         assert_eq!(all.pillars[0][1], all.bare[0]);
         assert_eq!(
@@ -172,7 +175,7 @@ fn rows_that_are_kept_are_those_that_were_solved() {
     };
     let mut expected = 0;
     for (pillars, light, number) in [(UPRIGHT.into(), ALONG_X, 3), (ROTATED.into(), HAND, 20)] {
-        let kept = || made(pillars, light).kept_in(Some(folder.path()));
+        let kept = || made(pillars, light).cached_in(Some(folder.path()));
         let classes = [class(number, 0.3)];
         let first = tables(&kept(), &classes).unwrap();
         assert_eq!(first, tables(&made(pillars, light), &classes).unwrap());
@@ -196,10 +199,10 @@ fn rows_that_are_kept_are_those_that_were_solved() {
     // A row that is there is not solved: other numbers under the same inputs are believed.
     let etched = perturbed(&stack(UPRIGHT.into()), &of_height(1.3));
     let orders = RowOrders::Given(BAND_ORDERS);
-    let table = kept::table(Some(folder.path()), &etched, UPRIGHT.into(), &[2], 0.0, (UM, orders));
+    let table = cache::table(Some(folder.path()), &etched, UPRIGHT.into(), &[2], 0.0, (UM, orders));
     let told = [Complex64::new(0.25, 0.5), Complex64::ONE];
-    table.write(&metalith_cell::kept::bytes_of(told), &Silent);
-    let chip = made(UPRIGHT.into(), ALONG_X).kept_in(Some(folder.path()));
+    table.write(&metalith_cell::cache_file::bytes_of(told), &Silent);
+    let chip = made(UPRIGHT.into(), ALONG_X).cached_in(Some(folder.path()));
     let PolarisedTables::Axes(found) = tables(&chip, &[class(2, 0.0)]).unwrap() else {
         panic!("upright rectangles keep both axes apart")
     };
@@ -211,7 +214,7 @@ fn what_rectangles_have_no_meaning_for_is_refused_with_a_reason() {
     let refused = |pillars: Rectangles, focused: FocusedLight, change: &dyn Fn(&mut crate::Perturbation)| {
         let mut model = model();
         change(&mut model.perturbation);
-        let made = MadeRectangles::new(&stack(pillars), &model, focused);
+        let made = AsBuiltRectangles::new(&stack(pillars), &model, focused);
         made.err().expect("it is refused")
     };
     let by_width = |of: &mut crate::Perturbation| {
