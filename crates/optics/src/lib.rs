@@ -46,17 +46,18 @@
 //!
 //! [`AsBuiltElement::aperture`] gives a [`metalith_wave::Aperture`], so that every propagator runs from it.
 
+mod as_built_chip;
+mod as_built_element;
 mod as_built_optics;
-mod bank;
+mod as_built_rectangles;
 mod bounds;
 mod camera;
-mod chip;
+mod cell_bank;
 mod class_fields;
 mod class_table;
 mod declared;
 mod density;
 mod drawn_optics;
-mod element;
 mod element_optics;
 mod etched_stack;
 pub mod expression;
@@ -69,21 +70,21 @@ mod perturbation;
 mod pupil;
 mod rational_interpolation;
 mod realised_cells;
-mod rectangles;
 mod shifted_aperture;
 mod simulation_case;
 mod stitching;
 pub mod zernike;
 
-pub use bank::{BankRange, CellBank};
+pub use as_built_chip::{AsBuiltChip, ModelStatement};
+pub use as_built_element::{AsBuiltAperture, AsBuiltElement, BIAS_STEP_NM, DrawnElement, mixed, realised_nm};
+pub use as_built_rectangles::{RectangleClass, bank_orders};
 pub use bounds::PerturbationFault;
 pub use camera::{KernelFilter, blur, veiled};
-pub use chip::{AsBuiltChip, ModelStatement};
+pub use cell_bank::{BankRange, CellBank};
 pub use class_fields::ClassFields;
 pub use class_table::ClassTable;
 pub use declared::{CompiledTerm, DeclaredQuantity, DeclaredTerm};
 pub use density::{RANGE_UM, fill};
-pub use element::{AsBuiltAperture, AsBuiltElement, BIAS_STEP_NM, DrawnElement, mixed, realised_nm};
 pub use element_optics::{ElementOptics, FocusedSites, Placement};
 pub use etched_stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
 pub use fields::{Field, IncoherentFields, spread};
@@ -93,6 +94,5 @@ pub use neighbour_pillars::NeighbourPillars;
 pub use not_applied::{Applied, NotApplied};
 pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
 pub use realised_cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
-pub use rectangles::{RectangleClass, bank_orders};
 pub use simulation_case::{CaseOptics, SimulationCase};
 pub use stitching::Stitching;

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::CellChange;
-use super::bank::CellBank;
+use super::cell_bank::CellBank;
 use super::etched_stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
 use metalith_cell::{
     BAND_ORDERS, CellStack, Illumination, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, POLARISATION_SHARE, dark,

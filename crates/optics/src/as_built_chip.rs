@@ -7,10 +7,10 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use serde::Serialize;
 
+use super::as_built_rectangles::AsBuiltRectangles;
 use super::etched_stack::to_middle_tops;
 use super::light::wave_of;
 use super::realised_cells::{RealisedCells, SolvedWidths};
-use super::rectangles::AsBuiltRectangles;
 use super::{
     Applied, ArrivingLight, AsBuiltElement, CalibratedModel, CellBank, CellChange, ClassTable, DrawnElement,
     IncoherentFields, NotApplied, Perturbation, RectangleClass, cell_direction, mixed, realised_nm,

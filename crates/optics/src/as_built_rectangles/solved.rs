@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use super::cache;
 use super::rows::{RowOrders, bare_row, row_length, solve_row};
 use super::{Colour, RowsOfBiases};
-use crate::bank::Axis;
+use crate::cell_bank::Axis;
 use crate::rational_interpolation::{around, rational};
 use crate::{CellChange, perturbed};
 use metalith_cell::cache_file::bytes_of;
