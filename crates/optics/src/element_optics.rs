@@ -21,7 +21,7 @@ pub struct Placement {
 
 /// An element whose light is asked for.
 pub trait ElementOptics: Sync {
-    /// Its fields in a light.
+    /// Fields in a light.
     ///
     /// # Errors
     /// If a cell has no answer, or the user stopped it.

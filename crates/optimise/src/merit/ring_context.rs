@@ -5,10 +5,10 @@ use crate::rings::split_complex::Planes;
 
 /// All that a ring's width is multiplied with.
 pub struct RingContext {
-    /// Its own factors: `[product][row]`.
+    /// Own factors: `[product][row]`.
     pub(crate) around: Planes,
-    /// Its factors as a neighbour of others: `[product of one distance][row]`.
+    /// Factors as a neighbour of others: `[product of one distance][row]`.
     pub(crate) reverse: Planes,
-    /// Its links to itself.
+    /// Links to itself.
     pub(crate) same: [Option<usize>; DISTANCES],
 }
