@@ -17,4 +17,4 @@ for design in mini_3x3 prototype_3x3 neighbours_3x3; do
 done
 cp "$work"/cache/neighbours-*.bin "$tables"
 # Cargo does not see by itself that the tables have changed.
-touch crates/cell/src/neighbours/shipped.rs
+touch crates/cell/src/coupled/shipped.rs

@@ -75,7 +75,7 @@ pub fn verify(
         let array = PillarArray::build(design, p)?;
         let model = model.as_deref().map(CalibratedModel::read).transpose()?;
         let chip = |model| -> Result<AsBuiltChip> {
-            Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+            Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.cached_in(cache_folder().as_deref()))
         };
         let made = model.as_ref().map(chip).transpose()?;
         if let Some(chip) = &made {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use metalith::cell::{LitStack, PolarisedLight, cache_folder};
+use metalith::cell::{FocusingStack, PolarisedLight, cache_folder};
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
 use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
@@ -264,7 +264,7 @@ pub fn psf_of_array<'py>(
         let (cells, made) = match &wanted {
             Wanted::Cell(fidelity) => (cell_models(&design, &[*fidelity])?, None),
             Wanted::Model(model) => {
-                let chip = AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref());
+                let chip = AsBuiltChip::in_light(&design.lit_stack()?, model)?.cached_in(cache_folder().as_deref());
                 let classes = chosen.iter().map(|k| &array.array.classes[placed[*k].class]);
                 chip.check_drawn(classes.map(|class| class.widths.histogram()))?;
                 (Vec::new(), Some(chip))
@@ -346,11 +346,11 @@ pub fn psf_of_widths<'py>(
         let (cell, made) = match &wanted {
             Wanted::Cell(fidelity) => (Some(cell_of(*fidelity, stack, &maps, light, &wavelengths_nm)?), None),
             Wanted::Model(model) => {
-                let stated = LitStack {
+                let stated = FocusingStack {
                     focused: shape.basis().map(|_| focused(light, shape)),
                     stack,
                 };
-                let chip = AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref());
+                let chip = AsBuiltChip::in_light(&stated, model)?.cached_in(cache_folder().as_deref());
                 chip.check_drawn(maps.iter().map(PillarMap::histogram))?;
                 (None, Some(chip))
             }

@@ -6,8 +6,8 @@ use clap::Args;
 use metalith::cell::cache_folder;
 use metalith::layout::read_pillars;
 use metalith::optimise::{
-    Checkpoint, Deconvolution, Judged, OptimiseReport, OptimiseTask, Optimised, OverWavelength, TaskCells, lens_alone,
-    mean_and_deviation, views, wavelengths, write_phase_table,
+    Checkpoint, Deconvolution, OptimiseReport, OptimiseTask, Optimised, OverWavelength, StrehlSummary, TaskCells,
+    lens_alone, mean_and_deviation, views, wavelengths, write_phase_table,
 };
 use metalith::report::sig;
 use metalith::study::plan_starts;
@@ -155,7 +155,7 @@ fn findings(
     folder: &Path,
     terminal: &Terminal,
 ) -> Result<OptimiseReport> {
-    let judge = |waves: &[f64]| -> Result<Vec<Judged>> {
+    let judge = |waves: &[f64]| -> Result<Vec<StrehlSummary>> {
         let mut judged = vec![task.judge_rings(waves, cells.own())?];
         if cells.own().fidelity() != cells.rigorous().fidelity() {
             judged.push(task.judge_rings(waves, cells.rigorous())?);

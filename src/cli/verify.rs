@@ -202,7 +202,7 @@ impl Judging {
         }
         let model = self.model()?;
         let chip = |model| -> Result<AsBuiltChip> {
-            Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+            Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.cached_in(cache_folder().as_deref()))
         };
         let made = model.as_ref().map(chip).transpose()?;
         // A made chip judges, and cells of the pillars as drawn stand beside it.

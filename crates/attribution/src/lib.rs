@@ -22,12 +22,12 @@ mod extent;
 mod fit;
 mod forward_model;
 mod index;
-#[cfg(test)]
-mod linear_model;
 mod linear_trend;
 mod measurements;
 mod search;
 mod surrogate;
+#[cfg(test)]
+mod test_model;
 
 pub use effect::{Parameter, Slot, ValueError};
 pub use extent::Extent;

@@ -7,7 +7,7 @@ use metalith_restoration::{Blend, FrameModel, Recorded, RestorationMethod, resto
 use ndarray::{Array2, Array3, Zip};
 
 use crate::baseline_camera::{BaselineCamera, Method, no_stage};
-use crate::stage::{Stage, StageKind};
+use crate::post_processing::{Stage, StageKind};
 use crate::wiener;
 
 /// A chip that is open for scenes of one field, and the ways of restoring its frames.
@@ -159,7 +159,7 @@ impl BaselineCamera for ArrayCamera<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::PICTURES;
+    use crate::post_processing::PICTURES;
     use metalith_core::Silent;
     use metalith_design::array::PillarArray;
     use metalith_design::{Design, cell_models};

@@ -6,7 +6,7 @@ use metalith_imaging::scene::SceneImage;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
-use crate::stage::StageKind;
+use crate::post_processing::StageKind;
 
 /// One way of making a picture of a frame.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
 use crate::baseline_camera::{BaselineCamera, Method};
-use crate::cpu::{cpu_seconds, since};
+use crate::cpu_time::{cpu_seconds, since};
 
 /// Scores of one way of making pictures, in all zones.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -44,12 +44,12 @@ pub struct ComparedCamera {
     pub limits: Option<String>,
     /// The first photograph; it is not kept with the scores.
     #[serde(skip)]
-    pub shown: Option<Shown>,
+    pub shown: Option<ShownPictures>,
 }
 
 /// Pictures of the first photograph.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct ShownPictures {
     /// Linear sRGB.
     pub scene: Array3<f64>,
     pub frame: Frame,
@@ -138,7 +138,7 @@ pub fn compare(
                 pictures.push(picture);
             }
         }
-        shown.get_or_insert(Shown {
+        shown.get_or_insert(ShownPictures {
             scene: truth,
             frame,
             channel_names: camera.channel_names(),

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::compare::{ComparedCamera, ComparisonResult, compare};
 use crate::lensless::of_one_wavelength;
-use crate::stage::Stage;
+use crate::post_processing::Stage;
 use crate::{ArrayCamera, BaselineCamera, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
 
 /// Comparison: designs, cameras without a lens, photographs, and how.

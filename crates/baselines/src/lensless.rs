@@ -10,7 +10,7 @@ use metalith_sensor::{Camera, Sampling};
 use ndarray::{Array2, Array3, Zip};
 
 use crate::baseline_camera::{BaselineCamera, Method, no_stage};
-use crate::stage::{Stage, StageKind};
+use crate::post_processing::{Stage, StageKind};
 
 /// A sensor in the light of scenes of one size and field, whatever stands before it.
 pub struct LenslessBench {

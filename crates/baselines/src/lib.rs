@@ -12,7 +12,7 @@
 //! | what cameras without a lens have in common | `lensless` |
 //! | a mask that is a product of two sequences | `flatcam/` |
 //! | the caustic of a random surface | `diffusercam/` |
-//! | learnt last stages, what they are trained by, and pictures by Wiener filters for one of them | `stage`, `provenance`, `training_stacks` (feature `training`), `wiener` |
+//! | learnt last stages, what they are trained by, and pictures by Wiener filters for one of them | `post_processing`, `provenance`, `training_stacks` (feature `training`), `wiener` |
 //! | which cameras, from their files | `comparison` |
 //! | scores of all photographs | `compare` |
 //! | the table, the page | `table`, `page` |
@@ -21,13 +21,13 @@ mod array;
 mod baseline_camera;
 mod compare;
 mod comparison;
-mod cpu;
+mod cpu_time;
 mod diffusercam;
 mod flatcam;
 mod lensless;
 mod page;
+mod post_processing;
 mod provenance;
-mod stage;
 mod table;
 #[cfg(feature = "training")]
 mod training_stacks;
@@ -40,4 +40,4 @@ pub use comparison::{Comparison, Lensless, ListedDesign, OpenComparison};
 pub use diffusercam::{DiffuserCam, DiffuserSpec};
 pub use flatcam::{FlatCam, MaskSpec};
 pub use page::write_comparison;
-pub use stage::{Stage, StageKind};
+pub use post_processing::{Stage, StageKind};

@@ -9,10 +9,10 @@ use metalith_imaging::SceneView;
 use metalith_prior::Provenance;
 
 use crate::comparison::{Lensless, OpenComparison};
-use crate::stage::{Stage, StageKind, camera_digest};
+use crate::post_processing::{Stage, StageKind, camera_digest};
 
 /// A camera of the table that a last stage can follow.
-pub(crate) struct Followed {
+pub(crate) struct PrecedingCamera {
     /// Digest of what decides its frames: layout, sensor, light, field.
     pub camera: String,
     /// Digest of what its layout does to light, if it has one.
@@ -20,7 +20,7 @@ pub(crate) struct Followed {
     pub kinds: Vec<StageKind>,
 }
 
-impl Followed {
+impl PrecedingCamera {
     /// True if a last stage was trained for it. One that does not say what the layout did to light is taken at its
     /// word.
     fn is_of(&self, kind: StageKind, provenance: &Provenance) -> bool {
@@ -36,7 +36,7 @@ impl Followed {
 impl OpenComparison<'_> {
     /// Requirement on the training of a last stage to follow camera `k` of the table, counted without cameras that have
     /// the assumptions of others: no stage follows these.
-    pub(crate) fn followed(&self, k: usize) -> Result<Followed> {
+    pub(crate) fn followed(&self, k: usize) -> Result<PrecedingCamera> {
         let first = self.photographs[0].view;
         if let Some(k) = k.checked_sub(self.designs.len()) {
             let spec = &self.of.lensless[k];
@@ -44,7 +44,7 @@ impl OpenComparison<'_> {
                 Lensless::FlatCam(_) => StageKind::FlatNet,
                 Lensless::DiffuserCam(_) => StageKind::UnrolledDiffuser,
             };
-            return Ok(Followed {
+            return Ok(PrecedingCamera {
                 camera: camera_digest(spec, &self.camera, &first)?,
                 optics: None,
                 kinds: vec![kind],
@@ -53,7 +53,7 @@ impl OpenComparison<'_> {
         let (listed, (design, camera)) = (&self.of.designs[k], &self.designs[k]);
         let field_deg = listed.field_deg.unwrap_or(first.field_deg);
         let optics = (design.digest(), hex(&file_digest(&listed.layout)?));
-        Ok(Followed {
+        Ok(PrecedingCamera {
             camera: camera_digest(&optics, camera, &SceneView { field_deg, ..first })?,
             optics: Some(design.simulation_digest()?),
             kinds: vec![StageKind::MultiWiener, StageKind::Blending],
@@ -66,7 +66,7 @@ impl OpenComparison<'_> {
             return Ok(());
         }
         let cameras = 0..self.designs.len() + self.of.lensless.len();
-        let followed: Vec<Followed> = cameras.map(|k| self.followed(k)).collect::<Result<_>>()?;
+        let followed: Vec<PrecedingCamera> = cameras.map(|k| self.followed(k)).collect::<Result<_>>()?;
         let mut seen = HashSet::new();
         for (stage, path) in self.stages.iter().zip(&self.of.learnt) {
             let refused = |what: String, hint: &str| {
@@ -139,7 +139,7 @@ mod tests {
         let shipped = Stage::read(&weights).unwrap();
         let before = shipped.provenance();
         assert_eq!(before.optics, None);
-        let camera = Followed {
+        let camera = PrecedingCamera {
             camera: before.camera.clone(),
             optics: Some("nitride".into()),
             kinds: vec![StageKind::MultiWiener],

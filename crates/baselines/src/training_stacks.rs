@@ -11,8 +11,8 @@ use metalith_training::Stack;
 
 use crate::baseline_camera::no_stage;
 use crate::comparison::OpenComparison;
-use crate::provenance::Followed;
-use crate::stage::{StageKind, encoded};
+use crate::post_processing::{StageKind, encoded};
+use crate::provenance::PrecedingCamera;
 
 impl OpenComparison<'_> {
     /// Pictures of all photographs by camera `k` for a last stage, each with its scene, and what is trained by them. Each is kept in a file
@@ -28,7 +28,7 @@ impl OpenComparison<'_> {
         cache: &KernelCache,
         progress: &dyn Progress,
     ) -> Result<(Vec<Stack>, Provenance)> {
-        let Followed { camera, optics, kinds } = self.followed(k)?;
+        let PrecedingCamera { camera, optics, kinds } = self.followed(k)?;
         if !kinds.contains(&kind) {
             return no_stage(kind, "this camera");
         }

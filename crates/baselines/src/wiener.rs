@@ -11,7 +11,7 @@ use ndarray::{Array2, Zip};
 use num_complex::Complex32;
 use rayon::prelude::*;
 
-use crate::stage::PICTURES;
+use crate::post_processing::PICTURES;
 
 /// Places of the field of an element whose kernels are used, from its axis, of the way to the last one that has some: the middle, and
 /// half of the way to each corner.

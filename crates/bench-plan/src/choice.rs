@@ -61,7 +61,7 @@ pub(crate) struct Choice<'a> {
 
 /// A measurement that was chosen, with its frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Picked {
+pub(crate) struct ChosenMeasurement {
     pub candidate: usize,
     pub frames: u32,
 }
@@ -72,30 +72,30 @@ impl Choice<'_> {
     }
 
     /// Some candidates with all of the frames.
-    pub(crate) fn whole(&self, candidates: impl IntoIterator<Item = usize>) -> Vec<Picked> {
+    pub(crate) fn whole(&self, candidates: impl IntoIterator<Item = usize>) -> Vec<ChosenMeasurement> {
         let frames = self.most_frames();
         candidates
             .into_iter()
-            .map(|candidate| Picked { candidate, frames })
+            .map(|candidate| ChosenMeasurement { candidate, frames })
             .collect()
     }
 
     /// Inner products of all parameters in a set, with its nuisances projected out, and its pixels. Registration was taken
     /// out with the most frames: a frame knows it far better than the stage does, so that fewer make no difference.
-    pub(crate) fn products(&self, picked: &[Picked]) -> (DMatrix<f64>, f64) {
+    pub(crate) fn products(&self, picked: &[ChosenMeasurement]) -> (DMatrix<f64>, f64) {
         let mut form = self.information.prior.clone();
         let mut pixels = 0.0;
         for p in picked {
-            let told = &self.information.told[p.candidate];
-            form += &told.form * (f64::from(p.frames) / f64::from(self.most_frames()));
-            pixels += told.pixels;
+            let measured = &self.information.measurements[p.candidate];
+            form += &measured.form * (f64::from(p.frames) / f64::from(self.most_frames()));
+            pixels += measured.pixels;
         }
         let inner = projected(&form, self.information.shared);
         (inner, pixels)
     }
 
     /// Gain per pixel of each requirement, over what is needed.
-    pub(crate) fn margins(&self, picked: &[Picked]) -> Vec<f64> {
+    pub(crate) fn margins(&self, picked: &[ChosenMeasurement]) -> Vec<f64> {
         if picked.is_empty() {
             return vec![0.0; self.requirements.len()];
         }
@@ -105,14 +105,14 @@ impl Choice<'_> {
     }
 
     /// Zero if nothing is missing, the more negative the more is.
-    fn score(&self, picked: &[Picked], reachable: &[bool]) -> f64 {
+    fn score(&self, picked: &[ChosenMeasurement], reachable: &[bool]) -> f64 {
         let margins = self.margins(picked);
         let counted = margins.iter().zip(reachable).filter(|(_, r)| **r);
         let short: f64 = counted.map(|(m, _)| m.max(NOTHING).ln().min(0.0)).sum();
         short - MISSING_GROUP * self.missing_groups(picked) as f64
     }
 
-    fn missing_groups(&self, picked: &[Picked]) -> usize {
+    fn missing_groups(&self, picked: &[ChosenMeasurement]) -> usize {
         let all: Vec<usize> = (0..self.places.len()).collect();
         let own: Vec<usize> = picked.iter().map(|p| p.candidate).collect();
         let lacking = |key: &dyn Fn(&Place) -> [f64; 4], least: usize| {
@@ -168,11 +168,11 @@ impl Choice<'_> {
     }
 
     /// The measurements to take, at most so many, in the order of the candidates.
-    pub(crate) fn measurements(&self, reachable: &[bool], most: usize) -> Vec<Picked> {
-        let mut picked: Vec<Picked> = Vec::new();
+    pub(crate) fn measurements(&self, reachable: &[bool], most: usize) -> Vec<ChosenMeasurement> {
+        let mut picked: Vec<ChosenMeasurement> = Vec::new();
         let mut now = self.score(&picked, reachable);
         while now < -SAME && picked.len() < most {
-            let mut best: Option<(f64, Picked)> = None;
+            let mut best: Option<(f64, ChosenMeasurement)> = None;
             for next in self.whole(0..self.places.len()) {
                 if picked.iter().any(|p| p.candidate == next.candidate) {
                     continue;
@@ -197,7 +197,7 @@ impl Choice<'_> {
     }
 
     /// Take out what the others have made needless, the earliest first: it was chosen knowing the least.
-    fn without_needless(&self, picked: &mut Vec<Picked>, score: f64, reachable: &[bool]) {
+    fn without_needless(&self, picked: &mut Vec<ChosenMeasurement>, score: f64, reachable: &[bool]) {
         let mut place = 0;
         while place < picked.len() && picked.len() > 1 {
             let out = picked.remove(place);
@@ -208,7 +208,7 @@ impl Choice<'_> {
         }
     }
 
-    fn with_fewest_frames(&self, picked: &mut [Picked], score: f64, reachable: &[bool]) {
+    fn with_fewest_frames(&self, picked: &mut [ChosenMeasurement], score: f64, reachable: &[bool]) {
         for place in 0..picked.len() {
             let most = picked[place].frames;
             for &frames in &self.frames {
@@ -250,13 +250,13 @@ pub(crate) fn lookalike(products: &DMatrix<f64>, r: &Requirement) -> Option<Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::information::Told;
+    use crate::information::MeasurementInformation;
     use metalith_calibrate::{ElementIndex, LedIndex, Measurement};
 
     /// Pixels of every test measurement.
     const PIXELS: f64 = 1000.0;
 
-    fn told(form: DMatrix<f64>) -> Told {
+    fn told(form: DMatrix<f64>) -> MeasurementInformation {
         let measurement = Measurement {
             name: String::new(),
             element: ElementIndex::from(0),
@@ -269,7 +269,7 @@ mod tests {
             dn: ndarray::Array2::zeros((1, 1)),
             noise: None,
         };
-        Told {
+        MeasurementInformation {
             measurement,
             form,
             pixels: PIXELS,
@@ -290,7 +290,7 @@ mod tests {
             told(form)
         });
         Information {
-            told: forms.collect(),
+            measurements: forms.collect(),
             prior,
             widths: None,
             shared: 1,
@@ -304,7 +304,7 @@ mod tests {
             beside,
         };
         Choice {
-            places: (0..information.told.len())
+            places: (0..information.measurements.len())
                 .map(|k| Place {
                     element: 0,
                     led: 0,

@@ -19,7 +19,7 @@ use metalith_calibrate::{Simulator, WIDTH_ROOM_NM};
 const TOGETHER: usize = 12;
 
 /// A measurement, exposed as it would be, and what it tells.
-pub(crate) struct Told {
+pub(crate) struct MeasurementInformation {
     /// Candidate with its scale set to the exposure, and its predicted frame.
     pub measurement: Measurement,
     /// Inner products of flux of each LED, black level, every parameter, and the residual, as
@@ -31,7 +31,7 @@ pub(crate) struct Told {
 
 /// Information of all candidates.
 pub(crate) struct Information {
-    pub told: Vec<Told>,
+    pub measurements: Vec<MeasurementInformation>,
     /// Prior knowledge of flux and black level.
     pub prior: DMatrix<f64>,
     /// Information of the widths by SEM, if the bench offers them.
@@ -69,7 +69,7 @@ pub(crate) fn information(
     progress: &dyn Progress,
 ) -> Result<(Information, CellSource)> {
     let mut out = Information {
-        told: Vec::new(),
+        measurements: Vec::new(),
         prior: DMatrix::zeros(0, 0),
         widths: None,
         shared: bench.leds.len() + 1,
@@ -77,7 +77,7 @@ pub(crate) fn information(
     for batch in candidates.measurements.chunks(TOGETHER) {
         let mut set = candidates.set.clone();
         set.measurements = PerMeasurement::from(batch.to_vec());
-        if let Some(offer) = bench.sem.filter(|_| out.told.is_empty()) {
+        if let Some(offer) = bench.sem.filter(|_| out.measurements.is_empty()) {
             set.sem = sem_sites(&set, offer);
         }
         let simulator = Simulator::new(Bench::new(&set, sampling), cells, effects(&set)?);
@@ -88,12 +88,12 @@ pub(crate) fn information(
         let problem = FitProblem::new(&simulator, surrogate, &data);
         let slots: Vec<usize> = (0..nothing.len()).collect();
         let fit = problem.at(&slots, nothing, Nuisances::stated(&data));
-        if out.told.is_empty() {
+        if out.measurements.is_empty() {
             out.prior = fit.nuisances.prior(&data, fit.equations.size());
             out.widths = bench.sem.map(|_| fit.equations.references.clone());
         }
         for ((c, measurement), form) in exposed.measurements.iter_enumerated().zip(&fit.equations.measurements) {
-            out.told.push(Told {
+            out.measurements.push(MeasurementInformation {
                 measurement: measurement.clone(),
                 form: form.clone(),
                 pixels: data.points(c) as f64,

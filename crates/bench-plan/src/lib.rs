@@ -9,23 +9,23 @@
 //! | `bench_file` | what the bench can do and what is asked of it |
 //! | `limits` | whether a set of the design can be planned |
 //! | `candidates` | every measurement that it could take |
-//! | `wanted` | what is asked of them |
+//! | `requirements` | what is asked of them |
 //! | `information` | normal equations of each, by the simulator and the noise |
 //! | `choice` | the fewest measurements |
-//! | `judgement` | what they find, and what they cannot distinguish |
-//! | `begun` | a folder whose plan is not to be overwritten |
+//! | `expected_performance` | what they find, and what they cannot distinguish |
+//! | `filled_in_files` | a folder whose plan is not to be overwritten |
 //! | `files`, `page` | the set folder, and the check list |
 
-mod begun;
 mod bench_file;
 mod candidates;
 mod choice;
+mod expected_performance;
 mod files;
+mod filled_in_files;
 mod information;
-mod judgement;
 mod limits;
 mod page;
-mod wanted;
+mod requirements;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -35,13 +35,13 @@ use metalith_design::Design;
 use metalith_pillars::PillarReader;
 use serde::Serialize;
 
-pub use begun::check_not_begun;
 pub use bench_file::{BenchFile, SemOffer};
-pub use judgement::{Confusion, PlannedEffect};
+pub use expected_performance::{Confusion, PlannedEffect};
+pub use filled_in_files::check_not_begun;
 pub use limits::check_plannable;
 
 use candidates::{Candidates, sem_sites};
-use choice::{Choice, Picked, Place, Requirement};
+use choice::{Choice, ChosenMeasurement, Place, Requirement};
 use information::{Information, cells_of, exposed};
 use metalith_calibrate::MeasuredSet;
 use metalith_calibrate::Simulator;
@@ -49,7 +49,7 @@ use metalith_calibrate::check_effects;
 use metalith_calibrate::{Bench, BenchSampling};
 use metalith_calibrate::{Effect, all_effects};
 use metalith_calibrate::{Surrogate, check_calibration_fits};
-use wanted::{check_wanted, only_of_what_is_found, requirements};
+use requirements::{check_wanted, only_of_what_is_found, requirements};
 
 /// Spectra of a plan: steps in wavelength are coarser than those of a calibration, since nothing is fitted.
 const SAMPLING: BenchSampling = BenchSampling {
@@ -150,7 +150,7 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
     check_wanted(&candidates.set, bench)?;
     let (information, cells) = information::information(&candidates, bench, SAMPLING, &effects, cells, progress)?;
     let choice = Choice {
-        places: information.told.iter().map(|t| place(&t.measurement)).collect(),
+        places: information.measurements.iter().map(|t| place(&t.measurement)).collect(),
         requirements: requirements(&known, bench),
         frames: bench.frames.clone(),
         information: &information,
@@ -174,8 +174,8 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
         .filter(|((r, _), _)| r.beside.is_empty())
         .map(|((r, margin), reachable)| (r.clone(), margin, *reachable))
         .collect();
-    let effects = judgement::effects(&simulator, &surrogate, &shown, &detections, progress)?;
-    let confusions = judgement::confusions(&simulator, &shown, &choice, &picked, &reachable);
+    let effects = expected_performance::effects(&simulator, &surrogate, &shown, &detections, progress)?;
+    let confusions = expected_performance::confusions(&simulator, &shown, &choice, &picked, &reachable);
     files::write_set(request.folder, design, bench, &shown, &request.layout_in_set)?;
     let plan = MeasurementPlan {
         folder: request.folder.to_owned(),
@@ -184,7 +184,7 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
         measurements: shown.measurements.iter().map(|c| planned(c, &shown, bench)).collect(),
         effects,
         confusions,
-        written: begun::digests(request.folder)?,
+        written: filled_in_files::digests(request.folder)?,
     };
     page::write_page(&plan, &shown, candidates.unseen)?;
     metalith_report::write_json(&request.folder.join("plan.json"), "plan", &plan)?;
@@ -210,12 +210,17 @@ fn place(measurement: &metalith_calibrate::Measurement) -> Place {
 }
 
 /// The session of the measurements that were chosen, and the widths by SEM that are offered.
-fn chosen_set(candidates: &Candidates, bench: &BenchFile, information: &Information, picked: &[Picked]) -> MeasuredSet {
+fn chosen_set(
+    candidates: &Candidates,
+    bench: &BenchFile,
+    information: &Information,
+    picked: &[ChosenMeasurement],
+) -> MeasuredSet {
     let mut set = candidates.set.clone();
     set.measurements = picked
         .iter()
         .map(|p| {
-            let mut measurement = information.told[p.candidate].measurement.clone();
+            let mut measurement = information.measurements[p.candidate].measurement.clone();
             measurement.frames = p.frames;
             measurement
         })

@@ -14,7 +14,7 @@ use metalith_optics::Perturbation;
 
 /// The error of one fidelity of the cell.
 #[derive(Clone, Debug, Serialize)]
-pub struct Rung {
+pub struct FidelityError {
     pub fidelity: String,
     /// Reduced chi-square per pixel of the fit.
     pub fit: f64,
@@ -35,7 +35,7 @@ pub(crate) fn compare_fidelities(
     sampling: BenchSampling,
     problem: &FitProblem<'_>,
     progress: &dyn Progress,
-) -> Result<Vec<Rung>> {
+) -> Result<Vec<FidelityError>> {
     let mut rungs = Vec::new();
     if set.stack.is_of_the_paper() {
         rungs = polynomials(set, sampling, problem, progress)?;
@@ -50,7 +50,7 @@ fn polynomials(
     sampling: BenchSampling,
     problem: &FitProblem<'_>,
     progress: &dyn Progress,
-) -> Result<Vec<Rung>> {
+) -> Result<Vec<FidelityError>> {
     let bench = Bench::new(set, sampling);
     let published = CellSource::Model(Box::new(PublishedCell::new(set.stack.cell.pitch_nm as u32)));
     let ends = bench
@@ -78,13 +78,13 @@ fn polynomials(
     Ok(rungs)
 }
 
-fn rung(name: &str, problem: &FitProblem<'_>) -> Rung {
+fn rung(name: &str, problem: &FitProblem<'_>) -> FidelityError {
     let fit = problem.nuisance_fit();
     let residual = |c| {
         let image = problem.prediction(&fit.theta, c);
         fit.nuisances.residual(problem.data, &image, c)
     };
-    Rung {
+    FidelityError {
         fidelity: name.into(),
         fit: fit.chi2 / problem.points(),
         held_out: mean_error(&held_out(problem, &fit.equations, &fit)),

@@ -25,7 +25,8 @@ mod diagnosis;
 mod effects;
 mod fidelity;
 mod grouping;
-mod names;
+mod interval_parts;
+mod nearest_names;
 mod optics;
 mod page;
 mod proposal;
@@ -40,7 +41,6 @@ mod smooth_shape;
 mod speckle;
 mod statistics;
 mod validate;
-mod width_parts;
 
 pub use bench::{Bench, BenchSampling};
 pub use cells::{CellSource, RigorousCells};
@@ -50,8 +50,9 @@ pub use diagnosis::{
     SetVerdict, Slope,
 };
 pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects, of_any_chip};
-pub use fidelity::Rung;
-pub use names::RENAMED as RENAMED_EFFECTS;
+pub use fidelity::FidelityError;
+pub use interval_parts::WidthParts;
+pub use nearest_names::RENAMED as RENAMED_EFFECTS;
 pub use proposal::{FieldBoundary, Proposed, boundary_of_fields, propose};
 pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations, check_effects};
@@ -66,4 +67,3 @@ pub use validate::synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};
 pub use validate::{
     ClaimedNumber, Coverage, DetectionLimit, Validation, ValidationPlan, ValidationTrial, validate, write_validation,
 };
-pub use width_parts::WidthParts;

@@ -12,13 +12,13 @@ use crate::data::Data;
 use crate::diagnosis::Diagnosis;
 use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
-use crate::names::unknown_names;
+use crate::interval_parts::WidthParts;
+use crate::nearest_names::unknown_names;
 use crate::screening::{UnusableMeasurement, unusable_measurements};
 use crate::set::{MeasuredSet, PerMeasurement};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::speckle::DefectNoise;
 use crate::statistics::{EndsSearch, Evidence, Fit, FitProblem, Surrogate, attribute_set, fit_of, half_widths};
-use crate::width_parts::WidthParts;
 
 /// Settings of the work on a set.
 #[derive(Clone, Debug)]

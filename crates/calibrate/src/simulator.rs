@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::bench::{Bench, Lit};
+use super::bench::{Bench, IlluminatedChip};
 use super::cells::{CellSource, PillarTable};
 use super::effects::Effect;
 use super::optics::PixelGrid;
@@ -145,9 +145,9 @@ impl<'a> Simulator<'a> {
                     Some(own)
                 })
                 .collect();
-            let chips: Vec<Lit<'_>> = together
+            let chips: Vec<IlluminatedChip<'_>> = together
                 .iter()
-                .map(|(step, cells, rim)| Lit {
+                .map(|(step, cells, rim)| IlluminatedChip {
                     cells: Arc::clone(cells),
                     rim: rim.clone(),
                     geometry: &perturbations[step[0]].geometry,

@@ -50,7 +50,7 @@ impl LibraryStudy {
         let wavelength_um = design.mapping.wavelength_um;
         let stack = design.cell_stack()?;
         let full = stack.full_transmission(wavelength_um)?;
-        let cell = UprightCell::new(stack, pillars, PolarisationAxis::X).kept_in(cache);
+        let cell = UprightCell::new(stack, pillars, PolarisationAxis::X).cached_in(cache);
         let along = cell.along(wavelength_um, progress)?;
         let library = PillarLibrary::of_cell(pillars, &along, full)?;
         let of_x = |number: u16| along[0][usize::from(number)] / full;

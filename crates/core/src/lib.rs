@@ -1,6 +1,6 @@
 //! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY.
 
-mod cross;
+mod alignment_cross;
 #[cfg(feature = "documents")]
 pub mod document;
 mod error;
@@ -17,7 +17,7 @@ mod warning;
 mod wedge;
 mod zernike;
 
-pub use cross::cross_corners;
+pub use alignment_cross::cross_corners;
 #[cfg(feature = "documents")]
 pub use document::{Fault, FaultKind, Faults};
 pub use error::{Error, Result};

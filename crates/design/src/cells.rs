@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use metalith_cell::{
-    CellModel, CellStack, Fidelity, FittedCell, LitStack, Mapping, NeighbourCell, PointwiseCell, PublishedCell,
+    CellModel, CellStack, Fidelity, FittedCell, FocusingStack, Mapping, NeighbourCell, PointwiseCell, PublishedCell,
     TableSpec, UniformLayer, cache_folder, polarising_cell,
 };
 use metalith_core::{Error, Result};
@@ -44,8 +44,8 @@ impl Design {
     ///
     /// # Errors
     /// As [`Design::cell_stack`].
-    pub fn lit_stack(&self) -> Result<LitStack> {
-        Ok(LitStack {
+    pub fn lit_stack(&self) -> Result<FocusingStack> {
+        Ok(FocusingStack {
             stack: self.cell_stack()?,
             focused: self.focused(),
         })
@@ -168,7 +168,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                 Fidelity::Rigorous => {
                     let stack = design.cell_stack()?;
                     let cell = PointwiseCell::new(stack, design.cell.widths_nm());
-                    Ok(Box::new(cell.kept_in(cache_folder().as_deref())))
+                    Ok(Box::new(cell.cached_in(cache_folder().as_deref())))
                 }
                 Fidelity::Neighbours => Ok(Box::new(neighbour_cell(design, cache_folder())?)),
                 Fidelity::Calibrated => Err(Error::refused(

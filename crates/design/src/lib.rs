@@ -4,6 +4,7 @@ pub mod array;
 mod cell_file;
 mod cells;
 mod design;
+mod digest;
 mod lattice_orders;
 pub mod phase;
 mod spec;

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::context::Context;
 use super::findings::Findings;
-use super::flat::{FlatLayout, Loose};
+use super::flat_layout::{FlatLayout, LooseShapes};
 use super::polygon::{point_segment, ring_of};
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::tolerance::EQUAL_NM;
@@ -115,7 +115,7 @@ impl Rule for ApertureRule {
 }
 
 /// Openings that the centre of an element lies in.
-fn over_centre(flat: &FlatLayout<'_>, openings: &Loose, element: usize) -> Result<Vec<usize>, Stop> {
+fn over_centre(flat: &FlatLayout<'_>, openings: &LooseShapes, element: usize) -> Result<Vec<usize>, Stop> {
     let [x, y] = flat.elements[element]
         .site
         .centre_nm
@@ -134,7 +134,7 @@ impl ApertureRule {
     fn judge_element(
         &self,
         flat: &FlatLayout<'_>,
-        openings: &Loose,
+        openings: &LooseShapes,
         element: usize,
         over: &[usize],
         found: &mut Findings,
@@ -176,7 +176,7 @@ impl ApertureRule {
 }
 
 /// Metal on shapes of the pillar layer that belong to no element.
-fn metal_on_others(flat: &FlatLayout<'_>, openings: &Loose, found: &mut Findings) -> RuleOutcome {
+fn metal_on_others(flat: &FlatLayout<'_>, openings: &LooseShapes, found: &mut Findings) -> RuleOutcome {
     for r in flat.loose(flat.pillars).iter().flat_map(|l| l.bounds()) {
         let mut open = false;
         for opening in openings.bodies() {

@@ -8,7 +8,7 @@ use include_dir::{Dir, include_dir};
 
 use super::context::Context;
 use super::rule::{DeckRule, Rule, Severity};
-use super::{aperture, budget, density, design, field, lattice, layers, marks, outline, spacing, tree, width};
+use super::{aperture, budget, density, design, grids, layers, marks, outline, spacing, tree, width, write_fields};
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::text::quoted;
@@ -207,10 +207,10 @@ fn read_rule(s: &Section<'_, '_>, context: &Context, ids: &mut BTreeSet<String>)
     let families: [Family; 12] = [
         width::read,
         outline::read,
-        lattice::read,
+        grids::read,
         spacing::read,
         density::read,
-        field::read,
+        write_fields::read,
         aperture::read,
         marks::read,
         layers::read,

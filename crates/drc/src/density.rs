@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::findings::Findings;
-use super::flat::FlatLayout;
+use super::flat_layout::FlatLayout;
 use super::rule::{NotRun, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_design::Design;

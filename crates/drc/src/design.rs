@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::findings::Findings;
-use super::flat::FlatLayout;
+use super::flat_layout::FlatLayout;
 use super::rule::{NO_DESIGN, Needs, NotRun, Rule, RuleOutcome};
 use super::work::{Stop, Work};
 

@@ -8,20 +8,19 @@
 mod aperture;
 mod body;
 mod budget;
+mod collect_shapes;
 mod context;
 mod deck;
 mod density;
 mod design;
 pub mod diff;
-mod drawn;
+mod drawn_outline;
 mod elements;
 mod export;
-mod field;
 mod findings;
-mod flat;
-mod gather;
+mod flat_layout;
+mod grids;
 mod input;
-mod lattice;
 mod layers;
 mod marks;
 mod outline;
@@ -36,6 +35,7 @@ mod waiver;
 mod width;
 mod winding;
 mod work;
+mod write_fields;
 
 pub use deck::Deck;
 pub use export::{junit, lyrdb, sarif, text};
@@ -46,7 +46,7 @@ pub use rule::{Severity, Status};
 pub use waiver::{Date, Waiver, Waivers};
 
 use findings::Findings;
-use flat::FlatLayout;
+use flat_layout::FlatLayout;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_gds::Layout;
@@ -76,7 +76,7 @@ pub fn check(layout: &Layout, deck: &Deck, input: &CheckInput<'_>, progress: &dy
         .iter()
         .map(|r| Findings::new(&r.id, layout.unit_nm(), input))
         .collect();
-    let mut flat = gather::gather(layout, deck, input, &allowance, &work, &mut found, progress)?;
+    let mut flat = collect_shapes::gather(layout, deck, input, &allowance, &work, &mut found, progress)?;
     flat.array = input.array.or(built.as_ref());
     progress.begin("rules", deck.rules().len() as u64);
     let mut statuses = Vec::with_capacity(deck.rules().len());

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::findings::Findings;
-use super::flat::{FlatLayout, Loose};
+use super::flat_layout::{FlatLayout, LooseShapes};
 use super::rule::{NotRun, Rule, RuleOutcome};
 use metalith_core::document::{Limits, Section};
 use metalith_design::MarkSpec;
@@ -103,7 +103,7 @@ fn keep_out(
         };
         let near = |r: &Rect| r.x0 < zone.x1 && zone.x0 < r.x1 && r.y0 < zone.y1 && zone.y0 < r.y1;
         for layer in others {
-            flat.work.spend(flat.loose(*layer).map_or(0, Loose::len))?;
+            flat.work.spend(flat.loose(*layer).map_or(0, LooseShapes::len))?;
             let shapes = flat.loose(*layer).into_iter().flat_map(|l| l.bounds());
             for r in shapes.filter(|r| near(r) && (*layer != marks || *r != mark)) {
                 found.rect(&r, || format!("within {} um of a mark", nm * 1e-3));

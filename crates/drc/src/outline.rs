@@ -1,7 +1,7 @@
 //! Rules of how outlines are drawn: squares, right angles, no crossings, no needless or doubled vertices.
 
 use super::context::Context;
-use super::drawn::DrawnOutline;
+use super::drawn_outline::DrawnOutline;
 use super::findings::Findings;
 use super::rule::Rule;
 use super::tolerance::ROUNDING_DEG;

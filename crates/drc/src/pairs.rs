@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::body::Body;
-use super::flat::{FlatLayout, Loose};
+use super::flat_layout::{FlatLayout, LooseShapes};
 use super::work::{Stop, Work};
 use metalith_gds::{LayerNumber, Rect};
 use metalith_pillars::PillarRows;
@@ -43,7 +43,7 @@ pub(super) fn near<'s>(
 /// Pairs of [`near`] with loose shapes.
 fn near_loose<'s>(
     flat: &'s FlatLayout<'_>,
-    loose: &'s Loose,
+    loose: &'s LooseShapes,
     layer: LayerNumber,
     reach: i64,
     f: &mut impl FnMut(Body<'s>, Body<'s>),

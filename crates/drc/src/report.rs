@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::deck::Deck;
 use super::findings::{Findings, Marker};
-use super::flat::FlatLayout;
+use super::flat_layout::FlatLayout;
 use super::input::CheckInput;
 use super::rule::{Severity, Status};
 

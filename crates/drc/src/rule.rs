@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::drawn::DrawnOutline;
+use super::drawn_outline::DrawnOutline;
 use super::findings::Findings;
-use super::flat::FlatLayout;
+use super::flat_layout::FlatLayout;
 use super::work::Stop;
 use metalith_core::document::Section;
 use metalith_gds::LayerNumber;

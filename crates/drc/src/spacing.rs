@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::context::Context;
 use super::findings::Findings;
-use super::flat::FlatLayout;
+use super::flat_layout::FlatLayout;
 use super::pairs::{near, place};
 use super::rule::{NO_DESIGN, NotRun, Rule, RuleOutcome, from_design};
 use super::tolerance::ROUNDING_NM;

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::findings::Findings;
-use super::flat::FlatLayout;
+use super::flat_layout::FlatLayout;
 use super::rule::{Needs, Rule, RuleOutcome};
 use metalith_core::document::Section;
 use metalith_gds::{Faulty, Layout};

@@ -1,7 +1,7 @@
 //! Widths of pillars: between limits, in proportion to their height, and of the cell library.
 
 use super::context::Context;
-use super::drawn::DrawnOutline;
+use super::drawn_outline::DrawnOutline;
 use super::findings::Findings;
 use super::rule::Rule;
 use super::tolerance::{EQUAL_NM, ROUNDING};

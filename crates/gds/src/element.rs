@@ -1,4 +1,4 @@
-//! One element, decoded by the grammar alone. What [`super::fast`] recognises is tested against this.
+//! One element, decoded by the grammar alone. What [`super::pillar_records`] recognises is tested against this.
 
 use super::input::Input;
 use super::limits::ReadLimits;

@@ -8,7 +8,7 @@ use super::element::{ElementContent, ElementKind};
 use super::layout::Layout;
 use super::names::Recent;
 use super::oasis::Copies;
-use super::outline::outline;
+use super::path_outline::outline;
 use super::shape::Point;
 use super::walk::{Sink, SinkError, Walk};
 use crate::error::{LayoutError, Limit, Result};

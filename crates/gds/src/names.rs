@@ -63,7 +63,7 @@ impl Names {
     }
 }
 
-/// Numbers of short names found lately, by key ([`super::fast::Reference`]): the millions of references of
+/// Numbers of short names found lately, by key ([`super::pillar_records::Reference`]): the millions of references of
 /// a layout go to a few hundred cells.
 pub(super) struct Recent(Vec<(u64, u32)>);
 

@@ -1,7 +1,7 @@
 //! Outlines that stand for pillars.
 
 use super::circle::circle_of;
-use super::memo::{BoxMemo, OutlineMemo};
+use super::outline_memo::{BoxMemo, OutlineMemo};
 use super::rectangle::tilted_rectangle_of;
 use super::shape::{Outline, Point, Rect, Shape, rectangle_of, simplified};
 use super::transform::Transform;

@@ -9,7 +9,7 @@ use super::input::{Input, Source};
 use super::limits::ReadLimits;
 use super::names::{Names, Recent};
 use super::oasis::{self, Copies, Texts};
-use super::outline::outline;
+use super::path_outline::outline;
 use super::record::{self, kind};
 use super::shape::{Point, Rect};
 use super::walk::{Sink, SinkError, Walk};

@@ -7,8 +7,8 @@ use super::element::{ElementContent, ElementKind};
 use super::layout::Layout;
 use super::names::Recent;
 use super::oasis::Copies;
-use super::outline::outline;
-use super::place::{self, magnified};
+use super::path_outline::outline;
+use super::placements::{self, magnified};
 use super::shape::{Outline, Point, Rect, Shape, ShapeKind, Text, rectangle_of};
 use super::transform::Transform;
 use super::tree;
@@ -82,7 +82,7 @@ impl Layout {
             return Err(self.fault(0, cause));
         }
         let mut input = self.reopen()?;
-        let placed = place::placements(self, &mut input, &roots)?;
+        let placed = placements::placements(self, &mut input, &roots)?;
         let mut own_input = self.reopen()?;
         let small = self.inline_shapes(&mut own_input, &counts)?;
         drop(own_input);
@@ -123,7 +123,7 @@ impl Layout {
         let mut walk = Walk::new(self.limits(), &Silent);
         for (index, cell) in self.cells().iter().enumerate() {
             if cell.inline && counts[index] > 0 {
-                let mut keep = Keep {
+                let mut keep = ShapeCollector {
                     shapes: Vec::new(),
                     unit_nm: self.unit_nm(),
                     numbered,
@@ -164,14 +164,14 @@ impl InlineShape {
     }
 }
 
-struct Keep {
+struct ShapeCollector {
     shapes: Vec<InlineShape>,
     unit_nm: f64,
     /// The number of the next one.
     numbered: u32,
 }
 
-impl Keep {
+impl ShapeCollector {
     fn keep(&mut self, kind: ShapeKind, layer: LayerNumber, points: Vec<Point>) {
         self.shapes
             .push(InlineShape::new(kind, layer, points, self.unit_nm, self.numbered));
@@ -179,7 +179,7 @@ impl Keep {
     }
 }
 
-impl Sink for Keep {
+impl Sink for ShapeCollector {
     fn five_points(&mut self, _offset: u64, layer: LayerNumber, points: &[Point; 5]) -> Result<(), SinkError> {
         self.keep(ShapeKind::Boundary, layer, points.to_vec());
         Ok(())

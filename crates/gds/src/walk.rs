@@ -2,10 +2,10 @@
 
 use super::cells::CellInput;
 use super::element::{ElementContent, ElementKind};
-use super::fast;
 use super::input::Input;
 use super::limits::ReadLimits;
 use super::oasis::Copies;
+use super::pillar_records;
 use super::record::kind;
 use super::shape::Point;
 use crate::error::{Error, LayoutError, Result};
@@ -55,7 +55,7 @@ pub(super) struct Walk<'a> {
     pub limits: &'a ReadLimits,
     pub progress: &'a dyn Progress,
     element: ElementContent,
-    /// True if [`super::fast`] may be used: tests read with and without.
+    /// True if [`super::pillar_records`] may be used: tests read with and without.
     fast: bool,
     reported: u64,
 }
@@ -135,9 +135,9 @@ impl<'a> Walk<'a> {
             let mut at = 0;
             while let Some(bytes) = window.get(at..).and_then(<[u8]>::first_chunk) {
                 let offset = base + at as u64;
-                let (taken, length) = if let Some((layer, points)) = fast::boundary(bytes) {
-                    (sink.five_points(offset, layer, &points), fast::BOUNDARY_BYTES)
-                } else if let Some(reference) = bytes.first_chunk().and_then(fast::reference) {
+                let (taken, length) = if let Some((layer, points)) = pillar_records::boundary(bytes) {
+                    (sink.five_points(offset, layer, &points), pillar_records::BOUNDARY_BYTES)
+                } else if let Some(reference) = bytes.first_chunk().and_then(pillar_records::reference) {
                     let taken = sink.plain_reference(offset, reference.key, reference.at);
                     (taken, reference.bytes)
                 } else {
@@ -149,7 +149,7 @@ impl<'a> Walk<'a> {
                     Err(SinkError::With(error)) => return Err(error),
                 }
             }
-            let more = window.len() - at < fast::BOUNDARY_BYTES && at > 0;
+            let more = window.len() - at < pillar_records::BOUNDARY_BYTES && at > 0;
             input.consume(at);
             if !more {
                 return Ok(());

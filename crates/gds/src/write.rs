@@ -1,7 +1,7 @@
 //! The two elements that a layout has millions of, as templates: all bytes ready but for the place.
 
 use crate::LayerNumber;
-use crate::fast::BOUNDARY_BYTES;
+use crate::pillar_records::BOUNDARY_BYTES;
 
 /// Offset at which the points of a BOUNDARY without optional record begin.
 const POINTS: usize = 20;

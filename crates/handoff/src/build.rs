@@ -5,12 +5,12 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use super::contents::{Contents, Handoff, HandoffCheck};
-use super::guard::{fits, replaceable};
+use super::inputs::Sources;
 use super::listing::Listing;
 use super::manifest::{Manifest, entry_of, files_below};
 use super::options::HandoffOptions;
-use super::sources::Sources;
-use super::{documents, front, layouts, manifest, rules, zip};
+use super::preconditions::{fits, replaceable};
+use super::{documents, front_page, layouts, manifest, rules, zip};
 use metalith_cell::{Fidelity, cache_folder};
 use metalith_core::{AtomicFolder, Error, Progress, Result};
 use metalith_design::array::PillarArray;
@@ -104,7 +104,7 @@ fn fill(
         rules: checked.reports,
         files: files.files.clone(),
     };
-    front::write(&files.at(""), &contents)?;
+    front_page::write(&files.at(""), &contents)?;
     write_json(&files.at("handoff.json"), "handoff", &contents)?;
     Ok(contents.checks)
 }
@@ -136,7 +136,7 @@ fn verification(
     }
     let models = cell_models(design, &wanted)?;
     let chip = |model| -> Result<AsBuiltChip> {
-        Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.kept_in(cache_folder().as_deref()))
+        Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.cached_in(cache_folder().as_deref()))
     };
     let made = sources.model.as_ref().map(chip).transpose()?;
     let cases = match &made {

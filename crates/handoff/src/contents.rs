@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::census::LayoutStatistics;
 use super::documents::Documents;
+use super::dose_matrix::DoseBlock;
 use super::drawing::RectNm;
+use super::layout_statistics::LayoutStatistics;
 use super::manifest::Manifest;
-use super::matrix::DoseBlock;
 use super::process::Process;
 use super::structures::Structure;
 use metalith_core::Result;

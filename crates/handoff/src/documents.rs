@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-use super::census::LayoutStatistics;
 use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
 use super::exposure::{exposures, snapping};
 use super::kind_words::KindWords;
+use super::layout_statistics::LayoutStatistics;
 use super::layouts::Layouts;
 use super::listing::Listing;
+use super::metrology_sites::{Cross, MetrologySite, crosses, sites};
 use super::process::Process;
-use super::sites::{Cross, MetrologySite, crosses, sites};
 use super::{job, tables};
 use metalith_core::Result;
 use metalith_design::Design;

@@ -1,9 +1,9 @@
 //! Exposed area and writing time of the first step, and the effect of the shot grid on widths.
 
-use super::census::LayoutStatistics;
 use super::dose::{Beam, Exposure, WriteTime};
-use super::fields;
+use super::layout_statistics::LayoutStatistics;
 use super::process::Process;
+use super::write_fields;
 use metalith_core::Result;
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
@@ -18,7 +18,7 @@ pub(super) fn exposures(
     let layers = &design.layout.layers;
     let mut exposures = Vec::new();
     for file in census {
-        let exposed = |l: &&super::census::LayerCount| {
+        let exposed = |l: &&super::layout_statistics::LayerCount| {
             let number = (i32::from(l.layer), i32::from(l.datatype));
             let is =
                 |layer: &metalith_design::LayoutLayer| number == (i32::from(layer.layer), i32::from(layer.datatype));
@@ -35,9 +35,9 @@ pub(super) fn exposures(
         }
         let Some(bounds) = bounds else { continue };
         exposure.fields = if exposures.is_empty() {
-            fields::of_design(design, process)
+            write_fields::of_design(design, process)
         } else {
-            fields::of_bounds(bounds, process)
+            write_fields::of_bounds(bounds, process)
         };
         let times = process
             .writer

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::dose::{Beam, doses};
+use super::metrology_sites::Cross;
 use super::process::Process;
-use super::sites::Cross;
 use metalith_design::Design;
 
 const WARNING: &str = "\

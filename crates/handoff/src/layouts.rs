@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use super::census::LayoutStatistics;
+use super::dose_matrix::{self, DoseBlock};
 use super::drawing::RectNm;
+use super::inputs::Sources;
+use super::layout_statistics::LayoutStatistics;
 use super::listing::Listing;
-use super::matrix::{self, DoseBlock};
 use super::process::Process;
-use super::sources::Sources;
 use super::structures::{Structure, Structures};
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
@@ -112,7 +112,7 @@ pub(super) fn write(
         named("dose", "dose_matrix"),
         "dose matrix for step 1: nine doses, datatype is the dose",
     );
-    let blocks = matrix::write(&dose_matrix, design, process)?;
+    let blocks = dose_matrix::write(&dose_matrix, design, process)?;
     let structures = Structures::new(design, process);
     let tests_frame = (structures.frame, structures.field_border);
     let tests = files.add(named("tests", "tests_pillars"), "test structures of step 1");
@@ -159,7 +159,7 @@ const BESIDE_REFERENCE: i64 = 50_000;
 
 /// The design with one hyperbolic lens on a separate chip, at full size.
 fn reference_design(design: &Design, process: &Process) -> Design {
-    let mut reference = matrix::hyperbolic(design, process.reference_wavelength_nm(design));
+    let mut reference = dose_matrix::hyperbolic(design, process.reference_wavelength_nm(design));
     reference.name = "reference_lens".into();
     reference.title = "Hyperbolic reference lens".into();
     reference.layout.marks.clear();

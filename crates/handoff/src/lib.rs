@@ -6,38 +6,38 @@
 //! Counts, areas and bounding boxes are read from the bytes of the files that are handed over.
 
 mod build;
-mod census;
 mod contents;
 mod documents;
 mod dose;
+mod dose_matrix;
 mod drawing;
 mod exposure;
-mod fields;
-mod front;
-mod guard;
+mod front_page;
+mod inputs;
 mod job;
 mod kind_words;
+mod layout_statistics;
 mod layouts;
 mod listing;
 mod manifest;
-mod matrix;
+mod metrology_sites;
 mod options;
 mod pad;
 mod pictures;
+mod preconditions;
 mod process;
 mod rules;
-mod sites;
-mod sources;
 mod structures;
 mod tables;
+mod write_fields;
 mod zip;
 
 pub use build::handoff;
-pub use census::{CellCount, LayerCount, LayoutStatistics};
 pub use contents::{Handoff, HandoffCheck};
 pub use dose::{Beam, DoseRow, Exposure, WriteTime};
+pub use layout_statistics::{CellCount, LayerCount, LayoutStatistics};
 pub use manifest::{HandoffVerification, Manifest, ManifestEntry, verify as verify_handoff};
+pub use metrology_sites::{Cross, MetrologySite};
 pub use options::HandoffOptions;
 pub use pad::DrawnSize;
 pub use process::Process;
-pub use sites::{Cross, MetrologySite};

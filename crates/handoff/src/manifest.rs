@@ -217,7 +217,7 @@ pub(super) fn entry_of(path: &Path, progress: &dyn Progress) -> Result<ManifestE
 
 /// Content of a folder, by relative path.
 #[derive(Default)]
-pub(super) struct Below {
+pub(super) struct FolderContent {
     pub files: BTreeMap<String, PathBuf>,
     /// Entries that are neither file nor folder, such as links: a hand-off has none, and they are not opened.
     pub other: Vec<String>,
@@ -229,8 +229,8 @@ pub(super) struct Below {
 ///
 /// # Errors
 /// If it cannot be read.
-pub(super) fn files_below(folder: &Path) -> Result<Below> {
-    let mut found = Below::default();
+pub(super) fn files_below(folder: &Path) -> Result<FolderContent> {
+    let mut found = FolderContent::default();
     let mut open = vec![(String::new(), folder.to_owned())];
     while let Some((prefix, folder)) = open.pop() {
         let mut entries = 0;

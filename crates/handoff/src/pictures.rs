@@ -1,7 +1,7 @@
 //! Pictures of a hand-off: the chip, the tone of both steps in cross-section, the dose matrix, the tests.
 
+use super::dose_matrix::DoseBlock;
 use super::drawing::RectNm;
-use super::matrix::DoseBlock;
 use super::pad::PadPillar;
 use super::process::{Method, Process, Tone};
 use super::structures::Structure;

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::contents::{HandoffCheck, RuleReports};
+use super::inputs::Sources;
 use super::layouts::{Layouts, OfEach};
 use super::listing::Listing;
-use super::sources::Sources;
 use super::structures::{Structure, middle_of_reference};
 use metalith_core::{AtomicFile, Progress, Result};
 use metalith_design::Design;

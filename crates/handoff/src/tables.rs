@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::dose::{DoseRow, WriteTime};
+use super::dose_matrix::DoseBlock;
 use super::kind_words::KindWords;
-use super::matrix::DoseBlock;
+use super::metrology_sites::{Cross, MetrologySite};
 use super::pad::DrawnSize;
 use super::process::Process;
-use super::sites::{Cross, MetrologySite};
 use super::structures::Structure;
 use metalith_core::{AtomicFile, Result};
 use metalith_pillars::PillarShape;

@@ -1,12 +1,12 @@
 //! Kernels and stray light that are kept on the disk between runs, by the digests of all that they follow from.
 //!
-//! The content of a kept file ([`metalith_cell::kept`]) is JSON of what is small, its length before it (u32), and the
+//! The content of a kept file ([`metalith_cell::cache_file`]) is JSON of what is small, its length before it (u32), and the
 //! numbers (f32), all little-endian.
 
 use std::io::Read;
 use std::path::Path;
 
-use metalith_cell::kept::{self, KeptWriter};
+use metalith_cell::cache_file::{self, CacheFileWriter};
 use metalith_core::{Error, Result};
 use metalith_design::array::Symmetry;
 use serde::{Deserialize, Serialize};
@@ -53,7 +53,7 @@ fn place(turn: Symmetry) -> usize {
 }
 
 fn file_of(folder: &Path, kind: &str, inputs: &[u8]) -> std::path::PathBuf {
-    folder.join(format!("{kind}-{}.bin", kept::name_of(inputs)))
+    folder.join(format!("{kind}-{}.bin", cache_file::name_of(inputs)))
 }
 
 /// Numbers that are written or read at once: a bank of half a gigabyte is held once, not beside the bytes of its file.
@@ -62,7 +62,7 @@ const PIECE: usize = 1 << 14;
 fn write(file: &Path, magic: [u8; 8], inputs: &[u8], head: &impl Serialize, numbers: &[&[f32]]) -> Result<()> {
     let head = serde_json::to_vec(head)
         .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
-    let mut kept = KeptWriter::create(file, magic, inputs)?;
+    let mut kept = CacheFileWriter::create(file, magic, inputs)?;
     kept.add(&(head.len() as u32).to_le_bytes())?;
     kept.add(&head)?;
     let mut bytes = Vec::with_capacity(4 * PIECE);
@@ -121,7 +121,7 @@ fn read<T>(
     inputs: &[u8],
     decode: impl FnOnce(&mut Content<'_>) -> Option<T>,
 ) -> Option<T> {
-    kept::read_by(file, magic, inputs, LONGEST, |from, left| {
+    cache_file::read_by(file, magic, inputs, LONGEST, |from, left| {
         let mut content = Content { from, left };
         let found = decode(&mut content)?;
         content.is_read().then_some(found)

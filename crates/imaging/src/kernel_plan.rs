@@ -186,7 +186,7 @@ impl<'a> KernelPlan<'a> {
         unexposed.name = String::new();
         unexposed.exposure = Camera::three_bands(1.0).exposure;
         let inputs = Inputs {
-            solver: metalith_cell::kept::solver_of(self.design.cell.shape),
+            solver: metalith_cell::cache_file::solver_of(self.design.cell.shape),
             layout,
             design: &self.design.optics_digest()?,
             lens_um: [lens.radius_um(), lens.focal_length_um],

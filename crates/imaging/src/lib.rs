@@ -24,7 +24,7 @@ mod kernel_cache;
 mod kernel_plan;
 mod kernels;
 mod layout;
-mod opening;
+mod open_system;
 mod operator;
 mod operator_error;
 mod page;

@@ -7,15 +7,15 @@
 
 mod aperture;
 mod convert;
-mod fixed;
-mod form;
+mod fixed_shapes;
 mod format;
-mod frame;
-mod free;
+mod free_layout;
+mod gds_frame;
+mod layer_properties;
 mod mark;
 mod oasis;
+mod pillar_form;
 mod pillars;
-mod properties;
 mod read;
 
 use std::path::{Path, PathBuf};
@@ -23,18 +23,18 @@ use std::path::{Path, PathBuf};
 use chrono::NaiveDateTime;
 use gds21::GdsElement;
 
-use fixed::FixedShapes;
-use frame::LibraryFrame;
+use fixed_shapes::FixedShapes;
+use gds_frame::LibraryFrame;
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use pillars::PillarWriter;
 
 pub use convert::convert;
-pub use form::PillarForm;
 pub use format::{LayoutFormat, OasisEncoding};
-pub use free::{FreeLayout, write_free};
-pub use properties::write_layer_properties;
+pub use free_layout::{FreeLayout, write_free};
+pub use layer_properties::write_layer_properties;
+pub use pillar_form::PillarForm;
 pub use read::{extraction_plan, read_pillars};
 
 /// A file that was written.
@@ -111,7 +111,7 @@ impl<'a> PillarLayout<'a> {
     fn of(design: &'a Design) -> Self {
         Self {
             top: top_cell(design),
-            date: frame::date(design),
+            date: gds_frame::date(design),
             layer: &design.layout.layers.pillars,
             form: PillarForm::of(design),
             fixed: FixedShapes::of_pillars(design),
@@ -186,7 +186,7 @@ fn no_symmetry(array: &PillarArray, class: usize) -> Option<String> {
 /// # Errors
 /// If the file cannot be written; the old file is then as it was.
 pub fn write_apertures(design: &Design, path: &Path) -> Result<Written> {
-    let frame = LibraryFrame::new(top_cell(design), frame::date(design))?;
+    let frame = LibraryFrame::new(top_cell(design), gds_frame::date(design))?;
     let (begin, end) = frame.cell(&top_cell(design), FixedShapes::of_apertures(design).gds())?;
     let bytes = [frame.head(), &begin, &end, frame.tail()].concat();
     AtomicFile::write(path, &bytes)?;

@@ -8,8 +8,8 @@ use std::path::Path;
 use gds21::{GdsElement, GdsStrans, GdsStructRef};
 use rayon::prelude::*;
 
-use super::form::PillarForm;
-use super::frame::LibraryFrame;
+use super::gds_frame::LibraryFrame;
+use super::pillar_form::PillarForm;
 use super::{coordinate, point, polygon};
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::LayoutLayer;

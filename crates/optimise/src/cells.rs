@@ -8,7 +8,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_design::{Design, NeighbourCell, cell_models, neighbour_cell};
 use metalith_pillars::PolarisationBasis;
 
-use crate::merit::robust::cells_off_height;
+use crate::merit::fabrication_errors::cells_off_height;
 
 /// Cells that a design is optimised and judged with.
 pub struct TaskCells {

@@ -5,8 +5,8 @@ use std::path::Path;
 use ndarray::Array2;
 use serde::Serialize;
 
-use crate::judge::Judged;
 use crate::rings::mapping::step;
+use crate::strehl_gain::StrehlSummary;
 use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, Table, Verdict, sig, write_json};
@@ -35,12 +35,12 @@ pub struct OptimiseReport {
     /// Limit on the step (waves).
     pub step_limit_waves: f64,
     /// Reference of gains, judged in each way: the design's own phase, or where that is a table, a hyperbolic one.
-    pub before: Vec<Judged>,
+    pub before: Vec<StrehlSummary>,
     /// The table that the design has.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub own: Vec<Judged>,
+    pub own: Vec<StrehlSummary>,
     /// The optimised phase.
-    pub after: Vec<Judged>,
+    pub after: Vec<StrehlSummary>,
     /// Wavelengths of `[verify]` (um) and Strehl ratios of the layout there by the cell as it judges single wavelengths, where that
     /// of a band is solved with fewer orders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -85,7 +85,7 @@ impl OptimiseReport {
     }
 
     /// All phases that were judged, with what they are called.
-    pub fn phases(&self) -> [(&'static str, &[Judged]); 3] {
+    pub fn phases(&self) -> [(&'static str, &[StrehlSummary]); 3] {
         [
             ("before", &self.before),
             ("table of the design", &self.own),

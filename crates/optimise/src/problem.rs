@@ -10,10 +10,10 @@ use crate::PixelWindow;
 use crate::image::deconvolution::Deconvolution;
 use crate::image::scene::Scene;
 use crate::image::views::Views;
+use crate::merit::fabrication_errors;
 use crate::merit::field::{FieldProblem, MeritKind};
 use crate::merit::field_point::FieldPoint;
 use crate::merit::focus::{FabricationError, Lens, wavelengths};
-use crate::merit::robust;
 use crate::rings::kernel::RingField;
 use crate::rings::mapping::Mapping;
 
@@ -41,7 +41,7 @@ pub(crate) fn field_problem(
 ) -> Result<Option<FieldProblem>> {
     let band = band(spec);
     let draws = match &spec.robust {
-        Some(robust) => robust::draw(robust, robust.draws as usize, cells.len(), spec.seed ^ 0x5eed),
+        Some(robust) => fabrication_errors::draw(robust, robust.draws as usize, cells.len(), spec.seed ^ 0x5eed),
         None => vec![FabricationError::default()],
     };
     let share = 1.0 / draws.len() as f64;

@@ -1,11 +1,12 @@
 //! Lattices, the kinds of pillars that stand on them, and maps of pillars by site.
 
 mod circle;
-mod eighth;
+mod eighth_map;
 mod element_site;
 mod kind;
 mod lattice;
 mod pillar_check;
+mod pillar_map;
 mod rectangle;
 mod rows;
 mod shape;
@@ -13,11 +14,12 @@ mod square;
 mod steepness;
 
 pub use circle::{CHORD_ERROR, Circle, circle_corners};
-pub use eighth::EighthMap;
+pub use eighth_map::EighthMap;
 pub use element_site::{ElementSite, PillarReader};
 pub use kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity};
-pub use lattice::{Lattice, LatticeKind, PillarMap};
+pub use lattice::{Lattice, LatticeKind};
 pub use pillar_check::PillarCheck;
+pub use pillar_map::PillarMap;
 pub use rectangle::{Rectangles, RotatedRectangles, UprightRectangles};
 pub use rows::PillarRows;
 pub use shape::PillarShape;

@@ -7,7 +7,7 @@ use ndarray::{Array2, Array3, ArrayView2, Axis};
 
 use crate::features::Features;
 use crate::network::{COLOURS, Network, Plan, Size};
-use crate::squares::{SIDE, corrected, mirrored, squares};
+use crate::network_input::{SIDE, corrected, mirrored, squares};
 use crate::weights::{read_weights, shipped_weights};
 
 /// A network that takes noise out of pictures.

@@ -13,30 +13,30 @@
 
 mod convolution;
 mod denoiser;
+mod diffusion_sampling;
 mod features;
 mod network;
+mod network_input;
 mod noise;
 #[cfg(feature = "onnx")]
 mod onnx;
 mod perceptual;
 mod post_processor;
-mod sample;
-mod squares;
 mod weights;
 
 pub use denoiser::NetworkDenoiser;
+pub use diffusion_sampling::SAMPLING_STEPS;
 pub use network::COLOURS;
 pub use noise::with_noise;
 pub use perceptual::PerceptualDistance;
 pub use post_processor::{PostProcessor, Provenance};
-pub use sample::SAMPLING_STEPS;
 
 /// The parts of the networks that a training needs: layers, gradients, files of weights.
 pub mod parts {
     pub use crate::denoiser::{input, over_squares};
     pub use crate::features::Features;
     pub use crate::network::{Layer, Network, Plan, Size, Trace};
+    pub use crate::network_input::{cut, piled, seen};
     pub use crate::post_processor::STAGE;
-    pub use crate::squares::{cut, piled, seen};
     pub use crate::weights::write_weights;
 }

@@ -10,7 +10,7 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
 use crate::network::{COLOURS, Network, Plan, Size};
-use crate::squares::{SIDE, corrected, cut, mirrored, piled, seen};
+use crate::network_input::{SIDE, corrected, cut, mirrored, piled, seen};
 use crate::weights::read_described;
 
 /// Key under which files of weights say what they were trained for.

@@ -3,9 +3,9 @@
 mod basis;
 mod error;
 mod jones;
-mod known_modes;
 mod layer;
 mod material;
+mod mode_cache;
 mod outline;
 mod permittivity;
 mod propagate;
@@ -21,9 +21,9 @@ use num_complex::Complex64;
 
 use basis::{Family, FieldBasis, Space};
 pub use jones::circular;
-use known_modes::{KnownModes, Section};
 use layer::Modes;
 pub use material::Material;
+use mode_cache::{KnownModes, Section};
 pub use outline::Outline;
 use permittivity::CrossSection;
 use propagate::{Ends, propagate_wave};

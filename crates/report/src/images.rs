@@ -5,7 +5,7 @@ use svg::node::element::Group;
 
 use super::colour::ColourMap;
 use super::figure::{Anchor, Figure, Frame, picture, rectangle, scale_bar, text};
-use super::heat::{colour_bar, shading};
+use super::heat_map::{colour_bar, shading};
 use super::raster;
 
 /// Images in a grid with one colour scale, one colour bar, and a scale bar in each.

@@ -17,7 +17,7 @@ const DRAWN_AFTER: usize = 2;
 
 /// State of a splitting.
 #[derive(Clone)]
-struct Standing {
+struct SplittingState {
     /// Planes of the system.
     x: Planes,
     /// The picture as the denoiser last gave it.
@@ -25,7 +25,7 @@ struct Standing {
     rounds: usize,
 }
 
-impl Standing {
+impl SplittingState {
     fn begin(system: &NormalSystem<'_>, progress: &dyn Progress) -> Result<Self> {
         let x = tikhonov::restore(system, progress)?;
         Ok(Self {
@@ -77,7 +77,7 @@ impl Standing {
 /// Restores by rounds of both steps.
 pub(crate) fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
     let schedule = denoiser.schedule();
-    let standing = Standing::begin(system, progress)?;
+    let standing = SplittingState::begin(system, progress)?;
     progress.begin("restoring by splitting", (schedule.rounds * schedule.steps) as u64);
     standing.finish(system, denoiser, progress)
 }
@@ -91,7 +91,7 @@ pub(crate) fn samples(
     progress: &dyn Progress,
 ) -> Result<Vec<Planes>> {
     let schedule = denoiser.schedule();
-    let mut standing = Standing::begin(system, progress)?;
+    let mut standing = SplittingState::begin(system, progress)?;
     let left = schedule.rounds - DRAWN_AFTER;
     let count = (seeds.end - seeds.start) as usize;
     progress.begin(

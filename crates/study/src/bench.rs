@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use metalith_cell::{BAND_ORDERS, CellStack, FocusedLight, LitStack};
+use metalith_cell::{BAND_ORDERS, CellStack, FocusedLight, FocusingStack};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
@@ -19,7 +19,7 @@ use crate::manifest::another_plan;
 use crate::picture::{KnownChip, PictureBench, TakenPicture};
 use crate::plan::{Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
-use crate::tolerance::Tolerance;
+use crate::study_file::Tolerance;
 
 /// Hears that the user wants to stop, and shows nothing: one draw is a step of something else.
 pub(crate) struct Quiet<'a>(pub &'a dyn Progress);
@@ -39,7 +39,7 @@ pub(crate) struct StudyBench {
     pub tolerance: Tolerance,
     pub drawer: Sampler,
     picture: Option<PictureBench>,
-    made: MadeRange,
+    made: AsBuiltRange,
     key: [u8; 32],
     files: Files,
     /// The design of the draws that are made now: one at a time is held, since draws of a design stand together.
@@ -71,7 +71,7 @@ pub struct JudgedDraw {
 }
 
 /// Range of what all draws make of a pillar, from the least to the most.
-struct MadeRange {
+struct AsBuiltRange {
     bias_nm: [f64; 2],
     changes: [CellChange; 2],
 }
@@ -92,7 +92,7 @@ impl StudyBench {
         }
         let drawer = Sampler::new(&tolerance, base);
         let picture = tolerance.picture.as_ref().map(PictureBench::open).transpose()?;
-        let mut made = MadeRange::of(&drawer, key)?;
+        let mut made = AsBuiltRange::of(&drawer, key)?;
         if picture.as_ref().is_some_and(PictureBench::knows_design) {
             made.add(drawer.base());
         }
@@ -275,7 +275,7 @@ impl StudyBench {
 
 /// A chip of a design, all its cells from a bank.
 fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Result<AsBuiltChip> {
-    let stated = LitStack {
+    let stated = FocusingStack {
         stack: bank.stated().clone(),
         focused: design.focused(),
     };
@@ -283,7 +283,7 @@ fn chip_of(design: &Design, bank: &Arc<CellBank>, model: &CalibratedModel) -> Re
 }
 
 /// Check that rectangles, if the pillars of a design are such, can be made like that.
-fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Result<()> {
+fn check_rectangles(design: &Design, made: &AsBuiltRange, has_picture: bool) -> Result<()> {
     if design.cell.shape.has_width() {
         return Ok(());
     }
@@ -304,7 +304,7 @@ fn check_rectangles(design: &Design, made: &MadeRange, has_picture: bool) -> Res
     Ok(())
 }
 
-impl MadeRange {
+impl AsBuiltRange {
     /// Every draw is drawn, none is simulated.
     fn of(drawer: &Sampler, key: [u8; 32]) -> Result<Self> {
         let first = drawer.perturbation(&drawer.draw(key, 0)?);

@@ -113,7 +113,7 @@ fn key(comparison: &Comparison) -> Result<String> {
     let mut files = Camera::read(&comparison.camera)?.files;
     for listed in &comparison.designs {
         let design = Design::read(&listed.design)?;
-        let solver = metalith_cell::kept::solver_of(design.cell.shape);
+        let solver = metalith_cell::cache_file::solver_of(design.cell.shape);
         hash.update(format!("{solver} {} ", design.optics_digest()?));
         // The file itself for what it verifies: by which cell, at which wavelengths.
         files.extend([listed.design.clone(), listed.layout.clone()]);

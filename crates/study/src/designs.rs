@@ -4,7 +4,7 @@ use metalith_core::document::{NoPlace, Scalar, Section, load, with_values};
 use metalith_core::{Error, Result};
 use metalith_design::Design;
 
-use crate::tolerance::Tolerance;
+use crate::study_file::Tolerance;
 
 /// Designs of a study at the most: each is a layout and, mostly, tables of cells of its own.
 const MOST_DESIGNS: u64 = 1000;

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal, Uniform};
 
 use crate::designs::DesignGrid;
-use crate::tolerance::{Distribution, TAIL_SD, Tolerance, effects};
+use crate::study_file::{Distribution, TAIL_SD, Tolerance, effects};
 
 /// Amounts that are drawn at the most until one is physical.
 const MOST_TRIES: usize = 10_000;
@@ -236,7 +236,7 @@ impl Sampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tolerance::{Grid, Varied};
+    use crate::study_file::{Grid, Varied};
     use metalith_wave::Accuracy;
 
     fn drawer(sd: f64) -> Sampler {

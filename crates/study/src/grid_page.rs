@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use metalith_report::{Axis, Cell, Chart, Column, Figure, Page, Table, count, sig};
 
+use crate::grid_points::{GridPoint, Spread};
 use crate::merge::StudyResult;
-use crate::points::{GridPoint, Spread};
 
 /// Room beside the outer points of a chart, so that these are seen whole, over the distance of the two.
 const BESIDE: f64 = 0.05;

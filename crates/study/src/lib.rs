@@ -12,7 +12,7 @@
 //!
 //! | file | holds |
 //! | --- | --- |
-//! | `tolerance` | the file of a study, and its quantities as effects of the calibration |
+//! | `study_file` | the file of a study, and its quantities as effects of the calibration |
 //! | `designs` | keys of the design that vary over a grid |
 //! | `draw` | the numbers of one draw |
 //! | `bias` | whether pillars can be as all draws make them |
@@ -22,7 +22,7 @@
 //! | `plan`, `shard` | the folder of a study |
 //! | `pairs`, `comparison`, `starts` | pairs for learning, cameras side by side, starts of the optimiser, in shards |
 //! | `cut`, `manifest`, `work` | shards of whatever work |
-//! | `merge`, `yields`, `response`, `points` | all draws, and what they say |
+//! | `merge`, `yields`, `response`, `grid_points` | all draws, and what they say |
 //! | `columns`, `parquet_file` | the draws as a table |
 //! | `page`, `grid_page` | what a person reads |
 //! | `slurm` | job arrays |
@@ -35,6 +35,7 @@ mod comparison;
 mod designs;
 mod draw;
 mod grid_page;
+mod grid_points;
 mod manifest;
 mod merge;
 mod page;
@@ -43,14 +44,13 @@ mod pairs;
 mod parquet_file;
 mod picture;
 mod plan;
-mod points;
 mod record;
 mod response;
 mod shard;
 mod sharding;
 mod slurm;
 mod starts;
-mod tolerance;
+mod study_file;
 mod work;
 mod yields;
 
@@ -59,19 +59,19 @@ pub use bench::JudgedDraw;
 pub use comparison::{ComparisonPlan, plan_comparison};
 pub use designs::DesignGrid;
 pub use draw::Drawn;
+pub use grid_points::{GridPoint, Spread};
 pub use manifest::{MANIFEST, is_planned};
 pub use merge::{StudyResult, TableFormat, merge};
 pub use page::{REPORT, write_page};
 pub use pairs::{PairsPlan, PairsRequest, plan_pairs};
 pub use picture::{KnownKernels, PictureSpec, SceneChoice, TakenPicture};
 pub use plan::{Layout, Plan, PlanSettings, plan};
-pub use points::{GridPoint, Spread};
 pub use record::{DrawRecord, LimitStatement};
 pub use response::{Response, Tightening};
 pub use shard::Run;
 pub use sharding::{Shard, Sharding, Status};
 pub use slurm::{Slurm, Submission, submissions};
 pub use starts::{StartRecord, StartsPlan, StartsResult, plan_starts};
-pub use tolerance::{Distribution, FigureLimit, Grid, Tolerance, Varied};
+pub use study_file::{Distribution, FigureLimit, Grid, Tolerance, Varied};
 pub use work::Work;
 pub use yields::{Yield, wilson};

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use crate::bench::JudgedDraw;
 use crate::columns::{columns, csv};
+use crate::grid_points::{GridPoint, combinations, each_value};
 use crate::plan::Plan;
-use crate::points::{GridPoint, combinations, each_value};
 use crate::record::DrawRecord;
 use crate::response::{Response, Table, Tightening};
 use crate::shard::Run;

@@ -193,7 +193,7 @@ impl PairsRequest {
     fn key(&self, digests: &[String]) -> Result<[u8; 32]> {
         let design = Design::read(&self.design)?;
         let mut hash = Sha256::new();
-        let solver = metalith_cell::kept::solver_of(design.cell.shape);
+        let solver = metalith_cell::cache_file::solver_of(design.cell.shape);
         hash.update(format!(
             "{} {solver} {} {} {}",
             env!("CARGO_PKG_VERSION"),

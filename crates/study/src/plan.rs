@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use metalith_cell::CellStack;
-use metalith_cell::kept::solver_of;
+use metalith_cell::cache_file::solver_of;
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
@@ -22,7 +22,7 @@ use crate::manifest::{Manifest, absolute, another_plan, is_planned};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
 use crate::sharding::{Sharding, parts_per_shard};
-use crate::tolerance::Tolerance;
+use crate::study_file::Tolerance;
 
 /// Version of the format of the manifest.
 const SCHEMA: u32 = 2;

@@ -6,7 +6,7 @@ use metalith_core::document::Scalar;
 use metalith_verify::{Check, Sense, Verification};
 use serde::{Deserialize, Serialize};
 
-use crate::tolerance::FigureLimit;
+use crate::study_file::FigureLimit;
 
 /// One draw, as one line of JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

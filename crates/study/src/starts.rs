@@ -180,7 +180,7 @@ impl StartsPlan {
 
 /// SHA-256 of everything that decides the answers.
 fn key(path: &Path, design: &Design, starts: u64) -> Result<String> {
-    let solver = metalith_cell::kept::solver_of(design.cell.shape);
+    let solver = metalith_cell::cache_file::solver_of(design.cell.shape);
     let mut hash = Sha256::new();
     hash.update(format!(
         "{} {solver} {} {starts} ",

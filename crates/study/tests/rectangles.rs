@@ -55,7 +55,7 @@ fn judged_with(small: &Small, model: Option<Perturbation>, kept: Option<&Path>) 
     let chip = model.map(|perturbation| {
         let model = CalibratedModel::new("set".into(), "found".into(), perturbation);
         let chip = AsBuiltChip::in_light(&design.lit_stack().unwrap(), &model).unwrap();
-        chip.kept_in(kept)
+        chip.cached_in(kept)
     });
     let cases = match &chip {
         Some(chip) => SimulationCases::judged_by(chip),

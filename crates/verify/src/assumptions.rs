@@ -6,7 +6,7 @@ use metalith_pillars::{OutlineForm, PolarisationBasis, RotatedRectangles};
 use metalith_report::{Cell, Column, Page, Table, exact, fixed, sig};
 
 use super::page::span;
-use super::steep::Slopes;
+use super::steep_phase_errors::Slopes;
 use super::{EqualRotations, OrderEfficiencies, PsfResult, Verification, birefringence, media};
 
 /// The table of assumptions; none of a layout that was not simulated.

@@ -6,8 +6,8 @@ mod birefringence;
 mod case;
 mod check;
 pub mod compensate;
-mod copies;
-mod large;
+mod distinct_elements;
+mod large_layouts;
 mod lens_figures;
 mod media;
 mod memory;
@@ -15,15 +15,15 @@ mod model_page;
 mod optics;
 mod page;
 mod phase;
+mod polychromatic;
+mod polychromatic_channels;
+mod polychromatic_page;
 mod psf_metrics;
 mod rotations;
 mod single;
 mod single_white;
 mod site_orders;
-mod steep;
-mod white;
-mod white_channels;
-mod white_page;
+mod steep_phase_errors;
 
 use std::path::Path;
 
@@ -44,8 +44,8 @@ use metalith_wave::propagation::Steepness;
 
 pub use case::SimulationCases;
 pub use check::{Check, Sense, verdict_words};
-pub use copies::CopyAngle;
-pub use large::{verify_in_parts, verify_pillars};
+pub use distinct_elements::CopyAngle;
+pub use large_layouts::{verify_in_parts, verify_pillars};
 pub use lens_figures::{focus_words, lens_figures};
 pub use memory::Simulation;
 pub use metalith_optics::SimulationCase;
@@ -53,12 +53,12 @@ pub use metalith_pillars::PillarCheck;
 pub use optics::open_matched;
 pub use page::write_report;
 pub use phase::{PhaseError, PhaseErrors, PillarResponse};
+pub use polychromatic::CameraStatement;
+pub use polychromatic_channels::{Contrast, WhiteChannel};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use rotations::EqualRotations;
 pub use single::{Lighting, STREHL_AGAINST, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use single_white::{SingleWhite, single_white, white_sampling};
-pub use white::CameraStatement;
-pub use white_channels::{Contrast, WhiteChannel};
 
 /// Facts of the file, in numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -161,7 +161,9 @@ impl Verification {
         let of_design: Vec<FieldAngle> = of_design.map(|s| s.field).collect();
         let mut asked = vec![spot.asked()];
         for copy in self.elements.iter().filter(|e| e.copy_of == Some(k)) {
-            let field = copy.turned.map(|symmetry| copies::turned(symmetry, spot.field));
+            let field = copy
+                .turned
+                .map(|symmetry| distinct_elements::turned(symmetry, spot.field));
             asked.extend(field.filter(|f| of_design.contains(f) && !asked.contains(f)));
         }
         asked
@@ -175,7 +177,7 @@ impl Verification {
 /// used.
 pub fn fits(design: &Design, path: &Path) -> Result<()> {
     metalith_gds::extract::fits(path, &design.sites())?;
-    white::camera_of(design)?;
+    polychromatic::camera_of(design)?;
     Ok(())
 }
 
@@ -280,7 +282,7 @@ pub fn wavelengths_um(design: &Design) -> Result<(Vec<f64>, Vec<f64>)> {
     single.push(design.mapping.wavelength_um);
     single.sort_by(f64::total_cmp);
     single.dedup();
-    Ok((single, white::wavelengths_um(design)?))
+    Ok((single, polychromatic::wavelengths_um(design)?))
 }
 
 /// Contents read of a layout.
@@ -306,19 +308,19 @@ fn judge(
     let mut elements = found.elements;
     let lens = LensPhase::of(&design.as_verified());
     let simulator = optics::ElementSimulator::new(design, array.lattice, cases, accuracy, part_bytes);
-    let chosen = copies::choose(
+    let chosen = distinct_elements::choose(
         design,
         array,
         &mut elements,
         cases.judge.perturbation().keeps_symmetry(),
     );
     simulator.solve(&chosen, progress)?;
-    let white = white::WhiteSimulator::new(design, array.lattice, cases.judge)?;
+    let white = polychromatic::WhiteSimulator::new(design, array.lattice, cases.judge)?;
     if let Some(white) = &white {
         let shown: Vec<Element> = chosen.iter().map(|one| one.element).collect();
         white.solve(simulator.judge(), &shown, progress)?;
     }
-    let in_white = white.as_ref().map_or(0, white::WhiteSimulator::psfs);
+    let in_white = white.as_ref().map_or(0, polychromatic::WhiteSimulator::psfs);
     let psfs: usize = chosen.iter().map(|one| simulator.psfs(one) + in_white).sum();
     progress.begin("simulating elements", psfs as u64);
     let mut simulated = Vec::new();
@@ -353,7 +355,7 @@ fn judge(
             Accuracy::Accurate => "accurate",
             Accuracy::Fast => "fast",
         },
-        camera: white.as_ref().map(white::WhiteSimulator::statement),
+        camera: white.as_ref().map(polychromatic::WhiteSimulator::statement),
         layout: found.layout,
         elements,
         foreign: found.foreign,

@@ -7,7 +7,7 @@ use metalith_design::{Design, Element, LensSpec};
 use metalith_gds::extract::{Holding, fits_folded, held_sites};
 use metalith_wave::{Accuracy, FoldedPropagator, Window};
 
-use super::{optics, white};
+use super::{optics, polychromatic};
 
 /// Bytes of each site of every element: its width as read.
 const READ_BYTES: f64 = 2.0;
@@ -118,7 +118,7 @@ fn largest_spectra_bytes(design: &Design, accuracy: Accuracy) -> Result<usize> {
         let fold = FoldedPropagator::plan(lattice, lens.radius_um(), wavelength_um, window, accuracy)?;
         Ok(fold.spectra_bytes())
     };
-    let white = white::wavelengths_um(design)?;
+    let white = polychromatic::wavelengths_um(design)?;
     let mut most = 0;
     for element in design.elements() {
         let lens = design.lens_of(&element);
@@ -130,7 +130,7 @@ fn largest_spectra_bytes(design: &Design, accuracy: Accuracy) -> Result<usize> {
         }
         // The shorter the wavelength, the more frequencies.
         if let Some(shortest) = white.iter().copied().reduce(f64::min) {
-            let landing = white::landing_um(&element, shortest, lens.focal_length_um)?;
+            let landing = polychromatic::landing_um(&element, shortest, lens.focal_length_um)?;
             most = most.max(bytes(lens, shortest, landing, Accuracy::Fast)?);
         }
     }

@@ -4,7 +4,7 @@ use ndarray::Array2;
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::copies::CopyAngle;
+use super::distinct_elements::CopyAngle;
 use metalith_cell::{Fidelity, PolarisedLight, PolarisedTables};
 use metalith_design::array::PillarRule;
 use metalith_design::{Element, FieldAngle};

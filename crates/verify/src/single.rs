@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::lens_figures::{focus_cells, focus_columns};
+use super::polychromatic::CameraStatement;
 use super::single_white::SingleWhite;
-use super::white::CameraStatement;
-use super::{model_page, white_page};
+use super::{model_page, polychromatic_page};
 use metalith_cell::{Fidelity, Illumination, PolarisedLight};
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_gds::extract::{ElementSite, Extraction};
@@ -269,7 +269,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         page.section("Polychromatic figures");
         for element in elements {
             page.subsection(&element.element);
-            white_page::channels(&mut page, camera, &element.channels, &[]);
+            polychromatic_page::channels(&mut page, camera, &element.channels, &[]);
         }
     }
     page.section("Pillars");

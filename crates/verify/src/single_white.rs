@@ -4,9 +4,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::polychromatic::{CameraStatement, step_nm};
+use super::polychromatic_channels::{Channels, Point, WhiteChannel, per_light};
 use super::single::{Lighting, distinct, kind_of, largest_number};
-use super::white::{CameraStatement, step_nm};
-use super::white_channels::{Channels, Point, WhiteChannel, per_light};
 use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
 use metalith_optics::{IncoherentFields, SimulationCase};

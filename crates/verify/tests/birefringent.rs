@@ -1,7 +1,7 @@
 //! Light along x and along y behind upright rectangles, from a design to its figures.
 
 use metalith_cell::{
-    Analyser, AxisTables, CellModel, CellResponse, Fidelity, Illumination, JonesTables, PillarLibrary, Polarisation,
+    Analyser, CellModel, CellResponse, Fidelity, Illumination, JonesTables, LinearTables, PillarLibrary, Polarisation,
     PolarisationAxis, PolarisedLight, PolarisedTables,
 };
 use metalith_core::{Progress, Result, Silent};
@@ -46,7 +46,7 @@ impl CellModel for IdealRetarders {
     }
 
     fn response(&self, _light: &Illumination<'_>, last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
-        let tables = PolarisedTables::Axes(AxisTables {
+        let tables = PolarisedTables::Axes(LinearTables {
             focused: PolarisationAxis::X,
             along: PolarisationAxis::ALL.map(|axis| self.table(axis, last)),
         });

@@ -1,7 +1,7 @@
 //! Source and detector of light at rotated rectangles, from a design to its figures.
 
 use metalith_cell::{
-    Analyser, CellModel, CellResponse, Fidelity, HandTables, Handedness, Illumination, JonesTables, Polarisation,
+    Analyser, CellModel, CellResponse, CircularTables, Fidelity, Handedness, Illumination, JonesTables, Polarisation,
     PolarisedLight, PolarisedTables,
 };
 use metalith_core::{Progress, Result, Silent};
@@ -57,7 +57,7 @@ impl CellModel for IdealPlates {
 
     fn response(&self, _light: &Illumination<'_>, _last: u16, _progress: &dyn Progress) -> Result<CellResponse> {
         let none = || self.table(|_| Complex64::ZERO);
-        let tables = PolarisedTables::Hands(HandTables {
+        let tables = PolarisedTables::Hands(CircularTables {
             focused: Handedness::Left,
             converted: [2.0, -2.0].map(|k| self.table(|rotation| Complex64::cis(k * rotation))),
             unconverted: [none(), none()],

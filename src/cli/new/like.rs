@@ -2,12 +2,10 @@
 
 use std::path::Path;
 
-use metalith::cell::cache_folder;
-use metalith::cell_study::CellRequest;
 use metalith::phase::RadialPhase;
-use metalith::{Design, Error, LatticeKind, PillarShape, Result};
+use metalith::{Design, Error, Result};
 
-use super::chosen::Materials;
+use super::start_cell::Materials;
 use super::{NewArgs, chord_nm};
 use crate::cli::Terminal;
 use crate::cli::section_text::{with_keys, without_section};
@@ -164,35 +162,17 @@ impl NewArgs {
         let film = self.material.clone().unwrap_or_else(|| cell.pillar_material.clone());
         let substrate = material(&self.substrate, &cell.substrate_material);
         let materials = Materials::new(Some(&film), substrate.as_deref(), wavelength_um, like.folder())?;
-        let shape = match self.shape.as_deref() {
-            Some("square") => PillarShape::Square,
-            Some(_) => PillarShape::Circle,
-            None => cell.shape,
-        };
-        let lattice = match self.lattice.as_deref() {
-            Some("hexagonal") => LatticeKind::Hexagonal,
-            Some(_) => LatticeKind::Square,
-            None => cell.lattice,
-        };
-        let radius_um = 0.5 * diameter_um;
-        let steps = 0.5 * f64::from(elements.0.max(elements.1).saturating_sub(1));
-        let request = CellRequest {
-            film: materials.film.clone(),
-            substrate: materials.substrate.clone(),
+        let (request, chosen) = self.choose_cell(
+            &materials,
             wavelength_um,
-            shape,
-            lattice,
-            numerical_aperture: radius_um / radius_um.hypot(focal_length_um),
-            steering_sine: (steps * steering_deg).to_radians().sin().abs(),
-            pitch_nm: self.pitch_nm,
-            height_nm: self.pillar_height_nm,
-        };
-        let chosen = request.choose(cache_folder().as_deref(), terminal)?;
-        terminal.clear();
-        terminal.say(&chosen.mapping.words());
+            [diameter_um, focal_length_um],
+            (elements, steering_deg),
+            (cell.shape, cell.lattice),
+            terminal,
+        )?;
         let some = |value: &dyn std::fmt::Display| Some(value.to_string());
         let quoted = |text: &str| Some(format!("\"{}\"", text.replace('\\', "/")));
-        let is_square = shape.is_square();
+        let is_square = request.shape.is_square();
         set(
             "[cell]",
             0,
@@ -200,7 +180,11 @@ impl NewArgs {
                 ("shape", quoted(if is_square { "square" } else { "circle" })),
                 (
                     "lattice",
-                    quoted(if lattice.is_square() { "square" } else { "hexagonal" }),
+                    quoted(if request.lattice.is_square() {
+                        "square"
+                    } else {
+                        "hexagonal"
+                    }),
                 ),
                 ("pitch_nm", some(&chosen.pitch_nm)),
                 ("pillar_height_nm", some(&chosen.height_nm)),

@@ -1,18 +1,18 @@
 //! `metalith new`: a commented design to start from.
 
-mod chosen;
 mod like;
+mod start_cell;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::cell::cache_folder;
-use metalith::cell_study::CellRequest;
+use metalith::cell_study::{CellRequest, ChosenCell};
 use metalith::{AtomicFile, Design, Error, LatticeKind, PillarShape, Result};
 
 use super::shipped_designs::ShippedDesign;
 use super::{Outcome, Terminal, print_line};
-use chosen::{Materials, StartCell};
+use start_cell::{Materials, StartCell};
 
 /// The design, with braces around what is filled in.
 const TEMPLATE: &str = include_str!("template.toml");
@@ -186,30 +186,54 @@ impl NewArgs {
             wavelength_um,
             folder,
         )?;
-        let (x, y) = self.elements();
+        let (request, cell) = self.choose_cell(
+            &materials,
+            wavelength_um,
+            [self.diameter_um(), focal_length_um],
+            (self.elements(), self.steering_deg()),
+            (PillarShape::Circle, LatticeKind::Square),
+            terminal,
+        )?;
+        Ok(StartCell::chosen(&request, &cell, &materials))
+    }
+
+    /// Pillars chosen for a lens of a diameter and focal length (um) in an array of so many elements with a steering
+    /// angle (degrees): what was requested, and the choice. Shape and lattice are those given unless an option says
+    /// others.
+    fn choose_cell(
+        &self,
+        materials: &Materials,
+        wavelength_um: f64,
+        [diameter_um, focal_length_um]: [f64; 2],
+        ((x, y), steering_deg): ((u32, u32), f64),
+        (shape, lattice): (PillarShape, LatticeKind),
+        terminal: &Terminal,
+    ) -> Result<(CellRequest, ChosenCell)> {
+        let radius_um = 0.5 * diameter_um;
         let steps = 0.5 * f64::from(x.max(y).saturating_sub(1));
-        let radius_um = 0.5 * self.diameter_um();
         let request = CellRequest {
             film: materials.film.clone(),
             substrate: materials.substrate.clone(),
             wavelength_um,
             shape: match self.shape.as_deref() {
                 Some("square") => PillarShape::Square,
-                _ => PillarShape::Circle,
+                Some(_) => PillarShape::Circle,
+                None => shape,
             },
             lattice: match self.lattice.as_deref() {
                 Some("hexagonal") => LatticeKind::Hexagonal,
-                _ => LatticeKind::Square,
+                Some(_) => LatticeKind::Square,
+                None => lattice,
             },
-            numerical_aperture: radius_um / radius_um.hypot(self.focal_length_um()),
-            steering_sine: (steps * self.steering_deg()).to_radians().sin().abs(),
+            numerical_aperture: radius_um / radius_um.hypot(focal_length_um),
+            steering_sine: (steps * steering_deg).to_radians().sin().abs(),
             pitch_nm: self.pitch_nm,
             height_nm: self.pillar_height_nm,
         };
-        let cell = request.choose(cache_folder().as_deref(), terminal)?;
+        let chosen = request.choose(cache_folder().as_deref(), terminal)?;
         terminal.clear();
-        terminal.say(&cell.mapping.words());
-        Ok(StartCell::chosen(&request, &cell, &materials))
+        terminal.say(&chosen.mapping.words());
+        Ok((request, chosen))
     }
 
     /// The text of the design.

@@ -1,8 +1,8 @@
 //! Cells, light and sensor by the options of `metalith psf`, and the assumptions beside them.
 
 use metalith::cell::{
-    CellStack, FittedCell, FocusedLight, Handedness, LitStack, Mapping, NeighbourCell, PointwiseCell, Polarisation,
-    PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
+    CellStack, FittedCell, FocusedLight, FocusingStack, Handedness, Mapping, NeighbourCell, PointwiseCell,
+    Polarisation, PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
 };
 use metalith::design::CellFile;
 use metalith::rcwa::CellLattice;
@@ -178,12 +178,12 @@ impl PsfArgs {
     /// The chip as a measured process makes it.
     pub(super) fn made(&self, found: &Extraction, model: &CalibratedModel) -> Result<AsBuiltChip> {
         let shape = found.shape;
-        let stated = LitStack {
+        let stated = FocusingStack {
             stack: self.stack(found)?,
             focused: shape.basis().map(|_| self.focused(shape)),
         };
         model.check_drawn(&stated.stack, found.elements.iter().map(|e| e.widths.histogram()))?;
-        Ok(AsBuiltChip::in_light(&stated, model)?.kept_in(cache_folder().as_deref()))
+        Ok(AsBuiltChip::in_light(&stated, model)?.cached_in(cache_folder().as_deref()))
     }
 
     /// Cell that solves it for the pillars as drawn.

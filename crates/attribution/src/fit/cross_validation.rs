@@ -250,7 +250,7 @@ pub(super) fn ends_95(draws: &mut [f64]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_model::{LinearModel, POINTS, Term, information, setups};
+    use crate::test_model::{LinearModel, POINTS, Term, information, setups};
 
     const PERIODS: [u32; 2] = [2, 3];
 

@@ -175,9 +175,7 @@ pub fn change_energy<M: Measurements>(problem: &FitProblem<'_, M>, fit: &Fit<M>)
 mod tests {
     use super::*;
     use crate::forward_model::ForwardModel;
-    use crate::linear_model::{
-        ERROR_PERIODS, ERROR_SIZE, ERROR_STEP, LIKENESS, LinearModel, SMOOTH_STEP, Term, setups,
-    };
+    use crate::test_model::{ERROR_PERIODS, ERROR_SIZE, ERROR_STEP, LIKENESS, LinearModel, SMOOTH_STEP, Term, setups};
 
     /// An effect that changes a prediction as an error of the model does is not distinguished from it: two groups, each with an
     /// error of its own and half of the measurements, make an error of the effect of one over the root of two.

@@ -106,7 +106,7 @@ pub(super) fn null_gains<M: Measurements>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_model::{LinearModel, NULL_TERMS, POINTS, Term, information, setups, smooth_periods};
+    use crate::test_model::{LinearModel, NULL_TERMS, POINTS, Term, information, setups, smooth_periods};
 
     /// Relative: what place, gain and offset make of the closed forms.
     const TOLERANCE: f64 = 2e-2;

@@ -252,8 +252,8 @@ impl<M: Measurements> FitProblem<'_, M> {
 mod tests {
     use super::super::{covariance, half_widths};
     use crate::fit::SIGMAS_95;
-    use crate::linear_model::{LinearModel, SCALE, SIGMA, Term, Waves, information, setups};
     use crate::measurements::Measurements;
+    use crate::test_model::{LinearModel, SCALE, SIGMA, Term, Waves, information, setups};
 
     /// Measurements of two gains, two objects and two runs.
     const MEASUREMENTS: f64 = 8.0;

@@ -179,7 +179,7 @@ impl Alternative {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_model::{ERROR_PERIODS, LinearModel, Term, setups};
+    use crate::test_model::{ERROR_PERIODS, LinearModel, Term, setups};
 
     /// Possible error of the model: clear of noise, and predicted in every measurement that is left out.
     #[test]

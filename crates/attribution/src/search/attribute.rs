@@ -277,7 +277,7 @@ fn try_pairs_from_start<'a, M: Measurements>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_model::{LinearModel, Term, setups};
+    use crate::test_model::{LinearModel, Term, setups};
     use metalith_core::Silent;
 
     fn six_effects() -> LinearModel {

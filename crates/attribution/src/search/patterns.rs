@@ -173,7 +173,7 @@ fn fitted<M: Measurements>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_model::{LinearModel, PARAMETER, Term, setups};
+    use crate::test_model::{LinearModel, PARAMETER, Term, setups};
 
     /// One pattern of another size in each object: no single value explains it, and the free values are those of the
     /// objects.

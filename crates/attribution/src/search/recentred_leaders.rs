@@ -74,7 +74,7 @@ mod tests {
     use super::super::attribute::attribute;
     use super::super::pairs::find_pair;
     use super::*;
-    use crate::linear_model::{LinearModel, Product, Term, setups};
+    use crate::test_model::{LinearModel, Product, Term, setups};
     use metalith_core::Silent;
 
     /// Effects that are found. The first number of the joined effect acts three times as strongly in one element as it would alone,

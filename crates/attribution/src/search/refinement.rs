@@ -118,7 +118,7 @@ impl<M: Measurements> FitProblem<'_, M> {
 #[cfg(test)]
 mod tests {
     use super::CONVERGED;
-    use crate::linear_model::{LinearModel, PARAMETER, Term, setups};
+    use crate::test_model::{LinearModel, PARAMETER, Term, setups};
     use metalith_core::Silent;
 
     /// Not a polynomial of the degree of the surrogate: the response saturates.

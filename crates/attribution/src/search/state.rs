@@ -123,7 +123,7 @@ impl<'a, M: Measurements> SearchState<'a, M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_model::{LinearModel, Product, Term, setups};
+    use crate::test_model::{LinearModel, Product, Term, setups};
     use metalith_core::Silent;
 
     /// Two numbers of an effect of which one acts by the other: about a fit from afar something is left, about what is found there

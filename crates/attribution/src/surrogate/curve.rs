@@ -185,7 +185,7 @@ impl<M: Measurements> Curve<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear_model::{Samples, Waves};
+    use crate::test_model::{Samples, Waves};
 
     #[test]
     fn a_polynomial_of_degree_four_is_reproduced_and_continued_linearly() {

@@ -130,8 +130,8 @@ mod tests {
 
     use super::*;
     use crate::index::MeasurementIndex;
-    use crate::linear_model::Samples;
-    use crate::linear_model::{LinearModel, Term, setups};
+    use crate::test_model::Samples;
+    use crate::test_model::{LinearModel, Term, setups};
 
     /// What another search simulated about a point is taken about this point, and no other. It was of a model in which the second
     /// parameter acts twice as strongly, by which it is recognised.

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use surface::RoughSurface;
 
 use crate::lensless::{Lensless, LenslessBench};
-use crate::stage::{PICTURES, Stage, StageKind};
+use crate::post_processing::{PICTURES, Stage, StageKind};
 
 /// A rough surface before a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -6,7 +6,7 @@
 //! of a grey surface.
 
 mod mask;
-mod solve;
+mod tikhonov;
 
 use faer::Mat;
 use metalith_core::{Error, Progress, Result};
@@ -18,10 +18,10 @@ use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
 use crate::lensless::{Lensless, LenslessBench};
-use crate::stage::{PICTURES, Stage, StageKind};
+use crate::post_processing::{PICTURES, Stage, StageKind};
 pub use mask::MaskSpec;
 use mask::Shadow;
-use solve::{Factor, TwoFactors};
+use tikhonov::{Factor, TwoFactors};
 
 /// Distance of the wavelengths that shadows are simulated at (nm).
 const STEP_NM: f64 = 25.0;

@@ -10,7 +10,7 @@ use crate::cells::PillarTable;
 use crate::set::{ElementIndex, PerMeasurement};
 use metalith_core::{Error, Progress, Result};
 use metalith_optics::{
-    ArrivingLight, AsBuiltElement, ClassTable, GeometryChange, LightChange, MadeAperture, PathChange, spread,
+    ArrivingLight, AsBuiltAperture, AsBuiltElement, ClassTable, GeometryChange, LightChange, PathChange, spread,
 };
 use metalith_pillars::Lattice;
 use metalith_wave::propagation::DistancesScratch;
@@ -26,7 +26,7 @@ fn made_bytes(lattice: Lattice) -> usize {
 }
 
 /// A candidate chip, and the light that it is illuminated with.
-pub struct Lit<'a> {
+pub struct IlluminatedChip<'a> {
     pub cells: Arc<PillarTable>,
     /// Those at the rim of each lens, to the tops of the pillars in its middle, where they differ.
     pub rim: Option<Arc<PillarTable>>,
@@ -44,7 +44,7 @@ impl Bench<'_> {
     /// If the user stopped it.
     pub fn intensities(
         &self,
-        chips: &[Lit<'_>],
+        chips: &[IlluminatedChip<'_>],
         path: &PathChange,
         progress: &dyn Progress,
     ) -> Result<Vec<Vec<PerMeasurement<Vec<f32>>>>> {
@@ -118,7 +118,7 @@ impl Bench<'_> {
     }
 
     /// An element of a candidate chip.
-    pub(super) fn element(&self, element: ElementIndex, chip: &Lit<'_>) -> Result<AsBuiltElement> {
+    pub(super) fn element(&self, element: ElementIndex, chip: &IlluminatedChip<'_>) -> Result<AsBuiltElement> {
         let made = AsBuiltElement::new(&self.drawn[element], chip.geometry)?;
         Ok(match chip.scatter {
             Some(seed) => made.with_pillars_removed(seed + usize::from(element) as u64),
@@ -130,7 +130,7 @@ impl Bench<'_> {
     fn group(
         &self,
         group: &FocusSeries,
-        chips: &[Lit<'_>],
+        chips: &[IlluminatedChip<'_>],
         elements: &[AsBuiltElement],
         path: &PathChange,
     ) -> Vec<Vec<Vec<Vec<f32>>>> {
@@ -165,7 +165,7 @@ impl Bench<'_> {
                 .zip(elements)
                 .map(|(chip, element)| table(chip, element, self.first[group.led] + k))
                 .collect();
-            let apertures: Vec<MadeAperture<'_>> = tables
+            let apertures: Vec<AsBuiltAperture<'_>> = tables
                 .iter()
                 .zip(elements)
                 .map(|(table, element)| element.aperture(table, um))
@@ -205,7 +205,7 @@ pub(super) fn light(group: &FocusSeries, path: &PathChange, wavelength_um: f64) 
 }
 
 /// Transmission of the sites of an element at one of the wavelengths.
-fn table(chip: &Lit<'_>, element: &AsBuiltElement, wavelength: usize) -> ClassTable {
+fn table(chip: &IlluminatedChip<'_>, element: &AsBuiltElement, wavelength: usize) -> ClassTable {
     let of = |cells: &PillarTable| element.table(|width| cells.at(wavelength, width), cells.bare[wavelength]);
     let mut table = of(&chip.cells);
     if let Some(rim) = &chip.rim {
@@ -337,7 +337,7 @@ mod tests {
             ..PathChange::default()
         };
         let light = LightChange::default();
-        let chip = Lit {
+        let chip = IlluminatedChip {
             cells,
             rim: None,
             geometry: &geometry,

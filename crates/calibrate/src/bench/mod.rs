@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-pub(crate) use light::Lit;
+pub(crate) use light::IlluminatedChip;
 
 use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{

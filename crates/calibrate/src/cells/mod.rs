@@ -3,10 +3,10 @@
 //! The stated cell is solved with many orders. A change of the pillar (height, index, walls, corners, mask) is
 //! solved with fewer, and corrected by their error on the stated pillar that is closest to the changed one.
 
-mod carry;
 mod table;
 #[cfg(test)]
 mod tests;
+mod truncation_correction;
 
 use std::collections::HashMap;
 use std::fs;
@@ -19,8 +19,8 @@ use sha2::{Digest, Sha256};
 
 pub(crate) use table::PillarTable;
 
-use self::carry::{Carried, carried_over};
-use metalith_cell::kept;
+use self::truncation_correction::{CorrectedTable, corrected};
+use metalith_cell::cache_file;
 use metalith_cell::{CellModel, CellStack};
 use metalith_core::text::hex;
 use metalith_core::{AtomicFile, Error, Progress, Result};
@@ -103,7 +103,7 @@ impl RigorousCells {
         if *change == stated || coarse >= self.fine {
             return self.solved(change, self.fine, progress);
         }
-        self.kept(change, -(coarse as f64), || {
+        self.cached(change, -(coarse as f64), || {
             self.carried(change, &alike, coarse, progress)
         })
     }
@@ -124,7 +124,7 @@ impl RigorousCells {
         let t = (0..self.wavelengths_nm.len())
             .into_par_iter()
             .map(|l| {
-                let Carried { mut t, resonant } = carried_over(&stated.t[l], &before.t[l], &after.t[l]);
+                let CorrectedTable { mut t, resonant } = corrected(&stated.t[l], &before.t[l], &after.t[l]);
                 if progress.stopped() {
                     return Err(Error::Interrupted);
                 }
@@ -180,11 +180,11 @@ impl RigorousCells {
     }
 
     fn solved(&self, change: &CellChange, orders: usize, progress: &dyn Progress) -> Result<Arc<PillarTable>> {
-        self.kept(change, orders as f64, || self.solve(change, orders, progress))
+        self.cached(change, orders as f64, || self.solve(change, orders, progress))
     }
 
     /// A table from the cache, or computed now; `how` is the number of orders, negative where they are few and corrected.
-    fn kept(
+    fn cached(
         &self,
         change: &CellChange,
         how: f64,
@@ -209,7 +209,7 @@ impl RigorousCells {
             .as_ref()
             .map(|f| f.join(format!("{}.cells", self.digest(&key, how < 0.0))));
         let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
-        let solver = kept::solver_of(self.stack.shape);
+        let solver = cache_file::solver_of(self.stack.shape);
         let load = |path: &std::path::Path| {
             let bytes = fs::read(path).ok()?;
             PillarTable::from_bytes(&bytes, solver, wavelengths, count, self.first_nm(), STEP_NM)

@@ -1,6 +1,6 @@
 //! Transmissions of pillars over width and wavelength.
 
-use metalith_cell::kept;
+use metalith_cell::cache_file;
 use metalith_optics::lagrange;
 use num_complex::Complex64;
 
@@ -39,7 +39,7 @@ impl PillarTable {
             .flat_map(|z| [z.re.to_le_bytes(), z.im.to_le_bytes()])
             .flatten()
             .collect();
-        kept::seal(MAGIC, &inputs, &content)
+        cache_file::seal(MAGIC, &inputs, &content)
     }
 
     /// Table from the cached bytes, if they hold this number of widths and wavelengths; else `None`.
@@ -52,7 +52,7 @@ impl PillarTable {
         step_nm: f64,
     ) -> Option<Self> {
         let inputs = inputs(solver, wavelengths, count, first_nm, step_nm);
-        let content = kept::open(bytes, MAGIC, &inputs).ok()?;
+        let content = cache_file::open(bytes, MAGIC, &inputs).ok()?;
         if content.len() != wavelengths * (count + 1) * 16 {
             return None;
         }
@@ -104,22 +104,23 @@ mod tests {
     #[test]
     fn a_kept_table_comes_back() {
         let table = table();
-        let back = PillarTable::from_bytes(&table.bytes(kept::SOLVER), kept::SOLVER, 3, 400, 100.0, 2.0).unwrap();
+        let back =
+            PillarTable::from_bytes(&table.bytes(cache_file::SOLVER), cache_file::SOLVER, 3, 400, 100.0, 2.0).unwrap();
         assert_eq!((back.t, back.bare), (table.t, table.bare));
     }
 
     /// A page of zeros, which is finite numbers all the same, and a table of other widths.
     #[test]
     fn a_damaged_table_is_made_again() {
-        let bytes = table().bytes(kept::SOLVER);
+        let bytes = table().bytes(cache_file::SOLVER);
         for page in (0..bytes.len()).step_by(4096) {
             let mut damaged = bytes.clone();
             damaged[page..(page + 4096).min(bytes.len())].fill(0);
-            assert!(PillarTable::from_bytes(&damaged, kept::SOLVER, 3, 400, 100.0, 2.0).is_none());
+            assert!(PillarTable::from_bytes(&damaged, cache_file::SOLVER, 3, 400, 100.0, 2.0).is_none());
         }
-        assert!(PillarTable::from_bytes(&bytes, kept::SOLVER, 3, 400, 102.0, 2.0).is_none());
-        assert!(PillarTable::from_bytes(&bytes, kept::SOLVER, 2, 400, 100.0, 2.0).is_none());
-        assert!(PillarTable::from_bytes(&bytes, kept::SOLVER + 1, 3, 400, 100.0, 2.0).is_none());
-        assert!(PillarTable::from_bytes(&bytes[..bytes.len() - 1], kept::SOLVER, 3, 400, 100.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes, cache_file::SOLVER, 3, 400, 102.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes, cache_file::SOLVER, 2, 400, 100.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes, cache_file::SOLVER + 1, 3, 400, 100.0, 2.0).is_none());
+        assert!(PillarTable::from_bytes(&bytes[..bytes.len() - 1], cache_file::SOLVER, 3, 400, 100.0, 2.0).is_none());
     }
 }

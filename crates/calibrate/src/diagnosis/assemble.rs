@@ -10,7 +10,8 @@ use super::{
     Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, MeasurementError, Ranked, SetVerdict,
 };
 use crate::effects::Effect;
-use crate::fidelity::Rung;
+use crate::fidelity::FidelityError;
+use crate::interval_parts::WidthParts;
 use crate::screening::UnusableMeasurement;
 use crate::set::MeasuredSet;
 use crate::simulator::Simulator;
@@ -19,7 +20,6 @@ use crate::statistics::{
     EXPLAINED, Evidence, Finding, Fit, HeldOutErrors, IntervalParts, Rejection, TriedEffect, error_of_measurement,
     may_leave, mean_error,
 };
-use crate::width_parts::WidthParts;
 
 /// The measure of error.
 const MEASURE: &str = "reduced chi-square per pixel";
@@ -36,7 +36,7 @@ impl Diagnosis {
         simulator: &Simulator<'_>,
         evidence: &Evidence,
         unusable: &[UnusableMeasurement],
-        ladder: Vec<Rung>,
+        ladder: Vec<FidelityError>,
     ) -> Self {
         let (set, finding) = (simulator.bench.set(), &evidence.finding);
         let pixels = evidence.problem(simulator).points();

@@ -11,8 +11,8 @@ use serde_json::Value;
 
 pub use pattern::{FreePattern, GroupValue, PatternTrend, Slope};
 
-use crate::fidelity::Rung;
-use crate::width_parts::WidthParts;
+use crate::fidelity::FidelityError;
+use crate::interval_parts::WidthParts;
 
 /// The verdict on a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -138,7 +138,7 @@ pub struct Diagnosis {
     /// Held-out error of each measurement before and after.
     pub measurements: Vec<MeasurementError>,
     /// The three fidelities of the cell, nuisances fitted.
-    pub ladder: Vec<Rung>,
+    pub ladder: Vec<FidelityError>,
 }
 
 /// Effects for what no effect of the list explains, in a file that can be declared.

@@ -10,9 +10,9 @@ use ndarray::Array2;
 use residual::{confusable, nuisances, smooth_residual};
 
 use crate::diagnosis::{Diagnosis, FreePattern, Ranked, SetVerdict};
+use crate::interval_parts::WidthParts;
 use crate::session::{Session, Simulations};
 use crate::statistics::Evidence;
-use crate::width_parts::WidthParts;
 use metalith_core::Result;
 use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, counted, fixed, sig};
 

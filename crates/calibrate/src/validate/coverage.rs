@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use crate::diagnosis::FoundEffect;
+use crate::interval_parts::WidthParts;
 use crate::statistics::SIGMAS_95;
-use crate::width_parts::WidthParts;
 use metalith_report::sig;
 
 /// A number that was claimed, beside the true one.

@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::bench::{Bench, BenchSampling, Lit};
+use crate::bench::{Bench, BenchSampling, IlluminatedChip};
 use crate::cells::{CellSource, RigorousCells};
 use crate::effects;
 use crate::optics::PixelGrid;
@@ -150,7 +150,7 @@ impl<'a> Synthesizer<'a> {
                         ));
                     }
                 };
-                let chips = tables.map(|table| Lit {
+                let chips = tables.map(|table| IlluminatedChip {
                     cells: Arc::new(table),
                     rim: None,
                     geometry: &perturbation.geometry,

@@ -5,8 +5,8 @@
 //! the sum over pairs ([`NeighbourTable`]); the coefficients are those with most light in the first order, mean of
 //! the wavelengths that the design compares mappings at. What is found is judged by supercells of rows of the element's own pillars.
 
-mod judge;
-mod sample;
+mod first_order;
+mod site_sample;
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -22,8 +22,8 @@ use metalith_core::{Error, Progress, Result, Wedge};
 use metalith_design::phase::LensPhase;
 use metalith_design::{Design, Element, SteeringSteps};
 
-use judge::judge;
-use sample::SiteSample;
+use first_order::judge;
+use site_sample::SiteSample;
 
 /// Share of the light in the first order at one wavelength, with the common mapping and with the element's own.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -119,12 +119,12 @@ fn steered(design: &Design) -> Vec<(SteeringSteps, Vec<Wedge>)> {
 }
 
 /// Elements with one wedge: a sample of their sites, and the tables of neighbours in their light, by wavelength.
-struct LitSample {
+struct IlluminatedSample {
     sample: SiteSample,
     tables: Vec<[NeighbourResponse; 2]>,
 }
 
-impl LitSample {
+impl IlluminatedSample {
     fn new(
         design: &Design,
         stack: &CellStack,
@@ -170,7 +170,7 @@ fn study(
     cache: Option<&Path>,
     progress: &dyn Progress,
 ) -> Result<SteeredStudy> {
-    let lit = |wedge| LitSample::new(design, stack, lens, wedge, cache, progress);
+    let lit = |wedge| IlluminatedSample::new(design, stack, lens, wedge, cache, progress);
     let lit = wedges.iter().map(lit).collect::<Result<Vec<_>>>()?;
     let common = &design.mapping.polynomial;
     progress.begin(
@@ -188,7 +188,7 @@ fn study(
     if progress.stopped() {
         return Err(Error::Interrupted);
     }
-    let shares = |polynomial: &InversePolynomial| LitSample::shares(&lit, |u| width_nm(design, polynomial, u));
+    let shares = |polynomial: &InversePolynomial| IlluminatedSample::shares(&lit, |u| width_nm(design, polynomial, u));
     let mean = |polynomial: &InversePolynomial| shares(polynomial).iter().sum::<f64>();
     let best = found
         .into_iter()
@@ -237,7 +237,7 @@ fn starts(design: &Design) -> [InversePolynomial; STARTS] {
     [common, even]
 }
 
-fn best(design: &Design, start: &InversePolynomial, lit: &[LitSample]) -> InversePolynomial {
+fn best(design: &Design, start: &InversePolynomial, lit: &[IlluminatedSample]) -> InversePolynomial {
     let rounded = |coefficients: &[f64]| coefficients.iter().map(|c| (c * ROUNDED).round() as i64).collect();
     let with = |rounded: &[i64]| InversePolynomial {
         coefficients: rounded.iter().map(|c| *c as f64 / ROUNDED).collect(),
@@ -251,7 +251,7 @@ fn best(design: &Design, start: &InversePolynomial, lit: &[LitSample]) -> Invers
         let outside = (f64::from(low) - narrow * pitch_nm)
             .max(wide * pitch_nm - f64::from(high))
             .max(0.0);
-        let shares = LitSample::shares(lit, |u| width_nm(design, polynomial, u));
+        let shares = IlluminatedSample::shares(lit, |u| width_nm(design, polynomial, u));
         outside - shares.iter().sum::<f64>() / shares.len() as f64
     };
     // The simplex shrinks below what coefficients are rounded to: most of its steps ask for what is known.

@@ -118,9 +118,9 @@ impl RotationMapping {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::rectangle::tests::{PILLARS, titania};
     use super::*;
     use crate::RotatedCell;
+    use crate::rotated::jones::tests::{PILLARS, titania};
 
     /// Residual of the phase (rad): 0.004 by the harmonics beyond the second, and rounding. Without the series it is
     /// 0.014.

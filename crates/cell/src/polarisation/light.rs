@@ -45,7 +45,7 @@ pub struct PolarisedLight {
 
 /// Pillars, and the light that they focus.
 #[derive(Clone, Debug)]
-pub struct LitStack {
+pub struct FocusingStack {
     pub stack: CellStack,
     /// The light that has the phase of a design behind them, if they distinguish polarisations.
     pub focused: Option<FocusedLight>,

@@ -1,8 +1,8 @@
 //! Polarisation of source and detector, before and behind pillars that distinguish polarisations.
 
-mod axes;
-mod hands;
+mod circular;
 mod light;
+mod linear;
 mod tables;
 
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -14,9 +14,9 @@ use serde::Serialize;
 
 use metalith_core::{Error, Result};
 
-pub use axes::{AxisTables, PolarisationAxis};
-pub use hands::HandTables;
-pub use light::{FocusedLight, LitStack, PolarisedLight};
+pub use circular::CircularTables;
+pub use light::{FocusedLight, FocusingStack, PolarisedLight};
+pub use linear::{LinearTables, PolarisationAxis};
 pub use tables::{PassedTable, PolarisedTables};
 
 use super::Handedness;

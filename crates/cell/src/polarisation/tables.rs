@@ -2,15 +2,15 @@
 
 use num_complex::Complex64;
 
-use super::{Analyser, AxisTables, FocusedLight, HandTables, PolarisedLight};
+use super::{Analyser, CircularTables, FocusedLight, LinearTables, PolarisedLight};
 
 /// Tables of pillars for light of both polarisations, by their numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PolarisedTables {
     /// Rotated rectangles, to both hands.
-    Hands(HandTables),
+    Hands(CircularTables),
     /// Upright rectangles, along both axes.
-    Axes(AxisTables),
+    Axes(LinearTables),
 }
 
 /// Transmissions of light that interferes with no other. They are of the field that leaves over that of all light that arrives.

@@ -16,13 +16,13 @@ fn pillars() -> Vec<[[Complex64; 2]; 2]> {
         .collect()
 }
 
-fn hands(focused: Handedness) -> HandTables {
+fn hands(focused: Handedness) -> CircularTables {
     let of = |out: usize, input: usize| pillars().iter().map(|j| circular(*j)[out][input]).collect::<Vec<_>>();
     let [own, other] = match focused {
         Handedness::Left => [0, 1],
         Handedness::Right => [1, 0],
     };
-    HandTables {
+    CircularTables {
         focused,
         converted: [of(other, own), of(own, other)],
         unconverted: [of(own, own), of(other, other)],
@@ -37,7 +37,7 @@ fn tables(focused: Handedness) -> PolarisedTables {
 /// Tables of the same pillars as if they turned no polarisation.
 fn axes(focused: PolarisationAxis) -> PolarisedTables {
     let along = [0, 1].map(|axis| pillars().iter().map(|j| j[axis][axis]).collect::<Vec<_>>());
-    PolarisedTables::Axes(AxisTables { focused, along })
+    PolarisedTables::Axes(LinearTables { focused, along })
 }
 
 /// Energy of the sum over all pillars with these weights, as at a place of the sensor.
@@ -147,7 +147,7 @@ fn what_has_unlike_phases_adds_up_over_whole_turns() {
             };
             [turned(0), turned(1)]
         };
-        let hands = PolarisedTables::Hands(HandTables {
+        let hands = PolarisedTables::Hands(CircularTables {
             focused,
             converted: pillar(&plain.converted, [1.0, -1.0]),
             unconverted: pillar(&plain.unconverted, [0.0, 0.0]),

@@ -1,5 +1,6 @@
 //! The rigorous cell of rectangular pillars of one size, by their rotation.
 
+pub(crate) mod jones;
 mod samples;
 mod series;
 
@@ -13,12 +14,12 @@ use metalith_core::{Progress, Result, Silent};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
 
+pub use self::jones::{Handedness, OBLIQUE_RECTANGLES, RotatedRectangle, oblique_refused};
 pub use self::samples::RotationSamples;
 
 use self::series::{Channels, Series, every};
 use super::{
-    CellModel, CellResponse, CellStack, Fidelity, HandTables, Handedness, Illumination, JonesTables, PolarisedTables,
-    Spectral,
+    CellModel, CellResponse, CellStack, CircularTables, Fidelity, Illumination, JonesTables, PolarisedTables, Spectral,
 };
 
 /// Intervals of an eighth of a turn whose ends are solved.
@@ -211,7 +212,7 @@ impl RotatedCell {
     ) -> Result<PolarisedTables> {
         let solved = self.solved(wavelength_um, of_band, progress)?;
         let of = |channel: usize| [Hand::Focused, Hand::Other].map(|hand| self.table(&solved, most, hand, channel));
-        Ok(PolarisedTables::Hands(HandTables {
+        Ok(PolarisedTables::Hands(CircularTables {
             focused: self.arriving,
             converted: of(0),
             unconverted: of(1),
@@ -319,7 +320,7 @@ impl CellModel for RotatedCell {
 
     fn response(&self, light: &Illumination<'_>, last: u16, progress: &dyn Progress) -> Result<CellResponse> {
         if light.cell_sines() != [0.0; 2] {
-            return Err(super::rectangle::oblique_refused());
+            return Err(oblique_refused());
         }
         let in_band = light.spectral == Spectral::InBand;
         // Of a band whoever asks says how far it is.
@@ -337,8 +338,8 @@ impl CellModel for RotatedCell {
 mod tests {
     use std::f64::consts::FRAC_1_SQRT_2;
 
-    use super::super::rectangle::tests::{PILLARS, titania};
     use super::super::{Polarisation, PolarisedLight, RotatedRectangle};
+    use super::jones::tests::{PILLARS, titania};
     use super::*;
     use metalith_rcwa::circular;
 
@@ -373,7 +374,7 @@ mod tests {
         each.into_iter().fold(0.0, f64::max)
     }
 
-    fn in_band(cell: &RotatedCell, most: u16) -> HandTables {
+    fn in_band(cell: &RotatedCell, most: u16) -> CircularTables {
         match cell.both_hands(0.532, true, most, &Silent).unwrap() {
             PolarisedTables::Hands(hands) => hands,
             PolarisedTables::Axes(_) => unreachable!("rotated pillars have tables of hands"),

@@ -11,7 +11,7 @@ use metalith_rcwa::{Orders, circular};
 
 use super::series::{Channels, Series, samples, solved_rotations};
 use super::{CHOICE, INTERVALS, Solved};
-use crate::{CellStack, HandTables, Handedness, RotatedRectangle};
+use crate::{CellStack, CircularTables, Handedness, RotatedRectangle};
 
 /// Response of a rectangle to light that arrives left circularly polarised, at rotations evenly over a quarter turn.
 /// Its response at any rotation and to either hand is linear in these numbers, so that they may be interpolated between
@@ -118,7 +118,7 @@ impl RotationSamples {
 
     /// Tables of pillars with the rotations of these numbers for light of both hands, in their order, where light of a
     /// hand is focused; as the tables of [`RotatedCell`](super::RotatedCell), at rotations as drawn.
-    pub fn hands(&self, pillars: RotatedRectangles, numbers: &[u16], focused: Handedness) -> HandTables {
+    pub fn hands(&self, pillars: RotatedRectangles, numbers: &[u16], focused: Handedness) -> CircularTables {
         let series = Series::of(&self.0);
         let of = |sign: f64, channel: usize| -> Vec<Complex64> {
             let at = |number: &u16| {
@@ -134,7 +134,7 @@ impl RotationSamples {
             Handedness::Left => [1.0, -1.0],
             Handedness::Right => [-1.0, 1.0],
         };
-        HandTables {
+        CircularTables {
             focused,
             converted: signs.map(|sign| of(sign, 0)),
             unconverted: signs.map(|sign| of(sign, 1)),
@@ -145,11 +145,11 @@ impl RotationSamples {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::rectangle::tests::{PILLARS, titania};
     use super::super::BAND_ORDERS;
     use super::super::RotatedCell;
     use super::*;
     use crate::PolarisedTables;
+    use crate::rotated::jones::tests::{PILLARS, titania};
 
     /// Sums of two dozen numbers of size one; the solver tells left from right to 1e-9.
     const SAME: f64 = 1e-6;

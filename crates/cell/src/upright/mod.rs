@@ -1,6 +1,6 @@
 //! The rigorous cell of upright rectangular pillars of many sizes.
 
-mod kept;
+mod cache;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,9 @@ use metalith_core::{Error, Progress, Result, Silent};
 use metalith_pillars::UprightRectangles;
 use metalith_rcwa::{Incidence, LayerStack, Orders, Outline, Side, solve_each};
 
-use crate::pointwise::BAND_ORDERS;
+use crate::BAND_ORDERS;
 use crate::{
-    AxisTables, CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, PolarisationAxis,
+    CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, LinearTables, PolarisationAxis,
     PolarisedTables, Spectral,
 };
 
@@ -134,7 +134,7 @@ impl UprightCell {
 
     /// This cell, whose answers for single wavelengths are cached in a folder from one run to the next.
     #[must_use]
-    pub fn kept_in(mut self, folder: Option<&Path>) -> Self {
+    pub fn cached_in(mut self, folder: Option<&Path>) -> Self {
         self.folder = folder.map(Path::to_owned);
         self
     }
@@ -144,19 +144,19 @@ impl UprightCell {
     /// # Errors
     /// As [`CellStack::birefringent`]; also if the user stopped it.
     pub fn along(&self, wavelength_um: f64, progress: &dyn Progress) -> Result<Along> {
-        let table = kept::table(
+        let table = cache::table(
             self.folder.as_deref(),
             &self.stack,
             self.pillars,
             wavelength_um,
             UPRIGHT_ORDERS,
         );
-        let decode = |content: &[u8]| kept::decode(content, usize::from(self.pillars.count()));
+        let decode = |content: &[u8]| cache::decode(content, usize::from(self.pillars.count()));
         if let Some(along) = table.read(decode, progress) {
             return Ok(along);
         }
         let along = self.solve(wavelength_um, Orders::new(UPRIGHT_ORDERS)?, progress)?;
-        table.write(&kept::encode(&along), progress);
+        table.write(&cache::encode(&along), progress);
         Ok(along)
     }
 
@@ -196,7 +196,7 @@ impl UprightCell {
 
     fn tables(&self, wavelength_um: f64, of_band: bool, last: u16, progress: &dyn Progress) -> Result<PolarisedTables> {
         let solved = self.solved(wavelength_um, of_band, progress)?;
-        Ok(PolarisedTables::Axes(AxisTables {
+        Ok(PolarisedTables::Axes(LinearTables {
             focused: self.focused,
             along: PolarisationAxis::ALL.map(|axis| Self::table(&solved, axis, last)),
         }))
@@ -210,7 +210,7 @@ impl CellModel for UprightCell {
 
     fn response(&self, light: &Illumination<'_>, last: u16, progress: &dyn Progress) -> Result<CellResponse> {
         if light.cell_sines() != [0.0; 2] {
-            return Err(crate::rectangle::oblique_refused());
+            return Err(crate::oblique_refused());
         }
         let tables = self.tables(light.wavelength_um, light.spectral == Spectral::InBand, last, progress)?;
         Ok(CellResponse::Jones(JonesTables::Polarised(tables)))
@@ -224,7 +224,7 @@ impl CellModel for UprightCell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rectangle::tests::titania;
+    use crate::rotated::jones::tests::titania;
     use crate::{RotatedRectangle, dark};
 
     const PILLARS: UprightRectangles = UprightRectangles {
@@ -304,7 +304,7 @@ mod tests {
     fn what_is_solved_is_kept() {
         let folder = tempfile::tempdir().unwrap();
         let cell =
-            |stack: CellStack| UprightCell::new(stack, PILLARS, PolarisationAxis::X).kept_in(Some(folder.path()));
+            |stack: CellStack| UprightCell::new(stack, PILLARS, PolarisationAxis::X).cached_in(Some(folder.path()));
         let files = || {
             std::fs::read_dir(folder.path())
                 .unwrap()

@@ -1,15 +1,15 @@
 //! Array of pillars made from the phase: the widths of every element, and the elements that are copies of one another.
 
-mod computed;
-mod domain;
+mod computed_widths;
+mod fundamental_domain;
 mod pillar_rule;
 mod symmetry;
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
-pub use computed::{ClassPillars, ComputedWidths};
-pub use domain::DomainPart;
+pub use computed_widths::{ClassPillars, ComputedWidths};
+pub use fundamental_domain::DomainPart;
 pub use pillar_rule::PillarRule;
 pub use symmetry::{Symmetry, SymmetryGroup};
 

@@ -2,13 +2,13 @@
 //! Phases are kept in turns, so that the modulo is exact.
 
 mod element;
-mod open;
+mod open_area;
 mod radial;
 mod table;
 mod term;
 
 pub(crate) use element::Rotation;
 pub use element::{ElementPhase, LensPhase};
-pub use open::OpenAreas;
+pub use open_area::OpenAreas;
 pub use radial::{Interpolation, RadialPhase, TableReading};
 pub use term::{MapTable, PhaseTerm, TermForm, ZernikeOrder};

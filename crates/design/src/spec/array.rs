@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::footprint::{Footprint, um};
 use super::lens::WAVELENGTH;
-use super::{CellSpec, LensSpec, term};
+use super::{CellSpec, LensSpec, phase_term};
 use metalith_core::Wedge;
 use metalith_core::document::{Limits, Section};
 
@@ -108,7 +108,7 @@ impl ArraySpec {
             }
         };
         s.finish();
-        term::check_elements(&spec, lens, phase, placed);
+        phase_term::check_elements(&spec, lens, phase, placed);
         spec
     }
 

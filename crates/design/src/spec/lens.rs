@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::array::whole_nm;
 use super::outline::{self, DIAMETER, LensOutline};
-use super::{CellSpec, term};
+use super::{CellSpec, phase_term};
 use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TableReading, TermForm};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
@@ -94,8 +94,8 @@ impl LensSpec {
             let renew = |phase: &mut RadialPhase, terms: &mut Vec<PhaseTerm>, said: &Section<'_, '_>| {
                 *phase = read_radial(said, focal_length_um, shared.radius_um());
                 let sections = said.sections("term");
-                for (term, said) in terms.iter_mut().zip(term::sections(said, &sections)) {
-                    term::default_focal_length(term, said, focal_length_um);
+                for (term, said) in terms.iter_mut().zip(phase_term::sections(said, &sections)) {
+                    phase_term::default_focal_length(term, said, focal_length_um);
                 }
                 terms.retain(|term| term.is_of(index));
             };
@@ -113,8 +113,10 @@ impl LensSpec {
         let read = |s: &Section<'_, '_>| {
             let radial = read_radial(s, focal_length_um, radius_um);
             let terms = s.sections("term");
-            let of_phase = term::is_plane(s).then(|| term::read_keys(s, focal_length_um, radius_um));
-            let terms = terms.iter().map(|term| term::read(term, focal_length_um, radius_um));
+            let of_phase = phase_term::is_plane(s).then(|| phase_term::read_keys(s, focal_length_um, radius_um));
+            let terms = terms
+                .iter()
+                .map(|term| phase_term::read(term, focal_length_um, radius_um));
             (radial, of_phase.into_iter().chain(terms).collect())
         };
         (self.phase, self.terms) = read(s);

@@ -9,8 +9,8 @@ mod mapping;
 mod mapping_cell;
 mod optimise;
 mod outline;
-mod steered;
-mod term;
+mod phase_term;
+mod steered_mapping;
 mod verify;
 
 pub use array::{ArraySpec, Element, PlacedSpec};
@@ -24,5 +24,5 @@ pub use mapping_cell::MappingIdentity;
 pub use optimise::{MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
 pub use outline::LensOutline;
 pub(crate) use outline::OutlineRows;
-pub use steered::{SteeredMapping, SteeringSteps};
+pub use steered_mapping::{SteeredMapping, SteeringSteps};
 pub use verify::{CellIncidence, FieldAngle, LimitSpec, USUAL_PIXEL_UM, VerifySpec};

@@ -7,10 +7,10 @@ use std::collections::HashMap;
 use copies::Images;
 
 use super::MOST_SITES;
-use super::held::StoredPillars;
-use super::oddity::Why;
 use super::plan::ExtractedElement;
-use super::sites::{Scale, Sites, Standing};
+use super::sites::{Scale, SitePlace, Sites};
+use super::stored_pillars::StoredPillars;
+use super::unrecognised_shapes::Why;
 use crate::{DrawnPillar, ExtractionError, Rect, Transform};
 use metalith_pillars::{EighthMap, ElementSite, PillarRows};
 
@@ -236,12 +236,12 @@ impl Filler {
     #[inline]
     fn site(&self, r: &Rect, width_nm: i64, guess: &mut u32) -> Result<(u32, usize, usize), Why> {
         match self.sites.stand(r, guess) {
-            Standing::Site(element, ..) | Standing::Between(element) if width_nm > self.sites.pitch_nm(element) => {
+            SitePlace::Site(element, ..) | SitePlace::Between(element) if width_nm > self.sites.pitch_nm(element) => {
                 Err(Why::TooWide)
             }
-            Standing::Site(element, row, column) => Ok((element, row, column)),
-            Standing::Between(_) => Err(Why::OffLattice),
-            Standing::Outside => Err(Why::OutsideElements),
+            SitePlace::Site(element, row, column) => Ok((element, row, column)),
+            SitePlace::Between(_) => Err(Why::OffLattice),
+            SitePlace::Outside => Err(Why::OutsideElements),
         }
     }
 
@@ -341,7 +341,7 @@ impl Filler {
     /// returns the number of the other.
     pub fn keep_larger_number(&mut self, pillar: &DrawnPillar, placement: usize) -> u16 {
         let number = pillar.number.unwrap_or(0);
-        let Standing::Site(element, row, column) = self.sites.stand(&pillar.around, &mut self.guesses[placement])
+        let SitePlace::Site(element, row, column) = self.sites.stand(&pillar.around, &mut self.guesses[placement])
         else {
             return number;
         };
@@ -358,7 +358,7 @@ impl Filler {
     /// Keeps the wider of a pillar and the one that is on its site already; returns the other, as a rectangle about the
     /// same site. Both have even widths.
     pub fn keep_wider(&mut self, r: &Rect, placement: usize) -> Rect {
-        let Standing::Site(element, row, column) = self.sites.stand(r, &mut self.guesses[placement]) else {
+        let SitePlace::Site(element, row, column) = self.sites.stand(r, &mut self.guesses[placement]) else {
             return *r;
         };
         let Some(width_nm) = self.scale.whole_nm(r.width()) else {

@@ -6,20 +6,20 @@
 
 mod discover;
 mod filler;
-mod held;
 mod lattices;
-mod oddity;
 mod pillars;
 mod places;
 mod plan;
 mod sites;
 mod sizes;
+mod stored_pillars;
 mod survey;
 mod tiles;
+mod unrecognised_shapes;
 
-pub use oddity::{UnrecognisedShape, UnrecognisedShapes, Why};
 pub use plan::{Elements, ExtractedElement, Extraction, ExtractionPlan};
 pub use survey::{LayerSummary, Survey, TextSummary};
+pub use unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
 
 use std::path::Path;
 
@@ -31,8 +31,8 @@ use pillars::PillarCollector;
 
 pub use discover::{Discovered, discover};
 pub use filler::Filler;
-pub use held::StoredPillars;
 pub use sites::Scale;
+pub use stored_pillars::StoredPillars;
 
 /// Sites of all elements together where they are held in full, or where the layout says how large they are: 5 x 5 lenses
 /// of 1 mm have 204 million.

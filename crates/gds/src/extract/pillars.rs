@@ -1,11 +1,11 @@
 //! The visitor that fills the width maps.
 
 use super::filler::Filler;
-use super::held::StoredPillars;
-use super::oddity::{UnrecognisedShape, UnrecognisedShapes, Why};
 use super::plan::{Extraction, ExtractionPlan};
 use super::sites::Scale;
+use super::stored_pillars::StoredPillars;
 use super::survey::Surveyor;
+use super::unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
 use crate::{ExtractionError, LayerNumber, LayoutCell, PillarFinder, Rect, Shape, Text, Transform, Visitor, pillar_of};
 use metalith_pillars::{ElementSite, PillarShape};
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::oddity::UnrecognisedShapes;
 use super::survey::Survey;
+use super::unrecognised_shapes::UnrecognisedShapes;
 use crate::{LayerNumber, Selection};
 use metalith_core::{Error, Result};
 use metalith_pillars::{ElementSite, PillarMap, PillarShape};

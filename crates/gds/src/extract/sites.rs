@@ -58,7 +58,7 @@ impl Scale {
 
 /// Place of a pillar on the sites.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Standing {
+pub(super) enum SitePlace {
     /// Site (row, column) of an element.
     Site(u32, usize, usize),
     /// Place between sites, in this element.
@@ -160,7 +160,7 @@ impl Sites {
 
     /// Place of a pillar on the sites. `guess` is the element to try first, and is set to the one found.
     #[inline]
-    pub(crate) fn stand(&self, pillar: &Rect, guess: &mut u32) -> Standing {
+    pub(crate) fn stand(&self, pillar: &Rect, guess: &mut u32) -> SitePlace {
         let x = (pillar.x0 + pillar.x1) * self.scale.num;
         let y = (pillar.y0 + pillar.y1) * self.scale.num;
         // Half a database unit, doubled and scaled.
@@ -175,11 +175,11 @@ impl Sites {
                 return standing;
             }
         }
-        Standing::Outside
+        SitePlace::Outside
     }
 
     #[inline]
-    fn try_element(&self, element: u32, x: i64, y: i64, slack: [i64; 2]) -> Option<Standing> {
+    fn try_element(&self, element: u32, x: i64, y: i64, slack: [i64; 2]) -> Option<SitePlace> {
         let grid = self.grids.get(element as usize)?;
         let (column, dx) = grid.nearest(0, x);
         let (row, dy) = grid.nearest(1, y);
@@ -188,9 +188,9 @@ impl Sites {
         }
         let is_site = !grid.staggered || (column + row) % 2 == 0;
         Some(if dx.abs() <= slack[0] && dy.abs() <= slack[1] && is_site {
-            Standing::Site(element, row as usize, column as usize)
+            SitePlace::Site(element, row as usize, column as usize)
         } else {
-            Standing::Between(element)
+            SitePlace::Between(element)
         })
     }
 }
@@ -222,26 +222,29 @@ mod tests {
         let mut guess = 0;
         assert_eq!(
             sites.stand(&square(175, -525, 100), &mut guess),
-            Standing::Site(0, 0, 2)
+            SitePlace::Site(0, 0, 2)
         );
         assert_eq!(
             sites.stand(&square(10_525, 175, 100), &mut guess),
-            Standing::Site(1, 2, 3)
+            SitePlace::Site(1, 2, 3)
         );
         assert_eq!(guess, 1);
-        assert_eq!(sites.stand(&square(176, 175, 100), &mut guess), Standing::Between(0));
-        assert_eq!(sites.stand(&square(5_000, 175, 100), &mut guess), Standing::Outside);
+        assert_eq!(sites.stand(&square(176, 175, 100), &mut guess), SitePlace::Between(0));
+        assert_eq!(sites.stand(&square(5_000, 175, 100), &mut guess), SitePlace::Outside);
         // An edge of odd length is half a unit off along its own axis alone.
         let odd = |dx: i64, dy: i64| Rect {
             x1: 225 + dx,
             y1: 225 + dy,
             ..square(175, 175, 100)
         };
-        assert_eq!(sites.stand(&odd(1, 0), &mut guess), Standing::Site(0, 2, 2));
-        assert_eq!(sites.stand(&odd(0, 1), &mut guess), Standing::Site(0, 2, 2));
-        assert_eq!(sites.stand(&odd(2, 1), &mut guess), Standing::Between(0));
+        assert_eq!(sites.stand(&odd(1, 0), &mut guess), SitePlace::Site(0, 2, 2));
+        assert_eq!(sites.stand(&odd(0, 1), &mut guess), SitePlace::Site(0, 2, 2));
+        assert_eq!(sites.stand(&odd(2, 1), &mut guess), SitePlace::Between(0));
         // 101 nm about a whole centre cannot be nearer than half a unit.
-        assert_eq!(sites.stand(&square(175, 175, 101), &mut guess), Standing::Site(0, 2, 2));
+        assert_eq!(
+            sites.stand(&square(175, 175, 101), &mut guess),
+            SitePlace::Site(0, 2, 2)
+        );
     }
 
     /// Two strips one above the other, nearer than their lattices are wide and in step with one another: each pillar is of the strip
@@ -260,10 +263,10 @@ mod tests {
                 let mut guess = before;
                 sites.stand(&square(200, y, 100), &mut guess)
             };
-            assert_eq!(stand(3_800), Standing::Site(0, 59, 50));
-            assert_eq!(stand(4_200), Standing::Site(1, 40, 50));
-            assert_eq!(stand(-4_200), Standing::Outside);
-            assert_eq!(stand(11_800), Standing::Site(1, 59, 50));
+            assert_eq!(stand(3_800), SitePlace::Site(0, 59, 50));
+            assert_eq!(stand(4_200), SitePlace::Site(1, 40, 50));
+            assert_eq!(stand(-4_200), SitePlace::Outside);
+            assert_eq!(stand(11_800), SitePlace::Site(1, 59, 50));
         }
     }
 
@@ -280,14 +283,14 @@ mod tests {
         let sites = Sites::new(&[site], Scale { num: 1, den: 1 });
         let mut guess = 0;
         let mut stand = |x, y| sites.stand(&square(x, y, 100), &mut guess);
-        assert_eq!(stand(1000, 0), Standing::Site(0, 4, 4));
-        assert_eq!(stand(1400, 0), Standing::Site(0, 4, 6));
-        assert_eq!(stand(1200, 346), Standing::Site(0, 5, 5));
-        assert_eq!(stand(1000, -692), Standing::Site(0, 2, 4));
-        assert_eq!(stand(1200, 0), Standing::Between(0));
-        assert_eq!(stand(1200, 347), Standing::Between(0));
+        assert_eq!(stand(1000, 0), SitePlace::Site(0, 4, 4));
+        assert_eq!(stand(1400, 0), SitePlace::Site(0, 4, 6));
+        assert_eq!(stand(1200, 346), SitePlace::Site(0, 5, 5));
+        assert_eq!(stand(1000, -692), SitePlace::Site(0, 2, 4));
+        assert_eq!(stand(1200, 0), SitePlace::Between(0));
+        assert_eq!(stand(1200, 347), SitePlace::Between(0));
         // Three rows above the middle is beyond a square about it.
-        assert_eq!(stand(1200, 1038), Standing::Outside);
+        assert_eq!(stand(1200, 1038), SitePlace::Outside);
     }
 
     /// A database unit of 0.5 nm and one of 5 nm see the same sites.
@@ -301,9 +304,9 @@ mod tests {
         };
         let mut guess = 0;
         let fine = Sites::new(std::slice::from_ref(&site), Scale { num: 1, den: 2 });
-        assert_eq!(fine.stand(&square(350, 350, 200), &mut guess), Standing::Site(0, 2, 2));
+        assert_eq!(fine.stand(&square(350, 350, 200), &mut guess), SitePlace::Site(0, 2, 2));
         let coarse = Sites::new(&[site], Scale { num: 5, den: 1 });
-        assert_eq!(coarse.stand(&square(35, 35, 20), &mut guess), Standing::Site(0, 2, 2));
-        assert_eq!(coarse.stand(&square(36, 35, 20), &mut guess), Standing::Between(0));
+        assert_eq!(coarse.stand(&square(35, 35, 20), &mut guess), SitePlace::Site(0, 2, 2));
+        assert_eq!(coarse.stand(&square(36, 35, 20), &mut guess), SitePlace::Between(0));
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::sites::Scale;
-use crate::memo::{BoxMemo, OutlineMemo};
+use crate::outline_memo::{BoxMemo, OutlineMemo};
 use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
 use metalith_pillars::{PillarShape, RotatedRectangles, UprightRectangles};
 

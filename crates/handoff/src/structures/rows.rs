@@ -1,9 +1,9 @@
 //! Rows of pads and of lines to measure widths on.
 
 use super::{APART, BESIDE, NUMERAL, StructureLayers, Structures, clear_of_borders};
+use crate::dose_matrix::top_pad;
 use crate::drawing::{RectNm, Sheet, nm};
 use crate::kind_words::KindWords;
-use crate::matrix::top_pad;
 use crate::pad::{DrawnSize, line_width, test_pads};
 use crate::process::Process;
 use metalith_design::Design;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::between::BetweenNodes;
+use super::kernel_interpolation::BetweenNodes;
 use crate::approximation_set::ApproximationSet;
 
 /// Planes of the scene that go into an operator, out of the spectra of its bank.

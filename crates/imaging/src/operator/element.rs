@@ -1,4 +1,4 @@
-//! One element: its warps, and the kernels of its nodes. What it does with light is in `pass`.
+//! One element: its warps, and the kernels of its nodes. What it does with light is in `element_pass`.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -8,8 +8,8 @@ use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
 use ndarray::Array2;
 use num_complex::Complex32;
 
-use super::between::BetweenNodes;
-use super::mixed::MixedKernels;
+use super::kernel_interpolation::BetweenNodes;
+use super::low_rank_kernels::MixedKernels;
 use super::source::KernelSource;
 use super::warp::{CellPoint, Warp};
 use crate::geometry::{ElementView, SceneSpace};

@@ -7,22 +7,22 @@
 //! | question | file |
 //! | --- | --- |
 //! | which place of the scene a pixel looks at | `warp` |
-//! | which kernels are in force between nodes | `between` |
+//! | which kernels are in force between nodes | `kernel_interpolation` |
 //! | how finely it samples the scene, and what it knows | `detail` |
 //! | kernels on the pixels of a grid | `source` |
 //! | an element: its warps, kernels of its nodes as spectra | `element` |
-//! | light through an element, and back | `pass` |
+//! | light through an element, and back | `element_pass` |
 //! | its pixels on the frame | `sub_image` |
-//! | the innermost loops | `loops` |
-//! | fewer of them than inputs | `mixed` |
+//! | the innermost loops | `inner_loops` |
+//! | fewer of them than inputs | `low_rank_kernels` |
 //! | a scene without what its grid cannot hold | `smooth` |
 
-mod between;
 mod detail;
 mod element;
-mod loops;
-mod mixed;
-mod pass;
+mod element_pass;
+mod inner_loops;
+mod kernel_interpolation;
+mod low_rank_kernels;
 mod smooth;
 mod source;
 mod sub_image;
@@ -40,9 +40,9 @@ use crate::geometry::{ElementView, SceneSpace, SceneView};
 use crate::kernels::KernelBank;
 use crate::stray_light::{self, StrayLight};
 
-pub use between::BetweenNodes;
 pub use detail::{Detail, SceneInputs, ScenePoints};
 use element::ElementOperator;
+pub use kernel_interpolation::BetweenNodes;
 use smooth::Smoothing;
 use source::KernelSource;
 

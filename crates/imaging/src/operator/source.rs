@@ -9,8 +9,8 @@ use std::ops::Range;
 use metalith_sensor::{ColourFilter, Sensor};
 use nalgebra::DMatrix;
 
-use super::between::BetweenNodes;
 use super::detail::{Detail, SceneInputs, ScenePoints};
+use super::kernel_interpolation::BetweenNodes;
 use crate::approximation_set::ApproximationSet;
 use crate::exposure::channel_at;
 use crate::kernels::{BankSpec, KernelBank, TurnedKernel};

@@ -3,7 +3,7 @@
 use metalith_sensor::Sensor;
 use ndarray::Array2;
 
-use super::between::BetweenNodes;
+use super::kernel_interpolation::BetweenNodes;
 use super::sub_image::PixelGrid;
 use crate::approximation_set::{ApproximationSet, butterworth};
 use crate::geometry::ElementView;

@@ -3,7 +3,7 @@
 use ndarray::{Array2, Axis};
 
 use super::SceneImage;
-use super::sides::SCORED_SIDES;
+use super::pixel_count::SCORED_SIDES;
 use crate::geometry::SceneView;
 
 /// Tolerance of a number of pixels that fit: a view is no finer than its own pixels.

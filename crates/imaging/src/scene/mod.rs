@@ -7,15 +7,15 @@
 //! | a spectral cube as a few planes | `cube` |
 //! | how far each pixel is | `depth` |
 //! | larger pixels | `average` |
-//! | how many pixels it may have | `sides` |
+//! | how many pixels it may have | `pixel_count` |
 
 mod average;
 mod chart;
 mod cube;
 mod depth;
 mod folder;
+mod pixel_count;
 mod read;
-mod sides;
 
 use ndarray::{Array2, Array3};
 
@@ -27,9 +27,9 @@ pub use chart::{BuiltIn, chart};
 pub(crate) use chart::{LEAN_DEG, SPOKES, STAR};
 pub use depth::read_depth;
 pub use folder::images_in;
+pub use pixel_count::SCORED_SIDES;
+pub(crate) use pixel_count::sides_words;
 pub use read::{SceneFile, read_far_scene, read_picture, read_scene};
-pub use sides::SCORED_SIDES;
-pub(crate) use sides::sides_words;
 
 /// A scene: planes of light, each with the spectrum of its reflectance.
 ///

@@ -11,7 +11,7 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::sides::{SIDES, sides_words};
+use super::pixel_count::{SIDES, sides_words};
 use super::{SceneImage, cube};
 use crate::geometry::SceneView;
 

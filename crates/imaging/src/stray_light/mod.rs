@@ -6,13 +6,13 @@
 //!
 //! | question | file |
 //! | --- | --- |
-//! | from pixels to squares and back | `squares` |
-//! | where the light of one square of the scene goes | `trace` |
-//! | how much light goes where in all | `shares` |
+//! | from pixels to squares and back | `coarse_grid` |
+//! | where the light of one square of the scene goes | `ray_trace` |
+//! | how much light goes where in all | `light_shares` |
 
-mod shares;
-mod squares;
-mod trace;
+mod coarse_grid;
+mod light_shares;
+mod ray_trace;
 
 use metalith_core::{Error, Result};
 use metalith_sensor::Sensor;
@@ -21,8 +21,8 @@ use pulp::Arch;
 
 use crate::kernels::MOST_BYTES;
 
-pub use shares::LightShares;
-pub(crate) use squares::{gather, lay, lift, spread};
+pub(crate) use coarse_grid::{gather, lay, lift, spread};
+pub use light_shares::LightShares;
 
 /// Squares an axis into which the light of a scene is gathered.
 pub(crate) const SCENE_CELLS: usize = 20;

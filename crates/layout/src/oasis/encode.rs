@@ -8,8 +8,8 @@ use metalith_oasis::{CellBounds, CompressedBlock, Placing, RecordBuffer, Repetit
 use metalith_pillars::PillarRows;
 use rayon::prelude::*;
 
-use super::super::form::PillarForm;
-use super::rings;
+use super::super::pillar_form::PillarForm;
+use super::ring_order;
 
 /// Bytes of records that are compressed together: smaller blocks cost size, larger ones memory.
 const BLOCK_BYTES: usize = 4 << 20;
@@ -67,7 +67,7 @@ impl PillarEncoding {
     fn pieces(self, n: usize) -> usize {
         match self {
             Self::Lists(_) => n.div_ceil(STRIP),
-            _ => rings::SECTORS,
+            _ => ring_order::SECTORS,
         }
     }
 }
@@ -229,7 +229,7 @@ impl<'a> ElementPillars<'a> {
                 Some(extent.map_or((first, last), |(l, r)| (l.min(first), r.max(last))))
             })
         });
-        rings::rings_of(n, extents)
+        ring_order::rings_of(n, extents)
     }
 
     /// Bytes of a pillar, from some pieces; none if no pillar is in them.
@@ -364,7 +364,7 @@ impl<'a> ElementPillars<'a> {
         let lattice = self.widths.lattice();
         // Outlines that are no squares, by width: made once a sector.
         let mut corners: Vec<Vec<[i64; 2]>> = Vec::new();
-        rings::walk(lattice.sites(), sector, rings, |ix, iy| {
+        ring_order::walk(lattice.sites(), sector, rings, |ix, iy| {
             if let Some(part) = self.group.part_of(self.parts, lattice.sites(), ix, iy)
                 && let width = self.widths.number(ix, iy)
                 && width != 0

@@ -1,7 +1,7 @@
 //! Layouts as OASIS.
 
 mod encode;
-mod rings;
+mod ring_order;
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -12,8 +12,8 @@ use metalith_design::{Design, Hierarchy, LayoutLayer};
 use metalith_oasis::{CompressedBlock, OasisWriter, Placing, RecordBuffer};
 use metalith_pillars::PillarRows;
 
-use super::fixed::FixedShapes;
-use super::form::PillarForm;
+use super::fixed_shapes::FixedShapes;
+use super::pillar_form::PillarForm;
 use super::{OasisEncoding, PillarLayout, Written, no_copies, no_symmetry, top_cell};
 use encode::{ElementPillars, NOTHING, PillarEncoding, bounds_of, unite};
 

@@ -36,7 +36,7 @@ enum Pair {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Known {
+struct ModalState {
     relative: Option<bool>,
     at: [Option<[i64; 2]>; 3],
     layer: Option<u32>,
@@ -57,7 +57,7 @@ struct Known {
 #[derive(Clone, Debug, Default)]
 pub struct RecordBuffer {
     bytes: Vec<u8>,
-    known: Known,
+    known: ModalState,
     /// True if places are written as steps from the one before.
     relative: bool,
 }
@@ -84,7 +84,7 @@ impl RecordBuffer {
     /// Begin again, keeping the memory.
     pub fn clear(&mut self) {
         self.bytes.clear();
-        self.known = Known::default();
+        self.known = ModalState::default();
     }
 
     /// Steps or places: what this element needs, switching if need be.

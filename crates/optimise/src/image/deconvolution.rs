@@ -6,8 +6,9 @@ use std::ops::Range;
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
+use crate::image::buffer_pool::BufferPool;
 use crate::image::image_error::Spectrum;
-use crate::image::imaging::{BufferPool, Imaging, OpticalTransfer};
+use crate::image::imaging::{Imaging, OpticalTransfer};
 use crate::image::pupil::Pupil;
 use crate::image::views::{Views, window_offset_um};
 use crate::merit::focus::Lens;
@@ -26,7 +27,7 @@ pub struct Deconvolution {
     pub(crate) pupils: Vec<Vec<Pupil>>,
     /// Transmission over its full value by whole width, one for each wavelength.
     pub(crate) tables: Vec<Vec<Complex64>>,
-    pub(crate) rooms: BufferPool,
+    pub(crate) buffers: BufferPool,
 }
 
 /// Wavelengths of one channel at one angle, by index.
@@ -113,7 +114,7 @@ impl Deconvolution {
             mapping,
             pupils,
             tables,
-            rooms: BufferPool::default(),
+            buffers: BufferPool::default(),
         })
     }
 
@@ -137,10 +138,10 @@ impl Deconvolution {
                     .into_par_iter()
                     .map(|length| {
                         let t = self.transmissions(length, widths_nm);
-                        let (pupil, room) = (&self.pupils[angle][length], self.rooms.enter());
-                        let mut imaging = Imaging::new(pupil, self.views.window, room);
+                        let (pupil, buffers) = (&self.pupils[angle][length], self.buffers.take());
+                        let mut imaging = Imaging::new(pupil, self.views.window, buffers);
                         let transfer = imaging.transfer(&t.0, &t.1);
-                        self.rooms.leave(imaging);
+                        self.buffers.put_back(imaging);
                         transfer
                     })
                     .collect()

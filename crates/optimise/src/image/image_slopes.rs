@@ -40,8 +40,8 @@ impl Deconvolution {
                 .par_iter()
                 .map(|&(angle, length)| {
                     let t = self.transmissions(length, widths_nm);
-                    let (pupil, room) = (&self.pupils[angle][length], self.rooms.enter());
-                    let mut imaging = Imaging::new(pupil, self.views.window, room);
+                    let (pupil, buffers) = (&self.pupils[angle][length], self.buffers.take());
+                    let mut imaging = Imaging::new(pupil, self.views.window, buffers);
                     let transfer = imaging.transfer(&t.0, &t.1);
                     (imaging, transfer)
                 })
@@ -69,7 +69,7 @@ impl Deconvolution {
                     });
                 slopes.par_extend(by_ring);
             }
-            done.into_iter().for_each(|(imaging, _)| self.rooms.leave(imaging));
+            done.into_iter().for_each(|(imaging, _)| self.buffers.put_back(imaging));
         }
         (merit, slopes)
     }

@@ -1,5 +1,6 @@
 //! The expected error of restored images, from the field over a wide window.
 
+pub(crate) mod buffer_pool;
 pub(crate) mod deconvolution;
 pub(crate) mod image_error;
 pub(crate) mod image_slopes;

@@ -7,9 +7,10 @@ use rayon::prelude::*;
 
 use crate::merit::field_point::{Condition, FieldPoint};
 use crate::merit::focus::Lens;
-use crate::merit::neighbour_terms::{NeighbourTerms, RingContext};
+use crate::merit::neighbour_terms::NeighbourTerms;
+use crate::merit::ring_context::RingContext;
 use crate::rings::mapping::Mapping;
-use crate::rings::planes::Planes;
+use crate::rings::split_complex::Planes;
 use metalith_cell::{CellModel, Fidelity};
 use metalith_core::{Error, Result};
 
@@ -174,21 +175,21 @@ impl FieldProblem {
 
     /// Context of a ring: what its width acts on other than its own transmission, while other rings have these widths
     /// (nm); `None` among equal neighbours.
-    pub fn visit(&self, ring: usize, widths_nm: &[u16]) -> Option<RingContext> {
-        self.surroundings.as_ref().map(|s| s.visit(ring, widths_nm))
+    pub fn context(&self, ring: usize, widths_nm: &[u16]) -> Option<RingContext> {
+        self.surroundings.as_ref().map(|s| s.context(ring, widths_nm))
     }
 
     /// Fields of all rows that depend on the width of a ring, if it has this one.
     #[inline(always)]
-    pub fn contribution(&self, ring: usize, width_nm: u16, visit: Option<&RingContext>, out: &mut Planes) {
+    pub fn contribution(&self, ring: usize, width_nm: u16, context: Option<&RingContext>, out: &mut Planes) {
         let (k_re, k_im) = self.kernel_of(ring);
         let (t_re, t_im) = self.transmission_of(width_nm);
         for i in 0..k_re.len() {
             out.re[i] = k_re[i] * t_re[i] - k_im[i] * t_im[i];
             out.im[i] = k_re[i] * t_im[i] + k_im[i] * t_re[i];
         }
-        if let (Some(surroundings), Some(visit)) = (&self.surroundings, visit) {
-            surroundings.add_contribution(width_nm, visit, out);
+        if let (Some(surroundings), Some(context)) = (&self.surroundings, context) {
+            surroundings.add_contribution(width_nm, context, out);
         }
     }
 }

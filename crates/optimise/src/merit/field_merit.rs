@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::merit::field::{FLOOR, FieldProblem, LANES, MeritKind};
 use crate::merit::objective::Objective;
-use crate::rings::planes::Planes;
+use crate::rings::split_complex::Planes;
 
 impl FieldProblem {
     /// Merit if ring `k` has pillars of `width_nm[k]`.
@@ -106,15 +106,15 @@ impl FieldProblem {
     }
 
     /// [`Objective::expand`] where a ring acts on those about it.
-    fn expand_visits(&self, widths_nm: &[u16], slopes: &[Complex64], gains: &mut [f64]) {
+    fn expand_contexts(&self, widths_nm: &[u16], slopes: &[Complex64], gains: &mut [f64]) {
         let choices = self.mapping.choices();
         let rings = gains.par_chunks_exact_mut(choices.len()).enumerate();
         rings.for_each_init(
             || Planes::zeros(self.rows()),
             |own, (ring, gains)| {
-                let visit = self.visit(ring, widths_nm);
+                let context = self.context(ring, widths_nm);
                 let mut of = |width: u16| {
-                    self.contribution(ring, width, visit.as_ref(), own);
+                    self.contribution(ring, width, context.as_ref(), own);
                     let each = slopes.iter().zip(own.re.iter().zip(&own.im));
                     2.0 * each
                         .map(|(g, (re, im))| g.re * f64::from(*re) + g.im * f64::from(*im))
@@ -154,7 +154,7 @@ impl Objective for FieldProblem {
         let slopes = self.field_gradient(&fields);
         let choices = self.mapping.choices();
         if self.surroundings.is_some() {
-            self.expand_visits(widths_nm, &slopes, gains);
+            self.expand_contexts(widths_nm, &slopes, gains);
             return self.merit_of_fields(&fields);
         }
         gains

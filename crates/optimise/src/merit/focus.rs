@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::merit::field_point::{Condition, FieldPoint};
 use crate::rings::kernel::RingField;
-use crate::rings::links::{distance_of, neighbour};
+use crate::rings::neighbour_links::{distance_of, neighbour};
 use crate::rings::pair_response::{PRODUCTS, PairResponse};
 use crate::rings::sites::Rings;
 use metalith_cell::{CellModel, NEIGHBOUR_DEGREE, NEIGHBOURS};
@@ -145,7 +145,7 @@ impl Lens {
             None => None,
         };
         // Sites at one distance with one width are one term.
-        let mut terms = BTreeMap::<(i64, u16), AlikeSites>::new();
+        let mut terms = BTreeMap::<(i64, u16), EqualSites>::new();
         for ((iy, ix), &width) in widths.number.indexed_iter().filter(|(_, w)| **w != 0) {
             let alike = terms.entry((widths.lattice.units2(ix, iy), width)).or_default();
             alike.count += 1;
@@ -165,7 +165,7 @@ impl Lens {
                     None => cell.transmissions(wavelength_um, widest)?,
                 };
                 let field = RingField::new(&self.rings, wavelength_um, self.distance_um);
-                let of = |&((r2, width), ref alike): &((i64, u16), AlikeSites)| {
+                let of = |&((r2, width), ref alike): &((i64, u16), EqualSites)| {
                     let width = usize::from(width);
                     let mut t = f64::from(alike.count) * table[width];
                     if let Some(unlike) = &unlike {
@@ -191,13 +191,13 @@ fn among_equals(widths_nm: &[u16], cell: &dyn CellModel, wavelength_um: f64) -> 
 
 /// Sites at one distance from the axis with one width.
 #[derive(Clone, Copy, Default)]
-struct AlikeSites {
+struct EqualSites {
     count: u32,
     /// Factors of the widths of all their neighbours, as [`PairResponse::factors`] has the own ones.
     neighbours: [f64; PRODUCTS],
 }
 
-impl AlikeSites {
+impl EqualSites {
     fn add_neighbours(&mut self, widths: &PillarMap, site: [usize; 2], factors: &[[f64; NEIGHBOUR_DEGREE]]) {
         for offset in NEIGHBOURS {
             let at = neighbour(site, offset, widths.lattice.sites());

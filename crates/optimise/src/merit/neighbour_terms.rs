@@ -2,17 +2,18 @@
 //!
 //! E = sum over rings of K_r own(w_r) + sum over links of K_l sum over b of U_b(w_r) V_b(w_s),
 //!
-//! r the ring of a link and s that of the neighbours ([`crate::unlike`]). What depends on the width of one ring is gathered
+//! r the ring of a link and s that of the neighbours ([`crate::rings::pair_response`]). What depends on the width of one ring is gathered
 //! before its candidates are tried: it is a sum of a few products for each of them.
 
 use rayon::prelude::*;
 
 use crate::merit::field_point::Condition;
 use crate::merit::focus::Lens;
+use crate::merit::ring_context::RingContext;
 use crate::rings::kernel::RingField;
-use crate::rings::links::{DISTANCES, Links};
+use crate::rings::neighbour_links::{DISTANCES, Links};
 use crate::rings::pair_response::{PRODUCTS, PairResponse};
-use crate::rings::planes::Planes;
+use crate::rings::split_complex::Planes;
 use metalith_cell::{CellModel, NEIGHBOUR_DEGREE};
 use metalith_core::{Error, Result};
 use num_complex::Complex64;
@@ -29,16 +30,6 @@ pub(crate) struct NeighbourTerms {
     same: Planes,
     /// Factors of a neighbour's width, by it.
     neighbour: Vec<[f32; NEIGHBOUR_DEGREE]>,
-}
-
-/// All that a ring's width is multiplied with.
-pub struct RingContext {
-    /// Own factors: `[product][row]`.
-    around: Planes,
-    /// Factors as a neighbour of others: `[product of one distance][row]`.
-    reverse: Planes,
-    /// Links to itself.
-    same: [Option<usize>; DISTANCES],
 }
 
 /// Terms of neighbours with what each pillar transmits on the mean over its neighbours.
@@ -148,8 +139,8 @@ impl NeighbourTerms {
     }
 
     /// Context of a ring: what its width, whatever it is, is multiplied with, while others have these widths.
-    pub(crate) fn visit(&self, ring: usize, widths_nm: &[u16]) -> RingContext {
-        let mut visit = RingContext {
+    pub(crate) fn context(&self, ring: usize, widths_nm: &[u16]) -> RingContext {
+        let mut context = RingContext {
             around: Planes::zeros(PRODUCTS * self.rows),
             reverse: Planes::zeros(NEIGHBOUR_DEGREE * self.rows),
             same: [None; DISTANCES],
@@ -157,7 +148,7 @@ impl NeighbourTerms {
         for k in self.links.of_ring(ring) {
             let link = &self.links.all()[k];
             if link.other == ring {
-                visit.same[link.distance] = Some(k);
+                context.same[link.distance] = Some(k);
                 continue;
             }
             let (k_re, k_im) = self.kernel.row(k, self.rows);
@@ -165,7 +156,7 @@ impl NeighbourTerms {
                 .into_iter()
                 .enumerate()
             {
-                let (re, im) = visit.around.row_mut(link.distance * NEIGHBOUR_DEGREE + b, self.rows);
+                let (re, im) = context.around.row_mut(link.distance * NEIGHBOUR_DEGREE + b, self.rows);
                 add_scaled((re, im), v, (k_re, k_im));
             }
         }
@@ -173,28 +164,28 @@ impl NeighbourTerms {
             let link = &self.links.all()[k];
             for b in 0..NEIGHBOUR_DEGREE {
                 let u = self.factor(widths_nm[link.ring], link.distance * NEIGHBOUR_DEGREE + b);
-                add_product(visit.reverse.row_mut(b, self.rows), self.kernel.row(k, self.rows), u);
+                add_product(context.reverse.row_mut(b, self.rows), self.kernel.row(k, self.rows), u);
             }
         }
-        visit
+        context
     }
 
     /// Add what the width of a ring that is visited contributes beside its own transmission.
     #[inline(always)]
-    pub(crate) fn add_contribution(&self, width_nm: u16, visit: &RingContext, out: &mut Planes) {
+    pub(crate) fn add_contribution(&self, width_nm: u16, context: &RingContext, out: &mut Planes) {
         let (re, im) = (&mut out.re[..], &mut out.im[..]);
         for product in 0..PRODUCTS {
-            let around = visit.around.row(product, self.rows);
+            let around = context.around.row(product, self.rows);
             add_product((re, im), around, self.factor(width_nm, product));
         }
-        for (distance, link) in visit.same.iter().enumerate() {
+        for (distance, link) in context.same.iter().enumerate() {
             if let Some(link) = link {
                 let same = self.same.row(usize::from(width_nm) * DISTANCES + distance, self.rows);
                 add_product((re, im), self.kernel.row(*link, self.rows), same);
             }
         }
         for (b, v) in self.neighbour[usize::from(width_nm)].into_iter().enumerate() {
-            add_scaled((re, im), v, visit.reverse.row(b, self.rows));
+            add_scaled((re, im), v, context.reverse.row(b, self.rows));
         }
     }
 
@@ -351,10 +342,10 @@ mod tests {
         let merit = problem.expand(&widths, &mut gains);
         assert_eq!(merit, problem.merit(&widths));
         for ring in [0, 1, 2, 11, problem.rings() - 1] {
-            let visit = problem.visit(ring, &widths);
+            let context = problem.context(ring, &widths);
             let mut own = Planes::zeros(problem.rows());
             let mut contribution = |width: u16| {
-                problem.contribution(ring, width, visit.as_ref(), &mut own);
+                problem.contribution(ring, width, context.as_ref(), &mut own);
                 let both = own.re.iter().zip(&own.im);
                 both.map(|(re, im)| Complex64::new(f64::from(*re), f64::from(*im)))
                     .collect::<Vec<_>>()
@@ -372,7 +363,7 @@ mod tests {
                 one_over_now: &one_over_now,
             };
             let mut scores = vec![0.0; choices.len()];
-            problem.score(ring, visit.as_ref(), fields, &choices, &mut scores);
+            problem.score(ring, context.as_ref(), fields, &choices, &mut scores);
             let slopes = problem.field_gradient(&before);
             for (k, &width) in choices.iter().enumerate().step_by(9) {
                 let new = contribution(width);

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use num_complex::Complex64;
 
 use crate::rings::kernel::RingField;
-use crate::rings::links::{DISTANCES, distance_of};
+use crate::rings::neighbour_links::{DISTANCES, distance_of};
 use crate::rings::sites::Rings;
 use metalith_cell::{
     CellModel, CellResponse, Illumination, NEIGHBOUR_DEGREE, NEIGHBOURS, NeighbourTables, SiteResponse,

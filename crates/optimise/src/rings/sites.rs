@@ -5,8 +5,8 @@ use std::sync::OnceLock;
 use metalith_core::{Error, Result, lagrange_weight};
 use metalith_pillars::{Lattice, PillarMap};
 
-use super::links::{Link, Links, distance_of, neighbour};
-use super::node::{NODES, Node};
+use super::neighbour_links::{Link, Links, distance_of, neighbour};
+use super::ring_radii::{NODES, Node};
 use metalith_cell::NEIGHBOURS;
 
 /// The lattice sites of a round lens, ring by ring.

@@ -1,6 +1,6 @@
 //! Adam (Kingma and Ba, 2015) on the phases of the rings, under the limit on their steps.
 
-use crate::rings::limit::StepLimit;
+use crate::rings::phase_step_limit::StepLimit;
 
 /// Decay of the running means of the gradient and of its square, as published.
 const DECAY: (f64, f64) = (0.9, 0.999);

@@ -11,8 +11,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::merit::objective::Objective;
-use crate::rings::limit::StepLimit;
 use crate::rings::mapping::Mapping;
+use crate::rings::phase_step_limit::StepLimit;
 
 /// Rings side by side that are free to move in a block; blocks draw one of these. Single rings take the
 /// widest jumps, long runs pass a step of phase from ring to ring.
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
     use crate::image::deconvolution::tests::small;
     use crate::merit::field::tests::problem;
-    use crate::rings::limit::largest_step;
+    use crate::rings::phase_step_limit::largest_step;
     use crate::{Start, Sum};
 
     fn limit() -> StepLimit {

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use crate::rings::sites::Rings;
 use crate::solvers::adam::Adam;
-use metalith_cell::{Fidelity, kept};
+use metalith_cell::{Fidelity, cache_file};
 use metalith_core::text::hex;
 use metalith_core::{Error, Result};
 use metalith_design::Design;
@@ -103,7 +103,7 @@ impl Checkpoint {
     pub fn begin(design: &Design) -> Self {
         Self {
             digest: digest(design),
-            solver: kept::solver_of(design.cell.shape),
+            solver: cache_file::solver_of(design.cell.shape),
             ..Self::default()
         }
     }
@@ -120,7 +120,7 @@ impl Checkpoint {
             return Err(Error::io("read", path)(error));
         }
         // One that cannot be used costs time, and the next save replaces it.
-        let Ok(Some(content)) = kept::read(path, MAGIC, &fresh.inputs(), LONGEST) else {
+        let Ok(Some(content)) = cache_file::read(path, MAGIC, &fresh.inputs(), LONGEST) else {
             return Ok(fresh);
         };
         let rings = Rings::new(design.lattice(), design.lens.diameter_nm)?.len();
@@ -160,7 +160,7 @@ impl Checkpoint {
     /// If it cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let content = serde_json::to_vec(self).expect("plain data serialises");
-        kept::write(path, MAGIC, &self.inputs(), &content)
+        cache_file::write(path, MAGIC, &self.inputs(), &content)
     }
 }
 

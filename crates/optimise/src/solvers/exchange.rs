@@ -5,8 +5,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::merit::field::{FLOOR, FieldProblem};
-use crate::rings::limit::StepLimit;
-use crate::rings::planes::Planes;
+use crate::rings::phase_step_limit::StepLimit;
+use crate::rings::split_complex::Planes;
 use crate::solvers::score::Fields;
 
 /// Schedule of an exchange: how long it lasts, and how hot it begins.
@@ -125,19 +125,19 @@ impl<'p> Exchange<'p> {
             for (i, now) in one_over_now.iter_mut().enumerate() {
                 *now = 1.0 / (fields.re[i] * fields.re[i] + fields.im[i] * fields.im[i] + FLOOR as f32);
             }
-            let visit = self.problem.visit(ring, &widths);
-            let visit = visit.as_ref();
+            let context = self.problem.context(ring, &widths);
+            let context = context.as_ref();
             let old = self.choices[ring];
-            self.problem.contribution(ring, widths[ring], visit, &mut own);
+            self.problem.contribution(ring, widths[ring], context, &mut own);
             add(&own, -1.0, &mut fields);
             let without = Fields {
                 without: &fields,
                 one_over_now: &one_over_now,
             };
-            self.problem.score(ring, visit, without, &widths_nm, &mut scores);
+            self.problem.score(ring, context, without, &widths_nm, &mut scores);
             let new = candidates[pick(&scores, temperature, &mut random)];
             widths[ring] = self.width_of(new);
-            self.problem.contribution(ring, widths[ring], visit, &mut own);
+            self.problem.contribution(ring, widths[ring], context, &mut own);
             add(&own, 1.0, &mut fields);
             changed |= new != old;
             self.choices[ring] = new;
@@ -200,8 +200,8 @@ fn pick(scores: &[f64], temperature: f64, random: &mut impl Rng) -> usize {
 mod tests {
     use super::*;
     use crate::merit::focus::{FabricationError, Lens};
-    use crate::rings::limit::largest_step;
     use crate::rings::mapping::tests::published;
+    use crate::rings::phase_step_limit::largest_step;
     use crate::rings::sites::Rings;
     use crate::{MeritKind, Start, wavelengths};
     use metalith_cell::{CellModel, PublishedCell};

@@ -1,8 +1,8 @@
 //! The inner loop of exchange: the merit of every candidate of one ring.
 
 use crate::merit::field::{FLOOR, FieldProblem, MeritKind};
-use crate::merit::neighbour_terms::RingContext;
-use crate::rings::planes::Planes;
+use crate::merit::ring_context::RingContext;
+use crate::rings::split_complex::Planes;
 
 impl FieldProblem {
     /// The merit, but for a constant, with each candidate width in one ring. `fields` are those without what depends on that
@@ -10,13 +10,13 @@ impl FieldProblem {
     pub fn score(
         &self,
         ring: usize,
-        visit: Option<&RingContext>,
+        context: Option<&RingContext>,
         fields: Fields<'_>,
         widths_nm: &[u16],
         scores: &mut [f64],
     ) {
         pulp::Arch::new().dispatch(|| {
-            if visit.is_none() {
+            if context.is_none() {
                 let kernel = self.kernel_of(ring);
                 for (score, &width) in scores.iter_mut().zip(widths_nm) {
                     *score = self.score_of(kernel, self.transmission_of(width), fields);
@@ -26,7 +26,7 @@ impl FieldProblem {
                 let none = vec![0.0; self.rows()];
                 let mut own = Planes::zeros(self.rows());
                 for (score, &width) in scores.iter_mut().zip(widths_nm) {
-                    self.contribution(ring, width, visit, &mut own);
+                    self.contribution(ring, width, context, &mut own);
                     *score = self.score_of((&own.re, &own.im), (&one, &none), fields);
                 }
             }

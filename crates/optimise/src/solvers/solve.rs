@@ -6,7 +6,7 @@ use crate::image::deconvolution::Deconvolution;
 use crate::merit::field::FieldProblem;
 use crate::merit::objective::{Objective, Sum};
 use crate::problem;
-use crate::rings::limit::StepLimit;
+use crate::rings::phase_step_limit::StepLimit;
 use crate::run::{OptimiseTask, Optimised};
 use crate::solvers::adam::Adam;
 use crate::solvers::chain::{Best, COLD_SWEEPS, Course};

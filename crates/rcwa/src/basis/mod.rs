@@ -1,14 +1,14 @@
 //! Plane waves of the lattice, and the symmetric combinations of them that a mirror plane leaves.
 
 mod family;
-mod kept;
+mod retained_orders;
 
 use faer::Mat;
 use num_complex::Complex64;
 
 use super::scalar::Scalar;
 pub(super) use family::Family;
-pub(super) use kept::RetainedOrders;
+pub(super) use retained_orders::RetainedOrders;
 
 /// Functions of one axis.
 ///

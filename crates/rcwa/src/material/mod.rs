@@ -1,8 +1,8 @@
 //! Refractive indices: published dispersion formulas with their ranges, constants, tables.
 
+mod dispersion;
 mod films;
-mod form;
-mod known;
+mod named;
 mod table;
 mod yaml;
 
@@ -15,8 +15,8 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use crate::{Error, Result, TableError};
-use form::Dispersion;
-use known::KNOWN;
+use dispersion::Dispersion;
+use named::KNOWN;
 use table::TableFault;
 
 /// An optical material: complex index n + i k over the wavelength.
@@ -58,7 +58,7 @@ impl Material {
             .find(|k| own == Some(k.name))
             .ok_or_else(|| Error::UnknownMaterial {
                 name: name.to_owned(),
-                known: known::nearest_first(name),
+                known: named::nearest_first(name),
             })?;
         Ok(Self {
             name: known.name.to_owned(),
@@ -69,7 +69,7 @@ impl Material {
 
     /// The name here of a material that is called by it or by a formula or word of the field, such as TiO2 or a-Si.
     pub fn own_name(name: &str) -> Option<&'static str> {
-        known::own_name(name)
+        named::own_name(name)
     }
 
     /// The material that a text file names: one of [`Material::named`], or a table whose path counts from `folder`.
@@ -236,7 +236,7 @@ impl fmt::Display for Material {
 
 #[cfg(test)]
 mod tests {
-    use super::form::monotone_cubic;
+    use super::dispersion::monotone_cubic;
     use super::*;
 
     /// Indices as published, to the digits given there.

@@ -1,6 +1,6 @@
 //! Files of the refractiveindex.info database, as they are: YAML with tables and dispersion formulas 1 to 9.
 
-use super::form::{Dispersion, IndexOver};
+use super::dispersion::{Dispersion, IndexOver};
 use super::table::TableFault;
 use crate::TableError;
 use metalith_core::text::quoted;

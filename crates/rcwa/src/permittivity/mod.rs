@@ -1,14 +1,14 @@
 //! The permittivity of a layer between the fields of a basis.
 //!
 //! For Ez it is the Laurent rule. For Ex and Ey the rule follows from the sides: `upright` where they are along the axes,
-//! `normal` where they are not, which also couples Ex and Ey.
+//! `normal_vector` where they are not, which also couples Ex and Ey.
 
 mod moments;
-mod normal;
+mod normal_vector;
 mod upright;
 
 pub(super) use moments::disc_moments;
-pub(super) use normal::PillarTensor;
+pub(super) use normal_vector::PillarTensor;
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;
@@ -61,7 +61,7 @@ impl<T: Scalar> Permittivity<T> {
     pub(crate) fn new(section: &CrossSection<'_>, basis: &FieldBasis) -> Self {
         let mut found = match section.outline.sides() {
             Sides::Upright(bands) => upright::permittivity(section, basis, &bands),
-            Sides::Slanted(form) => normal::permittivity(section, basis, &form),
+            Sides::Slanted(form) => normal_vector::permittivity(section, basis, &form),
         };
         if basis.families[0] == Family::Alike {
             found.transverse[1] *= faer::Scale(T::real(1.0 + SPLIT));

@@ -2,7 +2,7 @@
 //!
 //! The normal n enters by the matrix P = n n^T = (1 + [[c, s], [s, -c]]) / 2, where c and s are cosine and sine of twice its
 //! angle. They are given at the rim, and continued over the pillar by functions that are as smooth as may be there; outside
-//! of it they are not needed (see `normal`).
+//! of it they are not needed (see `normal_vector`).
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,13 +1,13 @@
 //! Camera frames from NPY, PNG and TIFF files, what the sensor itself adds to them, and several exposures as one.
 
 mod expected;
-mod join;
+mod merge_exposures;
 mod png;
 mod sensor;
 mod tiff;
 
 pub use expected::expected;
-pub use join::{ExposedFrame, joined};
+pub use merge_exposures::{ExposedFrame, joined};
 pub use sensor::{DarkPixels, SensorFrame, SensorFrames, SensorPixels};
 
 use std::path::Path;

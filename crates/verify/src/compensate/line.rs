@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use metalith_cell::{
-    CellModel, CellResponse, JonesTables, LitStack, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder,
+    CellModel, CellResponse, FocusingStack, JonesTables, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder,
 };
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
@@ -68,8 +68,8 @@ impl Line {
         let kept = cache_folder();
         let nothing = CalibratedModel::new(String::new(), String::new(), Perturbation::default());
         let mut line = Self {
-            stated: AsBuiltChip::in_light(&lit, &nothing)?.kept_in(kept.as_deref()),
-            chip: AsBuiltChip::in_light(&lit, model)?.kept_in(kept.as_deref()),
+            stated: AsBuiltChip::in_light(&lit, &nothing)?.cached_in(kept.as_deref()),
+            chip: AsBuiltChip::in_light(&lit, model)?.cached_in(kept.as_deref()),
             colours: Vec::new(),
             drawn,
             first_step: 0,
@@ -84,7 +84,7 @@ impl Line {
     /// Transmission of intended pillars as stated, at a wavelength (um).
     fn stated_colours(
         &self,
-        lit: &LitStack,
+        lit: &FocusingStack,
         wavelength_um: f64,
         progress: &dyn Progress,
     ) -> Result<Vec<ColourTransmissions>> {

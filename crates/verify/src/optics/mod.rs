@@ -6,7 +6,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::case::SimulationCases;
-use super::copies::{Chosen, CopyAngle};
+use super::distinct_elements::{Chosen, CopyAngle};
 use super::psf_metrics::{PsfImages, PsfPair, PsfResult};
 use metalith_cell::{Illumination, Incidence};
 use metalith_core::Progress;

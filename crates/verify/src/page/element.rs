@@ -3,7 +3,7 @@
 use crate::lens_figures::{focus_cells, focus_columns};
 use ndarray::Array2;
 
-use crate::{DistinctElement, PsfResult, Verification, white_page};
+use crate::{DistinctElement, PsfResult, Verification, polychromatic_page};
 use metalith_cell::Fidelity;
 use metalith_core::part;
 use metalith_design::Design;
@@ -116,7 +116,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
     page.table(orders.caption(format!(
         "Share of light in each order, computed from {whose}. The first order makes the image. The zeroth order passes the element as if it had no phase.{beside}",
     )));
-    white_page::write(page, found, element);
+    polychromatic_page::write(page, found, element);
 }
 
 fn steepness(element: &DistinctElement) -> String {

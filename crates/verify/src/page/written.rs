@@ -2,7 +2,7 @@
 
 use super::designed::{numbers, shown_number, step};
 use crate::Verification;
-use crate::copies::place_words;
+use crate::distinct_elements::place_words;
 use metalith_design::Design;
 use metalith_design::array::Symmetry;
 use metalith_report::{Axis, Cell, Chart, Column, Page, Table, count, counted, sig};

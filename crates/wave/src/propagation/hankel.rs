@@ -4,7 +4,7 @@ use metalith_pillars::Lattice;
 use num_complex::Complex64;
 
 use super::aperture::sites_inside;
-use super::direct::kernel;
+use super::direct_sum::kernel;
 use crate::error::{Result, WaveError};
 
 /// Rings of equal transmission about the axis, in light along the axis: the field depends on the distance

@@ -11,7 +11,7 @@ use metalith_pillars::Lattice;
 use num_complex::Complex32;
 
 use self::block::{Block, Moments, Pairs};
-use super::tiles::{Leaving, Tile, Tiling, for_tiles, power_scale};
+use super::tiles::{DepartureDirections, Tile, Tiling, for_tiles, power_scale};
 use super::{Aperture, LandingGrid, SensorIrradiance};
 use crate::error::Result;
 
@@ -79,7 +79,7 @@ impl LocalAngularSpectrum {
     /// If the map is none or too large.
     pub fn landing(&self, sines: [f64; 2], towards: [f64; 2], grid: LandingGrid) -> Result<SensorIrradiance> {
         grid.check()?;
-        let leaves = Leaving::new(&self.lattice, self.tiling, self.wavelength_um, sines, towards);
+        let leaves = DepartureDirections::new(&self.lattice, self.tiling, self.wavelength_um, sines, towards);
         let pairs = Pairs::new(self.tiling, &self.lattice);
         let mut spread = SpreadLight::new(grid);
         // How far light of each pair of directions lands from where it leaves, the same for all blocks; not a number if it does not travel.

@@ -3,41 +3,40 @@
 //! | question | file |
 //! | --- | --- |
 //! | what an element transmits | `aperture`, `phase` |
-//! | what arrives, and where its chief ray lands | `wave` |
+//! | what arrives, and where its chief ray lands | `plane_wave` |
 //! | where the field is wanted | `window` |
-//! | the sum itself | `direct` |
-//! | through frequencies, on one window | `fold`, with `band`, `transfer`, `zoom` |
+//! | the Rayleigh-Sommerfeld sum itself | `direct_sum` |
+//! | through frequencies, on one window | `folded_propagator`, with `band`, `transfer`, `chirp_transform` |
 //! | by the rings of a round element | `hankel` |
 //! | at several distances at once | `distances` |
-//! | where all the light lands, coarsely | `landing`; for many directions of arrival `departure` |
-//! | where a phase is too steep for its lattice | `steepness` |
+//! | where all the light lands, coarsely | `sensor_irradiance`; for many directions of arrival `local_angular_spectrum` |
 
 mod aperture;
 mod band;
-mod direct;
+mod chirp_transform;
+mod direct_sum;
 mod distances;
-mod fold;
+mod folded_propagator;
 mod hankel;
 mod local_angular_spectrum;
 mod phase;
+mod plane_wave;
 mod propagator;
 mod sensor_irradiance;
 mod tiles;
 mod transfer;
-mod wave;
 mod window;
-mod zoom;
 
 pub use aperture::{Aperture, PillarFunction, Pillars};
 pub use band::{Accuracy, Fade};
-pub use direct::Direct;
+pub use direct_sum::Direct;
 pub use distances::{Distances, DistancesPlan, DistancesScratch};
-pub use fold::{FoldedPropagator, Otf};
+pub use folded_propagator::{FoldedPropagator, Otf};
 pub use hankel::Hankel;
 pub use local_angular_spectrum::LocalAngularSpectrum;
 pub use metalith_pillars::Steepness;
 pub use phase::{PhaseFunction, PhaseMap, PhaseSites};
+pub use plane_wave::{PlaneWave, incident, landing_um, leaving};
 pub use propagator::{Field, Propagator, Scratch};
 pub use sensor_irradiance::{LandingGrid, SensorIrradiance};
-pub use wave::{PlaneWave, incident, landing_um, leaving};
 pub use window::Window;

@@ -10,7 +10,7 @@ use metalith_pillars::Lattice;
 use ndarray::Array2;
 use num_complex::Complex32;
 
-use super::tiles::{Leaving, Tiling, for_tiles, power_scale};
+use super::tiles::{DepartureDirections, Tiling, for_tiles, power_scale};
 use super::{Aperture, PlaneWave};
 use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
@@ -135,7 +135,7 @@ struct Rays {
 
 impl Rays {
     fn new(lattice: &Lattice, tiling: Tiling, wave: &PlaneWave, towards: [f64; 2], distance_um: f64) -> Self {
-        let leaving = Leaving::new(lattice, tiling, wave.wavelength_um, [0.0; 2], towards);
+        let leaving = DepartureDirections::new(lattice, tiling, wave.wavelength_um, [0.0; 2], towards);
         let shift_um = (0..tiling.directions())
             .map(|i| {
                 let [sx, sy] = leaving.sines(i / tiling.side, i % tiling.side);

@@ -138,7 +138,7 @@ pub(super) fn for_tiles(
 
 /// Directions that the light of a tile leaves in. Frequencies of a lattice are known but for its orders: each is taken for
 /// the one whose sines are nearest to where light is meant to go.
-pub(super) struct Leaving {
+pub(super) struct DepartureDirections {
     towards: [f64; 2],
     /// Sines of the bins along x and along y, each moved by whole periods of the grid.
     whole: [Vec<f64>; 2],
@@ -146,7 +146,7 @@ pub(super) struct Leaving {
     half: Option<[Vec<f64>; 2]>,
 }
 
-impl Leaving {
+impl DepartureDirections {
     /// Directions for light that arrives with these sines.
     pub(crate) fn new(
         lattice: &Lattice,

@@ -7,18 +7,18 @@
 //! | width at half maximum, power near the peak | `width` |
 //! | contrast | `mtf` |
 //! | all numbers that are reported | `metrics` |
-//! | what the best element of the same shape would do | `reference` |
+//! | what the best element of the same shape would do | `ideal_psf` |
 //! | how much two differ | `difference` |
 //! | a band of wavelengths from one direction | `polychromatic` |
 //! | shares of light in diffraction orders of a mapping | `orders` |
 
 mod difference;
 mod energy;
+mod ideal_psf;
 mod metrics;
 mod mtf;
 mod orders;
 mod polychromatic;
-mod reference;
 mod width;
 
 use metalith_core::part;
@@ -27,11 +27,11 @@ use ndarray::{Array2, Axis};
 use crate::error::Result;
 use crate::propagation::{Aperture, Field, Otf, PlaneWave, Propagator, Scratch, Window};
 
+pub use ideal_psf::IdealPsf;
 pub use metrics::PsfMetrics;
 pub use mtf::{PixelFrequencies, pixel_mtf};
 pub use orders::order_shares;
 pub use polychromatic::{BandPart, BandSample, Polychromatic, band_otf, polychromatic};
-pub use reference::IdealPsf;
 pub use width::{AIRY_FWHM, FOCUS_FWHM};
 
 /// |E|^2 / |E_inc|^2 on a window of the sensor's plane, E_inc in the medium of incidence.

@@ -92,7 +92,7 @@ pub fn band_otf(samples: &[BandSample], parts: &[BandPart]) -> Result<Option<Otf
 }
 
 /// The parts as they act on the samples.
-fn moved(samples: &[BandSample], parts: &[BandPart]) -> Result<Vec<Moved>> {
+fn moved(samples: &[BandSample], parts: &[BandPart]) -> Result<Vec<SampledPart>> {
     let total: f64 = parts.iter().map(|p| p.weight).sum();
     let usable = parts.iter().all(|p| p.weight >= 0.0 && p.place.is_finite());
     let Some(first) = samples.first().filter(|_| usable && total > 0.0 && total.is_finite()) else {
@@ -111,11 +111,11 @@ fn moved(samples: &[BandSample], parts: &[BandPart]) -> Result<Vec<Moved>> {
             });
         }
     }
-    Ok(parts.iter().map(|p| Moved::new(p, samples, total)).collect())
+    Ok(parts.iter().map(|p| SampledPart::new(p, samples, total)).collect())
 }
 
 /// A part of a band as it acts on its samples.
-struct Moved {
+struct SampledPart {
     weight: f64,
     /// The sample below it and the one above it, with the weight of the latter.
     between: [usize; 2],
@@ -126,7 +126,7 @@ struct Moved {
     along_um: [f64; 2],
 }
 
-impl Moved {
+impl SampledPart {
     fn new(part: &BandPart, samples: &[BandSample], total: f64) -> Self {
         let place = part.place.clamp(0.0, (samples.len() - 1) as f64);
         let low = place.floor() as usize;
@@ -161,7 +161,7 @@ fn shares(parts: &[BandPart], samples: &[BandSample]) -> ([[f64; 2]; 3], [f64; 3
     let passes: Vec<f64> = parts
         .iter()
         .map(|part| {
-            let m = Moved::new(part, samples, 1.0);
+            let m = SampledPart::new(part, samples, 1.0);
             let [low, high] = m.between.map(|k| power_um2(&samples[k].psf));
             part.weight * (low * (1.0 - m.upper) + high * m.upper)
         })
@@ -191,7 +191,7 @@ fn power_um2(psf: &Psf) -> f64 {
 }
 
 /// A window that holds the windows of all parts, or as much of it as is held at a time about the middle of the band.
-fn common_window(first: &BandSample, moved: &[Moved]) -> Window {
+fn common_window(first: &BandSample, moved: &[SampledPart]) -> Window {
     let own = first.psf.window;
     let lit = || moved.iter().filter(|m| m.weight > 0.0);
     let ends = |a: usize| {
@@ -223,13 +223,13 @@ fn common_window(first: &BandSample, moved: &[Moved]) -> Window {
 }
 
 /// The transfer function of all light, its phase counted from `centre_um`; none if one of the samples has none.
-fn otf(samples: &[BandSample], moved: &[Moved], centre_um: [f64; 2]) -> Option<Otf> {
+fn otf(samples: &[BandSample], moved: &[SampledPart], centre_um: [f64; 2]) -> Option<Otf> {
     let otfs: Vec<&Otf> = samples.iter().map(|s| s.psf.otf.as_ref()).collect::<Option<_>>()?;
     let lp_mm = otfs[0].lp_mm.clone();
     if otfs.iter().any(|o| o.lp_mm != lp_mm) {
         return None;
     }
-    let mix = |m: &Moved, of: &dyn Fn(&Otf) -> Complex64| {
+    let mix = |m: &SampledPart, of: &dyn Fn(&Otf) -> Complex64| {
         let [low, high] = m.between.map(|k| of(otfs[k]));
         (low * (1.0 - m.upper) + high * m.upper) * m.weight
     };

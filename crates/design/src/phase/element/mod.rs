@@ -24,7 +24,7 @@ pub struct LensPhase {
     lattice: Lattice,
     /// Greatest squared radius inside the lens: of a square lattice in squared half pitches, else of the diameter in nm^2.
     limit: i64,
-    turns: TurnsOfRadius,
+    turns: PhaseOfRadius,
     /// Entries are this power of two apart in squared half pitches: a shift, since this is done for each pillar.
     stride_log2: u32,
     offset: i64,
@@ -77,7 +77,7 @@ impl Rotation {
 
 /// Phase (turns) of a squared radius.
 #[derive(Clone, Debug)]
-enum TurnsOfRadius {
+enum PhaseOfRadius {
     Tabulated(Vec<f64>),
     Computed(RadialPhase),
 }
@@ -140,10 +140,10 @@ impl LensPhase {
         };
         // Zeros are not looked up in a table that is larger than caches are.
         let turns = if entries > most || !lattice.is_square() || *radial == RadialPhase::Flat {
-            TurnsOfRadius::Computed(radial.clone())
+            PhaseOfRadius::Computed(radial.clone())
         } else {
             let at = |k: i64| radial.turns(radius2_um2(lattice, (k << stride_log2) + offset));
-            TurnsOfRadius::Tabulated((0..entries).map(at).collect())
+            PhaseOfRadius::Tabulated((0..entries).map(at).collect())
         };
         Self {
             lattice,
@@ -166,8 +166,8 @@ impl LensPhase {
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
         let r2 = self.lattice.units2(ix, iy);
         self.holds(ix, iy).then(|| match &self.turns {
-            TurnsOfRadius::Tabulated(turns) => turns[((r2 - self.offset) >> self.stride_log2) as usize],
-            TurnsOfRadius::Computed(radial) => radial.turns(radius2_um2(self.lattice, r2)),
+            PhaseOfRadius::Tabulated(turns) => turns[((r2 - self.offset) >> self.stride_log2) as usize],
+            PhaseOfRadius::Computed(radial) => radial.turns(radius2_um2(self.lattice, r2)),
         })
     }
 

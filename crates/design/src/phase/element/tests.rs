@@ -28,7 +28,7 @@ fn a_computed_phase_is_the_tabulated_one() {
         let lattice = Lattice::covering(diameter_nm, 350).unwrap();
         let table = LensPhase::new(lattice, diameter_nm, &radial);
         let computed = LensPhase::with_entries(lattice, diameter_nm, &radial, 0);
-        assert!(matches!(computed.turns, TurnsOfRadius::Computed(_)));
+        assert!(matches!(computed.turns, PhaseOfRadius::Computed(_)));
         let n = lattice.sites();
         for (ix, iy) in (0..n * n).map(|k| (k % n, k / n)) {
             assert_eq!(table.turns(ix, iy), computed.turns(ix, iy));

@@ -1,12 +1,13 @@
 //! Imaging from the cells of a pupil to the point spread function over a window and its transform on the pixels'
 //! frequencies, and the adjoint of both.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
 use crate::PixelWindow;
+use crate::image::buffer_pool::Scratch;
 use crate::image::pupil::Pupil;
 
 /// Plans and place to work for one pupil. The field is even in y, so that columns stand for themselves
@@ -17,32 +18,7 @@ pub(crate) struct Imaging<'p> {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
     scratch: Vec<Complex32>,
-    room: Scratch,
-}
-
-/// The large buffers, which one view hands on to the next: memory fresh from the system costs a sixth of the time.
-#[derive(Default)]
-pub(crate) struct Scratch {
-    /// Rows of cells after the transform along x: `[cell y][x]`.
-    rows: Vec<Complex32>,
-    /// Field on the sensor for y >= 0: `[x][y]`, y from 0 to size / 2.
-    field: Vec<Complex32>,
-}
-
-/// Buffers that nobody uses.
-#[derive(Default)]
-pub(crate) struct BufferPool(Mutex<Vec<Scratch>>);
-
-impl BufferPool {
-    pub(crate) fn enter(&self) -> Scratch {
-        let mut rooms = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        rooms.pop().unwrap_or_default()
-    }
-
-    pub(crate) fn leave(&self, imaging: Imaging<'_>) {
-        let mut rooms = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        rooms.push(imaging.room);
-    }
+    pub(crate) buffers: Scratch,
 }
 
 /// Transfer function at the frequencies (i, j) / window, i and j from 0 to half the pixels: the others
@@ -50,10 +26,11 @@ impl BufferPool {
 pub(crate) type OpticalTransfer = Vec<Complex32>;
 
 impl<'p> Imaging<'p> {
-    pub(crate) fn new(pupil: &'p Pupil, window: PixelWindow, mut room: Scratch) -> Self {
+    pub(crate) fn new(pupil: &'p Pupil, window: PixelWindow, mut buffers: Scratch) -> Self {
         // Both are written in full before they are read.
-        room.rows.resize(pupil.cells.1 * pupil.size, Complex32::default());
-        room.field
+        buffers.rows.resize(pupil.cells.1 * pupil.size, Complex32::default());
+        buffers
+            .field
             .resize(pupil.size * (pupil.size / 2 + 1), Complex32::default());
         let mut planner = FftPlanner::new();
         let (forward, inverse) = (
@@ -67,7 +44,7 @@ impl<'p> Imaging<'p> {
             forward,
             inverse,
             scratch: vec![Complex32::default(); scratch],
-            room,
+            buffers,
         }
     }
 
@@ -90,7 +67,7 @@ impl<'p> Imaging<'p> {
         let mut along_y = vec![Complex32::default(); modes * n];
         let mut column = vec![Complex32::default(); n];
         for x in (0..n).step_by(2) {
-            let (field_a, field_b) = (&self.room.field[x * half..], &self.room.field[(x + 1) * half..]);
+            let (field_a, field_b) = (&self.buffers.field[x * half..], &self.buffers.field[(x + 1) * half..]);
             let (v_a, v_b) = (self.weight_x(x), self.weight_x(x + 1));
             for (y, (entry, v)) in column.iter_mut().zip(&self.pupil.weight).enumerate() {
                 *entry = Complex32::new(field_a[y].norm_sqr() * v_a, field_b[y].norm_sqr() * v_b) * v;
@@ -142,8 +119,8 @@ impl<'p> Imaging<'p> {
             self.forward.process_with_scratch(&mut column, &mut self.scratch);
             let (v_a, v_b) = (self.weight_x(x), self.weight_x(x + 1));
             for (y, (slope, v)) in column.iter().zip(&self.pupil.weight).enumerate() {
-                self.room.field[x * half + y] *= slope.re * v_a * v;
-                self.room.field[(x + 1) * half + y] *= slope.im * v_b * v;
+                self.buffers.field[x * half + y] *= slope.re * v_a * v;
+                self.buffers.field[(x + 1) * half + y] *= slope.im * v_b * v;
             }
         }
         self.propagate_back(g_re, g_im);
@@ -163,22 +140,22 @@ impl<'p> Imaging<'p> {
         let (cells_x, cells_y) = self.pupil.cells;
         let mut cells = vec![Complex32::default(); cells_x * cells_y];
         self.pupil.forward(t_re, t_im, &mut cells);
-        self.room.rows.fill(Complex32::default());
+        self.buffers.rows.fill(Complex32::default());
         for (y, row) in cells.chunks_exact(cells_x).enumerate() {
             for (i, &value) in row.iter().enumerate() {
                 let at = y * n + self.place(i);
-                self.room.rows[at] = value;
+                self.buffers.rows[at] = value;
             }
         }
         self.inverse
-            .process_with_scratch(&mut self.room.rows, &mut self.scratch);
+            .process_with_scratch(&mut self.buffers.rows, &mut self.scratch);
         let mut columns = vec![Complex32::default(); BLOCK * n];
         for first in (0..n).step_by(BLOCK) {
             let count = BLOCK.min(n - first);
             columns.fill(Complex32::default());
             for y in 0..cells_y {
                 for c in 0..count {
-                    let value = self.room.rows[y * n + first + c];
+                    let value = self.buffers.rows[y * n + first + c];
                     columns[c * n + y] = value;
                     columns[c * n + (n - y) % n] = value;
                 }
@@ -186,7 +163,7 @@ impl<'p> Imaging<'p> {
             self.inverse
                 .process_with_scratch(&mut columns[..count * n], &mut self.scratch);
             for c in 0..count {
-                self.room.field[(first + c) * half..(first + c + 1) * half]
+                self.buffers.field[(first + c) * half..(first + c + 1) * half]
                     .copy_from_slice(&columns[c * n..c * n + half]);
             }
         }
@@ -201,7 +178,7 @@ impl<'p> Imaging<'p> {
             let count = BLOCK.min(n - first);
             for c in 0..count {
                 let column = &mut columns[c * n..(c + 1) * n];
-                column[..half].copy_from_slice(&self.room.field[(first + c) * half..(first + c + 1) * half]);
+                column[..half].copy_from_slice(&self.buffers.field[(first + c) * half..(first + c + 1) * half]);
                 mirror(column);
             }
             self.forward
@@ -210,16 +187,16 @@ impl<'p> Imaging<'p> {
                 // A cell off the axis stands for two.
                 let share = if y == 0 { 1.0 } else { 2.0 };
                 for c in 0..count {
-                    self.room.rows[y * n + first + c] = columns[c * n + y] * share;
+                    self.buffers.rows[y * n + first + c] = columns[c * n + y] * share;
                 }
             }
         }
         self.forward
-            .process_with_scratch(&mut self.room.rows, &mut self.scratch);
+            .process_with_scratch(&mut self.buffers.rows, &mut self.scratch);
         let mut cells = vec![Complex32::default(); cells_x * cells_y];
         for (y, row) in cells.chunks_exact_mut(cells_x).enumerate() {
             for (i, value) in row.iter_mut().enumerate() {
-                *value = self.room.rows[y * n + self.place(i)];
+                *value = self.buffers.rows[y * n + self.place(i)];
             }
         }
         self.pupil.adjoint(&cells, g_re, g_im);

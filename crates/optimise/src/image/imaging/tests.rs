@@ -20,7 +20,7 @@ impl Imaging<'_> {
         self.propagate(t_re, t_im);
         let (n, half) = (self.pupil.size, self.pupil.size / 2 + 1);
         (0..n * half)
-            .map(|at| self.room.field[at].norm_sqr() * self.weight_x(at / half) * self.pupil.weight[at % half])
+            .map(|at| self.buffers.field[at].norm_sqr() * self.weight_x(at / half) * self.pupil.weight[at % half])
             .collect()
     }
 }

@@ -12,7 +12,7 @@
 //! ring puts into a cell is summed once; a step then is a sparse matrix and the transform.
 
 mod geometry;
-mod spreading;
+mod gridding;
 
 use metalith_core::{Error, Result};
 use metalith_wave::kernels::fft_size;
@@ -21,8 +21,8 @@ use num_complex::Complex32;
 use crate::PixelWindow;
 use crate::merit::focus::Lens;
 use geometry::Geometry;
-pub(crate) use spreading::USED;
-use spreading::{SPREAD, Spreading, first_cell, intensity_weights};
+pub(crate) use gridding::USED;
+use gridding::{SPREAD, Spreading, first_cell, intensity_weights};
 
 /// Contribution of each ring of unit transmission to each cell of directions.
 ///

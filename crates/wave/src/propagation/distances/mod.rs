@@ -17,8 +17,8 @@ use metalith_pillars::Lattice;
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
+use super::chirp_transform::Zoom;
 use super::transfer::FadedColumn;
-use super::zoom::Zoom;
 use super::{Aperture, Fade};
 use crate::kernels::fft_size;
 
@@ -77,7 +77,7 @@ pub struct DistancesScratch {
 
 /// Frequencies that are kept, in whole cycles a period.
 #[derive(Clone, Copy)]
-struct KeptFrequencies {
+struct RetainedFrequencies {
     first: [i64; 2],
     count: [usize; 2],
 }
@@ -147,7 +147,7 @@ impl DistancesPlan {
     }
 
     /// Chirp transform that forms the samples along y where a period holds no whole number of them.
-    fn along_y(&self, kept: &KeptFrequencies) -> Option<Zoom> {
+    fn along_y(&self, kept: &RetainedFrequencies) -> Option<Zoom> {
         let cycles = self.step_um() / self.period_um[1];
         let zoom = || {
             Zoom::new(
@@ -162,10 +162,10 @@ impl DistancesPlan {
     }
 
     /// Frequencies whose rays land within the end of the fade at any of the distances.
-    fn kept(&self, wavelength_um: f64, distances_um: &[f64]) -> KeptFrequencies {
+    fn kept(&self, wavelength_um: f64, distances_um: &[f64]) -> RetainedFrequencies {
         let end = self.fade_end_um();
         let z = distances_um.iter().copied().fold(f64::MAX, f64::min);
-        let mut kept = KeptFrequencies {
+        let mut kept = RetainedFrequencies {
             first: [0; 2],
             count: [0; 2],
         };

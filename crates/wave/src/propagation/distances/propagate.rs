@@ -2,11 +2,11 @@
 
 use num_complex::Complex32;
 
-use super::{DistancesPlan, DistancesScratch, KeptFrequencies};
+use super::{DistancesPlan, DistancesScratch, RetainedFrequencies};
 use crate::kernels::{gather, multiply_by, multiply_to, process};
 use crate::propagation::Aperture;
+use crate::propagation::chirp_transform::Zoom;
 use crate::propagation::transfer::{FrequencyColumn, Transfer};
-use crate::propagation::zoom::Zoom;
 
 /// Columns that go through one call of a transform: enough to fill cache lines.
 const LANES: usize = 8;
@@ -20,7 +20,7 @@ impl DistancesPlan {
         &self,
         wavelength_um: f64,
         distances_um: &[f64],
-        kept: &KeptFrequencies,
+        kept: &RetainedFrequencies,
         scratch: &mut DistancesScratch,
     ) {
         let [kx, ky] = kept.count;
@@ -70,7 +70,7 @@ impl DistancesPlan {
     /// Forward transform of what leaves the element in a wave, cut to the kept frequencies: `spectrum[kx][ky]`.
     pub(super) fn transform(
         &self,
-        kept: &KeptFrequencies,
+        kept: &RetainedFrequencies,
         element: &dyn Aperture,
         [along_x, along_y]: [&[Complex32]; 2],
         scratch: &mut DistancesScratch,
@@ -114,7 +114,7 @@ impl DistancesPlan {
     pub(super) fn propagate(
         &self,
         distances: usize,
-        kept: &KeptFrequencies,
+        kept: &RetainedFrequencies,
         along_y: Option<&Zoom>,
         scratch: &mut DistancesScratch,
     ) {
@@ -159,7 +159,7 @@ impl DistancesPlan {
     }
 
     /// Variant of the propagation by chirps.
-    fn propagate_by(&self, zoom: &Zoom, distances: usize, kept: &KeptFrequencies, scratch: &mut DistancesScratch) {
+    fn propagate_by(&self, zoom: &Zoom, distances: usize, kept: &RetainedFrequencies, scratch: &mut DistancesScratch) {
         let [kx, ky] = kept.count;
         let DistancesScratch {
             row,
@@ -193,7 +193,7 @@ impl DistancesPlan {
     /// Transform the rows of one distance back and square them.
     pub(super) fn square(
         &self,
-        kept: &KeptFrequencies,
+        kept: &RetainedFrequencies,
         distance: usize,
         scratch: &mut DistancesScratch,
         out: &mut Vec<f32>,

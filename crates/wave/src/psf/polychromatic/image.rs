@@ -4,7 +4,7 @@ use metalith_core::part;
 use ndarray::Array2;
 use num_complex::Complex64;
 
-use super::{BandSample, Moved};
+use super::{BandSample, SampledPart};
 use crate::kernels::{Fourier, fft_size};
 use crate::propagation::Window;
 
@@ -22,10 +22,10 @@ fn period(window: &Window, own: &Window, reach_um: f64) -> usize {
 
 /// All parts on the common window, cut at its border. Parts that reach so far out that their own windows lie beside it are
 /// left out.
-pub(super) fn image(samples: &[BandSample], moved: &[Moved], window: &Window) -> Array2<f64> {
+pub(super) fn image(samples: &[BandSample], moved: &[SampledPart], window: &Window) -> Array2<f64> {
     let own = samples[0].psf.window;
     let touching_um = window.half_width_um() + own.half_width_um();
-    let lit: Vec<&Moved> = moved
+    let lit: Vec<&SampledPart> = moved
         .iter()
         .filter(|m| m.weight > 0.0 && m.reach_um(window) <= touching_um)
         .collect();
