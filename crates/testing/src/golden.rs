@@ -17,6 +17,19 @@ pub fn design(name: &str) -> PathBuf {
     root().join("designs").join(format!("{name}.toml"))
 }
 
+/// A text with the first place of each of these words, all of which it has, changed in turn.
+pub fn replaced(text: &str, changes: &[(&str, impl AsRef<str>)]) -> String {
+    changes.iter().fold(text.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to.as_ref(), 1)
+    })
+}
+
+/// The text of a shipped design, [`replaced`].
+pub fn changed(name: &str, changes: &[(&str, &str)]) -> String {
+    replaced(&fs::read_to_string(design(name)).unwrap(), changes)
+}
+
 /// The text of a shipped design that takes its mapping whatever its cell is.
 pub fn accepting(text: &str) -> String {
     text.replacen("[mapping]", "[mapping]\naccept = \"a test of another cell\"", 1)

@@ -203,7 +203,7 @@ fn mappings_go_through_files_and_bad_ones_name_the_line() {
     assert_eq!(MappingTable::read_csv(&file, &widths).unwrap(), exact);
     let mut said = Vec::new();
     for (text, at) in [
-        ("", Some(1)),
+        ("", None),
         ("turns,width_nm\n", None),
         ("turns,width_nm\n0.25,100\n0.5,102\n", Some(3)),
         ("turns,width_nm\n0.25,100\n0.75,101\n", Some(3)),

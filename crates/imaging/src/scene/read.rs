@@ -123,15 +123,11 @@ fn values(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
 }
 
 fn fault(path: &Path, what: impl Into<String>) -> Error {
-    Error::Table {
-        path: path.to_owned(),
-        line: None,
-        what: what.into(),
-        hint: format!(
-            "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
-            sides_words()
-        ),
-    }
+    let hint = format!(
+        "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
+        sides_words()
+    );
+    Error::table(path, None, what, hint)
 }
 
 fn check_sides(path: &Path, rows: usize, columns: usize) -> Result<()> {
@@ -159,13 +155,9 @@ pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
 fn light(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     let (array, whole) = array(path, bytes)?;
     if whole {
-        return Err(Error::Table {
-            path: path.to_owned(),
-            line: None,
-            what: "it has whole numbers (uint8 or uint16), and linear light of which white is 1 has fractions".into(),
-            hint: "divide it by its white and save it as float32 or float64: `numpy.save(file, values / white)`; of values in sRGB make a PNG"
-                .into(),
-        });
+        let what = "it has whole numbers (uint8 or uint16), and linear light of which white is 1 has fractions";
+        let hint = "divide it by its white and save it as float32 or float64: `numpy.save(file, values / white)`; of values in sRGB make a PNG";
+        return Err(Error::table(path, None, what, hint));
     }
     if array.iter().any(|v| !v.is_finite() || *v < 0.0) {
         return Err(fault(path, "it holds light that is negative or no number"));
