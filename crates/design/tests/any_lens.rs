@@ -1,17 +1,12 @@
 //! Designs beyond the grid of radial lenses: phases over the plane, elements placed one by one, other bands and materials.
 
-use std::path::{Path, PathBuf};
-
 use metalith_cell::{Fidelity, RotatedRectangle};
 use metalith_core::Silent;
 use metalith_rcwa::{Orders, circular};
 
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarArray};
-
-fn path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))
-}
+use metalith_testing::design as path;
 
 fn text(name: &str) -> String {
     std::fs::read_to_string(path(name)).unwrap()
@@ -23,9 +18,7 @@ fn words(error: &metalith_core::Error) -> String {
 }
 
 fn changed(name: &str, from: &str, to: &str) -> metalith_core::Result<Design> {
-    let text = text(name);
-    assert!(text.contains(from), "{from}");
-    Design::parse(&path(name), &text.replacen(from, to, 1))
+    Design::parse(&path(name), &metalith_testing::changed(name, &[(from, to)]))
 }
 
 #[test]

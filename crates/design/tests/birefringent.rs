@@ -1,6 +1,6 @@
 //! Upright rectangles: what a design of two phases says, and which pillars it has.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use metalith_cell::{FocusedLight, Polarisation, PolarisationAxis};
 use metalith_core::{Result, Silent};
@@ -11,7 +11,7 @@ use metalith_pillars::PillarRows;
 const NAME: &str = "birefringent_532";
 
 fn path() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{NAME}.toml"))
+    metalith_testing::design(NAME)
 }
 
 fn text() -> String {
@@ -20,11 +20,7 @@ fn text() -> String {
 
 /// The design with parts of its text replaced, each of which it has.
 fn changed(pairs: &[(&str, &str)]) -> Result<Design> {
-    let text = pairs.iter().fold(text(), |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    });
-    Design::parse(&path(), &text)
+    Design::parse(&path(), &metalith_testing::changed(NAME, pairs))
 }
 
 /// Each site has the pillar of the library for the phase of light along x and that of light along y at that site.

@@ -18,13 +18,8 @@ const FIELD_DEG: f64 = 16.0;
 
 /// A smaller lens of a shipped design, by lines of it that are changed.
 fn lens(name: &str, changed: &[(&str, &str)]) -> (Design, Extraction) {
-    let path = std::path::PathBuf::from(format!("../../designs/{name}.toml"));
-    let mut text = std::fs::read_to_string(&path).unwrap();
-    for (from, to) in changed {
-        assert!(text.contains(from), "{from}");
-        text = text.replacen(from, to, 1);
-    }
-    let design = Design::parse(&path, &metalith_testing::accepting(&text)).unwrap();
+    let text = metalith_testing::accepting(&metalith_testing::changed(name, changed));
+    let design = Design::parse(&metalith_testing::design(name), &text).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let layout = folder.path().join("lens.gds");

@@ -1,11 +1,11 @@
 //! Apertures that are polygons: pillars stand in them and nowhere else, openings keep their margin, and all is read back.
 
 use metalith_core::Silent;
-use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_gds::extract::extract;
+use metalith_design::{Design, PillarArray};
 use metalith_gds::{Layout, Selection, Shape, Transform, Visitor};
-use metalith_layout::{LayoutFormat, OasisEncoding, extraction_plan, write_apertures, write_pillars_as};
+use metalith_layout::{extraction_plan, write_apertures};
 use metalith_testing::design;
+use metalith_testing::layouts::{each_layout, hologram_of, same_pillars};
 
 /// A circle, a rectangle that is turned by a quarter, a hexagon, and an L.
 const ELEMENTS: &str = r#"
@@ -41,13 +41,7 @@ const MARGIN_NM: i64 = 2_000;
 const ROUNDED_NM: f64 = 1.0;
 
 fn text(elements: &str) -> String {
-    let text = std::fs::read_to_string(design("hologram")).unwrap();
-    let (head, rest) = text.split_once("[[phase.term]]").unwrap();
-    let (_, array) = rest.split_once("[array]").unwrap();
-    let (array, _) = array.split_once("[[element]]").unwrap();
-    let (_, tail) = rest.split_once("[mapping]").unwrap();
-    let tail = tail.replace("size_um = [300, 200]", "size_um = [300, 300]");
-    format!("{head}[array]{array}{elements}\n[mapping]{tail}")
+    hologram_of(elements).replace("size_um = [300, 200]", "size_um = [300, 300]")
 }
 
 fn of(elements: &str) -> metalith_core::Result<Design> {
@@ -100,18 +94,9 @@ fn they_are_read_back_from_every_hierarchy_and_format() {
     let design = of(ELEMENTS).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    for format in [LayoutFormat::Gds, LayoutFormat::Oasis(OasisEncoding::Compact)] {
-        for hierarchy in [Hierarchy::Folded, Hierarchy::Sref, Hierarchy::Flat] {
-            let path = folder.path().join(format!("pillars.{}", format.extension()));
-            write_pillars_as(&design, &array, hierarchy, format, &path, &Silent).unwrap();
-            let layout = Layout::open(&path).unwrap();
-            let read = extract(&layout, &extraction_plan(&design), &Silent).unwrap();
-            assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0));
-            for (element, placed) in read.elements.iter().zip(&array.placed) {
-                assert!(element.widths.number == array.widths(placed).number);
-            }
-        }
-    }
+    each_layout(folder.path(), &design, &array, |path| {
+        same_pillars(path, &extraction_plan(&design), &array);
+    });
 }
 
 #[derive(Default)]

@@ -107,9 +107,7 @@ impl CellBank {
         (0..self.grid.count())
             .into_par_iter()
             .map(|stack| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let row = self.solve_row(colour, stack, widths_nm);
                 progress.advance(1);
                 row
