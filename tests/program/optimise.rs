@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use metalith::cell::PublishedCell;
 use metalith::layout::read_pillars;
 use metalith::optimise::{Checkpoint, OptimiseTask, lens_alone};
@@ -21,8 +20,7 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     let path = design(folder.path(), EXCHANGE);
     let phases = ["1", "2"].map(|threads| {
         let phase = folder.path().join(format!("phase_{threads}.csv"));
-        Command::cargo_bin("metalith")
-            .unwrap()
+        super::metalith()
             .args(["optimise", "--no-report", "--quiet", "--threads", threads])
             .arg(&path)
             .arg("--out")
@@ -88,7 +86,7 @@ fn a_lens_is_optimised_among_unlike_neighbours() {
     let phase = folder.path().join("phase.csv");
     let optimised = |text: &str| {
         fs::write(&path, text).unwrap();
-        let mut program = Command::cargo_bin("metalith").unwrap();
+        let mut program = super::metalith();
         program.args(["optimise", "--no-report", "--quiet"]).arg(&path);
         program.arg("--out").arg(folder.path()).arg("--phase").arg(&phase);
         program.assert()
@@ -212,12 +210,7 @@ fn a_lens_of_rotated_rectangles_is_optimised() {
     let text = metalith_testing::changed("geometric_phase_532", &changes);
     fs::write(&path, &text).unwrap();
     let run = |args: &[&str]| {
-        let out = Command::cargo_bin("metalith")
-            .unwrap()
-            .args(args)
-            .arg("--quiet")
-            .output()
-            .unwrap();
+        let out = super::metalith().args(args).arg("--quiet").output().unwrap();
         assert!(out.status.code() < Some(2), "{}", String::from_utf8_lossy(&out.stderr));
     };
     let number = |file: &Path, at: &[&str]| -> f64 {

@@ -3,17 +3,11 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use metalith_testing::{design, golden};
 use serde_json::{Value, json};
 
 pub(super) fn metalith(args: &[&str], paths: &[&Path]) -> std::process::Output {
-    Command::cargo_bin("metalith")
-        .unwrap()
-        .args(args)
-        .args(paths)
-        .output()
-        .unwrap()
+    super::metalith().args(args).args(paths).output().unwrap()
 }
 
 /// The program ended with this code; if not, what it said.

@@ -29,7 +29,7 @@ pub use lagrange::lagrange_weight;
 pub use layer::LayerNumber;
 pub use memo::Memo;
 pub use plane::part;
-pub use progress::{Progress, Silent};
+pub use progress::{Progress, Quiet, Silent};
 pub use warning::Warning;
 pub use wedge::{Wedge, turned_sine};
 pub use zernike::Zernike;

@@ -46,3 +46,16 @@ impl Progress for Silent {
 
     fn advance(&self, _steps: u64) {}
 }
+
+/// Hears that the user wants to stop, and shows nothing: the work is a step of something else.
+pub struct Quiet<'a>(pub &'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn begin(&self, _what: &str, _steps: u64) {}
+
+    fn advance(&self, _steps: u64) {}
+
+    fn stopped(&self) -> bool {
+        self.0.stopped()
+    }
+}

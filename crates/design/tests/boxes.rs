@@ -8,18 +8,9 @@ use metalith_testing::{changed, design as path};
 
 /// A map of phases in rad, rows along x.
 fn npy(columns: usize, rows: usize, rad: impl Fn(usize, usize) -> f64) -> Vec<u8> {
-    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
-    while !(10 + header.len() + 1).is_multiple_of(64) {
-        header.push(' ');
-    }
-    header.push('\n');
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((header.len() as u16).to_le_bytes());
-    bytes.extend(header.bytes());
-    for (iy, ix) in (0..rows * columns).map(|k| (k / columns, k % columns)) {
-        bytes.extend(rad(ix, iy).to_le_bytes());
-    }
-    bytes
+    let places = (0..rows * columns).map(|k| (k / columns, k % columns));
+    let numbers = places.flat_map(|(iy, ix)| rad(ix, iy).to_le_bytes());
+    metalith_testing::npy("<f8", &format!("({rows}, {columns})"), numbers)
 }
 
 /// The text of an error in a shipped design that was changed.

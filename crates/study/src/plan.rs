@@ -9,7 +9,7 @@ use metalith_cell::CellStack;
 use metalith_cell::kept::solver_of;
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Quiet, Result};
 use metalith_design::array::PillarArray;
 use metalith_layout::write_pillars;
 use metalith_optics::{BankRange, CellBank};
@@ -17,7 +17,7 @@ use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::bench::{Files, Quiet, StudyBench};
+use crate::bench::{Files, StudyBench};
 use crate::manifest::{Manifest, absolute, another_plan, is_planned, manifest};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;

@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_core::{AtomicFile, Error, Progress, Quiet, Result};
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells, write_phase_table};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::bench::Quiet;
 use crate::manifest::{Manifest, absolute, another_plan, manifest};
 use crate::sharding::Sharding;
 

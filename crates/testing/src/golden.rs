@@ -25,6 +25,18 @@ pub fn replaced(text: &str, changes: &[(&str, impl AsRef<str>)]) -> String {
     })
 }
 
+/// An NPY file in rows: kind of its numbers and shape as Python writes them, and the numbers.
+pub fn npy(kind: &str, shape: &str, numbers: impl IntoIterator<Item = u8>) -> Vec<u8> {
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+    // The numbers begin at a multiple of 64 bytes, the header ends with a new line.
+    let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((length as u16).to_le_bytes());
+    bytes.extend(format!("{header:<width$}\n", width = length - 1).bytes());
+    bytes.extend(numbers);
+    bytes
+}
+
 /// The text of a shipped design, [`replaced`].
 pub fn changed(name: &str, changes: &[(&str, &str)]) -> String {
     replaced(&fs::read_to_string(design(name)).unwrap(), changes)

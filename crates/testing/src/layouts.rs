@@ -6,7 +6,8 @@ use metalith_core::Silent;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{Extraction, ExtractionPlan, extract};
-use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_pillars_as};
+use metalith_layout::{LayoutFormat, OasisEncoding, convert, write_pillars, write_pillars_as};
+use tempfile::TempDir;
 
 /// Writes the pillars of a design in each hierarchy and format, and converts each to the other format; all are given to `check`.
 pub fn each_layout(folder: &Path, design: &Design, array: &PillarArray, check: impl Fn(&Path)) {
@@ -25,6 +26,15 @@ pub fn each_layout(folder: &Path, design: &Design, array: &PillarArray, check: i
             check(&converted);
         }
     }
+}
+
+/// A design with its array, and its layout as `lens.gds` in a folder.
+pub fn written(design: Design) -> (Design, PillarArray, TempDir) {
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lens.gds");
+    write_pillars(&design, &array, design.layout.hierarchy, &path, &Silent).unwrap();
+    (design, array, folder)
 }
 
 /// The pillars that a plan reads from a layout: as many as the array has, and nothing else.

@@ -14,7 +14,7 @@ pub mod session;
 use std::fmt::Display;
 use std::path::Path;
 
-pub use golden::{accepting, changed, design, golden, replaced, root};
+pub use golden::{accepting, changed, design, golden, npy, replaced, root};
 
 /// The text of an error without the folder that its files are in, which differs from machine to machine.
 pub fn without_folder(error: impl Display, folder: &Path) -> String {

@@ -293,16 +293,7 @@ pub(super) mod tests {
 
     /// An NPY file of doubles in rows; `shape` as Python writes it.
     pub(crate) fn npy_bytes(shape: &str, values: &[f64]) -> Vec<u8> {
-        npy_of("<f8", shape, values.iter().flat_map(|v| v.to_le_bytes()))
-    }
-
-    fn npy_of(kind: &str, shape: &str, values: impl Iterator<Item = u8>) -> Vec<u8> {
-        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend((header.len() as u16).to_le_bytes());
-        bytes.extend(header.as_bytes());
-        bytes.extend(values);
-        bytes
+        metalith_testing::npy("<f8", shape, values.iter().flat_map(|v| v.to_le_bytes()))
     }
 
     #[test]
@@ -428,12 +419,12 @@ pub(super) mod tests {
         refused(&npy_bytes("(16, 16)", &[-0.1; 256]), None, "negative");
         refused(&npy_bytes("(16, 16)", &[f64::INFINITY; 256]), None, "no number");
         refused(
-            &npy_of("|u1", "(16, 16)", [128; 256].into_iter()),
+            &metalith_testing::npy("|u1", "(16, 16)", [128; 256].into_iter()),
             None,
             "divide it by its white",
         );
         refused(
-            &npy_of("<u2", "(16, 16)", [117; 512].into_iter()),
+            &metalith_testing::npy("<u2", "(16, 16)", [117; 512].into_iter()),
             None,
             "divide it by its white",
         );
