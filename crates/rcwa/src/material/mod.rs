@@ -1,6 +1,5 @@
 //! Refractive indices: published dispersion formulas with their ranges, constants, tables.
 
-mod films;
 mod form;
 mod known;
 mod table;
