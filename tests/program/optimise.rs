@@ -7,6 +7,7 @@ use metalith::cell::PublishedCell;
 use metalith::layout::read_pillars;
 use metalith::optimise::{Checkpoint, OptimiseTask, lens_alone};
 use metalith::{Design, Fidelity, Hierarchy, PillarArray, Silent, cell_models, write_pillars};
+use metalith_testing::optimised as design;
 
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
 
@@ -178,14 +179,6 @@ fn the_program_is_interrupted_and_goes_on() {
         second > first && said.contains("checkpoint.bin"),
         "{first} {second} {said}"
     );
-}
-
-/// A design file beside the small one, with a section of its own to optimise it.
-fn design(folder: &Path, optimise: &str) -> std::path::PathBuf {
-    let path = folder.join("lens.toml");
-    let text = fs::read_to_string(metalith_testing::design("mini_3x3")).unwrap();
-    fs::write(&path, format!("{text}\n{optimise}")).unwrap();
-    path
 }
 
 /// Rotated rectangles: the phase gains on what it began from, and the layout that is read back has the Strehl ratio that `verify` says.

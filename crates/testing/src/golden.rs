@@ -37,9 +37,29 @@ pub fn npy(kind: &str, shape: &str, numbers: impl IntoIterator<Item = u8>) -> Ve
     bytes
 }
 
+/// Rows of a table of texts: ` | ` stands between fields, `\n` for the end of a line; lines that begin with `# ` are comments.
+pub fn rows<const N: usize>(table: &str) -> Vec<[String; N]> {
+    let lines = table.lines().filter(|line| !line.is_empty() && !line.starts_with("# "));
+    let row = |line: &str| {
+        let fields: Vec<String> = line.split(" | ").map(|field| field.replace("\\n", "\n")).collect();
+        fields
+            .try_into()
+            .unwrap_or_else(|_| panic!("{N} fields are wanted: {line}"))
+    };
+    lines.map(row).collect()
+}
+
 /// The text of a shipped design, [`replaced`].
 pub fn changed(name: &str, changes: &[(&str, &str)]) -> String {
     replaced(&fs::read_to_string(design(name)).unwrap(), changes)
+}
+
+/// A design file in a folder: the small one that is shipped, with a section of its own to optimise it.
+pub fn optimised(folder: &Path, optimise: &str) -> PathBuf {
+    let path = folder.join("lens.toml");
+    let text = fs::read_to_string(design("mini_3x3")).unwrap();
+    fs::write(&path, format!("{text}\n{optimise}")).unwrap();
+    path
 }
 
 /// The text of a shipped design that takes its mapping whatever its cell is.
