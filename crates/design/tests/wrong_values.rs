@@ -6,7 +6,7 @@ use std::fmt::Write;
 use metalith_core::document::{Scalar, with_values};
 use metalith_core::{Error, Warning};
 use metalith_design::Design;
-use metalith_testing::{changed, design, golden};
+use metalith_testing::{changed, design, golden, rows};
 use toml::Value;
 
 mod legitimate;
@@ -79,10 +79,11 @@ fn golden_each_wrong_value_is_said_or_legitimate() {
     let mut seen = BTreeMap::new();
     let mut silent = Vec::new();
     // The reason for each wrong value that is not used yet.
-    let mut reasons: BTreeMap<&str, &str> = BTreeMap::new();
-    for (why, values) in LEGITIMATE {
-        for value in *values {
-            assert_eq!(reasons.insert(value, why), None, "a reason for {value} stands twice");
+    let mut reasons: BTreeMap<String, String> = BTreeMap::new();
+    for [why, values] in rows(LEGITIMATE) {
+        for value in values.split(", ") {
+            let earlier = reasons.insert(value.into(), why.clone());
+            assert_eq!(earlier, None, "a reason for {value} stands twice");
         }
     }
     for (name, more) in DESIGNS {
@@ -111,9 +112,9 @@ fn golden_each_wrong_value_is_said_or_legitimate() {
                     &base,
                     Design::parse(&path, &changed).and_then(|design| design.warnings()),
                 );
-                let said = match (said, reasons.remove(format!("{shown} {sign}").as_str())) {
+                let said = match (said, reasons.remove(&format!("{shown} {sign}"))) {
                     (Some(said), None) => said,
-                    (None, Some(why)) => why.to_owned(),
+                    (None, Some(why)) => why,
                     (Some(said), Some(_)) => {
                         silent.push(format!("{shown} {sign} is said: {said}"));
                         said

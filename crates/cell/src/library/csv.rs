@@ -131,11 +131,11 @@ mod tests {
             }
         }
         insta::assert_snapshot!(said.join("\n"), @r#"
-            "100,140,0,0,1" is not a pillar
-            "100,140,0,x,1,1" is not a pillar
-            "100,140,0,inf,1,1" is not a pillar
+            5 fields under 6 columns: `100,140,0,0,1`
+            `x` in column `turns_y` is not a finite number
+            `inf` in column `turns_y` is not a finite number
             "100,140,1.7e308,0,1,1" is not a pillar
-            "100,140,0,0,1,1,1" is not a pillar
+            7 fields under 6 columns: `100,140,0,0,1,1,1`
             100 x 150 nm is no pillar of the design, whose edges are 100 to 240 nm in steps of 20
             100 x 260 nm is no pillar of the design, whose edges are 100 to 240 nm in steps of 20
             100 x 140 nm stands here twice
