@@ -19,12 +19,12 @@ fn main() {
         let solve = |(width, wavelength)| stack.transmission(width, wavelength, orders).expect("a cell");
         let repeats = 20;
         solve(POINTS[0]);
-        let (clock, cpu) = (Instant::now(), cpu_seconds());
+        let (clock, cpu) = (Instant::now(), metalith_testing::cpu_s());
         for _ in 0..repeats {
             std::hint::black_box(POINTS.map(solve));
         }
         let total = cpu
-            .zip(cpu_seconds())
+            .zip(metalith_testing::cpu_s())
             .map_or(clock.elapsed().as_secs_f64(), |(a, b)| b - a);
         let t = POINTS.map(solve).map(|t| format!("[{:.6}, {:.6}]", t.re, t.im));
         println!(
@@ -33,10 +33,4 @@ fn main() {
             t.join(", ")
         );
     }
-}
-
-/// Time on a processor of this thread, where the system tells.
-fn cpu_seconds() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    Some(text.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
 }

@@ -66,7 +66,7 @@ fn report(
     truth: Complex64,
 ) {
     let window = Window::about([0.0, 0.0], 0.35, 256, distance_um);
-    let (clock, cpu) = (Instant::now(), cpu_seconds());
+    let (clock, cpu) = (Instant::now(), metalith_testing::cpu_s());
     let mut value = Complex64::ZERO;
     for _ in 0..repeats {
         // Planning and memory are part of the cost of one PSF.
@@ -78,7 +78,7 @@ fn report(
         value = Complex64::new(v.re.into(), v.im.into());
     }
     let cpu_s = cpu
-        .zip(cpu_seconds())
+        .zip(metalith_testing::cpu_s())
         .map_or(clock.elapsed().as_secs_f64(), |(a, b)| b - a)
         / f64::from(repeats);
     println!(
@@ -88,12 +88,6 @@ fn report(
         (value - truth).norm() / truth.norm(),
         peak_mb().map_or("null".into(), |mb| format!("{mb:.1}")),
     );
-}
-
-/// Time on a processor of this thread, where the system tells.
-fn cpu_seconds() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    Some(text.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
 }
 
 /// Most memory that this process has had, where the system tells.

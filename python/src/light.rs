@@ -161,9 +161,7 @@ pub fn cell<'py>(
     let t = work(py, progress, |p| {
         p.begin("solving cells", (rows * columns) as u64);
         let one = |k: usize| {
-            if p.stopped() {
-                return Err(Error::Interrupted);
-            }
+            p.check_stopped()?;
             let t = stack.transmission(widths[k / columns], wavelengths[k % columns] * 1e-3, orders);
             p.advance(1);
             t

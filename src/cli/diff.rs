@@ -62,9 +62,5 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     } else {
         print_line!("{}", diff::text(&found).trim_end());
     }
-    Ok(if found.same_geometry {
-        Outcome::Fine
-    } else {
-        Outcome::OutsideLimits
-    })
+    Ok(Outcome::of(found.same_geometry))
 }

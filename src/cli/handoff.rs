@@ -148,11 +148,7 @@ fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {
     } else {
         describe(&found);
     }
-    Ok(if found.holds() {
-        Outcome::Fine
-    } else {
-        Outcome::OutsideLimits
-    })
+    Ok(Outcome::of(found.holds()))
 }
 
 fn describe(found: &HandoffVerification) {

@@ -58,6 +58,13 @@ pub enum Outcome {
     NotDone,
 }
 
+impl Outcome {
+    /// Fine, if what was asked holds.
+    fn of(holds: bool) -> Self {
+        if holds { Self::Fine } else { Self::OutsideLimits }
+    }
+}
+
 /// More threads than any machine here has cores; each takes memory of its own.
 const MOST_THREADS: i64 = 512;
 

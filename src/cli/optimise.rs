@@ -119,11 +119,7 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
         summary(&findings);
         print_line!("report: {}", folder.join("report.html").display());
     }
-    Ok(if findings.limit_kept() {
-        Outcome::Fine
-    } else {
-        Outcome::OutsideLimits
-    })
+    Ok(Outcome::of(findings.limit_kept()))
 }
 
 fn remarks(args: &OptimiseArgs, design: &Design) -> Vec<String> {

@@ -55,11 +55,7 @@ pub(crate) fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     } else {
         describe(&planned);
     }
-    Ok(if planned.finds_all() {
-        Outcome::Fine
-    } else {
-        Outcome::OutsideLimits
-    })
+    Ok(Outcome::of(planned.finds_all()))
 }
 
 fn describe(planned: &MeasurementPlan) {

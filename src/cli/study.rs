@@ -190,9 +190,7 @@ fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Termina
             failed.push(number);
         }
     }
-    if terminal.stopped() {
-        return Err(Error::Interrupted);
-    }
+    terminal.check_stopped()?;
     if failed.is_empty() {
         return Ok(());
     }

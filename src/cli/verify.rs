@@ -259,11 +259,7 @@ impl Judging {
         } else {
             summary(design, found, folder);
         }
-        Ok(if found.passed() {
-            Outcome::Fine
-        } else {
-            Outcome::OutsideLimits
-        })
+        Ok(Outcome::of(found.passed()))
     }
 }
 

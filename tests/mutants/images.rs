@@ -30,19 +30,12 @@ fn encoder_bytes(width: u32, height: u32, colour: png::ColorType, depth: png::Bi
 /// An NPY file of positive numbers.
 pub(crate) fn npy(shape: &[usize], (kind, size): (&str, usize)) -> Vec<u8> {
     let axes: String = shape.iter().map(|n| format!("{n}, ")).collect();
-    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({axes}), }}");
-    // The values begin at a multiple of 64 bytes, the header ends with a new line.
-    let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((length as u16).to_le_bytes());
-    bytes.extend(format!("{header:<width$}\n", width = length - 1).bytes());
-    for i in 0..shape.iter().product() {
-        match size {
-            2 => bytes.extend((i as u16 % 4000 + 1).to_le_bytes()),
-            _ => bytes.extend((i as f32 / 997.0 + 0.01).to_le_bytes()),
-        }
-    }
-    bytes
+    let number = |i: usize| match size {
+        2 => (i as u16 % 4000 + 1).to_le_bytes().to_vec(),
+        _ => (i as f32 / 997.0 + 0.01).to_le_bytes().to_vec(),
+    };
+    let numbers = (0..shape.iter().product()).flat_map(number);
+    metalith_testing::npy(kind, &format!("({axes})"), numbers)
 }
 
 /// A grey TIFF of 16 bits and some pages.

@@ -2,7 +2,6 @@
 
 use std::fs;
 
-use assert_cmd::Command;
 use metalith_testing::{golden, root};
 
 #[test]
@@ -19,9 +18,7 @@ fn golden_messages_of_broken_designs() {
     {
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
         let folder = tempfile::tempdir().unwrap();
-        let output = Command::cargo_bin("metalith")
-            .unwrap()
-            .current_dir(root())
+        let output = super::metalith()
             .env("NO_COLOR", "1")
             .args(["layout", &format!("tests/broken/{name}.toml"), "--out"])
             .arg(folder.path())

@@ -1,13 +1,11 @@
 //! `metalith calibrate`: what is refused before anything is read.
 
-use assert_cmd::Command;
-
 #[test]
 fn sets_whose_answers_would_be_in_one_folder_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let refused = |arguments: &[&str], id: &str| {
-        let mut command = Command::cargo_bin("metalith").unwrap();
+        let mut command = super::metalith();
         let told = command.arg("calibrate").args(arguments).assert().code(2);
         told.stderr(predicates::str::contains(super::refusal(id)));
     };

@@ -8,9 +8,8 @@ fn the_command_reports_on_a_cell_and_reuses_its_library() {
     let folder = tempfile::tempdir().unwrap();
     // Three orders and a tenth in t: wrong by far, but all of the way from the design to the report.
     let run = || {
-        let mut command = assert_cmd::Command::cargo_bin("metalith").unwrap();
+        let mut command = super::metalith();
         command
-            .current_dir(metalith_testing::root())
             .args(["cells", "designs/mini_3x3.toml", "--orders", "3", "--tolerance", "0.1"])
             .arg("--cache")
             .arg(folder.path().join("cache"))
@@ -51,7 +50,7 @@ fn the_library_of_upright_rectangles_is_made_of_the_design() {
     let design = folder.path().join("new.toml");
     fs::write(&design, text.replacen("phases/birefringent_532.csv", "library.csv", 1)).unwrap();
     let run = |arguments: &[&str]| {
-        let mut command = assert_cmd::Command::cargo_bin("metalith").unwrap();
+        let mut command = super::metalith();
         command
             .arg(arguments[0])
             .arg(&design)

@@ -10,12 +10,8 @@ use predicates::str::contains;
 use super::refusal;
 
 fn compare(arguments: &[&str], out: &str) -> Command {
-    let mut command = Command::cargo_bin("metalith").unwrap();
-    command
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
-        .arg("compare")
-        .args(arguments)
-        .args(["--out", out]);
+    let mut command = super::metalith();
+    command.arg("compare").args(arguments).args(["--out", out]);
     command
 }
 
@@ -160,9 +156,8 @@ fn a_last_stage_is_taught_and_used_by_its_camera_alone() {
     let at = |name: &str| folder.path().join("out").join(name).display().to_string();
     let camera = ["--camera", "cameras/gt1930.toml", "--field-deg", "60", "--pixels", "48"];
     let train = |stage: &str| {
-        let mut command = Command::cargo_bin("metalith").unwrap();
+        let mut command = super::metalith();
         command
-            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
             .args(["train", &photographs, "--stage", stage, "--steps", "2", "--batch", "1"])
             .args(["--piece", "32", "--out", &at("stage.safetensors")])
             .args(camera);

@@ -3,16 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use predicates::prelude::*;
 use predicates::str::contains;
 
 use super::refusal;
 
 fn dataset(images: &Path, out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
-    Command::cargo_bin("metalith")
-        .unwrap()
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
+    super::metalith()
         .args(["dataset", "--layout", "golden/mini_3x3/folded.gds.gz"])
         .args(["--design", "designs/mini_3x3.toml", "--camera", "cameras/gt1930.toml"])
         .arg(images)

@@ -10,17 +10,12 @@ use metalith::{Design, Fidelity, PillarArray, Silent, cell_models};
 use metalith_testing::{design, golden};
 use serde_json::Value;
 
-use super::run::{metalith, numbers, report};
+use super::run::{assert_code, metalith, numbers, report};
 
 /// The text of the shipped design with changes of it, in a folder.
 fn changed(folder: &tempfile::TempDir, changes: &[(&str, &str)]) -> PathBuf {
-    let mut text = fs::read_to_string(design("hexagonal_1550")).unwrap();
-    for (from, to) in changes {
-        assert!(text.contains(from), "{from}");
-        text = text.replacen(from, to, 1);
-    }
     let path = folder.path().join("hexagonal.toml");
-    fs::write(&path, text).unwrap();
+    fs::write(&path, metalith_testing::changed("hexagonal_1550", changes)).unwrap();
     path
 }
 
@@ -29,8 +24,7 @@ fn golden_numbers_of_the_hexagonal_design() {
     let folder = tempfile::tempdir().unwrap();
     let path = design("hexagonal_1550");
     let output = metalith(&["run", "--out"], &[folder.path(), &path]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert_code(&output, 0);
     let run = report(folder.path());
     golden("hexagonal_1550.json", format!("{:#}\n", numbers(&run)).as_bytes());
     let html = fs::read_to_string(folder.path().join("report.html")).unwrap();
@@ -42,12 +36,7 @@ fn golden_numbers_of_the_hexagonal_design() {
     let oasis = other.path().join("pillars.oas");
     assert_eq!(metalith(&["convert"], &[&layout, &oasis]).status.code(), Some(0));
     let output = metalith(&["verify", "--out"], &[other.path(), &path, &oasis]);
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert_code(&output, 0);
     assert_eq!(numbers(&report(other.path())), numbers(&run));
 
     // Without a design: the lattice is found, and the lens is as sharp.
@@ -63,12 +52,7 @@ fn golden_numbers_of_the_hexagonal_design() {
         "--cell",
     ];
     let output = metalith(&args, &[&path, &layout]);
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert_code(&output, 0);
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["elements"][0]["lattice"], "hexagonal");
     assert_eq!(found["elements"][0]["pillars"], found["pillars"]);
@@ -121,12 +105,7 @@ rotation_deg = 20
         ],
     );
     let output = metalith(&["run", "--out"], &[folder.path(), &path]);
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert_code(&output, 0);
     let found = report(folder.path());
     let distinct = found["verification"]["distinct"]
         .as_array()
@@ -148,12 +127,7 @@ rotation_deg = 20
     let other = folder.path().join("other.toml");
     fs::write(&other, text).unwrap();
     let output = metalith(&["verify", "--out"], &[folder.path(), &other, &layout]);
-    assert_eq!(
-        output.status.code(),
-        Some(1),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert_code(&output, 1);
 }
 
 /// What a process and a bench do to a chip costs a lens the same share of its Strehl ratio on either lattice.
@@ -185,12 +159,7 @@ fn a_chip_as_made_loses_as_much_as_on_a_square_lattice() {
         let design = changed(&folder, changes);
         let layout = folder.path().join("hexagonal_1550_pillars.gds");
         let output = metalith(&["layout", "--out"], &[folder.path(), &design]);
-        assert_eq!(
-            output.status.code(),
-            Some(0),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        assert_code(&output, 0);
         let model = folder.path().join("model.toml");
         let text = format!(
             "schema = 2\nset = \"made up\"\nfinding = \"made up\"\n[perturbation.geometry]\n{geometry}\n[perturbation.cell]\n\
@@ -199,12 +168,7 @@ fn a_chip_as_made_loses_as_much_as_on_a_square_lattice() {
         fs::write(&model, text).unwrap();
         let flags = ["verify", "--fast", "--out"];
         let output = metalith(&flags, &[folder.path(), &design, &layout, "--model".as_ref(), &model]);
-        assert_eq!(
-            output.status.code(),
-            Some(0),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        assert_code(&output, 0);
         numbers(&report(folder.path()))["distinct"][0]["spots"][0]["extracted_strehl"][0][1]
             .as_f64()
             .unwrap()
@@ -287,14 +251,14 @@ fn a_hexagonal_lens_takes_a_picture() {
             &camera,
         ],
     );
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert_code(&output, 0);
     let listed = String::from_utf8_lossy(&output.stdout);
     for file in ["picture.html", "frame.png", "restored_tikhonov.png"] {
         assert!(out.join(file).is_file() && listed.contains(file), "{file}: {listed}");
     }
     let found: Value = serde_json::from_str(&fs::read_to_string(out.join("picture.json")).unwrap()).unwrap();
     // Pixels of the scene are finer than half of those of the sensor.
+    let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("64 x 64") && said.contains("51 x 51"), "{said}");
     assert_eq!(
         found["points"].as_array().unwrap().len(),
@@ -411,8 +375,7 @@ fn a_hexagonal_lens_is_optimised() {
     assert!(said.contains("error[cell/fidelity-not-for-pillars]"), "{said}");
     let path = how("fitted");
     let output = asked(&path);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert_code(&output, 0);
 
     let design = Design::read(&path).unwrap();
     let alone = lens_alone(&design, &phase).unwrap();

@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
 use metalith::calibrate::{Bench, BenchSampling, MeasuredSet, Stage, all_effects};
 use metalith::compensate::{compensate, compensation_cases};
 use metalith::design::CellIncidence;
@@ -249,8 +248,7 @@ fn the_program_applies_what_it_once_left_out_and_names_what_it_cannot() {
         CalibratedModel::new("set".into(), "finding".into(), perturbation)
             .write(&path)
             .unwrap();
-        let out = Command::cargo_bin("metalith")
-            .unwrap()
+        let out = super::metalith()
             .args(["verify", "--fast", "--json"])
             .arg(&design)
             .arg(&files.layout)

@@ -20,6 +20,11 @@ mod run;
 mod study;
 mod train;
 
+/// The program, in the folder of the project.
+fn metalith() -> assert_cmd::Command {
+    assert_cmd::Command::cargo_bin("metalith").unwrap()
+}
+
 /// Text that the program prints before the words of a refusal with this identity.
 fn refusal(id: &str) -> String {
     format!("error[{id}]: ")

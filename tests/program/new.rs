@@ -2,14 +2,9 @@
 
 use std::fs;
 
-use assert_cmd::Command;
 use predicates::str::contains;
 
-use super::refusal;
-
-fn metalith() -> Command {
-    Command::cargo_bin("metalith").unwrap()
-}
+use super::{metalith, refusal};
 
 /// What `new` writes passes its own run and the design rules, at more than one size.
 #[test]
@@ -208,7 +203,7 @@ fn a_design_may_come_by_standard_input() {
     let folder = tempfile::tempdir().unwrap();
     let design = std::fs::read(metalith_testing::design("mini_3x3")).unwrap();
     let bytes = |from: &str, out: &str| {
-        let mut program = Command::cargo_bin("metalith").unwrap();
+        let mut program = metalith();
         program
             .current_dir(folder.path())
             .args(["layout", from, "--quiet", "--out", out]);
@@ -217,7 +212,7 @@ fn a_design_may_come_by_standard_input() {
     };
     std::fs::write(folder.path().join("mini.toml"), &design).unwrap();
     assert!(bytes("-", "piped") == bytes("mini.toml", "named"));
-    let mut program = Command::cargo_bin("metalith").unwrap();
+    let mut program = metalith();
     let failed = program
         .args(["layout", "-"])
         .write_stdin("schema = 2\n")

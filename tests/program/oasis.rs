@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use metalith::Silent;
 use metalith::extract::GdsPillars;
 use metalith::layout::{LayoutFormat, convert};
@@ -13,12 +12,7 @@ use serde_json::Value;
 const FORMATS: [&str; 2] = ["gds", "oas"];
 
 fn run(args: &[&str], folder: &Path) -> (Option<i32>, String) {
-    let output = Command::cargo_bin("metalith")
-        .unwrap()
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .unwrap();
+    let output = super::metalith().args(args).current_dir(folder).output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(!said.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
     (output.status.code(), said)

@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use metalith::cell::PublishedCell;
 use metalith::layout::read_pillars;
 use metalith::optimise::{Checkpoint, OptimiseTask, lens_alone};
 use metalith::{Design, Fidelity, Hierarchy, PillarArray, Silent, cell_models, write_pillars};
+use metalith_testing::optimised as design;
 
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";
 
@@ -21,8 +21,7 @@ fn the_phase_of_the_command_becomes_a_layout_that_keeps_the_limit() {
     let path = design(folder.path(), EXCHANGE);
     let phases = ["1", "2"].map(|threads| {
         let phase = folder.path().join(format!("phase_{threads}.csv"));
-        Command::cargo_bin("metalith")
-            .unwrap()
+        super::metalith()
             .args(["optimise", "--no-report", "--quiet", "--threads", threads])
             .arg(&path)
             .arg("--out")
@@ -73,8 +72,7 @@ fn a_lens_is_optimised_among_unlike_neighbours() {
     const OF_RINGS: f64 = 1e-6;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("unlike.toml");
-    let mut text = fs::read_to_string(metalith_testing::design("broadband_3x3")).unwrap();
-    for (from, to) in [
+    let changes = [
         ("diameter_um = 1000", "diameter_um = 40"),
         ("focal_length_um = 2400", "focal_length_um = 96"),
         ("source = \"table\"", "source = \"hyperbola\"\nwavelength_nm = 550"),
@@ -84,14 +82,12 @@ fn a_lens_is_optimised_among_unlike_neighbours() {
         ("step_nm = 1\n", "step_nm = 10\n"),
         ("chains = 4", "chains = 1"),
         ("hot_sweeps = 150", "hot_sweeps = 4"),
-    ] {
-        assert!(text.contains(from), "{from}");
-        text = text.replacen(from, to, 1);
-    }
+    ];
+    let text = metalith_testing::changed("broadband_3x3", &changes);
     let phase = folder.path().join("phase.csv");
     let optimised = |text: &str| {
         fs::write(&path, text).unwrap();
-        let mut program = Command::cargo_bin("metalith").unwrap();
+        let mut program = super::metalith();
         program.args(["optimise", "--no-report", "--quiet"]).arg(&path);
         program.arg("--out").arg(folder.path()).arg("--phase").arg(&phase);
         program.assert()
@@ -182,14 +178,6 @@ fn the_program_is_interrupted_and_goes_on() {
     );
 }
 
-/// A design file beside the small one, with a section of its own to optimise it.
-fn design(folder: &Path, optimise: &str) -> std::path::PathBuf {
-    let path = folder.join("lens.toml");
-    let text = fs::read_to_string(metalith_testing::design("mini_3x3")).unwrap();
-    fs::write(&path, format!("{text}\n{optimise}")).unwrap();
-    path
-}
-
 /// Rotated rectangles: the phase gains on what it began from, and the layout that is read back has the Strehl ratio that `verify` says.
 #[test]
 fn a_lens_of_rotated_rectangles_is_optimised() {
@@ -199,8 +187,7 @@ fn a_lens_of_rotated_rectangles_is_optimised() {
     const OF_A_BAND: f64 = 0.02;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("rotated.toml");
-    let mut text = fs::read_to_string(metalith_testing::design("geometric_phase_532")).unwrap();
-    for (from, to) in [
+    let changes = [
         ("diameter_um = 80", "diameter_um = 30"),
         ("focal_length_um = 80", "focal_length_um = 60"),
         ("wavelength_nm = 532\n\n[array]", "wavelength_nm = 580\n\n[array]"),
@@ -209,18 +196,11 @@ fn a_lens_of_rotated_rectangles_is_optimised() {
             "[optimise]\nband_nm = [525, 530]\nstep_nm = 1\nchains = 2\nhot_sweeps = 10\nblocks = 5\n\n[verify]",
         ),
         ("wavelengths_nm = [532]", "wavelengths_nm = [527.25]"),
-    ] {
-        assert!(text.contains(from), "{from}");
-        text = text.replacen(from, to, 1);
-    }
+    ];
+    let text = metalith_testing::changed("geometric_phase_532", &changes);
     fs::write(&path, &text).unwrap();
     let run = |args: &[&str]| {
-        let out = Command::cargo_bin("metalith")
-            .unwrap()
-            .args(args)
-            .arg("--quiet")
-            .output()
-            .unwrap();
+        let out = super::metalith().args(args).arg("--quiet").output().unwrap();
         assert!(out.status.code() < Some(2), "{}", String::from_utf8_lossy(&out.stderr));
     };
     let number = |file: &Path, at: &[&str]| -> f64 {

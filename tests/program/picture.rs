@@ -11,9 +11,8 @@ use super::refusal;
 const DESIGN: &str = "designs/mini_3x3.toml";
 
 fn picture(arguments: &[&str]) -> Command {
-    let mut command = Command::cargo_bin("metalith").unwrap();
+    let mut command = super::metalith();
     command
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
         .args(["picture", "golden/mini_3x3/folded.gds.gz", "star", "--design", DESIGN])
         .args(arguments);
     command
@@ -70,10 +69,8 @@ fn files_that_are_not_what_they_seem_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let [layouts, out] = ["layouts", "out"].map(|name| folder.path().join(name).display().to_string());
     let metalith = |arguments: &[&str]| {
-        let mut command = Command::cargo_bin("metalith").unwrap();
-        command
-            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
-            .args(arguments);
+        let mut command = super::metalith();
+        command.args(arguments);
         command
     };
     metalith(&["layout", DESIGN, "--out", &layouts]).assert().code(0);
@@ -88,12 +85,7 @@ fn files_that_are_not_what_they_seem_are_refused() {
         .code(2)
         .stderr(contains(refusal("layout/element-not-found")));
     let whole = folder.path().join("whole.npy");
-    let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (40, 40), }\n";
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((header.len() as u16).to_le_bytes());
-    bytes.extend(header.as_bytes());
-    bytes.extend([128; 1600]);
-    fs::write(&whole, bytes).unwrap();
+    fs::write(&whole, metalith_testing::npy("|u1", "(40, 40)", [128; 1600])).unwrap();
     at(DESIGN, &whole.display().to_string())
         .assert()
         .code(2)
@@ -133,9 +125,8 @@ fn frames_that_cannot_be_restored_are_refused() {
             "error[restore/unknown-method]",
         ),
     ] {
-        let mut command = Command::cargo_bin("metalith").unwrap();
+        let mut command = super::metalith();
         command
-            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
             .args(["restore", "golden/mini_3x3/folded.gds.gz", frame, "--design", DESIGN])
             .args(["--camera", "cameras/gt1930.toml", "--out", &out])
             .args(more);

@@ -1,6 +1,5 @@
 //! `metalith plan`: what is refused before anything is simulated.
 
-use assert_cmd::Command;
 use metalith_testing::session;
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
@@ -12,7 +11,7 @@ fn plan(bench: &str, more: &[&str]) -> assert_cmd::assert::Assert {
 }
 
 fn plan_of(design: &str, bench: &str, more: &[&str]) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("metalith").unwrap();
+    let mut command = super::metalith();
     command.args(["plan", design, "--bench", bench]).args(more);
     command.assert()
 }

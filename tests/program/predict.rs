@@ -1,7 +1,7 @@
 //! What the next chip will do: layouts judged by a calibrated model, compensated for it, and lit at an angle.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use assert_cmd::Command;
 use metalith::cell::CellStack;
@@ -11,7 +11,10 @@ use metalith::{
     Accuracy, Design, Extraction, ExtractionPlan, Fidelity, Layout, PillarArray, Silent, SimulationCases, cell_models,
     extract, verify, write_pillars,
 };
+use metalith_testing::root;
 use serde_json::Value;
+
+use super::metalith;
 
 /// Relative error, or nm: rounding of tables of some hundred widths.
 const ROUNDING: f64 = 1e-9;
@@ -21,10 +24,6 @@ const FELT: f64 = 0.05;
 
 /// Transmissions of size one by two ways through the same solver, or by a closed form.
 const SOLVED: f64 = 1e-12;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn mini() -> Design {
     let mut design = Design::read(&root().join("designs/mini_3x3.toml")).unwrap();
@@ -36,12 +35,6 @@ fn model(change: impl FnOnce(&mut Perturbation)) -> CalibratedModel {
     let mut perturbation = Perturbation::default();
     change(&mut perturbation);
     CalibratedModel::new("twin".into(), "as made".into(), perturbation)
-}
-
-fn metalith() -> Command {
-    let mut command = Command::cargo_bin("metalith").unwrap();
-    command.current_dir(root());
-    command
 }
 
 fn json(path: PathBuf) -> Value {

@@ -3,17 +3,17 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use metalith_testing::{design, golden};
 use serde_json::{Value, json};
 
 pub(super) fn metalith(args: &[&str], paths: &[&Path]) -> std::process::Output {
-    Command::cargo_bin("metalith")
-        .unwrap()
-        .args(args)
-        .args(paths)
-        .output()
-        .unwrap()
+    super::metalith().args(args).args(paths).output().unwrap()
+}
+
+/// The program ended with this code; if not, what it said.
+pub(super) fn assert_code(output: &std::process::Output, code: i32) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{said}");
 }
 
 pub(super) fn report(folder: &Path) -> Value {
@@ -81,12 +81,7 @@ const LEFT_OUT: f64 = 0.035;
 fn golden_numbers_of_the_mini_design() {
     let folder = tempfile::tempdir().unwrap();
     let output = metalith(&["run", "--out"], &[folder.path(), &design("mini_3x3")]);
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert_code(&output, 0);
     let numbers = numbers(&report(folder.path()));
     golden("mini_3x3/report.json", format!("{numbers:#}\n").as_bytes());
     let html = fs::read_to_string(folder.path().join("report.html")).unwrap();
@@ -278,12 +273,7 @@ fn a_layout_from_anywhere_is_found_and_simulated() {
         "--json",
     ];
     let output = metalith(&args, &[&layout]);
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert_code(&output, 0);
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     let elements = found["elements"].as_array().unwrap();
     assert_eq!(elements.len(), 9);

@@ -7,7 +7,7 @@ use assert_cmd::Command;
 use super::refusal;
 
 fn metalith(arguments: &[&str]) -> Command {
-    let mut command = Command::cargo_bin("metalith").unwrap();
+    let mut command = super::metalith();
     command.args(arguments);
     command
 }

@@ -22,7 +22,6 @@ fn photographs(folder: &Path) -> PathBuf {
 fn train(photographs: &Path, out: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_metalith"));
     command
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
         .arg("train")
         .arg(photographs)
         .args(arguments)

@@ -119,9 +119,7 @@ pub fn compare(
         }
         let mut pictures = Vec::new();
         for (k, way) in ways.iter().enumerate() {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let begun = cpu_seconds();
             let picture = camera.restore(&frame, k, progress)?;
             add(&mut seconds[k], begun);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result, Silent};
+use metalith_core::{Progress, Result, Silent};
 use metalith_imaging::KernelCache;
 use metalith_prior::Provenance;
 use metalith_training::Stack;
@@ -37,9 +37,7 @@ impl OpenComparison<'_> {
         self.ready(k * self.of.kinds(), cache, progress, &mut |ready, _, photographs| {
             progress.begin("pictures to learn from", photographs.len() as u64);
             for (i, (scene, path)) in photographs.iter().zip(&self.of.photographs).enumerate() {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let seed = self.of.seed.wrapping_add(i as u64);
                 let light = optics.as_deref().unwrap_or_default();
                 let of = format!("{} {camera} {light} {} {seed}", kind.name(), hex(&file_digest(path)?));

@@ -3,7 +3,7 @@
 //!
 //! Kernels are those of a grey surface. The stray light of a grey scene is subtracted; what neighbours' sub-images overlap stays.
 
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_imaging::{FrameOperator, ImagingSystem, sensor_um};
 use metalith_restoration::{FrameModel, Recorded, SceneStatistics, without_stray_light};
 use metalith_wave::kernels::{FftScratch, SquareFft, fft_size};
@@ -58,9 +58,7 @@ pub(crate) fn pictures(
         .collect();
     progress.begin("restoring by Wiener filters", PICTURES as u64);
     let one = |place: &[f64; 2]| {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         let channels = 0..operator.channels();
         let sharp: Vec<_> = channels
             .map(|c| tiles.sharpened(&even[c], c, *place, noise[c]))

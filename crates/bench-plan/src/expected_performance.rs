@@ -88,9 +88,7 @@ pub(crate) fn effects(
     let mut out = Vec::new();
     progress.begin("effects at their wanted size", asked.len() as u64);
     for (r, margin, reachable) in asked {
-        if progress.stopped() {
-            return Err(metalith_core::Error::Interrupted);
-        }
+        progress.check_stopped()?;
         let slot = simulator.slots[r.slot];
         let effect = simulator.effects[slot.effect].as_ref();
         let mut theta = surrogate.about.clone();

@@ -354,9 +354,7 @@ impl CellRequest {
             let stack = self.stack(pitch_nm, heights[0])?;
             let full = stack.full_transmission(self.wavelength_um)?;
             let solve = |&width: &u16| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let t = stack.at_heights(f64::from(width), self.wavelength_um, &heights, orders);
                 progress.advance(1);
                 t

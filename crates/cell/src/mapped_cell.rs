@@ -213,14 +213,9 @@ impl MappedCell {
         let text = String::from_utf8_lossy(&bytes);
         let text = text.trim_start_matches('\u{feff}');
         let fault = |line: usize, what: String| {
-            Error::Table {
-            path: path.to_owned(),
-            line: Some(line),
-            what,
-            hint: "lines such as `# pitch_nm = 350` at the head of the table state the cell that it is for, as `metalith cells` \
-                   writes them"
-                .into(),
-        }
+            let hint = "lines such as `# pitch_nm = 350` at the head of the table state the cell that it is for, as `metalith cells` \
+                        writes them";
+            Error::table(path, Some(line), what, hint)
         };
         let (mut cell, mut places) = (Self::default(), BTreeMap::new());
         for (line, text) in text.lines().enumerate().map(|(k, text)| (k + 1, text.trim())) {

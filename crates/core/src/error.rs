@@ -74,6 +74,16 @@ impl Error {
         }
     }
 
+    /// A file of numbers that does not hold what was expected, by line, with the remedy.
+    pub fn table(path: &Path, line: Option<usize>, what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::Table {
+            path: path.to_owned(),
+            line,
+            what: what.into(),
+            hint: hint.into(),
+        }
+    }
+
     /// An operating-system error with what was attempted: `Error::io("write", path)`.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();

@@ -1,12 +1,14 @@
 //! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY.
 
 mod alignment_cross;
+mod csv;
 #[cfg(feature = "documents")]
 pub mod document;
 mod error;
 pub mod file;
 mod lagrange;
 mod layer;
+mod memo;
 #[cfg(feature = "npy")]
 pub mod npy;
 mod plane;
@@ -18,14 +20,16 @@ mod wedge;
 mod zernike;
 
 pub use alignment_cross::cross_corners;
+pub use csv::{CsvRow, csv_columns, csv_rows};
 #[cfg(feature = "documents")]
 pub use document::{Fault, FaultKind, Faults};
 pub use error::{Error, Result};
 pub use file::{AtomicFile, AtomicFolder, FolderLock};
 pub use lagrange::lagrange_weight;
 pub use layer::LayerNumber;
+pub use memo::Memo;
 pub use plane::part;
-pub use progress::{Progress, Silent};
+pub use progress::{Progress, Quiet, Silent};
 pub use warning::Warning;
 pub use wedge::{Wedge, turned_sine};
 pub use zernike::Zernike;

@@ -68,14 +68,8 @@ pub fn read_phases(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Ar
     phases_from(BufReader::new(File::open(path)?), takes)
 }
 
-fn phases_from(mut from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
-    let header = plain_header(&mut from)?;
-    let npy = npyz::NpyFile::new(Cursor::new(header).chain(from)).map_err(|e| NpyError::Format(e.to_string()))?;
-    let shape = npy.shape().to_vec();
-    let columns_first = npy.order() != npyz::Order::C;
-    if !takes(&shape) {
-        return Err(NpyError::Shape { shape, columns_first });
-    }
+fn phases_from(from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
+    let (npy, shape, columns_first) = opened(from, |shape, _| takes(shape))?;
     let npy = match npy.try_data::<Complex64>() {
         Ok(data) => return angles(shape, columns_first, data),
         Err(npy) => npy,
@@ -87,14 +81,34 @@ fn phases_from(mut from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Resul
         }
         Err(npy) => npy,
     };
-    let values: io::Result<Vec<f64>> = match npy.try_data::<f64>() {
-        Ok(data) => data.collect(),
-        Err(npy) => {
-            let data = npy.try_data::<f32>().map_err(|_| NpyError::NoPhase)?;
-            data.map(|v| v.map(f64::from)).collect()
-        }
-    };
+    let values = reals(npy).map_err(|_| NpyError::NoPhase)?;
     Ok(rows_first(shape, columns_first, values.map_err(NpyError::Short)?))
+}
+
+/// A file behind its header, as it is in memory.
+type Headed<R> = npyz::NpyFile<io::Chain<Cursor<Vec<u8>>, R>>;
+
+/// A plain array of a shape that is taken, and whether its columns come first, with that shape.
+fn opened<R: Read>(
+    mut from: R,
+    takes: impl FnOnce(&[u64], bool) -> bool,
+) -> Result<(Headed<R>, Vec<u64>, bool), NpyError> {
+    let header = plain_header(&mut from)?;
+    let npy = npyz::NpyFile::new(Cursor::new(header).chain(from)).map_err(|e| NpyError::Format(e.to_string()))?;
+    let shape = npy.shape().to_vec();
+    let columns_first = npy.order() != npyz::Order::C;
+    match takes(&shape, columns_first) {
+        true => Ok((npy, shape, columns_first)),
+        false => Err(NpyError::Shape { shape, columns_first }),
+    }
+}
+
+/// Real numbers in double or single precision; the file itself if it holds others.
+fn reals<R: Read>(npy: npyz::NpyFile<R>) -> Result<io::Result<Vec<f64>>, npyz::NpyFile<R>> {
+    match npy.try_data::<f64>() {
+        Ok(data) => Ok(data.collect()),
+        Err(npy) => Ok(npy.try_data::<f32>()?.map(|v| v.map(f64::from)).collect()),
+    }
 }
 
 /// The angles of complex numbers (rad).
@@ -130,28 +144,15 @@ fn rows_first(shape: Vec<u64>, columns_first: bool, values: Vec<f64>) -> Array {
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_from(mut from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
-    let header = plain_header(&mut from)?;
-    let npy = npyz::NpyFile::new(Cursor::new(header).chain(from)).map_err(|e| NpyError::Format(e.to_string()))?;
-    let shape = npy.shape().to_vec();
-    let columns_first = npy.order() != npyz::Order::C;
-    if columns_first || !takes(&shape) {
-        return Err(NpyError::Shape { shape, columns_first });
-    }
-    let mut whole = false;
-    let values = match npy.try_data::<f64>() {
-        Ok(data) => data.collect::<io::Result<Vec<f64>>>(),
-        Err(npy) => match npy.try_data::<f32>() {
-            Ok(data) => data.map(|v| v.map(f64::from)).collect(),
+pub fn read_from(from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
+    let (npy, shape, _) = opened(from, |shape, columns_first| !columns_first && takes(shape))?;
+    let (values, whole) = match reals(npy) {
+        Ok(values) => (values, false),
+        Err(npy) => match npy.try_data::<u16>() {
+            Ok(data) => (data.map(|v| v.map(f64::from)).collect(), true),
             Err(npy) => {
-                whole = true;
-                match npy.try_data::<u16>() {
-                    Ok(data) => data.map(|v| v.map(f64::from)).collect(),
-                    Err(npy) => {
-                        let data = npy.try_data::<u8>().map_err(|_| NpyError::Type)?;
-                        data.map(|v| v.map(f64::from)).collect()
-                    }
-                }
+                let data = npy.try_data::<u8>().map_err(|_| NpyError::Type)?;
+                (data.map(|v| v.map(f64::from)).collect(), true)
             }
         },
     };

@@ -1,5 +1,7 @@
 //! Progress of long work: it reports how far it is, and learns that it should stop.
 
+use crate::{Error, Result};
+
 /// Observer of a long piece of work. The library prints nothing itself.
 pub trait Progress: Sync {
     /// A piece of work of `steps` equal steps begins; it ends where the next one begins.
@@ -18,9 +20,20 @@ pub trait Progress: Sync {
     }
 
     /// True if the user asked to stop; long work asks between steps and then returns
-    /// [`crate::error::Error::Interrupted`], or the best result so far where that is of use.
+    /// [`Error::Interrupted`], or the best result so far where that is of use.
     fn stopped(&self) -> bool {
         false
+    }
+
+    /// Ends long work between two steps if the user asked to stop.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`], if the user asked to stop.
+    fn check_stopped(&self) -> Result<()> {
+        match self.stopped() {
+            true => Err(Error::Interrupted),
+            false => Ok(()),
+        }
     }
 }
 
@@ -32,4 +45,17 @@ impl Progress for Silent {
     fn begin(&self, _what: &str, _steps: u64) {}
 
     fn advance(&self, _steps: u64) {}
+}
+
+/// Hears that the user wants to stop, and shows nothing: the work is a step of something else.
+pub struct Quiet<'a>(pub &'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn begin(&self, _what: &str, _steps: u64) {}
+
+    fn advance(&self, _steps: u64) {}
+
+    fn stopped(&self) -> bool {
+        self.0.stopped()
+    }
 }

@@ -184,21 +184,17 @@ fn edge_um(index: f64, [sin_x, sin_y]: [f64; 2], vectors_um: &[[f64; 2]]) -> f64
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
 
     /// Tolerance of sums of a few numbers near one, in um.
     const ROUNDING_UM: f64 = 1e-12;
 
     fn changed(name: &str, changes: &[(&str, &str)]) -> Design {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"));
-        let mut text = std::fs::read_to_string(&path).unwrap();
-        for (from, to) in changes {
-            assert!(text.contains(from), "{from}");
-            text = text.replacen(from, to, 1);
-        }
-        Design::parse(&path, &text).unwrap()
+        Design::parse(
+            &metalith_testing::design(name),
+            &metalith_testing::changed(name, changes),
+        )
+        .unwrap()
     }
 
     #[test]

@@ -305,18 +305,12 @@ fn distinct(um: impl Iterator<Item = f64>) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
 
     fn warned(name: &str, changes: &[(&str, &str)]) -> Vec<Warning> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"));
-        let mut text = std::fs::read_to_string(&path).unwrap();
-        for (from, to) in changes {
-            assert!(text.contains(from), "{from}");
-            text = text.replacen(from, to, 1);
-        }
-        Design::parse(&path, &text).unwrap().warnings().unwrap()
+        let text = metalith_testing::changed(name, changes);
+        let design = Design::parse(&metalith_testing::design(name), &text).unwrap();
+        design.warnings().unwrap()
     }
 
     fn ids(warnings: &[Warning]) -> Vec<&'static str> {

@@ -1,14 +1,9 @@
 //! Designs of other cells than the published one: nothing published is taken for them without a word.
 
-use std::path::{Path, PathBuf};
-
 use metalith_core::Error;
 use metalith_core::document::Faults;
 use metalith_design::Design;
-
-fn path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))
-}
+use metalith_testing::design as path;
 
 /// The text of a shipped design with other lines in `[mapping]`.
 fn mapped(name: &str, lines: &str) -> String {

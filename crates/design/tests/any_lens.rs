@@ -1,17 +1,12 @@
 //! Designs beyond the grid of radial lenses: phases over the plane, elements placed one by one, other bands and materials.
 
-use std::path::{Path, PathBuf};
-
 use metalith_cell::{Fidelity, RotatedRectangle};
 use metalith_core::Silent;
 use metalith_rcwa::{Orders, circular};
 
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, PillarArray};
-
-fn path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))
-}
+use metalith_testing::design as path;
 
 fn text(name: &str) -> String {
     std::fs::read_to_string(path(name)).unwrap()
@@ -23,9 +18,7 @@ fn words(error: &metalith_core::Error) -> String {
 }
 
 fn changed(name: &str, from: &str, to: &str) -> metalith_core::Result<Design> {
-    let text = text(name);
-    assert!(text.contains(from), "{from}");
-    Design::parse(&path(name), &text.replacen(from, to, 1))
+    Design::parse(&path(name), &metalith_testing::changed(name, &[(from, to)]))
 }
 
 #[test]
@@ -179,154 +172,47 @@ fn unlike_neighbours_judge_the_cell_of_the_paper_where_nothing_is_said() {
     );
 }
 
+/// Design, words of it and those in their place, and the mistakes that are made.
+const MISTAKES: &str = r#"
+asi_940 | shape = "circle" | shape = "hexagon" | cell.shape/unknown-choice
+asi_940 | [cell]\n | [cell]\nband_nm = [1000, 900]\n | cell.band_nm/inconsistent
+asi_940 | [cell]\n | [cell]\nspacer_nm = 50\n | cell.spacer_nm/inconsistent
+array_2x4 | spacing_um = [150, 120] | spacing_um = [150, 50] | array.spacing_um/inconsistent
+# 1000 um across, with 2858 sites of 350 nm.
+prototype_3x3 | spacing_um = 2420 | spacing_um = 1000 | array.spacing_um/inconsistent
+hologram | wrapped = "yes" | wrapped = "yes"\nscale = 0.5 | phase.term#0.scale/inconsistent
+hologram | elements_m = [2]  | elements_m = [3]  | phase.term#0.elements_m/inconsistent
+hologram | elements_m = [2]              # the second element alone\nelements_n = [0] | elements_m = []\nelements_n = [] | phase.term#0.elements_m/inconsistent
+array_2x4 | [array] | [[phase.term]]\nsource = "hyperbola"\nwavelength_nm = 500\nelements_m = [0]\nelements_n = [1]\n\n[array] | phase.term#0.elements_m/inconsistent
+mixed_lenses | coefficients_rad = [12.0, 12.0] | coefficients_rad = [12.0, 12.0]\nelements_m = [3]\nelements_n = [0] | element#3.phase.term#0.elements_m/inconsistent
+array_2x4 | elements = [2, 4] | elements = [2, 4.5] | array.elements/inconsistent
+geometric_phase_532 | pillar_length_nm = 250 | pillar_length_nm = 100 | cell.pillar_length_nm/inconsistent
+geometric_phase_532 | pillar_length_nm = 250 | pillar_length_nm = 350 | cell.pillar_length_nm/inconsistent
+geometric_phase_532 | rotation_step_deg = 1 | rotation_step_deg = 7 | cell.rotation_step_deg/inconsistent
+geometric_phase_532 | rotation_step_deg = 1 | rotation_step_deg = 0.5 | cell.rotation_step_deg/inconsistent
+geometric_phase_532 | [mapping]   | [mapping]\ncoefficients = [0.3, 0.5]\n# | mapping.coefficients/inconsistent
+geometric_phase_532 | pillar_height_nm = 600 | pillar_height_nm = 600\nwidth_min_nm = 100 | cell.width_min_nm/unknown
+geometric_phase_532 | rotation_sines_deg = [ | rotation_sines_deg = [0, 0, 0, 0, 0, 0,  | mapping.rotation_sines_deg/inconsistent
+tio2_532 | [mapping]   | [mapping]\nrotation_sines_deg = [0.1]\n# | mapping.rotation_sines_deg/inconsistent
+hologram | x_um = 60 | x_um = -20 | element#1.x_um/inconsistent
+hologram | [array]\n | [array]\nelements = [1, 1]\n | array.elements/inconsistent
+hologram | pitch_um = 0.35 | pitch_um = 0.2 | table/malformed
+hologram | source = "map" | source = "maps" | phase.term#0.wavelength_nm/missing phase.term#0.source/unknown-choice phase.term#0.source/unknown-choice phase.term#0.file/unknown phase.term#0.pitch_um/unknown phase.term#0.interpolation/unknown phase.term#0.wrapped/unknown
+array_2x4 | [array] | [[phase.term]]\nsource = "polynomial"\npowers_x = [1]\npowers_y = [0, 1]\ncoefficients_rad = [1.0]\n\n[array] | phase.term#0.powers_y/inconsistent
+array_2x4 | [array] | [[phase.term]]\nsource = "zernike"\norder = "noll"\ncoefficients_waves = [1.0]\n\n[array] | phase.term#0.order/unknown-choice
+"#;
+
 #[test]
 fn mistakes_are_said() {
-    let cases = [
-        (
-            "asi_940",
-            "shape = \"circle\"",
-            "shape = \"hexagon\"",
-            "cell.shape/unknown-choice",
-        ),
-        (
-            "asi_940",
-            "[cell]\n",
-            "[cell]\nband_nm = [1000, 900]\n",
-            "cell.band_nm/inconsistent",
-        ),
-        (
-            "asi_940",
-            "[cell]\n",
-            "[cell]\nspacer_nm = 50\n",
-            "cell.spacer_nm/inconsistent",
-        ),
-        (
-            "array_2x4",
-            "spacing_um = [150, 120]",
-            "spacing_um = [150, 50]",
-            "array.spacing_um/inconsistent",
-        ),
-        // 1000 um across, with 2858 sites of 350 nm.
-        (
-            "prototype_3x3",
-            "spacing_um = 2420",
-            "spacing_um = 1000",
-            "array.spacing_um/inconsistent",
-        ),
-        (
-            "hologram",
-            "wrapped = \"yes\"",
-            "wrapped = \"yes\"\nscale = 0.5",
-            "phase.term#0.scale/inconsistent",
-        ),
-        (
-            "hologram",
-            "elements_m = [2] ",
-            "elements_m = [3] ",
-            "phase.term#0.elements_m/inconsistent",
-        ),
-        (
-            "hologram",
-            "elements_m = [2]              # the second element alone\nelements_n = [0]",
-            "elements_m = []\nelements_n = []",
-            "phase.term#0.elements_m/inconsistent",
-        ),
-        (
-            "array_2x4",
-            "[array]",
-            "[[phase.term]]\nsource = \"hyperbola\"\nwavelength_nm = 500\nelements_m = [0]\nelements_n = [1]\n\n[array]",
-            "phase.term#0.elements_m/inconsistent",
-        ),
-        (
-            "mixed_lenses",
-            "coefficients_rad = [12.0, 12.0]",
-            "coefficients_rad = [12.0, 12.0]\nelements_m = [3]\nelements_n = [0]",
-            "element#3.phase.term#0.elements_m/inconsistent",
-        ),
-        (
-            "array_2x4",
-            "elements = [2, 4]",
-            "elements = [2, 4.5]",
-            "array.elements/inconsistent",
-        ),
-        (
-            "geometric_phase_532",
-            "pillar_length_nm = 250",
-            "pillar_length_nm = 100",
-            "cell.pillar_length_nm/inconsistent",
-        ),
-        (
-            "geometric_phase_532",
-            "pillar_length_nm = 250",
-            "pillar_length_nm = 350",
-            "cell.pillar_length_nm/inconsistent",
-        ),
-        (
-            "geometric_phase_532",
-            "rotation_step_deg = 1",
-            "rotation_step_deg = 7",
-            "cell.rotation_step_deg/inconsistent",
-        ),
-        (
-            "geometric_phase_532",
-            "rotation_step_deg = 1",
-            "rotation_step_deg = 0.5",
-            "cell.rotation_step_deg/inconsistent",
-        ),
-        (
-            "geometric_phase_532",
-            "[mapping]  ",
-            "[mapping]\ncoefficients = [0.3, 0.5]\n#",
-            "mapping.coefficients/inconsistent",
-        ),
-        (
-            "geometric_phase_532",
-            "pillar_height_nm = 600",
-            "pillar_height_nm = 600\nwidth_min_nm = 100",
-            "cell.width_min_nm/unknown",
-        ),
-        (
-            "geometric_phase_532",
-            "rotation_sines_deg = [",
-            "rotation_sines_deg = [0, 0, 0, 0, 0, 0, ",
-            "mapping.rotation_sines_deg/inconsistent",
-        ),
-        (
-            "tio2_532",
-            "[mapping]  ",
-            "[mapping]\nrotation_sines_deg = [0.1]\n#",
-            "mapping.rotation_sines_deg/inconsistent",
-        ),
-        ("hologram", "x_um = 60", "x_um = -20", "element#1.x_um/inconsistent"),
-        (
-            "hologram",
-            "[array]\n",
-            "[array]\nelements = [1, 1]\n",
-            "array.elements/inconsistent",
-        ),
-        ("hologram", "pitch_um = 0.35", "pitch_um = 0.2", "table/malformed"),
-        (
-            "hologram",
-            "source = \"map\"",
-            "source = \"maps\"",
-            "phase.term#0.wavelength_nm/missing phase.term#0.source/unknown-choice phase.term#0.source/unknown-choice phase.term#0.file/unknown phase.term#0.pitch_um/unknown phase.term#0.interpolation/unknown phase.term#0.wrapped/unknown",
-        ),
-        (
-            "array_2x4",
-            "[array]",
-            "[[phase.term]]\nsource = \"polynomial\"\npowers_x = [1]\npowers_y = [0, 1]\ncoefficients_rad = [1.0]\n\n[array]",
-            "phase.term#0.powers_y/inconsistent",
-        ),
-        (
-            "array_2x4",
-            "[array]",
-            "[[phase.term]]\nsource = \"zernike\"\norder = \"noll\"\ncoefficients_waves = [1.0]\n\n[array]",
-            "phase.term#0.order/unknown-choice",
-        ),
-    ];
-    let errors = cases.map(|(name, from, to, _)| changed(name, from, to).unwrap_err());
-    insta::assert_snapshot!(errors.each_ref().map(words).join("\n"));
-    assert_eq!(errors.map(|error| error.ids().join(" ")), cases.map(|case| case.3));
+    let cases = metalith_testing::rows::<4>(MISTAKES);
+    let errors: Vec<_> = cases
+        .iter()
+        .map(|[name, from, to, _]| changed(name, from, to).unwrap_err())
+        .collect();
+    insta::assert_snapshot!(errors.iter().map(words).collect::<Vec<_>>().join("\n"));
+    for (error, [.., ids]) in errors.iter().zip(&cases) {
+        assert_eq!(error.ids().join(" "), *ids);
+    }
 }
 
 fn zernike(order: &str, terms: usize) -> metalith_core::Result<Design> {

@@ -1,6 +1,6 @@
 //! Upright rectangles: what a design of two phases says, and which pillars it has.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use metalith_cell::{FocusedLight, Polarisation, PolarisationAxis};
 use metalith_core::{Result, Silent};
@@ -11,7 +11,7 @@ use metalith_pillars::PillarRows;
 const NAME: &str = "birefringent_532";
 
 fn path() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{NAME}.toml"))
+    metalith_testing::design(NAME)
 }
 
 fn text() -> String {
@@ -20,11 +20,7 @@ fn text() -> String {
 
 /// The design with parts of its text replaced, each of which it has.
 fn changed(pairs: &[(&str, &str)]) -> Result<Design> {
-    let text = pairs.iter().fold(text(), |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    });
-    Design::parse(&path(), &text)
+    Design::parse(&path(), &metalith_testing::changed(NAME, pairs))
 }
 
 /// Each site has the pillar of the library for the phase of light along x and that of light along y at that site.
@@ -164,48 +160,31 @@ fn light_says_which_phase_is_judged() {
     }
 }
 
+/// Words of the design and those in their place, and the mistakes that are made.
+const MISTAKES: &str = r#"
+library = "phases/birefringent_532.csv" |  | mapping.library/missing
+birefringent_532.csv | nowhere.csv | mapping.library/no-file
+width_step_nm = 10 | width_step_nm = 2 | cell.width_step_nm/inconsistent
+width_max_nm = 280 | width_max_nm = 270 | table/malformed
+width_max_nm = 280 | width_max_nm = 400 | cell.width_max_nm/out-of-range
+[mapping]  | [mapping]\ncoefficients = [0.2, 0.5]\n# | mapping.coefficients/inconsistent
+fidelity = "rigorous" | fidelity = "published" | verify.fidelity/inconsistent
+fidelity = "rigorous" | fidelity = "rigorous"\nanalyser = "circular" | verify.analyser/inconsistent
+shape = "upright_rectangle" | shape = "square" | phase.y/inconsistent mapping.coefficients/missing mapping.library/unknown mapping.library/inconsistent
+"#;
+
 #[test]
 fn what_cannot_be_is_told_with_its_place() {
-    let rigorous = "fidelity = \"rigorous\"";
-    let cases = [
-        (
-            "library = \"phases/birefringent_532.csv\"",
-            "",
-            "mapping.library/missing",
-        ),
-        ("birefringent_532.csv", "nowhere.csv", "mapping.library/no-file"),
-        (
-            "width_step_nm = 10",
-            "width_step_nm = 2",
-            "cell.width_step_nm/inconsistent",
-        ),
-        ("width_max_nm = 280", "width_max_nm = 270", "table/malformed"),
-        (
-            "width_max_nm = 280",
-            "width_max_nm = 400",
-            "cell.width_max_nm/out-of-range",
-        ),
-        (
-            "[mapping] ",
-            "[mapping]\ncoefficients = [0.2, 0.5]\n#",
-            "mapping.coefficients/inconsistent",
-        ),
-        (rigorous, "fidelity = \"published\"", "verify.fidelity/inconsistent"),
-        (
-            rigorous,
-            "fidelity = \"rigorous\"\nanalyser = \"circular\"",
-            "verify.analyser/inconsistent",
-        ),
-        (
-            "shape = \"upright_rectangle\"",
-            "shape = \"square\"",
-            "phase.y/inconsistent mapping.coefficients/missing mapping.library/unknown mapping.library/inconsistent",
-        ),
-    ];
-    let errors = cases.map(|(from, to, _)| changed(&[(from, to)]).unwrap_err());
+    let cases = metalith_testing::rows::<3>(MISTAKES);
+    let errors: Vec<_> = cases
+        .iter()
+        .map(|[from, to, _]| changed(&[(from.as_str(), to.as_str())]).unwrap_err())
+        .collect();
     let words = |error| metalith_testing::without_folder(error, path().parent().unwrap());
-    insta::assert_snapshot!(errors.each_ref().map(words).join("\n"));
-    assert_eq!(errors.map(|error| error.ids().join(" ")), cases.map(|case| case.2));
+    insta::assert_snapshot!(errors.iter().map(words).collect::<Vec<_>>().join("\n"));
+    for (error, [.., ids]) in errors.iter().zip(&cases) {
+        assert_eq!(error.ids().join(" "), *ids);
+    }
     // Whoever makes the library needs none, and takes none of other sizes.
     let missing = text().replace("birefringent_532.csv", "nowhere.csv");
     assert!(

@@ -1,30 +1,16 @@
 //! Tests of the box about an aperture: what maps of phases have to cover, and how near elements may stand.
 
-use std::path::{Path, PathBuf};
-
 use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_pillars::Lattice;
-
-fn path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))
-}
+use metalith_testing::{changed, design as path};
 
 /// A map of phases in rad, rows along x.
 fn npy(columns: usize, rows: usize, rad: impl Fn(usize, usize) -> f64) -> Vec<u8> {
-    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
-    while !(10 + header.len() + 1).is_multiple_of(64) {
-        header.push(' ');
-    }
-    header.push('\n');
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((header.len() as u16).to_le_bytes());
-    bytes.extend(header.bytes());
-    for (iy, ix) in (0..rows * columns).map(|k| (k / columns, k % columns)) {
-        bytes.extend(rad(ix, iy).to_le_bytes());
-    }
-    bytes
+    let places = (0..rows * columns).map(|k| (k / columns, k % columns));
+    let numbers = places.flat_map(|(iy, ix)| rad(ix, iy).to_le_bytes());
+    metalith_testing::npy("<f8", &format!("({rows}, {columns})"), numbers)
 }
 
 /// The text of an error in a shipped design that was changed.
@@ -43,16 +29,12 @@ fn hologram([columns, rows]: [usize; 2], changes: &[(&str, &str)]) -> Result<Des
     let folder = tempfile::tempdir().unwrap();
     let turns = |ix: usize, iy: usize| (ix + TURNS_A_ROW * iy) as f64 * std::f64::consts::TAU;
     std::fs::write(folder.path().join("map.npy"), npy(columns, rows, turns)).unwrap();
-    let text = std::fs::read_to_string(path("hologram")).unwrap();
     let own = [
         ("phases/four_spots.npy", "map.npy"),
         ("pitch_um = 0.35", "pitch_um = 0.5"),
         ("source = \"hyperbola\"\nwavelength_nm = 532", "source = \"flat\""),
     ];
-    let text = own.iter().chain(changes).fold(text, |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    });
+    let text = changed("hologram", &[&own, changes].concat());
     Design::parse(&folder.path().join("own.toml"), &text)
 }
 

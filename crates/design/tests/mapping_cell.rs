@@ -6,15 +6,7 @@ use std::path::Path;
 use metalith_core::{Error, FaultKind, Result};
 use metalith_design::Design;
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_testing::{accepting, design};
-
-fn text(name: &str, changes: &[(&str, &str)]) -> String {
-    let text = std::fs::read_to_string(design(name)).unwrap();
-    changes.iter().fold(text, |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    })
-}
+use metalith_testing::{accepting, changed as text, design};
 
 fn parse(name: &str, text: &str) -> Result<Design> {
     Design::parse(&design(name), text)

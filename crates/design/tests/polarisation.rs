@@ -1,14 +1,9 @@
 //! `polarisation` of `[verify]`: what may stand there, and what a design says of it.
 
-use std::path::{Path, PathBuf};
-
 use metalith_cell::{Analyser, Handedness, Polarisation, PolarisedLight};
 use metalith_core::Error;
 use metalith_design::Design;
-
-fn path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))
-}
+use metalith_testing::design as path;
 
 /// The text of a shipped design with a further line in `[verify]`.
 fn with(name: &str, line: &str) -> String {

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use metalith_core::document::{Scalar, with_values};
 use metalith_core::{Error, Warning};
 use metalith_design::Design;
-use metalith_testing::{design, golden};
+use metalith_testing::{changed, design, golden, rows};
 use toml::Value;
 
 mod legitimate;
@@ -78,18 +78,17 @@ fn golden_each_wrong_value_is_said_or_legitimate() {
     );
     let mut seen = BTreeMap::new();
     let mut silent = Vec::new();
-    let mut reasons: BTreeMap<(&str, &str), bool> = LEGITIMATE
-        .iter()
-        .map(|(key, factor, _)| ((*key, *factor), false))
-        .collect();
-    assert_eq!(reasons.len(), LEGITIMATE.len(), "a reason stands twice");
+    // The reason for each wrong value that is not used yet.
+    let mut reasons: BTreeMap<String, String> = BTreeMap::new();
+    for [why, values] in rows(LEGITIMATE) {
+        for value in values.split(", ") {
+            let earlier = reasons.insert(value.into(), why.clone());
+            assert_eq!(earlier, None, "a reason for {value} stands twice");
+        }
+    }
     for (name, more) in DESIGNS {
         let path = design(name);
-        let text = std::fs::read_to_string(&path).unwrap();
-        let text = more.iter().fold(text, |text, (from, to)| {
-            assert!(text.contains(from), "{name}: {from}");
-            text.replacen(from, to, 1)
-        });
+        let text = changed(name, more);
         let base = Design::parse(&path, &text).unwrap().warnings().unwrap();
         let mut keys = Vec::new();
         numbers("", &toml::from_str(&text).unwrap(), &mut keys);
@@ -113,13 +112,9 @@ fn golden_each_wrong_value_is_said_or_legitimate() {
                     &base,
                     Design::parse(&path, &changed).and_then(|design| design.warnings()),
                 );
-                let reason = LEGITIMATE.iter().find(|(key, of, _)| *key == shown && *of == sign);
-                let said = match (said, reason) {
+                let said = match (said, reasons.remove(&format!("{shown} {sign}"))) {
                     (Some(said), None) => said,
-                    (None, Some((key, of, why))) => {
-                        reasons.insert((*key, *of), true);
-                        (*why).to_owned()
-                    }
+                    (None, Some(why)) => why,
                     (Some(said), Some(_)) => {
                         silent.push(format!("{shown} {sign} is said: {said}"));
                         said
@@ -133,11 +128,11 @@ fn golden_each_wrong_value_is_said_or_legitimate() {
             }
         }
     }
-    for ((key, factor), used) in reasons {
-        if !used {
-            silent.push(format!("a reason for {key} {factor} is not needed"));
-        }
-    }
+    silent.extend(
+        reasons
+            .keys()
+            .map(|value| format!("a reason for {value} is not needed")),
+    );
     assert!(silent.is_empty(), "{}", silent.join("\n"));
     golden("wrong_values.txt", table.as_bytes());
 }

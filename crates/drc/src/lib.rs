@@ -81,9 +81,7 @@ pub fn check(layout: &Layout, deck: &Deck, input: &CheckInput<'_>, progress: &dy
     progress.begin("rules", deck.rules().len() as u64);
     let mut statuses = Vec::with_capacity(deck.rules().len());
     for (rule, found) in deck.rules().iter().zip(&mut found) {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         statuses.push(if in_force(rule) {
             judge(rule, &flat, found)?
         } else {

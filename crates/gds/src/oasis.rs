@@ -377,9 +377,7 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
         if count.is_multiple_of(ELEMENTS_AT_A_TIME) {
             progress.advance(cells.reader.offset().saturating_sub(reported));
             reported = cells.reader.offset();
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
         }
     }
     let units = [1.0 / grid_per_um, 1e-6 / grid_per_um];

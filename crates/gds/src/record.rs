@@ -61,59 +61,10 @@ pub(super) struct Record {
 
 /// Name of a record type, for messages.
 pub(super) fn name(kind: u8) -> String {
-    const NAMES: [&str; 0x32] = [
-        "HEADER",
-        "BGNLIB",
-        "LIBNAME",
-        "UNITS",
-        "ENDLIB",
-        "BGNSTR",
-        "STRNAME",
-        "ENDSTR",
-        "BOUNDARY",
-        "PATH",
-        "SREF",
-        "AREF",
-        "TEXT",
-        "LAYER",
-        "DATATYPE",
-        "WIDTH",
-        "XY",
-        "ENDEL",
-        "SNAME",
-        "COLROW",
-        "TEXTNODE",
-        "NODE",
-        "TEXTTYPE",
-        "PRESENTATION",
-        "SPACING",
-        "STRING",
-        "STRANS",
-        "MAG",
-        "ANGLE",
-        "UINTEGER",
-        "USTRING",
-        "REFLIBS",
-        "FONTS",
-        "PATHTYPE",
-        "GENERATIONS",
-        "ATTRTABLE",
-        "STYPTABLE",
-        "STRTYPE",
-        "ELFLAGS",
-        "ELKEY",
-        "LINKTYPE",
-        "LINKKEYS",
-        "NODETYPE",
-        "PROPATTR",
-        "PROPVALUE",
-        "BOX",
-        "BOXTYPE",
-        "PLEX",
-        "BGNEXTN",
-        "ENDEXTN",
-    ];
-    NAMES
-        .get(usize::from(kind))
-        .map_or_else(|| format!("0x{kind:02X}"), |n| (*n).to_owned())
+    const NAMES: &str = "HEADER BGNLIB LIBNAME UNITS ENDLIB BGNSTR STRNAME ENDSTR BOUNDARY PATH SREF AREF TEXT \
+        LAYER DATATYPE WIDTH XY ENDEL SNAME COLROW TEXTNODE NODE TEXTTYPE PRESENTATION SPACING STRING STRANS \
+        MAG ANGLE UINTEGER USTRING REFLIBS FONTS PATHTYPE GENERATIONS ATTRTABLE STYPTABLE STRTYPE ELFLAGS ELKEY \
+        LINKTYPE LINKKEYS NODETYPE PROPATTR PROPVALUE BOX BOXTYPE PLEX BGNEXTN ENDEXTN";
+    let known = NAMES.split(' ').nth(kind.into());
+    known.map_or_else(|| format!("0x{kind:02X}"), str::to_owned)
 }

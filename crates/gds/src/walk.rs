@@ -85,9 +85,7 @@ impl<'a> Walk<'a> {
     pub(crate) fn report(&mut self, offset: u64) -> Result<()> {
         self.progress.advance(offset.saturating_sub(self.reported));
         self.reported = offset;
-        if self.progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        self.progress.check_stopped()?;
         Ok(())
     }
 

@@ -203,9 +203,7 @@ fn seal(files: &Listing, sources: &Sources, options: &HandoffOptions, progress: 
     progress.begin("digests", there.files.len() as u64);
     for (name, path) in there.files {
         digests.insert(name, entry_of(&path, &metalith_core::Silent)?);
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         progress.advance(1);
     }
     let manifest = Manifest {

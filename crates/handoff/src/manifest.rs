@@ -115,11 +115,9 @@ impl Manifest {
     fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(NAME);
         let bytes = read_at_most(&path, LONGEST, "the manifest of a hand-off")?;
-        serde_json::from_slice(&bytes).map_err(|e| Error::Table {
-            path,
-            line: Some(e.line()),
-            what: format!("this is not a manifest: {}", printable(&e.to_string())),
-            hint: "ask the sender for the hand-off again".into(),
+        serde_json::from_slice(&bytes).map_err(|e| {
+            let what = format!("this is not a manifest: {}", printable(&e.to_string()));
+            Error::table(&path, Some(e.line()), what, "ask the sender for the hand-off again")
         })
     }
 }
@@ -202,9 +200,7 @@ pub(super) fn entry_of(path: &Path, progress: &dyn Progress) -> Result<ManifestE
         if n == 0 {
             break;
         }
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         hash.update(&block[..n]);
         bytes += n as u64;
         progress.advance(n as u64);

@@ -111,9 +111,7 @@ fn pack_one(out: &mut Counted, path: &Path, name: &str, file: &Path, progress: &
         if n == 0 {
             break;
         }
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         crc.update(&block[..n]);
         size += n as u64;
         encoder.write_all(&block[..n]).map_err(Error::io("write", path))?;

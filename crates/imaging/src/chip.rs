@@ -1,7 +1,7 @@
 //! The chip before its sensor: elements as read from a layout, in light.
 
 use metalith_cell::{Illumination, PolarisedLight};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_design::array::Symmetry;
 use metalith_design::phase::OpenAreas;
 use metalith_design::{Design, Element};
@@ -161,9 +161,7 @@ impl<'a> ChipInLight<'a> {
         let mut classes: Vec<Option<ClassFields>> = self.sampling.wavelengths_nm.iter().map(|_| None).collect();
         let element = &self.distinct[distinct];
         for i in wavelengths {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let of = |light: &Illumination<'_>| self.optics.classes(&element.made, element.widths, light, progress);
             let um = self.sampling.wavelengths_nm[*i] * 1e-3;
             classes[*i] = Some(in_band(&element.view, um, self.polarised, of)?);

@@ -148,9 +148,7 @@ pub fn write_dataset(
     progress.begin("recording frames", images.len() as u64);
     let writer = PairWriter::new(system, operator, manifest.seed, folder);
     for (i, image) in images.iter().enumerate() {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         manifest.pairs.push(writer.write(image, i, read)?);
         progress.advance(1);
     }

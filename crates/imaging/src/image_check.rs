@@ -20,9 +20,7 @@ pub fn check_images(images: &[PathBuf], progress: &dyn Progress) -> Result<()> {
     progress.begin("reading the images", images.len() as u64);
     let mut sizes = Vec::new();
     for some in images.chunks(AT_ONCE) {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         let found: Vec<Result<[usize; 2]>> = some.par_iter().map(|image| size_of(image)).collect();
         sizes.extend(found);
         progress.advance(some.len() as u64);

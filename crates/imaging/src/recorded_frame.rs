@@ -1,7 +1,7 @@
 //! Frames that a camera recorded, out of files.
 
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use metalith_core::file::read_at_most;
 use metalith_core::{Error, Result};
@@ -162,12 +162,7 @@ fn read_grey(path: &Path, [rows, columns]: [usize; 2]) -> Result<Grey> {
 }
 
 fn fault(path: &Path, what: &str, hint: &str) -> Error {
-    Error::Table {
-        path: PathBuf::from(path),
-        line: None,
-        what: what.into(),
-        hint: hint.into(),
-    }
+    Error::table(path, None, what, hint)
 }
 
 #[cfg(test)]

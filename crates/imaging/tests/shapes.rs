@@ -2,12 +2,11 @@
 
 use metalith_cell::{Analyser, CellModel, CellResponse, Illumination, PolarisedTables};
 use metalith_core::Silent;
-use metalith_design::array::PillarArray;
 use metalith_design::{Design, cell_models};
 use metalith_gds::extract::Extraction;
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{BankSpec, ChipInLight, KernelBank, StrayLight};
-use metalith_layout::{read_pillars, write_pillars};
+use metalith_layout::read_pillars;
 use metalith_optics::SimulationCase;
 use metalith_sensor::{Camera, Channel, Illuminant, Response, Sensor};
 use metalith_wave::{Direct, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
@@ -18,18 +17,10 @@ const FIELD_DEG: f64 = 16.0;
 
 /// A smaller lens of a shipped design, by lines of it that are changed.
 fn lens(name: &str, changed: &[(&str, &str)]) -> (Design, Extraction) {
-    let path = std::path::PathBuf::from(format!("../../designs/{name}.toml"));
-    let mut text = std::fs::read_to_string(&path).unwrap();
-    for (from, to) in changed {
-        assert!(text.contains(from), "{from}");
-        text = text.replacen(from, to, 1);
-    }
-    let design = Design::parse(&path, &metalith_testing::accepting(&text)).unwrap();
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let layout = folder.path().join("lens.gds");
-    write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
-    let extraction = read_pillars(&design, &layout, &Silent).unwrap();
+    let text = metalith_testing::accepting(&metalith_testing::changed(name, changed));
+    let design = Design::parse(&metalith_testing::design(name), &text).unwrap();
+    let (design, _, folder) = metalith_testing::layouts::written(design);
+    let extraction = read_pillars(&design, &folder.path().join("lens.gds"), &Silent).unwrap();
     (design, extraction)
 }
 

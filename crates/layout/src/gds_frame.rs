@@ -60,7 +60,7 @@ pub(super) fn date(design: &Design) -> NaiveDateTime {
     date.expect("checked when the design was read")
 }
 
-fn encode(library: &GdsLibrary) -> Result<Vec<u8>> {
+pub(super) fn encode(library: &GdsLibrary) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     library.write(&mut bytes).map_err(encoding)?;
     Ok(bytes)

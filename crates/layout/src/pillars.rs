@@ -246,9 +246,7 @@ impl<'a> PillarWriter<'a> {
         let n = lattice.sites();
         let places = [0, 1].map(|axis| -> Vec<i32> { (0..n).map(|i| coordinate(lattice.place_nm(axis, i))).collect() });
         for side_by_side in blocks(n, &runs).chunks(BLOCKS) {
-            if self.progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            self.progress.check_stopped()?;
             let mut buffers = std::mem::take(&mut self.buffers);
             let pillars = side_by_side
                 .par_iter()

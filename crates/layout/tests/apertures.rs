@@ -1,11 +1,11 @@
 //! Apertures that are polygons: pillars stand in them and nowhere else, openings keep their margin, and all is read back.
 
 use metalith_core::Silent;
-use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_gds::extract::extract;
+use metalith_design::{Design, PillarArray};
 use metalith_gds::{Layout, Selection, Shape, Transform, Visitor};
-use metalith_layout::{LayoutFormat, OasisEncoding, extraction_plan, write_apertures, write_pillars_as};
-use metalith_testing::design;
+use metalith_layout::{extraction_plan, write_apertures};
+use metalith_testing::layouts::{each_layout, hologram_of, same_pillars};
+use metalith_testing::{design, replaced};
 
 /// A circle, a rectangle that is turned by a quarter, a hexagon, and an L.
 const ELEMENTS: &str = r#"
@@ -41,13 +41,7 @@ const MARGIN_NM: i64 = 2_000;
 const ROUNDED_NM: f64 = 1.0;
 
 fn text(elements: &str) -> String {
-    let text = std::fs::read_to_string(design("hologram")).unwrap();
-    let (head, rest) = text.split_once("[[phase.term]]").unwrap();
-    let (_, array) = rest.split_once("[array]").unwrap();
-    let (array, _) = array.split_once("[[element]]").unwrap();
-    let (_, tail) = rest.split_once("[mapping]").unwrap();
-    let tail = tail.replace("size_um = [300, 200]", "size_um = [300, 300]");
-    format!("{head}[array]{array}{elements}\n[mapping]{tail}")
+    hologram_of(elements).replace("size_um = [300, 200]", "size_um = [300, 300]")
 }
 
 fn of(elements: &str) -> metalith_core::Result<Design> {
@@ -100,18 +94,9 @@ fn they_are_read_back_from_every_hierarchy_and_format() {
     let design = of(ELEMENTS).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    for format in [LayoutFormat::Gds, LayoutFormat::Oasis(OasisEncoding::Compact)] {
-        for hierarchy in [Hierarchy::Folded, Hierarchy::Sref, Hierarchy::Flat] {
-            let path = folder.path().join(format!("pillars.{}", format.extension()));
-            write_pillars_as(&design, &array, hierarchy, format, &path, &Silent).unwrap();
-            let layout = Layout::open(&path).unwrap();
-            let read = extract(&layout, &extraction_plan(&design), &Silent).unwrap();
-            assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0));
-            for (element, placed) in read.elements.iter().zip(&array.placed) {
-                assert!(element.widths.number == array.widths(placed).number);
-            }
-        }
-    }
+    each_layout(folder.path(), &design, &array, |path| {
+        same_pillars(path, &extraction_plan(&design), &array);
+    });
 }
 
 #[derive(Default)]
@@ -168,47 +153,25 @@ fn openings_are_the_apertures_with_their_margin() {
     }
 }
 
+/// Words of the elements and those in their place, and the mistakes that are made.
+const MISTAKES: &str = r#"
+corners_x_um = [-10, 25, 25, 10, 10, -10] | corners_x_um = [-10, 25, 25, 10, 10] | element#3.x_um/inconsistent element#3.corners_x_um/inconsistent apertures.chord_error_nm/inconsistent
+corners_x_um = [-10, 25, 25, 10, 10, -10] | corners_x_um = [-10, 25, -10, 10, 10, 25] | element#3.corners_x_um/inconsistent apertures.margin_um/inconsistent
+corners_x_um = [-10, 25, 25, 10, 10, -10] | corners_x_um = [15, 50, 50, 35, 35, 15] | element#3.corners_x_um/inconsistent
+aperture_um = [50, 20] | aperture_um = [50, 20]\ndiameter_um = 60 | element#1.diameter_um/inconsistent
+aperture_sides = 6 | aperture_sides = 2 | element#2.aperture_sides/out-of-range
+aperture = "regular" | aperture = "hexagon" | element#2.aperture/unknown-choice element#2.aperture_sides/unknown
+"#;
+
 #[test]
 fn apertures_that_cannot_be_are_refused() {
-    let l = "corners_x_um = [-10, 25, 25, 10, 10, -10]";
-    let cases = [
-        (
-            l,
-            "corners_x_um = [-10, 25, 25, 10, 10]",
-            "element#3.x_um/inconsistent element#3.corners_x_um/inconsistent apertures.chord_error_nm/inconsistent",
-        ),
-        (
-            l,
-            "corners_x_um = [-10, 25, -10, 10, 10, 25]",
-            "element#3.corners_x_um/inconsistent apertures.margin_um/inconsistent",
-        ),
-        (
-            l,
-            "corners_x_um = [15, 50, 50, 35, 35, 15]",
-            "element#3.corners_x_um/inconsistent",
-        ),
-        (
-            "aperture_um = [50, 20]",
-            "aperture_um = [50, 20]\ndiameter_um = 60",
-            "element#1.diameter_um/inconsistent",
-        ),
-        (
-            "aperture_sides = 6",
-            "aperture_sides = 2",
-            "element#2.aperture_sides/out-of-range",
-        ),
-        (
-            "aperture = \"regular\"",
-            "aperture = \"hexagon\"",
-            "element#2.aperture/unknown-choice element#2.aperture_sides/unknown",
-        ),
-    ];
-    let errors = cases.map(|(from, to, _)| {
-        assert!(ELEMENTS.contains(from));
-        of(&ELEMENTS.replace(from, to)).unwrap_err()
-    });
+    let cases = metalith_testing::rows::<3>(MISTAKES);
+    let errors: Vec<_> = cases
+        .iter()
+        .map(|[from, to, _]| of(&replaced(ELEMENTS, &[(from.as_str(), to)])).unwrap_err())
+        .collect();
     let words = |error| metalith_testing::without_folder(error, metalith_testing::design("hologram").parent().unwrap());
-    insta::assert_snapshot!(errors.each_ref().map(words).join("\n"), @r#"
+    insta::assert_snapshot!(errors.iter().map(words).collect::<Vec<_>>().join("\n"), @r#"
         hologram.toml:46:8: this lens overlaps that of element (1, 0), or the upright boxes about their pillars do
           help: place them at least 530.25 um apart along x, or 530.25 um along y: the boxes and a pitch between them
         hologram.toml:49:16: 5 places along x and 6 along y
@@ -230,7 +193,9 @@ fn apertures_that_cannot_be_are_refused() {
         hologram.toml:42:1: unknown key `aperture_sides` in [element]
           help: known here: aperture, diameter_um, focal_length_um, phase, rotation_deg, steering_x_deg, steering_y_deg, x_um, y_um
         "#);
-    assert_eq!(errors.map(|error| error.ids().join(" ")), cases.map(|case| case.2));
+    for (error, [.., ids]) in errors.iter().zip(&cases) {
+        assert_eq!(error.ids().join(" "), *ids);
+    }
 }
 
 /// The aperture of all elements of a grid.

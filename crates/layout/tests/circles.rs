@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use metalith_core::Silent;
-use metalith_design::{Design, Hierarchy, PillarArray};
+use metalith_design::{Design, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, Why, extract};
-use metalith_layout::{LayoutFormat, OasisEncoding, write_pillars_as};
 use metalith_pillars::PillarShape;
 use metalith_testing::design;
+use metalith_testing::layouts::{each_layout, same_pillars};
 
 fn circles() -> Design {
     let path = design("mini_3x3");
@@ -25,18 +25,11 @@ fn plan(design: &Design, shape: PillarShape) -> ExtractionPlan {
 
 fn holds(path: &Path, design: &Design, array: &PillarArray) {
     let name = path.display();
-    let layout = Layout::open(path).unwrap();
-    for plan in [
-        plan(design, PillarShape::Circle),
-        ExtractionPlan::discover(design.layout.layers.pillars.number()),
-    ] {
-        let read = extract(&layout, &plan, &Silent).unwrap();
-        assert_eq!(read.shape, PillarShape::Circle, "{name}");
-        assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0), "{name}");
-        for (element, placed) in read.elements.iter().zip(&array.placed) {
-            assert_eq!(element.widths.number, array.widths(placed).number, "{name}");
-        }
+    let found = ExtractionPlan::discover(design.layout.layers.pillars.number());
+    for plan in [plan(design, PillarShape::Circle), found] {
+        assert_eq!(same_pillars(path, &plan, array).shape, PillarShape::Circle, "{name}");
     }
+    let layout = Layout::open(path).unwrap();
     let squares = extract(&layout, &plan(design, PillarShape::Square), &Silent).unwrap();
     assert_eq!(squares.pillars, 0, "{name}");
     assert_eq!(
@@ -51,17 +44,7 @@ fn circles_are_read_back_from_every_hierarchy_and_format() {
     let design = circles();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    for hierarchy in [Hierarchy::Folded, Hierarchy::Sref, Hierarchy::Flat] {
-        let path = folder.path().join("circles.gds");
-        write_pillars_as(&design, &array, hierarchy, LayoutFormat::Gds, &path, &Silent).unwrap();
-        holds(&path, &design, &array);
-    }
-    for encoding in [OasisEncoding::Compact, OasisEncoding::Plain, OasisEncoding::Smallest] {
-        let path = folder.path().join("circles.oas");
-        let format = LayoutFormat::Oasis(encoding);
-        write_pillars_as(&design, &array, Hierarchy::Folded, format, &path, &Silent).unwrap();
-        holds(&path, &design, &array);
-    }
+    each_layout(folder.path(), &design, &array, |path| holds(path, &design, &array));
 }
 
 #[test]

@@ -5,8 +5,9 @@ use metalith_core::Silent;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, extract};
-use metalith_layout::{LayoutFormat, OasisEncoding, extraction_plan, write_pillars_as};
-use metalith_testing::design;
+use metalith_layout::{LayoutFormat, extraction_plan, write_pillars_as};
+use metalith_testing::layouts::{all_pillars, each_layout, hologram_of, same_pillars};
+use metalith_testing::{design, replaced};
 
 /// A lens of 100 um; beside it two small ones, two strips whose rows are a pitch apart, and one that is turned. Those in the middle
 /// are in step with one another: a place of one lattice is a place of the other.
@@ -46,16 +47,11 @@ aperture_um = [60, 8]
 "#;
 
 fn near() -> Design {
-    let text = std::fs::read_to_string(design("hologram")).unwrap();
-    let (head, rest) = text.split_once("[[phase.term]]").unwrap();
-    let (_, tail) = rest.split_once("[mapping]").unwrap();
-    let head = head.replacen("diameter_um = 60", "diameter_um = 100", 1);
-    let tail = tail.replacen("size_um = [300, 200]", "size_um = [400, 300]", 1);
-    Design::parse(
-        &design("hologram"),
-        &format!("{head}[array]\n{ELEMENTS}\n[mapping]{tail}"),
-    )
-    .unwrap()
+    let larger = [
+        ("diameter_um = 60", "diameter_um = 100"),
+        ("size_um = [300, 200]", "size_um = [400, 300]"),
+    ];
+    Design::parse(&design("hologram"), &replaced(&hologram_of(ELEMENTS), &larger)).unwrap()
 }
 
 #[test]
@@ -65,52 +61,29 @@ fn each_pillar_is_read_back_as_one_of_its_element() {
     assert_eq!(own, [false, true, true, true, true, true]);
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    for format in [LayoutFormat::Gds, LayoutFormat::Oasis(OasisEncoding::Compact)] {
-        for hierarchy in [Hierarchy::Folded, Hierarchy::Sref, Hierarchy::Flat] {
-            let path = folder.path().join(format!("pillars.{}", format.extension()));
-            write_pillars_as(&design, &array, hierarchy, format, &path, &Silent).unwrap();
-            let layout = Layout::open(&path).unwrap();
-            let mut plans = vec![extraction_plan(&design)];
-            // In any order: which element is met first decides nothing.
-            let mut sites = design.sites();
-            sites.reverse();
-            plans.push(ExtractionPlan::given(plans[0].pillar_layer, sites));
-            for (plan, is_reversed) in plans.into_iter().zip([false, true]) {
-                let mut read = extract(&layout, &plan, &Silent).unwrap();
-                assert_eq!(
-                    (read.pillars, read.oddities.total()),
-                    (array.pillars(), 0),
-                    "{hierarchy:?}"
-                );
-                if is_reversed {
-                    read.elements.reverse();
-                }
-                for (element, placed) in read.elements.iter().zip(&array.placed) {
-                    let meant = array.widths(placed);
-                    let label = placed.element.label();
-                    assert!(
-                        element.widths.number == meant.number,
-                        "{format:?} {hierarchy:?} {label}"
-                    );
-                }
-            }
+    each_layout(folder.path(), &design, &array, |path| {
+        let plan = extraction_plan(&design);
+        same_pillars(path, &plan, &array);
+        // In any order: which element is met first decides nothing.
+        let mut sites = design.sites();
+        sites.reverse();
+        let read = all_pillars(path, &ExtractionPlan::given(plan.pillar_layer, sites), &array);
+        for (element, placed) in read.elements.iter().rev().zip(&array.placed) {
+            let is_same = element.widths.number == array.widths(placed).number;
+            assert!(is_same, "{} {}", path.display(), placed.element.label());
         }
-    }
+    });
 }
 
 /// Elements that are found have the ends that they are found with, so that strips whose squares overlap are
 /// distinguished without the design.
 #[test]
 fn strips_are_found_without_the_design() {
-    let text = std::fs::read_to_string(design("hologram")).unwrap();
-    let (head, rest) = text.split_once("[[phase.term]]").unwrap();
-    let (_, tail) = rest.split_once("[mapping]").unwrap();
     let strip = |y_um: f64| {
         format!("[[element]]\nx_um = 0\ny_um = {y_um}\naperture = \"rectangle\"\naperture_um = [100, 20]\n")
     };
     let elements = strip(-35.0) + &strip(0.0) + &strip(35.0);
-    let text = format!("{head}[array]\n{elements}\n[mapping]{tail}");
-    let design = Design::parse(&design("hologram"), &text).unwrap();
+    let design = Design::parse(&design("hologram"), &hologram_of(&elements)).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for hierarchy in [Hierarchy::Folded, Hierarchy::Flat] {

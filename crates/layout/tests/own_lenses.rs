@@ -5,11 +5,11 @@ use std::path::Path;
 use metalith_core::Silent;
 use metalith_design::array::Symmetry;
 use metalith_design::phase::{ElementPhase, LensPhase};
-use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_gds::extract::extract;
+use metalith_design::{Design, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Selection, Shape, Transform, Visitor};
-use metalith_layout::{LayoutFormat, OasisEncoding, extraction_plan, write_apertures, write_pillars_as};
+use metalith_layout::{extraction_plan, write_apertures};
 use metalith_testing::design;
+use metalith_testing::layouts::{each_layout, hologram_of, same_pillars};
 
 /// The shared lens, a smaller and steered one of another focal length, holograms that are rotated by quarter turns and by 30
 /// degrees, and a lens with a phase of its own.
@@ -70,17 +70,7 @@ coefficients_rad = [-200, 10]
 "#;
 
 fn text() -> String {
-    let text = std::fs::read_to_string(design("hologram")).unwrap();
-    let (head, rest) = text.split_once("[[element]]").unwrap();
-    let (_, tail) = rest.split_once("[mapping]").unwrap();
-    // Without the term of the second element of the shipped design.
-    let (lens, rest) = head.split_once("[[phase.term]]").unwrap();
-    let head = format!("{lens}[array]{}", rest.split_once("[array]").unwrap().1);
-    let size = tail.lines().find(|line| line.starts_with("size_um")).unwrap();
-    format!(
-        "{head}{ELEMENTS}\n[mapping]{}",
-        tail.replace(size, "size_um = [400, 400]")
-    )
+    hologram_of(ELEMENTS).replace("size_um = [300, 200]", "size_um = [400, 400]")
 }
 
 fn own() -> Design {
@@ -92,26 +82,9 @@ fn every_pillar_is_read_back_from_every_hierarchy_and_format() {
     let design = own();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let oasis = [OasisEncoding::Compact, OasisEncoding::Plain, OasisEncoding::Smallest];
-    let formats = oasis.into_iter().map(LayoutFormat::Oasis).chain([LayoutFormat::Gds]);
-    for format in formats {
-        for hierarchy in [Hierarchy::Folded, Hierarchy::Sref, Hierarchy::Flat] {
-            let path = folder.path().join(format!("pillars.{}", format.extension()));
-            write_pillars_as(&design, &array, hierarchy, format, &path, &Silent).unwrap();
-            let layout = Layout::open(&path).unwrap();
-            let read = extract(&layout, &extraction_plan(&design), &Silent).unwrap();
-            assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0));
-            assert_eq!(read.elements.len(), 6);
-            for (element, placed) in read.elements.iter().zip(&array.placed) {
-                let meant = array.widths(placed);
-                assert!(
-                    element.widths.number == meant.number,
-                    "{format:?} {hierarchy:?} {}",
-                    placed.element.label()
-                );
-            }
-        }
-    }
+    each_layout(folder.path(), &design, &array, |path| {
+        same_pillars(path, &extraction_plan(&design), &array);
+    });
 }
 
 /// Rows made one by one, as of large lenses, are those that are held.

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use metalith_core::Silent;
-use metalith_design::{Design, Hierarchy, PillarArray};
+use metalith_design::{Design, PillarArray};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractionPlan, extract};
-use metalith_layout::{LayoutFormat, OasisEncoding, convert, extraction_plan, write_pillars_as};
+use metalith_layout::extraction_plan;
 use metalith_pillars::{PillarShape, RotatedRectangles};
 use metalith_testing::design;
+use metalith_testing::layouts::{each_layout, same_pillars};
 
 const PILLARS: RotatedRectangles = RotatedRectangles {
     width_nm: 100,
@@ -22,21 +23,14 @@ fn lens() -> Design {
 
 fn holds(path: &Path, design: &Design, array: &PillarArray) {
     let name = path.display();
-    let layout = Layout::open(path).unwrap();
-    for plan in [
-        extraction_plan(design),
-        ExtractionPlan::discover(design.layout.layers.pillars.number()),
-    ] {
-        let read = extract(&layout, &plan, &Silent).unwrap();
+    let found = ExtractionPlan::discover(design.layout.layers.pillars.number());
+    for plan in [extraction_plan(design), found] {
+        let read = same_pillars(path, &plan, array);
         assert_eq!(read.shape, PillarShape::Rectangle(PILLARS.into()), "{name}");
-        assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0), "{name}");
-        for (element, placed) in read.elements.iter().zip(&array.placed) {
-            assert_eq!(element.widths.number, array.widths(placed).number, "{name}");
-        }
     }
     // Upright ones, of a rotation of none or a quarter turn, are upright rectangles and no squares.
     let squares = extraction_plan(design).of_shape(PillarShape::Square);
-    let read = extract(&layout, &squares, &Silent).unwrap();
+    let read = extract(&Layout::open(path).unwrap(), &squares, &Silent).unwrap();
     assert_eq!((read.pillars, read.oddities.total()), (0, array.pillars()), "{name}");
 }
 
@@ -47,26 +41,10 @@ fn rectangles_are_read_back_from_every_hierarchy_and_format() {
     // Half a turn leaves a lens without wedge as it is; a mirror turns its pillars the other way.
     assert_eq!(array.classes[0].group.members().len(), 2);
     let folder = tempfile::tempdir().unwrap();
-    let (gds, oasis) = (folder.path().join("pillars.gds"), folder.path().join("pillars.oas"));
-    let mut folded = 0;
-    for hierarchy in [Hierarchy::Folded, Hierarchy::Sref, Hierarchy::Flat] {
-        let written = write_pillars_as(&design, &array, hierarchy, LayoutFormat::Gds, &gds, &Silent).unwrap();
-        holds(&gds, &design, &array);
-        match hierarchy {
-            Hierarchy::Folded => folded = written.bytes,
-            Hierarchy::Sref => assert!(folded < written.bytes * 3 / 5, "half of the references are written"),
-            Hierarchy::Flat => {}
-        }
-    }
-    for encoding in [OasisEncoding::Compact, OasisEncoding::Plain, OasisEncoding::Smallest] {
-        for hierarchy in [Hierarchy::Folded, Hierarchy::Flat] {
-            let format = LayoutFormat::Oasis(encoding);
-            write_pillars_as(&design, &array, hierarchy, format, &oasis, &Silent).unwrap();
-            holds(&oasis, &design, &array);
-        }
-    }
-    convert(&Layout::open(&oasis).unwrap(), LayoutFormat::Gds, &gds, &Silent).unwrap();
-    holds(&gds, &design, &array);
+    each_layout(folder.path(), &design, &array, |path| holds(path, &design, &array));
+    let bytes = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().len();
+    // Half of the references are written.
+    assert!(bytes("Folded.gds") < bytes("Sref.gds") * 3 / 5);
 }
 
 #[test]

@@ -4,23 +4,21 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use metalith_core::Silent;
-use metalith_design::{Design, Hierarchy, PillarArray};
-use metalith_gds::Layout;
-use metalith_gds::extract::{ExtractionPlan, extract};
-use metalith_layout::{LayoutFormat, OasisEncoding, convert, extraction_plan, write_pillars_as};
+use metalith_design::{Design, PillarArray};
+use metalith_gds::extract::ExtractionPlan;
+use metalith_layout::extraction_plan;
 use metalith_pillars::PillarMap;
 use metalith_testing::design;
+use metalith_testing::layouts::{all_pillars, each_layout};
 
 fn holds(path: &Path, design: &Design, array: &PillarArray) {
     let name = path.display();
-    let layout = Layout::open(path).unwrap();
     let pillars = design.cell.shape.upright().unwrap();
     for plan in [
         extraction_plan(design),
         ExtractionPlan::discover(design.layout.layers.pillars.number()),
     ] {
-        let read = extract(&layout, &plan, &Silent).unwrap();
-        assert_eq!((read.pillars, read.oddities.total()), (array.pillars(), 0), "{name}");
+        let read = all_pillars(path, &plan, array);
         // A layout from anywhere has the lengths that occur; edges are what counts.
         let found = read.shape.upright();
         let found = found.unwrap_or_else(|| panic!("{name}: {:?}", read.shape));
@@ -45,18 +43,5 @@ fn what_is_written_is_read_in_every_hierarchy_and_format() {
     let design = Design::read(&design("birefringent_532")).unwrap();
     let array = PillarArray::build(&design, &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let (gds, oasis) = (folder.path().join("pillars.gds"), folder.path().join("pillars.oas"));
-    for hierarchy in [Hierarchy::Folded, Hierarchy::Sref, Hierarchy::Flat] {
-        write_pillars_as(&design, &array, hierarchy, LayoutFormat::Gds, &gds, &Silent).unwrap();
-        holds(&gds, &design, &array);
-    }
-    for encoding in [OasisEncoding::Compact, OasisEncoding::Plain, OasisEncoding::Smallest] {
-        for hierarchy in [Hierarchy::Folded, Hierarchy::Flat] {
-            let format = LayoutFormat::Oasis(encoding);
-            write_pillars_as(&design, &array, hierarchy, format, &oasis, &Silent).unwrap();
-            holds(&oasis, &design, &array);
-        }
-    }
-    convert(&Layout::open(&oasis).unwrap(), LayoutFormat::Gds, &gds, &Silent).unwrap();
-    holds(&gds, &design, &array);
+    each_layout(folder.path(), &design, &array, |path| holds(path, &design, &array));
 }

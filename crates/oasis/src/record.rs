@@ -76,42 +76,9 @@ pub(crate) mod validation {
 
 /// Name of a record type, for messages.
 pub(crate) fn name(kind: u8) -> &'static str {
-    const NAMES: [&str; 35] = [
-        "PAD",
-        "START",
-        "END",
-        "CELLNAME",
-        "CELLNAME",
-        "TEXTSTRING",
-        "TEXTSTRING",
-        "PROPNAME",
-        "PROPNAME",
-        "PROPSTRING",
-        "PROPSTRING",
-        "LAYERNAME",
-        "LAYERNAME",
-        "CELL",
-        "CELL",
-        "XYABSOLUTE",
-        "XYRELATIVE",
-        "PLACEMENT",
-        "PLACEMENT",
-        "TEXT",
-        "RECTANGLE",
-        "POLYGON",
-        "PATH",
-        "TRAPEZOID",
-        "TRAPEZOID",
-        "TRAPEZOID",
-        "CTRAPEZOID",
-        "CIRCLE",
-        "PROPERTY",
-        "PROPERTY",
-        "XNAME",
-        "XNAME",
-        "XELEMENT",
-        "XGEOMETRY",
-        "CBLOCK",
-    ];
-    NAMES.get(usize::from(kind)).copied().unwrap_or("unknown")
+    const NAMES: &str = "PAD START END CELLNAME CELLNAME TEXTSTRING TEXTSTRING PROPNAME PROPNAME PROPSTRING \
+        PROPSTRING LAYERNAME LAYERNAME CELL CELL XYABSOLUTE XYRELATIVE PLACEMENT PLACEMENT TEXT RECTANGLE \
+        POLYGON PATH TRAPEZOID TRAPEZOID TRAPEZOID CTRAPEZOID CIRCLE PROPERTY PROPERTY XNAME XNAME XELEMENT \
+        XGEOMETRY CBLOCK";
+    NAMES.split(' ').nth(kind.into()).unwrap_or("unknown")
 }

@@ -1,14 +1,13 @@
 //! Pillars as drawn, by a cell model.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::light::wave_of;
 use super::{
     ArrivingLight, CameraChange, ElementOptics, Field, FocusedSites, IncoherentFields, PathChange, cell_direction,
 };
 use metalith_cell::{CellModel, CellResponse, Illumination, NeighbourTables, Spectral};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Memo, Progress, Result};
 use metalith_pillars::{LatticeKind, PillarMap, PillarRows};
 
 /// Wavelength, direction of equal and of coupled pillars, bit by bit; how closely it is looked at, and whether neighbours are equal.
@@ -19,7 +18,7 @@ pub(crate) struct DrawnCells<'a> {
     pub cell: &'a dyn CellModel,
     lattice: LatticeKind,
     largest_number: u16,
-    known: Mutex<HashMap<Key, Arc<CellResponse>>>,
+    known: Memo<Key, Arc<CellResponse>>,
 }
 
 impl<'a> DrawnCells<'a> {
@@ -29,7 +28,7 @@ impl<'a> DrawnCells<'a> {
             cell,
             lattice,
             largest_number,
-            known: Mutex::default(),
+            known: Memo::default(),
         }
     }
 
@@ -65,13 +64,8 @@ impl<'a> DrawnCells<'a> {
         let um = light.wavelength_um;
         let ([x, y], [u, v]) = (asked.cell_sines(), if coupled { viewing(um) } else { [0.0; 2] });
         let key = ([um, x, y, u, v].map(f64::to_bits), light.spectral, coupled);
-        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = known().get(&key) {
-            return Ok(Arc::clone(found));
-        }
-        let found = Arc::new(cell.response(&asked, self.largest_number, progress)?);
-        known().insert(key, Arc::clone(&found));
-        Ok(found)
+        let response = || cell.response(&asked, self.largest_number, progress);
+        self.known.get_or_make(key, || response().map(Arc::new))
     }
 }
 

@@ -258,9 +258,7 @@ impl RealisedCells {
         let solved = missing
             .into_par_iter()
             .map(|what| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 Ok(((place, what), self.solve_one(place, what)?))
             })
             .collect::<Result<Vec<_>>>()?;

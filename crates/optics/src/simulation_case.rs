@@ -14,7 +14,7 @@ use super::{
     ModelStatement, Perturbation, Placement,
 };
 use metalith_cell::{CellModel, CellResponse, Fidelity, Illumination};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_pillars::{LatticeKind, PillarMap, PillarRows};
 
 /// Simulation case of the pillars of a layout.
@@ -128,9 +128,7 @@ impl<'a> CaseOptics<'a> {
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
     pub fn response(&self, light: &Illumination<'_>, progress: &dyn Progress) -> Result<Option<Arc<CellResponse>>> {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         match &self.source {
             Source::Drawn(cells) => cells.response(light, progress).map(Some),
             Source::AsBuilt(_) => Ok(None),

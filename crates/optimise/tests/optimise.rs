@@ -1,8 +1,6 @@
 //! The optimised phase: kernels against the propagators, going on after an interruption, and the way from
 //! the command to a layout that keeps the limit.
 
-use std::fs;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use metalith_cell::{CellModel, PublishedCell};
@@ -10,6 +8,7 @@ use metalith_core::{FaultKind, Progress, Silent};
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, Lens, OptimiseTask, RingField, Rings, Start, largest_step};
 use metalith_pillars::Lattice;
+use metalith_testing::optimised as design;
 use metalith_wave::{Accuracy, Direct, FoldedPropagator, Pillars, PlaneWave, Propagator, Scratch, Window};
 use num_complex::Complex64;
 
@@ -81,14 +80,6 @@ impl Progress for StopAfter {
     fn stopped(&self) -> bool {
         self.solving.load(Ordering::SeqCst) && self.asked.fetch_add(1, Ordering::SeqCst) >= self.often
     }
-}
-
-/// A design file beside the small one, with a section of its own to optimise it.
-fn design(folder: &Path, optimise: &str) -> std::path::PathBuf {
-    let path = folder.join("lens.toml");
-    let text = fs::read_to_string(metalith_testing::design("mini_3x3")).unwrap();
-    fs::write(&path, format!("{text}\n{optimise}")).unwrap();
-    path
 }
 
 const EXCHANGE: &str = "[optimise]\ncell = \"published\"\nstep_nm = 5\nchains = 3\nhot_sweeps = 12\nseed = 4\n";

@@ -53,12 +53,9 @@ impl NetworkDenoiser {
 
     #[cfg(not(feature = "onnx"))]
     fn read_onnx(path: &Path) -> Result<Self> {
-        Err(metalith_core::Error::Table {
-            path: path.to_owned(),
-            line: None,
-            what: "it is a network in ONNX, which this program was built without".into(),
-            hint: "build with `cargo build --release --features onnx`".into(),
-        })
+        let what = "it is a network in ONNX, which this program was built without";
+        let hint = "build with `cargo build --release --features onnx`";
+        Err(metalith_core::Error::table(path, None, what, hint))
     }
 
     fn of_weights(weights: &[f32]) -> Self {

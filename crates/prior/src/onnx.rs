@@ -225,14 +225,9 @@ fn guarded<T>(work: impl FnOnce() -> TractResult<T>) -> std::result::Result<T, S
 const SHOWN: usize = 600;
 
 fn fault(path: &Path, what: String) -> Error {
-    Error::Table {
-        path: path.to_owned(),
-        line: None,
-        what: what.chars().take(SHOWN).collect(),
-        hint: "give a network from pictures [1, 3, rows, columns] to pictures of the same shape, with rows and columns left \
-               open and the deviation of the noise as a fourth plane, as a second input or not at all"
-            .into(),
-    }
+    let hint = "give a network from pictures [1, 3, rows, columns] to pictures of the same shape, with rows and columns left \
+                open and the deviation of the noise as a fourth plane, as a second input or not at all";
+    Error::table(path, None, what.chars().take(SHOWN).collect::<String>(), hint)
 }
 
 #[cfg(test)]

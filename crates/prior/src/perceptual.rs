@@ -80,12 +80,8 @@ impl PerceptualDistance {
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = read_at_most(path, LONGEST, "a file of weights")?;
         let fault = |what: String| {
-            Error::Table {
-            path: path.to_owned(),
-            line: None,
-            what,
-            hint: "write `{k: v.clone() for k, v in lpips.LPIPS(net=\"alex\").state_dict().items()}` of the authors' package by `safetensors.torch.save_file`".into(),
-        }
+            let hint = "write `{k: v.clone() for k, v in lpips.LPIPS(net=\"alex\").state_dict().items()}` of the authors' package by `safetensors.torch.save_file`";
+            Error::table(path, None, what, hint)
         };
         let file = SafeTensors::deserialize(&bytes).map_err(|e| fault(format!("it is no file of safetensors: {e}")))?;
         let mut faults = Vec::new();

@@ -49,12 +49,7 @@ fn read(path: &Path) -> Result<Vec<u8>> {
 }
 
 fn fault(path: &Path, what: String) -> Error {
-    Error::Table {
-        path: path.to_owned(),
-        line: None,
-        what,
-        hint: "give a file that `metalith train` wrote".into(),
-    }
+    Error::table(path, None, what, "give a file that `metalith train` wrote")
 }
 
 fn shape(layer: &Layer) -> Vec<usize> {

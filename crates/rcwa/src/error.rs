@@ -112,20 +112,12 @@ pub enum TableError {
     TooLong { bytes: u64 },
     #[error("it is not an ordinary file")]
     NotAFile,
-    #[error("the table is empty")]
-    Empty,
-    #[error("no column of wavelengths in \"{header}\"")]
-    NoWavelengths { header: String },
-    #[error("no column n in \"{header}\"")]
-    NoIndex { header: String },
-    #[error("the column \"{name}\" is unknown or occurs twice")]
-    UnknownColumn { name: String },
+    #[error("{what}")]
+    NotTheColumns { what: String },
     #[error("a value is missing")]
     Missing,
     #[error("\"{text}\" is not a number")]
     NotANumber { text: String },
-    #[error("\"{text}\" is not a finite number")]
-    NotFinite { text: String },
     #[error("a wavelength, n or k is not physical")]
     NotPhysical,
     #[error("the wavelengths do not rise")]

@@ -7,6 +7,7 @@ use svg::node::element::{Description, Group, Image, Line, Path, Rectangle, SVG, 
 
 use super::axis::Fitted;
 use super::number::short;
+use super::{HeatMap, ImageGrid, Matrix, PhotoRow, PillarZoom, Plan, Ranking};
 use metalith_core::{AtomicFile, Result};
 
 /// Styles of all drawings, for light, dark and print.
@@ -20,6 +21,19 @@ pub struct Figure {
     pub(super) title: String,
     pub(super) caption: String,
 }
+
+/// Lets drawings be finished with a caption.
+macro_rules! captioned {
+    ($($drawing:ty),*) => {$(
+        impl $drawing {
+            /// The finished drawing, with a caption.
+            pub fn caption(self, caption: impl Into<String>) -> Figure {
+                Figure::from(self).caption(caption)
+            }
+        }
+    )*};
+}
+captioned!(HeatMap, ImageGrid, Matrix, PhotoRow, PillarZoom, Plan, Ranking);
 
 impl Figure {
     pub(super) fn new(width: f64, height: f64, title: &str, words: &str, drawing: Group) -> Self {

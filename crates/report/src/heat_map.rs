@@ -108,11 +108,6 @@ impl HeatMap {
         self.marks.push((x, y, label.into()));
         self
     }
-
-    /// The finished drawing, with a caption.
-    pub fn caption(self, caption: impl Into<String>) -> Figure {
-        Figure::from(self).caption(caption)
-    }
 }
 
 /// Range of the colours: the given one, or that of the data; symmetric for a diverging map.

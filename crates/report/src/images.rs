@@ -85,11 +85,6 @@ impl ImageGrid {
         self.side = side.max(60.0);
         self
     }
-
-    /// The finished drawing, with a caption.
-    pub fn caption(self, caption: impl Into<String>) -> Figure {
-        Figure::from(self).caption(caption)
-    }
 }
 
 impl From<ImageGrid> for Figure {

@@ -40,11 +40,6 @@ impl Matrix {
         self.rows.push((name.into(), shares));
         self
     }
-
-    /// The finished drawing, with a caption.
-    pub fn caption(self, caption: impl Into<String>) -> Figure {
-        Figure::from(self).caption(caption)
-    }
 }
 
 impl From<Matrix> for Figure {

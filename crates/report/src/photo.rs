@@ -56,11 +56,6 @@ impl PhotoRow {
         });
         self
     }
-
-    /// The finished drawing, with a caption.
-    pub fn caption(self, caption: impl Into<String>) -> Figure {
-        Figure::from(self).caption(caption)
-    }
 }
 
 impl From<PhotoRow> for Figure {

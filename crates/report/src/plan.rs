@@ -112,11 +112,6 @@ impl Plan {
         self
     }
 
-    /// The finished drawing, with a caption.
-    pub fn caption(self, caption: impl Into<String>) -> Figure {
-        Figure::from(self).caption(caption)
-    }
-
     /// Bounding box of all shapes (um), with a little air.
     fn extent(&self) -> [f64; 4] {
         let mut e = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];

@@ -50,11 +50,6 @@ impl Ranking {
         });
         self
     }
-
-    /// The finished drawing, with a caption.
-    pub fn caption(self, caption: impl Into<String>) -> Figure {
-        Figure::from(self).caption(caption)
-    }
 }
 
 impl From<Ranking> for Figure {

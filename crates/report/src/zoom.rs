@@ -88,11 +88,6 @@ impl PillarZoom {
         self.side = side.max(100.0);
         self
     }
-
-    /// The finished drawing, with a caption.
-    pub fn caption(self, caption: impl Into<String>) -> Figure {
-        Figure::from(self).caption(caption)
-    }
 }
 
 fn nm(um: f64) -> i64 {

@@ -3,7 +3,7 @@
 //!
 //! They are solved by conjugate gradients, preconditioned by what `precondition` says.
 
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_wave::kernels::sum_of_products;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -132,9 +132,7 @@ impl<'a> NormalSystem<'a> {
         let mut direction = z.clone();
         let mut old = dot(&residual, &z);
         for _ in 0..iterations {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             progress.advance(1);
             let image = self.apply(&direction, terms);
             let curvature = dot(&direction, &image);

@@ -1,6 +1,6 @@
 //! Richardson and Lucy: the most likely picture for photons alone, reached by steps that keep it positive.
 
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use ndarray::Array2;
 
 use crate::frame_model::Planes;
@@ -34,9 +34,7 @@ pub(crate) fn restore(
     let level = (sum(recorded.light) / sum(&seen).max(f64::MIN_POSITIVE)).max(1e-6) as f32;
     x.iter_mut().for_each(|plane| *plane *= level);
     for _ in 0..ROUNDS {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         progress.advance(1);
         let mut ratio = operator.apply_elements(&x, elements, stray_light);
         for (c, plane) in ratio.iter_mut().enumerate() {

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use metalith_core::file::read_at_most;
-use metalith_core::text::{quoted, table_rows};
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, csv_rows};
 use serde::Serialize;
 
 /// Longest table that is read (bytes): 1 nm steps over all that silicon sees take 10 kB.
@@ -34,51 +33,25 @@ impl Spectrum {
     /// # Errors
     /// If the file cannot be read, or a line is not such a sample.
     pub fn read_csv(path: &Path, most: f64) -> Result<Self> {
-        let fault = |line: Option<usize>, what: String| Error::Table {
-            path: path.to_owned(),
-            line,
-            what,
-            hint: format!(
-                "give a header `nm,value` and lines of both, wavelengths rising, values from 0 to {most}, not all zero"
-            ),
-        };
+        let hint = format!(
+            "give a header `nm,value` and lines of both, wavelengths rising, values from 0 to {most}, not all zero"
+        );
+        let refuse = |line: Option<usize>, what: String| Error::table(path, line, what, &hint);
         let bytes = read_at_most(path, LONGEST, "a curve over wavelength")?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut lines = table_rows(&text);
-        match lines.next() {
-            Some((_, header)) if header.split(',').map(str::trim).eq(["nm", "value"]) => {}
-            Some((line, other)) => {
-                return Err(fault(
-                    Some(line),
-                    format!("the header \"{}\" is not `nm,value`", quoted(other)),
-                ));
-            }
-            None => return Err(fault(None, "there is nothing in it".into())),
-        }
         let mut samples: Vec<(f64, f64)> = Vec::new();
-        for (line, row) in lines {
-            let pair = row.split_once(',').and_then(|(nm, v)| {
-                let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-                Some((number(nm)?, number(v)?))
-            });
-            let Some((nm, value)) = pair else {
-                return Err(fault(
-                    Some(line),
-                    format!("\"{}\" is not a wavelength and a value", quoted(row)),
-                ));
-            };
+        for row in csv_rows(&text, "nm,value", &refuse)? {
+            let row = row?;
+            let [nm, value] = row.numbers()?;
             if nm <= 0.0 || !(0.0..=most).contains(&value) {
-                return Err(fault(Some(line), format!("{nm} nm with {value} cannot be")));
+                return Err(row.refused(format!("{nm} nm with {value} cannot be")));
             }
             if samples.last().is_some_and(|last| last.0 >= nm) {
-                return Err(fault(
-                    Some(line),
-                    format!("{nm} nm stands after a wavelength that is not shorter"),
-                ));
+                return Err(row.refused(format!("{nm} nm stands after a wavelength that is not shorter")));
             }
             samples.push((nm, value));
         }
-        Self::new(samples).ok_or_else(|| fault(None, "fewer than two wavelengths, or no light at all".into()))
+        Self::new(samples).ok_or_else(|| refuse(None, "fewer than two wavelengths, or no light at all".into()))
     }
 
     /// Value at a wavelength (nm).

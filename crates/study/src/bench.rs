@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use metalith_cell::{BAND_ORDERS, CellStack, FocusedLight, FocusingStack};
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Quiet, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{CellIncidence, Design};
 use metalith_gds::{Layout, ReadLimits};
@@ -20,19 +20,6 @@ use crate::picture::{KnownChip, PictureBench, TakenPicture};
 use crate::plan::{Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::study_file::Tolerance;
-
-/// Hears that the user wants to stop, and shows nothing: one draw is a step of something else.
-pub(crate) struct Quiet<'a>(pub &'a dyn Progress);
-
-impl Progress for Quiet<'_> {
-    fn begin(&self, _what: &str, _steps: u64) {}
-
-    fn advance(&self, _steps: u64) {}
-
-    fn stopped(&self) -> bool {
-        self.0.stopped()
-    }
-}
 
 /// Everything that judges a draw.
 pub(crate) struct StudyBench {

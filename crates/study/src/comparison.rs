@@ -12,7 +12,7 @@ use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::manifest::{Manifest, absolute, another_plan};
+use crate::manifest::{Manifest, absolute, another_plan, manifest};
 use crate::sharding::Sharding;
 
 /// Version of the format of the manifest.
@@ -32,31 +32,11 @@ pub struct ComparisonPlan {
     pub folder: PathBuf,
 }
 
-impl Manifest for ComparisonPlan {
-    fn key(&self) -> &str {
-        &self.key
-    }
-
-    fn is_known(&self) -> bool {
-        self.schema == SCHEMA
-    }
-
-    fn place(&mut self, folder: &Path) {
-        self.folder = folder.to_owned();
-    }
-}
+manifest!(ComparisonPlan, |_| true);
 
 impl ComparisonPlan {
     /// Value of `work` in the manifest.
     pub(crate) const WORK: &'static str = "compare";
-
-    /// The plan in a folder.
-    ///
-    /// # Errors
-    /// If there is none, or its manifest cannot be read.
-    pub fn open(folder: &Path) -> Result<Self> {
-        Self::open_in(folder)
-    }
 
     /// Division of the work: each camera for itself.
     pub fn cut(&self) -> Sharding {

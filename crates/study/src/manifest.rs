@@ -72,6 +72,37 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
     }
 }
 
+/// The manifest of a plan with a key, a version and a folder, of work that may be `known` further.
+macro_rules! manifest {
+    ($plan:ident, $known:expr) => {
+        impl crate::manifest::Manifest for $plan {
+            fn key(&self) -> &str {
+                &self.key
+            }
+
+            fn is_known(&self) -> bool {
+                let known: fn(&Self) -> bool = $known;
+                self.schema == SCHEMA && known(self)
+            }
+
+            fn place(&mut self, folder: &std::path::Path) {
+                self.folder = folder.to_owned();
+            }
+        }
+
+        impl $plan {
+            /// The plan in a folder.
+            ///
+            /// # Errors
+            /// If there is none, or its manifest cannot be read.
+            pub fn open(folder: &std::path::Path) -> metalith_core::Result<Self> {
+                <Self as crate::manifest::Manifest>::open_in(folder)
+            }
+        }
+    };
+}
+pub(crate) use manifest;
+
 const PLAN_AGAIN: &str =
     "plan it again: `metalith study plan`, or `--plan` of `metalith dataset`, `compare`, `optimise`";
 
@@ -90,12 +121,7 @@ pub(crate) fn read<T: DeserializeOwned>(folder: &Path) -> Result<T> {
 }
 
 fn fault(folder: &Path, what: String) -> Error {
-    Error::Table {
-        path: folder.join(MANIFEST),
-        line: None,
-        what,
-        hint: PLAN_AGAIN.into(),
-    }
+    Error::table(&folder.join(MANIFEST), None, what, PLAN_AGAIN)
 }
 
 /// Error for a folder whose plan is not the plan of these files.

@@ -17,7 +17,7 @@ use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::manifest::{Manifest, absolute, another_plan};
+use crate::manifest::{Manifest, absolute, another_plan, manifest};
 use crate::sharding::{Sharding, parts_per_shard, ranges};
 
 /// Version of the format of the manifest. Frames of version 1 have no black level.
@@ -67,31 +67,12 @@ fn image_digest(image: &Path) -> Result<String> {
     Ok(hex(&Sha256::digest(read_at_most(image, LONGEST, "an image")?)))
 }
 
-impl Manifest for PairsPlan {
-    fn key(&self) -> &str {
-        &self.key
-    }
-
-    fn is_known(&self) -> bool {
-        self.schema == SCHEMA && self.images_per_shard > 0 && self.digests.len() == self.request.images.len()
-    }
-
-    fn place(&mut self, folder: &Path) {
-        self.folder = folder.to_owned();
-    }
-}
+manifest!(PairsPlan, |plan| plan.images_per_shard > 0
+    && plan.digests.len() == plan.request.images.len());
 
 impl PairsPlan {
     /// Value of `work` in the manifest.
     pub(crate) const WORK: &'static str = "dataset";
-
-    /// The plan in a folder.
-    ///
-    /// # Errors
-    /// If there is none, or its manifest cannot be read.
-    pub fn open(folder: &Path) -> Result<Self> {
-        Self::open_in(folder)
-    }
 
     /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {
@@ -156,9 +137,7 @@ impl PairsPlan {
             |name: &str, digest: &str| file_digest(&self.folder.join(name)).is_ok_and(|found| hex(&found) == digest);
         let mut bad = Vec::new();
         for (k, pair) in pairs.iter().enumerate() {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             if !is(&pair.frame, &pair.frame_sha256) || !is(&pair.truth, &pair.truth_sha256) {
                 bad.push(k as u64);
             }
@@ -258,9 +237,7 @@ pub fn plan_pairs(
     progress.begin("digests of the images", request.images.len() as u64);
     let mut digests = Vec::new();
     for image in &request.images {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         digests.push(image_digest(image)?);
         progress.advance(1);
     }

@@ -9,7 +9,7 @@ use metalith_cell::CellStack;
 use metalith_cell::cache_file::solver_of;
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Quiet, Result};
 use metalith_design::array::PillarArray;
 use metalith_layout::write_pillars;
 use metalith_optics::{BankRange, CellBank};
@@ -17,8 +17,8 @@ use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::bench::{Files, Quiet, StudyBench};
-use crate::manifest::{Manifest, absolute, another_plan, is_planned};
+use crate::bench::{Files, StudyBench};
+use crate::manifest::{Manifest, absolute, another_plan, is_planned, manifest};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
 use crate::sharding::{Sharding, parts_per_shard};
@@ -73,14 +73,6 @@ pub struct PlanSettings {
 }
 
 impl Plan {
-    /// The study in a folder.
-    ///
-    /// # Errors
-    /// If there is none, or its manifest cannot be read.
-    pub fn open(folder: &Path) -> Result<Self> {
-        Self::open_in(folder)
-    }
-
     /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {
         Sharding {
@@ -103,19 +95,7 @@ impl Plan {
     }
 }
 
-impl Manifest for Plan {
-    fn key(&self) -> &str {
-        &self.key
-    }
-
-    fn is_known(&self) -> bool {
-        self.schema == SCHEMA && self.draws_per_shard > 0
-    }
-
-    fn place(&mut self, folder: &Path) {
-        self.folder = folder.to_owned();
-    }
-}
+manifest!(Plan, |plan| plan.draws_per_shard > 0);
 
 /// Name of the file of one design of a study: `layout.gds` if it is the only one, else `layout_2.gds`.
 fn named(stem: &str, ending: &str, number: u64, designs: u64) -> String {

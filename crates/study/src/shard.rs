@@ -1,8 +1,8 @@
 //! Shards of a study: its draws, judged one after the other.
 
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Quiet, Result};
 
-use crate::bench::{JudgedDraw, Quiet, StudyBench};
+use crate::bench::{JudgedDraw, StudyBench};
 use crate::plan::Plan;
 
 /// Judges the draws of shards, one after the other.

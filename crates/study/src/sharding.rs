@@ -124,9 +124,7 @@ impl Sharding {
         let mut text = line(&self.header(shard));
         progress.begin(&format!("shard {number}"), shard.end - shard.first);
         for k in shard.first..shard.end {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             text.push_str(&line(&part(k)?));
             progress.advance(1);
         }
@@ -279,11 +277,9 @@ impl Sharding {
             .map_err(|(id, why)| refused(id, path, why))?;
         let mut parts = Vec::new();
         for (k, line) in lines.enumerate() {
-            let part: T = serde_json::from_str(line).map_err(|e| Error::Table {
-                path: path.to_owned(),
-                line: Some(k + 2),
-                what: format!("this is no {}: {e}", self.part),
-                hint: "remove the file; its shard is then made again".into(),
+            let part: T = serde_json::from_str(line).map_err(|e| {
+                let what = format!("this is no {}: {e}", self.part);
+                Error::table(path, Some(k + 2), what, "remove the file; its shard is then made again")
             })?;
             parts.push((header.first + k as u64, part));
         }

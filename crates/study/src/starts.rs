@@ -4,14 +4,13 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_core::{AtomicFile, Error, Progress, Quiet, Result};
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells, write_phase_table};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::bench::Quiet;
-use crate::manifest::{Manifest, absolute, another_plan};
+use crate::manifest::{Manifest, absolute, another_plan, manifest};
 use crate::sharding::Sharding;
 
 /// Version of the format of the manifest.
@@ -63,31 +62,11 @@ pub struct StartsResult {
     pub phase: PathBuf,
 }
 
-impl Manifest for StartsPlan {
-    fn key(&self) -> &str {
-        &self.key
-    }
-
-    fn is_known(&self) -> bool {
-        self.schema == SCHEMA && self.starts_per_shard > 0
-    }
-
-    fn place(&mut self, folder: &Path) {
-        self.folder = folder.to_owned();
-    }
-}
+manifest!(StartsPlan, |plan| plan.starts_per_shard > 0);
 
 impl StartsPlan {
     /// Value of `work` in the manifest.
     pub(crate) const WORK: &'static str = "starts";
-
-    /// The plan in a folder.
-    ///
-    /// # Errors
-    /// If there is none, or its manifest cannot be read.
-    pub fn open(folder: &Path) -> Result<Self> {
-        Self::open_in(folder)
-    }
 
     /// Division of the work into shards.
     pub fn cut(&self) -> Sharding {

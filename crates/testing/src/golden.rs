@@ -17,6 +17,51 @@ pub fn design(name: &str) -> PathBuf {
     root().join("designs").join(format!("{name}.toml"))
 }
 
+/// A text with the first place of each of these words, all of which it has, changed in turn.
+pub fn replaced(text: &str, changes: &[(&str, impl AsRef<str>)]) -> String {
+    changes.iter().fold(text.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to.as_ref(), 1)
+    })
+}
+
+/// An NPY file in rows: kind of its numbers and shape as Python writes them, and the numbers.
+pub fn npy(kind: &str, shape: &str, numbers: impl IntoIterator<Item = u8>) -> Vec<u8> {
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+    // The numbers begin at a multiple of 64 bytes, the header ends with a new line.
+    let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((length as u16).to_le_bytes());
+    bytes.extend(format!("{header:<width$}\n", width = length - 1).bytes());
+    bytes.extend(numbers);
+    bytes
+}
+
+/// Rows of a table of texts: ` | ` stands between fields, `\n` for the end of a line; lines that begin with `# ` are comments.
+pub fn rows<const N: usize>(table: &str) -> Vec<[String; N]> {
+    let lines = table.lines().filter(|line| !line.is_empty() && !line.starts_with("# "));
+    let row = |line: &str| {
+        let fields: Vec<String> = line.split(" | ").map(|field| field.replace("\\n", "\n")).collect();
+        fields
+            .try_into()
+            .unwrap_or_else(|_| panic!("{N} fields are wanted: {line}"))
+    };
+    lines.map(row).collect()
+}
+
+/// The text of a shipped design, [`replaced`].
+pub fn changed(name: &str, changes: &[(&str, &str)]) -> String {
+    replaced(&fs::read_to_string(design(name)).unwrap(), changes)
+}
+
+/// A design file in a folder: the small one that is shipped, with a section of its own to optimise it.
+pub fn optimised(folder: &Path, optimise: &str) -> PathBuf {
+    let path = folder.join("lens.toml");
+    let text = fs::read_to_string(design("mini_3x3")).unwrap();
+    fs::write(&path, format!("{text}\n{optimise}")).unwrap();
+    path
+}
+
 /// The text of a shipped design that takes its mapping whatever its cell is.
 pub fn accepting(text: &str) -> String {
     text.replacen("[mapping]", "[mapping]\naccept = \"a test of another cell\"", 1)

@@ -1,9 +1,13 @@
 //! Damage to layouts, and the reading that must survive it.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
 use metalith_core::Silent;
 use metalith_gds::extract::ExtractionPlan;
 use metalith_gds::{Error, LayerNumber, Layout, ReadLimits, Selection, Shape, Text, Transform, Visitor};
-use rand::Rng;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// Limits small enough that the worst a mutant can ask for is done in milliseconds.
 pub const LIMITS: ReadLimits = ReadLimits {
@@ -70,6 +74,40 @@ pub fn mutate<R: Rng>(rng: &mut R, corpus: &[Vec<u8>]) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// Feeds damaged files to a reader: `COUNT SEED` are the arguments of the program. The n-th mutant is the same in every run (a second
+/// argument is another seed), so a failure is reproduced by its number, which is printed with the panic.
+pub fn fuzz(ending: &str, mutant: impl Fn(&mut ChaCha8Rng, u64) -> Vec<u8>, survives: impl Fn(&[u8]) -> bool) {
+    /// No mutant may take longer: ten thousand times the usual, and still nothing a user would notice.
+    const LONGEST: Duration = Duration::from_secs(2);
+    let mut arguments = std::env::args().skip(1).map(|a| a.parse::<u64>().expect("a number"));
+    let (count, seed) = (arguments.next().unwrap_or(100_000), arguments.next().unwrap_or(1));
+    let start = Instant::now();
+    let (mut read, mut slowest) = (0u64, Duration::ZERO);
+    for n in 0..count {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(n);
+        let bytes = mutant(&mut rng, n);
+        let began = Instant::now();
+        match catch_unwind(AssertUnwindSafe(|| survives(&bytes))) {
+            Ok(whole) => read += u64::from(whole),
+            Err(_) => {
+                let path = format!("mutant-{seed}-{n}.{ending}");
+                std::fs::write(&path, &bytes).expect("a writable folder");
+                eprintln!("mutant {n} of seed {seed} makes the reader panic; written to {path}");
+                std::process::exit(1);
+            }
+        }
+        slowest = slowest.max(began.elapsed());
+        assert!(slowest < LONGEST, "mutant {n} of seed {seed} took {slowest:?}");
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    println!(
+        "{count} mutants in {seconds:.1} s ({:.0} a second), {read} of them still readable, slowest {:.1} ms, no panic",
+        count as f64 / seconds,
+        slowest.as_secs_f64() * 1e3
+    );
 }
 
 struct Count(u64);

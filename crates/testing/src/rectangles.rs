@@ -120,10 +120,7 @@ impl Small {
             ]);
         }
         changes.push(("field_y_deg = [0, 0]", "field_y_deg = [0]".into()));
-        changes.iter().fold(crate::accepting(&text), |text, (from, to)| {
-            assert!(text.contains(from), "{from}");
-            text.replacen(from, to, 1)
-        })
+        crate::replaced(&crate::accepting(&text), &changes)
     }
 
     /// The shipped library with every third length of edges alone.

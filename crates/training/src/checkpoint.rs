@@ -69,12 +69,8 @@ impl Checkpoint {
         if !path.exists() {
             return Ok(None);
         }
-        let fault = |what: &str| Error::Table {
-            path: path.to_owned(),
-            line: None,
-            what: what.to_owned(),
-            hint: "remove it to train from the beginning, or give another --out".into(),
-        };
+        let hint = "remove it to train from the beginning, or give another --out";
+        let fault = |what: &str| Error::table(path, None, what, hint);
         let file = read_at_most(path, LONGEST, "a state of learning")?;
         let damaged = || fault("this state of learning is damaged");
         let (_, about) = SafeTensors::read_metadata(&file).map_err(|_| damaged())?;

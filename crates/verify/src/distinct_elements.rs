@@ -160,12 +160,7 @@ mod tests {
 
     fn read(name: &str, changes: &[(&str, &str)]) -> (Design, PillarArray) {
         let path = metalith_testing::design(name);
-        let mut text = std::fs::read_to_string(&path).unwrap();
-        for (from, to) in changes {
-            assert!(text.contains(from), "{from}");
-            text = text.replacen(from, to, 1);
-        }
-        let design = Design::parse(&path, &text).unwrap();
+        let design = Design::parse(&path, &metalith_testing::changed(name, changes)).unwrap();
         let array = PillarArray::build(&design, &Silent).unwrap();
         (design, array)
     }

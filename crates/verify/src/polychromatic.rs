@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::optics::{ReadElement, incidence};
 use super::polychromatic_channels::{Channels, Point, WhiteChannel, per_light};
 use metalith_cell::{Illumination, Incidence};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_design::phase::ElementPhase;
 use metalith_design::{Design, Element};
 use metalith_optics::{CaseOptics, IncoherentFields, SimulationCase};
@@ -193,9 +193,7 @@ impl<'a> WhiteSimulator<'a> {
             .par_iter()
             .zip(fields)
             .map_init(Scratch::default, |scratch, ((um, full), fields)| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let sample = self.sample(element, (*um, full * full * area_um2), &fields, scratch);
                 progress.advance(1);
                 sample

@@ -87,9 +87,7 @@ pub fn single_psfs(
             .par_iter()
             .zip(&elements)
             .map_init(Scratch::default, |scratch, (fields, (_, widths))| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let window = light.window(widths.lattice);
                 let psf = fields.psf(window, light.accuracy, &light.reported_lp_mm(), scratch)?;
                 progress.advance(1);

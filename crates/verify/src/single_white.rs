@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::polychromatic::{CameraStatement, step_nm};
 use super::polychromatic_channels::{Channels, Point, WhiteChannel, per_light};
 use super::single::{Lighting, distinct, kind_of, largest_number};
-use metalith_core::{Error, Progress, Result, Wedge};
+use metalith_core::{Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
 use metalith_optics::{IncoherentFields, SimulationCase};
 use metalith_sensor::{Camera, Sampling, WavelengthSteps};
@@ -76,9 +76,7 @@ pub fn single_white(
         };
         let fields = sampling.wavelengths_nm.iter().map(fields).collect::<Result<Vec<_>>>()?;
         let sample = |scratch: &mut Scratch, (um, fields): &(f64, IncoherentFields<'_>)| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let landing = point().landing_um(*um)?;
             let pitch = widths.lattice.pitch_um();
             let window = Window::about(landing, pitch, light.samples, light.distance_um);

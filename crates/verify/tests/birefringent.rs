@@ -6,8 +6,9 @@ use metalith_cell::{
 };
 use metalith_core::{Progress, Result, Silent};
 use metalith_design::{Design, PillarArray, cell_models};
-use metalith_layout::{read_pillars, write_pillars};
+use metalith_layout::read_pillars;
 use metalith_testing::design;
+use metalith_testing::layouts::written;
 use metalith_verify::{Lighting, SimulationCase, SimulationCases, SinglePsf, Verification, single_psfs, verify};
 use metalith_wave::Accuracy;
 use num_complex::Complex64;
@@ -19,12 +20,7 @@ const WAVELENGTH_UM: f64 = 0.532;
 
 /// The shipped lens with its layout.
 fn lens() -> (Design, PillarArray, tempfile::TempDir) {
-    let design = Design::read(&design("birefringent_532")).unwrap();
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("lens.gds");
-    write_pillars(&design, &array, design.layout.hierarchy, &path, &Silent).unwrap();
-    (design, array, folder)
+    written(Design::read(&design("birefringent_532")).unwrap())
 }
 
 /// Pillars that have the phases of a library and pass everything.

@@ -1,7 +1,6 @@
 //! Rectangles that a process makes too small, drawn so that they come out as intended.
 
 use std::fs;
-use std::path::Path;
 
 use metalith_cell::PolarisationAxis;
 use metalith_core::Silent;
@@ -22,14 +21,9 @@ const SHORT_NM: f64 = 20.0;
 
 /// A shipped design, smaller.
 fn design(name: &str, changes: &[(&str, &str)]) -> Design {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"));
-    let text = fs::read_to_string(&path).unwrap();
-    let small = ("diameter_um = 80", "diameter_um = 24");
-    let text = std::iter::once(&small).chain(changes).fold(text, |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    });
-    Design::parse(&path, &text).unwrap()
+    let small = [("diameter_um = 80", "diameter_um = 24")];
+    let text = metalith_testing::changed(name, &[&small, changes].concat());
+    Design::parse(&metalith_testing::design(name), &text).unwrap()
 }
 
 fn model(change: impl FnOnce(&mut Perturbation)) -> CalibratedModel {

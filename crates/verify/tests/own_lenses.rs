@@ -4,7 +4,8 @@ use metalith_cell::Fidelity;
 use metalith_core::Silent;
 use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 use metalith_layout::write_pillars;
-use metalith_testing::design;
+use metalith_testing::layouts::hologram_of;
+use metalith_testing::{design, replaced};
 use metalith_verify::{SimulationCases, Verification, verify};
 use metalith_wave::Accuracy;
 
@@ -46,14 +47,11 @@ fn of(elements: &str) -> Design {
 
 /// The elements of a lens with a further phase over the plane, seen from these field angles.
 fn with_term(term: &str, field: &str, elements: &str) -> Design {
-    let text = std::fs::read_to_string(design("hologram")).unwrap();
-    let (head, rest) = text.split_once("[[phase.term]]").unwrap();
-    let (_, array) = rest.split_once("[array]").unwrap();
-    let (array, _) = array.split_once("[[element]]").unwrap();
-    let (_, tail) = rest.split_once("[mapping]").unwrap();
-    let tail = tail.replacen("field_x_deg = [0]", field, 1);
-    let text = format!("{head}{term}\n[array]{array}{elements}\n[mapping]{tail}");
-    Design::parse(&design("hologram"), &text).unwrap()
+    let own = [
+        ("[array]", format!("{term}\n[array]")),
+        ("field_x_deg = [0]", field.into()),
+    ];
+    Design::parse(&design("hologram"), &replaced(&hologram_of(elements), &own)).unwrap()
 }
 
 fn verified(design: &Design, accuracy: Accuracy) -> Verification {

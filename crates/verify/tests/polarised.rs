@@ -5,10 +5,11 @@ use metalith_cell::{
     PolarisedLight, PolarisedTables,
 };
 use metalith_core::{Progress, Result, Silent};
-use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
-use metalith_layout::{read_pillars, write_pillars};
+use metalith_design::{Design, PillarArray, cell_models};
+use metalith_layout::read_pillars;
 use metalith_pillars::RotatedRectangles;
-use metalith_testing::design;
+use metalith_testing::layouts::written;
+use metalith_testing::{changed, design};
 use metalith_verify::{Lighting, SimulationCase, SimulationCases, SinglePsf, Verification, single_psfs, verify};
 use metalith_wave::{Accuracy, Psf};
 use num_complex::Complex64;
@@ -18,24 +19,12 @@ const ROUNDING: f64 = 1e-5;
 
 /// A quarter as large as the shipped one, so that it is simulated at once.
 fn lens() -> (Design, PillarArray, tempfile::TempDir) {
-    let text = std::fs::read_to_string(design("geometric_phase_532")).unwrap();
-    let text = text.replacen("diameter_um = 80", "diameter_um = 20", 1).replacen(
-        "focal_length_um = 80",
-        "focal_length_um = 20",
-        1,
-    );
-    let design = Design::parse(&design("geometric_phase_532"), &text).unwrap();
-    let array = PillarArray::build(&design, &Silent).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    write_pillars(
-        &design,
-        &array,
-        Hierarchy::Folded,
-        &folder.path().join("lens.gds"),
-        &Silent,
-    )
-    .unwrap();
-    (design, array, folder)
+    let smaller = [
+        ("diameter_um = 80", "diameter_um = 20"),
+        ("focal_length_um = 80", "focal_length_um = 20"),
+    ];
+    let text = changed("geometric_phase_532", &smaller);
+    written(Design::parse(&design("geometric_phase_532"), &text).unwrap())
 }
 
 /// Half-wave plates that nothing but their rotation distinguishes.

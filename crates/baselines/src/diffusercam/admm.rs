@@ -1,8 +1,9 @@
 //! A scene from the part of its image that the sensor has, with little total variation: the alternating direction method of
 //! multipliers with the crop, the slopes and the borders of the scene split off, so that every step has a closed form (Antipa et
-//! al., Optica 5, 1 (2018)).
+//! al., Optica 5, 1 (2018)). The total variation of `metalith-restoration` shares the splitting of slopes; its kernels change over
+//! the field, so that it takes steps of conjugate gradients in place of the closed form.
 
-use metalith_core::{Error, Progress, Result, part};
+use metalith_core::{Progress, Result, part};
 use metalith_restoration::{ExponentialSlopes, SlopeBorder, SlopeLength, SlopeSplit, squared_frequencies};
 use metalith_wave::kernels::{FftScratch, SquareFft};
 use ndarray::{Array2, Zip};
@@ -110,9 +111,7 @@ impl Deconvolution {
         let (mut crop_dual, mut border_dual) = (zero(), zero());
         let mut split = SlopeSplit::new((n, n), SLOPES, SlopeLength::Anisotropic, SlopeBorder::Periodic);
         for _ in 0..descent.rounds {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             // The whole image: what was seen where there is a sensor, else what the scene says.
             let mut whole = &image + &crop_dual;
             Zip::from(part(whole.view_mut(), 0..rows, 0..columns))

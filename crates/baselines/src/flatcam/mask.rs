@@ -1,7 +1,7 @@
 //! The mask and its shadow along one axis.
 
-use faer::Mat;
 use metalith_core::{Error, Result};
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
@@ -157,9 +157,9 @@ impl Shadow {
     }
 
     /// Light in each pixel (row) that comes from each place of the scene (column), a pixel of the scene wide, by its tangent.
-    pub fn on_pixels(&self, pixels: usize, pixel_um: f64, tangents: &[f64], wide: f64) -> Mat<f64> {
+    pub fn on_pixels(&self, pixels: usize, pixel_um: f64, tangents: &[f64], wide: f64) -> DMatrix<f64> {
         let middle = 0.5 * (pixels as f64 - 1.0);
-        Mat::from_fn(pixels, tangents.len(), |j, k| {
+        DMatrix::from_fn(pixels, tangents.len(), |j, k| {
             // Two halves of a pixel of the scene.
             let parts = [-0.25, 0.25].map(|o| {
                 let x = (j as f64 - middle) * pixel_um - self.distance_um * (tangents[k] + o * wide);

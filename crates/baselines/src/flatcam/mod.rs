@@ -8,12 +8,12 @@
 mod mask;
 mod tikhonov;
 
-use faer::Mat;
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{Frame, SceneView};
 use metalith_restoration::SceneStatistics;
 use metalith_sensor::Camera;
+use nalgebra::DMatrix;
 use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
@@ -38,7 +38,7 @@ const SEED: u64 = 1;
 pub struct FlatCam {
     bench: LenslessBench,
     /// Shadows by wavelength: along rows and along columns of the frame, `[pixel, place of the scene]`.
-    shadows: Vec<[Mat<f32>; 2]>,
+    shadows: Vec<[Array2<f32>; 2]>,
     /// Systems by channel, for each place of its pixels in the square of two by two.
     systems: Vec<Vec<([usize; 2], TwoFactors)>>,
     /// Strength of the prior by channel.
@@ -80,9 +80,9 @@ impl FlatCam {
                 shadow
             })
             .collect();
-        let shadows: Vec<[Mat<f32>; 2]> = patterns
+        let shadows: Vec<[Array2<f32>; 2]> = patterns
             .par_iter()
-            .map(|s| both(s).map(|m| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] as f32)))
+            .map(|s| both(s).map(|m| Array2::from_shape_fn(m.shape(), |at| m[at] as f32)))
             .collect();
         progress.begin("singular values of the mask", bench.channels() as u64);
         let systems = (0..bench.channels())
@@ -93,7 +93,7 @@ impl FlatCam {
                     .places(channel)
                     .into_iter()
                     .map(|[r, c]| {
-                        let own = |m: &Mat<f64>, first: usize| Factor::new(m, first);
+                        let own = |m: &DMatrix<f64>, first: usize| Factor::new(m, first);
                         Ok(([r, c], TwoFactors::new(own(&known[0], r)?, own(&known[1], c)?)))
                     })
                     .collect::<Result<Vec<_>>>();
@@ -101,9 +101,7 @@ impl FlatCam {
                 found
             })
             .collect::<Result<Vec<_>>>()?;
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         let mut camera = Self {
             bench,
             shadows,
@@ -210,16 +208,12 @@ impl Lensless for FlatCam {
             .map(|(i, [down, across])| {
                 let mut frames = nothing();
                 for (frame, own) in frames.iter_mut().zip(&weights) {
-                    let mut light = Mat::<f32>::zeros(scene.view.rows, scene.view.columns);
+                    let mut light = Array2::<f32>::zeros((scene.view.rows, scene.view.columns));
                     for (plane, w) in sent.iter().zip(own) {
-                        let w = w[i] as f32 * scale;
-                        for ((y, x), v) in plane.indexed_iter() {
-                            light[(y, x)] += w * v;
-                        }
+                        light.scaled_add(w[i] as f32 * scale, plane);
                     }
                     if own.iter().any(|w| w[i] != 0.0) {
-                        let seen = down * &light * across.transpose();
-                        *frame = Array2::from_shape_fn((rows, columns), |at| seen[at]);
+                        *frame = down.dot(&light).dot(&across.t());
                     }
                 }
                 frames

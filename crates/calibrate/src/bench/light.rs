@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{Bench, FocusSeries};
 use crate::cells::PillarTable;
 use crate::set::{ElementIndex, PerMeasurement};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_optics::{
     ArrivingLight, AsBuiltAperture, AsBuiltElement, ClassTable, GeometryChange, LightChange, PathChange, spread,
 };
@@ -71,9 +71,7 @@ impl Bench<'_> {
             let tasks: Vec<_> = groups
                 .par_iter()
                 .map(|group| {
-                    if progress.stopped() {
-                        return Err(Error::Interrupted);
-                    }
+                    progress.check_stopped()?;
                     let own = usize::from(group.element) - batch.start;
                     Ok(self.group(group, chips, &elements[own], path))
                 })

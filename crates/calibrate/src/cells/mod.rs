@@ -8,10 +8,9 @@ mod table;
 mod tests;
 mod truncation_correction;
 
-use std::collections::HashMap;
 use std::fs;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -23,7 +22,7 @@ use self::truncation_correction::{CorrectedTable, corrected};
 use metalith_cell::cache_file;
 use metalith_cell::{CellModel, CellStack};
 use metalith_core::text::hex;
-use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_core::{AtomicFile, Memo, Progress, Result};
 use metalith_optics::{CellChange, off_cutoff, perturbed, possible_width_nm};
 use metalith_rcwa::{Incidence, Orders, Outline, Side, solve};
 
@@ -59,7 +58,7 @@ pub struct RigorousCells {
     coarse: usize,
     leaning: usize,
     folder: Option<PathBuf>,
-    made: Mutex<HashMap<[u64; 6], Arc<PillarTable>>>,
+    made: Memo<[u64; 6], Arc<PillarTable>>,
 }
 
 impl RigorousCells {
@@ -73,7 +72,7 @@ impl RigorousCells {
             coarse: COARSE,
             leaning: LEANING,
             folder,
-            made: Mutex::default(),
+            made: Memo::default(),
         }
     }
 
@@ -125,9 +124,7 @@ impl RigorousCells {
             .into_par_iter()
             .map(|l| {
                 let CorrectedTable { mut t, resonant } = corrected(&stated.t[l], &before.t[l], &after.t[l]);
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 for k in resonant {
                     t[k] = self.solve_one(&stack, l, k, orders)?;
                 }
@@ -154,9 +151,7 @@ impl RigorousCells {
             .wavelengths_nm
             .par_iter()
             .map(|wavelength_nm| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 (0..count)
                     .map(|k| {
                         let um = wavelength_nm * 1e-3;
@@ -199,36 +194,30 @@ impl RigorousCells {
             how,
         ]
         .map(f64::to_bits);
-        let known =
-            |made: &Mutex<HashMap<_, _>>| made.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
-        if let Some(table) = known(&self.made) {
-            return Ok(table);
-        }
+        self.made
+            .get_or_make(key, || Ok(Arc::new(self.read_or_made(&key, make)?)))
+    }
+
+    /// Table in the cache folder; one that is not there is made and written.
+    fn read_or_made(&self, key: &[u64; 6], make: impl FnOnce() -> Result<PillarTable>) -> Result<PillarTable> {
         let path = self
             .folder
             .as_ref()
-            .map(|f| f.join(format!("{}.cells", self.digest(&key, how < 0.0))));
+            .map(|f| f.join(format!("{}.cells", self.digest(key, f64::from_bits(key[5]) < 0.0))));
         let (wavelengths, count) = (self.wavelengths_nm.len(), self.count());
         let solver = cache_file::solver_of(self.stack.shape);
         let load = |path: &std::path::Path| {
             let bytes = fs::read(path).ok()?;
             PillarTable::from_bytes(&bytes, solver, wavelengths, count, self.first_nm(), STEP_NM)
         };
-        let table = if let Some(table) = path.as_deref().and_then(load) {
-            table
-        } else {
-            let table = make()?;
-            if let Some(path) = &path {
-                // A cache that cannot be written costs time, not correctness.
-                let _ = AtomicFile::write(path, &table.bytes(solver));
-            }
-            table
-        };
-        let table = Arc::new(table);
-        self.made
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .insert(key, Arc::clone(&table));
+        if let Some(table) = path.as_deref().and_then(load) {
+            return Ok(table);
+        }
+        let table = make()?;
+        if let Some(path) = &path {
+            // A cache that cannot be written costs time, not correctness.
+            let _ = AtomicFile::write(path, &table.bytes(solver));
+        }
         Ok(table)
     }
 
@@ -255,9 +244,7 @@ impl RigorousCells {
             .par_iter()
             .enumerate()
             .map(|(l, nm)| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let row = (0..count)
                     .map(|k| self.solve_one(&stack, l, k, orders))
                     .collect::<Result<Vec<_>>>()?;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::effects::{DeclaredEffect, DeclaredParameter};
 use crate::statistics::{Fit, FitProblem, Measurements};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_optics::{DeclaredQuantity, blur};
 use metalith_wave::kernels::sum_of_products;
 
@@ -176,9 +176,7 @@ fn strongest_of(frames: &[Frame], blur: f64, places: &[[i32; 2]], progress: &dyn
     let tried: Vec<Option<Ghost>> = places
         .par_iter()
         .map(|&at| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             progress.advance(1);
             let sum = frames
                 .iter()

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use metalith_core::text::{quoted, table_rows};
-use metalith_core::{Error, Result, document};
+use metalith_core::text::quoted;
+use metalith_core::{CsvRow, Error, Result, csv_rows, document};
 
 /// The width of one pillar by scanning electron microscope.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,56 +30,26 @@ const MEASURED: usize = 5;
 /// If the file cannot be read or a line is not what its columns say.
 pub(crate) fn read(path: &Path) -> Result<Vec<SemSite>> {
     let text = document::load(path)?;
-    let fault = |line: usize, what: String| Error::Table {
-        path: path.to_owned(),
-        line: Some(line),
-        what,
-        hint: format!("the columns are `{COLUMNS}`"),
-    };
-    rows(&text, COLUMNS)
-        .map_err(|(at, what)| fault(at, what))?
-        .into_iter()
-        .filter(|(_, line)| {
-            line.split(',')
-                .nth(MEASURED)
-                .is_none_or(|field| !field.trim().is_empty())
-        })
-        .map(|(at, line)| {
-            let wrong = || fault(at, format!("`{}` is no width of a pillar", quoted(line)));
-            let [m, n, x, y, designed, measured, sigma] = numbers(line).ok_or_else(wrong)?;
-            if sigma <= 0.0 || measured <= 0.0 || m.fract() != 0.0 || n.fract() != 0.0 {
-                return Err(wrong());
+    let hint = format!("the columns are `{COLUMNS}`");
+    let refuse = |line: Option<usize>, what: String| Error::table(path, line, what, &hint);
+    let measured = |row: &Result<CsvRow<'_, Error>>| row.as_ref().map_or(true, |row| !row.field(MEASURED).is_empty());
+    csv_rows(&text, COLUMNS, &refuse)?
+        .filter(measured)
+        .map(|row| {
+            let row = row?;
+            let [m, n, x, y, designed_nm, measured_nm, sigma_nm] = row.numbers()?;
+            if sigma_nm <= 0.0 || measured_nm <= 0.0 || m.fract() != 0.0 || n.fract() != 0.0 {
+                return Err(row.refused(format!("`{}` is no width of a pillar", quoted(row.text))));
             }
             Ok(SemSite {
                 element: [m as i64, n as i64],
                 at_um: [x, y],
-                designed_nm: designed,
-                measured_nm: measured,
-                sigma_nm: sigma,
+                designed_nm,
+                measured_nm,
+                sigma_nm,
             })
         })
         .collect()
-}
-
-/// Lines of a CSV file behind its header, with their numbers.
-fn rows<'t>(text: &'t str, columns: &str) -> Result<Vec<(usize, &'t str)>, (usize, String)> {
-    let mut lines = table_rows(text);
-    match lines.next() {
-        None => Err((1, "the file is empty".into())),
-        Some((at, head)) if head.split(',').map(str::trim).ne(columns.split(',')) => {
-            Err((at, format!("the columns are `{}`", quoted(head))))
-        }
-        Some(_) => Ok(lines.collect()),
-    }
-}
-
-/// Exactly `N` finite numbers.
-fn numbers<const N: usize>(line: &str) -> Option<[f64; N]> {
-    let fields: Vec<f64> = line
-        .split(',')
-        .map(|f| f.trim().parse::<f64>().ok().filter(|v| v.is_finite()))
-        .collect::<Option<_>>()?;
-    fields.try_into().ok()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use metalith_calibrate::{MeasuredSet, Session, SetVerdict, Synthesizer, UnlistedEffect, boundary_of_fields, propose};
 use metalith_core::Silent;
 
-use crate::set::{LIKE, SIMULATIONS, SYNTHESIZER, names, settings, synthetic, with_effects};
+use crate::set::{LIKE, SIMULATIONS, SYNTHESIZER, diagnosis_of, names, settings, synthetic, with_effects};
 
 #[test]
 fn effects_are_found_and_nothing_is_found_where_nothing_is() {
@@ -95,10 +95,7 @@ fn measurements_of_one_colour_leave_something_open() {
     let first = set.measurements.iter().next().unwrap().led;
     set.measurements = set.measurements.into_iter().filter(|c| c.led == first).collect();
     let session = Session::new(&set, with_effects(&["defocus", "cd_bias"])).unwrap();
-    let d = session
-        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
-        .unwrap()
-        .0;
+    let d = diagnosis_of(&session);
     assert!(names(&d).contains(&"defocus"), "{}", d.sentence());
     assert!(d.remarks.iter().any(|r| r.contains("Of one colour")), "{:?}", d.remarks);
 }
@@ -109,8 +106,7 @@ fn a_tilt_of_the_sensor_is_found() {
     const TILT_MRAD: f64 = 40.0;
     let set = synthetic(&[("sensor_tilt_x", &[TILT_MRAD])], 24);
     let session = Session::new(&set, with_effects(&["sensor_tilt_x", "defocus", "tilt", "cd_bias"])).unwrap();
-    let simulations = session.simulate(&Silent).unwrap();
-    let d = session.diagnose(&simulations, &Silent).unwrap().0;
+    let d = diagnosis_of(&session);
     assert_eq!(names(&d), ["sensor_tilt_x"], "{}", d.sentence());
     assert_eq!(d.effects[0].holds(TILT_MRAD), Some(true), "{}", d.sentence());
     assert!(d.remarks[0].contains("cannot be distinguished"), "{:?}", d.remarks);
@@ -149,10 +145,7 @@ fn a_displaced_part_of_every_lens_is_found() {
         .unwrap();
     let set = synthesizer.draw(&images, 28);
     let session = Session::new(&set, with_effects(&["stitching_x", "coma", "defocus", "tilt"])).unwrap();
-    let d = session
-        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
-        .unwrap()
-        .0;
+    let d = diagnosis_of(&session);
     assert_eq!(names(&d), ["stitching_x"], "{} {:?}", d.sentence(), d.error);
     let found: Vec<f64> = serde_json::from_value(d.effects[0].value.clone()).unwrap();
     // Displacement and place trade for one another.
@@ -200,8 +193,7 @@ fn a_displaced_part_is_found_where_nobody_says_where_fields_meet() {
     for _ in 0..2 {
         set.field_boundary_um = Some([found[2], place[1]]);
         let session = Session::new(&set, with_effects(&tried)).unwrap();
-        let simulations = session.simulate(&Silent).unwrap();
-        let d = session.diagnose(&simulations, &Silent).unwrap().0;
+        let d = diagnosis_of(&session);
         assert_eq!(names(&d), ["stitching_x"], "{} {:?}", d.sentence(), d.error);
         found = serde_json::from_value(d.effects[0].value.clone()).unwrap();
     }
@@ -222,8 +214,7 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
     let parts = truth.each_ref().map(|(n, v)| (*n, std::slice::from_ref(v)));
     let set = synthetic(&parts, 24);
     let session = Session::new(&set, with_effects(&["cd_bias", "film_index", "zero_order", "defocus"])).unwrap();
-    let simulations = session.simulate(&Silent).unwrap();
-    let d = session.diagnose(&simulations, &Silent).unwrap().0;
+    let d = diagnosis_of(&session);
     assert_eq!(names(&d), ["cd_bias", "film_index"], "{}", d.sentence());
     assert_eq!(d.verdict, SetVerdict::Explained);
     let mut gains = Vec::new();
@@ -262,8 +253,7 @@ fn missing_pillars_are_found_by_their_mean_and_by_their_speckle() {
     let set = synthetic(&[("missing_pillars", &[SHARE])], 31);
     let settings = with_effects(&["missing_pillars", "zero_order", "stray_light", "defocus"]);
     let session = Session::new(&set, settings).unwrap();
-    let simulations = session.simulate(&Silent).unwrap();
-    let d = session.diagnose(&simulations, &Silent).unwrap().0;
+    let d = diagnosis_of(&session);
     assert_eq!(names(&d), ["missing_pillars"], "{} {:?}", d.sentence(), d.error);
     assert_eq!(d.verdict, SetVerdict::Explained);
     let by_mean = d.effects[0].value.as_f64().unwrap();

@@ -12,7 +12,7 @@ use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::set::{LIKE, SIMULATIONS, SYNTHESIZER, names, settings};
+use crate::set::{LIKE, SIMULATIONS, SYNTHESIZER, diagnosis_of, names, settings};
 
 /// Nanometres added to every width of the chips of these sets.
 const BIAS_NM: f64 = -8.0;
@@ -229,10 +229,7 @@ fn a_gap_is_found_on_a_bare_sensor() {
     let images = synthesizer.with_effect("defocus", &[DEFOCUS_UM], &Silent).unwrap();
     let set = synthesizer.draw(&images, 43);
     let session = Session::new(&set, settings()).unwrap();
-    let d = session
-        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
-        .unwrap()
-        .0;
+    let d = diagnosis_of(&session);
     assert_eq!(
         names(&d),
         ["defocus"],

@@ -57,6 +57,14 @@ pub(crate) fn synthetic(parts: &[(&str, &[f64])], seed: u64) -> MeasuredSet {
     SYNTHESIZER.draw(&images, seed)
 }
 
+/// The diagnosis of a session by simulations of its own.
+pub(crate) fn diagnosis_of(session: &Session<'_>) -> Diagnosis {
+    session
+        .diagnose(&session.simulate(&Silent).unwrap(), &Silent)
+        .unwrap()
+        .0
+}
+
 /// The names of what was found, in order of the alphabet.
 pub(crate) fn names(d: &Diagnosis) -> Vec<&str> {
     let mut found: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();

@@ -60,9 +60,7 @@ pub(super) fn judge(
     let amplitudes = rows
         .par_iter()
         .map(|row| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let solved = row.row.solve(&coarse, sines)?;
             progress.advance(1);
             Ok(solved.first_order(solved.transmitted(), &row.turns))

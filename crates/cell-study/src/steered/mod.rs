@@ -185,9 +185,7 @@ fn study(
             best
         })
         .collect();
-    if progress.stopped() {
-        return Err(Error::Interrupted);
-    }
+    progress.check_stopped()?;
     let shares = |polynomial: &InversePolynomial| IlluminatedSample::shares(&lit, |u| width_nm(design, polynomial, u));
     let mean = |polynomial: &InversePolynomial| shares(polynomial).iter().sum::<f64>();
     let best = found

@@ -1,10 +1,9 @@
 //! The cell of a design whose pillars have the neighbours that they have.
 
-use std::collections::HashMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
-use metalith_core::{Progress, Result, Silent};
+use metalith_core::{Memo, Progress, Result, Silent};
 
 use super::{BandNode, BandResponse, FittedNeighbours, Mapping, NEIGHBOURS, NeighbourTable, NeighbourTableSpec};
 use crate::{CellModel, CellResponse, CellStack, Fidelity, Illumination, NeighbourTables, PointwiseCell, Spectral};
@@ -20,9 +19,9 @@ pub struct NeighbourCell {
     /// Wavelengths with tables, for those of a band between them (um), in rising order.
     tabulated_um: Vec<f64>,
     /// Share of the light that equal neighbours pass, by wavelength bit by bit: see [`NeighbourCell::passed`].
-    passed: Mutex<HashMap<u64, f64>>,
+    passed: Memo<u64, f64>,
     /// Tables by wavelength and direction, bit by bit.
-    tables: Mutex<HashMap<[u64; 3], Arc<NeighbourTable>>>,
+    tables: Memo<[u64; 3], Arc<NeighbourTable>>,
 }
 
 impl NeighbourCell {
@@ -36,8 +35,8 @@ impl NeighbourCell {
             mappings,
             cache,
             tabulated_um: Vec::new(),
-            passed: Mutex::default(),
-            tables: Mutex::default(),
+            passed: Memo::default(),
+            tables: Memo::default(),
         }
     }
 
@@ -52,19 +51,15 @@ impl NeighbourCell {
 
     /// Share of the light that passes lattices of equal pillars, mean over the phases that the mappings draw.
     fn passed(&self, wavelength_um: f64) -> Result<f64> {
-        let known = || self.passed.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = known().get(&wavelength_um.to_bits()) {
-            return Ok(*found);
-        }
-        let widths = || self.mappings.iter().flat_map(Mapping::samples_nm);
-        let widest = widths().copied().max().unwrap_or(0);
-        let light = Illumination::normal(wavelength_um).in_band();
-        let t = self.equal.response(&light, widest, &Silent)?.focused()?;
-        let full = self.equal.full_transmission(wavelength_um)?;
-        let sum: f64 = widths().map(|w| (t[usize::from(*w)] / full).norm_sqr()).sum();
-        let found = sum / widths().count().max(1) as f64;
-        known().insert(wavelength_um.to_bits(), found);
-        Ok(found)
+        self.passed.get_or_make(wavelength_um.to_bits(), || {
+            let widths = || self.mappings.iter().flat_map(Mapping::samples_nm);
+            let widest = widths().copied().max().unwrap_or(0);
+            let light = Illumination::normal(wavelength_um).in_band();
+            let t = self.equal.response(&light, widest, &Silent)?.focused()?;
+            let full = self.equal.full_transmission(wavelength_um)?;
+            let sum: f64 = widths().map(|w| (t[usize::from(*w)] / full).norm_sqr()).sum();
+            Ok(sum / widths().count().max(1) as f64)
+        })
     }
 
     /// Widths around a pillar of a width (nm) where the phase is that of a grating (turns a pitch), in the order of
@@ -80,21 +75,9 @@ impl NeighbourCell {
 
     fn table(&self, wavelength_um: f64, sines: [f64; 2], progress: &dyn Progress) -> Result<Arc<NeighbourTable>> {
         let key = [wavelength_um, sines[0], sines[1]].map(f64::to_bits);
-        let known = || self.tables.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = known().get(&key) {
-            return Ok(Arc::clone(found));
-        }
         let spec = NeighbourTableSpec { wavelength_um, sines };
-        let cache = self.cache.as_deref();
-        let found = Arc::new(NeighbourTable::obtain(
-            &spec,
-            &self.stack,
-            &self.mappings,
-            cache,
-            progress,
-        )?);
-        known().insert(key, Arc::clone(&found));
-        Ok(found)
+        let obtain = || NeighbourTable::obtain(&spec, &self.stack, &self.mappings, self.cache.as_deref(), progress);
+        self.tables.get_or_make(key, || obtain().map(Arc::new))
     }
 
     /// Between the wavelengths that have tables; none without any.

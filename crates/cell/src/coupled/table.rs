@@ -149,9 +149,7 @@ fn solve(
         .par_iter()
         .enumerate()
         .map(|(number, cell)| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let TrainingCell { lattice, widths_nm, .. } = cell;
             let response = coarse.solve(*lattice, widths_nm, spec.sines)?;
             let t = coarse.transmissions(lattice, &response, 1.0);

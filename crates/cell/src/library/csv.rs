@@ -1,12 +1,12 @@
 //! A library as CSV.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::Path;
 
 use super::{LibraryPillar, PillarLibrary};
-use metalith_core::text::{quoted, table_rows};
-use metalith_core::{Error, Result};
+use metalith_core::file::read_at_most;
+use metalith_core::text::quoted;
+use metalith_core::{Error, Result, csv_rows};
 use metalith_pillars::UprightRectangles;
 
 /// Longest library that is read (bytes): twice that of the most pillars.
@@ -39,36 +39,17 @@ impl PillarLibrary {
     /// # Errors
     /// If the file cannot be read, has no or too many rows, or a row is no such pillar, with its line.
     pub fn read_csv(path: &Path, pillars: UprightRectangles) -> Result<Self> {
-        let fault = |line: Option<usize>, what: String| Error::Table {
-            path: path.to_owned(),
-            line,
-            what,
-            hint: format!(
-                "the columns are `{HEAD}`: edges that the design may write, phases in turns, shares of the power"
-            ),
-        };
-        let size = fs::metadata(path).map_err(Error::io("read", path))?.len();
-        if size > LONGEST_CSV {
-            return Err(fault(None, format!("{size} bytes are not a library")));
-        }
-        let bytes = fs::read(path).map_err(Error::io("read", path))?;
+        let hint =
+            format!("the columns are `{HEAD}`: edges that the design may write, phases in turns, shares of the power");
+        let refuse = |line: Option<usize>, what: String| Error::table(path, line, what, &hint);
+        let bytes = read_at_most(path, LONGEST_CSV, "a library")?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut rows = table_rows(&text);
-        if rows
-            .next()
-            .is_none_or(|(_, head)| head.split(',').map(str::trim).ne(HEAD.split(',')))
-        {
-            return Err(fault(Some(1), format!("the header is not `{HEAD}`")));
-        }
         let mut seen = BTreeSet::new();
-        let read = rows.map(|(line, row)| {
-            let no_pillar = || fault(Some(line), format!("\"{}\" is not a pillar", quoted(row)));
-            let fields: Vec<f64> = row.split(',').map_while(|f| f.trim().parse().ok()).collect();
-            let [x, y, turns_x, turns_y, passed_x, passed_y] = fields[..] else {
-                return Err(no_pillar());
-            };
-            if fields.len() != row.split(',').count() || ![turns_x, turns_y].iter().all(|v| v.abs() <= MOST_TURNS) {
-                return Err(no_pillar());
+        let read = csv_rows(&text, HEAD, &refuse)?.map(|row| {
+            let row = row?;
+            let [x, y, turns_x, turns_y, passed_x, passed_y] = row.numbers()?;
+            if ![turns_x, turns_y].iter().all(|v| v.abs() <= MOST_TURNS) {
+                return Err(row.refused(format!("\"{}\" is not a pillar", quoted(row.text))));
             }
             let whole = |nm: f64| (nm.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&nm)).then_some(nm as u16);
             let number = whole(x).zip(whole(y)).and_then(|(x, y)| pillars.number([x, y]));
@@ -78,14 +59,14 @@ impl PillarLibrary {
                     "{x} x {y} nm is no pillar of the design, whose edges are {shortest} to {longest} nm in steps of {}",
                     pillars.step_nm
                 );
-                fault(Some(line), what)
+                row.refused(what)
             })?;
             if !seen.insert(number) {
-                return Err(fault(Some(line), format!("{x} x {y} nm stands here twice")));
+                return Err(row.refused(format!("{x} x {y} nm stands here twice")));
             }
             let passed = [passed_x, passed_y];
             if let Some(share) = passed.iter().find(|p| !(**p > 0.0 && **p <= MOST_PASSED)) {
-                return Err(fault(Some(line), format!("a share of {share} of the power passes")));
+                return Err(row.refused(format!("a share of {share} of the power passes")));
             }
             Ok(LibraryPillar {
                 number,
@@ -95,7 +76,7 @@ impl PillarLibrary {
         });
         let read = read.collect::<Result<Vec<_>>>()?;
         if read.is_empty() {
-            return Err(fault(None, "the library has no pillars".into()));
+            return Err(refuse(None, "the library has no pillars".into()));
         }
         Self::new(read)
     }
@@ -114,7 +95,7 @@ mod tests {
     fn read(text: &str) -> Result<PillarLibrary> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("library.csv");
-        fs::write(&path, text).unwrap();
+        std::fs::write(&path, text).unwrap();
         PillarLibrary::read_csv(&path, PILLARS)
     }
 
@@ -150,11 +131,11 @@ mod tests {
             }
         }
         insta::assert_snapshot!(said.join("\n"), @r#"
-            "100,140,0,0,1" is not a pillar
-            "100,140,0,x,1,1" is not a pillar
-            "100,140,0,inf,1,1" is not a pillar
+            5 fields under 6 columns: `100,140,0,0,1`
+            `x` in column `turns_y` is not a finite number
+            `inf` in column `turns_y` is not a finite number
             "100,140,1.7e308,0,1,1" is not a pillar
-            "100,140,0,0,1,1,1" is not a pillar
+            7 fields under 6 columns: `100,140,0,0,1,1,1`
             100 x 150 nm is no pillar of the design, whose edges are 100 to 240 nm in steps of 20
             100 x 260 nm is no pillar of the design, whose edges are 100 to 240 nm in steps of 20
             100 x 140 nm stands here twice

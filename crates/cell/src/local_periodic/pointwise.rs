@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::cache_file::{CacheEntry, bytes_of, complex_of, solver_of};
 use crate::{CellModel, CellResponse, CellStack, Fidelity, Illumination, JonesTables, ObliqueTables, Spectral};
-use metalith_core::{Error, Progress, Result, Silent};
+use metalith_core::{Progress, Result, Silent};
 use metalith_rcwa::Orders;
 
 /// Median phase error over the cell's whole range 0.002 rad: finer than the table, and for a few
@@ -182,9 +182,7 @@ fn solve_widths<T: Send>(
         widths_nm.len() as u64,
     );
     let one = |&width_nm: &u16| {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         let solved = solve(width_nm);
         progress.advance(1);
         solved

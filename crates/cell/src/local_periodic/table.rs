@@ -136,9 +136,7 @@ impl CellTable {
             .par_iter()
             .map(|&width_nm| {
                 let column = WidthSpectrum::sample(spec.band_um, spec.tolerance, |wavelength_um| {
-                    if progress.stopped() {
-                        return Err(Error::Interrupted);
-                    }
+                    progress.check_stopped()?;
                     spec.stack.transmission(spec.reachable(width_nm), wavelength_um, orders)
                 })?;
                 progress.advance(1);

@@ -1,21 +1,22 @@
 //! A mapping as CSV.
 
-use std::fs;
 use std::path::Path;
 
 use super::MappingTable;
-use metalith_core::text::{quoted, table_rows};
-use metalith_core::{Error, Result};
+use metalith_core::file::read_at_most;
+use metalith_core::{CsvRow, Error, Result, csv_rows};
 
 /// Longest mapping that is read (bytes), and the rounding of its phases in print.
 const LONGEST_CSV: u64 = 4 << 20;
 const PRINTED_TURNS: f64 = 1e-6;
 
+const HEAD: &str = "turns,width_nm";
+
 impl MappingTable {
     /// The table as text: the phase in the middle of each part (turns) and its width.
     pub fn to_csv(&self) -> String {
         let n = self.widths_nm.len() as f64;
-        let mut text = "turns,width_nm\n".to_owned();
+        let mut text = format!("{HEAD}\n");
         for (i, width) in self.widths_nm.iter().enumerate() {
             text += &format!("{:.6},{width}\n", (i as f64 + 0.5) / n);
         }
@@ -28,50 +29,29 @@ impl MappingTable {
     /// # Errors
     /// If the file cannot be read, has too few or too many rows, or a row is not such a part.
     pub fn read_csv(path: &Path, allowed: &[u16]) -> Result<Self> {
-        let fault = |line: Option<usize>, what: String| Error::Table {
-            path: path.to_owned(),
-            line,
-            what,
-            hint: "give columns turns and width_nm: equal parts of a turn by their middles, widths that may be written"
-                .into(),
-        };
-        let size = fs::metadata(path).map_err(Error::io("read", path))?.len();
-        if size > LONGEST_CSV {
-            return Err(fault(None, format!("{size} bytes are not a mapping")));
-        }
-        let bytes = fs::read(path).map_err(Error::io("read", path))?;
+        let hint =
+            "give columns turns and width_nm: equal parts of a turn by their middles, widths that may be written";
+        let refuse = |line: Option<usize>, what: String| Error::table(path, line, what, hint);
+        let bytes = read_at_most(path, LONGEST_CSV, "a mapping")?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut rows = table_rows(&text);
-        if rows.next().is_none_or(|(_, header)| header != "turns,width_nm") {
-            return Err(fault(Some(1), "the header is not `turns,width_nm`".into()));
-        }
-        let rows: Vec<_> = rows.collect();
+        let rows = csv_rows(&text, HEAD, &refuse)?.collect::<Result<Vec<_>>>()?;
         if rows.len() < 2 {
-            return Err(fault(None, "fewer than two parts of a turn".into()));
+            return Err(refuse(None, "fewer than two parts of a turn".into()));
         }
         let n = rows.len() as f64;
-        let widths_nm = rows
-            .iter()
-            .enumerate()
-            .map(|(i, &(line, row))| {
-                let not_a_part = || fault(Some(line), format!("\"{}\" is not a phase and a width", quoted(row)));
-                let (turns, width) = row.split_once(',').ok_or_else(not_a_part)?;
-                let turns: f64 = turns.trim().parse().map_err(|_| not_a_part())?;
-                let width: u16 = width.trim().parse().map_err(|_| not_a_part())?;
-                let middle = (i as f64 + 0.5) / n;
-                let near = (turns - middle).abs() < 0.01 / n + PRINTED_TURNS;
-                if !near {
-                    return Err(fault(
-                        Some(line),
-                        format!("{turns} turns stand where {middle:.6} should"),
-                    ));
-                }
-                if allowed.binary_search(&width).is_err() {
-                    return Err(fault(Some(line), format!("a width of {width} nm may not be written")));
-                }
-                Ok(width)
-            })
-            .collect::<Result<Vec<_>>>()?;
+        let width = |(i, row): (usize, &CsvRow<'_, Error>)| {
+            let [turns, width] = row.numbers()?;
+            let middle = (i as f64 + 0.5) / n;
+            let near = (turns - middle).abs() < 0.01 / n + PRINTED_TURNS;
+            if !near {
+                return Err(row.refused(format!("{turns} turns stand where {middle:.6} should")));
+            }
+            let found = allowed.iter().find(|own| f64::from(**own) == width);
+            found
+                .copied()
+                .ok_or_else(|| row.refused(format!("a width of {width} nm may not be written")))
+        };
+        let widths_nm = rows.iter().enumerate().map(width).collect::<Result<_>>()?;
         Ok(Self { widths_nm })
     }
 }
@@ -85,7 +65,7 @@ mod tests {
     fn a_mark_of_the_byte_order_is_no_part_of_a_mapping() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mapping.csv");
-        fs::write(&path, "\u{feff}turns,width_nm\r\n0.25,100\r\n0.75,200\r\n").unwrap();
+        std::fs::write(&path, "\u{feff}turns,width_nm\r\n0.25,100\r\n0.75,200\r\n").unwrap();
         let read = MappingTable::read_csv(&path, &[100, 200]).unwrap();
         assert_eq!(read.widths_nm, [100, 200]);
     }

@@ -61,20 +61,23 @@ fn of(arriving: Polarisation, analyser: Option<Analyser>, focused: Handedness) -
     energy(&tables(focused).passed(light), WEIGHTS)
 }
 
+fn jones_vector(arriving: Polarisation) -> [Complex64; 2] {
+    match arriving {
+        Polarisation::Circular(Handedness::Left) => [Complex64::ONE, Complex64::I].map(|c| c * FRAC_1_SQRT_2),
+        Polarisation::Circular(Handedness::Right) => [Complex64::ONE, -Complex64::I].map(|c| c * FRAC_1_SQRT_2),
+        Polarisation::Linear(deg) => [deg.to_radians().cos(), deg.to_radians().sin()].map(Complex64::from),
+        Polarisation::Unpolarised => unreachable!("it has none"),
+    }
+}
+
 /// Against the Jones matrices along x and y themselves, analysers as projections on a circular and on linear polarisations.
 #[test]
 fn light_of_any_polarisation_is_that_of_its_jones_vector() {
-    let right = [Complex64::from(FRAC_1_SQRT_2), Complex64::new(0.0, -FRAC_1_SQRT_2)];
-    let vector = |arriving: Polarisation| match arriving {
-        Polarisation::Circular(Handedness::Left) => right.map(|c| c.conj()),
-        Polarisation::Circular(Handedness::Right) => right,
-        Polarisation::Linear(deg) => [deg.to_radians().cos(), deg.to_radians().sin()].map(Complex64::from),
-        Polarisation::Unpolarised => unreachable!("it has none"),
-    };
+    let right = jones_vector(Polarisation::Circular(Handedness::Right));
     let angles = [30.0, -75.0, 180.0].map(Polarisation::Linear);
     let named = Polarisation::CHOICES.map(|(_, one)| one);
     for arriving in named.into_iter().take(4).chain(angles) {
-        let e = vector(arriving);
+        let e = jones_vector(arriving);
         let field = [0, 1].map(|out| {
             let one = |(j, w): (&[[Complex64; 2]; 2], Complex64)| w * (j[out][0] * e[0] + j[out][1] * e[1]);
             pillars().iter().zip(WEIGHTS).map(one).sum::<Complex64>()
@@ -209,14 +212,8 @@ fn names_and_angles_are_read() {
 /// phase of the design.
 #[test]
 fn light_through_upright_pillars_is_that_of_its_jones_vector() {
-    let vector = |arriving: Polarisation| match arriving {
-        Polarisation::Circular(Handedness::Left) => [Complex64::ONE, Complex64::I].map(|c| c * FRAC_1_SQRT_2),
-        Polarisation::Circular(Handedness::Right) => [Complex64::ONE, -Complex64::I].map(|c| c * FRAC_1_SQRT_2),
-        Polarisation::Linear(deg) => [deg.to_radians().cos(), deg.to_radians().sin()].map(Complex64::from),
-        Polarisation::Unpolarised => unreachable!("it has none"),
-    };
     let field_of = |arriving: Polarisation| {
-        let e = vector(arriving);
+        let e = jones_vector(arriving);
         [0, 1].map(|axis| {
             let one = |(j, w): (&[[Complex64; 2]; 2], Complex64)| w * j[axis][axis] * e[axis];
             pillars().iter().zip(WEIGHTS).map(one).sum::<Complex64>()

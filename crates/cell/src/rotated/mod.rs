@@ -4,13 +4,12 @@ pub(crate) mod jones;
 mod samples;
 mod series;
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use num_complex::Complex64;
 use serde::Serialize;
 
-use metalith_core::{Progress, Result, Silent};
+use metalith_core::{Memo, Progress, Result, Silent};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
 
@@ -89,7 +88,7 @@ pub struct RotatedCell {
     pillars: RotatedRectangles,
     arriving: Handedness,
     /// Solutions by wavelength, and whether it is one of a band.
-    solved: Mutex<HashMap<(u64, bool), Arc<Solved>>>,
+    solved: Memo<(u64, bool), Arc<Solved>>,
 }
 
 impl RotatedCell {
@@ -99,7 +98,7 @@ impl RotatedCell {
             stack,
             pillars,
             arriving,
-            solved: Mutex::default(),
+            solved: Memo::default(),
         }
     }
 
@@ -138,18 +137,12 @@ impl RotatedCell {
     }
 
     fn solved(&self, wavelength_um: f64, of_band: bool, progress: &dyn Progress) -> Result<Arc<Solved>> {
-        let key = (wavelength_um.to_bits(), of_band);
-        let known = || self.solved.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(solved) = known().get(&key) {
-            return Ok(Arc::clone(solved));
-        }
-        let solved = Arc::new(if of_band {
-            self.solve_in_band(wavelength_um, progress)?
-        } else {
-            self.solve(wavelength_um, CHOICE, progress)?
-        });
-        known().insert(key, Arc::clone(&solved));
-        Ok(solved)
+        self.solved.get_or_make((wavelength_um.to_bits(), of_band), || {
+            Ok(Arc::new(match of_band {
+                true => self.solve_in_band(wavelength_um, progress)?,
+                false => self.solve(wavelength_um, CHOICE, progress)?,
+            }))
+        })
     }
 
     fn solve_in_band(&self, wavelength_um: f64, progress: &dyn Progress) -> Result<Solved> {

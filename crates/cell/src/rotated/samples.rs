@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use metalith_core::{Error, Progress, Result, Silent};
+use metalith_core::{Progress, Result, Silent};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::{Orders, circular};
 
@@ -81,9 +81,7 @@ impl RotationSamples {
         let what = format!("rectangles, {} orders an axis", orders.along_axis());
         progress.begin(&what, rotations.len() as u64);
         let jones = rotations.into_par_iter().map(|rotation| {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let pillar = RotatedRectangle {
                 width_nm,
                 length_nm,

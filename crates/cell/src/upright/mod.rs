@@ -4,12 +4,12 @@ mod cache;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use metalith_core::{Error, Progress, Result, Silent};
+use metalith_core::{Error, Memo, Progress, Result, Silent};
 use metalith_pillars::UprightRectangles;
 use metalith_rcwa::{Incidence, LayerStack, Orders, Outline, Side, solve_each};
 
@@ -31,7 +31,7 @@ pub struct UprightCell {
     /// Folder of the cache of what is solved for single wavelengths.
     folder: Option<PathBuf>,
     /// Along both axes, by wavelength, and whether it is one of a band.
-    solved: Mutex<HashMap<(u64, bool), Arc<Along>>>,
+    solved: Memo<(u64, bool), Arc<Along>>,
 }
 
 /// Transmissions of light along x and along y, by the number of the pillar; the first entry stands for no pillar.
@@ -106,9 +106,7 @@ pub fn birefringent_pillars(
     distinct.dedup();
     progress.begin("cells of upright rectangles", distinct.len() as u64);
     let solved = distinct.par_iter().map(|&edges| {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         progress.advance(1);
         Ok((key(edges), solve(edges)?))
     });
@@ -128,7 +126,7 @@ impl UprightCell {
             pillars,
             focused,
             folder: None,
-            solved: Mutex::default(),
+            solved: Memo::default(),
         }
     }
 
@@ -161,18 +159,12 @@ impl UprightCell {
     }
 
     fn solved(&self, wavelength_um: f64, of_band: bool, progress: &dyn Progress) -> Result<Arc<Along>> {
-        let key = (wavelength_um.to_bits(), of_band);
-        let known = || self.solved.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(solved) = known().get(&key) {
-            return Ok(Arc::clone(solved));
-        }
-        let solved = Arc::new(if of_band {
-            self.solve(wavelength_um, Orders::new(BAND_ORDERS)?, &Silent)?
-        } else {
-            self.along(wavelength_um, progress)?
-        });
-        known().insert(key, Arc::clone(&solved));
-        Ok(solved)
+        self.solved.get_or_make((wavelength_um.to_bits(), of_band), || {
+            Ok(Arc::new(match of_band {
+                true => self.solve(wavelength_um, Orders::new(BAND_ORDERS)?, &Silent)?,
+                false => self.along(wavelength_um, progress)?,
+            }))
+        })
     }
 
     fn solve(&self, wavelength_um: f64, orders: Orders, progress: &dyn Progress) -> Result<Along> {

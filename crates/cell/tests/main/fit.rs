@@ -202,7 +202,7 @@ fn mappings_go_through_files_and_bad_ones_name_the_line() {
     assert_eq!(MappingTable::read_csv(&file, &widths).unwrap(), exact);
     let mut said = Vec::new();
     for (text, at) in [
-        ("", Some(1)),
+        ("", None),
         ("turns,width_nm\n", None),
         ("turns,width_nm\n0.25,100\n0.5,102\n", Some(3)),
         ("turns,width_nm\n0.25,100\n0.75,101\n", Some(3)),
@@ -218,12 +218,12 @@ fn mappings_go_through_files_and_bad_ones_name_the_line() {
             other => panic!("{other:?}"),
         }
     }
-    insta::assert_snapshot!(said.join("\n"), @r#"
-    the header is not `turns,width_nm`
+    insta::assert_snapshot!(said.join("\n"), @"
+    there is nothing in it
     fewer than two parts of a turn
     0.5 turns stand where 0.750000 should
     a width of 101 nm may not be written
-    "0.75" is not a phase and a width
-    NaN turns stand where 0.750000 should
-    "#);
+    1 fields under 2 columns: `0.75`
+    `NaN` in column `turns` is not a finite number
+    ");
 }

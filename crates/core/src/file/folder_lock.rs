@@ -36,9 +36,7 @@ impl FolderLock {
         };
         let mut wait = Some(wait);
         while let Err(TryLockError::WouldBlock) = opened.try_lock() {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             if let Some(wait) = wait.take() {
                 wait();
             }

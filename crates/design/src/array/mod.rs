@@ -98,9 +98,7 @@ impl PillarArray {
             compensated: false,
         };
         for (k, (map, centre_nm)) in maps.into_iter().enumerate() {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             if map.lattice != lattice {
                 let sites = [map.lattice.sites(), lattice.sites()];
                 return Err(Error::refused(
@@ -150,9 +148,7 @@ impl PillarArray {
             compensated: false,
         };
         for element in elements {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let rule = Arc::new(PillarRule::of_element(design, element.index));
             array.place(
                 element,

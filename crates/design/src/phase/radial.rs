@@ -157,14 +157,14 @@ impl RadialPhase {
         // A ring-by-ring table ends in the middle of the last ring.
         let slack = 1.5 * (last - first) / radius_um.len() as f64;
         if first > slack || last < lens_radius_um - slack {
-            return Err(Error::Table {
-                path: file.clone(),
-                line: None,
-                what: format!(
-                    "the table covers radii from {first} to {last} um, the lens needs 0 to {lens_radius_um} um"
-                ),
-                hint: "extend the table, or make the lens smaller".into(),
-            });
+            let what =
+                format!("the table covers radii from {first} to {last} um, the lens needs 0 to {lens_radius_um} um");
+            return Err(Error::table(
+                file,
+                None,
+                what,
+                "extend the table, or make the lens smaller",
+            ));
         }
         Ok(())
     }

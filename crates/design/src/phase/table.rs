@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::Interpolation;
 use metalith_core::text::{quoted, table_rows};
-use metalith_core::{Error, Result, document, npy};
+use metalith_core::{CsvRow, Error, Result, csv_rows, document, npy};
 
 /// Most rows of a table: a ring for each site of the largest lens that can be designed.
 const MOST_ROWS: usize = 1 << 20;
@@ -31,11 +31,9 @@ pub(super) fn read(path: &Path, pitch_um: Option<f64>) -> Result<Rows> {
     } else {
         read_csv(path, pitch_um)?.into_iter().unzip()
     };
-    let fault = |row: usize, what: String| Error::Table {
-        path: path.to_owned(),
-        line: lines.get(row).copied(),
-        what,
-        hint: "radii ascend strictly from zero, all entries are finite".into(),
+    let fault = |row: usize, what: String| {
+        let hint = "radii ascend strictly from zero, all entries are finite";
+        Error::table(path, lines.get(row).copied(), what, hint)
     };
     if rows.len() < 2 {
         return Err(fault(0, format!("a table of {} rows", rows.len())));
@@ -59,59 +57,37 @@ pub(super) fn read(path: &Path, pitch_um: Option<f64>) -> Result<Rows> {
 /// Each row, and the line that it is in.
 fn read_csv(path: &Path, pitch_um: Option<f64>) -> Result<Vec<((f64, f64), usize)>> {
     let text = document::load(path)?;
-    let fault = |line: usize, what: String| Error::Table {
-        path: path.to_owned(),
-        line: Some(line),
-        what,
-        hint: match pitch_um {
-            None => {
-                "the columns are `r_um,phase_rad`; lines that begin with # are comments; phases alone need `pitch_um`"
-            }
-            Some(_) => "with `pitch_um` the one column is `phase_rad`; lines that begin with # are comments",
-        }
-        .into(),
+    let hint = match pitch_um {
+        None => "the columns are `r_um,phase_rad`; lines that begin with # are comments; phases alone need `pitch_um`",
+        Some(_) => "with `pitch_um` the one column is `phase_rad`; lines that begin with # are comments",
+    };
+    let refuse = |line: Option<usize>, what: String| Error::table(path, line, what, hint);
+    let Some(pitch_um) = pitch_um else {
+        let row = |row: Result<CsvRow<'_, Error>>| {
+            let row = row?;
+            let [r, phase] = row.numbers()?;
+            Ok(((r, phase), row.line))
+        };
+        return csv_rows(&text, "r_um,phase_rad", &refuse)?
+            .take(MOST_ROWS + 1)
+            .map(row)
+            .collect();
     };
     let mut lines = table_rows(&text).peekable();
-    let &(at, head) = lines.peek().ok_or_else(|| fault(1, "the file is empty".into()))?;
-    if let Some(pitch_um) = pitch_um {
-        if head == "phase_rad" {
-            lines.next();
-        }
-        let row = |(k, (at, line)): (usize, (usize, &str))| match line.parse::<f64>() {
-            Ok(phase) => Ok(((k as f64 * pitch_um, phase), at)),
-            Err(_) => Err(fault(at, format!("`{}` is not a number", quoted(line)))),
-        };
-        return lines.take(MOST_ROWS + 1).enumerate().map(row).collect();
-    }
-    if head.split(',').map(str::trim).ne(["r_um", "phase_rad"]) {
-        return Err(fault(at, format!("the columns are `{}`", quoted(head))));
-    }
-    lines
-        .skip(1)
-        .take(MOST_ROWS + 1)
-        .map(|(at, line)| {
-            let mut fields = line.split(',').map(|f| f.trim().parse::<f64>());
-            match (fields.next(), fields.next(), fields.next()) {
-                (Some(Ok(r)), Some(Ok(phase)), None) => Ok(((r, phase), at)),
-                _ => Err(fault(at, format!("`{}` is not two numbers", quoted(line)))),
-            }
-        })
-        .collect()
+    lines.next_if(|(_, head)| *head == "phase_rad");
+    let row = |(k, (at, line)): (usize, (usize, &str))| match line.parse::<f64>() {
+        Ok(phase) => Ok(((k as f64 * pitch_um, phase), at)),
+        Err(_) => Err(refuse(Some(at), format!("`{}` is not a number", quoted(line)))),
+    };
+    lines.take(MOST_ROWS + 1).enumerate().map(row).collect()
 }
 
 fn read_npy(path: &Path, pitch_um: Option<f64>) -> Result<Vec<(f64, f64)>> {
-    let fault = |what: String| {
-        Error::Table {
-        path: path.to_owned(),
-        line: None,
-        what,
-        hint: match pitch_um {
-            None => "save an array of shape [rows, 2], columns r_um and phase_rad, as float64 or float32; one of phases alone needs \
-                     `pitch_um`",
-            Some(_) => "with `pitch_um`, save phases in rad or complex fields as an array of one axis",
+    let hint = match pitch_um {
+        None => {
+            "save an array of shape [rows, 2], columns r_um and phase_rad, as float64 or float32; one of phases alone needs `pitch_um`"
         }
-        .into(),
-    }
+        Some(_) => "with `pitch_um`, save phases in rad or complex fields as an array of one axis",
     };
     let array = npy::read_phases(path, |shape| match (pitch_um, shape) {
         (None, [rows, 2]) | (Some(_), [rows]) => *rows <= MOST_ROWS as u64,
@@ -120,7 +96,7 @@ fn read_npy(path: &Path, pitch_um: Option<f64>) -> Result<Vec<(f64, f64)>> {
     let values = match array {
         Ok(array) => array.values,
         Err(npy::NpyError::Io(error)) => return Err(Error::io("read", path)(error)),
-        Err(error) => return Err(fault(error.to_string())),
+        Err(error) => return Err(Error::table(path, None, error.to_string(), hint)),
     };
     Ok(match pitch_um {
         None => values.chunks_exact(2).map(|row| (row[0], row[1])).collect(),

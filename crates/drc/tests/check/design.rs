@@ -162,13 +162,8 @@ fn shipped_designs_of_other_arrays_and_phases_hold() {
 
 /// A shipped design with words of its text replaced, as it is written, by the rules that are taken where none are named.
 fn by_its_own_rules(name: &str, changes: &[(&str, &str)]) -> DrcReport {
-    let path = metalith_testing::design(name);
-    let mut text = std::fs::read_to_string(&path).unwrap();
-    for (from, to) in changes {
-        assert!(text.contains(from), "{from}");
-        text = text.replacen(from, to, 1);
-    }
-    let design = Design::parse(&path, &metalith_testing::accepting(&text)).unwrap();
+    let text = metalith_testing::accepting(&metalith_testing::changed(name, changes));
+    let design = Design::parse(&metalith_testing::design(name), &text).unwrap();
     as_written(&design, &Deck::for_design(Some(&design)))
 }
 

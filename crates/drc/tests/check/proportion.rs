@@ -17,17 +17,11 @@ const NOT_OPTIMISED: f64 = 30.0;
 /// CPU seconds beside other tests over those alone: both cores share one memory.
 const BESIDE_OTHERS: f64 = 2.0;
 
-/// CPU time of this thread (s); none where the system does not tell.
-fn cpu_s() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    Some(text.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
-}
-
 /// Do something with a file of so many bytes, in the time that it may take.
 fn in_time<T>(what: &str, bytes: usize, work: impl FnOnce() -> T) -> T {
-    let before = cpu_s();
+    let before = metalith_testing::cpu_s();
     let result = work();
-    if let (Some(before), Some(after)) = (before, cpu_s()) {
+    if let (Some(before), Some(after)) = (before, metalith_testing::cpu_s()) {
         let slower = if cfg!(debug_assertions) { NOT_OPTIMISED } else { 1.0 };
         let most = (ANY_FILE_S + A_MEGABYTE_S * bytes as f64 * 1e-6) * slower * BESIDE_OTHERS;
         assert!(

@@ -10,11 +10,10 @@ use metalith_gds::{
     LayerNumber, Layout, Point, Rect, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of,
 };
 use metalith_handoff::{HandoffOptions, LayoutStatistics, handoff, verify_handoff};
-use metalith_layout::LayoutFormat;
 use metalith_pillars::{LatticeKind, PillarId, PillarRows, PillarShape, Rectangles};
-use metalith_wave::Accuracy;
+use metalith_testing::{design, root};
 
-use super::{PILLARS, SUMMED, TABLE_S, rows_in};
+use super::{PILLARS, SUMMED, TABLE_S, options, rows_in};
 
 /// Largest distance of a polygon from its circle where a design says nothing (nm), and the rounding of its corners.
 const CHORD_NM: f64 = 0.5;
@@ -23,24 +22,16 @@ const ROUNDED_NM: f64 = 0.7072;
 /// Half a digit of the last decimal of a table (nm).
 const PLACE_NM: i64 = 1;
 
-fn design(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../designs/{name}.toml"))
-}
-
 /// A hand-off by the process of the program that etches the film.
 fn made(name: &str) -> PathBuf {
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}_shapes"));
     let _ = std::fs::remove_dir_all(&out);
     let options = HandoffOptions {
-        compensate: None,
         design: design(name),
         process: None,
-        out: out.clone(),
         command: format!("metalith handoff designs/{name}.toml"),
-        format: LayoutFormat::Gds,
         fidelity: None,
-        accuracy: Accuracy::Fast,
-        waivers: None,
+        ..options(&out)
     };
     let made = handoff(&options, &Silent).unwrap();
     for check in &made.checks {
@@ -234,18 +225,12 @@ fn a_hexagonal_lattice_is_handed_over() {
 /// A film that is thicker than etch and rules are for is refused; without a process there is one for it.
 #[test]
 fn a_process_for_another_thickness_is_refused() {
-    let process = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../processes/jbx6300_asi.toml");
+    let process = root().join("processes/jbx6300_asi.toml");
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("thicker");
     let options = HandoffOptions {
-        compensate: None,
         design: design("hexagonal_1550"),
         process: Some(process),
-        out: out.clone(),
-        command: String::new(),
-        format: LayoutFormat::Gds,
-        fidelity: None,
-        accuracy: Accuracy::Fast,
-        waivers: None,
+        ..options(&out)
     };
     let error = handoff(&options, &Silent).unwrap_err();
     assert_eq!(error.id(), "handoff/film-thickness-differs");
@@ -272,8 +257,8 @@ fn upright_rectangles_are_handed_over() {
 #[test]
 fn a_process_without_rules_for_a_shape_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../processes/jbx6300_asi.toml");
-    let rules = std::fs::canonicalize(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rules")).unwrap();
+    let shipped = root().join("processes/jbx6300_asi.toml");
+    let rules = std::fs::canonicalize(root().join("rules")).unwrap();
     let text = std::fs::read_to_string(shipped).unwrap();
     let text = text
         .replace("[checks.circles]", "[checks.rectangles]")
@@ -282,15 +267,9 @@ fn a_process_without_rules_for_a_shape_is_refused() {
     std::fs::write(&process, text).unwrap();
     let out = folder.path().join("out");
     let options = HandoffOptions {
-        compensate: None,
         design: design("asi_940"),
         process: Some(process),
-        out: out.clone(),
-        command: String::new(),
-        format: LayoutFormat::Gds,
-        fidelity: None,
-        accuracy: Accuracy::Fast,
-        waivers: None,
+        ..options(&out)
     };
     let error = handoff(&options, &Silent).unwrap_err();
     assert_eq!(error.id(), "handoff/no-rules-for-pillars");

@@ -1,6 +1,6 @@
 //! Kernels from the field behind each element.
 
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_wave::kernels::FftScratch;
 use metalith_wave::{Accuracy, Scratch, Window};
 use rayon::prelude::*;
@@ -144,9 +144,7 @@ impl Builder<'_> {
         let sines = view.sines_of_landing(place, view.wedge.wavelength_um);
         let (mut spectra, mut in_window) = (Vec::new(), Vec::new());
         for (i, nm) in self.chip.sampling.wavelengths_nm.iter().enumerate() {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let quarters = self.quarters(i, nm * 1e-3, sines, scratch)?;
             in_window.push(quarters.iter().map(|v| f64::from(*v)).sum::<f64>() as f32);
             spectra.push(self.plan.spectrum(&quarters, fft));

@@ -124,15 +124,11 @@ fn values(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
 }
 
 fn fault(path: &Path, what: impl Into<String>) -> Error {
-    Error::Table {
-        path: path.to_owned(),
-        line: None,
-        what: what.into(),
-        hint: format!(
-            "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
-            sides_words()
-        ),
-    }
+    let hint = format!(
+        "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
+        sides_words()
+    );
+    Error::table(path, None, what, hint)
 }
 
 fn check_sides(path: &Path, rows: usize, columns: usize) -> Result<()> {
@@ -160,13 +156,9 @@ pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
 fn light(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     let (array, whole) = array(path, bytes)?;
     if whole {
-        return Err(Error::Table {
-            path: path.to_owned(),
-            line: None,
-            what: "it has whole numbers (uint8 or uint16), and linear light of which white is 1 has fractions".into(),
-            hint: "divide it by its white and save it as float32 or float64: `numpy.save(file, values / white)`; of values in sRGB make a PNG"
-                .into(),
-        });
+        let what = "it has whole numbers (uint8 or uint16), and linear light of which white is 1 has fractions";
+        let hint = "divide it by its white and save it as float32 or float64: `numpy.save(file, values / white)`; of values in sRGB make a PNG";
+        return Err(Error::table(path, None, what, hint));
     }
     if array.iter().any(|v| !v.is_finite() || *v < 0.0) {
         return Err(fault(path, "it holds light that is negative or no number"));
@@ -304,16 +296,7 @@ pub(super) mod tests {
 
     /// An NPY file of doubles in rows; `shape` as Python writes it.
     pub(crate) fn npy_bytes(shape: &str, values: &[f64]) -> Vec<u8> {
-        npy_of("<f8", shape, values.iter().flat_map(|v| v.to_le_bytes()))
-    }
-
-    fn npy_of(kind: &str, shape: &str, values: impl Iterator<Item = u8>) -> Vec<u8> {
-        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend((header.len() as u16).to_le_bytes());
-        bytes.extend(header.as_bytes());
-        bytes.extend(values);
-        bytes
+        metalith_testing::npy("<f8", shape, values.iter().flat_map(|v| v.to_le_bytes()))
     }
 
     #[test]
@@ -439,12 +422,12 @@ pub(super) mod tests {
         refused(&npy_bytes("(16, 16)", &[-0.1; 256]), None, "negative");
         refused(&npy_bytes("(16, 16)", &[f64::INFINITY; 256]), None, "no number");
         refused(
-            &npy_of("|u1", "(16, 16)", [128; 256].into_iter()),
+            &metalith_testing::npy("|u1", "(16, 16)", [128; 256].into_iter()),
             None,
             "divide it by its white",
         );
         refused(
-            &npy_of("<u2", "(16, 16)", [117; 512].into_iter()),
+            &metalith_testing::npy("<u2", "(16, 16)", [117; 512].into_iter()),
             None,
             "divide it by its white",
         );

@@ -1,6 +1,6 @@
 //! Ray trace of the light of each square of the scene.
 
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_sensor::{ChannelSampling, Sensor};
 use metalith_wave::PlaneWave;
 use metalith_wave::propagation::{LandingGrid, LocalAngularSpectrum, leaving};
@@ -52,9 +52,7 @@ impl StrayLight {
         let mut values = vec![0.0f32; pairs * size];
         let mut budget = vec![LightShares::default(); pairs];
         for distinct in 0..chip.distinct.len() {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let light = chip.in_light(distinct, &chosen, progress)?;
             let distance_um = chip.distinct[distinct].view.distance_um([0.0; 2]);
             let departed: Vec<DepartingLight> = chosen

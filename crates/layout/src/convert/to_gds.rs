@@ -10,7 +10,7 @@ use metalith_gds::{CellConsumer, CellItem, Layout, LayoutCell, Point};
 use metalith_oasis::Repetition;
 
 use super::does_not_fit;
-use crate::encoding;
+use crate::gds_frame::encode;
 
 /// Elements that gds21 encodes at a time.
 const AT_A_TIME: usize = 4096;
@@ -60,12 +60,6 @@ fn library(layout: &Layout) -> GdsLibrary {
     library.units = GdsUnits::new(layout.user_unit(), layout.unit_nm() * 1e-9);
     library.dates = dates();
     library
-}
-
-fn encode(library: &GdsLibrary) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    library.write(&mut bytes).map_err(encoding)?;
-    Ok(bytes)
 }
 
 struct Target<'a> {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use metalith_core::{Error, LayerNumber, Progress, Result};
+use metalith_core::{LayerNumber, Progress, Result};
 use metalith_design::array::{DomainPart, SymmetryGroup};
 use metalith_oasis::{CellBounds, CompressedBlock, Placing, RecordBuffer, Repetition};
 use metalith_pillars::PillarRows;
@@ -191,9 +191,7 @@ impl<'a> ElementPillars<'a> {
         let (largest, rings) = (self.largest(), self.rings(encoding));
         let mut cells: Vec<Encoded> = self.parts.iter().map(|_| Encoded::EMPTY).collect();
         for batch in ranges.chunks(SIDE_BY_SIDE) {
-            if progress.stopped() {
-                return Err(Error::Interrupted);
-            }
+            progress.check_stopped()?;
             let encoded: Vec<Vec<Encoded>> = batch
                 .par_iter()
                 .map(|range| self.pieces(encoding, rings, range.clone()))

@@ -21,7 +21,7 @@ use super::as_built_rectangles::{RowsOfBiases, bare_row, row_length, solve_rotat
 use super::etched_stack::{off_cutoff, perturbed, possible_width_nm};
 use super::{CellChange, SolvedWidths};
 use metalith_cell::{CellStack, UPRIGHT_ORDERS, cache_file};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Quiet, Result};
 use metalith_pillars::RotatedRectangles;
 use metalith_rcwa::Orders;
 
@@ -97,7 +97,7 @@ impl CellBank {
     fn solve_widths(&self, colour: usize, coarse: &[f64], progress: &dyn Progress) -> Result<Colour> {
         let rows = self.solve_rows(colour, coarse, progress)?;
         let added = between(coarse, &rows, self.each());
-        let fine = self.solve_rows(colour, &added, &Unwatched(progress))?;
+        let fine = self.solve_rows(colour, &added, &Quiet(progress))?;
         progress.advance(1);
         Ok(merged((coarse, &rows), (&added, &fine), self.each()))
     }
@@ -107,9 +107,7 @@ impl CellBank {
         (0..self.grid.count())
             .into_par_iter()
             .map(|stack| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let row = self.solve_row(colour, stack, widths_nm);
                 progress.advance(1);
                 row
@@ -425,19 +423,6 @@ fn upright_s(etched: &[CellStack], orders: usize) -> f64 {
     // Of a matrix as wide as there are orders over the plane, its cube.
     let share = orders as f64 / UPRIGHT_ORDERS as f64;
     UPRIGHT_S * share.powi(6) * sections.sum::<f64>()
-}
-
-/// Hears that the user wants to stop, and counts nothing.
-struct Unwatched<'a>(&'a dyn Progress);
-
-impl Progress for Unwatched<'_> {
-    fn begin(&self, _what: &str, _steps: u64) {}
-
-    fn advance(&self, _steps: u64) {}
-
-    fn stopped(&self) -> bool {
-        self.0.stopped()
-    }
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::widths::complex;
 use crate::rational_interpolation::{around, rational};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_pillars::UprightRectangles;
 
 /// Largest distance of the nodes that are solved at first (nm).
@@ -141,9 +141,7 @@ impl Sizes {
         }
         while !places.is_empty() {
             let solved = places.par_iter().map(|(k, short)| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let t = solve([short + f64::from(self.spans[*k].longer_nm), *short])?;
                 progress.advance(1);
                 Ok(t)

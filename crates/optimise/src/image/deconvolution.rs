@@ -85,9 +85,7 @@ impl Deconvolution {
                     .wavelengths_um
                     .par_iter()
                     .map(|&wavelength| {
-                        if progress.stopped() {
-                            return Err(Error::Interrupted);
-                        }
+                        progress.check_stopped()?;
                         let pupil = Pupil::new(lens, wavelength, angle, views.window, offset)?;
                         let bytes = pupil.bytes();
                         let so_far = used.fetch_add(bytes, std::sync::atomic::Ordering::Relaxed) + bytes;

@@ -240,9 +240,7 @@ impl OptimiseTask {
                 let limit = StepLimit::new(turns_limit)?;
                 let mut exchange = Exchange::new(&problem, limit, schedule, self.spec.seed, waves);
                 while !exchange.finished() {
-                    if progress.stopped() {
-                        return Err(Error::Interrupted);
-                    }
+                    progress.check_stopped()?;
                     exchange.sweep_once();
                 }
                 progress.advance(1);

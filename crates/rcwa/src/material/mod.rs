@@ -1,7 +1,6 @@
 //! Refractive indices: published dispersion formulas with their ranges, constants, tables.
 
 mod dispersion;
-mod films;
 mod named;
 mod table;
 mod yaml;

@@ -1,7 +1,7 @@
 //! Materials that can be named: published fits, each with its source and its range.
 
 use super::dispersion::Dispersion;
-use super::films;
+use super::table;
 
 /// A named material: name, source, formula.
 pub(super) struct NamedMaterial {
@@ -64,18 +64,18 @@ pub(super) const KNOWN: &[NamedMaterial] = &[
     NamedMaterial {
         name: "sin_poor_vogt_2015",
         source: "silicon nitride, n = 1.91 at 633 nm: film 1 of Vogt, thesis, Leibniz Universitaet Hannover (2015)",
-        form: || samples(films::SIN_POOR),
+        form: || film(include_str!("films/sin_poor.csv")),
     },
     NamedMaterial {
         name: "sin_rich_vogt_2015",
         source: "silicon nitride, n = 2.13 at 633 nm: film 3 of Vogt, thesis, Leibniz Universitaet Hannover (2015)",
-        form: || samples(films::SIN_RICH),
+        form: || film(include_str!("films/sin_rich.csv")),
     },
     NamedMaterial {
         name: "a_si_pierce_1972",
         source: "amorphous silicon, evaporated film: Pierce and Spicer, Phys. Rev. B 5, 3017 (1972), as sampled in Palik's \
                  Handbook of Optical Constants of Solids (1985)",
-        form: || samples(films::A_SI),
+        form: || film(include_str!("films/a_si.csv")),
     },
     NamedMaterial {
         name: "c_si_salzberg_1957",
@@ -93,7 +93,7 @@ pub(super) const KNOWN: &[NamedMaterial] = &[
     NamedMaterial {
         name: "tio2_siefke_2016",
         source: "titanium dioxide, ALD film: Siefke et al., Adv. Opt. Mater. 4, 1780 (2016)",
-        form: || samples(films::TIO2_ALD),
+        form: || film(include_str!("films/tio2_ald.csv")),
     },
     NamedMaterial {
         name: "tio2_rutile_devore_1951",
@@ -118,7 +118,7 @@ pub(super) const KNOWN: &[NamedMaterial] = &[
     NamedMaterial {
         name: "nb2o5_lemarchand_2013",
         source: "niobium pentoxide, sputtered film: Lemarchand (2013), measured as in Gao et al., Opt. Express 20, 15734 (2012)",
-        form: || samples(films::NB2O5),
+        form: || film(include_str!("films/nb2o5.csv")),
     },
     NamedMaterial {
         name: "air",
@@ -127,10 +127,10 @@ pub(super) const KNOWN: &[NamedMaterial] = &[
     },
 ];
 
-fn samples(known: &[[f64; 3]]) -> Dispersion {
-    Dispersion::Table {
-        samples: known.to_vec(),
-    }
+/// A film that is known by measured samples, not by a formula.
+fn film(table: &str) -> Dispersion {
+    let samples = table::parse(table).expect("the program's own tables are right");
+    Dispersion::Table { samples }
 }
 
 /// Formulas and words of the field, in small letters and without signs, each with the material that is meant.

@@ -1,56 +1,36 @@
 //! Tables of the index by wavelength, from CSV.
 
 use crate::TableError;
-use metalith_core::text::{quoted, table_rows};
+use metalith_core::{csv_columns, csv_rows};
 
 /// Line, counted from one, and what is wrong there.
 pub(super) type TableFault = (Option<usize>, TableError);
 
 /// Samples (L (um), n, k) of the text of a table, wavelengths rising.
 pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
-    let mut lines = table_rows(text);
-    let (number, header) = lines.next().ok_or((None, TableError::Empty))?;
-    let names: Vec<_> = header.split(',').map(str::trim).collect();
-    let column = |name: &str| names.iter().position(|n| *n == name);
-    let (wavelength, unit) = match (column("wavelength_nm"), column("wavelength_um")) {
-        (Some(at), _) => (at, 1e-3),
-        (None, Some(at)) => (at, 1.0),
-        (None, None) => {
-            let header = quoted(header);
-            return Err((Some(number), TableError::NoWavelengths { header }));
-        }
+    let names = csv_columns(text);
+    let (wavelength, unit) = match names.contains(&"wavelength_um") && !names.contains(&"wavelength_nm") {
+        true => ("wavelength_um", 1.0),
+        false => ("wavelength_nm", 1e-3),
     };
-    let n = column("n").ok_or_else(|| {
-        let header = quoted(header);
-        (Some(number), TableError::NoIndex { header })
-    })?;
-    let k = column("k");
-    // A column that nobody reads may be what is missing: K is no k.
-    let known = [Some(wavelength), Some(n), k];
-    if let Some(at) = (0..names.len()).find(|at| !known.contains(&Some(*at))) {
-        let name = quoted(names[at]);
-        return Err((Some(number), TableError::UnknownColumn { name }));
-    }
+    let absorbs = names.contains(&"k");
+    let columns = format!("{wavelength},n{}", if absorbs { ",k" } else { "" });
+    let refuse = |line: Option<usize>, what: String| (line, TableError::NotTheColumns { what });
     let mut samples: Vec<[f64; 3]> = Vec::new();
-    for (number, line) in lines {
-        let cells: Vec<_> = line.split(',').map(str::trim).collect();
-        let value = |at: usize| -> Result<f64, TableFault> {
-            let text = cells.get(at).ok_or((Some(number), TableError::Missing))?;
-            let value: f64 = text
-                .parse()
-                .map_err(|_| (Some(number), TableError::NotANumber { text: quoted(text) }))?;
-            if value.is_finite() {
-                Ok(value)
-            } else {
-                Err((Some(number), TableError::NotFinite { text: quoted(text) }))
-            }
-        };
-        let sample = [value(wavelength)? * unit, value(n)?, k.map_or(Ok(0.0), value)?];
+    for row in csv_rows(text, &columns, &refuse)? {
+        let row = row?;
+        let number = Some(row.line);
+        let mut sample = [0.0; 3];
+        match absorbs {
+            true => sample = row.numbers()?,
+            false => sample[..2].copy_from_slice(&row.numbers::<2>()?),
+        }
+        sample[0] *= unit;
         if sample[0] <= 0.0 || sample[1] <= 0.0 || sample[2] < 0.0 {
-            return Err((Some(number), TableError::NotPhysical));
+            return Err((number, TableError::NotPhysical));
         }
         if samples.last().is_some_and(|last| last[0] >= sample[0]) {
-            return Err((Some(number), TableError::NotRising));
+            return Err((number, TableError::NotRising));
         }
         samples.push(sample);
     }
@@ -74,8 +54,12 @@ mod tests {
             ("wavelength_nm,n,", ""),
         ] {
             let found = parse(&format!("# film\n{header}\n400,2,0.1\n410,2.1,0.1\n"));
-            let name = name.to_owned();
-            assert_eq!(found, Err((Some(2), TableError::UnknownColumn { name })), "{header}");
+            match found {
+                Err((Some(2), TableError::NotTheColumns { what })) => {
+                    assert!(what.contains(&format!("`{name}`")), "{what}")
+                }
+                other => panic!("{header}: {other:?}"),
+            }
         }
         assert_eq!(
             parse("k,n,wavelength_um\n0.1,2,0.4\n0.2,2.1,0.5\n").unwrap()[1],

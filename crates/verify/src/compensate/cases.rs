@@ -9,7 +9,7 @@ use super::line::Line;
 use crate::optics::incidence;
 use crate::{PsfResult, open_matched};
 use metalith_cell::{Illumination, Incidence, PolarisationAxis, PolarisedLight};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Element};
@@ -95,9 +95,7 @@ fn of_element(
     let mut scratch = Scratch::default();
     let mut cases = Vec::new();
     for colour in &line.colours {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         let um = colour.wavelength_um;
         let wave = incident(&element.wedge, um, [0.0, 0.0])?;
         let light = Illumination {

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use choose::Kinds;
 use line::Line;
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::{PillarArray, SymmetryGroup};
 use metalith_optics::{CalibratedModel, NotApplied};
@@ -84,9 +84,7 @@ pub fn compensate(
     drawn.compensated = true;
     let mut error = [0.0; 2];
     for pass in 0..PASSES {
-        if progress.stopped() {
-            return Err(Error::Interrupted);
-        }
+        progress.check_stopped()?;
         let classes = drawn.classes.iter().zip(&openings_um);
         let steps: Vec<Vec<i32>> = classes.map(|(c, um)| line.steps(&c.widths.map(), *um)).collect();
         let mut kinds = Kinds::default();

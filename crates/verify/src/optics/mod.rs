@@ -10,7 +10,7 @@ use super::distinct_elements::{Chosen, CopyAngle};
 use super::psf_metrics::{PsfImages, PsfPair, PsfResult};
 use metalith_cell::{Illumination, Incidence};
 use metalith_core::Progress;
-use metalith_core::{Error, Result};
+use metalith_core::Result;
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_optics::{CaseOptics, ElementOptics, IncoherentFields, Placement, SimulationCase};
@@ -201,9 +201,7 @@ impl<'a> ElementSimulator<'a> {
         tasks
             .into_par_iter()
             .map_init(Scratch::default, |scratch, task| {
-                if progress.stopped() {
-                    return Err(Error::Interrupted);
-                }
+                progress.check_stopped()?;
                 let pair = self.pair(&task, (element, phase), designed, scratch);
                 progress.advance(1);
                 pair

@@ -255,10 +255,8 @@ mod tests {
 
     /// The words of a shipped design, with a part of its text replaced.
     fn words(name: &str, from: &str, to: &str) -> String {
-        let path = metalith_testing::design(name);
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert!(text.contains(from), "{from}");
-        elements(&Design::parse(&path, &text.replacen(from, to, 1)).unwrap())
+        let text = metalith_testing::changed(name, &[(from, to)]);
+        elements(&Design::parse(&metalith_testing::design(name), &text).unwrap())
     }
 
     #[test]

@@ -97,22 +97,29 @@ impl<'t> Section<'_, 't> {
         String::new()
     }
 
-    /// A list of texts; an empty one where the key is left out.
-    pub fn texts(&self, key: &str) -> Vec<String> {
+    /// What `read` makes of the items of a list, without those of a wrong type; an empty list where the key is left out.
+    fn list<T>(&self, key: &str, expected: &str, read: impl Fn(&Spanned<DeValue<'t>>) -> Option<T>) -> Vec<T> {
         let Some(value) = self.get(key) else { return Vec::new() };
         let DeValue::Array(items) = value.get_ref() else {
-            self.wrong_type(key, value, "a list of texts in quotes");
+            self.wrong_type(key, value, expected);
             return Vec::new();
         };
-        let text = |item: &Spanned<DeValue<'t>>| {
-            if let DeValue::String(s) = item.get_ref() {
-                Some(self.one_line(key, item.span(), s))
-            } else {
-                self.wrong_type(key, item, "a list of texts in quotes");
-                None
+        let item = |item: &Spanned<DeValue<'t>>| {
+            let read = read(item);
+            if read.is_none() {
+                self.wrong_type(key, item, expected);
             }
+            read
         };
-        items.iter().filter_map(text).collect()
+        items.iter().filter_map(item).collect()
+    }
+
+    /// A list of texts; an empty one where the key is left out.
+    pub fn texts(&self, key: &str) -> Vec<String> {
+        self.list(key, "a list of texts in quotes", |item| match item.get_ref() {
+            DeValue::String(s) => Some(self.one_line(key, item.span(), s)),
+            _ => None,
+        })
     }
 
     /// One of a few words; the first choice takes the place of a wrong one.
@@ -176,41 +183,23 @@ impl<'t> Section<'_, 't> {
 
     /// A list of numbers, each within the limits; an empty one where the key is left out.
     pub fn floats(&self, key: &str, limits: Limits) -> Vec<f64> {
-        let Some(value) = self.get(key) else { return Vec::new() };
-        let DeValue::Array(items) = value.get_ref() else {
-            self.wrong_type(key, value, &format!("a list of numbers{}", describe(&limits)));
-            return Vec::new();
-        };
-        items
-            .iter()
-            .map(|item| {
-                if let Some(v) = number(item.get_ref()) {
-                    self.limited(item.span(), key, v, &limits)
-                } else {
-                    self.wrong_type(key, item, &format!("a list of numbers{}", describe(&limits)));
-                    *limits.range.start()
-                }
-            })
-            .collect()
+        let expected = format!("a list of numbers{}", describe(&limits));
+        self.list(key, &expected, |item| match number(item.get_ref()) {
+            Some(v) => Some(self.limited(item.span(), key, v, &limits)),
+            None => {
+                self.wrong_type(key, item, &expected);
+                Some(*limits.range.start())
+            }
+        })
     }
 
     /// A list of numbers, texts or switches; an empty one where the key is left out.
     pub fn scalars(&self, key: &str) -> Vec<Scalar> {
         const EXPECTED: &str = "a list of numbers, texts in quotes, or true and false";
-        let Some(value) = self.get(key) else { return Vec::new() };
-        let DeValue::Array(items) = value.get_ref() else {
-            self.wrong_type(key, value, EXPECTED);
-            return Vec::new();
-        };
-        let scalar = |item: &Spanned<DeValue<'t>>| match Scalar::of(item.get_ref()) {
-            Some(Scalar::Text(text)) => Some(Scalar::Text(self.one_line(key, item.span(), &text))),
-            Some(other) => Some(other),
-            None => {
-                self.wrong_type(key, item, EXPECTED);
-                None
-            }
-        };
-        items.iter().filter_map(scalar).collect()
+        self.list(key, EXPECTED, |item| match Scalar::of(item.get_ref())? {
+            Scalar::Text(text) => Some(Scalar::Text(self.one_line(key, item.span(), &text))),
+            other => Some(other),
+        })
     }
 
     /// Exactly `N` numbers that must be there, each within the limits.

@@ -74,12 +74,7 @@ impl MapTable {
     /// # Errors
     /// If the file is no NPY array of shape `[ny, nx]`, holds what is no number, or ends before.
     pub(super) fn load(&mut self, reach_um: [f64; 2]) -> Result<()> {
-        let fault = |what: String, hint: &str| Error::Table {
-            path: self.file.clone(),
-            line: None,
-            what,
-            hint: hint.into(),
-        };
+        let fault = |what: String, hint: &str| Error::table(&self.file, None, what, hint);
         let array = read(&self.file)?;
         let [rows, columns] = [array.shape[0], array.shape[1]].map(|n| n as usize);
         if let Some(at) = array.values.iter().position(|v| !v.is_finite()) {
@@ -173,12 +168,8 @@ fn read(path: &Path) -> Result<npy::Array> {
 
 /// Rows of numbers, equally many in each, between commas, semicolons, tabs or spaces.
 fn read_text(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<npy::Array> {
-    let fault = |line: Option<usize>, what: String| Error::Table {
-        path: path.to_owned(),
-        line,
-        what,
-        hint: format!("give phases in rad, 2 to {MOST} rows of as many numbers each, the lowest row first"),
-    };
+    let hint = format!("give phases in rad, 2 to {MOST} rows of as many numbers each, the lowest row first");
+    let fault = |line: Option<usize>, what: String| Error::table(path, line, what, &hint);
     let bytes = metalith_core::file::read_at_most(path, LONGEST_TEXT, "a table of phases")?;
     let text = String::from_utf8(bytes).map_err(|_| fault(None, "this is not text".into()))?;
     let (mut values, mut rows, mut columns) = (Vec::new(), 0, 0);

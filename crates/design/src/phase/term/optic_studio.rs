@@ -5,7 +5,7 @@
 //! the radius that lengths are divided by (in the unit of `UNIT`), and those after are coefficients (rad): of x, y, x^2, xy, y^2,
 //! x^3, ... for Binary 1, of r^2, r^4, ... for Binary 2. `CURV`, `CONI` and `PARM 1` to `PARM 8` bend the surface; a chip is flat.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::TermForm;
 use crate::phase::RadialPhase;
@@ -244,12 +244,7 @@ struct Fault<'a>(&'a Path);
 
 impl Fault<'_> {
     fn error(&self, line: Option<usize>, what: String, hint: &str) -> Error {
-        Error::Table {
-            path: PathBuf::from(self.0),
-            line,
-            what,
-            hint: hint.into(),
-        }
+        Error::table(self.0, line, what, hint)
     }
 
     fn at(&self, line: usize, what: String) -> Error {
