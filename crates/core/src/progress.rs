@@ -30,10 +30,7 @@ pub trait Progress: Sync {
     /// # Errors
     /// [`Error::Interrupted`], if the user asked to stop.
     fn check_stopped(&self) -> Result<()> {
-        match self.stopped() {
-            true => Err(Error::Interrupted),
-            false => Ok(()),
-        }
+        if self.stopped() { Err(Error::Interrupted) } else { Ok(()) }
     }
 }
 

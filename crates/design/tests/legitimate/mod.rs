@@ -1,7 +1,7 @@
 //! Reasons for wrong values of which nothing is said before a file is written.
 
 /// What catches wrong values or why they are legitimate, and the values: key and factor.
-pub(crate) const LEGITIMATE: &str = r#"
+pub(crate) const LEGITIMATE: &str = r"
 legitimate: a range that the mapping does not use; `metalith check` holds what is drawn to the process | cell.width_min_nm / 10
 legitimate: the hyperbola follows, and a lens may have any NA that its lattice carries | lens.focal_length_um x 10, lens.focal_length_um / 10
 legitimate: a number names a layer, two purposes on one are refused | layers.pillars.layer / 10, layers.pillar_marks.layer x 10, layers.pillar_marks.layer / 10, layers.apertures.layer x 10, layers.apertures.layer / 10
@@ -35,4 +35,4 @@ legitimate: a weaker polynomial | element.phase.term.coefficients_rad / 10
 legitimate: the cross still meets no opening, which is refused | mark.x_um / 10, mark.y_um / 10
 legitimate: an aberration may have any size | phase.term.coefficients_waves x 10, phase.term.coefficients_waves / 10
 legitimate: a term may have any size | phase.term.scale x 10, phase.term.scale / 10
-"#;
+";

@@ -422,12 +422,12 @@ pub(super) mod tests {
         refused(&npy_bytes("(16, 16)", &[-0.1; 256]), None, "negative");
         refused(&npy_bytes("(16, 16)", &[f64::INFINITY; 256]), None, "no number");
         refused(
-            &metalith_testing::npy("|u1", "(16, 16)", [128; 256].into_iter()),
+            &metalith_testing::npy("|u1", "(16, 16)", [128; 256]),
             None,
             "divide it by its white",
         );
         refused(
-            &metalith_testing::npy("<u2", "(16, 16)", [117; 512].into_iter()),
+            &metalith_testing::npy("<u2", "(16, 16)", [117; 512]),
             None,
             "divide it by its white",
         );
