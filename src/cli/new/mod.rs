@@ -110,6 +110,10 @@ fn chord_nm(diameter_um: f64, margin_um: f64) -> f64 {
     (0.5 * opening_nm * side_angle.powi(2)).ceil().max(FINEST_CHORD_NM)
 }
 
+/// Diameters and focal lengths that a design may have (um): refused before a cell is solved for them.
+const DIAMETERS_UM: std::ops::RangeInclusive<f64> = 5.0..=100_000.0;
+const FOCAL_LENGTHS_UM: std::ops::RangeInclusive<f64> = 1.0..=100_000.0;
+
 /// Shortest and longest pitch of a design (nm).
 const PITCHES_NM: std::ops::RangeInclusive<f64> = 100.0..=20_000.0;
 
@@ -183,15 +187,16 @@ impl NewArgs {
             return Ok(StartCell::of_the_paper());
         }
         let (nm, focal_length_um) = (self.wavelength_nm(), self.focal_length_um());
-        let numbers = [nm, self.diameter_um(), focal_length_um];
-        if !(numbers.iter().all(|n| n.is_finite() && *n > 0.0) && self.steering_deg().abs() < 90.0) {
+        let is_lens = DIAMETERS_UM.contains(&self.diameter_um()) && FOCAL_LENGTHS_UM.contains(&focal_length_um);
+        if !(nm.is_finite() && nm > 0.0 && is_lens && self.steering_deg().abs() < 90.0) {
             return Err(Error::refused(
                 "new/numbers",
                 format!(
                     "a lens of {} um, f = {focal_length_um} um, for {nm} nm",
                     self.diameter_um()
                 ),
-                "give positive numbers, and steering of less than 90 degrees",
+                "give a diameter from 5 to 100000 um, a focal length from 1 to 100000 um, a positive wavelength and steering of less than \
+                 90 degrees",
             ));
         }
         let wavelength_um = nm * 1e-3;
