@@ -21,7 +21,7 @@ fn lens(referenced: bool) -> (Vec<u8>, ElementSite) {
     for iy in 0..SITES {
         for ix in 0..SITES {
             let w = (ix * 7 + iy * 13) % 100;
-            let (x, y) = (lattice.coordinate_nm(ix) as i32, lattice.coordinate_nm(iy) as i32);
+            let (x, y) = (lattice.whole_nm(0, ix) as i32, lattice.whole_nm(0, iy) as i32);
             if referenced {
                 gds.sref(&format!("W{w}"), x, y);
             } else {

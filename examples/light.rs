@@ -27,7 +27,7 @@ fn main() -> Result<()> {
         .iter()
         .map(|&l| {
             Ok((
-                cell.transmissions(l, design.cell.pitch_nm as u16)?,
+                cell.transmissions(l, design.cell.pitch_nm.nm() as u16)?,
                 cell.full_transmission(l)?,
             ))
         })
@@ -37,7 +37,7 @@ fn main() -> Result<()> {
     for (placed, found) in array.placed.iter().zip(&extraction.elements) {
         let phase = ElementPhase::of(&lens, &placed.element);
         // Sums of exp(-2 pi i m u) over the pillars of each width, for m = 0 and 1.
-        let mut by_width = vec![[Complex64::ZERO; 2]; design.cell.pitch_nm as usize + 1];
+        let mut by_width = vec![[Complex64::ZERO; 2]; design.cell.pitch_nm.nm() as usize + 1];
         let mut pillars = 0.0;
         for ((iy, ix), &width) in found.widths.number.indexed_iter() {
             if let (Some(u), true) = (phase.wrapped(ix, iy), width > 0) {

@@ -50,7 +50,7 @@ fn main() -> Result<()> {
                     *most = blocks;
                 }
                 let cell: Box<dyn CellModel> = match fidelity {
-                    Fidelity::Published => Box::new(PublishedCell::new(design.cell.pitch_nm)),
+                    Fidelity::Published => Box::new(PublishedCell::new(design.cell.pitch_nm.nm() as u32)),
                     _ => Box::new(RigorousCell::obtain(&shipped.table_spec()?, cache_folder().as_deref(), &Silent)?.0),
                 };
                 let start = Instant::now();

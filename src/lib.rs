@@ -124,8 +124,8 @@ pub use metalith_gds::extract::{Extraction, ExtractionPlan, extract};
 pub use metalith_layout::{write_apertures, write_layer_properties, write_pillars};
 pub use metalith_optics::{AsBuiltChip, CalibratedModel};
 pub use metalith_pillars::{
-    ElementSite, Lattice, LatticeKind, OutlineForm, PillarId, PillarKind, PillarMap, PillarRows, PillarShape,
-    PolarisationBasis, Rectangles, RotatedRectangles, UprightRectangles,
+    DatabaseUnit, ElementSite, Lattice, LatticeKind, OutlineForm, PillarId, PillarKind, PillarMap, PillarRows,
+    PillarShape, Pitch, PolarisationBasis, Rectangles, RotatedRectangles, UprightRectangles,
 };
 pub use metalith_verify::{SimulationCase, SimulationCases, Verification, verify, write_report};
 pub use metalith_wave::Accuracy;

@@ -7,13 +7,13 @@ use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
 use metalith::{
     ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarId, PillarMap, PillarShape,
-    Wedge, extract,
+    Pitch, Wedge, extract,
 };
 use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::lattices::{check_places, check_shape, kind_of, lattice_of};
+use crate::lattices::{PitchNm, check_places, check_shape, kind_of, lattice_of};
 use crate::shapes::{ToldShape, shape_of, told};
 use crate::work::{error, work};
 
@@ -60,8 +60,8 @@ impl Design {
     }
 
     #[getter]
-    fn pitch_nm(&self) -> u32 {
-        self.design.cell.pitch_nm
+    fn pitch_nm(&self) -> PitchNm {
+        self.design.cell.pitch_nm.into()
     }
 
     /// Lattice of the pillars.
@@ -126,8 +126,8 @@ impl Array {
     }
 
     #[getter]
-    fn pitch_nm(&self) -> u32 {
-        self.array.lattice.pitch_nm()
+    fn pitch_nm(&self) -> PitchNm {
+        self.array.lattice.pitch_nm().into()
     }
 
     /// Lattice of the pillars.
@@ -269,7 +269,7 @@ pub fn width_map(
 ) -> metalith::Result<PillarMap> {
     check_shape(kind, shape)?;
     let lattice = lattice_of(kind, pitch_nm, width_nm.dim(), "map")?;
-    let widest_nm = kind.widest_nm(pitch_nm);
+    let widest_nm = kind.widest_nm(pitch_nm.into(), lattice.unit());
     if let (Some(PillarId(last)), Some((_, longer))) = (shape.last(), shape.edge_range_nm()) {
         if u32::from(longer) > pitch_nm {
             return Err(Error::refused(
@@ -307,7 +307,7 @@ type ReadLayout<'py> = (
     Vec<String>,
     Vec<[i64; 2]>,
     Vec<Bound<'py, PyArray2<u16>>>,
-    u32,
+    PitchNm,
     String,
     u64,
     u64,
@@ -345,7 +345,8 @@ pub fn read_layout<'py>(
     let others = found.oddities.total();
     let shape = told(found.shape);
     let lattice = found.elements.first().map(|e| e.site.lattice);
-    let (pitch_nm, kind) = lattice.map_or((0, LatticeKind::Square), |l| (l.pitch_nm(), l.kind()));
+    let (pitch_nm, kind) = lattice.map_or((Pitch::whole(0), LatticeKind::Square), |l| (l.pitch_nm(), l.kind()));
+    let pitch_nm = PitchNm::from(pitch_nm);
     let (mut names, mut centres_nm, mut widths_nm) = (vec![], vec![], vec![]);
     for ExtractedElement { site, widths } in found.elements {
         names.push(site.name);

@@ -2,7 +2,7 @@
 
 use metalith::cell::CellStack;
 use metalith::rcwa::CellLattice;
-use metalith::{Error, Lattice, LatticeKind, PillarShape, Result};
+use metalith::{DatabaseUnit, Error, Lattice, LatticeKind, PillarShape, Pitch, Result};
 use ndarray::Array2;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -30,7 +30,7 @@ pub fn lattice_of(kind: LatticeKind, pitch_nm: u32, (rows, columns): (usize, usi
             "give a square one: pad it with zeros, which are places without pillars",
         ));
     }
-    Lattice::of_kind(kind, pitch_nm, rows)
+    exact(kind, pitch_nm, rows)
 }
 
 /// Succeeds if pillars of such a shape can stand on a lattice of the kind.
@@ -79,10 +79,36 @@ pub fn stack_on(stack: CellStack, kind: LatticeKind, shape: PillarShape) -> Resu
         ));
     }
     Ok(CellStack {
-        lattice: CellLattice::drawn(kind, stack.pitch_nm as u32),
+        lattice: CellLattice::drawn(kind, (stack.pitch_nm as u32).into(), DatabaseUnit::Nanometre),
         shape,
         ..stack
     })
+}
+
+/// Pitch of a lattice: an integer where it is whole (nm).
+#[derive(IntoPyObject)]
+pub enum PitchNm {
+    Whole(u32),
+    Fraction(f64),
+}
+
+impl From<Pitch> for PitchNm {
+    fn from(pitch: Pitch) -> Self {
+        pitch.whole_nm().map_or_else(|| Self::Fraction(pitch.nm()), Self::Whole)
+    }
+}
+
+/// The lattice of a kind whose places are all whole nanometres.
+fn exact(kind: LatticeKind, pitch_nm: u32, sites: usize) -> Result<Lattice> {
+    let lattice = Lattice::of_kind(kind, pitch_nm, sites)?;
+    if lattice.rounding_nm() > 0.0 {
+        return Err(Error::refused(
+            "lattice/off-grid",
+            format!("a pitch of {pitch_nm} nm and {sites} sites put pillar centres off the 1 nm grid"),
+            "use an even number of nanometres, or on a square lattice an odd number of sites",
+        ));
+    }
+    Ok(lattice)
 }
 
 /// Places of columns and rows from the middle of an element (nm), and which places of the grid are sites, `[row, column]`.
@@ -96,8 +122,8 @@ pub type Places<'py> = (
 #[pyfunction]
 pub fn places<'py>(py: Python<'py>, sites: usize, pitch_nm: u32, lattice: &str) -> PyResult<Places<'py>> {
     let kind = kind_of(lattice).map_err(error)?;
-    let lattice = Lattice::of_kind(kind, pitch_nm, sites).map_err(error)?;
-    let along = |axis: usize| PyArray1::from_iter(py, (0..sites).map(|i| lattice.place_nm(axis, i)));
+    let lattice = exact(kind, pitch_nm, sites).map_err(error)?;
+    let along = |axis: usize| PyArray1::from_iter(py, (0..sites).map(|i| lattice.place_units(axis, i)));
     let is_site = Array2::from_shape_fn((sites, sites), |(iy, ix)| is_site(lattice, ix, iy));
     Ok((along(0), along(1), PyArray2::from_owned_array(py, is_site)))
 }

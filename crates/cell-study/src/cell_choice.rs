@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use metalith_cell::{AVOIDED_BELOW, CellStack, PhaseCurve, SolvedMapping, UniformLayer};
 use metalith_core::{Error, Progress, Result};
-use metalith_pillars::{LatticeKind, PillarShape};
+use metalith_pillars::{DatabaseUnit, LatticeKind, PillarShape, Pitch};
 use metalith_rcwa::{CellLattice, Material, Orders};
 
 /// Diffraction orders along an axis while cells are tried, and widths of each.
@@ -53,14 +53,16 @@ pub struct CellRequest {
     pub numerical_aperture: f64,
     pub steering_sine: f64,
     /// Pitch and height (nm), where they are given.
-    pub pitch_nm: Option<u32>,
+    pub pitch_nm: Option<Pitch>,
     pub height_nm: Option<f64>,
 }
 
 /// A cell that was chosen.
 #[derive(Clone, Debug)]
 pub struct ChosenCell {
-    pub pitch_nm: u32,
+    pub pitch_nm: Pitch,
+    /// Database unit of its layouts.
+    pub database_unit: DatabaseUnit,
     pub height_nm: f64,
     /// Narrowest and widest pillar, and the step between widths (nm).
     pub widths_nm: (u16, u16),
@@ -78,10 +80,18 @@ pub struct ChosenCell {
 /// A pitch and a height with the mapping of a few widths.
 #[derive(Clone, Debug)]
 struct Trial {
-    pitch_nm: u32,
+    pitch_nm: Pitch,
     height_nm: f64,
     mapping: SolvedMapping,
     score: f64,
+}
+
+/// Database unit for a pitch: the largest of which half the pitch is a multiple, so that a lens has as many sites on either side
+/// of its centre; else the largest that divides the pitch, with a site in the centre; else the finest.
+fn unit_of(pitch: Pitch) -> DatabaseUnit {
+    let exact = DatabaseUnit::ALL.into_iter().find(|unit| unit.divides_half(pitch));
+    let exact = exact.or_else(|| DatabaseUnit::of_pitch(pitch));
+    exact.unwrap_or(DatabaseUnit::Tenth)
 }
 
 /// True if a mapping makes a lens.
@@ -115,9 +125,9 @@ impl CellRequest {
         self.numerical_aperture + self.steering_sine
     }
 
-    fn stack(&self, pitch_nm: u32, height_nm: f64) -> Result<CellStack> {
+    fn stack(&self, pitch_nm: Pitch, height_nm: f64) -> Result<CellStack> {
         Ok(CellStack {
-            lattice: CellLattice::drawn(self.lattice, pitch_nm),
+            lattice: CellLattice::drawn(self.lattice, pitch_nm, unit_of(pitch_nm)),
             shape: self.shape,
             film: self.film.clone(),
             substrate: self.substrate.clone(),
@@ -225,6 +235,7 @@ impl CellRequest {
             if best.as_ref().is_none_or(|(most, _)| score > *most) {
                 let cell = ChosenCell {
                     pitch_nm: trial.pitch_nm,
+                    database_unit: unit_of(trial.pitch_nm),
                     height_nm: trial.height_nm,
                     widths_nm,
                     step_nm,
@@ -291,8 +302,8 @@ impl CellRequest {
     }
 
     /// Narrowest and widest pillar and the step (nm) on a pitch.
-    fn widths(&self, pitch_nm: u32) -> Result<((u16, u16), u16)> {
-        let widest = f64::from(self.lattice.widest_nm(pitch_nm));
+    fn widths(&self, pitch_nm: Pitch) -> Result<((u16, u16), u16)> {
+        let widest = f64::from(self.lattice.widest_nm(pitch_nm, DatabaseUnit::Nanometre));
         let step = 2.0 * (f64::from(pitch_nm) / 500.0).round().max(1.0);
         let low = step * ((NARROWEST * widest).max(LEAST_NM) / step).ceil();
         let high = step * ((widest - (GAP * widest).max(LEAST_NM)) / step).floor();
@@ -324,11 +335,11 @@ impl CellRequest {
     fn trials(&self, diffracts_nm: f64, progress: &dyn Progress) -> Result<Vec<Trial>> {
         // At longer pitches the steps of the phase send light past the lens, into an order that travels in air.
         let limit_nm = diffracts_nm.min(1e3 * self.wavelength_um / (1.0 + self.sine()));
-        let pitches: Vec<u32> = match self.pitch_nm {
+        let pitches: Vec<Pitch> = match self.pitch_nm {
             Some(pitch) => vec![pitch],
             None => PITCHES
                 .iter()
-                .map(|share| 2 * (0.5 * share * limit_nm).floor() as u32)
+                .map(|share| Pitch::whole(2 * (0.5 * share * limit_nm).floor() as u32))
                 .collect(),
         };
         let heights = self.heights()?;
@@ -410,12 +421,12 @@ mod tests {
     #[test]
     fn pitches_and_apertures_beyond_the_lattice_are_refused() {
         let coarse = said(&CellRequest {
-            pitch_nm: Some(500),
+            pitch_nm: Some(500.into()),
             ..request()
         });
         assert!(coarse.contains("434.") && coarse.contains("--pitch-nm 434"), "{coarse}");
         let steep = said(&CellRequest {
-            pitch_nm: Some(400),
+            pitch_nm: Some(400.into()),
             numerical_aperture: 0.9,
             ..request()
         });
@@ -430,11 +441,11 @@ mod tests {
 
     #[test]
     fn widths_and_heights_are_on_their_grids() {
-        let ((low, high), step) = request().widths(400).unwrap();
+        let ((low, high), step) = request().widths(400.into()).unwrap();
         assert_eq!((low, high, step), (100, 340, 2));
-        let ((low, high), step) = request().widths(2700).unwrap();
+        let ((low, high), step) = request().widths(2700.into()).unwrap();
         assert!(step == 10 && low % step == 0 && high % step == 0);
-        assert!(request().widths(110).is_err());
+        assert!(request().widths(110.into()).is_err());
         let heights = request().heights().unwrap();
         assert!(heights.is_sorted() && heights.iter().all(|h| h % 10.0 == 0.0) && heights.len() > 20);
     }

@@ -97,7 +97,11 @@ fn opened<R: Read>(
     let npy = npyz::NpyFile::new(Cursor::new(header).chain(from)).map_err(|e| NpyError::Format(e.to_string()))?;
     let shape = npy.shape().to_vec();
     let columns_first = npy.order() != npyz::Order::C;
-    if takes(&shape, columns_first) { Ok((npy, shape, columns_first)) } else { Err(NpyError::Shape { shape, columns_first }) }
+    if takes(&shape, columns_first) {
+        Ok((npy, shape, columns_first))
+    } else {
+        Err(NpyError::Shape { shape, columns_first })
+    }
 }
 
 /// Real numbers in double or single precision; the file itself if it holds others.

@@ -30,7 +30,11 @@ pub trait Progress: Sync {
     /// # Errors
     /// [`Error::Interrupted`], if the user asked to stop.
     fn check_stopped(&self) -> Result<()> {
-        if self.stopped() { Err(Error::Interrupted) } else { Ok(()) }
+        if self.stopped() {
+            Err(Error::Interrupted)
+        } else {
+            Ok(())
+        }
     }
 }
 

@@ -37,7 +37,9 @@ fn main() {
     let coarse = CoarseCell::new(&stack, um, prototype.mapping.range_nm()).unwrap();
     let full = coarse.full_transmission().unwrap();
     let equal = PointwiseCell::new(stack.clone(), prototype.design.cell.widths_nm());
-    let equal = equal.transmissions(um, prototype.design.cell.pitch_nm as u16).unwrap();
+    let equal = equal
+        .transmissions(um, prototype.design.cell.pitch_nm.nm() as u16)
+        .unwrap();
     let table = prototype.neighbours(um, ALONG_NORMAL);
 
     let mut shares: Vec<(f64, [f64; 3])> = Vec::new();

@@ -114,7 +114,7 @@ impl CellSpec {
             })
         };
         Ok(CellStack {
-            lattice: CellLattice::drawn(self.lattice, self.pitch_nm),
+            lattice: CellLattice::drawn(self.lattice, self.pitch_nm, self.database_unit),
             shape: self.shape,
             film: material(&self.pillar_material)?,
             substrate: material(&self.substrate_material)?,

@@ -213,8 +213,8 @@ impl Design {
     /// The lattice that the pillars of each element stand on: it covers the largest.
     pub fn lattice(&self) -> Lattice {
         let largest_nm = self.array.largest_nm(&self.lens);
-        Lattice::of_kind_covering(self.cell.lattice, largest_nm, self.cell.pitch_nm)
-            .expect("checked when the design was read")
+        let lattice = self.cell.lattice_covering(largest_nm);
+        lattice.expect("checked when the design was read")
     }
 
     /// The lens of an element: its own, or that all share.

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 
 use serde::Serialize;
 
-use crate::{Design, FieldAngle};
+use crate::{CellSpec, Design, FieldAngle};
 use metalith_core::Result;
 use metalith_pillars::LatticeKind;
 
@@ -119,7 +119,7 @@ impl Design {
         }
         wavelengths_um.sort_by(f64::total_cmp);
         wavelengths_um.dedup();
-        let vectors = vectors_um(self.cell.lattice, self.cell.pitch_nm);
+        let vectors = vectors_um(&self.cell);
         let elements = self.elements();
         let mut found = Vec::new();
         for medium in Medium::BOTH {
@@ -157,12 +157,15 @@ impl Design {
 }
 
 /// Vectors of the lattice (1/um) that the longest edges belong to, and more.
-fn vectors_um(lattice: LatticeKind, pitch_nm: u32) -> Vec<[f64; 2]> {
-    let pitch_um = f64::from(pitch_nm) * 1e-3;
+fn vectors_um(cell: &CellSpec) -> Vec<[f64; 2]> {
+    let pitch_um = cell.pitch_nm.nm() * 1e-3;
     // Of staggered rows, those of a rectangle of two rows whose sum is even.
-    let (along_y_um, staggered) = match lattice {
+    let (along_y_um, staggered) = match cell.lattice {
         LatticeKind::Square => (pitch_um, false),
-        LatticeKind::Hexagonal => (2.0 * f64::from(lattice.row_nm(pitch_nm)) * 1e-3, true),
+        LatticeKind::Hexagonal => (
+            2.0 * cell.lattice.row_nm(cell.pitch_nm, cell.database_unit) * 1e-3,
+            true,
+        ),
     };
     let all = (-2..=2).flat_map(|m: i32| (-2..=2).map(move |n: i32| (m, n)));
     all.filter(|&(m, n)| (m, n) != (0, 0) && !(staggered && (m + n) % 2 != 0))
@@ -197,9 +200,17 @@ mod tests {
         .unwrap()
     }
 
+    fn of_lattice(lattice: LatticeKind, pitch_nm: u32) -> Vec<[f64; 2]> {
+        vectors_um(&CellSpec {
+            lattice,
+            pitch_nm: pitch_nm.into(),
+            ..changed("asi_940", &[]).cell
+        })
+    }
+
     #[test]
     fn edges_are_those_of_the_grating_equation() {
-        let square = vectors_um(LatticeKind::Square, 500);
+        let square = of_lattice(LatticeKind::Square, 500);
         assert!((edge_um(1.5, [0.0; 2], &square) - 0.75).abs() < ROUNDING_UM);
         // Light from a sine of 0.2 meets the order that turns it back later, whichever side it is from.
         for sines in [[0.2, 0.0], [-0.2, 0.0], [0.0, 0.2], [0.0, -0.2]] {
@@ -210,7 +221,7 @@ mod tests {
         let wanted = 0.5 * (diagonal + (1.0 - diagonal * diagonal).sqrt());
         assert!((edge_um(1.0, [diagonal, -diagonal], &square) - wanted).abs() < ROUNDING_UM);
         // Rows are 606 nm apart.
-        let hexagonal = vectors_um(LatticeKind::Hexagonal, 700);
+        let hexagonal = of_lattice(LatticeKind::Hexagonal, 700);
         let along_rows = 1.0 / (1.0 / 0.7f64).hypot(1.0 / 1.212);
         assert!((edge_um(1.0, [0.0; 2], &hexagonal) - along_rows.max(0.606)).abs() < ROUNDING_UM);
     }

@@ -1,10 +1,10 @@
 //! Properties of a design that are allowed and easily are mistakes.
 
 use metalith_core::{Result, Warning};
-use metalith_pillars::{PillarShape, Steepness};
+use metalith_pillars::{DatabaseUnit, PillarShape, Pitch, Steepness};
 
 use crate::phase::{ElementPhase, LensPhase, RadialPhase, TermForm};
-use crate::{AskedLight, Design, LatticeOrders, LensSpec};
+use crate::{AskedLight, CellSpec, Design, LatticeOrders, LensSpec};
 
 /// Sites of a design whose phase is compared with the phase of their neighbours: of larger elements some rows are.
 const MOST_SITES: usize = 1 << 22;
@@ -39,6 +39,7 @@ impl Design {
         found.extend(self.other_discs());
         found.extend(self.wide_margins());
         found.extend(self.coarse_circles());
+        found.extend(self.rounded_places());
         found.extend(self.steep_phase());
         found.extend(lattice_warning(
             &self.lattice_orders(AskedLight::All)?,
@@ -89,6 +90,34 @@ impl Design {
             ),
             "use one wavelength in [phase], [mapping] and [array], unless this is meant",
         ))
+    }
+
+    /// Pillars that are not where the lattice has them, because the grid of the files is too coarse.
+    fn rounded_places(&self) -> Option<Warning> {
+        let (lattice, unit) = (self.lattice(), self.cell.database_unit);
+        let rounding_nm = lattice.rounding_nm();
+        let exact = DatabaseUnit::ALL.into_iter().filter(|finer| {
+            let same = CellSpec {
+                database_unit: *finer,
+                ..self.cell.clone()
+            };
+            let lattice = same.lattice_covering(self.array.largest_nm(&self.lens));
+            lattice.is_ok_and(|lattice| lattice.rounding_nm() == 0.0)
+        });
+        let mut exact = exact.map(|unit| format!("`database_unit_nm = {unit}` in [cell] leaves all where they are"));
+        (rounding_nm > 0.0).then(|| {
+            Warning::new(
+                "layout/rounded-places",
+                format!(
+                    "pillars on a lattice of {} nm are up to {:.2} nm off their places along an axis, on the database unit of {unit} nm; copies by \
+                     symmetry are exact, gaps differ by up to {:.2} nm",
+                    self.cell.pitch_nm,
+                    rounding_nm,
+                    2.0 * rounding_nm
+                ),
+                exact.next().unwrap_or_else(|| "use a pitch that is a multiple of a database unit".to_owned()),
+            )
+        })
     }
 
     /// Tables of phases that jump by whole waves.
@@ -281,7 +310,7 @@ fn missed(lens: &LensSpec, wavelength_um: f64) -> f64 {
 }
 
 /// Light that the lattice diffracts, and the pitch (nm) that would not.
-fn lattice_warning(orders: &[LatticeOrders], pitch_nm: u32) -> Option<Warning> {
+fn lattice_warning(orders: &[LatticeOrders], pitch_nm: Pitch) -> Option<Warning> {
     let pitches = orders.iter().map(|o| o.wavelength_um / o.edge_um * f64::from(pitch_nm));
     let pitch = pitches.fold(f64::INFINITY, f64::min).floor();
     (!orders.is_empty()).then(|| {

@@ -69,8 +69,9 @@ fn each_missing_key_is_one_mistake() {
     let rectangles = faults("geometric_phase_532", &mapped("geometric_phase_532", ""));
     assert_eq!(words(&rectangles), [NO_WAVELENGTH]);
     // Nothing is said of a cell that is not known.
-    let text = mapped("asi_940", "").replacen("pitch_nm = 450", "pitch_nm = 451", 1);
-    assert_eq!(words(&faults("asi_940", &text)), ["a pitch of 451 nm is odd"]);
+    let text = mapped("asi_940", "").replacen("pitch_nm = 450", "pitch_nm = 451.02", 1);
+    let wrong = "a pitch of 451.02 nm is no multiple of 0.05 nm";
+    assert_eq!(words(&faults("asi_940", &text)), [wrong]);
 }
 
 #[test]

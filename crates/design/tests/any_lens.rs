@@ -265,9 +265,9 @@ fn the_least_spacing_of_a_grid_leaves_a_pitch() {
         assert_eq!(error.ids(), ["array.spacing_um/inconsistent"], "{name}: {error}");
         let design = read(least_um).unwrap();
         let lattice = design.lattice();
-        let outermost_nm = lattice.place_nm(0, lattice.sites() - 1);
+        let outermost_nm = lattice.whole_nm(0, lattice.sites() - 1);
         let between_nm = design.array.spacing_nm - 2 * outermost_nm;
-        assert_eq!(between_nm, i64::from(design.cell.pitch_nm), "{name}");
+        assert_eq!(between_nm, design.cell.pitch_nm.nm() as i64, "{name}");
     }
 }
 

@@ -59,7 +59,7 @@ fn a_map_covers_the_box_about_its_aperture() {
         for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
             let [x, y] = [lattice.place_um(0, ix), lattice.place_um(1, iy)];
             let Some(turns) = phase.turns(ix, iy) else {
-                assert!(!outline.holds(lattice.place_nm(0, ix), lattice.place_nm(1, iy)));
+                assert!(!outline.holds(lattice.whole_nm(0, ix), lattice.whole_nm(1, iy)));
                 continue;
             };
             inside += 1;

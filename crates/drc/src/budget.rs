@@ -109,7 +109,7 @@ impl Writing {
             .elements
             .iter()
             .map(|e| {
-                (e.site.lattice.sites() as f64 * (f64::from(e.site.lattice.steps_nm()[0]) * 1e-3) / self.field_um)
+                (e.site.lattice.sites() as f64 * (e.site.lattice.steps_nm()[0] * 1e-3) / self.field_um)
                     .ceil()
                     .powi(2)
             })

@@ -52,7 +52,7 @@ impl Windows {
         let n = lattice.sites();
         let (mut sites, mut first, mut count) = ([0; 2], [0; 2], [0; 2]);
         for (axis, step) in lattice.steps_nm().into_iter().enumerate() {
-            let own = ((window_um / (f64::from(step) * 1e-3)) as usize).max(1);
+            let own = ((window_um / (step * 1e-3)) as usize).max(1);
             // Windows on each side of the middle one.
             let beside = (n as i64 - own as i64).max(-1).div_euclid(2 * own as i64);
             sites[axis] = own;
@@ -75,7 +75,7 @@ impl Windows {
             }
         }
         // On a square lattice the square of one number, to the last bit.
-        let [wide, high] = [0, 1].map(|axis| sites[axis] as f64 * (f64::from(lattice.steps_nm()[axis]) * 1e-3) * 1e3);
+        let [wide, high] = [0, 1].map(|axis| sites[axis] as f64 * (lattice.steps_nm()[axis] * 1e-3) * 1e3);
         let share = |area: u64| area as f64 * flat.shape.area_share() / (wide * high);
         let fill = areas.into_iter().map(|area| area.map(share)).collect();
         Self {
@@ -109,14 +109,14 @@ impl Windows {
     /// The area of window `k`.
     fn place(&self, flat: &FlatLayout<'_>, element: usize, k: usize) -> Rect {
         let site = &flat.elements[element].site;
-        let steps = site.lattice.steps_nm().map(i64::from);
+        let steps = site.lattice.steps_nm();
         let corner = |axis: usize, at: usize| {
-            let first = (self.first[axis] + at * self.sites[axis]) as i64;
-            site.centre_nm[axis] + site.lattice.place_nm(axis, 0) + first * steps[axis] - steps[axis] / 2
+            let first = (self.first[axis] + at * self.sites[axis]) as f64;
+            site.centre_nm[axis] as f64 + site.lattice.place_nm(axis, 0) + first * steps[axis] - steps[axis] / 2.0
         };
-        let unit = |nm: i64| flat.units(nm as f64).round() as i64;
+        let unit = |nm: f64| flat.units(nm).round() as i64;
         let (x, y) = (corner(0, k % self.count[0]), corner(1, k / self.count[0]));
-        let size = [0, 1].map(|axis| self.sites[axis] as i64 * steps[axis]);
+        let size = [0, 1].map(|axis| self.sites[axis] as f64 * steps[axis]);
         let mut r = Rect::EMPTY;
         r.include(Point::new(unit(x), unit(y)));
         r.include(Point::new(unit(x + size[0]), unit(y + size[1])));

@@ -105,10 +105,10 @@ impl FlatLayout<'_> {
             OutlineForm::Square => Body::Rect(around),
             OutlineForm::Circle => Body::Disc(around),
             OutlineForm::Polygon => {
-                let (e, unit) = (&self.elements[element], |nm: i64| self.units(nm as f64).round() as i64);
-                let x = e.site.centre_nm[0] + e.site.lattice.place_nm(0, column);
-                let y = e.site.centre_nm[1] + e.site.lattice.place_nm(1, row);
-                let corner = |(dx, dy): (i64, i64)| Point::new(unit(x + dx), unit(y + dy));
+                let (e, unit) = (&self.elements[element], |nm: f64| self.units(nm).round() as i64);
+                let x = e.site.centre_nm[0] as f64 + e.site.lattice.drawn_nm(0, column);
+                let y = e.site.centre_nm[1] as f64 + e.site.lattice.drawn_nm(1, row);
+                let corner = |(dx, dy): (i64, i64)| Point::new(unit(x + dx as f64), unit(y + dy as f64));
                 let corners = self.shape.four_corners(PillarId(e.widths.number(column, row)));
                 let [a, b, c, d] = corners
                     .expect("pillars that are polygons have four corners")
@@ -127,8 +127,8 @@ impl FlatLayout<'_> {
     pub(crate) fn pillar(&self, element: usize, row: usize, column: usize) -> Rect {
         let e = &self.elements[element];
         let [half_x, half_y] = self.half_nm(e.widths.number(column, row));
-        let x = (e.site.centre_nm[0] + e.site.lattice.place_nm(0, column)) as f64;
-        let y = (e.site.centre_nm[1] + e.site.lattice.place_nm(1, row)) as f64;
+        let x = e.site.centre_nm[0] as f64 + e.site.lattice.drawn_nm(0, column);
+        let y = e.site.centre_nm[1] as f64 + e.site.lattice.drawn_nm(1, row);
         let unit = |nm: f64| self.units(nm).round() as i64;
         Rect {
             x0: unit(x - half_x),

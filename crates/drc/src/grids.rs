@@ -168,7 +168,7 @@ impl Rule for ExposureGrid {
                     )
                 });
             }
-            let row = f64::from(e.site.lattice.kind().row_nm(e.site.lattice.pitch_nm()));
+            let row = e.site.lattice.row_nm();
             if row != pitch && self.remainder(row).abs() > ROUNDING_NM {
                 found.plain(&format!("{} rows", e.site.name), || {
                     format!(

@@ -145,10 +145,10 @@ fn pillars_out(flat: &FlatLayout<'_>, out: &impl Fn(&Rect) -> bool, found: &mut 
     for (k, e) in flat.elements.iter().enumerate() {
         let n = e.site.lattice.sites() - 1;
         let site = |row, column| {
-            let half = i64::from(e.site.lattice.pitch_nm()) / 2;
-            let unit = |nm: i64| flat.units(nm as f64).round() as i64;
-            let x = e.site.centre_nm[0] + e.site.lattice.place_nm(0, column);
-            let y = e.site.centre_nm[1] + e.site.lattice.place_nm(1, row);
+            let half = e.site.lattice.pitch_nm().nm() / 2.0;
+            let unit = |nm: f64| flat.units(nm).round() as i64;
+            let x = e.site.centre_nm[0] as f64 + e.site.lattice.drawn_nm(0, column);
+            let y = e.site.centre_nm[1] as f64 + e.site.lattice.drawn_nm(1, row);
             Rect {
                 x0: unit(x - half),
                 y0: unit(y - half),

@@ -137,8 +137,8 @@ fn sites_in(flat: &FlatLayout<'_>, element: usize, r: &Rect) -> (Range<i64>, Ran
     let (sites, pitch) = (site.lattice.sites() as i64, f64::from(site.lattice.pitch_nm()));
     let range = |axis: usize, low: i64, high: i64| {
         // Widths are at most a pitch: sites within half a pitch of the rectangle.
-        let first = site.lattice.place_nm(axis, 0) as f64 + site.centre_nm[axis] as f64;
-        let step = f64::from(site.lattice.steps_nm()[axis]);
+        let first = site.lattice.place_nm(axis, 0) + site.centre_nm[axis] as f64;
+        let step = site.lattice.steps_nm()[axis];
         let index = |v: i64, half: f64| (v as f64 * flat.unit_nm + half - first) / step;
         let from = index(low, -pitch / 2.0).floor().max(0.0) as i64;
         let to = index(high, pitch / 2.0).ceil().min((sites - 1) as f64) as i64;

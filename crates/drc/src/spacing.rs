@@ -111,7 +111,8 @@ impl Rule for SpacingRule {
 /// Distance of the nearest two pillars of a design if both are as wide as they may be (nm).
 fn least_gap_nm(design: &Design) -> f64 {
     let cell = &design.cell;
-    let nearest_nm = CellLattice::drawn(cell.lattice, cell.pitch_nm).nearest_nm(f64::from(cell.pitch_nm));
+    let nearest_nm =
+        CellLattice::drawn(cell.lattice, cell.pitch_nm, cell.database_unit).nearest_nm(f64::from(cell.pitch_nm));
     let (_, widest) = cell.width_range_nm;
     cell.shape.least_gap(PillarId(widest), [nearest_nm, 0.0]).max(0.0)
 }
@@ -203,7 +204,7 @@ fn on_lattices(
                 e.site.name
             ));
         }
-        let steps = lattice.steps_nm().map(f64::from);
+        let steps = lattice.steps_nm();
         let apart = |up: usize, right: isize| [steps[0] * right as f64, steps[1] * up as f64];
         let widths = e.widths.histogram().len();
         let widest = widths.saturating_sub(1) as u16;

@@ -74,8 +74,8 @@ impl FieldRule {
     fn lines(&self, flat: &FlatLayout<'_>, element: usize, axis: usize, beside: i64) -> Vec<(usize, f64)> {
         let site = &flat.elements[element].site;
         let (lattice, centre) = (site.lattice, self.centre(site.centre_nm));
-        let (pitch, step) = (f64::from(lattice.pitch_nm()), f64::from(lattice.steps_nm()[axis]));
-        let first = (site.centre_nm[axis] + lattice.place_nm(axis, 0)) as f64;
+        let (pitch, step) = (f64::from(lattice.pitch_nm()), lattice.steps_nm()[axis]);
+        let first = site.centre_nm[axis] as f64 + lattice.place_nm(axis, 0);
         let (most, last) = (lattice.sites() - 1, first + (lattice.sites() - 1) as f64 * step);
         self.boundaries(axis, centre[axis], first - pitch / 2.0, last + pitch / 2.0)
             .flat_map(|b| {
@@ -165,7 +165,7 @@ impl Rule for FieldRule {
             let rows = rows.filter(|&(row, _)| (0..n).any(|column| e.widths.number(column, row) != 0));
             let lines = columns.count() + rows.count();
             if lines > 0 {
-                let half = (e.site.lattice.place_nm(0, 0).abs() + i64::from(e.site.lattice.pitch_nm()) / 2) as f64;
+                let half = e.site.lattice.place_nm(0, 0).abs() + e.site.lattice.pitch_nm().nm() / 2.0;
                 let unit = |nm: f64| flat.units(nm).round() as i64;
                 let c = e.site.centre_nm.map(|c| c as f64);
                 let lens = Rect {

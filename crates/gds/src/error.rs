@@ -333,7 +333,9 @@ impl ExtractionError {
             Self::Groups { most, .. } => format!("up to {most} elements are read; is this the layer of the pillars?"),
             Self::Scattered { .. } => "give the design, which says where the elements are".into(),
             Self::Sparse { .. } => "this is no lens on a lattice; give the design to say where its elements are".into(),
-            Self::Lattice { .. } => "lattices with an even pitch about a whole nanometre are read".into(),
+            Self::Lattice { .. } => {
+                "lattices with a pitch of whole steps of 0.05 nm about a whole nanometre are read".into()
+            }
         }
     }
 }

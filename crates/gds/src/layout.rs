@@ -43,6 +43,9 @@ pub struct Faulty {
     pub offset: u64,
 }
 
+/// Steps of a nanometre to which database units are rounded.
+const STEPS_PER_NM: f64 = 20.0;
+
 impl Layout {
     /// Read the file at `path` once.
     ///
@@ -121,9 +124,10 @@ impl Layout {
     /// Database unit (nm).
     pub fn unit_nm(&self) -> f64 {
         let nm = self.units[1] * 1e9;
-        // The format's reals are not decimal: one nanometre comes back as 1 to within 1e-16.
-        if (nm - nm.round()).abs() < 1e-9 * nm {
-            nm.round()
+        // The format's reals are not decimal: 1 and 0.1 nm come back to within 1e-16.
+        let steps = nm * STEPS_PER_NM;
+        if (steps - steps.round()).abs() < 1e-9 * steps {
+            steps.round() / STEPS_PER_NM
         } else {
             nm
         }

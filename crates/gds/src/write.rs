@@ -27,8 +27,8 @@ impl SquareRecord {
 
     /// Append the square of an even width about a centre, both in database units, corners counter-clockwise from the lower left.
     #[inline]
-    pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32, width: u16) {
-        let half = i32::from(width) / 2;
+    pub fn append(&self, out: &mut Vec<u8>, x: i32, y: i32, width: u32) {
+        let half = (width / 2) as i32;
         let (left, low, right, high) = (x - half, y - half, x + half, y + half);
         let corners = [left, low, right, low, right, high, left, high, left, low];
         let mut record = self.0;
@@ -143,7 +143,7 @@ mod tests {
         #[test]
         fn squares_are_those_of_gds21(x in -2_000_000_000..2_000_000_000, y in -2_000_000_000..2_000_000_000, half in 1u16..30_000, layer in 0i16..256, datatype in 0i16..256) {
             let mut ours = Vec::new();
-            SquareRecord::on(LayerNumber::new(layer as u16, datatype as u16)).append(&mut ours, x, y, 2 * half);
+            SquareRecord::on(LayerNumber::new(layer as u16, datatype as u16)).append(&mut ours, x, y, 2 * u32::from(half));
             let h = i32::from(half);
             let corners = [(x - h, y - h), (x + h, y - h), (x + h, y + h), (x - h, y + h), (x - h, y - h)];
             let boundary = GdsBoundary {

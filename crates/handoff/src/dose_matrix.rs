@@ -11,7 +11,7 @@ use metalith_design::Design;
 use metalith_design::array::{Class, PillarArray, Symmetry};
 use metalith_design::phase::RadialPhase;
 use metalith_layout::PillarForm;
-use metalith_pillars::LatticeKind;
+use metalith_pillars::{DatabaseUnit, LatticeKind};
 
 /// Space between the parts of a block (nm).
 const APART: i64 = 20_000;
@@ -122,13 +122,13 @@ pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<V
     let spec = &process.dose_matrix;
     let lens = small_lens(design, spec.lens_diameter_um, process.reference_wavelength_nm(design))?;
     let pads = dose_pads(design, process);
-    let pitch = i64::from(design.cell.pitch_nm);
+    let pitch = i64::from(pad_pitch(design));
     let (label, marks) = (
         number(&design.layout.layers.label),
         number(&design.layout.layers.pillar_marks),
     );
     let blocks = blocks(process, pads.len());
-    let mut drawing = Drawing::new("DOSE_MATRIX", &design.layout.timestamp);
+    let mut drawing = Drawing::new("DOSE_MATRIX", design);
     let mut top = Sheet::new("DOSE_MATRIX");
     for (block, dose) in blocks.iter().zip(doses(process)) {
         let layer: LayerPair = (spec.layer, block.number as i16);
@@ -165,10 +165,20 @@ pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<V
     Ok(blocks)
 }
 
+/// Pitch of pads: that of the design, to whole nanometres.
+pub(super) fn pad_pitch(design: &Design) -> u32 {
+    design.cell.pitch_nm.nm().round() as u32
+}
+
+/// Distance of two rows of a pad (nm).
+pub(super) fn row_nm(kind: LatticeKind, pitch_nm: u32) -> i64 {
+    kind.row_nm(pitch_nm.into(), DatabaseUnit::Nanometre) as i64
+}
+
 /// A square pad of pillars about a place, on a lattice of this kind. Of a hexagonal one every other row is an array, and a pillar
 /// is in the middle.
 pub(super) fn top_pad(sheet: &mut Sheet, pillar: &str, (x, y): (i64, i64), side: i64, kind: LatticeKind, pitch: i64) {
-    let row = i64::from(kind.row_nm(pitch as u32));
+    let row = row_nm(kind, pitch as u32);
     let mut lines = |columns: i64, rows: i64, steps: [i64; 2]| {
         let first = [columns, rows].map(|n| -(n - 1));
         let at = (x + first[0] * steps[0] / 2, y + first[1] * steps[1] / 2);

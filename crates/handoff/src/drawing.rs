@@ -1,19 +1,19 @@
-//! Cells of polygons, references and labels in whole nanometres, written through gds21.
+//! Cells of polygons, references and labels in whole nanometres, pillars in database units, written through gds21.
 
 use std::path::Path;
 
 use chrono::NaiveDateTime;
 use gds21::{
     GdsArrayRef, GdsBoundary, GdsDateTimes, GdsElement, GdsLibrary, GdsPoint, GdsStrans, GdsStruct, GdsStructRef,
-    GdsTextElem, GdsUnits,
+    GdsTextElem,
 };
 
 use metalith_core::{AtomicFile, Error, Result, Silent};
-use metalith_design::LayoutLayer;
 use metalith_design::array::{Class, Symmetry};
+use metalith_design::{Design, LayoutLayer};
 use metalith_gds::Layout;
-use metalith_layout::{LayoutFormat, PillarForm, convert};
-use metalith_pillars::PillarRows;
+use metalith_layout::{LayoutFormat, PillarForm, convert, gds_units};
+use metalith_pillars::{DatabaseUnit, PillarRows};
 
 /// Layer and datatype.
 pub(super) type LayerPair = (i16, i16);
@@ -190,23 +190,43 @@ fn runs(bits: u8) -> Vec<(i64, i64)> {
 /// Cells of a file to be.
 pub(super) struct Drawing {
     tree: GdsLibrary,
+    unit: DatabaseUnit,
 }
 
 impl Drawing {
-    /// An empty drawing. The date stands in its headers, checked when the design was read.
-    pub(crate) fn new(name: &str, timestamp: &str) -> Self {
-        let date = timestamp.parse::<NaiveDateTime>().unwrap_or_default();
+    /// An empty drawing with the database unit and the date of a design, which was checked when the design was read.
+    pub(crate) fn new(name: &str, design: &Design) -> Self {
+        let date = design.layout.timestamp.parse::<NaiveDateTime>().unwrap_or_default();
         let mut library = GdsLibrary::new(name);
-        library.units = GdsUnits::new(1e-3, 1e-9);
+        library.units = gds_units(design.cell.database_unit);
         library.dates = GdsDateTimes {
             modified: date,
             accessed: date,
         };
-        Self { tree: library }
+        Self {
+            tree: library,
+            unit: design.cell.database_unit,
+        }
     }
 
-    /// Add a cell; cells come before those that refer to them.
-    pub(crate) fn add(&mut self, sheet: Sheet) {
+    /// Add a cell in nanometres; cells come before those that refer to them.
+    pub(crate) fn add(&mut self, mut sheet: Sheet) {
+        let per_nm = self.unit.per_nm() as i32;
+        let scale = |p: &mut GdsPoint| (p.x, p.y) = (p.x * per_nm, p.y * per_nm);
+        for element in &mut sheet.elements {
+            match element {
+                GdsElement::GdsBoundary(boundary) => boundary.xy.iter_mut().for_each(scale),
+                GdsElement::GdsTextElem(text) => scale(&mut text.xy),
+                GdsElement::GdsStructRef(reference) => scale(&mut reference.xy),
+                GdsElement::GdsArrayRef(array) => array.xy.iter_mut().for_each(scale),
+                _ => {}
+            }
+        }
+        self.add_drawn(sheet);
+    }
+
+    /// Add a cell in database units.
+    fn add_drawn(&mut self, sheet: Sheet) {
         self.tree.structs.push(GdsStruct {
             name: sheet.name,
             dates: self.tree.dates.clone(),
@@ -214,11 +234,11 @@ impl Drawing {
         });
     }
 
-    /// Add a cell of one pillar with these corners, for arrays of it.
+    /// Add a cell of one pillar with these corners (database units), for arrays of it.
     pub(crate) fn add_pillar(&mut self, name: &str, layer: LayerPair, corners: &[(i64, i64)]) {
         let mut sheet = Sheet::new(name);
         sheet.polygon(layer, (0, 0), corners);
-        self.add(sheet);
+        self.add_drawn(sheet);
     }
 
     /// Add the pillars of a lens as a cell of this name, folded by its symmetries. Squares are drawn where they are; other
@@ -242,7 +262,7 @@ impl Drawing {
                     .zip(class.widths.row(iy, run, &mut room))
                     .filter(|(_, w)| **w != 0)
                 {
-                    let at = (lattice.place_nm(0, ix), lattice.place_nm(1, iy));
+                    let at = (lattice.place_units(0, ix), lattice.place_units(1, iy));
                     if form.is_square() {
                         sheet.polygon(layer, at, &form.corners(width));
                     } else {
@@ -253,9 +273,9 @@ impl Drawing {
             for symmetry in &part.copies {
                 whole.place(&sheet.name, (0, 0), *symmetry);
             }
-            self.add(sheet);
+            self.add_drawn(sheet);
         }
-        self.add(whole);
+        self.add_drawn(whole);
     }
 
     /// Write the file, in the format that its name asks for.

@@ -69,15 +69,15 @@ pub(super) fn sites(
         let radius_um = design.lens_of(&placed.element).radius_um();
         for best in best_sites(&map, array.shape, radius_um, &widths, zones) {
             let (around_nm, around_deg, around_by_nm) = neighbours(array.shape, &best);
-            let (x, y) = (map.lattice.place_nm(0, best.ix), map.lattice.place_nm(1, best.iy));
+            let (x, y) = (map.lattice.drawn_nm(0, best.ix), map.lattice.drawn_nm(1, best.iy));
             sites.push(MetrologySite {
                 id: format!("L{:02}", sites.len() + 1),
                 file: "pillars",
                 place: format!("element {}", placed.element.label()),
-                x_um: (cx + x) as f64 * 1e-3,
-                y_um: (cy + y) as f64 * 1e-3,
-                element_x_um: Some(x as f64 * 1e-3),
-                element_y_um: Some(y as f64 * 1e-3),
+                x_um: (cx as f64 + x) * 1e-3,
+                y_um: (cy as f64 + y) * 1e-3,
+                element_x_um: Some(x * 1e-3),
+                element_y_um: Some(y * 1e-3),
                 drawn: DrawnSize::of(array.shape, best.number),
                 around_nm,
                 around_deg,
@@ -179,7 +179,7 @@ fn best_sites(map: &PillarMap, shape: PillarShape, radius_um: f64, targets: &[u1
             let r_um = map.lattice.place_um(0, ix).hypot(map.lattice.place_um(1, iy));
             let zone = ((r_um / radius_um * zones as f64) as usize).min(zones - 1);
             let difference = u64::from(around.0.unsigned_abs().max(around.1.unsigned_abs()));
-            let aside = map.lattice.place_nm(1, iy).unsigned_abs();
+            let aside = map.lattice.whole_nm(1, iy).unsigned_abs();
             let score = (difference << 32) | aside;
             let held = &mut best[target * zones + zone];
             if held.as_ref().is_none_or(|(known, _)| score < *known) {

@@ -32,7 +32,7 @@ fn the_stray_light_of_an_element_is_that_of_its_field() {
         let k = elements.iter().position(|e| e.index == index).unwrap();
         let widths = array.widths(&array.placed[k]);
         for um in [0.455, 0.53, 0.66] {
-            let table = cells[0].transmissions(um, design.cell.pitch_nm as u16).unwrap();
+            let table = cells[0].transmissions(um, design.cell.pitch_nm.nm() as u16).unwrap();
             let pillars = Pillars::new(widths.as_ref(), &table).unwrap();
             let departure = LocalAngularSpectrum::of(&pillars, um, focal_um, BLOCKS);
             for (beyond, most_of_total, most_of_map) in DIRECTIONS {

@@ -8,7 +8,7 @@ use super::{mark, point};
 /// Polygons and texts of a top cell.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FixedShapes<'a> {
-    /// Corners (nm), the first not repeated.
+    /// Corners (database units), the first not repeated.
     pub polygons: Vec<(&'a LayoutLayer, Vec<(i64, i64)>)>,
     pub texts: Vec<(&'a LayoutLayer, String, (i64, i64))>,
 }
@@ -21,7 +21,7 @@ impl<'a> FixedShapes<'a> {
         fixed.add(&layers.pillar_marks, mark::crosses(&design.layout.marks));
         fixed.add(&layers.outline, [mark::outline(&design.layout.chip).to_vec()]);
         fixed.label(design);
-        fixed
+        fixed.on_grid(design)
     }
 
     /// Openings, marks of the second step and label.
@@ -31,7 +31,19 @@ impl<'a> FixedShapes<'a> {
         fixed.add(&layers.apertures, super::aperture::openings(design));
         fixed.add(&layers.aperture_marks, mark::crosses(&design.layout.marks));
         fixed.label(design);
-        fixed
+        fixed.on_grid(design)
+    }
+
+    /// Shapes in nanometres as shapes in database units.
+    fn on_grid(mut self, design: &Design) -> Self {
+        let unit = design.cell.database_unit;
+        let scaled = |(x, y): &mut (i64, i64)| (*x, *y) = (unit.units(*x), unit.units(*y));
+        self.polygons
+            .iter_mut()
+            .flat_map(|(_, corners)| corners)
+            .for_each(scaled);
+        self.texts.iter_mut().for_each(|(_, _, at)| scaled(at));
+        self
     }
 
     fn add(&mut self, layer: &'a LayoutLayer, polygons: impl IntoIterator<Item = Vec<(i64, i64)>>) {

@@ -61,7 +61,7 @@ pub fn write_free(
         top: free.top.to_owned(),
         date: NaiveDateTime::default(),
         layer: &layer,
-        form: PillarForm::plain(free.shape),
+        form: PillarForm::plain(free.shape).on_grid(array.lattice.unit()),
         fixed: FixedShapes::default(),
     };
     layout.write(array, hierarchy, format, path, progress)

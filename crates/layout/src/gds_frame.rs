@@ -6,6 +6,7 @@ use gds21::{GdsDateTimes, GdsElement, GdsLibrary, GdsStruct, GdsUnits};
 use super::encoding;
 use metalith_core::Result;
 use metalith_design::Design;
+use metalith_pillars::DatabaseUnit;
 
 /// Length of the records ENDSTR and ENDLIB.
 const END: usize = 4;
@@ -17,10 +18,10 @@ pub(super) struct LibraryFrame {
 }
 
 impl LibraryFrame {
-    /// An empty library of this name: database unit 1 nm, user unit 1 um, one date for everything.
-    pub(crate) fn new(name: String, date: NaiveDateTime) -> Result<Self> {
+    /// An empty library of this name with a database unit: user unit 1 um, one date for everything.
+    pub(crate) fn new(name: String, unit: DatabaseUnit, date: NaiveDateTime) -> Result<Self> {
         let mut library = GdsLibrary::new(name);
-        library.units = GdsUnits::new(1e-3, 1e-9);
+        library.units = gds_units(unit);
         library.dates = GdsDateTimes {
             modified: date,
             accessed: date,
@@ -51,6 +52,16 @@ impl LibraryFrame {
         let cell = &bytes[self.head().len()..bytes.len() - END];
         let (begin, end) = cell.split_at(cell.len() - END);
         Ok((begin.to_vec(), end.to_vec()))
+    }
+}
+
+/// Database unit in user units of 1 um, and in metres.
+pub fn gds_units(unit: DatabaseUnit) -> GdsUnits {
+    match unit {
+        DatabaseUnit::Nanometre => GdsUnits::new(1e-3, 1e-9),
+        DatabaseUnit::Half => GdsUnits::new(0.5e-3, 0.5e-9),
+        DatabaseUnit::Quarter => GdsUnits::new(0.25e-3, 0.25e-9),
+        DatabaseUnit::Tenth => GdsUnits::new(1e-4, 1e-10),
     }
 }
 

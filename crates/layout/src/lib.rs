@@ -33,6 +33,7 @@ use pillars::PillarWriter;
 pub use convert::convert;
 pub use format::{LayoutFormat, OasisEncoding};
 pub use free_layout::{FreeLayout, write_free};
+pub use gds_frame::gds_units;
 pub use layer_properties::write_layer_properties;
 pub use pillar_form::PillarForm;
 pub use read::{extraction_plan, read_pillars};
@@ -140,7 +141,7 @@ impl<'a> PillarLayout<'a> {
         path: &Path,
         progress: &dyn Progress,
     ) -> Result<Written> {
-        let frame = LibraryFrame::new(self.top.clone(), self.date)?;
+        let frame = LibraryFrame::new(self.top.clone(), self.form.unit(), self.date)?;
         let mut writer = PillarWriter::create(path, &frame, self.layer, self.form, progress)?;
         let mut remarks = Vec::new();
         match hierarchy {
@@ -186,7 +187,7 @@ fn no_symmetry(array: &PillarArray, class: usize) -> Option<String> {
 /// # Errors
 /// If the file cannot be written; the old file is then as it was.
 pub fn write_apertures(design: &Design, path: &Path) -> Result<Written> {
-    let frame = LibraryFrame::new(top_cell(design), gds_frame::date(design))?;
+    let frame = LibraryFrame::new(top_cell(design), design.cell.database_unit, gds_frame::date(design))?;
     let (begin, end) = frame.cell(&top_cell(design), FixedShapes::of_apertures(design).gds())?;
     let bytes = [frame.head(), &begin, &end, frame.tail()].concat();
     AtomicFile::write(path, &bytes)?;
@@ -217,13 +218,14 @@ fn is_of_a_part(name: &str) -> bool {
     numbers.any(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// A point of the layout. Designs are limited to 300 mm, far inside the 2.1 m of a 32-bit nanometre.
-fn point(x_nm: i64, y_nm: i64) -> gds21::GdsPoint {
-    gds21::GdsPoint::new(coordinate(x_nm), coordinate(y_nm))
+/// A point of the layout in database units. Designs are limited to 300 mm about the origin, inside the 429 mm of 32 bits of
+/// 0.1 nm.
+fn point(x: i64, y: i64) -> gds21::GdsPoint {
+    gds21::GdsPoint::new(coordinate(x), coordinate(y))
 }
 
-fn coordinate(nm: i64) -> i32 {
-    i32::try_from(nm).expect("designs are limited to 300 mm")
+fn coordinate(units: i64) -> i32 {
+    i32::try_from(units).expect("designs are limited to 300 mm")
 }
 
 /// A polygon; the first point is repeated at the end, as the format asks.

@@ -37,7 +37,7 @@ pub(super) struct PillarWriter<'a> {
     buffers: [Vec<u8>; BLOCKS],
 }
 
-/// One pillar of a lens: its centre from the lens's (nm), its width (nm) or number.
+/// One pillar of a lens: its centre from the lens's (database units), its width (nm) or number.
 struct PlacedPillar {
     x: i32,
     y: i32,
@@ -46,7 +46,7 @@ struct PlacedPillar {
 
 /// Bytes that are written for a pillar.
 enum Template {
-    Square(SquareRecord),
+    Square(SquareRecord, PillarForm),
     Polygons(ByWidth<PolygonRecord>),
     /// To cells of one outline.
     References(ByWidth<ReferenceRecord>),
@@ -79,7 +79,7 @@ impl Template {
     /// The outline itself for each pillar.
     fn outlines(array: &PillarArray, layer: &LayoutLayer, form: PillarForm) -> Self {
         if form.is_square() {
-            return Self::Square(SquareRecord::on(layer.number()));
+            return Self::Square(SquareRecord::on(layer.number()), form);
         }
         let record = |width: u16| {
             let corners: Vec<[i32; 2]> = form
@@ -96,7 +96,7 @@ impl Template {
     fn append(&self, out: &mut Vec<u8>, pillar: &PlacedPillar) {
         let PlacedPillar { x, y, width } = *pillar;
         match self {
-            Self::Square(square) => square.append(out, x, y, width),
+            Self::Square(square, form) => square.append(out, x, y, form.edge(width) as u32),
             Self::Polygons(polygons) => polygons.of(width).append(out, x, y),
             Self::References(cells) => cells.of(width).append(out, x, y),
         }
@@ -143,7 +143,7 @@ impl<'a> PillarWriter<'a> {
     pub(crate) fn folded(&mut self, array: &PillarArray) -> Result<Vec<String>> {
         // Squares are as short as references to them; other outlines are written once each.
         let template = if self.form.is_square() {
-            Template::Square(SquareRecord::on(self.layer.number()))
+            Template::Square(SquareRecord::on(self.layer.number()), self.form)
         } else {
             Template::References(self.width_cells(array)?)
         };
@@ -166,7 +166,7 @@ impl<'a> PillarWriter<'a> {
             self.put(&begin)?;
             self.put(&end)?;
         }
-        let place = |p: &PlacedElement| reference(&lens_name(p.class), p.symmetry, p.element.centre_nm);
+        let place = |p: &PlacedElement| reference(&lens_name(p.class), p.symmetry, self.centre(p));
         self.placed = array.placed.iter().map(place).collect();
         Ok(remarks)
     }
@@ -199,8 +199,8 @@ impl<'a> PillarWriter<'a> {
                 |out, s| template.append(out, &s),
             )?;
             self.put(&end)?;
-            self.placed
-                .push(reference(&name, Symmetry::IDENTITY, placed.element.centre_nm));
+            let at = self.centre(placed);
+            self.placed.push(reference(&name, Symmetry::IDENTITY, at));
         }
         Ok(())
     }
@@ -215,7 +215,7 @@ impl<'a> PillarWriter<'a> {
             let template = Template::outlines(array, self.layer, self.form);
             for placed in &array.placed {
                 let widths = array.rows(placed);
-                let (cx, cy) = placed.element.centre_nm;
+                let (cx, cy) = self.centre(placed);
                 let (cx, cy) = (coordinate(cx), coordinate(cy));
                 self.rows(
                     widths.as_ref(),
@@ -244,7 +244,8 @@ impl<'a> PillarWriter<'a> {
     ) -> Result<()> {
         let lattice = widths.lattice();
         let n = lattice.sites();
-        let places = [0, 1].map(|axis| -> Vec<i32> { (0..n).map(|i| coordinate(lattice.place_nm(axis, i))).collect() });
+        let places =
+            [0, 1].map(|axis| -> Vec<i32> { (0..n).map(|i| coordinate(lattice.place_units(axis, i))).collect() });
         for side_by_side in blocks(n, &runs).chunks(BLOCKS) {
             self.progress.check_stopped()?;
             let mut buffers = std::mem::take(&mut self.buffers);
@@ -272,6 +273,12 @@ impl<'a> PillarWriter<'a> {
             self.progress.advance(pillars);
         }
         Ok(())
+    }
+
+    /// Centre of an element (database units).
+    fn centre(&self, placed: &PlacedElement) -> (i64, i64) {
+        let (x, y) = placed.element.centre_nm;
+        (self.form.unit().units(x), self.form.unit().units(y))
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
@@ -304,7 +311,7 @@ fn lens_name(class: usize) -> String {
 }
 
 /// A reference with one of the symmetries of the square; a plain one has no STRANS record.
-fn reference(cell: &str, symmetry: Symmetry, at_nm: (i64, i64)) -> GdsElement {
+fn reference(cell: &str, symmetry: Symmetry, at: (i64, i64)) -> GdsElement {
     let strans = (symmetry != Symmetry::IDENTITY).then(|| GdsStrans {
         reflected: symmetry.mirrored,
         angle: (symmetry.quarter_turns > 0).then(|| 90.0 * f64::from(symmetry.quarter_turns)),
@@ -312,7 +319,7 @@ fn reference(cell: &str, symmetry: Symmetry, at_nm: (i64, i64)) -> GdsElement {
     });
     GdsStructRef {
         name: cell.to_owned(),
-        xy: point(at_nm.0, at_nm.1),
+        xy: point(at.0, at.1),
         strans,
         ..Default::default()
     }

@@ -76,7 +76,7 @@ fn pillars_stand_in_the_aperture_and_nowhere_else() {
     for (k, placed) in array.placed.iter().enumerate() {
         let widths = array.widths(placed);
         for ((iy, ix), &w) in widths.number.indexed_iter() {
-            let (x, y) = (lattice.coordinate_nm(ix), lattice.coordinate_nm(iy));
+            let (x, y) = (lattice.whole_nm(0, ix), lattice.whole_nm(0, iy));
             assert!(inside(k, x, y).is_none_or(|held| held == (w != 0)), "{k} at ({x}, {y})");
         }
     }

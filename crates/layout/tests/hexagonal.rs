@@ -82,7 +82,7 @@ fn holds(path: &Path, design: &Design, array: &PillarArray) {
         let lattice = element.site.lattice;
         let mut there = BTreeMap::new();
         element.widths.each_pillar(|iy, ix, width| {
-            there.insert((lattice.place_nm(0, ix), lattice.place_nm(1, iy)), width);
+            there.insert((lattice.whole_nm(0, ix), lattice.whole_nm(1, iy)), width);
         });
         assert_eq!(there, expected(design, k), "{name}");
     }
@@ -120,7 +120,7 @@ fn own_lenses_and_polygons_stand_on_the_lattice() {
             let lattice = element.site.lattice;
             let mut there = BTreeMap::new();
             element.widths.each_pillar(|iy, ix, width| {
-                there.insert((lattice.place_nm(0, ix), lattice.place_nm(1, iy)), width);
+                there.insert((lattice.whole_nm(0, ix), lattice.whole_nm(1, iy)), width);
             });
             assert!(there.len() > 1000);
             assert_eq!(there, expected(&design, k), "element {k}, {hierarchy:?}");

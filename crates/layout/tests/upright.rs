@@ -26,7 +26,7 @@ fn holds(path: &Path, design: &Design, array: &PillarArray) {
             // Where a lens has no pillar in the outermost sites, fewer are found.
             let edges = |map: &PillarMap, of: &dyn Fn(u16) -> [u16; 2]| -> BTreeMap<[i64; 2], [u16; 2]> {
                 let there = map.number.indexed_iter().filter(|(_, number)| **number > 0);
-                let place = |iy, ix| [map.lattice.place_nm(0, ix), map.lattice.place_nm(1, iy)];
+                let place = |iy, ix| [map.lattice.whole_nm(0, ix), map.lattice.whole_nm(1, iy)];
                 there.map(|((iy, ix), number)| (place(iy, ix), of(*number))).collect()
             };
             let written = edges(&array.widths(placed), &|number| pillars.edges_nm(number));

@@ -17,7 +17,7 @@ const STRIP: usize = 16;
 pub fn fill(pillars: &PillarMap, shape: PillarShape) -> Vec<f32> {
     let lattice = pillars.lattice;
     let n = lattice.sites();
-    let steps_nm = lattice.steps_nm().map(f64::from);
+    let steps_nm = lattice.steps_nm();
     // Of the place in the grid of the lattice: beside each pillar of a hexagonal one is an empty place.
     let area = |w: u16| match shape.has_width() {
         true => (f64::from(w) / steps_nm[0] * (f64::from(w) / steps_nm[1]) * shape.area_share()) as f32,

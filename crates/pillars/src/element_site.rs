@@ -43,7 +43,7 @@ impl ElementSite {
     pub fn widen(sites: &mut [Self]) {
         let whole: Vec<_> = sites.iter().map(|s| s.in_layout(&s.lattice.reach())).collect();
         for (k, site) in sites.iter_mut().enumerate() {
-            let pitch = i64::from(site.lattice.pitch_nm());
+            let pitch = site.lattice.pitch_nm().at_least_nm();
             let near = |other: &[[i64; 2]; 2]| {
                 let own = &whole[k];
                 (0..2).all(|x| own[x][0] < other[x][1] + pitch && other[x][0] < own[x][1] + pitch)

@@ -33,7 +33,7 @@ impl Steepness {
     /// If that is none.
     pub fn of_rows(lattice: &Lattice, one_in: usize, turns: impl Fn(usize, usize) -> Option<f64>) -> Self {
         let mut found = Self::default();
-        let mut nearest2 = i64::MAX;
+        let mut nearest2 = f64::MAX;
         let [columns, rows] = lattice.reach();
         // Neighbours are in the same row or in the next one, this far along it; columns are counted from as many before the
         // first as the farthest is away.
@@ -80,8 +80,8 @@ impl Steepness {
             std::mem::swap(&mut here, &mut above);
         }
         found.largest_step_rad = largest_step * std::f64::consts::TAU;
-        let pitch2 = f64::from(lattice.pitch_nm()).powi(2);
-        found.from_pitches = (found.steep_sites > 0).then(|| (nearest2 as f64 / pitch2).sqrt());
+        let pitch2 = lattice.pitch_nm().nm().powi(2);
+        found.from_pitches = (found.steep_sites > 0).then(|| (nearest2 / pitch2).sqrt());
         found
     }
 }

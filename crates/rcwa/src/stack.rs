@@ -1,6 +1,6 @@
 //! Input of the solver: layers on a lattice, in optical constants.
 
-use metalith_pillars::LatticeKind;
+use metalith_pillars::{DatabaseUnit, LatticeKind, Pitch};
 use num_complex::Complex64;
 use serde::Serialize;
 
@@ -31,12 +31,12 @@ impl CellLattice {
         }
     }
 
-    /// The lattice of such a kind as it is drawn, where rows are whole nanometres apart.
-    pub fn drawn(kind: LatticeKind, pitch_nm: u32) -> Self {
+    /// The lattice of such a kind as it is drawn, where rows are whole database units apart.
+    pub fn drawn(kind: LatticeKind, pitch: Pitch, unit: DatabaseUnit) -> Self {
         match kind {
             LatticeKind::Square => Self::Square,
             LatticeKind::Hexagonal => Self::Staggered {
-                row_nm: f64::from(kind.row_nm(pitch_nm)),
+                row_nm: kind.row_nm(pitch, unit),
             },
         }
     }

@@ -40,7 +40,7 @@ impl PillarZoom {
                     continue;
                 }
                 // The drawing counts nanometres from its middle, y downwards.
-                let (x, y) = (lattice.place_nm(0, ix) - origin.0, origin.1 - lattice.place_nm(1, iy));
+                let (x, y) = (lattice.whole_nm(0, ix) - origin.0, origin.1 - lattice.whole_nm(1, iy));
                 pillars.push(([x, y], width));
             }
         }

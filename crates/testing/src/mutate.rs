@@ -90,7 +90,9 @@ pub fn fuzz(ending: &str, mutant: impl Fn(&mut ChaCha8Rng, u64) -> Vec<u8>, surv
         rng.set_stream(n);
         let bytes = mutant(&mut rng, n);
         let began = Instant::now();
-        if let Ok(whole) = catch_unwind(AssertUnwindSafe(|| survives(&bytes))) { read += u64::from(whole) } else {
+        if let Ok(whole) = catch_unwind(AssertUnwindSafe(|| survives(&bytes))) {
+            read += u64::from(whole)
+        } else {
             let path = format!("mutant-{seed}-{n}.{ending}");
             std::fs::write(&path, &bytes).expect("a writable folder");
             eprintln!("mutant {n} of seed {seed} makes the reader panic; written to {path}");

@@ -3,7 +3,7 @@
 
 mod adjoint;
 
-use metalith_pillars::{Lattice, LatticeKind};
+use metalith_pillars::{DatabaseUnit, Lattice, LatticeKind};
 use metalith_wave::propagation::{LandingGrid, LocalAngularSpectrum, SensorIrradiance, Steepness};
 use metalith_wave::{
     Accuracy, Aperture, Direct, FoldedPropagator, Hankel, IdealPsf, PhaseFunction, PillarFunction, PlaneWave,
@@ -221,7 +221,7 @@ fn orders_of_a_coarse_lattice_land_where_the_reciprocal_lattice_has_them() {
     };
     let wave = PlaneWave::normal(um);
     let matched = PI * 225.0 / (um * z);
-    let row_um = f64::from(LatticeKind::Hexagonal.row_nm(pitch_nm)) * 1e-3;
+    let row_um = LatticeKind::Hexagonal.row_nm(pitch_nm.into(), DatabaseUnit::Nanometre) * 1e-3;
     // The six nearest orders, and one that only the grid of the lattice has.
     let nearest = [
         [1.0, 0.5],

@@ -187,6 +187,10 @@ impl NewArgs {
                     }),
                 ),
                 ("pitch_nm", some(&chosen.pitch_nm)),
+                (
+                    "database_unit_nm",
+                    (!chosen.database_unit.is_nanometre()).then(|| chosen.database_unit.to_string()),
+                ),
                 ("pillar_height_nm", some(&chosen.height_nm)),
                 ("width_min_nm", some(&chosen.widths_nm.0)),
                 ("width_max_nm", some(&chosen.widths_nm.1)),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::cell::cache_folder;
 use metalith::cell_study::{CellRequest, ChosenCell};
-use metalith::{AtomicFile, Design, Error, LatticeKind, PillarShape, Result};
+use metalith::{AtomicFile, Design, Error, LatticeKind, PillarShape, Pitch, Result};
 
 use super::shipped_designs::ShippedDesign;
 use super::{Outcome, Terminal, print_line};
@@ -91,9 +91,10 @@ pub(crate) struct NewArgs {
     #[arg(long, value_name = "NM")]
     pillar_height_nm: Option<f64>,
 
-    /// Pitch (nm), even; chosen below that which diffracts, and for the aperture, if left out.
-    #[arg(long, value_name = "NM", value_parser = clap::value_parser!(u32).range(20..=20_000))]
-    pitch_nm: Option<u32>,
+    /// Pitch (nm), a multiple of 0.05; chosen below that which diffracts, and for the aperture, if left out. The database unit
+    /// follows from it.
+    #[arg(long, value_name = "NM", value_parser = pitch)]
+    pitch_nm: Option<Pitch>,
 
     /// Begin with a shipped design and the files that it reads instead: other pillars, lattices, materials, wavelengths, phases and
     /// arrays. With other options it is rescaled: chip and marks follow the lenses, pillars and mapping are chosen anew.
@@ -107,6 +108,25 @@ fn chord_nm(diameter_um: f64, margin_um: f64) -> f64 {
     let side_angle = std::f64::consts::PI / f64::from(MOST_SIDES);
     let opening_nm = (0.5 * diameter_um + margin_um) * 1e3;
     (0.5 * opening_nm * side_angle.powi(2)).ceil().max(FINEST_CHORD_NM)
+}
+
+/// Diameters and focal lengths that a design may have (um): refused before a cell is solved for them.
+const DIAMETERS_UM: std::ops::RangeInclusive<f64> = 5.0..=100_000.0;
+const FOCAL_LENGTHS_UM: std::ops::RangeInclusive<f64> = 1.0..=100_000.0;
+
+/// Shortest and longest pitch of a design (nm).
+const PITCHES_NM: std::ops::RangeInclusive<f64> = 100.0..=20_000.0;
+
+/// A pitch.
+fn pitch(text: &str) -> Result<Pitch, String> {
+    let nm: f64 = text
+        .trim()
+        .parse()
+        .map_err(|_| "give a number of nanometres, such as 350 or 433.3")?;
+    if !PITCHES_NM.contains(&nm) {
+        return Err(format!("give 100 to 20000 nm, not {nm}"));
+    }
+    Pitch::of_nm(nm).ok_or_else(|| format!("give a multiple of 0.05 nm, such as {}", (nm * 20.0).round() / 20.0))
 }
 
 /// Numbers of elements along x and y.
@@ -167,15 +187,16 @@ impl NewArgs {
             return Ok(StartCell::of_the_paper());
         }
         let (nm, focal_length_um) = (self.wavelength_nm(), self.focal_length_um());
-        let numbers = [nm, self.diameter_um(), focal_length_um];
-        if !(numbers.iter().all(|n| n.is_finite() && *n > 0.0) && self.steering_deg().abs() < 90.0) {
+        let is_lens = DIAMETERS_UM.contains(&self.diameter_um()) && FOCAL_LENGTHS_UM.contains(&focal_length_um);
+        if !(nm.is_finite() && nm > 0.0 && is_lens && self.steering_deg().abs() < 90.0) {
             return Err(Error::refused(
                 "new/out-of-range",
                 format!(
                     "a lens of {} um, f = {focal_length_um} um, for {nm} nm",
                     self.diameter_um()
                 ),
-                "give positive numbers, and steering of less than 90 degrees",
+                "give a diameter from 5 to 100000 um, a focal length from 1 to 100000 um, a positive wavelength and steering of less than \
+                 90 degrees",
             ));
         }
         let wavelength_um = nm * 1e-3;

@@ -118,6 +118,20 @@ fn line(key: &str, value: impl std::fmt::Display, note: &str) -> String {
     }
 }
 
+/// The database unit with its reason; nothing where it is 1 nm.
+fn unit_line(cell: &ChosenCell) -> String {
+    let (unit, pitch) = (cell.database_unit, cell.pitch_nm);
+    let why = match (unit.divides_half(pitch), unit.divides(pitch)) {
+        _ if unit.is_nanometre() => return String::new(),
+        (true, _) => format!("the largest of which half of {pitch} nm is a multiple: no pillar is off its place"),
+        (_, true) => format!(
+            "the largest of which {pitch} nm is a multiple: a pillar stands in the centre, none is off its place"
+        ),
+        _ => "the finest; pillars are rounded to it".to_owned(),
+    };
+    line("database_unit_nm", unit, &why)
+}
+
 impl StartCell {
     /// The silicon nitride pillars of the paper, for colour.
     pub(crate) fn of_the_paper() -> Self {
@@ -209,6 +223,7 @@ impl StartCell {
                     ),
                 ),
             ),
+            unit_line(cell),
             line(
                 "pillar_height_nm",
                 cell.height_nm,

@@ -9,8 +9,8 @@ use metalith::rcwa::CellLattice;
 use metalith::report::{exact, sig};
 use metalith::verify::Lighting;
 use metalith::{
-    Accuracy, AsBuiltChip, CalibratedModel, CellModel, Error, Extraction, LatticeKind, PillarShape, PolarisationBasis,
-    Result, Wedge,
+    Accuracy, AsBuiltChip, CalibratedModel, CellModel, Error, Extraction, LatticeKind, PillarShape, Pitch,
+    PolarisationBasis, Result, Wedge,
 };
 
 use super::{FidelityArg, PsfArgs, PsfLight};
@@ -19,8 +19,9 @@ use super::{FidelityArg, PsfArgs, PsfLight};
 const USUAL_HEIGHT_NM: f64 = 700.0;
 
 impl PsfArgs {
-    fn pitch_nm(found: &Extraction) -> u32 {
-        found.elements.first().map_or(350, |e| e.site.lattice.pitch_nm())
+    fn pitch_nm(found: &Extraction) -> Pitch {
+        let first = found.elements.first();
+        first.map_or(Pitch::whole(350), |e| e.site.lattice.pitch_nm())
     }
 
     pub(super) fn lattice_kind(found: &Extraction) -> LatticeKind {
@@ -39,7 +40,9 @@ impl PsfArgs {
         };
         Ok(CellStack {
             pitch_nm: f64::from(pitch_nm),
-            lattice: CellLattice::drawn(Self::lattice_kind(found), pitch_nm),
+            lattice: found.elements.first().map_or(CellLattice::Square, |e| {
+                CellLattice::drawn(e.site.lattice.kind(), pitch_nm, e.site.lattice.unit())
+            }),
             shape: found.shape,
             ..stated
         })

@@ -53,7 +53,13 @@ impl Factor {
 /// A root of the covariance of a line of pixels with this correlation of neighbours: lower triangle.
 fn correlated(n: usize) -> DMatrix<f64> {
     let new = (1.0 - CORRELATION * CORRELATION).sqrt();
-    DMatrix::from_fn(n, n, |i, j| if i >= j { CORRELATION.powi((i - j) as i32) * if j == 0 { 1.0 } else { new } } else { 0.0 })
+    DMatrix::from_fn(n, n, |i, j| {
+        if i >= j {
+            CORRELATION.powi((i - j) as i32) * if j == 0 { 1.0 } else { new }
+        } else {
+            0.0
+        }
+    })
 }
 
 /// Factors of both axes.

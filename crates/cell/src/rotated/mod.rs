@@ -138,7 +138,11 @@ impl RotatedCell {
 
     fn solved(&self, wavelength_um: f64, of_band: bool, progress: &dyn Progress) -> Result<Arc<Solved>> {
         self.solved.get_or_make((wavelength_um.to_bits(), of_band), || {
-            Ok(Arc::new(if of_band { self.solve_in_band(wavelength_um, progress)? } else { self.solve(wavelength_um, CHOICE, progress)? }))
+            Ok(Arc::new(if of_band {
+                self.solve_in_band(wavelength_um, progress)?
+            } else {
+                self.solve(wavelength_um, CHOICE, progress)?
+            }))
         })
     }
 

@@ -160,7 +160,11 @@ impl UprightCell {
 
     fn solved(&self, wavelength_um: f64, of_band: bool, progress: &dyn Progress) -> Result<Arc<Along>> {
         self.solved.get_or_make((wavelength_um.to_bits(), of_band), || {
-            Ok(Arc::new(if of_band { self.solve(wavelength_um, Orders::new(BAND_ORDERS)?, &Silent)? } else { self.along(wavelength_um, progress)? }))
+            Ok(Arc::new(if of_band {
+                self.solve(wavelength_um, Orders::new(BAND_ORDERS)?, &Silent)?
+            } else {
+                self.along(wavelength_um, progress)?
+            }))
         })
     }
 

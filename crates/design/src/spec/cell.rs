@@ -5,14 +5,20 @@ use serde::Serialize;
 use super::lens::WAVELENGTH;
 use metalith_cell::{FocusedLight, Handedness, InversePolynomial, Polarisation, PolarisationAxis};
 use metalith_core::document::{Limits, Section};
-use metalith_pillars::{LatticeKind, PillarId, PillarShape, PolarisationBasis, RotatedRectangles, UprightRectangles};
+use metalith_pillars::{
+    DatabaseUnit, Lattice, LatticeKind, PillarId, PillarShape, Pitch, PolarisationBasis, RotatedRectangles,
+    UprightRectangles,
+};
 use metalith_rcwa::Material;
 
 /// The unit cell: a pillar on a lattice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellSpec {
-    /// Distance of neighbouring pillars (nm), even.
-    pub pitch_nm: u32,
+    /// Distance of neighbouring pillars (nm).
+    pub pitch_nm: Pitch,
+    /// Grid of both files: places and edges are multiples of it.
+    #[serde(rename = "database_unit_nm", skip_serializing_if = "DatabaseUnit::is_nanometre")]
+    pub database_unit: DatabaseUnit,
     /// Lattice of the pillars; on a hexagonal one they are circles.
     #[serde(skip_serializing_if = "LatticeKind::is_square")]
     pub lattice: LatticeKind,
@@ -28,7 +34,8 @@ pub struct CellSpec {
     /// Narrowest and widest pillar that may be written (nm), both multiples of the step; of rectangles the first and the last
     /// number.
     pub width_range_nm: (u16, u16),
-    /// Widths are multiples of this (nm), even, so that edges of centred squares are whole nanometres; 1 of rectangles.
+    /// Widths are multiples of this (nm), even where the database unit is 1 nm, so that edges of centred squares are on the
+    /// grid; 1 of rectangles.
     pub width_step_nm: u16,
     /// Name of the pillar's material, or path of a CSV table of n and k.
     pub pillar_material: String,
@@ -68,18 +75,12 @@ pub const TALLEST_NM: f64 = 50_000.0;
 
 impl CellSpec {
     pub(crate) fn read(s: &Section<'_, '_>) -> Self {
-        let pitch_nm = s.integer("pitch_nm", 100..=i64::from(WIDEST_PITCH_NM), "nm") as u32;
-        if !pitch_nm.is_multiple_of(2) {
-            s.fault(
-                "pitch_nm",
-                format!("a pitch of {pitch_nm} nm is odd"),
-                "use an even number: half a pitch must be whole nanometres",
-            );
-        }
-        // A pitch with a fault bounds nothing.
+        let unit = read_unit(s);
         let lattice = s.choice("lattice", &LatticeKind::CHOICES, Some(LatticeKind::Square));
+        let pitch_nm = read_pitch(s, lattice, unit);
+        // A pitch with a fault bounds nothing.
         let widest = if s.sound(&["cell.pitch_nm"]) {
-            lattice.widest_nm(pitch_nm)
+            lattice.widest_nm(pitch_nm, unit)
         } else {
             WIDEST_PITCH_NM
         };
@@ -90,8 +91,8 @@ impl CellSpec {
             ("upright_rectangle", Kind::Upright),
         ];
         let (shape, width_range_nm, width_step_nm) = match s.choice("shape", &kinds, Some(Kind::Square)) {
-            Kind::Square => with_widths(s, PillarShape::Square, widest),
-            Kind::Circle => with_widths(s, PillarShape::Circle, widest),
+            Kind::Square => with_widths(s, PillarShape::Square, widest, unit),
+            Kind::Circle => with_widths(s, PillarShape::Circle, widest, unit),
             Kind::Rectangle => {
                 let pillars = read_rectangles(s, widest);
                 (pillars.into(), (1, pillars.steps), 1)
@@ -111,8 +112,6 @@ impl CellSpec {
         }
         let arriving = (shape.basis() == Some(PolarisationBasis::Circular))
             .then(|| s.choice("arriving", &Handedness::CHOICES, Some(Handedness::default())));
-        // Widths and places are whole nanometres; the key is there so that a design says so.
-        s.optional_integer("database_unit_nm", 1..=1, "nm, the only unit that is written");
         let pillar_material = read_material(s, "pillar_material").unwrap_or_else(|| DEFAULT_FILM.into());
         let ambient_material = read_material(s, "ambient_material");
         if ambient_material.is_some() && s.has("ambient_index") {
@@ -123,7 +122,8 @@ impl CellSpec {
             );
         }
         let cell = Self {
-            pitch_nm: pitch_nm & !1,
+            pitch_nm,
+            database_unit: unit,
             lattice,
             shape,
             arriving,
@@ -148,7 +148,7 @@ impl CellSpec {
     pub fn is_of_the_paper(&self) -> bool {
         self.shape.is_square()
             && self.lattice.is_square()
-            && self.pitch_nm == 350
+            && self.pitch_nm == Pitch::whole(350)
             && self.pillar_height_nm == 700.0
             && self.pillar_material == DEFAULT_FILM
             && self.substrate_material == DEFAULT_SUBSTRATE
@@ -189,7 +189,15 @@ impl CellSpec {
     /// The largest width (nm) or number that a pillar can have: no width is beyond the pitch.
     pub fn most(&self) -> u16 {
         let last = self.shape.last().map(|PillarId(number)| number);
-        last.unwrap_or_else(|| self.lattice.widest_nm(self.pitch_nm) as u16)
+        last.unwrap_or_else(|| self.lattice.widest_nm(self.pitch_nm, self.database_unit) as u16)
+    }
+
+    /// The smallest lattice of this cell that covers a disc of this diameter.
+    ///
+    /// # Errors
+    /// As [`Lattice::covering_on_grid`].
+    pub fn lattice_covering(&self, diameter_nm: u32) -> metalith_core::Result<Lattice> {
+        Lattice::covering_on_grid(self.lattice, diameter_nm, self.pitch_nm, self.database_unit)
     }
 
     /// The light that pillars give the phase of the design where they distinguish polarisations, in the light that it
@@ -217,14 +225,64 @@ enum Kind {
     Upright,
 }
 
-/// A shape with its narrowest and widest pillar and the step between widths (nm).
-fn with_widths(s: &Section<'_, '_>, shape: PillarShape, widest: u32) -> (PillarShape, (u16, u16), u16) {
-    let step = s.optional_integer("width_step_nm", 2..=100, "nm").unwrap_or(2) as u16;
-    if !step.is_multiple_of(2) {
+/// The database unit.
+fn read_unit(s: &Section<'_, '_>) -> DatabaseUnit {
+    let Some(nm) = s.optional_float("database_unit_nm", Limits::new(0.1..=1.0, "nm")) else {
+        return DatabaseUnit::default();
+    };
+    DatabaseUnit::of_nm(nm).unwrap_or_else(|| {
+        s.fault(
+            "database_unit_nm",
+            format!("a database unit of {nm} nm"),
+            "use 1, 0.5, 0.25 or 0.1",
+        );
+        DatabaseUnit::default()
+    })
+}
+
+/// The pitch: on a hexagonal lattice a multiple of the database unit.
+fn read_pitch(s: &Section<'_, '_>, lattice: LatticeKind, unit: DatabaseUnit) -> Pitch {
+    let nm = s.float("pitch_nm", Limits::new(100.0..=f64::from(WIDEST_PITCH_NM), "nm"));
+    let Some(pitch) = Pitch::of_nm(nm) else {
+        let nearest = (nm * 20.0).round() / 20.0;
+        s.fault(
+            "pitch_nm",
+            format!("a pitch of {nm} nm is no multiple of 0.05 nm"),
+            format!("use {nearest}"),
+        );
+        return Pitch::whole(nm as u32);
+    };
+    if lattice == LatticeKind::Hexagonal && !unit.divides(pitch) {
+        let finer = DatabaseUnit::of_pitch(pitch).map_or_else(
+            || format!("use a pitch of {:.1} nm with `database_unit_nm = 0.1`", nm),
+            |finer| format!("add `database_unit_nm = {finer}`, or use a multiple of {unit} nm"),
+        );
+        s.fault_given(
+            &["cell.database_unit_nm"],
+            "pitch_nm",
+            format!("a hexagonal lattice with a pitch of {nm} nm on a grid of {unit} nm"),
+            finer,
+        );
+    }
+    pitch
+}
+
+/// A shape with its narrowest and widest pillar and the step between widths (nm). Edges of centred pillars of an odd width are
+/// on the grid of half a nanometre and finer ones.
+fn with_widths(
+    s: &Section<'_, '_>,
+    shape: PillarShape,
+    widest: u32,
+    unit: DatabaseUnit,
+) -> (PillarShape, (u16, u16), u16) {
+    let even = unit.is_nanometre();
+    let least = if even { 2 } else { 1 };
+    let step = s.optional_integer("width_step_nm", least..=100, "nm").unwrap_or(2) as u16;
+    if even && !step.is_multiple_of(2) {
         s.fault(
             "width_step_nm",
             format!("a width step of {step} nm is odd"),
-            "use an even number, so that all edges are on the 1 nm grid",
+            "use an even number, so that all edges are on the 1 nm grid, or add `database_unit_nm = 0.5`",
         );
     }
     let low = s.integer("width_min_nm", 10..=i64::from(widest), "nm") as u16;
@@ -258,7 +316,8 @@ const WHOLE: f64 = 1e-6;
 
 /// Upright rectangles: the lengths that both edges may have.
 fn read_upright(s: &Section<'_, '_>, widest: u32) -> UprightRectangles {
-    let (_, (shortest_nm, longest_nm), step_nm) = with_widths(s, PillarShape::Square, widest);
+    // Upright rectangles are numbered by even lengths.
+    let (_, (shortest_nm, longest_nm), step_nm) = with_widths(s, PillarShape::Square, widest, DatabaseUnit::default());
     let step_nm = step_nm.max(2);
     let lengths = longest_nm.saturating_sub(shortest_nm) / step_nm + 1;
     let most = UprightRectangles::MOST_LENGTHS;

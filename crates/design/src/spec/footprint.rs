@@ -2,7 +2,6 @@
 
 use super::{ArraySpec, CellSpec, LensSpec, PlacedSpec};
 use metalith_core::document::Section;
-use metalith_pillars::Lattice;
 
 /// Outermost places of the pillars of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,14 +15,14 @@ impl Footprint {
     /// Footprint of a lens whose outline is turned by so many degrees; `None` where there is no lattice, which is
     /// another mistake.
     pub(crate) fn of(lens: &LensSpec, rotation_deg: f64, cell: &CellSpec) -> Option<Self> {
-        let lattice = Lattice::of_kind_covering(cell.lattice, lens.diameter_nm, cell.pitch_nm).ok()?;
+        let lattice = cell.lattice_covering(lens.diameter_nm).ok()?;
         let reach = match &lens.outline {
             Some(outline) => lattice.within(outline.rotated(rotation_deg).ends_nm()),
             None => lattice.reach(),
         };
         Some(Self {
             ends_nm: lattice.ends_nm(&reach),
-            pitch_nm: i64::from(lattice.pitch_nm()),
+            pitch_nm: lattice.pitch_nm().at_least_nm(),
         })
     }
 

@@ -10,7 +10,7 @@ use super::{CellSpec, phase_term};
 use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TableReading, TermForm};
 use metalith_core::Result;
 use metalith_core::document::{Limits, Section};
-use metalith_pillars::{Lattice, PolarisationBasis};
+use metalith_pillars::PolarisationBasis;
 
 /// The lens that all elements of the array share, or that one element alone has.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -242,7 +242,7 @@ const FOCAL_LENGTH: Limits = Limits {
 pub(super) fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {
     let diameter_um = s.float("diameter_um", DIAMETER);
     let diameter_nm = whole_nm(s, "diameter_um", diameter_um) as u32;
-    if Lattice::of_kind_covering(cell.lattice, diameter_nm, cell.pitch_nm).is_err() {
+    if cell.lattice_covering(diameter_nm).is_err() {
         s.fault_given(
             &["cell.pitch_nm"],
             "diameter_um",

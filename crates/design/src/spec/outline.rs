@@ -89,9 +89,7 @@ pub(super) fn read(s: &Section<'_, '_>, cell: &CellSpec) -> (u32, Option<LensOut
     let outline = LensOutline::rounded(corners_um.into_iter());
     let diameter_nm = outline.diameter_nm();
     let largest_nm = DIAMETER.range.end() * 1e3;
-    if f64::from(diameter_nm) > largest_nm
-        || Lattice::of_kind_covering(cell.lattice, diameter_nm, cell.pitch_nm).is_err()
-    {
+    if f64::from(diameter_nm) > largest_nm || cell.lattice_covering(diameter_nm).is_err() {
         s.fault_given(
             &["cell.pitch_nm"],
             key,
@@ -138,7 +136,7 @@ impl LensOutline {
     /// Sides by the rows of a lattice.
     pub(crate) fn rows(&self, lattice: &Lattice) -> OutlineRows {
         let reached = |iy| {
-            let y = lattice.place_nm(1, iy);
+            let y = lattice.whole_nm(1, iy);
             let reaches = |((_, ay), (_, by)): &Side| (*ay.min(by)..=*ay.max(by)).contains(&y);
             sides(&self.corners_nm).filter(reaches).collect()
         };
@@ -338,7 +336,7 @@ mod tests {
         let l = outline(&L).rotated(33.0);
         let rows = l.rows(&lattice);
         for (iy, ix) in (0..120 * 120).map(|k| (k / 120, k % 120)) {
-            let [x, y] = [ix, iy].map(|i| lattice.coordinate_nm(i));
+            let [x, y] = [ix, iy].map(|i| lattice.whole_nm(0, i));
             assert_eq!(rows.holds(iy, x, y), l.holds(x, y), "({x}, {y})");
         }
     }

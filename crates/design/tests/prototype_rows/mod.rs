@@ -85,7 +85,7 @@ impl Prototype {
         let coarse = CoarseCell::new(&stack, um, self.mapping.range_nm()).unwrap();
         let full = coarse.full_transmission().unwrap();
         let equal = PointwiseCell::new(stack.clone(), self.design.cell.widths_nm());
-        let widest = self.design.cell.pitch_nm as u16;
+        let widest = self.design.cell.pitch_nm.nm() as u16;
         let normal = equal.transmissions(um, widest).unwrap();
         let oblique = if along_normal {
             [normal.clone(), normal.clone()]

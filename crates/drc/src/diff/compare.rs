@@ -121,7 +121,7 @@ fn map_over(a: &Content, b: &Content, unit_nm: f64) -> ChangeMap {
         [all.x0, all.y0, all.x1, all.y1].map(|v| v as f64 * unit_nm)
     };
     for e in &a.elements {
-        let half = (e.site.lattice.place_nm(0, 0).abs() + i64::from(e.site.lattice.pitch_nm())) as f64;
+        let half = e.site.lattice.place_nm(0, 0).abs() + e.site.lattice.pitch_nm().nm();
         for axis in 0..2 {
             let centre = e.site.centre_nm[axis] as f64;
             bounds[axis] = bounds[axis].min(centre - half);
@@ -197,8 +197,8 @@ fn element(
             diff.largest_change_nm = diff.largest_change_nm.max(change);
             squares += u64::from(change) * u64::from(change);
         }
-        let x = (a.site.centre_nm[0] + lattice.place_nm(0, column)) as f64;
-        let y = (a.site.centre_nm[1] + lattice.place_nm(1, row)) as f64;
+        let x = a.site.centre_nm[0] as f64 + lattice.drawn_nm(0, column);
+        let y = a.site.centre_nm[1] as f64 + lattice.drawn_nm(1, row);
         let half = shape.widest_nm(PillarId(from.max(to))) / 2.0;
         let widths = shape.has_width().then_some([from, to]);
         changes.add(what, layer, [x - half, y - half, x + half, y + half], widths);

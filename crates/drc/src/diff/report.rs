@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use metalith_pillars::Pitch;
 use serde::Serialize;
 
 use metalith_gds::LayerNumber;
@@ -13,7 +14,7 @@ pub struct ElementDiff {
     pub centre_nm: [i64; 2],
     /// Sites an axis and their distance: the frame of the counts.
     pub sites: usize,
-    pub pitch_nm: u32,
+    pub pitch_nm: Pitch,
     pub pillars: [u64; 2],
     /// Sites with a pillar only in the second layout.
     pub added: u64,

@@ -1,7 +1,6 @@
 //! The elements of both layouts on common lattices.
 
 use metalith_gds::extract::ElementSite;
-use metalith_pillars::Lattice;
 
 /// Add the elements of a second layout to those of a first: an element on the lattice of one that is known
 /// extends it; one that overlaps a known one on another lattice is left out, and its pillars are compared
@@ -39,7 +38,8 @@ fn overlap(a: &ElementSite, b: &ElementSite) -> bool {
 
 /// The smallest square lattice with the sites of both, if they are on one; of hexagonal ones the larger, about one middle.
 fn cover(a: &ElementSite, b: &ElementSite) -> Option<ElementSite> {
-    let pitch = i64::from(a.lattice.pitch_nm());
+    // Places of lattices with another pitch are told from where their design says they are.
+    let pitch = i64::from(a.lattice.pitch_nm().whole_nm()?);
     if a.lattice.pitch_nm() != b.lattice.pitch_nm() || a.lattice.kind() != b.lattice.kind() {
         return None;
     }
@@ -62,19 +62,21 @@ fn cover(a: &ElementSite, b: &ElementSite) -> Option<ElementSite> {
         counts[axis] = (a1.max(b1) - first[axis]) / pitch + 1;
     }
     let sites = counts[0].max(counts[1]);
-    // The shorter axis is in the middle, as where elements are found. A pitch is even.
-    let centre_nm = [0, 1].map(|axis| first[axis] - (sites - counts[axis]) / 2 * pitch + (sites - 1) * (pitch / 2));
+    // The shorter axis is in the middle, as where elements are found. A site is where the middle between two is off the grid.
+    let sites = sites + (pitch % 2) * ((sites + 1) % 2);
+    let centre_nm = [0, 1].map(|axis| first[axis] - (sites - counts[axis]) / 2 * pitch + (sites - 1) * pitch / 2);
     Some(ElementSite {
         name: a.name.clone(),
         centre_nm,
         within_nm: Some(within(a, b, centre_nm)),
-        lattice: Lattice::new(a.lattice.pitch_nm(), sites as usize).ok()?,
+        lattice: a.lattice.with_sites(sites as usize).ok()?,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metalith_pillars::Lattice;
 
     #[test]
     fn lattices_grow_together() {

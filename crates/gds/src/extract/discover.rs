@@ -126,13 +126,13 @@ impl Seen {
     /// True if a search for wider pitches may find more: nothing was found, or no lattice that is closer than such
     /// pitches are.
     fn may_be_wider(&self) -> bool {
-        let is_wide = |site: &ElementSite| i64::from(site.lattice.pitch_nm()) > CLOSE.widest_nm;
+        let is_wide = |site: &ElementSite| site.lattice.pitch_nm().at_least_nm() > CLOSE.widest_nm;
         self.shapes >= FEWEST && self.sites.iter().all(is_wide)
     }
 
     /// True if there are elements, none of a pitch that no design has.
     fn holds_a_lens(&self) -> bool {
-        let is_known = |site: &ElementSite| i64::from(site.lattice.pitch_nm()) <= WIDE.widest_nm;
+        let is_known = |site: &ElementSite| site.lattice.pitch_nm().at_least_nm() <= WIDE.widest_nm;
         !self.sites.is_empty() && self.sites.iter().all(is_known)
     }
 }
@@ -182,6 +182,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     let mut sites = Vec::new();
     for members in tiles.clusters() {
         let cluster = Cluster {
+            steps_per_nm: scale.steps_per_nm(),
             tiles: &tiles,
             members: &members,
         };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::tiles::TileMap;
 use crate::{ExtractionError, Point, Rect};
-use metalith_pillars::{ElementSite, Lattice, LatticeKind};
+use metalith_pillars::{DatabaseUnit, ElementSite, Lattice, LatticeKind, Pitch};
 
 /// Fewer pillars together are no element.
 pub(super) const FEWEST: u64 = 16;
@@ -18,6 +18,8 @@ const SITES_PER_PILLAR: u64 = 64;
 
 /// Tiles next to one another, which may be an element.
 pub(super) struct Cluster<'a> {
+    /// Steps of places in a nanometre.
+    pub steps_per_nm: i64,
     pub tiles: &'a TileMap,
     /// Numbers of its tiles.
     pub members: &'a [usize],
@@ -55,37 +57,69 @@ impl Cluster<'_> {
         let (x, columns) = self.places(0, step, [bounds.x0, bounds.x1]);
         let (y, rows) = self.places(1, step, [bounds.y0, bounds.y1]);
         let sites = columns.max(rows);
-        dense_enough(pillars, sites, &bounds, [columns, rows], step as f64 / 2.0)?;
-        let centre = |first: i64, count: i64| first - (sites - count) / 2 * step + (sites - 1) * step / 2;
-        let (twice_x, twice_y) = (centre(x, columns), centre(y, rows));
-        let bad = ExtractionError::Lattice {
-            pitch_nm: step as f64 / 2.0,
-            centre_nm: [twice_x as f64 / 2.0, twice_y as f64 / 2.0],
+        self.dense_enough(pillars, sites, &bounds, [columns, rows], step)?;
+        let centres = |sites: i64| {
+            let centre = |first: i64, count: i64| 2 * first - (sites - count) / 2 * 2 * step + (sites - 1) * step;
+            [centre(x, columns), centre(y, rows)]
         };
-        if step % 4 != 0 || twice_x % 2 != 0 || twice_y % 2 != 0 {
-            return Err(bad);
+        // In half steps, doubled. Where the centre between two sites is no whole nanometre, a site is.
+        let whole = 4 * self.steps_per_nm;
+        let is_whole = |sites: &i64| centres(*sites).iter().all(|c| c % whole == 0);
+        let sites = [sites, sites + 1].into_iter().find(is_whole).unwrap_or(sites);
+        let centre = centres(sites);
+        let lattice = self
+            .pitch(step)
+            .and_then(|pitch| Lattice::on_grid(LatticeKind::Square, pitch, self.unit(pitch), sites as usize).ok());
+        match lattice {
+            Some(lattice) if is_whole(&sites) => Ok(Some(ElementSite {
+                name: String::new(),
+                centre_nm: centre.map(|c| c / whole),
+                lattice,
+                within_nm: Some([(0, x, columns), (1, y, rows)].map(|(axis, first, count)| {
+                    let from = first - centre[axis] / 2;
+                    self.ends_nm(from, from + (count - 1) * step)
+                })),
+            })),
+            _ => Err(ExtractionError::Lattice {
+                pitch_nm: self.nm(step),
+                centre_nm: centre.map(|c| c as f64 / whole as f64),
+            }),
         }
-        let Ok(lattice) = Lattice::new((step / 2) as u32, sites as usize) else {
-            return Err(bad);
-        };
-        let ends =
-            |first: i64, count: i64, twice: i64| [first - twice, first + (count - 1) * step - twice].map(|c| c / 2);
-        Ok(Some(ElementSite {
-            name: String::new(),
-            centre_nm: [twice_x / 2, twice_y / 2],
-            lattice,
-            within_nm: Some([ends(x, columns, twice_x), ends(y, rows, twice_y)]),
-        }))
     }
 
-    /// Box around all centres (half nm).
+    /// A length in half steps (nm).
+    fn nm(&self, halves: i64) -> f64 {
+        halves as f64 / (2 * self.steps_per_nm) as f64
+    }
+
+    /// A length in half steps as a pitch, if it may be one.
+    fn pitch(&self, halves: i64) -> Option<Pitch> {
+        Pitch::of_nm(self.nm(halves)).filter(|pitch| pitch.nm() > 0.0)
+    }
+
+    /// The grid of the file; that of 1 nm where a lattice with such a pitch stands on it, whatever the file has.
+    fn unit(&self, pitch: Pitch) -> DatabaseUnit {
+        if DatabaseUnit::Nanometre.divides_half(pitch) {
+            DatabaseUnit::Nanometre
+        } else {
+            DatabaseUnit::of_per_nm(self.steps_per_nm).unwrap_or_default()
+        }
+    }
+
+    /// Two places from the centre in half steps, outwards to whole nanometres.
+    fn ends_nm(&self, first: i64, last: i64) -> [i64; 2] {
+        let whole = 2 * self.steps_per_nm;
+        [first.div_euclid(whole), -(-last).div_euclid(whole)]
+    }
+
+    /// Box around all centres (half steps).
     fn bounds(&self) -> Rect {
         let mut bounds = Rect::EMPTY;
         self.members.iter().for_each(|&k| bounds.unite(&self.tiles.bounds(k)));
         bounds
     }
 
-    /// The first place of a lattice with this step along an axis, between two ends, and the number of its places (half nm).
+    /// The first place of a lattice with this step along an axis, between two ends, and the number of its places (half steps).
     fn places(&self, axis: usize, step: i64, [from, to]: [i64; 2]) -> (i64, i64) {
         let mut phases: BTreeMap<i64, u64> = BTreeMap::new();
         for s in self.members.iter().flat_map(|&k| self.tiles.samples(k)) {
@@ -99,7 +133,7 @@ impl Cluster<'_> {
     }
 
     /// True if enough of the last centres of its tiles are in rows between the rows of its samples, and shifted as on a
-    /// hexagonal lattice with this half pitch and distance of rows (half nm).
+    /// hexagonal lattice with this half pitch and distance of rows (half steps).
     fn has_rows_between(&self, half_pitch: i64, row: i64) -> bool {
         let between = |&&k: &&usize| {
             let (Some(first), Some(last)) = (self.tiles.samples(k).next(), self.tiles.last(k)) else {
@@ -119,18 +153,24 @@ impl Cluster<'_> {
         let [Some(step_x), Some(step_y)] = [0, 1].map(|axis: usize| most_common(steps[axis].clone())) else {
             return Ok(None);
         };
-        // Half a pitch in half nanometres is a pitch in nanometres.
-        let pitches = [step_x / 2, step_x].map(|pitch| u32::try_from(pitch).unwrap_or(0));
-        let row = |pitch_nm: u32| 2 * i64::from(LatticeKind::Hexagonal.row_nm(pitch_nm));
-        let fits = |pitch: &u32| {
-            let row = row(*pitch);
-            let sound = pitch.is_multiple_of(2) && *pitch > 0;
-            sound && (step_y == row || (step_y == 2 * row && self.has_rows_between((*pitch).into(), row)))
-        };
-        let Some(pitch_nm) = pitches.into_iter().find(fits) else {
+        // Half a pitch along x, and the distance of rows on the grid of the file or on that of 1 nm.
+        let units = [DatabaseUnit::Nanometre]
+            .into_iter()
+            .chain(DatabaseUnit::of_per_nm(self.steps_per_nm));
+        let steps = [step_x / 2, step_x]
+            .into_iter()
+            .flat_map(|half| units.clone().map(move |unit| (half, unit)));
+        let mut lattices = steps.filter_map(|(half, unit)| {
+            let pitch = self
+                .pitch(2 * half)
+                .filter(|pitch| half % 2 == 0 && unit.divides(*pitch))?;
+            let row = (LatticeKind::Hexagonal.row_nm(pitch, unit) * 2.0 * self.steps_per_nm as f64).round() as i64;
+            let fits = step_y == row || (step_y == 2 * row && self.has_rows_between(half, row));
+            fits.then_some((pitch, unit, half, row))
+        });
+        let Some((pitch, unit, step_x, step_y)) = lattices.next() else {
             return Ok(None);
         };
-        let (step_x, step_y) = (i64::from(pitch_nm), row(pitch_nm));
         let bounds = self.bounds();
         let (x, columns) = self.places(0, step_x, [bounds.x0, bounds.x1]);
         let (y, rows) = self.places(1, step_y, [bounds.y0, bounds.y1]);
@@ -152,46 +192,48 @@ impl Cluster<'_> {
         let high = row.max(rows - 1 - row);
         let sites = 2 * reach.max((high * step_y + step_x - 1) / step_x) + 1;
         let centre = [x + column * step_x, y + row * step_y];
-        let ends = |step: i64, before: i64, count: i64| [-before * step / 2, (count - 1 - before) * step / 2];
-        dense_enough(pillars, sites, &bounds, [columns, rows], pitch_nm.into())?;
-        let lattice = Lattice::of_kind(LatticeKind::Hexagonal, pitch_nm, sites as usize);
+        let ends = |step: i64, before: i64, count: i64| self.ends_nm(-before * step, (count - 1 - before) * step);
+        self.dense_enough(pillars, sites, &bounds, [columns, rows], 2 * step_x)?;
+        let lattice = Lattice::on_grid(LatticeKind::Hexagonal, pitch, unit, sites as usize);
+        let whole = 2 * self.steps_per_nm;
         match lattice {
-            Ok(lattice) if centre.iter().all(|c| c % 2 == 0) => Ok(Some(ElementSite {
+            Ok(lattice) if centre.iter().all(|c| c % whole == 0) => Ok(Some(ElementSite {
                 name: String::new(),
-                centre_nm: centre.map(|c| c / 2),
+                centre_nm: centre.map(|c| c / whole),
                 lattice,
                 within_nm: Some([ends(step_x, column, columns), ends(step_y, row, rows)]),
             })),
             _ => Err(ExtractionError::Lattice {
-                pitch_nm: f64::from(pitch_nm),
-                centre_nm: centre.map(|c| c as f64 / 2.0),
+                pitch_nm: pitch.nm(),
+                centre_nm: centre.map(|c| self.nm(c)),
             }),
         }
+    }
+
+    /// Succeeds if so many pillars fill a lattice of so many places an axis well enough to be one.
+    fn dense_enough(
+        &self,
+        pillars: u64,
+        sites: i64,
+        bounds: &Rect,
+        [columns, rows]: [i64; 2],
+        pitch: i64,
+    ) -> Result<(), ExtractionError> {
+        if (sites as u64).saturating_pow(2) <= pillars.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
+            return Ok(());
+        }
+        Err(ExtractionError::Sparse {
+            pillars,
+            at_nm: [bounds.x0, bounds.y0].map(|c| c / (2 * self.steps_per_nm)),
+            columns,
+            rows,
+            pitch_nm: self.nm(pitch),
+        })
     }
 }
 
 /// Coordinates of a place along x and along y.
 const AXES: [fn(Point) -> i64; 2] = [|s| s.x, |s| s.y];
-
-/// Succeeds if so many pillars fill a lattice of so many places an axis well enough to be one.
-fn dense_enough(
-    pillars: u64,
-    sites: i64,
-    bounds: &Rect,
-    [columns, rows]: [i64; 2],
-    pitch_nm: f64,
-) -> Result<(), ExtractionError> {
-    if (sites as u64).saturating_pow(2) <= pillars.saturating_mul(SITES_PER_PILLAR) + (1 << 16) {
-        return Ok(());
-    }
-    Err(ExtractionError::Sparse {
-        pillars,
-        at_nm: [bounds.x0 / 2, bounds.y0 / 2],
-        columns,
-        rows,
-        pitch_nm,
-    })
-}
 
 /// Count of the key counted most often.
 fn most_common_count(counts: &BTreeMap<i64, u64>) -> u64 {

@@ -1,13 +1,13 @@
 //! Places of the shapes of one kind on a layout, tile by tile.
 
 use super::sites::Scale;
-use super::tiles::{MOST_TILES, TileMap};
+use super::tiles::{COARSE, MOST_TILES, TileMap};
 use crate::{Point, Rect, Transform};
 
-/// A shape as it is looked for, in half nanometres.
+/// A shape as it is looked for, in half steps of [`Scale::steps_per_nm`].
 pub(super) struct Centre {
     pub at: Point,
-    /// True if its edges are on the grid of whole nanometres where its centre is on the grid of half ones.
+    /// True if its edges are on the grid of whole steps where its centre is on the grid of half ones.
     pub even: bool,
 }
 
@@ -19,7 +19,7 @@ impl Centre {
             return None;
         }
         let even = r.width() % 2 == 0 && r.height() % 2 == 0;
-        let at = Point::new(scale.whole_nm(r.x0 + r.x1)?, scale.whole_nm(r.y0 + r.y1)?);
+        let at = Point::new(scale.whole_steps(r.x0 + r.x1)?, scale.whole_steps(r.y0 + r.y1)?);
         Some(Self { at, even })
     }
 }
@@ -39,8 +39,11 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Places by tiles whose side is two to the power of `bits` (half nm).
+    /// Places by tiles whose side is two to the power of `bits` (half nm), or less than twice that; on fine grids
+    /// as large as the numbers of places allow.
     pub(crate) fn new(scale: Scale, bits: u32) -> Self {
+        let finer = (scale.steps_per_nm() as u64).next_power_of_two().trailing_zeros();
+        let bits = (bits + finer).min(COARSE);
         Self {
             scale,
             tiles: TileMap::new(bits),
@@ -105,7 +108,7 @@ impl Places {
     /// True if the shapes of a cell with these placements are gathered in its own coordinates.
     fn gathers(&self, placements: &[Transform]) -> bool {
         let near = |t: &Transform| matches!(*t, Transform::Square { dx, dy, .. } if self.scale.reaches(&Rect::around(&[Point::new(dx, dy)])));
-        placements.len() > 1 && self.scale.den == 1 && placements.iter().all(near)
+        placements.len() > 1 && self.scale.den == self.scale.steps_per_nm() && placements.iter().all(near)
     }
 
     /// Put the tiles of the last cell where it is placed.

@@ -13,7 +13,13 @@ pub struct Scale {
 }
 
 /// Farthest coordinate at which a pillar is looked for (database units): products with [`Scale`] fit.
-const REACH: i64 = 1 << 40;
+const REACH: i64 = 1 << 35;
+
+/// Steps of pitches in a nanometre: see [`Pitch`](metalith_pillars::Pitch).
+pub(super) const PITCHES_PER_NM: i64 = 20;
+
+/// Half steps of pitches in a nanometre: places of all lattices are whole numbers of them.
+const PLACES_PER_NM: i64 = 2 * PITCHES_PER_NM;
 
 impl Scale {
     /// Scale of the database unit of a layout.
@@ -28,6 +34,20 @@ impl Scale {
     /// Database units as nanometres.
     pub fn nm(self, value: f64) -> f64 {
         value * self.num as f64 / self.den as f64
+    }
+
+    /// Steps of a nanometre in which places are looked for: database units where pitches are multiples of these, else one.
+    pub fn steps_per_nm(self) -> i64 {
+        if PITCHES_PER_NM % self.den == 0 { self.den } else { 1 }
+    }
+
+    /// A length in the steps of [`Scale::steps_per_nm`], if it is a whole number of them.
+    #[inline]
+    pub fn whole_steps(self, value: i64) -> Option<i64> {
+        if PITCHES_PER_NM % self.den == 0 {
+            return Some(value * self.num);
+        }
+        self.whole_nm(value)
     }
 
     /// A length in whole nanometres, rounded up.
@@ -66,11 +86,13 @@ pub(super) enum SitePlace {
     Outside,
 }
 
-/// One element in scaled units (nm * den), doubled so that the middle between two grid lines is whole.
+/// One element in scaled units (nm * den), [`PLACES_PER_NM`] times as fine, so that its places are whole.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     first: [i64; 2],
     step: [i64; 2],
+    /// Largest distance of a place that is rounded to the grid of the file.
+    rounding: i64,
     inverse: [f64; 2],
     /// Columns and rows that pillars may be in: the first, and the one after the last.
     reach: [[i64; 2]; 2],
@@ -82,15 +104,17 @@ struct Grid {
 impl Grid {
     fn new(site: &ElementSite, scale: Scale) -> Self {
         let lattice = site.lattice;
-        let step = lattice.steps_nm().map(|nm| 2 * i64::from(nm) * scale.den);
-        let first = |axis: usize| 2 * (site.centre_nm[axis] + lattice.place_nm(axis, 0)) * scale.den;
+        let scaled = |nm: f64| (nm * PLACES_PER_NM as f64).round() as i64 * scale.den;
+        let step = lattice.steps_nm().map(scaled);
+        let first = |axis: usize| PLACES_PER_NM * site.centre_nm[axis] * scale.den + scaled(lattice.place_nm(axis, 0));
         Self {
             first: [first(0), first(1)],
             step,
+            rounding: scaled(lattice.rounding_nm()),
             inverse: step.map(|step| 1.0 / step as f64),
             reach: site.reach().map(|reach| [reach.start as i64, reach.end as i64]),
             staggered: !lattice.is_square(),
-            pitch_nm: i64::from(lattice.pitch_nm()),
+            pitch_nm: lattice.pitch_nm().at_least_nm(),
         }
     }
 
@@ -161,10 +185,11 @@ impl Sites {
     /// Place of a pillar on the sites. `guess` is the element to try first, and is set to the one found.
     #[inline]
     pub(crate) fn stand(&self, pillar: &Rect, guess: &mut u32) -> SitePlace {
-        let x = (pillar.x0 + pillar.x1) * self.scale.num;
-        let y = (pillar.y0 + pillar.y1) * self.scale.num;
-        // Half a database unit, doubled and scaled.
-        let slack = [pillar.x1 - pillar.x0, pillar.y1 - pillar.y0].map(|edge| edge % 2 * self.scale.num);
+        let half = PITCHES_PER_NM * self.scale.num;
+        let x = (pillar.x0 + pillar.x1) * half;
+        let y = (pillar.y0 + pillar.y1) * half;
+        // Half a database unit.
+        let slack = [pillar.x1 - pillar.x0, pillar.y1 - pillar.y0].map(|edge| edge % 2 * half);
         if let Some(standing) = self.try_element(*guess, x, y, slack) {
             return standing;
         }
@@ -187,6 +212,7 @@ impl Sites {
             return None;
         }
         let is_site = !grid.staggered || (column + row) % 2 == 0;
+        let slack = slack.map(|slack| slack + grid.rounding);
         Some(if dx.abs() <= slack[0] && dy.abs() <= slack[1] && is_site {
             SitePlace::Site(element, row as usize, column as usize)
         } else {

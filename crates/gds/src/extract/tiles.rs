@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::{Point, Rect, Transform};
 
-/// Side of a tile, two to this power half nanometres, the unit of all places here: 8.2 um. Two elements with an empty tile
+/// Side of a tile, two to this power half nanometres: 8.2 um; all places here are in half steps of the scale. Two elements with an empty tile
 /// between them are two. Wider than pitches are, so that sparse places of a lens hold together.
 pub(super) const FINE: u32 = 14;
 /// Bits of the side of a tile for pitches up to 20 um: 33 um, the widest whose places the numbers of
@@ -64,7 +64,7 @@ pub(super) struct TileMap {
 }
 
 impl TileMap {
-    /// Map of tiles whose side is two to the power of `bits` (half nm).
+    /// Map of tiles whose side is two to the power of `bits` (half steps).
     pub(crate) fn new(bits: u32) -> Self {
         Self {
             bits,
@@ -115,7 +115,7 @@ impl TileMap {
         self.tiles[tile].1.pillars
     }
 
-    /// Box around the centres in a tile (half nm).
+    /// Box around the centres in a tile (half steps).
     pub(crate) fn bounds(&self, tile: usize) -> Rect {
         let (key, tile) = &self.tiles[tile];
         let corner = self.corner(*key);
@@ -127,7 +127,7 @@ impl TileMap {
         Rect { x0, y0, x1, y1 }
     }
 
-    /// Centres remembered of a tile (half nm).
+    /// Centres remembered of a tile (half steps).
     pub(crate) fn samples(&self, tile: usize) -> impl Iterator<Item = Point> + '_ {
         let (key, Tile { sampled, .. }) = &self.tiles[tile];
         let corner = self.corner(*key);
@@ -136,7 +136,7 @@ impl TileMap {
             .map(move |&(x, y)| Point::new(corner.0 + i64::from(x), corner.1 + i64::from(y)))
     }
 
-    /// The last centre met in a tile that has samples (half nm).
+    /// The last centre met in a tile that has samples (half steps).
     pub(crate) fn last(&self, tile: usize) -> Option<Point> {
         let (key, Tile { sampled, .. }) = &self.tiles[tile];
         let (corner, (x, y)) = (self.corner(*key), self.last[tile]);
@@ -190,7 +190,7 @@ impl TileMap {
         }
     }
 
-    /// Add the tiles of a cell, as large as these, where a placement, which moves by half nanometres, puts them; whether there is
+    /// Add the tiles of a cell, as large as these, where a placement, which moves by half steps, puts them; whether there is
     /// room.
     pub(crate) fn place(&mut self, cell: &Self, placement: &Transform) -> bool {
         let mut guess = 0;

@@ -124,7 +124,10 @@ fn circles_of_few_corners_are_on_their_sites() {
         let [element] = &read.elements[..] else {
             panic!("{corners}: {} elements", read.elements.len())
         };
-        assert_eq!((element.site.centre_nm, element.site.lattice.pitch_nm()), ([0, 0], 350));
+        assert_eq!(
+            (element.site.centre_nm, element.site.lattice.pitch_nm()),
+            ([0, 0], 350.into())
+        );
         assert!(element.widths.number.iter().all(|w| *w == 200), "{corners}");
     }
 }
@@ -283,7 +286,10 @@ fn two_arrays_are_one_hexagonal_lattice() {
         panic!("{} elements", found.elements.len())
     };
     assert_eq!(element.site.lattice.kind(), LatticeKind::Hexagonal);
-    assert_eq!((element.site.lattice.pitch_nm(), element.site.centre_nm), (700, [0, 0]));
+    assert_eq!(
+        (element.site.lattice.pitch_nm(), element.site.centre_nm),
+        (700.into(), [0, 0])
+    );
     assert_eq!(element.widths.pillars(), 81 * 49 + 82 * 48);
     if let Ok(other) = rows(false) {
         assert!(other.elements.iter().all(|e| e.site.lattice.is_square()));
@@ -312,7 +318,10 @@ fn wide_pillars_are_found_and_pads_are_not() {
             panic!("{pitch}: {} elements", read.elements.len())
         };
         let lattice = element.site.lattice;
-        assert_eq!((lattice.pitch_nm(), element.site.centre_nm), (pitch as u32, [0, 0]));
+        assert_eq!(
+            (lattice.pitch_nm(), element.site.centre_nm),
+            ((pitch as u32).into(), [0, 0])
+        );
         assert_eq!((read.pillars, read.oddities.total()), (36, 0), "{pitch}");
         assert_eq!(element.widths.number[[1, 2]], (least + 8 * step) as u16);
     }
@@ -327,7 +336,10 @@ fn wide_pillars_are_found_and_pads_are_not() {
     }
     let read = found(&mut gds).unwrap();
     let lattice = read.elements[0].site.lattice;
-    assert_eq!((lattice.kind(), lattice.pitch_nm()), (LatticeKind::Hexagonal, 12_000));
+    assert_eq!(
+        (lattice.kind(), lattice.pitch_nm()),
+        (LatticeKind::Hexagonal, 12_000.into())
+    );
     assert_eq!(
         (read.elements.len(), read.pillars, read.shape),
         (1, 81, PillarShape::Circle)
@@ -345,7 +357,7 @@ fn wide_pillars_are_found_and_pads_are_not() {
         (read.elements.len(), read.pillars, read.oddities.total()),
         (1, 400, 400)
     );
-    assert_eq!(read.elements[0].site.lattice.pitch_nm(), 350);
+    assert_eq!(read.elements[0].site.lattice.pitch_nm(), 350.into());
 }
 
 /// Several lenses, found without being told, one of them a mirrored and magnified copy.
@@ -360,17 +372,17 @@ fn elements_are_discovered() {
     let found: Vec<_> = read
         .elements
         .iter()
-        .map(|e| (e.site.centre_nm, e.site.lattice.pitch_nm(), e.widths.pillars()))
+        .map(|e| (e.site.centre_nm, e.site.lattice.pitch_nm().nm(), e.widths.pillars()))
         .collect();
     assert_eq!(
         found,
         [
-            ([196_500, -3500], 700, 100),
-            ([1750, 1750], 350, 100),
+            ([196_500, -3500], 700.0, 100),
+            ([1750, 1750], 350.0, 100),
             // Five columns, four rows: the lattice is square, its row to spare on top.
-            ([100_700, 100_700], 350, 20),
-            ([1750, 301_750], 350, 100),
-            ([71_750, 301_750], 350, 100),
+            ([100_700, 100_700], 350.0, 20),
+            ([1750, 301_750], 350.0, 100),
+            ([71_750, 301_750], 350.0, 100),
         ]
     );
 }

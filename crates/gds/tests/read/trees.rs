@@ -183,7 +183,7 @@ proptest! {
                 let w = 2 * rand::Rng::random_range(&mut rng, 20..pitch as u16);
                 if lattice.half_radius2(ix, iy) <= (2 * half as i64).pow(2) {
                     widths.number[[iy, ix]] = w;
-                    let (px, py) = (x + lattice.coordinate_nm(ix), y + lattice.coordinate_nm(iy));
+                    let (px, py) = (x + lattice.whole_nm(0, ix), y + lattice.whole_nm(0, iy));
                     gds.square(1, px as i32, py as i32, i32::from(w));
                 }
             }

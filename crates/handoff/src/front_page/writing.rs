@@ -81,7 +81,8 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
         }
     }
     page.table(table);
-    let (lattice, pitch_nm) = (c.design.cell.lattice, c.design.cell.pitch_nm);
+    let cell = &c.design.cell;
+    let row_nm = cell.lattice.row_nm(cell.pitch_nm, cell.database_unit);
     let mut snap = Table::new([
         Column::number("Current", "nA"),
         Column::number("Shot step", "nm"),
@@ -91,8 +92,8 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
     ])
     .caption("What the shots of each beam do to the pillars of the array");
     for (beam, rms) in &c.documents.snapping {
-        let fits = |nm: u32| f64::from(nm) % beam.shot_step_nm == 0.0;
-        let pitch = if fits(pitch_nm) && fits(lattice.row_nm(pitch_nm)) {
+        let fits = |nm: f64| nm % beam.shot_step_nm == 0.0;
+        let pitch = if fits(cell.pitch_nm.nm()) && fits(row_nm) {
             "a multiple of the step".to_owned()
         } else {
             format!(

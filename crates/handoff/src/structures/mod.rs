@@ -144,15 +144,14 @@ impl Structures {
     /// # Errors
     /// If one cannot be written.
     pub(crate) fn write(self, design: &Design, pillars: &Path, step2: &Path) -> Result<Vec<Structure>> {
-        let timestamp = &design.layout.timestamp;
-        let mut drawing = Drawing::new("TESTS", timestamp);
+        let mut drawing = Drawing::new("TESTS", design);
         for pillar in &self.pillars {
             let layer = number(&design.layout.layers.pillars);
             drawing.add_pillar(&pillar.cell_name(), layer, &pillar.corners());
         }
         drawing.add(self.top);
         drawing.write(pillars)?;
-        let mut drawing = Drawing::new("TESTS_STEP2", timestamp);
+        let mut drawing = Drawing::new("TESTS_STEP2", design);
         drawing.add(self.step2);
         drawing.write(step2)?;
         Ok(self.list)

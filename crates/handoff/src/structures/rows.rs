@@ -1,7 +1,7 @@
 //! Rows of pads and of lines to measure widths on.
 
 use super::{APART, BESIDE, NUMERAL, StructureLayers, Structures, clear_of_borders};
-use crate::dose_matrix::top_pad;
+use crate::dose_matrix::{pad_pitch, row_nm, top_pad};
 use crate::drawing::{RectNm, Sheet, nm};
 use crate::kind_words::KindWords;
 use crate::pad::{DrawnSize, line_width, test_pads};
@@ -16,9 +16,7 @@ const LINES: i64 = 5;
 /// number of nanometres, as shot steps are, and the pitch is as much wider.
 fn pad_pitch_nm(kind: LatticeKind, pitch_nm: u32, sparse: i64) -> i64 {
     let wanted = pitch_nm * sparse as u32;
-    let mut fitting = (wanted..)
-        .step_by(2)
-        .filter(|pitch| kind.row_nm(*pitch).is_multiple_of(2));
+    let mut fitting = (wanted..).step_by(2).filter(|pitch| row_nm(kind, *pitch) % 2 == 0);
     let found = if sparse == 1 { None } else { fitting.next() };
     i64::from(found.unwrap_or(wanted))
 }
@@ -35,7 +33,7 @@ impl Structures {
         y: i64,
     ) -> RectNm {
         let side = nm(process.tests.pad_um);
-        let pitch = pad_pitch_nm(design.cell.lattice, design.cell.pitch_nm, sparse);
+        let pitch = pad_pitch_nm(design.cell.lattice, pad_pitch(design), sparse);
         let cleave = sparse == 1;
         let KindWords { sizes, .. } = KindWords::of(design.cell.shape);
         // Room at the left for the dashes of the cleave line.
@@ -157,7 +155,7 @@ mod tests {
             assert_eq!(pad_pitch_nm(LatticeKind::Hexagonal, pitch, 1), i64::from(pitch));
             let sparse = pad_pitch_nm(LatticeKind::Hexagonal, pitch, 3) as u32;
             assert!((3 * pitch..3 * pitch + 10).contains(&sparse), "{sparse}");
-            assert!(LatticeKind::Hexagonal.row_nm(sparse).is_multiple_of(2) && sparse.is_multiple_of(2));
+            assert!(row_nm(LatticeKind::Hexagonal, sparse) % 2 == 0 && sparse.is_multiple_of(2));
         }
     }
 }

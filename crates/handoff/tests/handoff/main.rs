@@ -18,7 +18,6 @@ use metalith_design::{Design, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Selection, Shape, Transform, Visitor};
 use metalith_handoff::{HandoffOptions, LayoutStatistics, Manifest, handoff, verify_handoff};
 use metalith_layout::LayoutFormat;
-use metalith_pillars::Lattice;
 use metalith_wave::Accuracy;
 
 const DESIGN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/mini_3x3.toml");
@@ -453,7 +452,7 @@ fn the_reference_lens_is_as_large_as_the_elements() {
     let design = Design::read(Path::new(DESIGN)).unwrap();
     let census = LayoutStatistics::take(&shared().join("tests/mini_3x3_reference_pillars.gds"), &Silent).unwrap();
     let bounds = census.layer(1, 0).unwrap().bounds_um.unwrap();
-    let lattice = Lattice::covering(design.lens.diameter_nm, design.cell.pitch_nm).unwrap();
+    let lattice = design.cell.lattice_covering(design.lens.diameter_nm).unwrap();
     let reach = lattice.coordinate_um(lattice.sites() - 1);
     assert!(
         bounds

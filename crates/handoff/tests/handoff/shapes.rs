@@ -10,7 +10,7 @@ use metalith_gds::{
     LayerNumber, Layout, Point, Rect, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of,
 };
 use metalith_handoff::{HandoffOptions, LayoutStatistics, handoff, verify_handoff};
-use metalith_pillars::{LatticeKind, PillarId, PillarRows, PillarShape, Rectangles};
+use metalith_pillars::{DatabaseUnit, LatticeKind, PillarId, PillarRows, PillarShape, Rectangles};
 use metalith_testing::{design, root};
 
 use super::{PILLARS, SUMMED, TABLE_S, options, rows_in};
@@ -175,7 +175,7 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
             (steps[0], all.len() as i64)
         };
         let ((x_step, columns), (y_step, rows)) = (apart(0), apart(1));
-        let pitch = i64::from(design.cell.pitch_nm) * if dense { 1 } else { 3 };
+        let pitch = (design.cell.pitch_nm.nm() as i64) * if dense { 1 } else { 3 };
         match design.cell.lattice {
             LatticeKind::Square => {
                 let across = (x1 - x0) / pitch;
@@ -185,7 +185,10 @@ fn tables_hold(name: &str, sites: usize, pads: usize) {
             LatticeKind::Hexagonal => {
                 // Places are doubled, so half a pitch is one; sparse ones are wider by the even rows that they have.
                 assert!((pitch..pitch + 10).contains(&x_step) && (dense || y_step % 4 == 0));
-                assert_eq!(y_step, 2 * i64::from(LatticeKind::Hexagonal.row_nm(x_step as u32)));
+                assert_eq!(
+                    y_step,
+                    2 * LatticeKind::Hexagonal.row_nm((x_step as u32).into(), DatabaseUnit::Nanometre) as i64
+                );
                 let (half, side) = (columns / 2 * x_step, x1 - x0);
                 assert!((side - 2 * x_step..=side).contains(&(half + x_step)), "{row:?}");
                 assert!((2 * side - 3 * y_step..=2 * side).contains(&(rows * y_step)), "{row:?}");

@@ -312,14 +312,14 @@ impl<'a> ElementPillars<'a> {
     /// Write the lists of a strip and empty them.
     fn put_lists(&self, out: &mut Packer) {
         let lattice = self.widths.lattice();
-        let at = |ix: i32, iy: i32| [lattice.place_nm(0, ix as usize), lattice.place_nm(1, iy as usize)];
-        let steps = lattice.steps_nm();
+        let at = |ix: i32, iy: i32| [lattice.place_units(0, ix as usize), lattice.place_units(1, iy as usize)];
+        let grid = lattice.grid_step();
         for width in 1..out.lists.len() {
             let mut places = std::mem::take(&mut out.lists[width]);
             let Some(&first) = places.first() else {
                 continue;
             };
-            let side = width as i64;
+            let side = self.form.edge(width as u16);
             let corners = places.iter().fold([first; 2], |[low, high], p| {
                 [
                     [low[0].min(p[0]), low[1].min(p[1])],
@@ -331,15 +331,16 @@ impl<'a> ElementPillars<'a> {
             }
             let count = places.len() as u64;
             places.remove(0);
-            places.iter_mut().for_each(|p| *p = [p[0] - first[0], p[1] - first[1]]);
-            let mut grid = i64::from(steps[0]);
-            if steps[0] != steps[1] {
-                // No number of nanometres but 1 divides both steps in general.
-                places
-                    .iter_mut()
-                    .for_each(|p| *p = [p[0] * steps[0] as i32, p[1] * steps[1] as i32]);
-                grid = 1;
-            }
+            let from = at(first[0], first[1]);
+            places.iter_mut().for_each(|p| match grid {
+                Some(_) => *p = [p[0] - first[0], p[1] - first[1]],
+                // No number of units but 1 divides all distances in general.
+                None => {
+                    let place = at(p[0], p[1]);
+                    *p = [0, 1].map(|axis| (place[axis] - from[axis]) as i32);
+                }
+            });
+            let grid = grid.unwrap_or(1);
             let list = Repetition::List { grid, places };
             let (centre, copies) = (at(first[0], first[1]), (count > 1).then_some(&list));
             if self.form.is_square() {
@@ -368,8 +369,8 @@ impl<'a> ElementPillars<'a> {
                 && width != 0
             {
                 let out = &mut out[part];
-                let centre = [lattice.place_nm(0, ix), lattice.place_nm(1, iy)];
-                let side = i64::from(width);
+                let centre = [lattice.place_units(0, ix), lattice.place_units(1, iy)];
+                let side = self.form.edge(width);
                 if encoding == PillarEncoding::References {
                     let cell = self.width_cells[usize::from(width)];
                     out.records.placement(cell, centre, &Placing::PLAIN, None);

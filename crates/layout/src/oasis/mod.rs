@@ -7,18 +7,18 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use metalith_core::{AtomicFile, Error, Progress, Result};
-use metalith_design::array::{DomainPart, PillarArray, Symmetry, SymmetryGroup};
+use metalith_design::array::{DomainPart, PillarArray, PlacedElement, Symmetry, SymmetryGroup};
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use metalith_oasis::{CompressedBlock, OasisWriter, Placing, RecordBuffer};
-use metalith_pillars::PillarRows;
+use metalith_pillars::{DatabaseUnit, PillarRows};
 
 use super::fixed_shapes::FixedShapes;
 use super::pillar_form::PillarForm;
 use super::{OasisEncoding, PillarLayout, Written, no_copies, no_symmetry, top_cell};
 use encode::{ElementPillars, NOTHING, PillarEncoding, bounds_of, unite};
 
-/// Steps of the grid in a micrometre: 1 nm.
-const GRID_PER_UM: f64 = 1000.0;
+/// Nanometres in a micrometre.
+const NM_PER_UM: f64 = 1000.0;
 
 /// A sample tells sizes to a few percent: what is not smaller by more is written as lists, which read faster.
 const SURE: f64 = 0.97;
@@ -48,7 +48,7 @@ pub(super) fn write_pillars(
     progress: &dyn Progress,
 ) -> Result<Written> {
     let (fixed, pillars) = (&layout.fixed, layout.layer);
-    let mut file = OasisFile::create(&layout.top, path)?;
+    let mut file = OasisFile::create(&layout.top, layout.form.unit(), path)?;
     let mut remarks = Vec::new();
     let mut elements = Elements {
         file: &mut file,
@@ -69,7 +69,7 @@ pub(super) fn write_pillars(
     if encoding == OasisEncoding::Plain {
         file.top(fixed, &placed, |layer| layer.number() == pillars.number())?;
         let mut written = file.finish(remarks)?;
-        written.beside = layers_apart(&layout.top, fixed, pillars, path)?;
+        written.beside = layers_apart(&layout.top, layout.form.unit(), fixed, pillars, path)?;
         return Ok(written);
     }
     file.top(fixed, &placed, |_| true)?;
@@ -84,18 +84,25 @@ pub(super) fn write_apertures(design: &Design, encoding: OasisEncoding, path: &P
     let fixed = FixedShapes::of_apertures(design);
     let openings = &design.layout.layers.apertures;
     let top = top_cell(design);
-    let mut file = OasisFile::create(&top, path)?;
+    let unit = design.cell.database_unit;
+    let mut file = OasisFile::create(&top, unit, path)?;
     let plain = encoding == OasisEncoding::Plain;
     file.top(&fixed, &[], |layer| !plain || layer.number() == openings.number())?;
     let mut written = file.finish(Vec::new())?;
     if plain {
-        written.beside = layers_apart(&top, &fixed, openings, path)?;
+        written.beside = layers_apart(&top, unit, &fixed, openings, path)?;
     }
     Ok(written)
 }
 
 /// A file for each layer of polygons but one; texts for people are left out.
-fn layers_apart(top: &str, fixed: &FixedShapes<'_>, but: &LayoutLayer, path: &Path) -> Result<Vec<PathBuf>> {
+fn layers_apart(
+    top: &str,
+    unit: DatabaseUnit,
+    fixed: &FixedShapes<'_>,
+    but: &LayoutLayer,
+    path: &Path,
+) -> Result<Vec<PathBuf>> {
     let mut numbers: Vec<_> = fixed.polygons.iter().map(|(layer, _)| layer.number()).collect();
     numbers.sort_unstable();
     numbers.dedup();
@@ -105,7 +112,7 @@ fn layers_apart(top: &str, fixed: &FixedShapes<'_>, but: &LayoutLayer, path: &Pa
     for number in numbers {
         let name = format!("{stem}_{}_{}.oas", number.layer, number.datatype);
         let path = path.with_file_name(name);
-        let mut file = OasisFile::create(top, &path)?;
+        let mut file = OasisFile::create(top, unit, &path)?;
         file.top(fixed, &[], |layer| layer.number() == number)?;
         paths.push(file.finish(Vec::new())?.path);
     }
@@ -116,24 +123,25 @@ fn layers_apart(top: &str, fixed: &FixedShapes<'_>, but: &LayoutLayer, path: &Pa
 struct PlacedCell {
     cell: u64,
     symmetry: Symmetry,
-    at_nm: (i64, i64),
+    /// Place (database units).
+    at: (i64, i64),
     bounds: [i64; 4],
 }
 
 impl PlacedCell {
-    fn new(cell: u64, symmetry: Symmetry, at_nm: (i64, i64), own: [i64; 4]) -> Self {
+    fn new(cell: u64, symmetry: Symmetry, at: (i64, i64), own: [i64; 4]) -> Self {
         let mut bounds = NOTHING;
         if own[0] <= own[2] {
             for (x, y) in [(own[0], own[1]), (own[2], own[3])] {
                 let (x, y) = symmetry.point(x, y);
-                let (x, y) = (x + at_nm.0, y + at_nm.1);
+                let (x, y) = (x + at.0, y + at.1);
                 bounds = unite(bounds, [x, y, x, y]);
             }
         }
         Self {
             cell,
             symmetry,
-            at_nm,
+            at,
             bounds,
         }
     }
@@ -144,7 +152,7 @@ impl PlacedCell {
             angle_deg: 90.0 * f64::from(self.symmetry.quarter_turns),
             ..Placing::PLAIN
         };
-        records.placement(self.cell, [self.at_nm.0, self.at_nm.1], &placing, None);
+        records.placement(self.cell, [self.at.0, self.at.1], &placing, None);
     }
 }
 
@@ -156,9 +164,10 @@ struct OasisFile<'a> {
 }
 
 impl<'a> OasisFile<'a> {
-    fn create(top: &str, path: &'a Path) -> Result<Self> {
+    fn create(top: &str, unit: DatabaseUnit, path: &'a Path) -> Result<Self> {
         let out = BufWriter::new(AtomicFile::create(path)?);
-        let writer = OasisWriter::new(out, GRID_PER_UM, &[top], true).map_err(Error::io("write", path))?;
+        let writer =
+            OasisWriter::new(out, NM_PER_UM * unit.per_nm() as f64, &[top], true).map_err(Error::io("write", path))?;
         Ok(Self {
             writer,
             path,
@@ -256,6 +265,12 @@ impl Elements<'_, '_> {
         }
     }
 
+    /// Centre of an element (database units).
+    fn centre(&self, placed: &PlacedElement) -> (i64, i64) {
+        let (x, y) = placed.element.centre_nm;
+        (self.form.unit().units(x), self.form.unit().units(y))
+    }
+
     /// Each class once, in the parts that symmetry leaves unique.
     fn folded(&mut self, array: &PillarArray) -> Result<Vec<PlacedCell>> {
         let mut classes = Vec::new();
@@ -267,7 +282,7 @@ impl Elements<'_, '_> {
             .iter()
             .map(|p| {
                 let (cell, bounds) = classes[p.class];
-                PlacedCell::new(cell, p.symmetry, p.element.centre_nm, bounds)
+                PlacedCell::new(cell, p.symmetry, self.centre(p), bounds)
             })
             .collect())
     }
@@ -281,12 +296,7 @@ impl Elements<'_, '_> {
             let parts = alone.domain(widths.as_ref());
             let mut pillars = self.element(widths.as_ref(), &alone, &parts);
             let (cell, bounds) = self.pillars(&[format!("E{k}")], &mut pillars)?[0];
-            placed.push(PlacedCell::new(
-                cell,
-                Symmetry::IDENTITY,
-                element.element.centre_nm,
-                bounds,
-            ));
+            placed.push(PlacedCell::new(cell, Symmetry::IDENTITY, self.centre(element), bounds));
         }
         Ok(placed)
     }
@@ -382,10 +392,10 @@ impl Elements<'_, '_> {
     fn width_cells(self) -> Result<()> {
         for (width, number) in self.width_cells.iter().enumerate() {
             if number.is_some() {
-                let half = width as i64 / 2;
+                let side = self.form.edge(width as u16);
                 let mut records = RecordBuffer::absolute();
                 if self.form.is_square() {
-                    records.rectangle(numbers(self.layer), [-half; 2], [width as i64; 2], None);
+                    records.rectangle(numbers(self.layer), [-side / 2; 2], [side; 2], None);
                 } else {
                     let corners = self.form.corners(width as u16);
                     let corners: Vec<[i64; 2]> = corners.iter().map(|&(x, y)| [x, y]).collect();

@@ -115,7 +115,8 @@ pub(crate) mod tests {
     pub(crate) fn rule(coefficients: &[f64]) -> PillarRule {
         let cell = CellSpec {
             lattice: Default::default(),
-            pitch_nm: 350,
+            pitch_nm: 350.into(),
+            database_unit: Default::default(),
             pillar_height_nm: 700.0,
             width_range_nm: (100, 300),
             width_step_nm: 2,

@@ -37,17 +37,17 @@ impl Rings {
     /// If a square lattice has an odd number of sites, or the lattice is smaller than the lens.
     pub fn new(lattice: Lattice, diameter_nm: u32) -> Result<Self> {
         let odd = lattice.is_square() && !lattice.sites().is_multiple_of(2);
-        if odd || diameter_nm / lattice.pitch_nm() < 2 {
+        if odd || f64::from(diameter_nm) < 2.0 * lattice.pitch_nm().nm() {
             return Err(Error::refused(
                 "optimise/no-rings",
                 format!(
                     "a lens of {diameter_nm} nm on a lattice of {} sites has no rings",
                     lattice.sites()
                 ),
-                "use an even number of sites and a lens of several pitches",
+                "use an even number of sites, by a `database_unit_nm` of which half the pitch is a multiple, and a lens of several pitches",
             ));
         }
-        if (lattice.sites() as u64) * u64::from(lattice.steps_nm()[0]) < u64::from(diameter_nm) {
+        if lattice.sites() as f64 * lattice.steps_nm()[0] < f64::from(diameter_nm) {
             return Err(Error::refused(
                 "optimise/lattice-too-small",
                 format!("{} sites do not hold a lens of {diameter_nm} nm", lattice.sites()),
@@ -286,7 +286,7 @@ mod tests {
                 let r2 = if lattice.is_square() {
                     lattice.half_radius2(ix, iy) * 175 * 175
                 } else {
-                    lattice.radius2_nm2(ix, iy)
+                    lattice.radius2_nm2(ix, iy) as i64
                 };
                 let ring = (lattice.has(ix, iy) && r2 <= 20_000 * 20_000).then(|| (r2 as u64).isqrt() as usize / 350);
                 assert_eq!(rings.ring_at(ix, iy), ring);

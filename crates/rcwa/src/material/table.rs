@@ -9,7 +9,11 @@ pub(super) type TableFault = (Option<usize>, TableError);
 /// Samples (L (um), n, k) of the text of a table, wavelengths rising.
 pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
     let names = csv_columns(text);
-    let (wavelength, unit) = if names.contains(&"wavelength_um") && !names.contains(&"wavelength_nm") { ("wavelength_um", 1.0) } else { ("wavelength_nm", 1e-3) };
+    let (wavelength, unit) = if names.contains(&"wavelength_um") && !names.contains(&"wavelength_nm") {
+        ("wavelength_um", 1.0)
+    } else {
+        ("wavelength_nm", 1e-3)
+    };
     let absorbs = names.contains(&"k");
     let columns = format!("{wavelength},n{}", if absorbs { ",k" } else { "" });
     let refuse = |line: Option<usize>, what: String| (line, TableError::NotTheColumns { what });
@@ -18,7 +22,11 @@ pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
         let row = row?;
         let number = Some(row.line);
         let mut sample = [0.0; 3];
-        if absorbs { sample = row.numbers()? } else { sample[..2].copy_from_slice(&row.numbers::<2>()?) }
+        if absorbs {
+            sample = row.numbers()?
+        } else {
+            sample[..2].copy_from_slice(&row.numbers::<2>()?)
+        }
         sample[0] *= unit;
         if sample[0] <= 0.0 || sample[1] <= 0.0 || sample[2] < 0.0 {
             return Err((number, TableError::NotPhysical));

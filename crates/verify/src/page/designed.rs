@@ -3,7 +3,7 @@
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase, RadialPhase};
 use metalith_design::{Design, LensSpec};
-use metalith_pillars::{Lattice, PillarId, PillarMap, PillarRows, PolarisationBasis};
+use metalith_pillars::{PillarId, PillarMap, PillarRows, PolarisationBasis};
 use metalith_report::{Axis, Cell, Chart, Column, Page, PillarZoom, Plan, Table, exact};
 
 /// Pillars that the picture of the middle shows along an axis.
@@ -149,8 +149,7 @@ fn middle(rows: &impl PillarRows) -> PillarMap {
     let lattice = rows.lattice();
     let n = lattice.sites();
     let beside = n.saturating_sub(2 * RADIUS_POINTS) / 2;
-    let shown =
-        Lattice::of_kind(lattice.kind(), lattice.pitch_nm(), n - 2 * beside).expect("a part of a lattice is one");
+    let shown = lattice.with_sites(n - 2 * beside).expect("a part of a lattice is one");
     let mut map = PillarMap::empty(shown);
     for ((iy, ix), width) in map.number.indexed_iter_mut() {
         *width = rows.number(ix + beside, iy + beside);

@@ -11,7 +11,7 @@ use measurements::{measurements, widths};
 use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{LayerNumber, Progress, Result};
-use metalith_pillars::{ElementSite, LatticeKind, PillarReader, PillarShape};
+use metalith_pillars::{DatabaseUnit, ElementSite, LatticeKind, PillarReader, PillarShape};
 use metalith_rcwa::CellLattice;
 use metalith_sensor::frame::{self, Recorded, SensorFrame, SensorFrames};
 use metalith_sensor::{Colour, ColourFilter, RelayCamera};
@@ -185,7 +185,7 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
     let is_known = film.is_some() && substrate.is_some();
     let even_nm = pitch_nm + pitch_nm % 2;
     let cell = CellStack {
-        lattice: CellLattice::drawn(lattice, even_nm),
+        lattice: CellLattice::drawn(lattice, even_nm.into(), DatabaseUnit::Nanometre),
         shape,
         film: film.unwrap_or_else(vacuum),
         substrate: substrate.unwrap_or_else(vacuum),

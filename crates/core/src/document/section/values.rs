@@ -184,9 +184,13 @@ impl<'t> Section<'_, 't> {
     /// A list of numbers, each within the limits; an empty one where the key is left out.
     pub fn floats(&self, key: &str, limits: Limits) -> Vec<f64> {
         let expected = format!("a list of numbers{}", describe(&limits));
-        self.list(key, &expected, |item| if let Some(v) = number(item.get_ref()) { Some(self.limited(item.span(), key, v, &limits)) } else {
-            self.wrong_type(key, item, &expected);
-            Some(*limits.range.start())
+        self.list(key, &expected, |item| {
+            if let Some(v) = number(item.get_ref()) {
+                Some(self.limited(item.span(), key, v, &limits))
+            } else {
+                self.wrong_type(key, item, &expected);
+                Some(*limits.range.start())
+            }
         })
     }
 

@@ -173,7 +173,7 @@ impl LensPhase {
 
     /// True if a site is inside the lens.
     pub fn holds(&self, ix: usize, iy: usize) -> bool {
-        let place = |axis, i| self.lattice.place_nm(axis, i);
+        let place = |axis, i| self.lattice.whole_nm(axis, i);
         self.lattice.units2(ix, iy) <= self.limit
             && self.lattice.has(ix, iy)
             && self
@@ -228,7 +228,7 @@ impl<'a> ElementPhase<'a> {
         let [x, y] = lens
             .lattice
             .steps_nm()
-            .map(|step| f64::from(step) * 1e-3 / 2.0 / wedge.wavelength_um);
+            .map(|step| step * 1e-3 / 2.0 / wedge.wavelength_um);
         Self {
             lens,
             terms: Vec::new(),

@@ -105,8 +105,8 @@ impl Filler {
                     Some(sum) => sum == Some(twice) && symmetric(&e.site.reach()[axis]),
                     // Of elements side by side, that which the first is in.
                     None => first[axis].checked_mul(2 * self.scale.num).is_some_and(|place| {
-                        let across = e.site.lattice.sites() as i64 * i64::from(e.site.lattice.steps_nm()[axis]);
-                        place.abs_diff(twice) <= (across * self.scale.den) as u64
+                        let across = e.site.lattice.sites() as f64 * e.site.lattice.steps_nm()[axis];
+                        place.abs_diff(twice) <= (across * self.scale.den as f64) as u64
                     }),
                 }
             })
