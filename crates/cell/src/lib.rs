@@ -23,6 +23,7 @@ mod rotated;
 mod rotation;
 mod stack;
 mod table;
+mod unit_cells;
 mod upright;
 
 pub use cache::cache_folder;
@@ -58,4 +59,5 @@ pub use rotated::{RotatedCell, RotationResponse, RotationSamples, Truncation};
 pub use rotation::RotationMapping;
 pub use stack::{CellStack, MOST_SUBSTRATE_K, UniformLayer};
 pub use table::{CellTable, Origin, TableSpec};
+pub use unit_cells::{PhaseConvention, TabulatedCells, TabulatedPhase, UnitCellTable};
 pub use upright::{Along, UPRIGHT_ORDERS, UprightCell, birefringent_pillars, birefringent_stacks};

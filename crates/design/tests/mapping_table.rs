@@ -28,6 +28,47 @@ fn a_design_takes_its_mapping_from_a_table() {
     );
 }
 
+/// A table of unit cells under the same key gives the mapping that its phases ask for, whatever the sign of time.
+#[test]
+fn a_design_takes_its_mapping_from_unit_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    let widths: Vec<u16> = (100..=300).step_by(2).collect();
+    let curve = PhaseCurve::new(&PublishedCell::new(350), 0.452, &widths).unwrap();
+    let text = std::fs::read_to_string(metalith_testing::design("mini_3x3")).unwrap();
+    let kept: Vec<_> = text.lines().filter(|line| !line.starts_with("coefficients")).collect();
+    let read = |sign: f64, keys: &str| {
+        let each = widths.iter().zip(&curve.turns);
+        let rows: String = each.map(|(w, turns)| format!("{w},{}\n", sign * turns)).collect();
+        std::fs::write(
+            folder.path().join("cells.csv"),
+            format!("width_nm,phase (waves)\n{rows}"),
+        )
+        .unwrap();
+        let text = kept
+            .join("\n")
+            .replace("[mapping]", &format!("[mapping]\ntable = \"cells.csv\"\n{keys}"));
+        let path = folder.path().join("design.toml");
+        std::fs::write(&path, text).unwrap();
+        Design::read(&path)
+    };
+    let exact = MappingTable::nearest(&curve, &[]).unwrap();
+    for (sign, convention) in [(1.0, "exp(-iwt)"), (-1.0, "exp(+iwt)")] {
+        for keys in [String::new(), format!("phase_convention = \"{convention}\"")] {
+            let design = read(sign, &keys).unwrap();
+            assert_eq!(design.mapping.table.as_ref(), Some(&exact));
+            let cells = design.mapping.solved.unwrap().cells.unwrap();
+            assert_eq!(cells.convention.name(), convention);
+            assert!(cells.interpolation.is_none());
+        }
+    }
+    let error = read(1.0, "phase_convention = \"exp(+iwt)\"").unwrap_err();
+    assert_eq!(error.id(), "mapping/phase-convention");
+    // A mapping has no convention.
+    let path = folder.path().join("design.toml");
+    std::fs::write(folder.path().join("cells.csv"), exact.to_csv()).unwrap();
+    assert_eq!(Design::read(&path).unwrap_err().id(), "mapping/phase-convention");
+}
+
 /// A mapping that is solved from the cell needs no wavelength beside that of the lens, and stands beside no other.
 #[test]
 fn a_mapping_of_the_cell_stands_alone() {

@@ -9,10 +9,11 @@ use super::cell::read_band;
 use super::lens::WAVELENGTH;
 use super::{ArraySpec, CellSpec, LensSpec, MappingIdentity, SteeredMapping, SteeringSteps};
 use metalith_cell::{
-    Basis, CellStack, InversePolynomial, MappingTable, PillarLibrary, RotationMapping, SolvedMapping, cache_folder,
+    Basis, CellStack, InversePolynomial, MappingTable, PhaseConvention, PillarLibrary, RotationMapping, SolvedMapping,
+    UnitCellTable, cache_folder,
 };
 use metalith_core::document::{Limits, Section};
-use metalith_core::{Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_pillars::PolarisationBasis;
 
 pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
@@ -32,16 +33,19 @@ pub struct MappingSpec {
     pub wavelength_um: f64,
     /// Duty cycle over phase.
     pub polynomial: InversePolynomial,
-    /// File of a table that stands in its place, such as `metalith cells` writes.
+    /// File of a table that stands in its place: a mapping such as `metalith cells` writes, or unit cells of another program.
     #[serde(skip)]
     pub table_file: Option<PathBuf>,
+    /// Convention of the phases of that file, where the design says it.
+    #[serde(skip)]
+    pub phase_convention: Option<PhaseConvention>,
     /// Contents of that file, or the mapping that was solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<MappingTable>,
     /// True if the mapping is solved from the cell of the design.
     #[serde(skip)]
     pub from_cells: bool,
-    /// Mapping that was solved from the cell; the layout depends on its table alone.
+    /// Mapping that was solved from the cell, or made from a table of unit cells; the layout depends on its table alone.
     #[serde(skip)]
     pub solved: Option<SolvedMapping>,
     /// File of the library of upright rectangles, such as `metalith cells` writes.
@@ -162,9 +166,16 @@ impl MappingSpec {
             coefficients,
         };
         let refuse_all = |why: &str, instead: &str| {
-            for key in ["coefficients", "table", "basis", "steered", "source"]
-                .into_iter()
-                .filter(|key| s.has(key))
+            for key in [
+                "coefficients",
+                "table",
+                "basis",
+                "steered",
+                "source",
+                "phase_convention",
+            ]
+            .into_iter()
+            .filter(|key| s.has(key))
             {
                 s.fault(key, why, format!("leave `{key}` out{instead}"));
             }
@@ -211,6 +222,16 @@ impl MappingSpec {
                 "keep one of `table` and `coefficients`",
             );
         }
+        let phase_convention = s
+            .has("phase_convention")
+            .then(|| s.choice("phase_convention", &PhaseConvention::CHOICES, None));
+        if phase_convention.is_some() && table_file.is_none() && !rotated && !upright {
+            s.fault(
+                "phase_convention",
+                "a convention of phases, and no table of them",
+                "leave `phase_convention` out, or give a `table` of unit cells",
+            );
+        }
         if from_cells {
             for key in ["coefficients", "basis", "table", "cell", "accept"]
                 .into_iter()
@@ -254,6 +275,7 @@ impl MappingSpec {
             identity,
             polynomial,
             table_file,
+            phase_convention,
             table: None,
             from_cells,
             solved: None,
@@ -282,7 +304,26 @@ impl MappingSpec {
         }
         if let Some(file) = &self.table_file {
             let allowed: Vec<u16> = cell.widths_nm().collect();
-            self.table = Some(MappingTable::read_csv(file, &allowed)?);
+            let table = match UnitCellTable::read(file)? {
+                None if self.phase_convention.is_some() => {
+                    return Err(Error::refused(
+                        "mapping/phase-convention",
+                        format!("{}: a mapping, whose phases have no convention", file.display()),
+                        "leave `phase_convention` of [mapping] out: it is for tables of unit cells",
+                    ));
+                }
+                None => MappingTable::read_csv(file, &allowed)?,
+                Some(cells) => {
+                    let convention = self.phase_convention;
+                    let (curve, cells) =
+                        cells.curve(cell.pillar_height_nm, self.wavelength_um, &allowed, convention)?;
+                    let made = SolvedMapping::of_table(&curve, cells)?;
+                    let table = made.table.clone();
+                    self.solved = Some(made);
+                    table
+                }
+            };
+            self.table = Some(table);
         }
         if let (Some(file), Some(pillars)) = (&self.pillar_library_file, cell.shape.upright()) {
             let read = PillarLibrary::read_csv(file, pillars);
