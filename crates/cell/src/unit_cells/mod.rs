@@ -1,5 +1,7 @@
 //! Tables of unit cells that other programs wrote: complex transmission over width, and over height and wavelength.
 
+mod arrays;
+mod hdf5;
 mod slice;
 #[cfg(test)]
 mod tests;
@@ -17,6 +19,9 @@ pub use slice::{TabulatedCells, TabulatedPhase};
 
 /// Longest table that is read (bytes).
 const LONGEST: u64 = 64 << 20;
+
+/// Most unit cells of a table: a simulation of each takes a second or more.
+const MOST_CELLS: usize = 1 << 20;
 
 /// Difference between equal lengths, as a share of them: programs write six digits or more.
 const ROUNDING: f64 = 1e-6;
@@ -73,8 +78,14 @@ impl UnitCellTable {
     /// # Errors
     /// If the file cannot be read or is no such table.
     pub fn read(path: &Path) -> Result<Option<Self>> {
-        let bytes = read_at_most(path, LONGEST, "a table of unit cells")?;
-        let text = String::from_utf8_lossy(&bytes);
+        Self::of_bytes(path, &read_at_most(path, LONGEST, "a table of unit cells")?)
+    }
+
+    fn of_bytes(path: &Path, bytes: &[u8]) -> Result<Option<Self>> {
+        if let Some(table) = arrays::read(path, bytes) {
+            return table.map(Some);
+        }
+        let text = String::from_utf8_lossy(bytes);
         if metalith_core::text::table_rows(&text)
             .next()
             .is_some_and(|(_, row)| row.starts_with("turns,"))

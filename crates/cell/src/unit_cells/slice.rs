@@ -66,7 +66,7 @@ impl TabulatedCells {
             .collect();
         let error = match &self.interpolation {
             Some(error) => format!(
-                "interpolated, error at most {:.3} rad rms ({:.3} worst) and {:.3} of the amplitude ({:.3} worst)",
+                "interpolated, error at most {:.4} rad rms ({:.4} worst) and {:.4} of the amplitude ({:.4} worst)",
                 error.rms_rad, error.worst_rad, error.rms_amplitude, error.worst_amplitude
             ),
             None => "no interpolation".into(),

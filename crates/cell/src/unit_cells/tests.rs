@@ -185,3 +185,51 @@ fn what_is_no_table_is_said() {
         .unwrap_err();
     assert_eq!(error.id(), "mapping/phase-convention");
 }
+
+fn golden(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../golden/unit_cells")
+        .join(name)
+}
+
+/// Files of `golden/unit_cells/make.py`, which has the same pillar.
+#[test]
+fn arrays_of_hdf5_are_read() {
+    for (name, samples) in [
+        ("tidy3d.hdf5", [25, 3, 4]),
+        ("latest.hdf5", [25, 3, 4]),
+        ("chunks.h5", [25, 3, 4]),
+        ("parts.nc", [25, 0, 1]),
+    ] {
+        let table = UnitCellTable::read(&golden(name)).unwrap().unwrap();
+        for (height, wavelength) in [(600.0, 620.0), (590.0, 633.0)] {
+            let found = table.curve(height, wavelength * 1e-3, &WIDTHS, None);
+            if samples[2] == 1 && wavelength != 620.0 {
+                assert_eq!(found.unwrap_err().id(), "mapping/table-range");
+                continue;
+            }
+            let (curve, note) = found.unwrap();
+            assert!(off(&curve, height, wavelength) < CLOSE, "{name}");
+            assert_eq!(note.samples, samples, "{name}");
+        }
+    }
+}
+
+/// Whatever is cut or changed in a file, it is read or refused.
+#[test]
+fn damaged_hdf5_is_refused() {
+    let read = |bytes: &[u8]| UnitCellTable::of_bytes(Path::new("cells.h5"), bytes);
+    for name in ["tidy3d.hdf5", "latest.hdf5", "chunks.h5", "parts.nc"] {
+        let whole = std::fs::read(golden(name)).unwrap();
+        for end in (600..whole.len()).step_by(297) {
+            let _ = read(&whole[..end]);
+        }
+        // What says where things are stands before the numbers and behind them.
+        for at in (0..2400).step_by(5).chain(whole.len() - 300..whole.len()) {
+            let mut bytes = whole.clone();
+            bytes[at] ^= [0x10, 0xff, 0x01][at % 3];
+            let _ = read(&bytes);
+        }
+    }
+    assert_eq!(read(b"\x89HDF\r\n\x1a\n").unwrap_err().id(), "mapping/hdf5");
+}

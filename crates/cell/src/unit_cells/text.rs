@@ -7,7 +7,7 @@ use std::path::Path;
 
 use num_complex::Complex64;
 
-use super::{AXES, Row, UnitCellTable};
+use super::{AXES, MOST_CELLS, Row, UnitCellTable};
 use metalith_core::text::{quoted, without_mark};
 use metalith_core::{Error, Result};
 
@@ -20,7 +20,7 @@ const MOST_M: f64 = 1e-3;
 
 /// Quantity of a column.
 #[derive(Clone, Copy, PartialEq)]
-enum Quantity {
+pub(super) enum Quantity {
     /// A length along an axis of the table, of which the width is so many.
     Length(usize, f64),
     Frequency,
@@ -33,11 +33,11 @@ enum Quantity {
 }
 
 /// A column that is read.
-struct Column<'t> {
-    index: usize,
-    name: &'t str,
-    quantity: Quantity,
-    unit: Option<&'static str>,
+pub(super) struct Column<'t> {
+    pub index: usize,
+    pub name: &'t str,
+    pub quantity: Quantity,
+    pub unit: Option<&'static str>,
 }
 
 /// Units, as they are written, by the names that messages give them.
@@ -84,6 +84,9 @@ pub(super) fn read(path: &Path, text: &str) -> Result<UnitCellTable> {
         if rows.is_empty() && (is_note || !fields(bare).first().is_some_and(is_number)) {
             head = Some((line, bare));
         } else {
+            if rows.len() == MOST_CELLS {
+                return Err(fault(Some(line), format!("more than {MOST_CELLS} rows")));
+            }
             rows.push((line, fields(text)));
         }
     }
@@ -226,7 +229,7 @@ fn columns<'t>(names: &[&'t str]) -> std::result::Result<Vec<Column<'t>>, String
 }
 
 /// Quantity and unit that a name says, if it is one of a unit cell.
-fn quantity(name: &str) -> Option<(Quantity, Option<&'static str>)> {
+pub(super) fn quantity(name: &str) -> Option<(Quantity, Option<&'static str>)> {
     let lower = name.to_lowercase();
     let unit_of = |text: &str| UNITS.iter().find(|(_, all)| all.contains(&text)).map(|(unit, _)| *unit);
     let in_brackets = lower
@@ -322,7 +325,7 @@ pub(super) fn axis_nm(
 }
 
 /// Transmissions row by row; `words` get what their columns are.
-fn transmissions(
+pub(super) fn transmissions(
     columns: &[Column<'_>],
     values: &[Vec<Complex64>],
     words: &mut Vec<String>,
