@@ -91,3 +91,34 @@ fn a_mapping_of_the_cell_stands_alone() {
         assert!(with(keys).is_err(), "{keys}");
     }
 }
+
+/// The library of upright rectangles can be solved like a mapping, and stands beside no other.
+#[test]
+fn a_library_of_the_cell_stands_alone() {
+    let path = metalith_testing::design("birefringent_532");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let with = |keys: &str| {
+        let text = text.replace("library = \"phases/birefringent_532.csv\"", keys);
+        Design::parse_without_library(&path, &text)
+    };
+    let design = with("source = \"cells\"").unwrap();
+    assert!(design.mapping.from_cells && design.mapping.identity.is_stated);
+    assert!(design.mapping.pillar_library_file.is_none());
+    let both = "library = \"phases/birefringent_532.csv\"\nsource = \"cells\"";
+    let error = with(both).unwrap_err();
+    assert!(
+        error.has_fault(metalith_core::FaultKind::Inconsistent, "mapping.library"),
+        "{error}"
+    );
+    let rotated = metalith_testing::design("geometric_phase_532");
+    let text = std::fs::read_to_string(&rotated).unwrap();
+    let error = Design::parse(
+        &rotated,
+        &text.replace("[mapping] ", "[mapping]\nsource = \"cells\"\n#"),
+    )
+    .unwrap_err();
+    assert!(
+        error.has_fault(metalith_core::FaultKind::Inconsistent, "mapping.source"),
+        "{error}"
+    );
+}

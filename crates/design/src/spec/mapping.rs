@@ -91,8 +91,11 @@ impl MappingSpec {
     /// True if the mapping is solved from the cell: a section says so, or says none to whoever makes it.
     pub(crate) fn is_from_cells(s: &Section<'_, '_>, cell: &CellSpec, library: LibraryFile) -> bool {
         let says_none = !s.has("coefficients") && !s.has("table") && !cell.is_of_the_paper();
-        let asked = s.has("source") || (library == LibraryFile::ToBeMade && says_none);
-        asked && cell.shape.basis().is_none()
+        match cell.shape.basis() {
+            None => s.has("source") || (library == LibraryFile::ToBeMade && says_none),
+            Some(PolarisationBasis::Linear) => s.has("source"),
+            Some(PolarisationBasis::Circular) => false,
+        }
     }
 
     /// The wavelength that the mapping is made for (um), which other sections go by.
@@ -175,7 +178,7 @@ impl MappingSpec {
                 "phase_convention",
             ]
             .into_iter()
-            .filter(|key| s.has(key))
+            .filter(|key| s.has(key) && !(upright && *key == "source"))
             {
                 s.fault(key, why, format!("leave `{key}` out{instead}"));
             }
@@ -189,7 +192,7 @@ impl MappingSpec {
         if upright {
             refuse_all(
                 "upright rectangles have two widths, one for the phase of light along each axis",
-                ": pillars are chosen from the `library`",
+                ": pillars are chosen from the `library`, or from one that `source = \"cells\"` solves",
             );
         } else if s.has("library") {
             s.fault_given(
@@ -202,10 +205,10 @@ impl MappingSpec {
                 "leave `library` out, or use `shape = \"upright_rectangle\"`",
             );
         }
-        let pillar_library_file = upright.then(|| match library {
+        let pillar_library_file = (upright && !from_cells).then(|| match library {
             LibraryFile::Needed => s.file_else(
                 "library",
-                "make it: `metalith cells DESIGN` writes `library.csv` into its folder; copy that to this name",
+                "make it: `metalith cells DESIGN` writes `library.csv` into its folder; copy that to this name; or give `source = \"cells\"` in its place",
             ),
             LibraryFile::ToBeMade => s.path("library"),
         });
@@ -233,10 +236,11 @@ impl MappingSpec {
             );
         }
         if from_cells {
-            for key in ["coefficients", "basis", "table", "cell", "accept"]
-                .into_iter()
-                .filter(|key| s.has(key))
-            {
+            let others: &[&str] = match upright {
+                true => &["library", "cell", "accept"],
+                false => &["coefficients", "basis", "table", "cell", "accept"],
+            };
+            for key in others.iter().copied().filter(|key| s.has(key)) {
                 s.fault(
                     key,
                     "a mapping beside `source = \"cells\"`, by which it is solved from [cell]",
@@ -341,9 +345,15 @@ impl MappingSpec {
 
     /// Solve the mapping from the cell, if that is its source.
     pub(crate) fn solve(&mut self, cell: &CellSpec, stack: &CellStack, progress: &dyn Progress) -> Result<()> {
-        if self.from_cells {
+        if !self.from_cells {
+            return Ok(());
+        }
+        let cache = cache_folder();
+        if let Some(pillars) = cell.shape.upright() {
+            let (library, _) = PillarLibrary::solve(stack, pillars, self.wavelength_um, cache.as_deref(), progress)?;
+            self.pillar_library = Some(Arc::new(library));
+        } else {
             let widths_nm: Vec<u16> = cell.widths_nm().collect();
-            let cache = cache_folder();
             let solved = SolvedMapping::solve(stack, self.wavelength_um, &widths_nm, cache.as_deref(), progress)?;
             self.table = Some(solved.table.clone());
             self.solved = Some(solved);
