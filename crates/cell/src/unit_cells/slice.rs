@@ -171,14 +171,15 @@ impl UnitCellTable {
         if (least..=greatest).contains(&at) || same(least, at) || same(greatest, at) {
             return Ok(());
         }
+        let [least, greatest, at] = [least, greatest, at].map(|nm| (nm * 1e4).round() / 1e4);
         let range = match samples.len() {
-            1 => format!("the {} {least:.6} nm alone", AXES[axis]),
-            _ => format!("{}s from {least:.6} to {greatest:.6} nm", AXES[axis]),
+            1 => format!("the {} {least} nm alone", AXES[axis]),
+            _ => format!("{}s from {least} to {greatest} nm", AXES[axis]),
         };
         Err(Error::refused(
             "mapping/table-range",
             format!(
-                "{}: the table has {range}, and the design asks for {at:.6} nm",
+                "{}: the table has {range}, and the design asks for {at} nm",
                 self.path.display()
             ),
             format!("change `{key}`, or simulate further cells: nothing is extrapolated"),
