@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use metalith::bench_plan::BenchFile;
 use metalith::calibrate::{DeclaredEffect, MeasuredSet};
-use metalith::cell::{MappingTable, Material, PillarLibrary};
+use metalith::cell::{MappingTable, Material, PillarLibrary, UnitCellTable};
 use metalith::drc::{Deck, Waivers};
 use metalith::gds::extract::GdsPillars;
 use metalith::handoff::{Manifest, ManifestEntry, Process, verify_handoff};
@@ -179,6 +179,25 @@ fn designs(folder: &Path) -> Vec<Format> {
             move |path| MappingTable::read_csv(path, &allowed),
         ),
         Format::new(
+            "unit cells",
+            folder.join("cells.h5"),
+            Kind::Bytes,
+            ["tidy3d.hdf5", "latest.hdf5", "chunks.h5", "parts.nc"]
+                .map(|name| file(&format!("golden/unit_cells/{name}")))
+                .to_vec(),
+            unit_cells,
+        ),
+        Format::new(
+            "unit cells as text",
+            folder.join("cells.txt"),
+            Kind::Text,
+            vec![
+                b"radius (m), abs(S21), angle(S21)\n5e-8,0.9,0.1\n6e-8,0.9,0.3\n7e-8,0.9,0.6\n8e-8,0.9,0.9\n".to_vec(),
+                b"width,f,t\n0.1,4.8e14,(0.9+0.1j)\n0.12,4.8e14,(0.8+0.3j)\n0.14,4.8e14,(0.6+0.6j)\n0.16,4.8e14,(0.2+0.9j)\n".to_vec(),
+            ],
+            unit_cells,
+        ),
+        Format::new(
             "material",
             folder.join("material.csv"),
             Kind::Text,
@@ -186,6 +205,14 @@ fn designs(folder: &Path) -> Vec<Format> {
             Material::read_csv,
         ),
     ]
+}
+
+/// Reads unit cells as a design does.
+fn unit_cells(path: &Path) -> metalith::Result<()> {
+    match UnitCellTable::read(path)? {
+        Some(table) => table.curve(600.0, 0.62, &[101, 121, 159], None).map(|_| ()),
+        None => Ok(()),
+    }
 }
 
 /// Files that say how something is done.

@@ -6,7 +6,7 @@ use std::path::Path;
 use ndarray::Array2;
 use serde::Serialize;
 
-use metalith_cell::{LibraryErrors, MappedCell, PillarLibrary, PolarisationAxis, UPRIGHT_ORDERS, UprightCell};
+use metalith_cell::{LibraryErrors, MappedCell, PillarLibrary, PolarisationAxis, UPRIGHT_ORDERS};
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::Design;
 use metalith_pillars::UprightRectangles;
@@ -50,9 +50,7 @@ impl LibraryStudy {
         let wavelength_um = design.mapping.wavelength_um;
         let stack = design.cell_stack()?;
         let full = stack.full_transmission(wavelength_um)?;
-        let cell = UprightCell::new(stack, pillars, PolarisationAxis::X).cached_in(cache);
-        let along = cell.along(wavelength_um, progress)?;
-        let library = PillarLibrary::of_cell(pillars, &along, full)?;
+        let (library, along) = PillarLibrary::solve(&stack, pillars, wavelength_um, cache, progress)?;
         let of_x = |number: u16| along[0][usize::from(number)] / full;
         Ok(Self {
             name: design.name.clone(),

@@ -18,6 +18,7 @@ mod response;
 mod rotated;
 mod rotation_mapping;
 mod stack;
+mod unit_cells;
 mod upright;
 
 pub use cache_file::cache_folder;
@@ -54,4 +55,5 @@ pub use rotated::{
 };
 pub use rotation_mapping::RotationMapping;
 pub use stack::{CellStack, MOST_SUBSTRATE_K, UniformLayer};
+pub use unit_cells::{PhaseConvention, TabulatedCells, TabulatedPhase, UnitCellTable};
 pub use upright::{Along, UPRIGHT_ORDERS, UprightCell, birefringent_pillars, birefringent_stacks};

@@ -132,7 +132,7 @@ pub struct Verification {
     pub elements: Vec<ElementCheck>,
     pub foreign: UnrecognisedShapes,
     pub distinct: Vec<DistinctElement>,
-    /// Mapping of the design, where it was solved from the cell.
+    /// Mapping of the design, where it was solved from the cell or made from a table of unit cells.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mapping: Option<SolvedMapping>,
     /// Error of the lattice of a design of rotated rectangles against the phase that is asked.

@@ -32,7 +32,10 @@ pub(super) fn rows(row: &mut impl FnMut(&str, String, &str), design: &Design, fo
     );
     if let Some(solved) = &design.mapping.solved {
         row(
-            "The mapping was solved from the cell of the design",
+            match solved.cells {
+                Some(_) => "The mapping was made from a table of unit cells",
+                None => "The mapping was solved from the cell of the design",
+            },
             solved.words(),
             "width with the nearest phase in a lattice of equal pillars; widths that transmit less than 0.3 of the light, or at which the phase falls with the width, are avoided",
         );

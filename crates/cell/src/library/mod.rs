@@ -3,13 +3,14 @@
 mod csv;
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Along, MappingError, PolarisationAxis};
-use metalith_core::{Error, Result};
+use super::{Along, CellStack, MappingError, PolarisationAxis, UprightCell};
+use metalith_core::{Error, Progress, Result};
 use metalith_pillars::UprightRectangles;
 
 /// Parts of a turn that phases are distinguished by, along either axis: 0.012 rad at most from the middle of one, where
@@ -94,6 +95,24 @@ impl PillarLibrary {
             over_parts,
             turns,
         })
+    }
+
+    /// The library of a cell (see [`PillarLibrary::of_cell`]) and what all its pillars transmit at a wavelength (um), solved or read from
+    /// the cache in `folder`.
+    ///
+    /// # Errors
+    /// If the cell cannot be solved, or the user stopped it.
+    pub fn solve(
+        stack: &CellStack,
+        pillars: UprightRectangles,
+        wavelength_um: f64,
+        folder: Option<&Path>,
+        progress: &dyn Progress,
+    ) -> Result<(Self, Along)> {
+        let cell = UprightCell::new(stack.clone(), pillars, PolarisationAxis::X).cached_in(folder);
+        let along = cell.along(wavelength_um, progress)?;
+        let library = Self::of_cell(pillars, &along, stack.full_transmission(wavelength_um)?)?;
+        Ok((library, along))
     }
 
     /// The library of all that a cell has: what pillars transmit along both axes, by number, where `full` is |t| of one that passes

@@ -6,7 +6,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::{MappingTable, RampOrders};
-use crate::{CellStack, MappingError, ORDERS, PhaseCurve, PointwiseCell};
+use crate::{CellStack, MappingError, ORDERS, PhaseCurve, PointwiseCell, TabulatedCells};
 use metalith_core::text::hex;
 use metalith_core::{Progress, Result};
 
@@ -33,6 +33,9 @@ pub struct SolvedMapping {
     pub light: RampOrders,
     /// First half of the SHA-256 of [`MappingTable::to_csv`], in hexadecimal.
     pub digest: String,
+    /// Table of unit cells that it was made from, in place of a solver.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cells: Option<TabulatedCells>,
     #[serde(skip)]
     pub table: MappingTable,
 }
@@ -53,6 +56,17 @@ impl SolvedMapping {
         let cell = PointwiseCell::new(stack.clone(), widths_nm.iter().copied()).cached_in(folder);
         let curve = PhaseCurve::solved(&cell, wavelength_um, widths_nm, Some(progress))?;
         Self::of_curve(&curve, ORDERS)
+    }
+
+    /// Mapping of a curve out of a table of unit cells.
+    ///
+    /// # Errors
+    /// If all widths are avoided.
+    pub fn of_table(curve: &PhaseCurve, cells: TabulatedCells) -> Result<Self> {
+        Ok(Self {
+            cells: Some(cells),
+            ..Self::of_curve(curve, 0)?
+        })
     }
 
     /// Mapping of a curve that was solved before, with so many orders an axis.
@@ -84,23 +98,21 @@ impl SolvedMapping {
             phase: table.phase_error(curve),
             light: table.orders_of(curve),
             digest: hex(&Sha256::digest(table.to_csv())[..16]),
+            cells: None,
             table,
         })
     }
 
     /// One line of what was solved.
     pub fn words(&self) -> String {
+        let nm = self.wavelength_um * 1e3;
+        let source = match &self.cells {
+            Some(cells) => format!("mapping at {nm:.1} nm from {} (", cells.words()),
+            None => format!("mapping solved at {nm:.1} nm ({} orders an axis, ", self.orders),
+        };
         format!(
-            "mapping solved at {:.1} nm ({} orders an axis, {} widths, {} avoided): {:.2} waves, {:.3} rad rms, first order {:.3}; \
-             digest {}",
-            self.wavelength_um * 1e3,
-            self.orders,
-            self.widths,
-            self.avoided,
-            self.span_waves,
-            self.phase.rms_rad,
-            self.light.first,
-            self.digest
+            "{source}{} widths, {} avoided): {:.2} waves, {:.3} rad rms, first order {:.3}; digest {}",
+            self.widths, self.avoided, self.span_waves, self.phase.rms_rad, self.light.first, self.digest
         )
     }
 }

@@ -9,10 +9,11 @@ use super::cell::read_band;
 use super::lens::WAVELENGTH;
 use super::{ArraySpec, CellSpec, LensSpec, MappingIdentity, SteeredMapping, SteeringSteps};
 use metalith_cell::{
-    Basis, CellStack, InversePolynomial, MappingTable, PillarLibrary, RotationMapping, SolvedMapping, cache_folder,
+    Basis, CellStack, InversePolynomial, MappingTable, PhaseConvention, PillarLibrary, RotationMapping, SolvedMapping,
+    UnitCellTable, cache_folder,
 };
 use metalith_core::document::{Limits, Section};
-use metalith_core::{Progress, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_pillars::PolarisationBasis;
 
 pub(super) const COEFFICIENT: Limits = Limits::new(-100.0..=100.0, "(duty cycle over turns)");
@@ -32,16 +33,19 @@ pub struct MappingSpec {
     pub wavelength_um: f64,
     /// Duty cycle over phase.
     pub polynomial: InversePolynomial,
-    /// File of a table that stands in its place, such as `metalith cells` writes.
+    /// File of a table that stands in its place: a mapping such as `metalith cells` writes, or unit cells of another program.
     #[serde(skip)]
     pub table_file: Option<PathBuf>,
+    /// Convention of the phases of that file, where the design says it.
+    #[serde(skip)]
+    pub phase_convention: Option<PhaseConvention>,
     /// Contents of that file, or the mapping that was solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<MappingTable>,
     /// True if the mapping is solved from the cell of the design.
     #[serde(skip)]
     pub from_cells: bool,
-    /// Mapping that was solved from the cell; the layout depends on its table alone.
+    /// Mapping that was solved from the cell, or made from a table of unit cells; the layout depends on its table alone.
     #[serde(skip)]
     pub solved: Option<SolvedMapping>,
     /// File of the library of upright rectangles, such as `metalith cells` writes.
@@ -87,8 +91,11 @@ impl MappingSpec {
     /// True if the mapping is solved from the cell: a section says so, or says none to whoever makes it.
     pub(crate) fn is_from_cells(s: &Section<'_, '_>, cell: &CellSpec, library: LibraryFile) -> bool {
         let says_none = !s.has("coefficients") && !s.has("table") && !cell.is_of_the_paper();
-        let asked = s.has("source") || (library == LibraryFile::ToBeMade && says_none);
-        asked && cell.shape.basis().is_none()
+        match cell.shape.basis() {
+            None => s.has("source") || (library == LibraryFile::ToBeMade && says_none),
+            Some(PolarisationBasis::Linear) => s.has("source"),
+            Some(PolarisationBasis::Circular) => false,
+        }
     }
 
     /// The wavelength that the mapping is made for (um), which other sections go by.
@@ -163,9 +170,16 @@ impl MappingSpec {
             coefficients,
         };
         let refuse_all = |why: &str, instead: &str| {
-            for key in ["coefficients", "table", "basis", "steered", "source"]
-                .into_iter()
-                .filter(|key| s.has(key))
+            for key in [
+                "coefficients",
+                "table",
+                "basis",
+                "steered",
+                "source",
+                "phase_convention",
+            ]
+            .into_iter()
+            .filter(|key| s.has(key) && !(upright && *key == "source"))
             {
                 s.fault(key, why, format!("leave `{key}` out{instead}"));
             }
@@ -179,7 +193,7 @@ impl MappingSpec {
         if upright {
             refuse_all(
                 "upright rectangles have two widths, one for the phase of light along each axis",
-                ": pillars are chosen from the `library`",
+                ": pillars are chosen from the `library`, or from one that `source = \"cells\"` solves",
             );
         } else if s.has("library") {
             s.fault_given(
@@ -192,10 +206,10 @@ impl MappingSpec {
                 "leave `library` out, or use `shape = \"upright_rectangle\"`",
             );
         }
-        let pillar_library_file = upright.then(|| match library {
+        let pillar_library_file = (upright && !from_cells).then(|| match library {
             LibraryFile::Needed => s.file_else(
                 "library",
-                "make it: `metalith cells DESIGN` writes `library.csv` into its folder; copy that to this name",
+                "make it: `metalith cells DESIGN` writes `library.csv` into its folder; copy that to this name; or give `source = \"cells\"` in its place",
             ),
             LibraryFile::ToBeMade => s.path("library"),
         });
@@ -212,11 +226,22 @@ impl MappingSpec {
                 "keep one of `table` and `coefficients`",
             );
         }
+        let phase_convention = s
+            .has("phase_convention")
+            .then(|| s.choice("phase_convention", &PhaseConvention::CHOICES, None));
+        if phase_convention.is_some() && table_file.is_none() && !rotated && !upright {
+            s.fault(
+                "phase_convention",
+                "a convention of phases, and no table of them",
+                "leave `phase_convention` out, or give a `table` of unit cells",
+            );
+        }
         if from_cells {
-            for key in ["coefficients", "basis", "table", "cell", "accept"]
-                .into_iter()
-                .filter(|key| s.has(key))
-            {
+            let others: &[&str] = match upright {
+                true => &["library", "cell", "accept"],
+                false => &["coefficients", "basis", "table", "cell", "accept"],
+            };
+            for key in others.iter().copied().filter(|key| s.has(key)) {
                 s.fault(
                     key,
                     "a mapping beside `source = \"cells\"`, by which it is solved from [cell]",
@@ -256,6 +281,7 @@ impl MappingSpec {
             identity,
             polynomial,
             table_file,
+            phase_convention,
             table: None,
             from_cells,
             solved: None,
@@ -284,7 +310,26 @@ impl MappingSpec {
         }
         if let Some(file) = &self.table_file {
             let allowed: Vec<u16> = cell.widths_nm().collect();
-            self.table = Some(MappingTable::read_csv(file, &allowed)?);
+            let table = match UnitCellTable::read(file)? {
+                None if self.phase_convention.is_some() => {
+                    return Err(Error::refused(
+                        "mapping/phase-convention",
+                        format!("{}: a mapping, whose phases have no convention", file.display()),
+                        "leave `phase_convention` of [mapping] out: it is for tables of unit cells",
+                    ));
+                }
+                None => MappingTable::read_csv(file, &allowed)?,
+                Some(cells) => {
+                    let convention = self.phase_convention;
+                    let (curve, cells) =
+                        cells.curve(cell.pillar_height_nm, self.wavelength_um, &allowed, convention)?;
+                    let made = SolvedMapping::of_table(&curve, cells)?;
+                    let table = made.table.clone();
+                    self.solved = Some(made);
+                    table
+                }
+            };
+            self.table = Some(table);
         }
         if let (Some(file), Some(pillars)) = (&self.pillar_library_file, cell.shape.upright()) {
             let read = PillarLibrary::read_csv(file, pillars);
@@ -302,9 +347,15 @@ impl MappingSpec {
 
     /// Solve the mapping from the cell, if that is its source.
     pub(crate) fn solve(&mut self, cell: &CellSpec, stack: &CellStack, progress: &dyn Progress) -> Result<()> {
-        if self.from_cells {
+        if !self.from_cells {
+            return Ok(());
+        }
+        let cache = cache_folder();
+        if let Some(pillars) = cell.shape.upright() {
+            let (library, _) = PillarLibrary::solve(stack, pillars, self.wavelength_um, cache.as_deref(), progress)?;
+            self.pillar_library = Some(Arc::new(library));
+        } else {
             let widths_nm: Vec<u16> = cell.widths_nm().collect();
-            let cache = cache_folder();
             let solved = SolvedMapping::solve(stack, self.wavelength_um, &widths_nm, cache.as_deref(), progress)?;
             self.table = Some(solved.table.clone());
             self.solved = Some(solved);

@@ -137,6 +137,7 @@ pub(crate) mod tests {
             wavelength_um: 0.452,
             polynomial,
             table_file: None,
+            phase_convention: None,
             table: None,
             from_cells: false,
             solved: None,

@@ -12,7 +12,7 @@ use metalith_core::text::{hex, quoted, table_rows};
 use metalith_core::{Error, Result, npy};
 
 /// Entries of a table along an axis at most: sites of the largest lens that is held.
-const MOST: u64 = 1 << 15;
+pub(super) const MOST: u64 = 1 << 15;
 
 /// Rounding of distances (um): a map that ends where the lens does covers it.
 const ROUNDING_UM: f64 = 1e-6;
@@ -76,30 +76,53 @@ impl MapTable {
     pub(super) fn load(&mut self, reach_um: [f64; 2]) -> Result<()> {
         let fault = |what: String, hint: &str| Error::table(&self.file, None, what, hint);
         let array = read(&self.file)?;
-        let [rows, columns] = [array.shape[0], array.shape[1]].map(|n| n as usize);
+        let columns = array.shape[1] as usize;
         if let Some(at) = array.values.iter().position(|v| !v.is_finite()) {
             return Err(fault(
                 format!("entry [{}, {}] is {}", at / columns, at % columns, array.values[at]),
                 "every phase must be a finite number, in rad",
             ));
         }
+        self.set(columns, &array.values);
+        self.covers(reach_um)
+    }
+
+    /// The table of values (rad), rows along x, the lowest y first, out of a file.
+    pub(super) fn of_values(file: &Path, pitch_um: f64, wrapped: bool, columns: usize, values: &[f64]) -> Self {
+        let mut table = Self::new(file.to_owned(), pitch_um, Interpolation::Linear, wrapped);
+        table.set(columns, values);
+        table
+    }
+
+    fn set(&mut self, columns: usize, values: &[f64]) {
+        let mut digest = Sha256::new();
+        digest.update((columns as u64).to_le_bytes());
+        values.iter().for_each(|v| digest.update(v.to_le_bytes()));
+        self.digest = hex(&digest.finalize());
+        self.values = Arc::new((columns, values.iter().map(|rad| rad / TAU).collect()));
+    }
+
+    /// Succeeds if the table covers places up to these distances along x and y (um).
+    ///
+    /// # Errors
+    /// If it ends before.
+    pub(super) fn covers(&self, reach_um: [f64; 2]) -> Result<()> {
+        let (columns, values) = &*self.values;
+        let rows = values.len().checked_div(*columns).unwrap_or(0);
         // Half a place beyond the last is still nearest to it.
-        let extent = [columns, rows].map(|n| n as f64 * self.pitch_um / 2.0);
+        let extent = self.extent_um();
         if (0..2).any(|axis| extent[axis] < reach_um[axis] - ROUNDING_UM) {
             let [(to_x, to_y), (lens_x, lens_y)] = [extent, reach_um].map(|um| (shown_um(um[0]), shown_um(um[1])));
-            return Err(fault(
-                format!(
+            return Err(Error::Table {
+                path: self.file.clone(),
+                line: None,
+                what: format!(
                     "{columns} by {rows} places of {} um reach to {to_x} and {to_y} um, the lens to {lens_x} and {lens_y} um",
                     self.pitch_um
                 ),
-                "extend the table, give its pitch in um, or make the lens smaller",
-            ));
+                hint: "extend the table, give its pitch in um, or make the lens smaller".into(),
+            });
         }
-        let mut digest = Sha256::new();
-        digest.update((columns as u64).to_le_bytes());
-        array.values.iter().for_each(|v| digest.update(v.to_le_bytes()));
-        self.digest = hex(&digest.finalize());
-        self.values = Arc::new((columns, array.values.iter().map(|rad| rad / TAU).collect()));
         Ok(())
     }
 

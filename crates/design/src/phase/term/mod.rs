@@ -1,5 +1,6 @@
 //! Phases over the plane of an element that are added to the radial phase of the lens.
 
+mod grid_phase;
 mod map;
 mod optic_studio;
 
@@ -8,7 +9,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::RadialPhase;
-use metalith_core::{Result, Zernike};
+use metalith_core::{Error, Result, Zernike};
 
 pub use map::MapTable;
 
@@ -76,14 +77,26 @@ impl PhaseTerm {
     /// If the file is not what it should be, or does not cover the lens; a map has to cover the box about the aperture.
     pub fn load(&mut self, lens_radius_um: f64, ends_um: [[f64; 2]; 2]) -> Result<()> {
         let reach_um = lens_radius_um + self.centre_um[0].hypot(self.centre_um[1]);
+        let box_um = [0, 1].map(|axis| {
+            let far = ends_um[axis].map(|end| (end - self.centre_um[axis]).abs());
+            far[0].max(far[1])
+        });
         match &mut self.form {
             TermForm::Radial(radial) => radial.load(reach_um),
-            TermForm::Map(map) => map.load([0, 1].map(|axis| {
-                let far = ends_um[axis].map(|end| (end - self.centre_um[axis]).abs());
-                far[0].max(far[1])
-            })),
+            TermForm::Map(map) => map.load(box_um),
             TermForm::OpticStudio { file, surface } => {
-                self.form = optic_studio::read(file, *surface)?;
+                let form = optic_studio::read(file, *surface)?;
+                if let TermForm::Map(map) = &form {
+                    map.covers(box_um)?;
+                    if map.is_wrapped() && self.scale.fract() != 0.0 {
+                        return Err(Error::refused(
+                            "phase/scaled-jumps",
+                            format!("{}: phases that jump by waves, times {}", file.display(), self.scale),
+                            "take a whole number as `scale`, or a grid of phases without jumps",
+                        ));
+                    }
+                }
+                self.form = form;
                 Ok(())
             }
             TermForm::Zernike { .. } | TermForm::Polynomial { .. } => Ok(()),

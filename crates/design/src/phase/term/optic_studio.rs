@@ -1,17 +1,17 @@
 //! Phase surfaces out of lens files of OpticStudio (`.zmx`).
 //!
-//! A surface begins with `SURF n`; its `TYPE` is `BINARY_1` or `BINARY_2`, and stands before or behind its other lines. `PARM 0` is
+//! A surface begins with `SURF n`; its `TYPE` is `BINARY_1`, `BINARY_2`, `SZERNPHA` or `FZERNPHA`, and stands before or behind its other lines. `PARM 0` is
 //! the order of diffraction, which the phase is multiplied by. Of the extra data, `XDAT 1` is the number of coefficients, `XDAT 2`
 //! the radius that lengths are divided by (in the unit of `UNIT`), and those after are coefficients (rad): of x, y, x^2, xy, y^2,
-//! x^3, ... for Binary 1, of r^2, r^4, ... for Binary 2. `CURV`, `CONI` and `PARM 1` to `PARM 8` bend the surface; a chip is flat.
+//! x^3, ... for Binary 1, of r^2, r^4, ... for Binary 2; or coefficients (waves) of Zernike polynomials, standard or fringe. `CURV`, `CONI` and `PARM 1` to `PARM 8` bend the surface; a chip is flat.
 
 use std::path::Path;
 
-use super::TermForm;
+use super::{TermForm, ZernikeOrder, grid_phase};
 use crate::phase::RadialPhase;
 use metalith_core::file::read_at_most;
 use metalith_core::text::without_mark;
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, Zernike};
 
 /// Longest file that is read (bytes).
 const LONGEST: u64 = 16 << 20;
@@ -27,6 +27,8 @@ struct Surface<'t> {
     data: Vec<f64>,
     /// The line that bends it.
     bent: Option<(usize, &'t str)>,
+    /// Line that shifts its polynomials.
+    moved: Option<(usize, &'t str)>,
     /// Other lines with their numbers.
     lines: Vec<(usize, &'t str)>,
 }
@@ -35,6 +37,7 @@ struct Surface<'t> {
 enum Kind {
     Binary1,
     Binary2,
+    Zernike(ZernikeOrder),
 }
 
 /// The phase of a surface of a file; the only one that has a phase if none is named.
@@ -45,6 +48,9 @@ pub(super) fn read(path: &Path, wanted: Option<u32>) -> Result<TermForm> {
     let bytes = read_at_most(path, LONGEST, "a lens file")?;
     let fault = Fault(path);
     let text = decoded(&bytes);
+    if let Some(grid) = grid_phase::read(path, &text) {
+        return grid.map(TermForm::Map);
+    }
     let (mut unit_um, mut surfaces) = (1e3, Vec::<Surface<'_>>::new());
     for (line, text) in text.lines().enumerate().map(|(k, line)| (k + 1, line.trim())) {
         let mut words = text.split_ascii_whitespace();
@@ -86,6 +92,9 @@ pub(super) fn read(path: &Path, wanted: Option<u32>) -> Result<TermForm> {
 /// Parameters from one to this are coefficients of an asphere.
 const LAST_ASPHERE: f64 = 8.0;
 
+/// Parameters that move the polynomials of a Zernike surface.
+const DECENTRES: [f64; 2] = [9.0, 10.0];
+
 /// Most entries of the extra data: Binary 1 has 230 coefficients.
 const MOST_DATA: usize = 242;
 
@@ -95,6 +104,8 @@ impl Surface<'_> {
         match self.kind? {
             "BINARY_1" => Some(Kind::Binary1),
             "BINARY_2" => Some(Kind::Binary2),
+            "SZERNPHA" => Some(Kind::Zernike(ZernikeOrder::Standard)),
+            "FZERNPHA" => Some(Kind::Zernike(ZernikeOrder::Fringe)),
             _ => None,
         }
     }
@@ -112,6 +123,8 @@ impl Surface<'_> {
                         self.order = Some(value);
                     } else if value != 0.0 && at <= LAST_ASPHERE {
                         self.bent.get_or_insert((line, text));
+                    } else if value != 0.0 && DECENTRES.contains(&at) {
+                        self.moved.get_or_insert((line, text));
                     }
                 }
                 "XDAT" => {
@@ -147,7 +160,26 @@ impl Surface<'_> {
                 "a chip is flat and has the phase alone: optimise the lens with a flat surface (no curvature, parameters 1 to 8 at 0)",
             ));
         }
+        if let (Some((line, text)), Some(Kind::Zernike(_))) = (self.moved, self.phase()) {
+            return Err(fault.error(
+                Some(line),
+                format!(
+                    "the polynomials of surface {} are moved: `{}`",
+                    self.number,
+                    metalith_core::text::quoted(text)
+                ),
+                "set parameters 9 and 10 to 0, and move the phase with `centre_um`",
+            ));
+        }
         let count = self.data.first().copied().unwrap_or(0.0).max(0.0) as usize;
+        let most = Zernike::FRINGE_SET as usize;
+        if self.phase() == Some(Kind::Zernike(ZernikeOrder::Fringe)) && count > most {
+            let what = format!(
+                "surface {} has {count} fringe polynomials, and {most} are all there are",
+                self.number
+            );
+            return Err(fault.error(None, what, "fit it with these, or with Zernike standard polynomials"));
+        }
         let radius_um = self.data.get(1).copied().unwrap_or(0.0) * unit_um;
         let coefficients = self.data.get(2..count.saturating_add(2)).unwrap_or_default();
         if count == 0 || coefficients.len() < count || radius_um <= 0.0 {
@@ -176,6 +208,11 @@ impl Surface<'_> {
         Ok(match self.phase() {
             Some(Kind::Binary1) => TermForm::Polynomial {
                 terms: powers().zip(coefficients).map(|((i, j), a)| (i, j, a)).collect(),
+                radius_um,
+            },
+            Some(Kind::Zernike(order)) => TermForm::Zernike {
+                order,
+                coefficients: coefficients.collect(),
                 radius_um,
             },
             _ => TermForm::Radial(RadialPhase::EvenPowers {
@@ -231,10 +268,13 @@ fn list(known: &[Surface<'_>], others: &[Surface<'_>]) -> String {
         .collect();
     kinds.sort_unstable();
     kinds.dedup();
-    let none = "no surface of type BINARY_1 or BINARY_2 is in the file";
+    let none = "no surface of type BINARY_1, BINARY_2, SZERNPHA or FZERNPHA is in the file";
     match (others.is_empty(), kinds.is_empty()) {
         (true, _) => format!("{none}, nor any other: it is no lens in text"),
         (false, true) => none.into(),
+        (false, false) if kinds.iter().any(|kind| kind.starts_with("GRID_PHA")) => {
+            format!("{none}; the phase of GRID_PHA stands in a .DAT file: give that as `file`")
+        }
         (false, false) => format!("{none}; there are {}", kinds.join(", ")),
     }
 }
@@ -373,6 +413,22 @@ mod tests {
         assert_eq!(read_text(LENS.as_bytes(), Some(2)).unwrap(), twice);
     }
 
+    /// Coefficients are in waves, and the order of diffraction multiplies them.
+    #[test]
+    fn zernike_surfaces_are_read() {
+        for (kind, order) in [("SZERNPHA", ZernikeOrder::Standard), ("FZERNPHA", ZernikeOrder::Fringe)] {
+            let text = format!(
+                "UNIT MM\nSURF 1\n  TYPE {kind}\n  PARM 0 -1\n  XDAT 1 4\n  XDAT 2 0.03\n  XDAT 3 0\n  XDAT 4 0.5\n  XDAT 5 0\n  XDAT 6 -12.5\n"
+            );
+            let wanted = TermForm::Zernike {
+                order,
+                coefficients: vec![-0.0, -0.5, -0.0, 12.5],
+                radius_um: 30.0,
+            };
+            assert_eq!(read_text(text.as_bytes(), None).unwrap(), wanted);
+        }
+    }
+
     #[test]
     fn what_is_missing_is_said() {
         let said = [
@@ -383,7 +439,13 @@ mod tests {
             ("SURF 1\nTYPE BINARY_2\nXDAT 1 x\n", None),
             ("SURF 1\nTYPE BINARY_2\nXDAT 999999999 1\n", None),
             ("UNIT PARSEC\n", None),
-            ("SURF 0\nTYPE SZERNPHA\nSURF 1\n", None),
+            ("SURF 0\nTYPE BINARY_3\nSURF 1\n", None),
+            ("SURF 0\nTYPE GRID_PHA\nSURF 1\n", None),
+            (
+                "SURF 1\nTYPE SZERNPHA\nPARM 9 0.1\nXDAT 1 1\nXDAT 2 1\nXDAT 3 1\n",
+                None,
+            ),
+            ("SURF 1\nTYPE FZERNPHA\nXDAT 1 38\nXDAT 2 1\n", None),
             ("PK\u{3}\u{4}", None),
         ]
         .map(|(text, surface)| refusal(text.as_bytes(), surface));
@@ -392,7 +454,7 @@ mod tests {
               help: save the lens as .zmx, and name the surface with `surface` if several have a phase
             lens.zmx: surface 7 has no phase; phases are on surfaces 1, 2
               help: save the lens as .zmx, and name the surface with `surface` if several have a phase
-            lens.zmx: no surface of type BINARY_1 or BINARY_2 is in the file; there are STANDARD
+            lens.zmx: no surface of type BINARY_1, BINARY_2, SZERNPHA or FZERNPHA is in the file; there are STANDARD
               help: save the lens as .zmx, and name the surface with `surface` if several have a phase
             lens.zmx: surface 1 has 2 coefficients over a radius of 1000 um, and 1 are there
               help: give the number of coefficients as XDAT 1, the radius as XDAT 2, and each coefficient after them
@@ -402,9 +464,15 @@ mod tests {
               help: save the lens as .zmx, and name the surface with `surface` if several have a phase
             lens.zmx, line 1: an unknown unit of length
               help: save the lens as .zmx, and name the surface with `surface` if several have a phase
-            lens.zmx: no surface of type BINARY_1 or BINARY_2 is in the file; there are SZERNPHA
+            lens.zmx: no surface of type BINARY_1, BINARY_2, SZERNPHA or FZERNPHA is in the file; there are BINARY_3
               help: save the lens as .zmx, and name the surface with `surface` if several have a phase
-            lens.zmx: no surface of type BINARY_1 or BINARY_2 is in the file, nor any other: it is no lens in text
+            lens.zmx: no surface of type BINARY_1, BINARY_2, SZERNPHA or FZERNPHA is in the file; the phase of GRID_PHA stands in a .DAT file: give that as `file`
+              help: save the lens as .zmx, and name the surface with `surface` if several have a phase
+            lens.zmx, line 3: the polynomials of surface 1 are moved: `PARM 9 0.1`
+              help: set parameters 9 and 10 to 0, and move the phase with `centre_um`
+            lens.zmx: surface 1 has 38 fringe polynomials, and 37 are all there are
+              help: fit it with these, or with Zernike standard polynomials
+            lens.zmx: no surface of type BINARY_1, BINARY_2, SZERNPHA or FZERNPHA is in the file, nor any other: it is no lens in text
               help: save the lens as .zmx, and name the surface with `surface` if several have a phase
             ");
     }
