@@ -219,7 +219,8 @@ impl Judging {
         let cases = match &made {
             Some(chip) => SimulationCases::judged_by(chip).with_cells(&models),
             None => SimulationCases::of_cells(&models)?,
-        };
+        }
+        .with_through_focus();
         let found = verify(design, array, layout, &cases, self.accuracy(), terminal)?;
         let picture = match camera {
             Some(camera) => match thumbnail(design, layout, &camera, model.as_ref(), terminal) {
