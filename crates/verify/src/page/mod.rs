@@ -48,7 +48,7 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
         page.paragraph(format!("Lens: {line}."));
     }
     for warning in &found.warnings {
-        page.note(format!("Warning: {}. {}. `{}`", warning.what, warning.hint, warning.id));
+        page.note(warning.paragraph());
     }
     let half = exact(PixelFrequencies::of(design.verify.pixel_um).half_nyquist_lp_mm);
     let contrast_at = format!("MTF at {half} lp/mm, one wavelength");
