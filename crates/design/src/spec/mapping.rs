@@ -1,6 +1,6 @@
 //! `[mapping]`: from phase to width.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::{Serialize, Serializer};
@@ -8,9 +8,7 @@ use serde::{Serialize, Serializer};
 use super::cell::read_band;
 use super::lens::WAVELENGTH;
 use super::{ArraySpec, CellSpec, LensSpec, MappingIdentity, SteeredMapping, SteeringSteps};
-use metalith_cell::{
-    Basis, CellStack, InversePolynomial, MappingTable, PillarLibrary, RotationMapping, SolvedMapping, cache_folder,
-};
+use metalith_cell::{Basis, CellStack, InversePolynomial, MappingTable, PillarLibrary, RotationMapping, SolvedMapping};
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Progress, Result};
 use metalith_pillars::PolarisationBasis;
@@ -299,11 +297,16 @@ impl MappingSpec {
     }
 
     /// Solve the mapping from the cell, if that is its source.
-    pub(crate) fn solve(&mut self, cell: &CellSpec, stack: &CellStack, progress: &dyn Progress) -> Result<()> {
+    pub(crate) fn solve(
+        &mut self,
+        cell: &CellSpec,
+        stack: &CellStack,
+        cache: Option<&Path>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         if self.from_cells {
             let widths_nm: Vec<u16> = cell.widths_nm().collect();
-            let cache = cache_folder();
-            let solved = SolvedMapping::solve(stack, self.wavelength_um, &widths_nm, cache.as_deref(), progress)?;
+            let solved = SolvedMapping::solve(stack, self.wavelength_um, &widths_nm, cache, progress)?;
             self.table = Some(solved.table.clone());
             self.solved = Some(solved);
         }
