@@ -21,7 +21,7 @@ from ._layouts import (
     read_layout,
     write_layout,
 )
-from ._light import Psf, PsfSet, Transmission, cell, index, propagate, psf
+from ._light import Psf, PsfSet, ThroughFocus, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
 from ._pictures import Frame, ImagingSystem, denoise
 from ._checks import MeasurementPlan, CheckReport, Marker, Verification, check, plan, verify
@@ -49,6 +49,7 @@ __all__ = [
     "ImagingSystem",
     "Study",
     "StudyResult",
+    "ThroughFocus",
     "Transmission",
     "UprightRectangles",
     "Verification",

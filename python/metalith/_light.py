@@ -25,6 +25,35 @@ SILICON_NITRIDE = "sin_luke_2015"
 FUSED_SILICA = "fused_silica_malitson_1965"
 
 
+# Planes of a through-focus series where no number is asked for, and the most.
+PLANES = 9
+MOST_PLANES = 101
+
+
+@dataclass(frozen=True)
+class ThroughFocus:
+    """PSFs of one element in planes along z; arrays have an entry for each plane, NaN where there is no number."""
+
+    focal_length_um: float | None
+    """Distance of the greatest Strehl ratio from the pillars (um), by a parabola through it and its neighbours; None if that is the
+    first or the last plane."""
+    sensor_um: float
+    """Distance of the sensor (um)."""
+    depth_of_focus_um: float
+    """Wavelength over the square of the numerical aperture (um)."""
+    plane_spacing_um: float
+    distance_um: Float64 = field(repr=False)
+    """Distance of each plane from the pillars (um)."""
+    strehl: Float64 = field(repr=False)
+    """Against the ideal PSF in the plane of the sensor."""
+    peak: Float64 = field(repr=False)
+    fwhm_x_um: Float64 = field(repr=False)
+    fwhm_y_um: Float64 = field(repr=False)
+    focusing_efficiency: Float64 = field(repr=False)
+    values: Float64 = field(repr=False)
+    """Intensity over that of the light that arrives, shape ``[planes, samples, samples]``."""
+
+
 @dataclass(frozen=True)
 class Psf:
     """The PSF of one element in one light."""
@@ -60,6 +89,8 @@ class Psf:
     5.86 um."""
     mtf_nyquist: tuple[float, float] = field(repr=False)
     """The same at all of it: 85.3 line pairs a millimetre for 5.86 um."""
+    through_focus: ThroughFocus | None = field(default=None, repr=False)
+    """PSFs in planes along z, if asked for."""
 
     def to_xarray(self) -> Any:
         """As :meth:`PsfSet.to_xarray`, of this one."""
@@ -96,7 +127,7 @@ class PsfSet(Sequence[Psf]):
         """The figures of each PSF, for ``pandas.DataFrame`` or a loop."""
         rows = []
         for p in self._psfs:
-            row = {k: v for k, v in vars(p).items() if k not in ("x_um", "y_um", "values")}
+            row = {k: v for k, v in vars(p).items() if k not in ("x_um", "y_um", "values", "through_focus")}
             rows.append(row)
         return rows
 
@@ -183,6 +214,8 @@ def psf(
     pillar_height_nm: float = 700.0,
     pillar: str = SILICON_NITRIDE,
     substrate: str = FUSED_SILICA,
+    through_focus: bool | float = False,
+    planes: int = PLANES,
     progress: Progress | None = None,
 ) -> PsfSet:
     """PSFs of the distinct lenses of an array, of the elements of a layout that was read, or of one map of widths.
@@ -207,12 +240,19 @@ def psf(
     left out, it is ``left`` for rotated rectangles and ``x`` for upright ones.
     ``analyser`` is what is before the sensor: ``x``, ``y`` or an angle, or, of rotated rectangles, ``circular``, which passes
     what light that arrives ``left`` or ``right`` is converted to. An
-    array of a design is in the light that the design says. Intensities are over that of all light that arrives."""
+    array of a design is in the light that the design says. Intensities are over that of all light that arrives.
+
+    ``through_focus`` asks for ``planes`` planes along z about the sensor, up to so many micrometres on each side; ``True`` takes two
+    depths of focus, twice the wavelength over the square of the numerical aperture. Each PSF then has ``.through_focus``."""
     wavelengths = [float(nm) for nm in _arguments.wavelengths("wavelengths_nm", wavelengths_nm).ravel()]
     if not wavelengths:
         raise _native.MetalithError("PSFs at no wavelength\n  help: give at least one in `wavelengths_nm`")
     fields = _arguments.fields(field_deg)
     samples = _arguments.maybe_whole("samples", samples, 1, MOST_SAMPLES)
+    series = None
+    if through_focus is not False:
+        range_um = None if through_focus is True else float(through_focus)
+        series = (range_um, _arguments.whole("planes", planes, 3, MOST_PLANES))
     if isinstance(of, Array) and of.design is not None:
         own = (distance_um, aperture_um, pitch_nm, shape, lattice, arriving, analyser, pillar_height_nm, pillar, substrate)
         if own != (None, None, None, "square", "square", None, None, 700.0, SILICON_NITRIDE, FUSED_SILICA):
@@ -223,7 +263,7 @@ def psf(
             )
         chosen = None if elements is None else _arguments.elements(elements, len(of))
         found, said = _native.psf_of_array(
-            of._native, wavelengths, fields, fidelity, model, fast, samples, pixel_um, chosen, progress
+            of._native, wavelengths, fields, fidelity, model, fast, samples, pixel_um, chosen, series, progress
         )
         return _set(found, said)
     maps, centres, pitch, lattice, shape = _maps(of, pitch_nm, lattice, shape)
@@ -253,12 +293,16 @@ def psf(
         pillar_height_nm,
         pillar,
         substrate,
+        series,
         progress,
     )
     return _set(found, said)
 
 
 def _set(found: list[dict[str, Any]], said: str | None) -> PsfSet:
+    for p in found:
+        series = p["through_focus"]
+        p["through_focus"] = None if series is None else ThroughFocus(**series)
     return PsfSet([Psf(**p) for p in found], None if said is None else json.loads(said))
 
 

@@ -100,6 +100,7 @@ def psf_of_array(
     samples: int | None,
     pixel_um: float | None,
     elements: list[int] | None = None,
+    through_focus: tuple[float | None, int] | None = None,
     progress: Progress | None = None,
 ) -> tuple[list[dict[str, Any]], str | None]: ...
 def psf_of_widths(
@@ -123,6 +124,7 @@ def psf_of_widths(
     height_nm: float,
     pillar: str,
     substrate: str,
+    through_focus: tuple[float | None, int] | None = None,
     progress: Progress | None = None,
 ) -> tuple[list[dict[str, Any]], str | None]: ...
 def propagate(

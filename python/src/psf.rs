@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use metalith::cell::{FocusingStack, PolarisedLight, cache_folder};
 use metalith::extract::{ElementSite, ExtractedElement, Extraction};
-use metalith::verify::{Lighting, SimulationCase, SinglePsf, single_psfs};
+use metalith::verify::{FocusRequest, Lighting, SimulationCase, SinglePsf, single_psfs};
 use metalith::wave::propagation::{incident, landing_um};
+use metalith::wave::psf::{FocusPlane, ThroughFocus};
 use metalith::{
     Accuracy, AsBuiltChip, Error, PillarMap, PillarRows as _, PillarShape, Progress, Result, Wedge, cell_models,
 };
-use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
+use numpy::ndarray::{Axis, stack as stack_arrays};
+use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -77,6 +79,14 @@ struct Looked {
     /// Polarisation of source and detector, where pillars change it.
     polarised: PolarisedLight,
     fast: bool,
+    through_focus: Option<FocusRequest>,
+}
+
+/// Range (um) and number of planes along z, if asked for.
+type Planes = Option<(Option<f64>, usize)>;
+
+fn request(planes: Planes) -> Option<FocusRequest> {
+    planes.map(|(range_um, planes)| FocusRequest { range_um, planes })
 }
 
 /// One PSF with where it is from.
@@ -162,6 +172,7 @@ fn simulate_together(
                 polarised: light.polarised,
                 aperture_radius_um,
                 accuracy: if light.fast { Accuracy::Fast } else { Accuracy::Accurate },
+                through_focus: light.through_focus,
             };
             let psfs = single_psfs(&extraction, case, &lighting, progress)?;
             for (k, (_, own)) in found.iter_mut().enumerate() {
@@ -209,16 +220,40 @@ fn told<'py>(py: Python<'py>, (found, made): (Vec<Found>, Option<AsBuiltChip>)) 
         dict.set_item("energy_passed", m.energy_passed)?;
         dict.set_item("mtf_half_nyquist", (m.mtf_half_nyquist[0], m.mtf_half_nyquist[1]))?;
         dict.set_item("mtf_nyquist", (m.mtf_nyquist[0], m.mtf_nyquist[1]))?;
+        let series = f.psf.through_focus.map(|series| planes(py, series)).transpose()?;
+        dict.set_item("through_focus", series)?;
         Ok(dict)
     };
     let psfs = found.into_iter().map(one).collect::<PyResult<_>>()?;
     Ok((psfs, made.map(|chip| json(&chip.statement()))))
 }
 
+/// A through-focus series for Python: arrays with an entry for each plane, NaN where there is no number.
+fn planes(py: Python<'_>, series: ThroughFocus) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    let planes = &series.planes;
+    let each = |of: &dyn Fn(&FocusPlane) -> f64| PyArray1::from_iter(py, planes.iter().map(of));
+    let number = |number: Option<f64>| number.unwrap_or(f64::NAN);
+    dict.set_item("focal_length_um", series.focal_length_um)?;
+    dict.set_item("sensor_um", series.sensor_um)?;
+    dict.set_item("depth_of_focus_um", series.depth_of_focus_um)?;
+    dict.set_item("plane_spacing_um", series.plane_spacing_um)?;
+    dict.set_item("distance_um", each(&|p| p.distance_um))?;
+    dict.set_item("strehl", each(&|p| p.focus.strehl))?;
+    dict.set_item("peak", each(&|p| p.peak))?;
+    dict.set_item("fwhm_x_um", each(&|p| number(p.focus.fwhm_um[0])))?;
+    dict.set_item("fwhm_y_um", each(&|p| number(p.focus.fwhm_um[1])))?;
+    dict.set_item("focusing_efficiency", each(&|p| number(p.focus.focusing_efficiency)))?;
+    let values: Vec<_> = series.psfs.iter().map(|psf| psf.values.view()).collect();
+    let values = stack_arrays(Axis(0), &values).expect("windows of one size");
+    dict.set_item("values", PyArray3::from_owned_array(py, values))?;
+    Ok(dict)
+}
+
 /// PSFs of the distinct lenses of an array of a design, or of the elements that are named.
 #[pyfunction]
 #[pyo3(signature = (array, wavelengths_nm, fields_deg, fidelity, model, fast, samples, pixel_um, elements=None,
-    progress=None))]
+    through_focus=None, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn psf_of_array<'py>(
     py: Python<'py>,
@@ -231,6 +266,7 @@ pub fn psf_of_array<'py>(
     samples: Option<usize>,
     pixel_um: Option<f64>,
     elements: Option<Vec<usize>>,
+    through_focus: Planes,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<ToldPsfs<'py>> {
     let design = array.design.as_ref().ok_or_else(|| {
@@ -286,6 +322,7 @@ pub fn psf_of_array<'py>(
             pixel_um: pixel_um.unwrap_or(design.verify.pixel_um),
             polarised: design.verify.light(),
             fast,
+            through_focus: request(through_focus),
         };
         let case = match &made {
             Some(chip) => SimulationCase::from(chip),
@@ -299,7 +336,8 @@ pub fn psf_of_array<'py>(
 /// PSFs of maps of widths, without a design.
 #[pyfunction]
 #[pyo3(signature = (widths, names, centres_nm, pitch_nm, lattice, wavelengths_nm, fields_deg, distance_um, fidelity, model,
-    aperture_um, fast, samples, pixel_um, shape, arriving, analyser, height_nm, pillar, substrate, progress=None))]
+    aperture_um, fast, samples, pixel_um, shape, arriving, analyser, height_nm, pillar, substrate, through_focus=None,
+    progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn psf_of_widths<'py>(
     py: Python<'py>,
@@ -323,6 +361,7 @@ pub fn psf_of_widths<'py>(
     height_nm: f64,
     pillar: &str,
     substrate: &str,
+    through_focus: Planes,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<ToldPsfs<'py>> {
     let wanted = Wanted::of(fidelity, model.as_deref()).map_err(error)?;
@@ -372,6 +411,7 @@ pub fn psf_of_widths<'py>(
             pixel_um: pixel_um.unwrap_or(PIXEL_UM),
             polarised: light,
             fast,
+            through_focus: request(through_focus),
         };
         let case = match (&made, &cell) {
             (Some(chip), _) => SimulationCase::from(chip),

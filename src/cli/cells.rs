@@ -87,12 +87,12 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let options = StudyOptions { threshold: args.avoid };
     options.check()?;
-    design.solve_mapping(terminal)?;
+    let cache = args.cache.clone().or_else(cache_folder);
+    design.solve_mapping(cache.as_deref(), terminal)?;
     let design = design;
     let mut spec = design.table_spec()?;
     spec.orders = args.orders;
     spec.tolerance = args.tolerance;
-    let cache = args.cache.clone().or_else(cache_folder);
     let (table, origin) = CellTable::obtain(&spec, cache.as_deref(), terminal)?;
     terminal.clear();
     let mut study = CellStudy::new(&design, &RigorousCell::new(table), options)?;

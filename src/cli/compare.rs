@@ -198,10 +198,10 @@ impl ComparedDesign {
     ///
     /// # Errors
     /// If the design cannot be read, or has no layout.
-    pub(crate) fn listed(&self) -> Result<ListedDesign> {
+    pub(crate) fn listed(&self, terminal: &Terminal) -> Result<ListedDesign> {
         Ok(ListedDesign {
             name: self.name.clone(),
-            layout: self.layout(&Design::read(&self.design)?)?,
+            layout: self.layout(&Design::read_with(&self.design, terminal)?)?,
             design: self.design.clone(),
             camera: self.camera.clone(),
             field_deg: self.field_deg,
@@ -230,10 +230,10 @@ impl ComparedDesign {
 
 impl CompareArgs {
     /// Comparison that is asked for, as the library has it.
-    fn comparison(&self) -> Result<Comparison> {
+    fn comparison(&self, terminal: &Terminal) -> Result<Comparison> {
         Ok(Comparison {
             camera: self.camera.clone(),
-            designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
+            designs: self.design.iter().map(|d| d.listed(terminal)).collect::<Result<_>>()?,
             lensless: self
                 .baselines
                 .iter()
@@ -254,7 +254,7 @@ impl CompareArgs {
 
 pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let comparison = args.comparison()?;
+    let comparison = args.comparison(terminal)?;
     let outputs = ["compare.html", "compare.json"].map(|n| args.out.join(n));
     apart(
         comparison.photographs.iter().map(PathBuf::as_path),
@@ -270,7 +270,7 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
         );
         return Ok(Outcome::Fine);
     }
-    let open = comparison.open()?;
+    let open = comparison.open(terminal)?;
     open.notes().iter().for_each(|note| terminal.say(note));
     let cache = KernelCache::of_user();
     let take = |k| open.take(k, &cache, terminal);

@@ -12,8 +12,10 @@ use metalith::design::CellFile;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
-    STREHL_AGAINST, SimulationCase, SinglePsfReport, focus_words, single_psfs, single_white, write_single_psf_report,
+    STREHL_AGAINST, SimulationCase, SinglePsfReport, focal_length_words, focus_words, plane_words, single_psfs,
+    single_white, write_single_psf_report,
 };
+use metalith::wave::psf::FOCUS_PLANES;
 use metalith::{
     AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, Layout, PolarisationBasis, Result, extract,
 };
@@ -106,6 +108,15 @@ pub(crate) struct PsfArgs {
     /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
     #[arg(long)]
     fast: bool,
+
+    /// Simulate planes along z too, up to this distance from the sensor on each side (um): for each plane Strehl ratio, FWHM and
+    /// focusing efficiency, and the focal length found through focus. Without a value two depths of focus, 2 lambda / NA^2.
+    #[arg(long, value_name = "RANGE_UM", num_args = 0..=1, require_equals = true, value_parser = between(1e-3, 1e6))]
+    through_focus: Option<Option<f64>>,
+
+    /// Number of planes of --through-focus.
+    #[arg(long, value_name = "N", default_value_t = FOCUS_PLANES, requires = "through_focus")]
+    planes: usize,
 
     /// Add polychromatic figures for the camera of this file; all wavelengths arrive at the same angle.
     #[arg(long, value_name = "CAMERA")]
@@ -434,6 +445,18 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             sig(psf.metrics.peak_um[0], 5),
             sig(psf.metrics.peak_um[1], 5),
         );
+        if let Some(series) = &psf.through_focus {
+            print_line!(
+                "{}, {} nm, through focus: {}; the sensor is at {} um",
+                psf.element,
+                sig(psf.wavelength_um * 1e3, 4),
+                focal_length_words(series),
+                exact(series.sensor_um)
+            );
+            for plane in &series.planes {
+                print_line!("  z {} um: {}", sig(plane.distance_um, 6), plane_words(&plane.focus));
+            }
+        }
     }
     if !psfs.is_empty() {
         print_line!("{STREHL_AGAINST}");

@@ -20,6 +20,9 @@ const ONE_WISH: Duration = Duration::from_secs(1);
 /// within it none.
 const BETWEEN_LINES: Duration = Duration::from_secs(30);
 
+/// Warnings that are printed in full, two lines each.
+const MOST_WARNINGS: usize = 3;
+
 /// The user's terminal, or the log that standard error goes to.
 pub struct Terminal {
     quiet: bool,
@@ -136,9 +139,19 @@ impl Terminal {
         }
     }
 
-    /// Print warnings about an input, unless `--quiet`.
+    /// Print warnings about an input, unless `--quiet`; of many the first in full and the others by their identities, so that the
+    /// first screen holds what came out.
     pub fn warnings(&self, warnings: &[Warning]) {
-        warnings.iter().for_each(|warning| self.say(&warning.to_string()));
+        let full = match warnings.len() {
+            0..=MOST_WARNINGS => warnings.len(),
+            _ => MOST_WARNINGS - 1,
+        };
+        let (full, others) = warnings.split_at(full);
+        full.iter().for_each(|warning| self.say(&warning.to_string()));
+        if !others.is_empty() {
+            let others: Vec<String> = others.iter().map(|warning| format!("[{}]", warning.id)).collect();
+            self.say(&format!("and {} warnings more: {}", others.len(), others.join(" ")));
+        }
     }
 
     /// True if nothing but errors and requested output is printed.

@@ -91,7 +91,7 @@ impl TrainArgs {
     }
 
     /// The camera that a last stage is for.
-    fn comparison(&self, kind: StageKind, photographs: Vec<PathBuf>) -> Result<Comparison> {
+    fn comparison(&self, kind: StageKind, photographs: Vec<PathBuf>, terminal: &Terminal) -> Result<Comparison> {
         let wrong = |what: &str, hint: &str| Err(Error::refused("train/stage-not-for-camera", what, hint));
         let lensless = match (kind, &self.design) {
             (StageKind::FlatNet, None) => vec![self.bare.camera(BaselineKind::Flatcam)?],
@@ -102,7 +102,7 @@ impl TrainArgs {
         };
         Ok(Comparison {
             camera: self.camera.clone().unwrap_or_default(),
-            designs: self.design.iter().map(ComparedDesign::listed).collect::<Result<_>>()?,
+            designs: self.design.iter().map(|d| d.listed(terminal)).collect::<Result<_>>()?,
             lensless,
             methods: Vec::new(),
             separate: false,
@@ -125,8 +125,8 @@ impl TrainArgs {
         [out, state]: [&Path; 2],
         terminal: &Terminal,
     ) -> Result<TrainingReport> {
-        let comparison = self.comparison(kind, photographs)?;
-        let open = comparison.open()?;
+        let comparison = self.comparison(kind, photographs, terminal)?;
+        let open = comparison.open(terminal)?;
         Stacks::check(comparison.photographs.len(), open.size(), spec.piece)?;
         let cache = KernelCache::of_user();
         let (stacks, trained) = open.training_stacks(0, kind, &beside(out, ".pictures"), &cache, terminal)?;

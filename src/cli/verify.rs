@@ -6,7 +6,7 @@ use clap::Args;
 use metalith::cell::{cache_folder, oblique_refused};
 use metalith::design::CellIncidence;
 use metalith::imaging::thumbnail;
-use metalith::report::{Figure, sig};
+use metalith::report::{Figure, count, counted, sig};
 use metalith::sensor::Camera;
 use metalith::{
     Accuracy, AsBuiltChip, CalibratedModel, Design, Error, Fidelity, PillarArray, PillarRows, Result, SimulationCases,
@@ -219,7 +219,8 @@ impl Judging {
         let cases = match &made {
             Some(chip) => SimulationCases::judged_by(chip).with_cells(&models),
             None => SimulationCases::of_cells(&models)?,
-        };
+        }
+        .with_through_focus();
         let found = verify(design, array, layout, &cases, self.accuracy(), terminal)?;
         let picture = match camera {
             Some(camera) => match thumbnail(design, layout, &camera, model.as_ref(), terminal) {
@@ -257,14 +258,22 @@ impl Judging {
         } else if terminal.is_quiet() {
             print_failed(found);
         } else {
-            summary(design, found, folder);
+            summary(design, array, found, folder);
         }
         Ok(Outcome::of(found.passed()))
     }
 }
 
-/// The verdict on the file, what the lens does, and the page.
-fn summary(design: &Design, found: &Verification, folder: &Path) {
+/// What was made and where, the verdict on the file, what the lens does, and the page.
+fn summary(design: &Design, array: &PillarArray, found: &Verification, folder: &Path) {
+    print_line!(
+        "layout: {} pillars in {}, {} of them distinct; {}, {} MB",
+        count(found.layout.pillars),
+        counted(array.placed.len(), "element"),
+        array.classes.len(),
+        found.layout.file,
+        sig(found.layout.bytes as f64 * 1e-6, 3)
+    );
     for quantity in found.model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");
     }
@@ -276,9 +285,18 @@ fn summary(design: &Design, found: &Verification, folder: &Path) {
     print_line!("report: {}", folder.join("report.html").display());
 }
 
+/// Limits that do not hold and are printed one by one.
+const MOST_FAILED: usize = 3;
+
 /// The limits that do not hold.
 fn print_failed(found: &Verification) {
-    for check in found.checks.iter().filter(|check| !check.passed()) {
+    let failed: Vec<_> = found.checks.iter().filter(|check| !check.passed()).collect();
+    let shown = match failed.len() {
+        0..=MOST_FAILED => failed.len(),
+        _ => MOST_FAILED - 1,
+    };
+    let (shown, others) = failed.split_at(shown);
+    for check in shown {
         print_line!(
             "FAILS: {}: {} (limit {}, `{}`)",
             check.what,
@@ -286,6 +304,10 @@ fn print_failed(found: &Verification) {
             sig(check.limit, 4),
             check.key
         );
+    }
+    if !others.is_empty() {
+        let keys: Vec<_> = others.iter().map(|check| format!("`{}`", check.key)).collect();
+        print_line!("FAILS too: {}", keys.join(", "));
     }
 }
 

@@ -128,6 +128,7 @@ impl Files {
             pixel_um: self.design.verify.pixel_um,
             aperture_radius_um: Some(self.design.aperture_radius_um()),
             accuracy: Accuracy::Accurate,
+            through_focus: None,
         };
         let single = single_psfs(&read, SimulationCase::from(&chip), &light, &Silent)
             .unwrap()

@@ -95,7 +95,7 @@ impl Comparison {
     ///
     /// # Errors
     /// If nothing is compared, a file cannot be read, or photographs are not of one size.
-    pub fn open(&self) -> Result<OpenComparison<'_>> {
+    pub fn open(&self, progress: &dyn Progress) -> Result<OpenComparison<'_>> {
         if self.designs.is_empty() && self.lensless.is_empty() {
             return Err(Error::refused(
                 "compare/no-camera",
@@ -129,7 +129,10 @@ impl Comparison {
         }
         let own = |listed: &ListedDesign| {
             let own = listed.camera.as_deref().map(Camera::read).transpose()?;
-            Ok((Design::read(&listed.design)?, own.unwrap_or_else(|| camera.clone())))
+            Ok((
+                Design::read_with(&listed.design, progress)?,
+                own.unwrap_or_else(|| camera.clone()),
+            ))
         };
         let designs: Vec<(Design, Camera)> = self.designs.iter().map(own).collect::<Result<_>>()?;
         let view = self.simulated_view(&designs, first);
@@ -364,6 +367,7 @@ impl OpenComparison<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metalith_core::Silent;
     use ndarray::Array3;
 
     /// Photographs that are finer than a design is simulated with are averaged, for all cameras alike, and the table says so.
@@ -392,7 +396,7 @@ mod tests {
             learnt: Vec::new(),
             lpips: None,
         };
-        let open = comparison.open().unwrap();
+        let open = comparison.open(&Silent).unwrap();
         let found = open.comparison(Vec::new());
         assert_eq!((found.size, found.averaged_from), ([91, 1374], Some([100, 1500])));
         assert_eq!(open.photographs[0].planes[0].dim(), (91, 1374));
@@ -401,6 +405,6 @@ mod tests {
             designs: Vec::new(),
             ..comparison.clone()
         };
-        assert_eq!(coarse.open().unwrap().comparison(Vec::new()).averaged_from, None);
+        assert_eq!(coarse.open(&Silent).unwrap().comparison(Vec::new()).averaged_from, None);
     }
 }

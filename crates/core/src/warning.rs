@@ -22,6 +22,11 @@ impl Warning {
             hint: hint.into(),
         }
     }
+
+    /// The warning as a paragraph of a page; the identity between back quotes.
+    pub fn paragraph(&self) -> String {
+        format!("Warning: {}. {}. `{}`", self.what, self.hint, self.id)
+    }
 }
 
 impl fmt::Display for Warning {

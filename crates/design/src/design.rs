@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use metalith_cell::{CellStack, FocusedLight, PolarisationAxis};
+use metalith_cell::{CellStack, FocusedLight, PolarisationAxis, cache_folder};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::text::quoted;
 use metalith_core::{Error, Progress, Result, Silent};
@@ -70,18 +70,18 @@ impl Design {
     pub fn parse_with(path: &Path, text: &str, progress: &dyn Progress) -> Result<Self> {
         let mut design = Document::read(path, text, |root| Self::sections(path, root, LibraryFile::Needed))?
             .with_files(LibraryFile::Needed)?;
-        design.solve_mapping(progress)?;
+        design.solve_mapping(cache_folder().as_deref(), progress)?;
         Ok(design)
     }
 
-    /// Solve the mapping from the cell, or read it from the cache, if the design has no other: for designs of
+    /// Solve the mapping from the cell, or read it from the folder `cache`, if the design has no other: for designs of
     /// [`Design::parse_without_library`].
     ///
     /// # Errors
     /// If the cell cannot be solved, all widths transmit little, or the user stopped it.
-    pub fn solve_mapping(&mut self, progress: &dyn Progress) -> Result<()> {
+    pub fn solve_mapping(&mut self, cache: Option<&Path>, progress: &dyn Progress) -> Result<()> {
         let stack = self.cell_stack()?;
-        self.mapping.solve(&self.cell, &stack, progress)
+        self.mapping.solve(&self.cell, &stack, cache, progress)
     }
 
     /// Reads a design as [`Design::read`] and [`Design::parse_without_library`] do.

@@ -29,7 +29,7 @@ use metalith_verify::{SimulationCases, verify_layout, write_report};
 /// Mistakes in the design or process file; a folder in the way; another run that makes the same hand-off; a file
 /// that cannot be written; the user stopped it.
 pub fn handoff(options: &HandoffOptions, progress: &dyn Progress) -> Result<Handoff> {
-    let sources = Sources::read(options)?;
+    let sources = Sources::read(options, progress)?;
     fits(&sources.design, &sources.process)?;
     let cell = &sources.design.cell;
     judging(options, &sources).check(cell.shape, cell.lattice)?;

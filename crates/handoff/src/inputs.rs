@@ -8,7 +8,7 @@ use super::options::HandoffOptions;
 use super::process::{Process, ShapeRules};
 use metalith_core::file::read_at_most;
 use metalith_core::text::is_printable;
-use metalith_core::{Error, Result, document};
+use metalith_core::{Error, Progress, Result, document};
 use metalith_design::Design;
 use metalith_drc::{Deck, Waivers};
 use metalith_optics::CalibratedModel;
@@ -44,8 +44,8 @@ impl Sources {
     ///
     /// # Errors
     /// Mistakes in one of them; a file that cannot be read, is no ordinary file, or changes while it is read.
-    pub(crate) fn read(options: &HandoffOptions) -> Result<Self> {
-        let (design, mut kept) = read_design(&options.design)?;
+    pub(crate) fn read(options: &HandoffOptions, progress: &dyn Progress) -> Result<Self> {
+        let (design, mut kept) = read_design(&options.design, progress)?;
         let process = match &options.process {
             Some(path) => Process::read(path)?,
             None => Process::of_film(&design.cell.pillar_material, design.cell.pillar_height_nm),
@@ -159,10 +159,10 @@ fn unique(taken: &BTreeSet<String>, name: &str) -> String {
 
 /// Read the design and the files it names. What is kept is what was read: the files are read before and after the
 /// design is, and must not change in between.
-fn read_design(path: &Path) -> Result<(Design, Vec<InputCopy>)> {
-    let named = files_of(path, &Design::read(path)?)?;
+fn read_design(path: &Path, progress: &dyn Progress) -> Result<(Design, Vec<InputCopy>)> {
+    let named = files_of(path, &Design::read_with(path, progress)?)?;
     let before = bytes_of(&named)?;
-    let design = Design::read(path)?;
+    let design = Design::read_with(path, progress)?;
     let same_files = files_of(path, &design)? == named;
     for ((path, ..), bytes) in named.iter().zip(&before) {
         if !same_files || read_at_most(path, LONGEST, "an input of a hand-off")? != *bytes {

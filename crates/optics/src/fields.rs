@@ -132,18 +132,70 @@ impl<'e> IncoherentFields<'e> {
     /// # Errors
     /// If the window is none, or the light arrives too steeply.
     pub fn psf(&self, stated: Window, accuracy: Accuracy, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
+        self.psf_by(&self.folded(stated, accuracy)?, lp_mm, scratch)
+            .map(|psf| Psf { window: stated, ..psf })
+    }
+
+    /// PSFs at some stated distances of the sensor (um), in windows along the ray through the middle of a window, without
+    /// transfers; see [`FoldedPropagator::fields_at`].
+    ///
+    /// # Errors
+    /// As [`IncoherentFields::psf`].
+    pub fn psfs_at(
+        &self,
+        stated: Window,
+        distances_um: &[f64],
+        accuracy: Accuracy,
+        scratch: &mut Scratch,
+    ) -> Result<Vec<Psf>> {
+        let nearest_um = distances_um.iter().copied().fold(stated.distance_um, f64::min);
+        let nearest = Window {
+            distance_um: nearest_um,
+            centre_um: stated.centre_um.map(|c| c * nearest_um / stated.distance_um),
+            ..stated
+        };
+        let fold = self.folded(nearest, accuracy)?;
+        let as_built: Vec<f64> = distances_um.iter().map(|z| z + self.defocus_um).collect();
+        let of = |field: &Field<'_>| {
+            let aperture = field.aperture(&self.light)?;
+            let mut psfs = Psf::formed_at(&fold, aperture.as_ref(), &self.light.plane, &as_built, scratch)?;
+            psfs.iter_mut().for_each(|psf| self.add_scattered(field, psf));
+            Ok(psfs)
+        };
+        let mut fields = self.fields.iter().map(of).collect::<Result<Vec<_>>>()?;
+        let plane = |distance_um: &f64| {
+            let psfs = fields.iter_mut().map(|planes| planes.remove(0)).collect();
+            let mut psf = Psf::sum(psfs, self.weight);
+            self.camera.apply(&mut psf);
+            psf.window.distance_um = *distance_um;
+            psf
+        };
+        Ok(distances_um.iter().map(plane).collect())
+    }
+
+    /// The propagator to a window at the stated distance of the sensor.
+    fn folded(&self, stated: Window, accuracy: Accuracy) -> Result<FoldedPropagator> {
         let window = Window {
             distance_um: stated.distance_um + self.defocus_um,
             ..stated
         };
         let wavelength_um = self.light.plane.wavelength_um;
         let fold = FoldedPropagator::plan(self.lattice, self.radius_um, wavelength_um, window, accuracy)?;
-        let fold = match self.part_bytes {
+        Ok(match self.part_bytes {
             Some(bytes) => fold.within(bytes),
             None => fold,
-        };
-        self.psf_by(&fold, lp_mm, scratch)
-            .map(|psf| Psf { window: stated, ..psf })
+        })
+    }
+
+    /// Light that missing pillars of a field scatter evenly over the window.
+    fn add_scattered(&self, field: &Field<'_>, psf: &mut Psf) {
+        let (scattered, window) = (field.scattered(), psf.window);
+        let cell_um2 = self.lattice.cell_um2();
+        let wavelength_um = self.light.plane.wavelength_um;
+        psf.values += scattered * spread(cell_um2, window.centre_um, window.distance_um, wavelength_um);
+        if let Some(otf) = &mut psf.otf {
+            otf.power_um2 += scattered * cell_um2;
+        }
     }
 
     /// PSF by a propagator of the caller's, whose window is at the distance as fabricated.
@@ -151,15 +203,10 @@ impl<'e> IncoherentFields<'e> {
     /// # Errors
     /// As [`Propagator::field`].
     pub fn psf_by(&self, propagator: &dyn Propagator, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
-        let (plane, cell_um2) = (&self.light.plane, self.lattice.cell_um2());
         let of = |field: &Field<'_>| {
             let aperture = field.aperture(&self.light)?;
-            let mut psf = Psf::formed(propagator, aperture.as_ref(), plane, lp_mm, scratch)?;
-            let (scattered, window) = (field.scattered(), psf.window);
-            psf.values += scattered * spread(cell_um2, window.centre_um, window.distance_um, plane.wavelength_um);
-            if let Some(otf) = &mut psf.otf {
-                otf.power_um2 += scattered * cell_um2;
-            }
+            let mut psf = Psf::formed(propagator, aperture.as_ref(), &self.light.plane, lp_mm, scratch)?;
+            self.add_scattered(field, &mut psf);
             Ok(psf)
         };
         let psfs = self.fields.iter().map(of).collect::<Result<Vec<_>>>()?;

@@ -98,11 +98,11 @@ impl StudyBench {
     ///
     /// # Errors
     /// If a file has changed since the plan was made.
-    pub(crate) fn open(plan: &Plan) -> Result<Self> {
+    pub(crate) fn open(plan: &Plan, progress: &dyn Progress) -> Result<Self> {
         let tolerance = Tolerance::read(&plan.tolerance)?;
         let files = plan.files();
         let known = if files.layouts.len() as u64 == tolerance.designs() {
-            Some(key(&tolerance, &files.layouts)?)
+            Some(key(&tolerance, &files.layouts, progress)?)
         } else {
             None
         };
@@ -149,7 +149,7 @@ impl StudyBench {
         bank: &dyn Fn(&CellStack, BankRange) -> Result<CellBank>,
         progress: &dyn Progress,
     ) -> Result<Subject> {
-        let design = self.tolerance.design(number)?;
+        let design = self.tolerance.design(number, progress)?;
         if design.verify.incidence == CellIncidence::Oblique {
             return Err(Error::refused(
                 "study/oblique-unsupported",

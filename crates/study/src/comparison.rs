@@ -54,10 +54,10 @@ impl ComparisonPlan {
     /// # Errors
     /// If a file has changed since it was planned, kernels are not there, or the user stopped it.
     pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
-        if key(&self.comparison)? != self.key {
+        if key(&self.comparison, progress)? != self.key {
             return Err(another_plan(&self.folder));
         }
-        let open = self.comparison.open()?;
+        let open = self.comparison.open(progress)?;
         let cache = KernelCache::only(&self.folder);
         let camera = |k: u64| open.take(k as usize, &cache, progress);
         shards.iter().try_for_each(|n| self.cut().make(*n, &camera, progress))
@@ -69,10 +69,10 @@ impl ComparisonPlan {
     /// If cameras are missing or there twice; as [`ComparisonPlan::run`].
     pub fn merge(&self, progress: &dyn Progress) -> Result<ComparisonResult> {
         let mut cameras: Vec<ComparedCamera> = self.cut().whole(&|_| None)?;
-        if key(&self.comparison)? != self.key {
+        if key(&self.comparison, progress)? != self.key {
             return Err(another_plan(&self.folder));
         }
-        let open = self.comparison.open()?;
+        let open = self.comparison.open(progress)?;
         let cache = KernelCache::only(&self.folder);
         for (k, camera) in cameras.iter_mut().enumerate() {
             camera.shown = open.take_first(k, 1, &cache, progress)?.shown;
@@ -82,7 +82,7 @@ impl ComparisonPlan {
 }
 
 /// SHA-256 of everything that decides the answers.
-fn key(comparison: &Comparison) -> Result<String> {
+fn key(comparison: &Comparison, progress: &dyn Progress) -> Result<String> {
     let mut hash = Sha256::new();
     hash.update(env!("CARGO_PKG_VERSION"));
     // What is asked for, with the names of the files; what they say follows.
@@ -92,7 +92,7 @@ fn key(comparison: &Comparison) -> Result<String> {
     );
     let mut files = Camera::read(&comparison.camera)?.files;
     for listed in &comparison.designs {
-        let design = Design::read(&listed.design)?;
+        let design = Design::read_with(&listed.design, progress)?;
         let solver = metalith_cell::cache_file::solver_of(design.cell.shape);
         hash.update(format!("{solver} {} ", design.optics_digest()?));
         // The file itself for what it verifies: by which cell, at which wavelengths.
@@ -122,9 +122,9 @@ fn key(comparison: &Comparison) -> Result<String> {
 /// If a file cannot be used, the folder holds another plan, or the user stopped it.
 pub fn plan_comparison(comparison: &Comparison, folder: &Path, progress: &dyn Progress) -> Result<ComparisonPlan> {
     let comparison = placed(comparison)?;
-    let open = comparison.open()?;
+    let open = comparison.open(progress)?;
     open.notes().iter().for_each(|note| progress.warn(note));
-    let key = key(&comparison)?;
+    let key = key(&comparison, progress)?;
     if let Some(known) = ComparisonPlan::known_in(folder, &key)? {
         return Ok(known);
     }

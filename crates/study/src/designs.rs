@@ -1,7 +1,7 @@
 //! The designs of a study: its design file with the values of each point of the grid.
 
 use metalith_core::document::{NoPlace, Scalar, Section, load, with_values};
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 
 use crate::study_file::Tolerance;
@@ -50,17 +50,17 @@ impl Tolerance {
         setting(&self.design_grids, design)
     }
 
-    /// Design by its number.
+    /// Design by its number, with progress of a mapping that is solved from the cell.
     ///
     /// # Errors
     /// As [`Design::read`].
-    pub fn design(&self, number: u64) -> Result<Design> {
+    pub fn design(&self, number: u64, progress: &dyn Progress) -> Result<Design> {
         if self.design_grids.is_empty() {
-            return Design::read(&self.design);
+            return Design::read_with(&self.design, progress);
         }
         let text = with_values(&load(&self.design)?, &self.setting(number))
             .map_err(|NoPlace { what, hint, .. }| Error::refused("study/key-not-in-design", what, hint))?;
-        Design::parse(&self.design, &text)
+        Design::parse_with(&self.design, &text, progress)
     }
 }
 

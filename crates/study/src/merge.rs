@@ -49,7 +49,7 @@ pub struct StudyResult {
 pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyResult> {
     let draws = plan.cut().whole(&|d: &DrawRecord| Some(d.draw))?;
     check_counts(plan, &draws)?;
-    let run = Run::open(plan)?;
+    let run = Run::open(plan, progress)?;
     let drawer = run.drawer();
     let count = plan.quantities.len();
     let names = plan.quantities.iter().map(|q| q.0.clone()).collect();

@@ -90,7 +90,7 @@ impl PairsPlan {
     /// # Errors
     /// If a file has changed since it was planned, kernels are not there, a pair cannot be made, or the user stopped it.
     pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
-        if hex(&self.request.key(&self.digests)?) != self.key {
+        if hex(&self.request.key(&self.digests, progress)?) != self.key {
             return Err(another_plan(&self.folder));
         }
         let system = self.request.system(&KernelCache::only(&self.folder), progress)?;
@@ -169,8 +169,8 @@ impl PairsPlan {
 
 impl PairsRequest {
     /// SHA-256 of everything that decides the pairs.
-    fn key(&self, digests: &[String]) -> Result<[u8; 32]> {
-        let design = Design::read(&self.design)?;
+    fn key(&self, digests: &[String], progress: &dyn Progress) -> Result<[u8; 32]> {
+        let design = Design::read_with(&self.design, progress)?;
         let mut hash = Sha256::new();
         let solver = metalith_cell::cache_file::solver_of(design.cell.shape);
         hash.update(format!(
@@ -199,7 +199,7 @@ impl PairsRequest {
     }
 
     fn system(&self, cache: &KernelCache, progress: &dyn Progress) -> Result<ImagingSystem> {
-        let design = Design::read(&self.design)?;
+        let design = Design::read_with(&self.design, progress)?;
         let camera = Camera::read(&self.camera)?;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let first = self.images.first();
@@ -241,7 +241,7 @@ pub fn plan_pairs(
         digests.push(image_digest(image)?);
         progress.advance(1);
     }
-    let key = hex(&request.key(&digests)?);
+    let key = hex(&request.key(&digests, progress)?);
     if let Some(known) = PairsPlan::known_in(folder, &key)? {
         return Ok(known);
     }

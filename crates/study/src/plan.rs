@@ -128,7 +128,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
     if known && !paths.iter().all(|path| path.exists()) {
         return Err(another_plan(folder));
     }
-    let key = key(&tolerance, &paths)?;
+    let key = key(&tolerance, &paths, progress)?;
     if let Some(known) = Plan::known_in(folder, &hex(&key))? {
         return Ok(known);
     }
@@ -173,7 +173,7 @@ fn layouts(tolerance: &Tolerance, folder: &Path, known: bool, progress: &dyn Pro
         let name = named("layout", "gds", number, designs);
         let path = folder.join(&name);
         if !known {
-            let design = tolerance.design(number)?;
+            let design = tolerance.design(number, progress)?;
             // Others differ by the values of a grid.
             if number == 0 {
                 design
@@ -248,7 +248,7 @@ impl Plan {
 }
 
 /// SHA-256 of everything that decides the answers; how a study is cut is no part of it.
-pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf]) -> Result<[u8; 32]> {
+pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf], progress: &dyn Progress) -> Result<[u8; 32]> {
     let mut hash = Sha256::new();
     let mut add = |what: &str, bytes: &[u8]| {
         hash.update((bytes.len() as u64).to_le_bytes());
@@ -265,7 +265,7 @@ pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf]) -> Result<[u8; 32]
         }
     }
     for number in 0..tolerance.designs() {
-        let design = tolerance.design(number)?;
+        let design = tolerance.design(number, progress)?;
         let solver = solver_of(design.cell.shape);
         add("version", format!("{} {solver}", env!("CARGO_PKG_VERSION")).as_bytes());
         // A design names further files: its digest covers what they say.

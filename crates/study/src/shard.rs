@@ -16,10 +16,10 @@ impl<'p> Run<'p> {
     ///
     /// # Errors
     /// If a file of the study has changed.
-    pub fn open(plan: &'p Plan) -> Result<Self> {
+    pub fn open(plan: &'p Plan, progress: &dyn Progress) -> Result<Self> {
         Ok(Self {
             plan,
-            bench: StudyBench::open(plan)?,
+            bench: StudyBench::open(plan, progress)?,
         })
     }
 

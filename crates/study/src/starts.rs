@@ -84,7 +84,7 @@ impl StartsPlan {
     /// # Errors
     /// If the design has changed since it was planned, tables are not there, or the user stopped it.
     pub fn run(&self, shards: &[u64], progress: &dyn Progress) -> Result<()> {
-        let design = Design::read(&self.design)?;
+        let design = Design::read_with(&self.design, progress)?;
         if key(&self.design, &design, self.starts)? != self.key {
             return Err(another_plan(&self.folder));
         }
@@ -182,7 +182,7 @@ pub fn plan_starts(
     progress: &dyn Progress,
 ) -> Result<StartsPlan> {
     let path = absolute(design_path)?;
-    let design = Design::read(&path)?;
+    let design = Design::read_with(&path, progress)?;
     OptimiseTask::of(&design)?;
     let key = key(&path, &design, starts)?;
     if let Some(known) = StartsPlan::known_in(folder, &key)? {

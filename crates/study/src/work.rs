@@ -81,7 +81,7 @@ impl Work {
         }
         match self {
             Self::Study(plan) => {
-                let run = Run::open(plan)?;
+                let run = Run::open(plan, progress)?;
                 missing.into_iter().try_for_each(|n| run.shard(n, progress))
             }
             Self::Pairs(plan) => plan.run(&missing, progress),

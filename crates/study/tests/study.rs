@@ -36,7 +36,7 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     assert_eq!(one.key, many.key);
     let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     single.install(|| run_shard(&one, 0)).unwrap();
-    let run = Run::open(&many).unwrap();
+    let run = Run::open(&many, &Silent).unwrap();
     for shard in [2, 0, 1] {
         run.shard(shard, &Silent).unwrap();
     }
@@ -145,7 +145,7 @@ fn designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables() {
     assert_eq!(one.cells[0], one.cells[1]);
     assert_ne!(one.cells[1], one.cells[2]);
     run_shard(&one, 0).unwrap();
-    let run = Run::open(&many).unwrap();
+    let run = Run::open(&many, &Silent).unwrap();
     for shard in [4, 1, 0, 3, 2] {
         run.shard(shard, &Silent).unwrap();
     }
@@ -244,7 +244,7 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
     let design = folder.path().join("design.toml");
     let text = fs::read_to_string(&design).unwrap();
     fs::write(&design, text.replace("window_samples = 32", "window_samples = 34")).unwrap();
-    let changed = refusal(Run::open(&made).map(|_| ()));
+    let changed = refusal(Run::open(&made, &Silent).map(|_| ()));
     assert_eq!(changed.id(), "study/plan-differs");
     assert!(plan(&path, &study, PlanSettings::default(), &Silent).is_err());
 }

@@ -241,7 +241,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     ");
     work.run(&[0], &Silent).unwrap();
     let merged = planned.merge(&Silent).unwrap();
-    let open = comparison.open().unwrap();
+    let open = comparison.open(&Silent).unwrap();
     let kept = metalith_imaging::KernelCache::only(&at("parts"));
     let cameras = (0..4).map(|k| open.take(k, &kept, &Silent).unwrap()).collect();
     let direct = open.comparison(cameras);

@@ -91,7 +91,7 @@ pub fn fuzz(ending: &str, mutant: impl Fn(&mut ChaCha8Rng, u64) -> Vec<u8>, surv
         let bytes = mutant(&mut rng, n);
         let began = Instant::now();
         if let Ok(whole) = catch_unwind(AssertUnwindSafe(|| survives(&bytes))) {
-            read += u64::from(whole)
+            read += u64::from(whole);
         } else {
             let path = format!("mutant-{seed}-{n}.{ending}");
             std::fs::write(&path, &bytes).expect("a writable folder");

@@ -9,12 +9,8 @@ use super::page::span;
 use super::steep_phase_errors::Slopes;
 use super::{EqualRotations, OrderEfficiencies, PsfResult, Verification, birefringence, media};
 
-/// The table of assumptions; none of a layout that was not simulated.
+/// The table of assumptions of a layout that was simulated.
 pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
-    if found.not_simulated.is_some() {
-        return;
-    }
-    page.section("Assumptions");
     let mut table = Table::new([
         Column::text("Assumption"),
         Column::text("Size for this design"),

@@ -9,6 +9,8 @@ use metalith_optics::SimulationCase;
 pub struct SimulationCases<'a> {
     pub judge: SimulationCase<'a>,
     pub beside: Vec<SimulationCase<'a>>,
+    /// True if the central element is also simulated in planes along z.
+    pub through_focus: bool,
 }
 
 impl<'a> SimulationCases<'a> {
@@ -17,6 +19,7 @@ impl<'a> SimulationCases<'a> {
         Self {
             judge: judge.into(),
             beside: Vec::new(),
+            through_focus: false,
         }
     }
 
@@ -41,6 +44,15 @@ impl<'a> SimulationCases<'a> {
         self.beside
             .extend(cells.iter().map(|c| SimulationCase::from(c.as_ref())));
         self
+    }
+
+    /// Same cases, with a through-focus series of the central element.
+    #[must_use]
+    pub fn with_through_focus(self) -> Self {
+        Self {
+            through_focus: true,
+            ..self
+        }
     }
 
     /// All cases, the one that judges first.

@@ -1,16 +1,20 @@
 //! Figures of the lens in a few lines: the numbers that papers on metalenses give.
 
 use metalith_design::Design;
-use metalith_report::{Cell, Column, sig};
-use metalith_wave::psf::{AIRY_FWHM, PsfMetrics};
+use metalith_report::{Cell, Column, exact, sig};
+use metalith_wave::psf::{AIRY_FWHM, FocusMetrics, PsfMetrics};
 
+use super::through_focus::focal_length_words;
 use super::{DistinctElement, PsfPair, Verification};
 
 /// Most PSFs that are named one by one; of more, the best and the worst.
-const MOST_NAMED: usize = 4;
+const MOST_NAMED: usize = 3;
+
+/// Strehl ratio below which a target is not diffraction-limited (Marechal).
+const LOW_STREHL: f64 = 0.8;
 
 /// Strehl ratio, focusing efficiency and width of each PSF of the layout in words, by the simulation that judges; of many, of the PSFs
-/// with the greatest and the least Strehl ratio.
+/// with the greatest and the least Strehl ratio. Then the focal length found through focus.
 pub fn lens_figures(design: &Design, found: &Verification) -> Vec<String> {
     let spots: Vec<(&DistinctElement, &PsfPair)> = found
         .distinct
@@ -18,16 +22,41 @@ pub fn lens_figures(design: &Design, found: &Verification) -> Vec<String> {
         .flat_map(|element| element.spots.iter().map(move |spot| (element, spot)))
         .collect();
     let strehl = |(_, spot): &(&DistinctElement, &PsfPair)| spot.judged().metrics.strehl;
+    let mut lines = Vec::new();
     if spots.len() <= MOST_NAMED {
-        return spots.iter().map(|spot| words(design, *spot)).collect();
+        lines.extend(spots.iter().map(|spot| words(design, *spot)));
+        lines.extend(found.distinct.iter().filter_map(through_focus));
+        return lines;
     }
     let best = spots.iter().max_by(|a, b| strehl(a).total_cmp(&strehl(b)));
     let worst = spots.iter().min_by(|a, b| strehl(a).total_cmp(&strehl(b)));
     let named = [("greatest", best), ("least", worst)];
-    named
-        .into_iter()
-        .filter_map(|(name, spot)| Some(format!("{name} of {} PSFs: {}", spots.len(), words(design, *spot?))))
-        .collect()
+    let words =
+        |(name, spot): (&str, Option<&_>)| Some(format!("{name} of {} PSFs: {}", spots.len(), words(design, *spot?)));
+    lines.extend(named.into_iter().filter_map(words));
+    lines.extend(found.distinct.iter().filter_map(through_focus));
+    lines
+}
+
+/// What an element shows through focus by wavelength, in words.
+fn through_focus(element: &DistinctElement) -> Option<String> {
+    let all = &element.through_focus;
+    let each: Vec<String> = all
+        .iter()
+        .map(|series| {
+            format!(
+                "{} at {} nm",
+                focal_length_words(series),
+                exact(series.wavelength_um * 1e3)
+            )
+        })
+        .collect();
+    Some(format!(
+        "through focus: {}; design {} um: element {}",
+        each.join(", "),
+        exact(all.first()?.sensor_um),
+        element.element.label()
+    ))
 }
 
 fn words(design: &Design, (element, spot): (&DistinctElement, &PsfPair)) -> String {
@@ -36,10 +65,12 @@ fn words(design: &Design, (element, spot): (&DistinctElement, &PsfPair)) -> Stri
         || "no focus within the window".to_owned(),
         |words| words + &limit(design, element, spot),
     );
+    let target = spot.designed.metrics.strehl;
     format!(
-        "Strehl ratio {} (target phase {}), {focus}: {}",
+        "Strehl ratio {} (target phase {}{}), {focus}: {}",
         sig(metrics.strehl, 3),
-        sig(spot.designed.metrics.strehl, 3),
+        sig(target, 3),
+        if target < LOW_STREHL { ", low by design" } else { "" },
         spot.label(&element.element)
     )
 }
@@ -60,10 +91,23 @@ fn limit(design: &Design, element: &DistinctElement, spot: &PsfPair) -> String {
 
 /// Focusing efficiency and width of a PSF in words; none if the window does not hold its width.
 pub fn focus_words(metrics: &PsfMetrics) -> Option<String> {
-    let (share, [x, y]) = (metrics.focusing_efficiency?, metrics.fwhm_um);
+    width_words(metrics.focusing_efficiency, metrics.fwhm_um)
+}
+
+/// Strehl ratio, focusing efficiency and width of the PSF in a plane along z, in words.
+pub fn plane_words(focus: &FocusMetrics) -> String {
+    let width = width_words(focus.focusing_efficiency, focus.fwhm_um);
+    format!(
+        "Strehl ratio {}{}",
+        sig(focus.strehl, 3),
+        width.map_or_else(String::new, |words| format!(", {words}"))
+    )
+}
+
+fn width_words(share: Option<f64>, [x, y]: [Option<f64>; 2]) -> Option<String> {
     Some(format!(
         "focusing efficiency {} %, FWHM {} x {} um",
-        sig(share * 100.0, 3),
+        sig(share? * 100.0, 3),
         sig(x?, 3),
         sig(y?, 3)
     ))
@@ -78,13 +122,12 @@ pub(super) fn focus_columns() -> [Column; 3] {
     ]
 }
 
-/// Focusing efficiency and width of a PSF in a row of a table.
-pub(super) fn focus_cells(metrics: &PsfMetrics) -> [Cell; 3] {
+/// Focusing efficiency and widths (um) of a PSF in a row of a table.
+pub(super) fn focus_cells(share: Option<f64>, fwhm_um: [Option<f64>; 2]) -> [Cell; 3] {
     let width = |um: Option<f64>| um.map_or_else(Cell::none, |um| Cell::sig(um, 3));
-    let share = metrics.focusing_efficiency;
     [
         share.map_or_else(Cell::none, |share| Cell::fixed(share * 100.0, 1)),
-        width(metrics.fwhm_um[0]),
-        width(metrics.fwhm_um[1]),
+        width(fwhm_um[0]),
+        width(fwhm_um[1]),
     ]
 }

@@ -24,6 +24,7 @@ mod single;
 mod single_white;
 mod site_orders;
 mod steep_phase_errors;
+mod through_focus;
 
 use std::path::Path;
 
@@ -41,12 +42,13 @@ use metalith_optics::ModelStatement;
 use metalith_pillars::PillarRows;
 use metalith_wave::Accuracy;
 use metalith_wave::propagation::Steepness;
+use metalith_wave::psf::ThroughFocus;
 
 pub use case::SimulationCases;
 pub use check::{Check, Sense, verdict_words};
 pub use distinct_elements::CopyAngle;
 pub use large_layouts::{verify_in_parts, verify_pillars};
-pub use lens_figures::{focus_words, lens_figures};
+pub use lens_figures::{focus_words, lens_figures, plane_words};
 pub use memory::Simulation;
 pub use metalith_optics::SimulationCase;
 pub use metalith_pillars::PillarCheck;
@@ -57,8 +59,11 @@ pub use polychromatic::CameraStatement;
 pub use polychromatic_channels::{Contrast, WhiteChannel};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use rotations::EqualRotations;
-pub use single::{Lighting, STREHL_AGAINST, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
+pub use single::{
+    FocusRequest, Lighting, STREHL_AGAINST, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report,
+};
 pub use single_white::{SingleWhite, single_white, white_sampling};
+pub use through_focus::focal_length_words;
 
 /// Facts of the file, in numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -100,6 +105,9 @@ pub struct DistinctElement {
     /// One entry for each wavelength and field angle of the design; then for each wavelength those that are asked of copies
     /// and come from other sides than these.
     pub spots: Vec<PsfPair>,
+    /// Planes along z in the middle of the field, one entry for each wavelength of the design; of the central element alone.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub through_focus: Vec<ThroughFocus>,
     /// A point of the scene in white light, one entry for each channel of the camera.
     pub white: Vec<WhiteChannel>,
     /// Number of pillars of each width that were read back; index is the width (nm), the first entry counts empty sites.
@@ -321,10 +329,13 @@ fn judge(
         white.solve(simulator.judge(), &shown, progress)?;
     }
     let in_white = white.as_ref().map_or(0, polychromatic::WhiteSimulator::psfs);
+    // Spectra of many planes are not held in parts.
+    let central = if cases.through_focus && part_bytes.is_none() { central(&chosen) } else { None };
+    let series = central.map_or(0, |_| design.verify.wavelengths_um.len());
     let psfs: usize = chosen.iter().map(|one| simulator.psfs(one) + in_white).sum();
-    progress.begin("simulating elements", psfs as u64);
+    progress.begin("simulating elements", (psfs + series) as u64);
     let mut simulated = Vec::new();
-    for one in chosen {
+    for (k, one) in chosen.into_iter().enumerate() {
         let element = one.element;
         let widths = found.widths[one.index];
         let phase = ElementPhase::of(&lens, &element);
@@ -337,6 +348,7 @@ fn judge(
             steepness: Steepness::of(&array.lattice, |ix, iy| phase.turns(ix, iy)),
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&one, &phase, &read, progress)?,
+            through_focus: if central == Some(k) { simulator.through_focus(&element, &phase, &read, progress)? } else { Vec::new() },
             white: match &white {
                 Some(white) => white.simulate(&element, &phase, &read, progress)?,
                 None => Vec::new(),
@@ -368,6 +380,15 @@ fn judge(
     };
     verification.checks = check::all(&design.verify.limits, &verification);
     Ok(verification)
+}
+
+/// The element nearest to the middle of the array, by its number; none where its cells are solved for other light than from the
+/// middle of the field.
+fn central(chosen: &[distinct_elements::Chosen]) -> Option<usize> {
+    let middle = |one: &&distinct_elements::Chosen| one.angles.iter().any(|(field, _)| *field == optics::MIDDLE);
+    let of = |one: &distinct_elements::Chosen| one.element.index.0.abs() + one.element.index.1.abs();
+    let all = chosen.iter().enumerate().filter(|(_, one)| middle(one));
+    all.min_by_key(|(_, one)| of(one)).map(|(k, _)| k)
 }
 
 /// Phase errors of an element's pillars at the wavelength of the mapping, in the case that judges.

@@ -12,14 +12,14 @@ use serde::Serialize;
 use super::lens_figures::{focus_cells, focus_columns};
 use super::polychromatic::CameraStatement;
 use super::single_white::SingleWhite;
-use super::{model_page, polychromatic_page};
+use super::{model_page, polychromatic_page, through_focus};
 use metalith_cell::{Fidelity, Illumination, PolarisedLight};
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_optics::{CaseOptics, ElementOptics, ModelStatement, Placement, SimulationCase};
 use metalith_pillars::{Lattice, LatticeKind, PillarMap};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
-use metalith_wave::psf::{IdealPsf, PixelFrequencies, Psf, PsfMetrics};
+use metalith_wave::psf::{FocusPlanes, IdealPsf, PixelFrequencies, Psf, PsfMetrics, ThroughFocus};
 use metalith_wave::{Accuracy, Pillars, Scratch, Window};
 
 /// Lighting: the light, and the place on the sensor.
@@ -45,6 +45,54 @@ pub struct Lighting {
     /// where a model has them off their place.
     pub aperture_radius_um: Option<f64>,
     pub accuracy: Accuracy,
+    /// Planes along z besides the plane of the sensor; none if not asked for.
+    pub through_focus: Option<FocusRequest>,
+}
+
+/// Planes along z that are asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FocusRequest {
+    /// Distance of the first and the last plane from the sensor (um); two depths of focus if left out.
+    pub range_um: Option<f64>,
+    pub planes: usize,
+}
+
+impl FocusRequest {
+    /// Most planes: each holds a PSF.
+    pub const PLANES: std::ops::RangeInclusive<usize> = 3..=101;
+
+    /// Check against the distance of the sensor (um).
+    ///
+    /// # Errors
+    /// If there are too few or too many planes, or they reach farther than half of the distance.
+    pub fn check(&self, sensor_um: f64) -> Result<()> {
+        let range = 0.0..=0.5 * sensor_um;
+        let right = self.range_um.is_none_or(|um| um > 0.0 && range.contains(&um));
+        if right && Self::PLANES.contains(&self.planes) {
+            return Ok(());
+        }
+        let range = self
+            .range_um
+            .map_or_else(String::new, |um| format!(", up to {um} um from the sensor"));
+        Err(Error::refused(
+            "psf/through-focus",
+            format!("{} planes{range} through focus", self.planes),
+            format!(
+                "give {} to {} planes, and at most half of the distance to the sensor, {} um",
+                Self::PLANES.start(),
+                Self::PLANES.end(),
+                sig(0.5 * sensor_um, 4)
+            ),
+        ))
+    }
+
+    fn planes(&self, wavelength_um: f64, radius_um: f64, sensor_um: f64) -> FocusPlanes {
+        let usual = FocusPlanes::usual(wavelength_um, radius_um, sensor_um);
+        FocusPlanes {
+            range_um: self.range_um.unwrap_or(usual.range_um),
+            planes: self.planes,
+        }
+    }
 }
 
 /// The PSF of one element of a layout at one wavelength.
@@ -56,6 +104,9 @@ pub struct SinglePsf {
     pub fidelity: Fidelity,
     #[serde(flatten)]
     pub metrics: PsfMetrics,
+    /// Planes along z, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub through_focus: Option<ThroughFocus>,
     #[serde(skip)]
     pub psf: Psf,
 }
@@ -70,6 +121,9 @@ pub fn single_psfs(
     light: &Lighting,
     progress: &dyn Progress,
 ) -> Result<Vec<SinglePsf>> {
+    if let Some(request) = &light.through_focus {
+        request.check(light.distance_um)?;
+    }
     let elements = distinct(found);
     progress.begin(
         "simulating elements",
@@ -90,17 +144,24 @@ pub fn single_psfs(
                 progress.check_stopped()?;
                 let window = light.window(widths.lattice);
                 let psf = fields.psf(window, light.accuracy, &light.reported_lp_mm(), scratch)?;
+                let through = |request: &FocusRequest| {
+                    let planes = request.planes(wavelength_um, widths.circle_um(), light.distance_um);
+                    fields.psfs_at(window, &planes.distances_um(light.distance_um), light.accuracy, scratch)
+                };
+                let planes = light.through_focus.as_ref().map(through).transpose()?;
                 progress.advance(1);
-                Ok(psf)
+                Ok((psf, planes))
             });
         let psfs = psfs.collect::<Result<Vec<_>>>()?;
         let full = case.full_transmission(wavelength_um)?;
         let focus = [light.at_um[0], light.at_um[1], light.distance_um];
-        for ((site, widths), psf) in elements.iter().zip(psfs) {
+        for ((site, widths), (psf, planes)) in elements.iter().zip(psfs) {
             // Strehl is against the sites as drawn, whatever they transmit.
             let table = vec![Complex64::ONE; usize::from(largest_number(&elements)) + 1];
             let matched = IdealPsf::of(&Pillars::new(*widths, &table)?, focus, wavelength_um, full);
+            let size_um = [widths.circle_um(), light.distance_um];
             all.push(SinglePsf {
+                through_focus: planes.map(|psfs| ThroughFocus::of(psfs, &matched, wavelength_um, size_um)),
                 element: site.name.clone(),
                 wavelength_um,
                 fidelity: case.fidelity(),
@@ -213,15 +274,6 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     if let Some(model) = model {
         model_page::write(&mut page, model);
     }
-    page.section("Assumptions");
-    page.paragraph(
-        "A layout contains shapes only. The other quantities are options of the command, or their defaults:",
-    );
-    let mut assumed = Table::new([Column::text("Quantity"), Column::text("Value")]);
-    for (what, value) in assumptions {
-        assumed.row([Cell::from(*what), Cell::from(value.as_str())]);
-    }
-    page.table(assumed);
     let mut table = Table::new(
         [
             Column::text("Element"),
@@ -247,7 +299,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
                 Cell::sig(m.strehl, 3),
             ]
             .into_iter()
-            .chain(focus_cells(m))
+            .chain(focus_cells(m.focusing_efficiency, m.fwhm_um))
             .chain([
                 Cell::fixed(m.energy_1_pixel * 100.0, 2),
                 Cell::fixed(m.energy_2_pixels * 100.0, 2),
@@ -260,16 +312,6 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         images.image(format!("{}, {nm} nm", found.element), found.psf.values.clone());
         write_npy(&folder.join(format!("psf_{k}_{nm}nm.npy")), &found.psf.values)?;
     }
-    page.section("PSFs");
-    page.table(table.caption(STREHL_AGAINST));
-    page.figure(images.caption("Whole window, four decades."));
-    if let Some((camera, elements)) = white {
-        page.section("Polychromatic figures");
-        for element in elements {
-            page.subsection(&element.element);
-            polychromatic_page::channels(&mut page, camera, &element.channels, &[]);
-        }
-    }
     page.section("Pillars");
     let zooms = elements.iter().take(4).map(|(site, widths)| {
         PillarZoom::new(format!("Middle of {}", site.name), widths, (0.0, 0.0), 10.0)
@@ -277,6 +319,38 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
             .caption("Pillars as read, to scale.")
     });
     page.row(zooms);
+    page.section("PSFs");
+    page.row([images.caption("Whole window, four decades.")]);
+    let name = |found: &SinglePsf| format!("{}, {} nm", found.element, sig(found.wavelength_um * 1e3, 4));
+    let series = || {
+        psfs.iter()
+            .filter_map(|psf| Some((name(psf), psf.through_focus.as_ref()?)))
+    };
+    for (name, series) in series() {
+        page.row([through_focus::row(&name, series)]);
+    }
+    page.table(table.caption(STREHL_AGAINST));
+    if series().next().is_some() {
+        page.table(through_focus::table("Element, wavelength", series()));
+    }
+    if let Some((camera, elements)) = white {
+        page.section("Polychromatic figures");
+        for element in elements {
+            page.subsection(&element.element);
+            polychromatic_page::channels(&mut page, camera, &element.channels, &[]);
+        }
+    }
+    page.section("Assumptions");
+    page.details("Quantities that no layout states", |page| {
+        page.paragraph(
+            "A layout contains shapes only. The other quantities are options of the command, or their defaults:",
+        );
+        let mut assumed = Table::new([Column::text("Quantity"), Column::text("Value")]);
+        for (what, value) in assumptions {
+            assumed.row([Cell::from(*what), Cell::from(value.as_str())]);
+        }
+        page.table(assumed);
+    });
     write_json(
         &folder.join("report.json"),
         "psf",

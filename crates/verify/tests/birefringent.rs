@@ -73,6 +73,7 @@ fn image((design, _, folder): &Lens, arriving: Polarisation, analyser: Option<An
         },
         aperture_radius_um: None,
         accuracy: Accuracy::Accurate,
+        through_focus: None,
     };
     let case = SimulationCase::from(&cell as &dyn CellModel);
     single_psfs(&found, case, &light, &Silent).unwrap().remove(0)

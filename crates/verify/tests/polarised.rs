@@ -78,6 +78,7 @@ fn of_ideal_plates(arriving: Polarisation, analyser: Option<Analyser>) -> Single
         },
         aperture_radius_um: None,
         accuracy: Accuracy::Accurate,
+        through_focus: None,
     };
     single_psfs(&found, SimulationCase::from(&plates as &dyn CellModel), &light, &Silent)
         .unwrap()

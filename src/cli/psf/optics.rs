@@ -7,7 +7,7 @@ use metalith::cell::{
 use metalith::design::CellFile;
 use metalith::rcwa::CellLattice;
 use metalith::report::{exact, sig};
-use metalith::verify::Lighting;
+use metalith::verify::{FocusRequest, Lighting};
 use metalith::{
     Accuracy, AsBuiltChip, CalibratedModel, CellModel, Error, Extraction, LatticeKind, PillarShape, Pitch,
     PolarisationBasis, Result, Wedge,
@@ -251,6 +251,10 @@ impl PsfArgs {
             polarised: self.polarised_light(shape),
             aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
             accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },
+            through_focus: self.through_focus.map(|range_um| FocusRequest {
+                range_um,
+                planes: self.planes,
+            }),
         }
     }
 }

@@ -46,10 +46,7 @@ impl<'a> Bytes<'a> {
     }
 
     fn is(&mut self, mark: &[u8]) -> Parsed<()> {
-        match self.take(mark.len())? == mark {
-            true => Ok(()),
-            false => Err(format!("no {} where one should be", String::from_utf8_lossy(mark))),
-        }
+        if self.take(mark.len())? == mark { Ok(()) } else { Err(format!("no {} where one should be", String::from_utf8_lossy(mark))) }
     }
 
     /// Text up to a zero byte, which is taken too.
@@ -261,7 +258,7 @@ impl<'a> File<'a> {
                     let flags = at.number(1)?;
                     let kind = if flags & 0x08 > 0 { at.number(1)? } else { 0 };
                     at.take(if flags & 0x04 > 0 { 8 } else { 0 })?;
-                    at.take(if flags & 0x10 > 0 { 1 } else { 0 })?;
+                    at.take(usize::from(flags & 0x10 > 0))?;
                     let length = at.number(1 << (flags & 3))?;
                     let name = String::from_utf8_lossy(at.take((length as usize).min(LONGEST_NAME))?).into_owned();
                     // Links to other files and by name lead to no data of this one.
@@ -387,10 +384,7 @@ impl<'a> File<'a> {
         let mut values = vec![Complex64::ZERO; count];
         let mut seen = BTreeSet::new();
         self.chunks(tree, set, sides, 0, &mut seen, &mut values)?;
-        match product(&counts) == Some(seen.len()) {
-            true => Ok(values),
-            false => Err("a data set without all of its chunks".into()),
-        }
+        if product(&counts) == Some(seen.len()) { Ok(values) } else { Err("a data set without all of its chunks".into()) }
     }
 
     fn chunks(
@@ -478,10 +472,7 @@ fn unfiltered(stored: &[u8], set: &DataSet<'_>, skipped: u64, size: usize) -> Pa
             }
         }
     }
-    match bytes.len() == size {
-        true => Ok(bytes),
-        false => Err(format!("a chunk of {} bytes in place of {size}", bytes.len())),
-    }
+    if bytes.len() == size { Ok(bytes) } else { Err(format!("a chunk of {} bytes in place of {size}", bytes.len())) }
 }
 
 /// Lengths along the axes; none where there is no data.

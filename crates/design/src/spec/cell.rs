@@ -254,7 +254,7 @@ fn read_pitch(s: &Section<'_, '_>, lattice: LatticeKind, unit: DatabaseUnit) -> 
     };
     if lattice == LatticeKind::Hexagonal && !unit.divides(pitch) {
         let finer = DatabaseUnit::of_pitch(pitch).map_or_else(
-            || format!("use a pitch of {:.1} nm with `database_unit_nm = 0.1`", nm),
+            || format!("use a pitch of {nm:.1} nm with `database_unit_nm = 0.1`"),
             |finer| format!("add `database_unit_nm = {finer}`, or use a multiple of {unit} nm"),
         );
         s.fault_given(

@@ -1,6 +1,6 @@
 //! `[mapping]`: from phase to width.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::{Serialize, Serializer};
@@ -10,7 +10,7 @@ use super::lens::WAVELENGTH;
 use super::{ArraySpec, CellSpec, LensSpec, MappingIdentity, SteeredMapping, SteeringSteps};
 use metalith_cell::{
     Basis, CellStack, InversePolynomial, MappingTable, PhaseConvention, PillarLibrary, RotationMapping, SolvedMapping,
-    UnitCellTable, cache_folder,
+    UnitCellTable,
 };
 use metalith_core::document::{Limits, Section};
 use metalith_core::{Error, Progress, Result};
@@ -237,10 +237,7 @@ impl MappingSpec {
             );
         }
         if from_cells {
-            let others: &[&str] = match upright {
-                true => &["library", "cell", "accept"],
-                false => &["coefficients", "basis", "table", "cell", "accept"],
-            };
+            let others: &[&str] = if upright { &["library", "cell", "accept"] } else { &["coefficients", "basis", "table", "cell", "accept"] };
             for key in others.iter().copied().filter(|key| s.has(key)) {
                 s.fault(
                     key,
@@ -346,17 +343,22 @@ impl MappingSpec {
     }
 
     /// Solve the mapping from the cell, if that is its source.
-    pub(crate) fn solve(&mut self, cell: &CellSpec, stack: &CellStack, progress: &dyn Progress) -> Result<()> {
+    pub(crate) fn solve(
+        &mut self,
+        cell: &CellSpec,
+        stack: &CellStack,
+        cache: Option<&Path>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         if !self.from_cells {
             return Ok(());
         }
-        let cache = cache_folder();
         if let Some(pillars) = cell.shape.upright() {
-            let (library, _) = PillarLibrary::solve(stack, pillars, self.wavelength_um, cache.as_deref(), progress)?;
+            let (library, _) = PillarLibrary::solve(stack, pillars, self.wavelength_um, cache, progress)?;
             self.pillar_library = Some(Arc::new(library));
         } else {
             let widths_nm: Vec<u16> = cell.widths_nm().collect();
-            let solved = SolvedMapping::solve(stack, self.wavelength_um, &widths_nm, cache.as_deref(), progress)?;
+            let solved = SolvedMapping::solve(stack, self.wavelength_um, &widths_nm, cache, progress)?;
             self.table = Some(solved.table.clone());
             self.solved = Some(solved);
         }

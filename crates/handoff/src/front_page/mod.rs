@@ -24,6 +24,9 @@ pub(super) fn write(folder: &Path, c: &Contents<'_>) -> Result<()> {
         format!("{}. Process: {}.", c.design.title, c.process.title),
     );
     verdict(&mut page, c);
+    for warning in c.design.warnings()? {
+        page.note(warning.paragraph());
+    }
     let (w, h) = c.design.layout.chip.size_nm;
     page.facts(&[
         ("Pillars", count(c.pillars)),

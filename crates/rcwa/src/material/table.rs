@@ -23,9 +23,9 @@ pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
         let number = Some(row.line);
         let mut sample = [0.0; 3];
         if absorbs {
-            sample = row.numbers()?
+            sample = row.numbers()?;
         } else {
-            sample[..2].copy_from_slice(&row.numbers::<2>()?)
+            sample[..2].copy_from_slice(&row.numbers::<2>()?);
         }
         sample[0] *= unit;
         if sample[0] <= 0.0 || sample[1] <= 0.0 || sample[2] < 0.0 {

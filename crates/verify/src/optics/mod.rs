@@ -16,14 +16,14 @@ use metalith_design::{CellIncidence, Design, Element, FieldAngle};
 use metalith_optics::{CaseOptics, ElementOptics, IncoherentFields, Placement, SimulationCase};
 use metalith_pillars::{Lattice, PillarRows};
 use metalith_wave::propagation::{incident, landing_um};
-use metalith_wave::psf::PixelFrequencies;
+use metalith_wave::psf::{FocusPlanes, PixelFrequencies, ThroughFocus};
 use metalith_wave::{
     Accuracy, Aperture, FoldedPropagator, IdealPsf, PhaseFunction, PhaseMap, PhaseSites, PlaneWave, Psf, Scratch,
     Window,
 };
 
 /// Viewing direction of an element in the middle of its field.
-const MIDDLE: FieldAngle = FieldAngle { x_deg: 0.0, y_deg: 0.0 };
+pub(super) const MIDDLE: FieldAngle = FieldAngle { x_deg: 0.0, y_deg: 0.0 };
 
 /// Simulator of the elements of a design.
 pub(super) struct ElementSimulator<'a> {
@@ -207,6 +207,45 @@ impl<'a> ElementSimulator<'a> {
                 pair
             })
             .collect()
+    }
+
+    /// Through-focus series of an element in the middle of its field, in the case that judges, at each wavelength of the design.
+    ///
+    /// # Errors
+    /// As [`Self::simulate`].
+    pub(crate) fn through_focus(
+        &self,
+        element: &Element,
+        phase: &ElementPhase<'_>,
+        read: &ReadElement<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<ThroughFocus>> {
+        let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
+        let sensor_um = lens.focal_length_um;
+        let series = |&wavelength_um: &f64| {
+            progress.check_stopped()?;
+            let wave = arriving(element, wavelength_um, MIDDLE)?;
+            let fields = self.in_light(element, &wave, |light| read.cases[0].in_light(light, progress))?;
+            let chief = landing_um(&element.wedge, &wave, sensor_um)?;
+            let window = Window::about(chief, self.lattice.pitch_um(), spec.window_samples, sensor_um);
+            let planes = FocusPlanes::usual(wavelength_um, lens.radius_um(), sensor_um);
+            let psfs = fields.psfs_at(
+                window,
+                &planes.distances_um(sensor_um),
+                self.accuracy,
+                &mut Scratch::default(),
+            )?;
+            let full = self.judge().case().full_transmission(wavelength_um)?;
+            let perfect = self.perfect(element, phase, chief, wavelength_um).scaled(full);
+            progress.advance(1);
+            Ok(ThroughFocus::of(
+                psfs,
+                &perfect,
+                wavelength_um,
+                [lens.radius_um(), sensor_um],
+            ))
+        };
+        spec.wavelengths_um.par_iter().map(series).collect()
     }
 
     fn pair(

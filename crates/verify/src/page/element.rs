@@ -3,7 +3,7 @@
 use crate::lens_figures::{focus_cells, focus_columns};
 use ndarray::Array2;
 
-use crate::{DistinctElement, PsfResult, Verification, polychromatic_page};
+use crate::{DistinctElement, PsfResult, Verification, polychromatic_page, through_focus};
 use metalith_cell::Fidelity;
 use metalith_core::part;
 use metalith_design::Design;
@@ -15,25 +15,8 @@ const PSF_DECADES: f64 = 4.0;
 /// Most of a PSF that is shown, along an axis (um): some ten sensor pixels.
 const PSF_SHOWN_UM: f64 = 60.0;
 
-/// The section of one distinct element.
-pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, element: &DistinctElement) {
-    page.section(format!("Element {}", element.element.label()));
-    page.paragraph(format!(
-        "This element represents {} of {}{}. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, with the simulation model `{}`, {} rad rms, {} at most. {}",
-        element.copies,
-        counted(found.elements.len(), "element"),
-        match element.copies {
-            1 => "",
-            _ => ": the others have the same figures, with places, directions and field angles transformed as in the table of elements",
-        },
-        sig(element.phase.rounding.rms_rad, 3),
-        sig(element.phase.rounding.largest_rad, 3),
-        found.fidelity.of_width_alone(),
-        sig(element.phase.mapping.rms_rad, 3),
-        sig(element.phase.mapping.largest_rad, 3),
-        steepness(element),
-    ));
-    page.table(spot_table(element, design.verify.pixel_um));
+/// PSFs of one distinct element in the middle of its field.
+pub(super) fn pictures(page: &mut Page, found: &Verification, element: &DistinctElement) {
     let shown: Vec<_> = element
         .spots
         .iter()
@@ -54,21 +37,48 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
     let shown_um = shown.first().map_or(PSF_SHOWN_UM, |(_, seen)| {
         shown_samples(&seen.designed, seen.step_um) as f64 * seen.step_um
     });
-    let mut chart = Chart::new(
-        "MTF with the sensor's pixel",
-        Axis::linear("spatial frequency", "1/mm"),
-        Axis::linear("MTF", "").range(0.0, 1.0),
-    );
-    for (spot, _) in &shown {
-        let colour = format!("{} nm", exact(spot.wavelength_um * 1e3));
-        chart.line(format!("target, {colour}"), spot.designed.mtf_curve.iter().copied());
-        chart.line(format!("layout, {colour}"), spot.judged().mtf_curve.iter().copied());
-    }
     page.figure(images.caption(format!(
         "The middle {} um about the chief ray, {PSF_DECADES} decades. The layout is simulated with the model `{}`.",
         sig(shown_um, 3),
         found.fidelity
     )));
+}
+
+/// Figures of one distinct element in tables; in polychromatic light too if a band is asked for.
+pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, element: &DistinctElement, band: bool) {
+    page.paragraph(format!(
+        "This element represents {} of {}{}. Phase errors at the wavelength of the mapping: rounding {} rad rms, {} at most; mapping, with the simulation model `{}`, {} rad rms, {} at most. {}",
+        element.copies,
+        counted(found.elements.len(), "element"),
+        match element.copies {
+            1 => "",
+            _ => ": the others have the same figures, with places, directions and field angles transformed as in the table of elements",
+        },
+        sig(element.phase.rounding.rms_rad, 3),
+        sig(element.phase.rounding.largest_rad, 3),
+        found.fidelity.of_width_alone(),
+        sig(element.phase.mapping.rms_rad, 3),
+        sig(element.phase.mapping.largest_rad, 3),
+        steepness(element),
+    ));
+    page.table(spot_table(element, design.verify.pixel_um));
+    if !element.through_focus.is_empty() {
+        let series = element.through_focus.iter();
+        page.table(through_focus::table(
+            "Wavelength",
+            series.map(|s| (format!("{} nm", exact(s.wavelength_um * 1e3)), s)),
+        ));
+    }
+    let mut chart = Chart::new(
+        "MTF with the sensor's pixel",
+        Axis::linear("spatial frequency", "1/mm"),
+        Axis::linear("MTF", "").range(0.0, 1.0),
+    );
+    for spot in element.spots.iter().filter(|spot| spot.images().is_some()) {
+        let colour = format!("{} nm", exact(spot.wavelength_um * 1e3));
+        chart.line(format!("target, {colour}"), spot.designed.mtf_curve.iter().copied());
+        chart.line(format!("layout, {colour}"), spot.judged().mtf_curve.iter().copied());
+    }
     page.figure(chart.caption("MTF in the middle of the field, mean of x and y."));
     let converts = element.orders.iter().any(|o| o.unconverted.is_some());
     let diverges = element.orders.iter().any(|o| o.diverging.is_some());
@@ -116,7 +126,9 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification, elem
     page.table(orders.caption(format!(
         "Share of light in each order, computed from {whose}. The first order makes the image. The zeroth order passes the element as if it had no phase.{beside}",
     )));
-    polychromatic_page::write(page, found, element);
+    if band {
+        polychromatic_page::write(page, found, element);
+    }
 }
 
 fn steepness(element: &DistinctElement) -> String {
@@ -167,7 +179,7 @@ fn spot_table(element: &DistinctElement, pixel_um: f64) -> Table {
                     Cell::sig(m.strehl, 3),
                 ]
                 .into_iter()
-                .chain(focus_cells(m))
+                .chain(focus_cells(m.focusing_efficiency, m.fwhm_um))
                 .chain([
                     Cell::fixed(m.energy_1_pixel * 100.0, 2),
                     Cell::fixed(m.energy_2_pixels * 100.0, 2),

@@ -6,7 +6,10 @@ mod written;
 
 use std::path::Path;
 
-use super::{PsfResult, Sense, Verification, assumptions, lens_figures, model_page, verdict_words};
+use super::{
+    CameraStatement, PsfResult, Sense, Verification, assumptions, lens_figures, model_page, through_focus,
+    verdict_words,
+};
 use metalith_cell::Fidelity;
 use metalith_core::Result;
 use metalith_design::array::PillarArray;
@@ -45,7 +48,7 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
         page.paragraph(format!("Lens: {line}."));
     }
     for warning in &found.warnings {
-        page.note(format!("Warning: {}. {}. `{}`", warning.what, warning.hint, warning.id));
+        page.note(warning.paragraph());
     }
     let half = exact(PixelFrequencies::of(design.verify.pixel_um).half_nyquist_lp_mm);
     let contrast_at = format!("MTF at {half} lp/mm, one wavelength");
@@ -53,10 +56,11 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
         ("Pillars", count(found.layout.pillars)),
         ("Elements", found.elements.len().to_string()),
         ("Distinct elements", found.distinct.len().to_string()),
-        ("Strehl ratio, least to greatest", strehl(found)),
-        (contrast_at.as_str(), contrast(found)),
+        ("Strehl ratio", range(found, |psf| psf.metrics.strehl)),
+        (contrast_at.as_str(), range(found, |psf| psf.mtf()[0])),
     ];
-    let white_contrast_at = found.camera.as_ref().map(|camera| {
+    let band = band_of(design, found);
+    let white_contrast_at = band.map(|camera| {
         let half = exact(camera.frequencies().half_nyquist_lp_mm);
         format!("MTF at {half} lp/mm, polychromatic, one channel")
     });
@@ -67,48 +71,81 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
     if let Some(picture) = picture {
         page.figure(picture);
     }
-    limits(&mut page, found);
-    assumptions::write(&mut page, design, found);
     designed::write(&mut page, design, array);
-    written::write(&mut page, design, found);
     // From the middle outwards: the plainest element first.
     let mut elements = found.distinct.iter().collect::<Vec<_>>();
     elements.sort_by_key(|e| e.element.index.0.abs() + e.element.index.1.abs());
-    for element in elements {
-        element::write(&mut page, design, found, element);
+    if let Some(central) = elements.first() {
+        page.section(format!("PSFs of element {}", central.element.label()));
+        element::pictures(&mut page, found, central);
+        for series in &central.through_focus {
+            page.row([through_focus::row(
+                &format!("{} nm", exact(series.wavelength_um * 1e3)),
+                series,
+            )]);
+        }
     }
-    method(&mut page, design, found);
+    limits(&mut page, found);
+    for (k, element) in elements.into_iter().enumerate() {
+        page.section(format!("Element {}", element.element.label()));
+        if k > 0 {
+            element::pictures(&mut page, found, element);
+        }
+        element::write(&mut page, design, found, element, band.is_some());
+    }
+    written::write(&mut page, design, found);
+    page.section("Assumptions and method");
+    if found.not_simulated.is_none() {
+        page.details("Assumptions, each with its size for this design", |page| {
+            assumptions::write(page, design, found);
+        });
+    }
+    page.details("Method", |page| method(page, design, found));
     page
 }
 
-/// Range of the Strehl ratios of the case that judges.
-fn strehl(found: &Verification) -> String {
-    range(found, |psf| psf.metrics.strehl)
-}
-
-/// Range of its contrast at half the frequency of the sensor, pixel included.
-fn contrast(found: &Verification) -> String {
-    range(found, |psf| psf.mtf()[0])
+/// The camera of polychromatic figures, where the design asks for a band: by a camera, several wavelengths, or a limit.
+fn band_of<'f>(design: &Design, found: &'f Verification) -> Option<&'f CameraStatement> {
+    let (spec, limits) = (&design.verify, &design.verify.limits);
+    let limited = limits.polychromatic_mtf_min > 0.0 || limits.polychromatic_energy_2_pixels_min > 0.0;
+    let asked = spec.camera.is_some() || spec.wavelengths_um.len() > 1 || limited;
+    found.camera.as_ref().filter(|_| asked)
 }
 
 /// Contrast in the light of each channel of the camera, along both axes.
 fn white_contrast(found: &Verification) -> String {
     let half = found.camera.as_ref().map(|c| c.frequencies().half_nyquist_lp_mm);
-    let channels = found.distinct.iter().flat_map(|d| &d.white);
-    let contrasts = channels.flat_map(|channel| &channel.contrast);
-    between(contrasts.filter(|c| Some(c.lp_mm) == half).flat_map(|c| c.mtf))
-}
-
-fn range(found: &Verification, of: impl Fn(&PsfResult) -> f64) -> String {
-    between(found.distinct.iter().flat_map(|d| &d.spots).map(|s| of(s.judged())))
-}
-
-/// Least and greatest in words; one number where they read the same.
-fn between(values: impl Iterator<Item = f64>) -> String {
-    let ends = values.fold(None, |ends: Option<(f64, f64)>, v| {
-        Some(ends.map_or((v, v), |(a, b)| (a.min(v), b.max(v))))
+    let channels = found.distinct.iter().flat_map(|d| {
+        let name = move |channel: &str| format!("element {}, channel {channel}", d.element.label());
+        d.white.iter().map(move |white| (white, name(&white.channel)))
     });
-    ends.map_or_else(|| "none".into(), |(least, most)| span(sig(least, 2), sig(most, 2)))
+    between(channels.flat_map(|(white, name)| {
+        let contrasts = white.contrast.iter().filter(move |c| Some(c.lp_mm) == half);
+        contrasts.flat_map(move |c| c.mtf.map(|mtf| (mtf, name.clone())))
+    }))
+}
+
+/// Least and greatest of a number of the case that judges, each with its element and light.
+fn range(found: &Verification, of: impl Fn(&PsfResult) -> f64) -> String {
+    let many = found.distinct.len() > 1;
+    let each = found.distinct.iter().flat_map(|d| {
+        d.spots.iter().map(move |s| if many { (s, s.label(&d.element)) } else { (s, s.place()) })
+    });
+    between(each.map(|(spot, name)| (of(spot.judged()), name)))
+}
+
+/// Least and greatest in words, each with its name; one number where they read the same.
+fn between(values: impl Iterator<Item = (f64, String)>) -> String {
+    let values: Vec<_> = values.collect();
+    let by_value = |a: &&(f64, String), b: &&(f64, String)| a.0.total_cmp(&b.0);
+    let ends = [values.iter().min_by(by_value), values.iter().max_by(by_value)];
+    let [Some((least, at_least)), Some((most, at_most))] = ends else {
+        return "none".into();
+    };
+    match (sig(*least, 2), sig(*most, 2)) {
+        (least, most) if least == most => least,
+        (least, most) => format!("{least} ({at_least}) to {most} ({at_most})"),
+    }
 }
 
 /// Span from one number to another, or the one number that both are.
@@ -146,7 +183,6 @@ fn limits(page: &mut Page, found: &Verification) {
 }
 
 fn method(page: &mut Page, design: &Design, found: &Verification) {
-    page.section("Method");
     if let Some(model) = &found.model {
         model_page::write(page, model);
     }

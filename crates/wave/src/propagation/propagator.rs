@@ -32,6 +32,7 @@ pub struct Scratch {
     pub(crate) tiles: Vec<Complex32>,
     pub(crate) columns: Vec<Complex32>,
     pub(crate) spectrum: Vec<Complex32>,
+    pub(crate) sent: Vec<Complex32>,
     pub(crate) middle: Vec<Complex32>,
     pub(crate) fft: Vec<Complex32>,
     pub(crate) padded: Vec<Complex32>,

@@ -4,6 +4,20 @@ use serde::Serialize;
 
 use super::{FOCUS_FWHM, IdealPsf, PixelFrequencies, Psf, pixel_mtf};
 
+/// Peak, width and focusing efficiency of a PSF.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FocusMetrics {
+    /// Largest sample over the peak of the same aperture with all its power and the perfect phase.
+    pub strehl: f64,
+    /// Place of the largest sample from the element's centre, x and y (um).
+    pub peak_um: [f64; 2],
+    /// Full width at half maximum along x and y (um); none if it reaches beyond the window.
+    pub fwhm_um: [Option<f64>; 2],
+    /// Focusing efficiency: power in a circle of three full widths about the peak, over the power incident on the aperture. None without
+    /// a width.
+    pub focusing_efficiency: Option<f64>,
+}
+
 /// The numbers that two PSFs are compared by.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PsfMetrics {
@@ -38,15 +52,9 @@ pub struct PsfMetrics {
 }
 
 impl Psf {
-    /// All numbers that are reported of a PSF, for pixels with this edge (um). Contrast is over all light that passes if the PSF was
-    /// formed with the frequencies of these pixels.
-    pub fn metrics(&self, matched: &IdealPsf, pixel_um: f64) -> PsfMetrics {
+    /// Peak, width and focusing efficiency.
+    pub fn focus(&self, matched: &IdealPsf) -> FocusMetrics {
         let (peak, peak_um) = self.peak();
-        let mtf = |lp_mm: f64| [0, 1].map(|axis| self.contrast(axis, lp_mm));
-        let passed = self.otf.as_ref().map_or_else(|| self.energy_um2(), |otf| otf.power_um2);
-        let [half, nyquist] = PixelFrequencies::of(pixel_um).reported();
-        let seen = |lp_mm: f64| mtf(lp_mm).map(|m| m * pixel_mtf(pixel_um, lp_mm));
-        let share = |edge_um| self.energy_in_square_um2(peak_um, edge_um) / matched.power_um2;
         let fwhm_um = self.fwhm_um();
         let focusing_efficiency = match fwhm_um {
             [Some(x), Some(y)] => {
@@ -55,8 +63,30 @@ impl Psf {
             }
             _ => None,
         };
-        PsfMetrics {
+        FocusMetrics {
             strehl: peak / matched.peak,
+            peak_um,
+            fwhm_um,
+            focusing_efficiency,
+        }
+    }
+
+    /// All numbers that are reported of a PSF, for pixels with this edge (um). Contrast is over all light that passes if the PSF was
+    /// formed with the frequencies of these pixels.
+    pub fn metrics(&self, matched: &IdealPsf, pixel_um: f64) -> PsfMetrics {
+        let FocusMetrics {
+            strehl,
+            peak_um,
+            fwhm_um,
+            focusing_efficiency,
+        } = self.focus(matched);
+        let mtf = |lp_mm: f64| [0, 1].map(|axis| self.contrast(axis, lp_mm));
+        let passed = self.otf.as_ref().map_or_else(|| self.energy_um2(), |otf| otf.power_um2);
+        let [half, nyquist] = PixelFrequencies::of(pixel_um).reported();
+        let seen = |lp_mm: f64| mtf(lp_mm).map(|m| m * pixel_mtf(pixel_um, lp_mm));
+        let share = |edge_um| self.energy_in_square_um2(peak_um, edge_um) / matched.power_um2;
+        PsfMetrics {
+            strehl,
             peak_um,
             fwhm_um,
             focusing_efficiency,

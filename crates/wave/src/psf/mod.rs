@@ -5,6 +5,7 @@
 //! | the function, its peak and centroid | here |
 //! | energy in squares, circles and pixels | `energy` |
 //! | width at half maximum, power near the peak | `width` |
+//! | planes along z, focal length | `through_focus` |
 //! | contrast | `mtf` |
 //! | all numbers that are reported | `metrics` |
 //! | what the best element of the same shape would do | `ideal_psf` |
@@ -19,6 +20,7 @@ mod metrics;
 mod mtf;
 mod orders;
 mod polychromatic;
+mod through_focus;
 mod width;
 
 use metalith_core::part;
@@ -28,10 +30,11 @@ use crate::error::Result;
 use crate::propagation::{Aperture, Field, Otf, PlaneWave, Propagator, Scratch, Window};
 
 pub use ideal_psf::IdealPsf;
-pub use metrics::PsfMetrics;
+pub use metrics::{FocusMetrics, PsfMetrics};
 pub use mtf::{PixelFrequencies, pixel_mtf};
 pub use orders::order_shares;
 pub use polychromatic::{BandPart, BandSample, Polychromatic, band_otf, polychromatic};
+pub use through_focus::{FOCUS_PLANES, FocusPlane, FocusPlanes, ThroughFocus, depth_of_focus_um};
 pub use width::{AIRY_FWHM, FOCUS_FWHM};
 
 /// |E|^2 / |E_inc|^2 on a window of the sensor's plane, E_inc in the medium of incidence.

@@ -59,7 +59,7 @@ impl FoldedPropagator {
             let rows = self.band.rows[k].clone();
             let kept = &mut spectrum[rows.clone()];
             let transfer = &mut transfer[..rows.len()];
-            self.transfer(k, faded, transfer);
+            self.transfer(&self.window, k, faded, transfer);
             multiply_conj(kept, transfer);
             column.fill(Complex32::ZERO);
             scatter(column, kept, self.band.first[1] + rows.start as i64);

@@ -6,8 +6,8 @@ use ndarray::ArrayViewMut2;
 use num_complex::Complex32;
 
 use super::{FoldedPropagator, LANES};
-use crate::kernels::{accumulate, gather, multiply, process, product_sum};
-use crate::propagation::{Aperture, PlaneWave, Scratch};
+use crate::kernels::{accumulate, gather, multiply_to, process, product_sum};
+use crate::propagation::{Aperture, PlaneWave, Scratch, Window};
 
 impl FoldedPropagator {
     /// Folds and transforms along x; leaves the kept columns of these blocks in tiles of `LANES` columns by all rows. Gives
@@ -64,11 +64,12 @@ impl FoldedPropagator {
         power * self.lattice.cell_um2()
     }
 
-    /// Transforms these blocks along y, sends each frequency to the sensor, shows it to `observe`, and forms the window's
-    /// rows of each column.
+    /// Transforms these blocks along y, sends each frequency to each plane, shows it to `observe`, and forms the rows of the
+    /// planes' windows of each column.
     pub(super) fn columns_forward(
         &self,
         blocks: Range<usize>,
+        planes: &[Window],
         scratch: &mut Scratch,
         observe: &mut dyn FnMut(&[Complex32]),
     ) {
@@ -78,6 +79,7 @@ impl FoldedPropagator {
             tiles,
             columns,
             spectrum,
+            sent,
             middle,
             fft,
             padded,
@@ -88,8 +90,9 @@ impl FoldedPropagator {
         } = scratch;
         columns.resize(LANES * m, Complex32::ZERO);
         spectrum.resize(ky, Complex32::ZERO);
+        sent.resize(ky, Complex32::ZERO);
         transfer.resize(ky, Complex32::ZERO);
-        middle.resize(samples * kx, Complex32::ZERO);
+        middle.resize(planes.len() * samples * kx, Complex32::ZERO);
         row.resize(samples.max(row.len()), Complex32::ZERO);
         for (block, tile) in blocks.zip(tiles.chunks_exact(residues * LANES)) {
             let lanes = LANES.min(kx - block * LANES);
@@ -103,27 +106,31 @@ impl FoldedPropagator {
                 let k = block * LANES + lane;
                 let rows = self.band.rows[k].clone();
                 process(&*self.forward[1], column, fft);
-                spectrum.fill(Complex32::ZERO);
                 let kept = &mut spectrum[rows.clone()];
                 gather(kept, column, self.band.first[1] + rows.start as i64);
                 let transfer = &mut transfer[..rows.len()];
-                self.transfer(k, faded, transfer);
-                multiply(kept, transfer);
-                observe(spectrum);
-                self.zoom[1].run(spectrum, &mut row[..samples], padded, fft);
-                for (value, line) in row.iter().zip(middle.chunks_exact_mut(kx)) {
-                    line[k] = *value;
+                sent.fill(Complex32::ZERO);
+                for (plane, middle) in planes.iter().zip(middle.chunks_exact_mut(samples * kx)) {
+                    self.transfer(plane, k, faded, transfer);
+                    multiply_to(&mut sent[rows.clone()], kept, transfer);
+                    observe(sent);
+                    self.zoom[1].run(sent, &mut row[..samples], padded, fft);
+                    for (value, line) in row.iter().zip(middle.chunks_exact_mut(kx)) {
+                        line[k] = *value;
+                    }
                 }
             }
         }
     }
 
-    /// Forms the window's samples of each of its rows.
-    pub(super) fn window_rows(&self, scratch: &mut Scratch, values: &mut ArrayViewMut2<Complex32>) {
+    /// Forms the samples of each row of the window of a plane, by its number.
+    pub(super) fn window_rows(&self, plane: usize, scratch: &mut Scratch, values: &mut ArrayViewMut2<Complex32>) {
+        let (kx, samples) = (self.band.count[0], self.window.samples);
         let Scratch {
             middle, fft, padded, ..
         } = scratch;
-        for (line, mut out) in middle.chunks(self.band.count[0]).zip(values.rows_mut()) {
+        let middle = &middle[plane * samples * kx..][..samples * kx];
+        for (line, mut out) in middle.chunks(kx).zip(values.rows_mut()) {
             let out = out.as_slice_mut().expect("rows are contiguous");
             self.zoom[0].run(line, out, padded, fft);
         }

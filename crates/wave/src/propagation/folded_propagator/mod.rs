@@ -166,13 +166,6 @@ impl FoldedPropagator {
         mut values: ArrayViewMut2<Complex32>,
         observe: &mut dyn FnMut(&[Complex32]),
     ) -> Result<f64> {
-        check_wave(wave, self.wavelength_um)?;
-        if aperture.lattice() != self.lattice {
-            return Err(WaveError::Lattice {
-                given: aperture.lattice(),
-                planned: self.lattice,
-            });
-        }
         let samples = self.window.samples;
         if values.dim() != (samples, samples) || !values.is_standard_layout() {
             return Err(WaveError::Shape {
@@ -181,13 +174,66 @@ impl FoldedPropagator {
                 wanted: [samples; 2],
             });
         }
+        let power_um2 = self.spectra(aperture, wave, &[self.window], scratch, observe)?;
+        self.window_rows(0, scratch, &mut values);
+        Ok(power_um2)
+    }
+
+    /// Fields in planes along z by one transform of the aperture: at each of `distances_um` in a window of the size of the
+    /// planned one, about the ray from the centre of the element through the middle of that window.
+    ///
+    /// Frequencies are those whose rays reach the planned window: a plan is for the nearest of the planes.
+    ///
+    /// # Errors
+    /// As [`Propagator::field`], and if a distance is not positive.
+    pub fn fields_at(
+        &self,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        distances_um: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<Vec<Field>> {
+        let plane = |z: &f64| Window {
+            distance_um: *z,
+            centre_um: self.window.centre_um.map(|c| c * z / self.window.distance_um),
+            ..self.window
+        };
+        let planes: Vec<Window> = distances_um.iter().map(plane).collect();
+        planes.iter().try_for_each(|plane| plane.check(self.wavelength_um))?;
+        self.spectra(aperture, wave, &planes, scratch, &mut |_| {})?;
+        let field = |(k, window): (usize, &Window)| {
+            let mut values = Array2::zeros([window.samples; 2]);
+            self.window_rows(k, scratch, &mut values.view_mut());
+            Field {
+                window: *window,
+                ..self.finished(values, wave)
+            }
+        };
+        Ok(planes.iter().enumerate().map(field).collect())
+    }
+
+    /// Transforms an aperture to the columns of windows in planes along z; see [`Self::field_observed`].
+    fn spectra(
+        &self,
+        aperture: &dyn Aperture,
+        wave: &PlaneWave,
+        planes: &[Window],
+        scratch: &mut Scratch,
+        observe: &mut dyn FnMut(&[Complex32]),
+    ) -> Result<f64> {
+        check_wave(wave, self.wavelength_um)?;
+        if aperture.lattice() != self.lattice {
+            return Err(WaveError::Lattice {
+                given: aperture.lattice(),
+                planned: self.lattice,
+            });
+        }
         let mut power_um2 = 0.0;
         for first in (0..self.blocks()).step_by(self.blocks_at_once) {
             let part = first..(first + self.blocks_at_once).min(self.blocks());
             power_um2 = self.rows_forward(aperture, wave, part.clone(), scratch);
-            self.columns_forward(part, scratch, observe);
+            self.columns_forward(part, planes, scratch, observe);
         }
-        self.window_rows(scratch, &mut values);
         Ok(power_um2)
     }
 
@@ -222,14 +268,14 @@ impl FoldedPropagator {
         self.band.count[0].div_ceil(LANES)
     }
 
-    /// Factors of the retained frequencies of column `k` of the band.
-    fn transfer(&self, k: usize, faded: &mut FadedColumn, out: &mut [Complex32]) {
-        let z = self.window.distance_um;
+    /// Factors of the retained frequencies of column `k` of the band on their way to a plane.
+    fn transfer(&self, plane: &Window, k: usize, faded: &mut FadedColumn, out: &mut [Complex32]) {
+        let z = plane.distance_um;
         let first = [0, self.rows().start];
         let transfer = Transfer {
             wavelength_um: self.wavelength_um,
-            centre_um: self.window.centre_um,
-            shift_um: [0, 1].map(|a| self.window.centre_um[a] - self.lattice.place_um(a, first[a])),
+            centre_um: plane.centre_um,
+            shift_um: [0, 1].map(|a| plane.centre_um[a] - self.lattice.place_um(a, first[a])),
             fade: &self.band.fade,
             cell_um: self.lattice.cell_um(),
         };

@@ -1,0 +1,86 @@
+//! Through-focus series in words, a table and pictures.
+
+use metalith_core::part;
+use metalith_report::{Cell, Column, Figure, ImageGrid, Table, sig};
+use metalith_wave::psf::ThroughFocus;
+
+use super::lens_figures::{focus_cells, focus_columns};
+
+/// Decades of a PSF that are shown.
+const DECADES: f64 = 4.0;
+/// Edge of a PSF that is shown, in wavelengths over the numerical aperture: an ideal PSF is half of one wide.
+const SHOWN_WIDTHS: f64 = 12.0;
+/// Width of all pictures of a row together in the drawing.
+const ROW_WIDTH: f64 = 940.0;
+
+/// The focal length that a series shows, in words.
+pub fn focal_length_words(series: &ThroughFocus) -> String {
+    let [first, last] = series.ends_um().map(|um| sig(um, 5));
+    match series.focal_length_um {
+        Some(um) => format!(
+            "focal length {} um (planes {} um apart)",
+            sig(um, 5),
+            sig(series.plane_spacing_um, 3)
+        ),
+        None => format!("no focus between {first} and {last} um"),
+    }
+}
+
+/// Table of the planes of some series, each with the name of its element or light.
+pub(super) fn table<'a>(name: &str, all: impl IntoIterator<Item = (String, &'a ThroughFocus)>) -> Table {
+    let head = [
+        Column::text(name),
+        Column::number("z", "um"),
+        Column::number("Strehl ratio", ""),
+    ];
+    let tail = [
+        Column::number("Peak", ""),
+        Column::number("Peak x", "um"),
+        Column::number("y", "um"),
+    ];
+    let mut table = Table::new(head.into_iter().chain(focus_columns()).chain(tail));
+    for (name, series) in all {
+        for plane in &series.planes {
+            let focus = &plane.focus;
+            let head = [
+                Cell::from(name.as_str()),
+                Cell::sig(plane.distance_um, 6),
+                Cell::sig(focus.strehl, 3),
+            ];
+            let tail = [
+                Cell::sig(plane.peak, 4),
+                Cell::fixed(focus.peak_um[0], 2),
+                Cell::fixed(focus.peak_um[1], 2),
+            ];
+            let focus = focus_cells(focus.focusing_efficiency, focus.fwhm_um);
+            table.row(head.into_iter().chain(focus).chain(tail));
+        }
+    }
+    table.caption(
+        "Planes along z, counted from the pillar tops. Strehl ratios of all planes are against the ideal PSF in the plane of the sensor. The focal length found through focus is the z of the greatest Strehl ratio, by a parabola through the greatest and its two neighbours. It is known to half of the distance of the planes.",
+    )
+}
+
+/// The PSFs of a series side by side, the middle of each window.
+pub(super) fn row(name: &str, series: &ThroughFocus) -> Figure {
+    let count = series.psfs.len().max(1);
+    let mut images = ImageGrid::new(format!("Through focus, {name}"), count)
+        .values("|E|² / |E inc|²", "")
+        .log(DECADES)
+        .side(ROW_WIDTH / count as f64 - 14.0);
+    for psf in &series.psfs {
+        let (window, n) = (psf.window, psf.window.samples);
+        let keep = ((series.shown_um(SHOWN_WIDTHS) / window.step_um) as usize).clamp(1, n);
+        let from = (n - keep) / 2;
+        images = images.pixel_um(window.step_um);
+        images.image(
+            format!("{} um", sig(window.distance_um, 5)),
+            part(psf.values.view(), from..from + keep, from..from + keep).to_owned(),
+        );
+    }
+    images.caption(format!(
+        "PSFs in planes along z: {}; the sensor is at {} um. {DECADES} decades.",
+        focal_length_words(series),
+        sig(series.sensor_um, 6)
+    ))
+}
