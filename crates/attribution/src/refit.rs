@@ -34,7 +34,7 @@ pub struct RefitEffect {
     pub slots: Vec<usize>,
     /// Effects that it changes, which must have been taken before.
     pub after: Vec<usize>,
-    /// Way of leaving out whose groups have a value each: these are not predicted from other groups.
+    /// Way of leaving out whose groups have a value each, also those that are not fitted. It is tried after all others.
     pub across: Option<usize>,
 }
 
@@ -76,7 +76,12 @@ pub trait RefitModel: Sync {
     /// Names of the figures of merit that judge a prediction, each with its unit; smaller is better.
     fn figure_names(&self) -> Vec<(&'static str, &'static str)>;
 
-    /// Figures of merit of a measurement; those of several are the root of their mean square.
+    /// Whether the figure of several measurements is the mean; the root of the mean square if not.
+    fn is_mean(&self, _figure: usize) -> bool {
+        false
+    }
+
+    /// Figures of merit of a measurement.
     fn figures(&self, measurement: usize, theta: &[f64]) -> Vec<f64>;
 
     /// Whether an effect is refused that makes a figure of measurements worse that were never fitted.
@@ -180,7 +185,7 @@ pub struct RefitFinding {
 const LEAST_SHARE: f64 = 0.004;
 
 /// A figure of measurements that were never fitted may grow by this share: rounding, and steps of a fit that end early.
-const MAY_GROW: f64 = 0.01;
+const MAY_GROW: f64 = 0.002;
 
 /// Steps of a fit: of a candidate, and of what was taken.
 const STEPS: [usize; 2] = [5, 12];
@@ -230,7 +235,7 @@ impl Selection<'_> {
         let mut last: Vec<Option<RefitTried>> = vec![None; effects.len()];
         loop {
             let open: Vec<usize> = (0..effects.len())
-                .filter(|e| !chosen.contains(e) && effects[*e].after.iter().all(|b| chosen.contains(b)))
+                .filter(|&e| effects[e].across.is_none() && !chosen.contains(&e) && self.has_base(e, &chosen))
                 .collect();
             progress.begin(&format!("effects, step {}", chosen.len() + 1), open.len() as u64);
             let before = ladder.last().expect("the errors without effects");
@@ -259,7 +264,20 @@ impl Selection<'_> {
             });
             ladder.push(errors);
         }
-        let intervals = self.intervals(&now);
+        let mut intervals = self.intervals(&now);
+        let across: Vec<usize> = (0..effects.len())
+            .filter(|&e| effects[e].across.is_some() && self.has_base(e, &chosen))
+            .collect();
+        for effect in across {
+            let (tried, state, own) = self.by_group(effect, &now);
+            if tried.rejected.is_none() {
+                chosen.push(effect);
+                now = self.at(now.active, state.theta);
+                ladder.push(self.errors(&now));
+                effects[effect].slots.iter().for_each(|&s| intervals[s] = own[s]);
+            }
+            last[effect] = Some(tried);
+        }
         let before = ladder.last().expect("the errors without effects");
         let mut order = chosen.clone();
         order.extend((0..effects.len()).filter(|e| !chosen.contains(e)));
@@ -281,6 +299,32 @@ impl Selection<'_> {
             theta: now.theta,
             intervals,
         })
+    }
+
+    /// Whether the effects that an effect changes were taken.
+    fn has_base(&self, effect: usize, chosen: &[usize]) -> bool {
+        self.model.effects()[effect]
+            .after
+            .iter()
+            .all(|base| chosen.contains(base))
+    }
+
+    /// An effect with a value for each group, fitted to all measurements with all else as it was found: no group predicts the
+    /// value of another, so those that were not fitted have theirs too. Single measurements of a group predict the others.
+    fn by_group(&self, effect: usize, now: &State) -> (RefitTried, State, Vec<Option<[f64; 2]>>) {
+        let plan = RefitPlan {
+            fitted: vec![true; self.model.count()],
+            ways: self.plan.ways.clone(),
+        };
+        let all = Selection {
+            model: self.model,
+            plan: &plan,
+        };
+        let before = all.at(Vec::new(), now.theta.clone());
+        let after = all.fit(all.with(&before, effect), STEPS[0]);
+        let tried = all.judge(effect, &after, &all.errors(&before));
+        let intervals = all.intervals(&after);
+        (tried, after, intervals)
     }
 
     /// Equations of all measurements about some values.
@@ -406,11 +450,13 @@ impl Selection<'_> {
             .map(|m| self.model.figures(m, &now.theta))
             .collect();
         let of = |fitted: bool, k: usize| {
-            root_mean(
-                (0..count)
-                    .filter(|&m| self.plan.fitted[m] == fitted)
-                    .map(|m| figures[m][k].powi(2)),
-            )
+            let own = (0..count)
+                .filter(|&m| self.plan.fitted[m] == fitted)
+                .map(|m| figures[m][k]);
+            match self.model.is_mean(k) {
+                true => root_mean(own).map(|mean| mean.powi(2)),
+                false => root_mean(own.map(|v| v * v)),
+            }
         };
         let names = self.model.figure_names().len();
         RefitErrors {

@@ -131,6 +131,10 @@ impl RefitModel for Only<'_> {
         self.model.figure_names()
     }
 
+    fn is_mean(&self, figure: usize) -> bool {
+        self.model.is_mean(figure)
+    }
+
     fn figures(&self, measurement: usize, theta: &[f64]) -> Vec<f64> {
         self.model.figures(measurement, theta)
     }

@@ -328,6 +328,10 @@ impl RefitModel for HeightModel<'_> {
         names
     }
 
+    fn is_mean(&self, figure: usize) -> bool {
+        figure == 2
+    }
+
     fn figures(&self, field: usize, theta: &[f64]) -> Vec<f64> {
         let [shape, level] = self
             .shape_and_level(field, &[], theta)
@@ -340,7 +344,7 @@ impl RefitModel for HeightModel<'_> {
         out
     }
 
-    /// The level of a group that was never fitted is not predicted, so it refuses nothing.
+    /// The level of a group that was not fitted is not predicted, so it refuses nothing.
     fn decides(&self, figure: usize) -> bool {
         figure > 0
     }
@@ -420,8 +424,7 @@ fn effects(set: &HeightSet) -> (Vec<RefitParameter>, Vec<RefitEffect>) {
     let bends = if nuisances.lines { 1 } else { 2 };
     effect("curvature", (BEND + 2..).take(bends).collect(), &["level"], None);
     if set.groups.len() > 1 {
-        let fitted = |g: &usize| set.fields.iter().any(|f| f.fitted && f.group == *g);
-        let slots = (0..set.groups.len()).filter(fitted).map(|g| LEVELS + g).collect();
+        let slots = (0..set.groups.len()).map(|g| LEVELS + g).collect();
         effect(&by, slots, &["level"], Some(0));
     }
     (parameters, out)
