@@ -76,6 +76,11 @@ pub trait RefitModel: Sync {
     /// Names of the figures of merit that judge a prediction, each with its unit; smaller is better.
     fn figure_names(&self) -> Vec<(&'static str, &'static str)>;
 
+    /// Whether two effects at once are tried where they may hide one another: a fit must cost next to nothing.
+    fn tries_pairs(&self) -> bool {
+        false
+    }
+
     /// Whether the figure of several measurements is the mean; the root of the mean square if not.
     fn is_mean(&self, _figure: usize) -> bool {
         false
@@ -187,6 +192,9 @@ const LEAST_SHARE: f64 = 0.004;
 /// A figure of measurements that were never fitted may grow by this share: rounding, and steps of a fit that end early.
 const MAY_GROW: f64 = 0.002;
 
+/// Two effects are taken at once if they gain by this share more than the best one alone.
+const PAIR_SHARE: f64 = 0.1;
+
 /// Steps of a fit: of a candidate, and of what was taken.
 const STEPS: [usize; 2] = [5, 12];
 
@@ -238,7 +246,7 @@ impl Selection<'_> {
                 .filter(|&e| effects[e].across.is_none() && !chosen.contains(&e) && self.has_base(e, &chosen))
                 .collect();
             progress.begin(&format!("effects, step {}", chosen.len() + 1), open.len() as u64);
-            let before = ladder.last().expect("the errors without effects");
+            let before = &ladder[ladder.len() - 1].clone();
             let mut best: Option<(f64, State, RefitTried)> = None;
             for &effect in &open {
                 if progress.stopped() {
@@ -252,6 +260,28 @@ impl Selection<'_> {
                     best = Some((tried.gain.0, state, tried.clone()));
                 }
                 last[effect] = Some(tried);
+            }
+            if self.model.tries_pairs() && (chosen.is_empty() || best.is_none()) {
+                let least = best.as_ref().map_or(0.0, |(gain, ..)| *gain);
+                if let Some((pair, state)) = self.pair(&now, &open, before, least, progress)? {
+                    for (k, effect) in pair.into_iter().enumerate() {
+                        let with = match k {
+                            0 => self.fit(self.with(&now, effect), STEPS[1]),
+                            _ => self.fit(self.at(state.active.clone(), state.theta.clone()), STEPS[1]),
+                        };
+                        let tried = self.judge(effect, &with, before);
+                        chosen.push(effect);
+                        ladder.push(tried.errors.clone());
+                        last[effect] = Some(RefitTried {
+                            rejected: None,
+                            ..tried
+                        });
+                        if k == 1 {
+                            now = with;
+                        }
+                    }
+                    continue;
+                }
             }
             let Some((_, state, tried)) = best else { break };
             now = self.fit(state, STEPS[1]);
@@ -299,6 +329,40 @@ impl Selection<'_> {
             theta: now.theta,
             intervals,
         })
+    }
+
+    /// The two effects that predict most together what was left out, with their fit; none that gain less than `least` by so much
+    /// that one of them suffices, or that are refused.
+    fn pair(
+        &self,
+        now: &State,
+        open: &[usize],
+        before: &RefitErrors,
+        least: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<([usize; 2], State)>> {
+        let pairs: Vec<[usize; 2]> = { open.iter().enumerate() }
+            .flat_map(|(k, &b)| open[..k].iter().map(move |&a| [a, b]))
+            .collect();
+        progress.begin("pairs of effects", pairs.len() as u64);
+        let mut best: Option<(f64, [usize; 2], State)> = None;
+        for pair in pairs {
+            if progress.stopped() {
+                return Err(Error::Interrupted);
+            }
+            let state = self.fit(self.with(&self.with(now, pair[0]), pair[1]), STEPS[0]);
+            progress.advance(1);
+            // Each of both must hold as if it were tried last.
+            let tried = pair.map(|effect| self.judge(effect, &state, before));
+            if tried.iter().any(|t| t.rejected.is_some()) {
+                continue;
+            }
+            let gain = tried[0].gain.0;
+            if gain > best.as_ref().map_or((1.0 + PAIR_SHARE) * least, |(most, ..)| *most) {
+                best = Some((gain, pair, state));
+            }
+        }
+        Ok(best.map(|(_, pair, state)| (pair, state)))
     }
 
     /// Whether the effects that an effect changes were taken.

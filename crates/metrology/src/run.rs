@@ -131,6 +131,10 @@ impl RefitModel for Only<'_> {
         self.model.figure_names()
     }
 
+    fn tries_pairs(&self) -> bool {
+        self.model.tries_pairs()
+    }
+
     fn is_mean(&self, figure: usize) -> bool {
         self.model.is_mean(figure)
     }

@@ -18,6 +18,9 @@ const NODES: [[f64; 2]; 6] = [
     [0.932_469_514_203_152, 0.171_324_492_379_170],
 ];
 
+/// Widest standard deviation of the resolution, in steps of the wavelength.
+const WIDEST_LINE: f64 = 2.0;
+
 const APERTURE: usize = 0;
 const ROUGHNESS: usize = 1;
 const REFERENCE: usize = 2;
@@ -75,7 +78,19 @@ impl<'a> SpectrumModel<'a> {
             1e-5,
             |v| v,
         );
-        add("resolution".into(), "nm", (0.0, 9.0), (0.0, 1e4), 1e-2, f64::sqrt);
+        // A spectrometer whose lines are wider would be read in wider steps.
+        let widest = match set.wavelengths_nm.as_slice() {
+            [first, second, ..] => (WIDEST_LINE * (second - first)).powi(2),
+            _ => 1.0,
+        };
+        add(
+            "resolution".into(),
+            "nm",
+            (0.0, 0.25 * widest),
+            (0.0, widest),
+            1e-3 * widest,
+            f64::sqrt,
+        );
         add("height_offset".into(), "nm", (0.0, 0.0), (-1e3, 1e3), 1e-2, |v| v);
         let mut effects: Vec<RefitEffect> = Vec::new();
         let names = [
@@ -269,6 +284,11 @@ impl RefitModel for SpectrumModel<'_> {
             (squares / base.len() as f64).sqrt()
         };
         vec![rms(self.mean(spectrum)), rms(&self.set.spectra[spectrum].reflectance)]
+    }
+
+    /// A film that is thicker hides the cone of the objective, and the cone hides the film.
+    fn tries_pairs(&self) -> bool {
+        true
     }
 
     fn decides(&self, figure: usize) -> bool {
