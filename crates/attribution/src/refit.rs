@@ -76,7 +76,8 @@ pub trait RefitModel: Sync {
     /// Names of the figures of merit that judge a prediction, each with its unit; smaller is better.
     fn figure_names(&self) -> Vec<(&'static str, &'static str)>;
 
-    /// Whether two effects at once are tried where they may hide one another: a fit must cost next to nothing.
+    /// Whether two effects at once are tried where none alone helps any more, and not only at the start: a fit must cost next to
+    /// nothing.
     fn tries_pairs(&self) -> bool {
         false
     }
@@ -261,7 +262,7 @@ impl Selection<'_> {
                 }
                 last[effect] = Some(tried);
             }
-            if self.model.tries_pairs() && (chosen.is_empty() || best.is_none()) {
+            if chosen.is_empty() || best.is_none() && self.model.tries_pairs() {
                 let least = best.as_ref().map_or(0.0, |(gain, ..)| *gain);
                 if let Some((pair, state)) = self.pair(&now, &open, before, least, progress)? {
                     for (k, effect) in pair.into_iter().enumerate() {
@@ -293,6 +294,20 @@ impl Selection<'_> {
                 ..tried
             });
             ladder.push(errors);
+        }
+        while let Some(place) = self.redundant(&now, &chosen) {
+            let effect = chosen.remove(place);
+            ladder.remove(place + 1);
+            let (mut active, mut theta) = (now.active.clone(), now.theta.clone());
+            active.retain(|slot| !effects[effect].slots.contains(slot));
+            for &slot in &effects[effect].slots {
+                theta[slot] = self.model.parameters()[slot].neutral;
+            }
+            now = self.fit(self.at(active, theta), STEPS[1]);
+            *ladder.last_mut().expect("the errors without effects") = self.errors(&now);
+            if let Some(tried) = &mut last[effect] {
+                tried.rejected = Some(RefitRejection::Nothing);
+            }
         }
         let mut intervals = self.intervals(&now);
         let across: Vec<usize> = (0..effects.len())
@@ -363,6 +378,19 @@ impl Selection<'_> {
             }
         }
         Ok(best.map(|(_, pair, state)| (pair, state)))
+    }
+
+    /// Place of an effect that others made needless: the intervals of its values include no effect, and none changes it.
+    fn redundant(&self, now: &State, chosen: &[usize]) -> Option<usize> {
+        let (effects, intervals) = (self.model.effects(), self.intervals(now));
+        let neutral = |&slot: &usize| {
+            let value = self.model.parameters()[slot].neutral;
+            intervals[slot].is_some_and(|[low, high]| (low..=high).contains(&value))
+        };
+        chosen.iter().position(|&e| {
+            let is_base = chosen.iter().any(|&other| effects[other].after.contains(&e));
+            !is_base && effects[e].slots.iter().all(neutral)
+        })
     }
 
     /// Whether the effects that an effect changes were taken.

@@ -222,7 +222,11 @@ fn spectra_as_stated_have_no_effect_and_known_ones_are_found() {
     found.sort_unstable();
     assert_eq!(found, ["film_thickness", "reference_gain"]);
     let effect = |name: &str| answer.effects.iter().find(|e| e.name == name).unwrap();
-    assert!(holds(effect("film_thickness"), 8.0) && holds(effect("reference_gain"), 0.05));
+    assert!(
+        holds(effect("film_thickness"), 8.0) && holds(effect("reference_gain"), 0.05),
+        "{:?}",
+        answer.effects
+    );
     assert_eq!(answer.verdict, "explained");
 }
 
