@@ -217,17 +217,19 @@ fn spectra_as_stated_have_no_effect_and_known_ones_are_found() {
     let answer = spectra(0.0, 1.0, 1);
     assert!(answer.effects.is_empty(), "{:?}", names(&answer));
     assert_eq!(answer.verdict, "no_residual");
-    let answer = spectra(8.0, 1.05, 2);
-    let mut found = names(&answer);
-    found.sort_unstable();
-    assert_eq!(found, ["film_thickness", "reference_gain"]);
-    let effect = |name: &str| answer.effects.iter().find(|e| e.name == name).unwrap();
-    assert!(
-        holds(effect("film_thickness"), 8.0) && holds(effect("reference_gain"), 0.05),
-        "{:?}",
-        answer.effects
-    );
-    assert_eq!(answer.verdict, "explained");
+    // Of eight 95 % intervals, one may miss.
+    let mut held = 0;
+    for seed in 2..6 {
+        let answer = spectra(8.0, 1.05, seed);
+        let mut found = names(&answer);
+        found.sort_unstable();
+        assert_eq!(found, ["film_thickness", "reference_gain"], "{seed}");
+        let effect = |name: &str| answer.effects.iter().find(|e| e.name == name).unwrap();
+        held += usize::from(holds(effect("film_thickness"), 8.0));
+        held += usize::from(holds(effect("reference_gain"), 0.05));
+        assert_eq!(answer.verdict, "explained");
+    }
+    assert!(held >= 7, "{held}");
 }
 
 #[test]
