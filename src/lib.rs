@@ -100,6 +100,7 @@ pub use metalith_gds::extract;
 pub use metalith_handoff as handoff;
 pub use metalith_imaging as imaging;
 pub use metalith_layout as layout;
+pub use metalith_metrology as metrology;
 pub use metalith_optics as optics;
 pub use metalith_optimise as optimise;
 pub use metalith_prior as prior;

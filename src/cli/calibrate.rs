@@ -9,6 +9,7 @@ use metalith::calibrate::{
 };
 use metalith::cell::cache_folder;
 use metalith::extract::GdsPillars;
+use metalith::metrology::{self, Answer, SetKind, kind_of};
 use metalith::{Error, Result};
 
 use super::{Outcome, Terminal, print_json, print_line};
@@ -108,6 +109,10 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
             "calibrate sets whose folders have the same name with one command each, and different --out",
         ));
     }
+    let kinds: Vec<_> = args.sets.iter().map(|set| kind_of(set)).collect();
+    if kinds.iter().any(Option::is_some) {
+        return run_metrology(args, &kinds, &outs, terminal);
+    }
     if args.validate && args.sets.len() > 1 {
         return Err(Error::refused(
             "calibrate/several-sets-to-validate",
@@ -170,6 +175,55 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
         }
     }
     Ok(outcome)
+}
+
+/// Calibrate sets of heights and of spectra.
+fn run_metrology(
+    args: &CalibrateArgs,
+    kinds: &[Option<SetKind>],
+    outs: &[PathBuf],
+    terminal: &Terminal,
+) -> Result<Outcome> {
+    if args.validate || args.adopt || args.declare.is_some() {
+        return Err(Error::refused(
+            "calibrate/kind-has-none",
+            "--validate, --adopt and --declare are for sets of kind `psf`",
+            "leave the option out: sets of heights and spectra are judged by what was left out of the fit",
+        ));
+    }
+    for ((set, kind), out) in args.sets.iter().zip(kinds).zip(outs) {
+        let Some(kind) = kind else {
+            return Err(Error::refused(
+                "calibrate/kinds",
+                format!(
+                    "{} is not of kind `heights` or `spectra`, another set is",
+                    set.display()
+                ),
+                "calibrate sets of kind `psf` by a command of their own",
+            ));
+        };
+        let done = metrology::calibrate(set, *kind, out, &args.effects, terminal)?;
+        terminal.clear();
+        if args.json {
+            print_json(&done.diagnosis);
+        } else {
+            describe_metrology(&done);
+        }
+    }
+    Ok(Outcome::Fine)
+}
+
+fn describe_metrology(done: &Answer) {
+    let diagnosis = &done.diagnosis;
+    print_line!("{}: {}", diagnosis.set, diagnosis.sentence());
+    for line in diagnosis.ladder_lines() {
+        print_line!("{line}");
+    }
+    for line in &diagnosis.validation {
+        print_line!("{line}");
+    }
+    print_line!("{}", done.answer.display());
+    print_line!("{}", done.report.display());
 }
 
 fn describe(done: &Calibration) {

@@ -16,6 +16,7 @@
 //! | `fit` | least squares, cross-validation, intervals, null test | `surrogate` |
 //! | `search` | which effects explain a residual | `fit` |
 //! | `linear_trend`, `extent` | values that are linear over a plane | `fit` |
+//! | `refit` | selection for forward models that are fitted in full for each candidate | `fit` |
 
 mod effect;
 mod extent;
@@ -24,6 +25,7 @@ mod forward_model;
 mod index;
 mod linear_trend;
 mod measurements;
+mod refit;
 mod search;
 mod surrogate;
 #[cfg(test)]
@@ -40,6 +42,10 @@ pub use forward_model::{ForwardModel, Model, ParameterPoint, SmoothGroups, Smoot
 pub use index::{MeasurementIndex, PerMeasurement};
 pub use linear_trend::LinearTrend;
 pub use measurements::{MeasurementEquations, Measurements, ReferenceValue, References, eliminate, own_step};
+pub use refit::{
+    LeaveOut, RefitEffect, RefitEquations, RefitErrors, RefitFinding, RefitModel, RefitParameter, RefitPlan,
+    RefitRejection, RefitTried, select,
+};
 pub use search::{
     Alternative, EXPLAINED, EndsSearch, Evidence, Finding, LEAST_GAIN, Pattern, REFERENCES_DECIDE, RandomNoise,
     Rejection, SearchState, TriedEffect, attribute_set, cosines, fit_of, may_leave,

@@ -3,7 +3,7 @@
 mod cross_validation;
 mod intervals;
 mod model_error;
-mod normal_equations;
+pub(crate) mod normal_equations;
 mod null_test;
 mod problem;
 mod references;

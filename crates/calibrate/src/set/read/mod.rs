@@ -53,6 +53,8 @@ impl MeasuredSet {
 
 fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, progress: &dyn Progress) -> MeasuredSet {
     root.integer("schema", SCHEMA..=SCHEMA, "");
+    // Other kinds have other readers.
+    root.choice("kind", &[("psf", ()), ("heights", ()), ("spectra", ())], Some(()));
     let title = root.text("title");
     let layers = root.section("layout_layers");
     let layer = |key| {

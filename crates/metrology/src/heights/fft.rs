@@ -1,0 +1,61 @@
+//! Fourier transforms over two axes.
+
+use std::sync::Arc;
+
+use num_complex::Complex;
+use rustfft::{Fft, FftNum, FftPlanner};
+
+/// Transforms of arrays of one size, row by row.
+pub(super) struct Fft2<T: FftNum> {
+    pub(super) rows: usize,
+    pub(super) cols: usize,
+    along: [Arc<dyn Fft<T>>; 2],
+}
+
+impl<T: FftNum> Fft2<T> {
+    /// Transforms of `rows` x `cols` numbers, forward or inverse (not normalised).
+    pub(super) fn new(rows: usize, cols: usize, inverse: bool) -> Self {
+        let mut planner = FftPlanner::new();
+        let mut plan = |n| match inverse {
+            true => planner.plan_fft_inverse(n),
+            false => planner.plan_fft_forward(n),
+        };
+        Self {
+            rows,
+            cols,
+            along: [plan(cols), plan(rows)],
+        }
+    }
+
+    /// Transform; the answer is transposed: `cols` rows of `rows` numbers.
+    pub(super) fn transposed(&self, mut values: Vec<Complex<T>>) -> Vec<Complex<T>> {
+        self.along[0].process(&mut values);
+        let mut turned = transpose(&values, self.rows, self.cols);
+        self.along[1].process(&mut turned);
+        turned
+    }
+}
+
+/// Rows as columns.
+pub(super) fn transpose<V: Copy>(values: &[V], rows: usize, cols: usize) -> Vec<V> {
+    /// Edge of a tile that stays in the cache.
+    const TILE: usize = 16;
+    let mut out = values.to_vec();
+    for y0 in (0..rows).step_by(TILE) {
+        for x0 in (0..cols).step_by(TILE) {
+            for y in y0..(y0 + TILE).min(rows) {
+                for x in x0..(x0 + TILE).min(cols) {
+                    out[x * rows + y] = values[y * cols + x];
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Frequency of the sample `k` of `n`, in cycles per sample.
+pub(super) fn frequency(k: usize, n: usize) -> f64 {
+    let k = k as f64;
+    let n = n as f64;
+    (if k > n / 2.0 { k - n } else { k }) / n
+}

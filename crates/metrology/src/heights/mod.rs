@@ -1,0 +1,12 @@
+//! Measured heights: maps of a printed or etched relief beside the maps that were drawn.
+
+mod far_field;
+mod fft;
+mod map;
+mod model;
+mod page;
+mod set;
+
+pub use model::HeightModel;
+pub(crate) use page::figures;
+pub use set::{HeightField, HeightSet};

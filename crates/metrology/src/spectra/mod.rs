@@ -1,0 +1,10 @@
+//! Measured spectra: reflectance of film stacks against a reference, through an objective.
+
+mod model;
+mod page;
+mod set;
+mod stack;
+
+pub use model::SpectrumModel;
+pub(crate) use page::figures;
+pub use set::{Spectrum, SpectrumSet, StatedLayer};

@@ -1,0 +1,297 @@
+//! Forward model of spectra: a film stack over the cone of an objective, and what the instrument makes of it.
+
+use metalith_attribution::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
+use metalith_rcwa::Material;
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use super::set::{SCALED_BY, SpectrumSet};
+use super::stack::{Film, reflectance};
+
+/// Gauss-Legendre nodes on (-1, 1) with their weights: the squared sine over the cone. Six nodes are exact to 1e-4 at 0.95.
+const NODES: [[f64; 2]; 6] = [
+    [-0.932_469_514_203_152, 0.171_324_492_379_170],
+    [-0.661_209_386_466_265, 0.360_761_573_048_139],
+    [-0.238_619_186_083_197, 0.467_913_934_572_691],
+    [0.238_619_186_083_197, 0.467_913_934_572_691],
+    [0.661_209_386_466_265, 0.360_761_573_048_139],
+    [0.932_469_514_203_152, 0.171_324_492_379_170],
+];
+
+/// Widest standard deviation of the resolution, in steps of the wavelength.
+const WIDEST_LINE: f64 = 2.0;
+
+const APERTURE: usize = 0;
+const ROUGHNESS: usize = 1;
+const REFERENCE: usize = 2;
+const STRAY: usize = 3;
+const WAVELENGTH: usize = 4;
+const RESOLUTION: usize = 5;
+const HEIGHT: usize = 6;
+/// First of three parameters of each layer that is not the object: thickness, scale of the index, offset of the index.
+const LAYERS: usize = 7;
+
+/// A set of spectra with its forward model.
+pub struct SpectrumModel<'a> {
+    set: &'a SpectrumSet,
+    parameters: Vec<RefitParameter>,
+    effects: Vec<RefitEffect>,
+    steps: Vec<f64>,
+    /// Mean of the repeats that each spectrum is one of.
+    means: Vec<Vec<f64>>,
+}
+
+impl<'a> SpectrumModel<'a> {
+    /// A model of a set that was read.
+    pub fn new(set: &'a SpectrumSet) -> Self {
+        let mut parameters = Vec::new();
+        let mut steps = Vec::new();
+        let mut add = |name: String, unit, (neutral, start): (f64, f64), range, step, shown: fn(f64) -> f64| {
+            parameters.push(RefitParameter {
+                name,
+                unit,
+                neutral,
+                start,
+                range,
+                shown,
+            });
+            steps.push(step);
+        };
+        let stated = set.numerical_aperture;
+        let start = if stated > 0.0 { stated } else { 0.5 };
+        add(
+            "numerical_aperture".into(),
+            "",
+            (stated, start),
+            (0.0, 0.99),
+            1e-4,
+            |v| v,
+        );
+        add("roughness".into(), "nm", (0.0, 16.0), (0.0, 1e4), 1e-2, f64::sqrt);
+        add("reference_gain".into(), "", (0.0, 0.0), (-0.9, 9.0), 1e-4, |v| v);
+        add("stray_light".into(), "", (0.0, 0.0), (-1.0, 1.0), 1e-4, |v| v);
+        add(
+            "wavelength_scale".into(),
+            "",
+            (0.0, 0.0),
+            (-SCALED_BY, SCALED_BY),
+            1e-5,
+            |v| v,
+        );
+        // A spectrometer whose lines are wider would be read in wider steps.
+        let widest = match set.wavelengths_nm.as_slice() {
+            [first, second, ..] => (WIDEST_LINE * (second - first)).powi(2),
+            _ => 1.0,
+        };
+        add(
+            "resolution".into(),
+            "nm",
+            (0.0, 0.25 * widest),
+            (0.0, widest),
+            1e-3 * widest,
+            f64::sqrt,
+        );
+        add("height_offset".into(), "nm", (0.0, 0.0), (-1e3, 1e3), 1e-2, |v| v);
+        let mut effects: Vec<RefitEffect> = Vec::new();
+        let names = [
+            "numerical_aperture",
+            "roughness",
+            "reference_gain",
+            "stray_light",
+            "wavelength_scale",
+            "resolution",
+            "height_offset",
+        ];
+        let effect = |name: &str, slot: usize| RefitEffect {
+            name: name.into(),
+            slots: vec![slot],
+            after: Vec::new(),
+            across: None,
+        };
+        effects.extend(names.iter().enumerate().map(|(slot, name)| effect(name, slot)));
+        for (k, layer) in set.layers.iter().enumerate() {
+            let name = &layer.name;
+            let own = [
+                (format!("{name}_thickness"), "nm", 1e4, 1e-2),
+                (format!("{name}_index_scale"), "", 0.5, 1e-5),
+                (format!("{name}_index_offset"), "", 1.0, 1e-5),
+            ];
+            for (place, (name, unit, most, step)) in own.into_iter().enumerate() {
+                let slot = LAYERS + 3 * k + place;
+                if let Some(thickness) = layer.thickness_nm {
+                    effects.push(effect(&name, slot));
+                    let low = if place == 0 { -thickness } else { -most };
+                    add(name, unit, (0.0, 0.0), (low, most), step, |v| v);
+                } else {
+                    add(name, unit, (0.0, 0.0), (0.0, 0.0), step, |v| v);
+                }
+            }
+        }
+        let mut means = vec![Vec::new(); set.spectra.len()];
+        for own in set.repeats() {
+            let mean: Vec<f64> = (0..set.wavelengths_nm.len())
+                .map(|k| own.iter().map(|&s| set.spectra[s].reflectance[k]).sum::<f64>() / own.len() as f64)
+                .collect();
+            own.iter().for_each(|&s| means[s].clone_from(&mean));
+        }
+        Self {
+            set,
+            parameters,
+            effects,
+            steps,
+            means,
+        }
+    }
+
+    /// Roles of the spectra: heights, media and single spectra are left out in turn.
+    pub fn plan(&self) -> RefitPlan {
+        let spectra = &self.set.spectra;
+        let mut heights: Vec<f64> = spectra.iter().map(|s| s.height_nm).collect();
+        heights.sort_by(f64::total_cmp);
+        heights.dedup();
+        let place = |h: f64| heights.iter().position(|own| *own == h).unwrap_or(0);
+        let way = |name: &str, groups: Vec<usize>| LeaveOut {
+            name: name.into(),
+            groups,
+        };
+        let mut ways = vec![way("height", spectra.iter().map(|s| place(s.height_nm)).collect())];
+        let fitted_media: Vec<usize> = spectra.iter().filter(|s| s.fitted).map(|s| s.medium).collect();
+        if fitted_media.iter().any(|m| *m != fitted_media[0]) {
+            ways.push(way("medium", spectra.iter().map(|s| s.medium).collect()));
+        }
+        ways.push(way("spectrum", (0..spectra.len()).collect()));
+        RefitPlan {
+            fitted: spectra.iter().map(|s| s.fitted).collect(),
+            ways,
+        }
+    }
+
+    /// Mean of the repeats of a spectrum.
+    pub fn mean(&self, spectrum: usize) -> &[f64] {
+        &self.means[spectrum]
+    }
+
+    /// Reflectance that the instrument shows of a spectrum, at each wavelength of the set.
+    pub fn predicted(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
+        let own = &self.set.spectra[spectrum];
+        let medium = &self.set.media[own.medium].1;
+        let height_nm = (own.height_nm + theta[HEIGHT]).max(0.0);
+        let scale = 1.0 + theta[WAVELENGTH];
+        let aperture2 = theta[APERTURE].powi(2);
+        let values = self.set.wavelengths_nm.iter().map(|nm| {
+            let nm = nm * scale;
+            let index = |m: &Material| m.index(nm * 1e-3).unwrap_or(Complex64::from(1.0));
+            let films: Vec<Film> = self
+                .set
+                .layers
+                .iter()
+                .enumerate()
+                .map(|(k, layer)| match (&layer.material, layer.thickness_nm) {
+                    (Some(material), Some(thickness)) => {
+                        let [thicker, scaled, more] = [0, 1, 2].map(|p| theta[LAYERS + 3 * k + p]);
+                        (index(material) * (1.0 + scaled) + more, thickness + thicker)
+                    }
+                    _ => (index(medium), height_nm),
+                })
+                .collect();
+            let substrate = self.set.substrate.as_ref().map_or(Complex64::from(1.5), index);
+            let at = |sine2: f64| reflectance(self.set.ambient_index, &films, substrate, nm, sine2);
+            let mean = match aperture2 > 0.0 {
+                true => NODES
+                    .iter()
+                    .map(|[x, w]| 0.5 * w * at(0.5 * (x + 1.0) * aperture2))
+                    .sum(),
+                false => at(0.0),
+            };
+            let scattered = (-(4.0 * std::f64::consts::PI / nm).powi(2) * theta[ROUGHNESS]).exp();
+            mean * scattered
+        });
+        let mut values: Vec<f64> = values.collect();
+        if theta[RESOLUTION] > 0.0 {
+            values = self.smoothed(&values, theta[RESOLUTION]);
+        }
+        let gain = 1.0 + theta[REFERENCE];
+        values.iter_mut().for_each(|v| *v = *v * gain + theta[STRAY]);
+        values
+    }
+
+    /// Values under a Gaussian of a variance (nm^2), to four standard deviations.
+    fn smoothed(&self, values: &[f64], variance: f64) -> Vec<f64> {
+        let step = self.set.wavelengths_nm[1] - self.set.wavelengths_nm[0];
+        let reach = ((4.0 * variance.sqrt() / step).ceil() as usize).min(values.len());
+        (0..values.len())
+            .map(|k| {
+                let near = k.saturating_sub(reach)..(k + reach + 1).min(values.len());
+                let weighted = near.map(|j| {
+                    let off = (j as f64 - k as f64) * step;
+                    let weight = (-0.5 * off * off / variance).exp();
+                    (weight, weight * values[j])
+                });
+                let (all, sum) = weighted.fold((0.0, 0.0), |(a, s), (w, v)| (a + w, s + v));
+                sum / all
+            })
+            .collect()
+    }
+}
+
+impl RefitModel for SpectrumModel<'_> {
+    fn parameters(&self) -> &[RefitParameter] {
+        &self.parameters
+    }
+
+    fn effects(&self) -> &[RefitEffect] {
+        &self.effects
+    }
+
+    fn count(&self) -> usize {
+        self.set.spectra.len()
+    }
+
+    fn points(&self, _: usize) -> f64 {
+        self.set.wavelengths_nm.len() as f64
+    }
+
+    fn equations(&self, spectrum: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
+        let base = self.predicted(spectrum, theta);
+        let measured = &self.set.spectra[spectrum].reflectance;
+        let mut columns: Vec<Vec<f64>> = Vec::with_capacity(active.len() + 1);
+        for &slot in active {
+            let mut moved = theta.to_vec();
+            let (_, high) = self.parameters[slot].range;
+            // Towards the middle at the end of a range.
+            let step = if theta[slot] + self.steps[slot] > high {
+                -self.steps[slot]
+            } else {
+                self.steps[slot]
+            };
+            moved[slot] += step;
+            let changed = self.predicted(spectrum, &moved);
+            columns.push(changed.iter().zip(&base).map(|(c, b)| (c - b) / step).collect());
+        }
+        columns.push(measured.iter().zip(&base).map(|(m, b)| m - b).collect());
+        let product = |i: usize, j: usize| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum();
+        RefitEquations::alike(DMatrix::from_fn(columns.len(), columns.len(), product))
+    }
+
+    fn figure_names(&self) -> Vec<(&'static str, &'static str)> {
+        vec![("reflectance, mean of repeats", "rms"), ("reflectance", "rms")]
+    }
+
+    fn figures(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
+        let base = self.predicted(spectrum, theta);
+        let rms = |to: &[f64]| {
+            let squares: f64 = to.iter().zip(&base).map(|(a, b)| (a - b).powi(2)).sum();
+            (squares / base.len() as f64).sqrt()
+        };
+        vec![rms(self.mean(spectrum)), rms(&self.set.spectra[spectrum].reflectance)]
+    }
+
+    /// A film that is thicker hides the cone of the objective, and the cone hides the film.
+    fn tries_pairs(&self) -> bool {
+        true
+    }
+
+    fn decides(&self, figure: usize) -> bool {
+        figure == 0
+    }
+}

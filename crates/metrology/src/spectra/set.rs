@@ -1,0 +1,343 @@
+//! A set of kind `spectra`: reflectance of film stacks with an object of known height.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use metalith_core::Result;
+use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::text::{quoted, without_mark};
+use metalith_rcwa::Material;
+
+use crate::pattern::NamePattern;
+
+/// A layer as it was stated.
+#[derive(Clone, Debug)]
+pub struct StatedLayer {
+    pub name: String,
+    /// None of the object, whose medium differs by measurement.
+    pub material: Option<Material>,
+    /// Thickness (nm); none of the object, whose height differs by measurement.
+    pub thickness_nm: Option<f64>,
+}
+
+/// One measured spectrum.
+#[derive(Clone, Debug)]
+pub struct Spectrum {
+    /// Name of the file without its ending.
+    pub name: String,
+    /// Height of the object (nm).
+    pub height_nm: f64,
+    /// Number of the medium in the object.
+    pub medium: usize,
+    /// Reflectance at each wavelength of the set.
+    pub reflectance: Vec<f64>,
+    /// Whether it is fitted; if not, it judges.
+    pub fitted: bool,
+}
+
+/// A set of spectra.
+#[derive(Clone, Debug)]
+pub struct SpectrumSet {
+    pub path: PathBuf,
+    pub title: String,
+    pub wavelengths_nm: Vec<f64>,
+    pub ambient_index: f64,
+    /// Layers from the light inwards; one is the object.
+    pub layers: Vec<StatedLayer>,
+    pub substrate: Option<Material>,
+    /// Stated numerical aperture of the objective; zero for normal incidence.
+    pub numerical_aperture: f64,
+    /// Media of the object, each with its name.
+    pub media: Vec<(String, Material)>,
+    pub spectra: Vec<Spectrum>,
+}
+
+/// Longest table of a spectrum (rows).
+const MOST_ROWS: usize = 100_000;
+
+impl SpectrumSet {
+    /// Read a set from its `measurement.toml`.
+    ///
+    /// # Errors
+    /// All mistakes of the text and of the files that it names, each at its line.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = load(path)?;
+        Document::read(path, &text, |root| sections(path, root))
+    }
+
+    /// Root mean square by which repeats of one object differ from their mean; none without repeats.
+    pub fn repeat_rms(&self) -> Option<f64> {
+        let (mut squares, mut degrees) = (0.0, 0.0);
+        for own in self.repeats() {
+            for k in 0..self.wavelengths_nm.len() {
+                let values = || own.iter().map(|&s| self.spectra[s].reflectance[k]);
+                let mean = values().sum::<f64>() / own.len() as f64;
+                squares += values().map(|v| (v - mean).powi(2)).sum::<f64>();
+                degrees += own.len() as f64 - 1.0;
+            }
+        }
+        (degrees > 0.0).then(|| (squares / degrees).sqrt())
+    }
+
+    /// Numbers of the spectra of each object in each medium.
+    pub(crate) fn repeats(&self) -> Vec<Vec<usize>> {
+        let mut out: Vec<Vec<usize>> = Vec::new();
+        for (k, s) in self.spectra.iter().enumerate() {
+            let same = |own: &&mut Vec<usize>| {
+                let first = &self.spectra[own[0]];
+                first.height_nm == s.height_nm && first.medium == s.medium
+            };
+            match out.iter_mut().find(same) {
+                Some(own) => own.push(k),
+                None => out.push(vec![k]),
+            }
+        }
+        out
+    }
+}
+
+fn sections(path: &Path, root: &Section<'_, '_>) -> SpectrumSet {
+    root.integer("schema", 1..=1, "");
+    root.choice("kind", &[("spectra", ())], None);
+    let title = root.text("title");
+    let folder = crate::run::folder_of(path, root);
+    let range = root.section("range");
+    let nm = || Limits::new(100.0..=20_000.0, "nm");
+    let (from, to) = (range.float("from_nm", nm()), range.float("to_nm", nm()));
+    let step = range.float("step_nm", Limits::new(0.05..=100.0, "nm"));
+    let count = ((to - from) / step).floor();
+    if !(8.0..=5000.0).contains(&count) {
+        range.fault(
+            "to_nm",
+            "the range has less than 9 or more than 5001 steps",
+            "check `from_nm`, `to_nm` and `step_nm`",
+        );
+    }
+    range.finish();
+    let wavelengths_nm: Vec<f64> = (0..=count.clamp(0.0, 5000.0) as usize)
+        .map(|k| from + k as f64 * step)
+        .collect();
+    let stack = root.section("stack");
+    let ambient_index = stack
+        .optional_float("ambient_index", Limits::new(1.0..=3.0, ""))
+        .unwrap_or(1.0);
+    let substrate = material(&stack, "substrate", &folder, &wavelengths_nm);
+    let numerical_aperture = stack
+        .optional_float("numerical_aperture", Limits::new(0.0..=0.98, ""))
+        .unwrap_or(0.0);
+    stack.finish();
+    let layers = layers(root, &folder, &wavelengths_nm);
+    let reference = root.section("reference");
+    let mirror = table(&reference, "file", &folder.join(reference.text("file")), 0);
+    reference.finish();
+    let (media, spectra) = captures(root, &folder, &wavelengths_nm, &mirror);
+    SpectrumSet {
+        path: path.to_owned(),
+        title,
+        wavelengths_nm,
+        ambient_index,
+        layers,
+        substrate,
+        numerical_aperture,
+        media,
+        spectra,
+    }
+}
+
+/// A share of the range by which wavelengths may be scaled, which materials must cover too.
+pub(super) const SCALED_BY: f64 = 0.01;
+
+/// A material by name, file or constant index.
+fn material(s: &Section<'_, '_>, key: &str, folder: &Path, wavelengths_nm: &[f64]) -> Option<Material> {
+    let text = s.text(key);
+    if text.is_empty() {
+        return None;
+    }
+    let found = match text.parse::<f64>() {
+        Ok(n) => Material::constant(n, 0.0),
+        Err(_) => Material::resolve(&text, folder),
+    };
+    let hint = "name a material, a table (wavelength_nm,n,k), or an index in quotes";
+    let found = found.map_err(|e| s.fault(key, e.to_string(), hint)).ok()?;
+    let (low, high) = found.range_um();
+    let ends = [wavelengths_nm.first()?, wavelengths_nm.last()?].map(|nm| nm * 1e-3);
+    if ends[0] * (1.0 - SCALED_BY) < low || ends[1] * (1.0 + SCALED_BY) > high {
+        let what = format!(
+            "{found} is known from {low} to {high} um, {} to {} um are simulated",
+            ends[0], ends[1]
+        );
+        s.fault(
+            key,
+            what,
+            "shorten [range], with one per cent beyond its ends, or give a longer table",
+        );
+        return None;
+    }
+    Some(found)
+}
+
+fn layers(root: &Section<'_, '_>, folder: &Path, wavelengths_nm: &[f64]) -> Vec<StatedLayer> {
+    let mut out = Vec::new();
+    for s in root.sections("layer") {
+        let name = s.text("name");
+        let is_object = s.choice("object", &[("yes", true), ("no", false)], Some(false));
+        out.push(StatedLayer {
+            name,
+            material: (!is_object)
+                .then(|| material(&s, "material", folder, wavelengths_nm))
+                .flatten(),
+            thickness_nm: (!is_object).then(|| s.float("thickness_nm", Limits::new(0.0..=100_000.0, "nm"))),
+        });
+        s.finish();
+    }
+    if out.iter().filter(|l| l.thickness_nm.is_none()).count() != 1 {
+        root.fault(
+            "layer",
+            "not one layer is the object",
+            "give [[layer]] sections from the light inwards, one with `object = \"yes\"`",
+        );
+    }
+    out
+}
+
+fn captures(
+    root: &Section<'_, '_>,
+    folder: &Path,
+    wavelengths_nm: &[f64],
+    mirror: &[[f64; 2]],
+) -> (Vec<(String, Material)>, Vec<Spectrum>) {
+    let (mut media, mut spectra) = (Vec::new(), Vec::new());
+    root.must_have("captures", "one or more sections [[captures]]");
+    for s in root.sections("captures") {
+        let text = s.text("files");
+        let header = s.optional_integer("header_lines", 0..=1000, "").unwrap_or(0) as usize;
+        let name = s.text("medium_name");
+        let medium = material(&s, "medium", folder, wavelengths_nm);
+        let all_fitted = s.choice("fitted", &[("yes", true), ("no", false)], Some(true));
+        let not_fitted = s.texts("not_fitted");
+        s.finish();
+        let hint = "write the height in nm and the repeat in braces: captures/{height_nm}_{repeat}.csv";
+        let pattern = match NamePattern::parse(&text, folder) {
+            Ok(pattern) if pattern.names().contains(&"height_nm") => pattern,
+            Ok(_) => {
+                s.fault("files", "the names of files have no {height_nm}", hint);
+                continue;
+            }
+            Err(what) => {
+                s.fault("files", what, hint);
+                continue;
+            }
+        };
+        let files = match pattern.files() {
+            Ok(files) => files,
+            Err(what) => {
+                s.fault("files", what, "check the folder and the pattern");
+                continue;
+            }
+        };
+        let number = media.len();
+        let Some(medium) = medium else { continue };
+        media.push((name, medium));
+        let mut known: BTreeMap<String, ()> = BTreeMap::new();
+        for (path, named) in files {
+            let height = &named["height_nm"];
+            known.insert(height.clone(), ());
+            let Some(height_nm) = height.parse::<f64>().ok().filter(|h| (0.0..=100_000.0).contains(h)) else {
+                let what = format!("{}: `{height}` is no height in nm", path.display());
+                s.fault("files", what, hint);
+                continue;
+            };
+            let capture = table(&s, "files", &path, header);
+            let values: Option<Vec<f64>> = wavelengths_nm
+                .iter()
+                .map(|&nm| Some(at(&capture, nm)? / 100.0 * at(mirror, nm)? / 100.0))
+                .collect();
+            let Some(reflectance) = values else {
+                if !capture.is_empty() && !mirror.is_empty() {
+                    let what = format!("{} or the reference does not cover [range]", path.display());
+                    s.fault("files", what, "shorten [range]");
+                }
+                continue;
+            };
+            spectra.push(Spectrum {
+                name: path
+                    .file_stem()
+                    .map_or_else(String::new, |n| n.to_string_lossy().into()),
+                height_nm,
+                medium: number,
+                reflectance,
+                fitted: all_fitted && !not_fitted.contains(height),
+            });
+        }
+        for height in not_fitted.iter().filter(|h| !known.contains_key(*h)) {
+            s.fault(
+                "not_fitted",
+                format!("no file has the height `{}`", quoted(height)),
+                "write heights as the names of files have them",
+            );
+        }
+    }
+    if !spectra.is_empty() && spectra.iter().filter(|s| s.fitted).count() < 2 {
+        root.fault(
+            "captures",
+            "fewer than two spectra are fitted",
+            "leave fewer out of the fit",
+        );
+    }
+    (media, spectra)
+}
+
+/// Rows of two numbers, wavelengths (nm) rising, after some header lines; a fault at the key if there are none.
+fn table(s: &Section<'_, '_>, key: &str, path: &Path, header: usize) -> Vec<[f64; 2]> {
+    let mut out: Vec<[f64; 2]> = Vec::new();
+    let hint = "give rows of a wavelength (nm) and a per cent, with a comma between";
+    let text = match metalith_core::document::load(path) {
+        Ok(text) => text,
+        Err(error) => {
+            s.fault(key, error.to_string(), hint);
+            return out;
+        }
+    };
+    for (k, line) in without_mark(&text).lines().enumerate().skip(header) {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let row = line
+            .split_once(',')
+            .and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
+        let wrong = match row {
+            Some(row @ [nm, value]) if f64::is_finite(nm) && f64::is_finite(value) => {
+                let rises = out.last().is_none_or(|last| last[0] < nm);
+                out.push(row);
+                (!rises).then_some("its wavelength does not rise")
+            }
+            _ => Some("it is not two numbers"),
+        };
+        if let Some(why) = wrong.or_else(|| (out.len() > MOST_ROWS).then_some("the table is too long")) {
+            s.fault(
+                key,
+                format!("{}, line {}: `{}`: {why}", path.display(), k + 1, quoted(line)),
+                hint,
+            );
+            return Vec::new();
+        }
+    }
+    if out.len() < 2 {
+        s.fault(key, format!("{} has less than two rows", path.display()), hint);
+        out.clear();
+    }
+    out
+}
+
+/// Linear interpolation; none beyond the rows.
+fn at(rows: &[[f64; 2]], nm: f64) -> Option<f64> {
+    let after = rows.partition_point(|r| r[0] < nm);
+    let high = rows.get(after)?;
+    if high[0] == nm {
+        return Some(high[1]);
+    }
+    let low = rows.get(after.checked_sub(1)?)?;
+    let part = (nm - low[0]) / (high[0] - low[0]);
+    Some(low[1] + part * (high[1] - low[1]))
+}
