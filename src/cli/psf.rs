@@ -112,6 +112,10 @@ pub(crate) struct PsfArgs {
     /// Simulate planes along z too, up to this distance from the sensor on each side (um): for each plane Strehl ratio, FWHM and
     /// focusing efficiency, and the focal length found through focus. Without a value two depths of focus, 2 lambda / NA^2.
     #[arg(long, value_name = "RANGE_UM", num_args = 0..=1, require_equals = true, value_parser = between(1e-3, 1e6))]
+    #[expect(
+        clippy::option_option,
+        reason = "absent, without a value, with a value: as clap tells them"
+    )]
     through_focus: Option<Option<f64>>,
 
     /// Number of planes of --through-focus.

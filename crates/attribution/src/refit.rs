@@ -545,9 +545,10 @@ impl Selection<'_> {
             let own = (0..count)
                 .filter(|&m| self.plan.fitted[m] == fitted)
                 .map(|m| figures[m][k]);
-            match self.model.is_mean(k) {
-                true => root_mean(own).map(|mean| mean.powi(2)),
-                false => root_mean(own.map(|v| v * v)),
+            if self.model.is_mean(k) {
+                root_mean(own).map(|mean| mean.powi(2))
+            } else {
+                root_mean(own.map(|v| v * v))
             }
         };
         let names = self.model.figure_names().len();

@@ -30,9 +30,10 @@ pub struct Answer {
 
 /// The `measurement.toml` of a set that is named by its folder or by the file.
 fn file_of(set: &Path) -> PathBuf {
-    match set.is_dir() {
-        true => set.join("measurement.toml"),
-        false => set.to_owned(),
+    if set.is_dir() {
+        set.join("measurement.toml")
+    } else {
+        set.to_owned()
     }
 }
 

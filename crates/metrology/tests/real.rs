@@ -20,7 +20,7 @@ fn diagnosis(name: &str, kind: SetKind) -> Option<Diagnosis> {
     };
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../examples/measured/{name}.toml"));
     let text = std::fs::read_to_string(example).unwrap();
-    let schema = format!("schema = 1\nfolder = {:?}", folder.canonicalize().unwrap());
+    let schema = format!("schema = 1\nfolder = '{}'", folder.canonicalize().unwrap().display());
     let out = tempfile::tempdir().unwrap();
     let set = out.path().join("measurement.toml");
     std::fs::write(&set, text.replace("schema = 1", &schema)).unwrap();

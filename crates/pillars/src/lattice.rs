@@ -42,12 +42,12 @@ impl LatticeKind {
     pub fn row_nm(self, pitch: Pitch, unit: DatabaseUnit) -> f64 {
         match self {
             Self::Square => pitch.nm(),
-            Self::Hexagonal => self.row_units(pitch, unit) as f64 / unit.per_nm() as f64,
+            Self::Hexagonal => Self::row_units(pitch, unit) as f64 / unit.per_nm() as f64,
         }
     }
 
     /// Distance of two rows of a hexagonal lattice (database units).
-    fn row_units(self, pitch: Pitch, unit: DatabaseUnit) -> i64 {
+    fn row_units(pitch: Pitch, unit: DatabaseUnit) -> i64 {
         let pitch = pitch.nm() * unit.per_nm() as f64;
         (0.75 * pitch.powi(2)).sqrt().round() as i64
     }
@@ -345,7 +345,7 @@ impl Lattice {
             // An odd number of places: twice the place is even.
             (LatticeKind::Hexagonal, 0) => self.half_index(i) / 2 * self.pitch.half(),
             (LatticeKind::Hexagonal, _) => {
-                let row = self.kind.row_units(self.pitch, self.unit);
+                let row = LatticeKind::row_units(self.pitch, self.unit);
                 self.half_index(i) / 2 * row * (Pitch::HALVES_PER_NM / self.unit.per_nm())
             }
         }
@@ -407,7 +407,10 @@ impl Lattice {
         match self.kind {
             LatticeKind::Square => self.half_radius2(ix, iy),
             LatticeKind::Hexagonal => {
-                let steps = [self.unit.of(self.pitch), 2 * self.kind.row_units(self.pitch, self.unit)];
+                let steps = [
+                    self.unit.of(self.pitch),
+                    2 * LatticeKind::row_units(self.pitch, self.unit),
+                ];
                 let [x, y] = [self.half_index(ix) / 2 * steps[0], self.half_index(iy) / 2 * steps[1]];
                 x * x + y * y
             }

@@ -330,7 +330,11 @@ fn judge(
     }
     let in_white = white.as_ref().map_or(0, polychromatic::WhiteSimulator::psfs);
     // Spectra of many planes are not held in parts.
-    let central = if cases.through_focus && part_bytes.is_none() { central(&chosen) } else { None };
+    let central = if cases.through_focus && part_bytes.is_none() {
+        central(&chosen)
+    } else {
+        None
+    };
     let series = central.map_or(0, |_| design.verify.wavelengths_um.len());
     let psfs: usize = chosen.iter().map(|one| simulator.psfs(one) + in_white).sum();
     progress.begin("simulating elements", (psfs + series) as u64);
@@ -348,7 +352,11 @@ fn judge(
             steepness: Steepness::of(&array.lattice, |ix, iy| phase.turns(ix, iy)),
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&one, &phase, &read, progress)?,
-            through_focus: if central == Some(k) { simulator.through_focus(&element, &phase, &read, progress)? } else { Vec::new() },
+            through_focus: if central == Some(k) {
+                simulator.through_focus(&element, &phase, &read, progress)?
+            } else {
+                Vec::new()
+            },
             white: match &white {
                 Some(white) => white.simulate(&element, &phase, &read, progress)?,
                 None => Vec::new(),

@@ -46,7 +46,11 @@ impl<'a> Bytes<'a> {
     }
 
     fn is(&mut self, mark: &[u8]) -> Parsed<()> {
-        if self.take(mark.len())? == mark { Ok(()) } else { Err(format!("no {} where one should be", String::from_utf8_lossy(mark))) }
+        if self.take(mark.len())? == mark {
+            Ok(())
+        } else {
+            Err(format!("no {} where one should be", String::from_utf8_lossy(mark)))
+        }
     }
 
     /// Text up to a zero byte, which is taken too.
@@ -287,7 +291,7 @@ impl<'a> File<'a> {
             }
             return Ok(());
         }
-        let count = self.node(&mut at, 0, depth)?;
+        let count = Self::node(&mut at, 0, depth)?;
         for _ in 0..count {
             at.take(8)?;
             self.symbols(at.number(8)?, names, depth + 1, found)?;
@@ -296,7 +300,7 @@ impl<'a> File<'a> {
     }
 
     /// Head of a node of a tree: number of its children.
-    fn node(&self, at: &mut Bytes<'a>, kind: u64, depth: u32) -> Parsed<u64> {
+    fn node(at: &mut Bytes<'a>, kind: u64, depth: u32) -> Parsed<u64> {
         at.is(b"TREE")?;
         if at.number(1)? != kind || depth > DEEPEST {
             return Err("a tree of another kind".into());
@@ -384,7 +388,11 @@ impl<'a> File<'a> {
         let mut values = vec![Complex64::ZERO; count];
         let mut seen = BTreeSet::new();
         self.chunks(tree, set, sides, 0, &mut seen, &mut values)?;
-        if product(&counts) == Some(seen.len()) { Ok(values) } else { Err("a data set without all of its chunks".into()) }
+        if product(&counts) == Some(seen.len()) {
+            Ok(values)
+        } else {
+            Err("a data set without all of its chunks".into())
+        }
     }
 
     fn chunks(
@@ -399,7 +407,7 @@ impl<'a> File<'a> {
         self.visit()?;
         let mut at = self.at(address)?;
         let level = at.0.get(5).copied().unwrap_or(0);
-        for _ in 0..self.node(&mut at, 1, depth)? {
+        for _ in 0..Self::node(&mut at, 1, depth)? {
             let (size, skipped) = (at.number(4)? as usize, at.number(4)?);
             let first = (0..sides.len()).map(|_| at.number(8)).collect::<Parsed<Vec<_>>>()?;
             at.take(8)?;
@@ -472,7 +480,11 @@ fn unfiltered(stored: &[u8], set: &DataSet<'_>, skipped: u64, size: usize) -> Pa
             }
         }
     }
-    if bytes.len() == size { Ok(bytes) } else { Err(format!("a chunk of {} bytes in place of {size}", bytes.len())) }
+    if bytes.len() == size {
+        Ok(bytes)
+    } else {
+        Err(format!("a chunk of {} bytes in place of {size}", bytes.len()))
+    }
 }
 
 /// Lengths along the axes; none where there is no data.

@@ -166,5 +166,9 @@ fn same(a: f64, b: f64) -> bool {
 /// Place of the value nearest to one, of values that rise.
 fn nearest(values: &[f64], at: f64) -> usize {
     let after = values.partition_point(|v| *v < at).min(values.len() - 1);
-    if after > 0 && at - values[after - 1] < values[after] - at { after - 1 } else { after }
+    if after > 0 && at - values[after - 1] < values[after] - at {
+        after - 1
+    } else {
+        after
+    }
 }

@@ -129,9 +129,13 @@ impl UnitCellTable {
         let mut off = false;
         let coarser = widths_nm.iter().zip(&t).map(|(w, t)| {
             let place = at(f64::from(*w));
-            (0..3).fold(*t, |sum, axis| if self.is_sample(axis, place[axis]) { sum } else {
-                off = true;
-                sum + turned(self.value(place, Some(axis))) - *t
+            (0..3).fold(*t, |sum, axis| {
+                if self.is_sample(axis, place[axis]) {
+                    sum
+                } else {
+                    off = true;
+                    sum + turned(self.value(place, Some(axis))) - *t
+                }
             })
         });
         let coarser: Vec<Complex64> = coarser.collect();
@@ -221,7 +225,11 @@ impl UnitCellTable {
             "the phase {word} by {:.2} waves from {narrow:.0} to {wide:.0} nm of width",
             rise.abs()
         );
-        let found = if rise < 0.0 { PhaseConvention::Plus } else { PhaseConvention::Minus };
+        let found = if rise < 0.0 {
+            PhaseConvention::Plus
+        } else {
+            PhaseConvention::Minus
+        };
         match stated {
             Some(stated) if is_clear && stated != found => Err(Error::refused(
                 "mapping/phase-convention",

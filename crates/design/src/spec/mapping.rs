@@ -84,6 +84,19 @@ pub struct MappingComparison {
     pub wavelengths_um: Vec<f64>,
 }
 
+impl MappingComparison {
+    fn read(s: &Section<'_, '_>) -> Self {
+        Self {
+            band_um: read_band(s),
+            wavelengths_um: if s.has("compared_nm") {
+                s.floats("compared_nm", WAVELENGTH).iter().map(|nm| nm * 1e-3).collect()
+            } else {
+                Vec::new()
+            },
+        }
+    }
+}
+
 /// The cell that there is a published mapping of, in words.
 const PUBLISHED_CELL: &str = "only square pillars of `sin_luke_2015`, 700 nm high, 350 nm apart, on fused silica in air have a published mapping";
 
@@ -237,14 +250,7 @@ impl MappingSpec {
             );
         }
         if from_cells {
-            let others: &[&str] = if upright { &["library", "cell", "accept"] } else { &["coefficients", "basis", "table", "cell", "accept"] };
-            for key in others.iter().copied().filter(|key| s.has(key)) {
-                s.fault(
-                    key,
-                    "a mapping beside `source = \"cells\"`, by which it is solved from [cell]",
-                    format!("keep one of `source` and `{key}`"),
-                );
-            }
+            refuse_beside_source(s, upright);
         }
         let steered = s.sections("steered");
         let steered: Vec<_> = steered
@@ -259,14 +265,7 @@ impl MappingSpec {
                 "give one `[[mapping.steered]]` for each pair of steps",
             );
         }
-        let comparison = MappingComparison {
-            band_um: read_band(s),
-            wavelengths_um: if s.has("compared_nm") {
-                s.floats("compared_nm", WAVELENGTH).iter().map(|nm| nm * 1e-3).collect()
-            } else {
-                Vec::new()
-            },
-        };
+        let comparison = MappingComparison::read(s);
         let identity = if from_cells {
             MappingIdentity::of_this_cell()
         } else {
@@ -431,6 +430,22 @@ pub(super) fn check_widths(s: &Section<'_, '_>, cell: &CellSpec, polynomial: &In
             format!(
                 "the cell allows {narrow} to {wide} nm: change the coefficients or [cell] width_min_nm, width_max_nm"
             ),
+        );
+    }
+}
+
+/// Faults of keys that state a mapping beside `source = "cells"`.
+fn refuse_beside_source(s: &Section<'_, '_>, upright: bool) {
+    let others: &[&str] = if upright {
+        &["library", "cell", "accept"]
+    } else {
+        &["coefficients", "basis", "table", "cell", "accept"]
+    };
+    for key in others.iter().copied().filter(|key| s.has(key)) {
+        s.fault(
+            key,
+            "a mapping beside `source = \"cells\"`, by which it is solved from [cell]",
+            format!("keep one of `source` and `{key}`"),
         );
     }
 }

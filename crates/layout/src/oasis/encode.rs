@@ -332,13 +332,14 @@ impl<'a> ElementPillars<'a> {
             let count = places.len() as u64;
             places.remove(0);
             let from = at(first[0], first[1]);
-            places.iter_mut().for_each(|p| match grid {
-                Some(_) => *p = [p[0] - first[0], p[1] - first[1]],
-                // No number of units but 1 divides all distances in general.
-                None => {
+            places.iter_mut().for_each(|p| {
+                *p = if grid.is_some() {
+                    [p[0] - first[0], p[1] - first[1]]
+                } else {
+                    // No number of units but 1 divides all distances in general.
                     let place = at(p[0], p[1]);
-                    *p = [0, 1].map(|axis| (place[axis] - from[axis]) as i32);
-                }
+                    [0, 1].map(|axis| (place[axis] - from[axis]) as i32)
+                };
             });
             let grid = grid.unwrap_or(1);
             let list = Repetition::List { grid, places };

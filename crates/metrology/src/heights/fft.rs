@@ -16,9 +16,12 @@ impl<T: FftNum> Fft2<T> {
     /// Transforms of `rows` x `cols` numbers, forward or inverse (not normalised).
     pub(super) fn new(rows: usize, cols: usize, inverse: bool) -> Self {
         let mut planner = FftPlanner::new();
-        let mut plan = |n| match inverse {
-            true => planner.plan_fft_inverse(n),
-            false => planner.plan_fft_forward(n),
+        let mut plan = |n| {
+            if inverse {
+                planner.plan_fft_inverse(n)
+            } else {
+                planner.plan_fft_forward(n)
+            }
         };
         Self {
             rows,

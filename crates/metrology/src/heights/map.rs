@@ -26,11 +26,12 @@ pub(super) fn read(path: &Path) -> Result<Array2<f32>, String> {
 }
 
 fn check_size(rows: usize, cols: usize) -> Result<(), String> {
-    match [rows, cols].iter().all(|n| (FEWEST..=MOST).contains(n)) {
-        true => Ok(()),
-        false => Err(format!(
+    if [rows, cols].iter().all(|n| (FEWEST..=MOST).contains(n)) {
+        Ok(())
+    } else {
+        Err(format!(
             "it has {rows} x {cols} samples; {FEWEST} to {MOST} along each axis are read"
-        )),
+        ))
     }
 }
 

@@ -214,10 +214,9 @@ impl<'a> HeightModel<'a> {
         let [rows, cols] = self.inside();
         let measured = &self.set.fields[field].measured;
         let (rim, group) = (self.set.rim, self.set.fields[field].group);
-        let count = rows.div_ceil(STRIDE) * cols.div_ceil(STRIDE);
-        let mut out = vec![Vec::with_capacity(count); active.len() + 1];
+        let mut out = vec![Vec::new(); active.len() + 1];
         let nuisances = &self.set.nuisances;
-        let mut own = vec![Vec::with_capacity(count); 4];
+        let mut own = vec![Vec::new(); 4];
         for y in (0..rows).step_by(STRIDE) {
             for x in (0..cols).step_by(STRIDE) {
                 let k = y * cols + x;
@@ -260,9 +259,10 @@ impl<'a> HeightModel<'a> {
         let along = self.inside()[1].div_ceil(STRIDE);
         let means: Vec<f64> = columns.iter().map(|c| mean(c)).collect();
         for column in columns.iter_mut().chain(&mut own) {
-            match self.set.nuisances.lines {
-                true => column.chunks_mut(along).for_each(without_mean),
-                false => without_mean(column),
+            if self.set.nuisances.lines {
+                column.chunks_mut(along).for_each(without_mean);
+            } else {
+                without_mean(column);
             }
         }
         // Columns of nuisances are made orthonormal; those that lines hold already are rounding.

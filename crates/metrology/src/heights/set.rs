@@ -303,7 +303,7 @@ fn pattern(s: &Section<'_, '_>, folder: &Path) -> Option<NamePattern> {
                 "files",
                 what,
                 "write names in braces in the last part: maps/F{plate}{field}.tif",
-            )
+            );
         })
         .ok()
 }

@@ -196,12 +196,13 @@ impl<'a> SpectrumModel<'a> {
                 .collect();
             let substrate = self.set.substrate.as_ref().map_or(Complex64::from(1.5), index);
             let at = |sine2: f64| reflectance(self.set.ambient_index, &films, substrate, nm, sine2);
-            let mean = match aperture2 > 0.0 {
-                true => NODES
+            let mean = if aperture2 > 0.0 {
+                NODES
                     .iter()
                     .map(|[x, w]| 0.5 * w * at(0.5 * (x + 1.0) * aperture2))
-                    .sum(),
-                false => at(0.0),
+                    .sum()
+            } else {
+                at(0.0)
             };
             let scattered = (-(4.0 * std::f64::consts::PI / nm).powi(2) * theta[ROUGHNESS]).exp();
             mean * scattered

@@ -1,6 +1,6 @@
 //! A set of kind `spectra`: reflectance of film stacks with an object of known height.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use metalith_core::Result;
@@ -238,10 +238,10 @@ fn captures(
         let number = media.len();
         let Some(medium) = medium else { continue };
         media.push((name, medium));
-        let mut known: BTreeMap<String, ()> = BTreeMap::new();
+        let mut known = BTreeSet::new();
         for (path, named) in files {
             let height = &named["height_nm"];
-            known.insert(height.clone(), ());
+            known.insert(height.clone());
             let Some(height_nm) = height.parse::<f64>().ok().filter(|h| (0.0..=100_000.0).contains(h)) else {
                 let what = format!("{}: `{height}` is no height in nm", path.display());
                 s.fault("files", what, hint);
@@ -269,7 +269,7 @@ fn captures(
                 fitted: all_fitted && !not_fitted.contains(height),
             });
         }
-        for height in not_fitted.iter().filter(|h| !known.contains_key(*h)) {
+        for height in not_fitted.iter().filter(|h| !known.contains(*h)) {
             s.fault(
                 "not_fitted",
                 format!("no file has the height `{}`", quoted(height)),

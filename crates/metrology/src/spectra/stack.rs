@@ -11,10 +11,7 @@ pub(super) fn reflectance(ambient: f64, films: &[Film], substrate: Complex64, wa
     let mut out = 0.0;
     for is_p in [false, true] {
         // Tilted admittances: of s, the normal component of n; of p, n^2 over it.
-        let tilted = |n: Complex64| match is_p {
-            true => n * n / normal(n),
-            false => normal(n),
-        };
+        let tilted = |n: Complex64| if is_p { n * n / normal(n) } else { normal(n) };
         let mut y = tilted(substrate);
         for &(n, thickness_nm) in films.iter().rev() {
             let (own, phase) = (

@@ -129,7 +129,9 @@ fn white_contrast(found: &Verification) -> String {
 fn range(found: &Verification, of: impl Fn(&PsfResult) -> f64) -> String {
     let many = found.distinct.len() > 1;
     let each = found.distinct.iter().flat_map(|d| {
-        d.spots.iter().map(move |s| if many { (s, s.label(&d.element)) } else { (s, s.place()) })
+        d.spots
+            .iter()
+            .map(move |s| if many { (s, s.label(&d.element)) } else { (s, s.place()) })
     });
     between(each.map(|(spot, name)| (of(spot.judged()), name)))
 }
