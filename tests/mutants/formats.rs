@@ -192,8 +192,8 @@ fn designs(folder: &Path) -> Vec<Format> {
             folder.join("cells.txt"),
             Kind::Text,
             vec![
-                b"radius (m), abs(S21), angle(S21)\n5e-8,0.9,0.1\n6e-8,0.9,0.3\n7e-8,0.9,0.6\n8e-8,0.9,0.9\n".to_vec(),
-                b"width,f,t\n0.1,4.8e14,(0.9+0.1j)\n0.12,4.8e14,(0.8+0.3j)\n0.14,4.8e14,(0.6+0.6j)\n0.16,4.8e14,(0.2+0.9j)\n".to_vec(),
+                b"radius (m), abs(S21), angle(S21)\n5e-8,0.9,0.1\n6e-8,0.9,0.8\n7e-8,0.9,1.7\n8e-8,0.9,2.8\n".to_vec(),
+                b"width,f,t\n0.1,4.8e14,(0.9+0.1j)\n0.12,4.8e14,(0.5+0.7j)\n0.14,4.8e14,(-0.3+0.9j)\n0.16,4.8e14,(-0.9+0.2j)\n".to_vec(),
             ],
             unit_cells,
         ),
