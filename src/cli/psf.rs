@@ -69,7 +69,7 @@ pub(crate) struct PsfArgs {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-1e6, 1e6))]
     at_y_um: f64,
 
-    /// Samples along an axis of the window, one pitch apart.
+    /// Width of the window in pitches. Samples are a pitch apart, or an equal part of one that is at most lambda / (4 NA).
     #[arg(long, default_value_t = 256, value_parser = samples)]
     samples: usize,
 

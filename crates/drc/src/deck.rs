@@ -292,7 +292,7 @@ mod tests {
             deck.toml:6:1: [rule] lacks `nm`
               help: add `nm`: a number from 0 to 1000000 nm
             deck.toml:10:6: a second rule `a`
-              help: give every rule an id of its own
+              help: give every rule its own id
             deck.toml:11:9: there is no check `wings`
               help: docs/guide/check.md lists all checks
             deck.toml:15:8: `from` cannot be "layout"

@@ -34,7 +34,7 @@ mod richardson_lucy;
 mod scene_statistics;
 mod separate;
 mod slope_denoiser;
-mod slopes;
+mod slope_split;
 mod tikhonov;
 mod total_variation;
 
@@ -52,7 +52,7 @@ pub use recorded::Recorded;
 pub use scene_statistics::{SceneStatistics, squared_frequencies};
 pub use separate::{Blend, restore_each, without_stray_light};
 pub use slope_denoiser::SlopeDenoiser;
-pub use slopes::{ExponentialSlopes, SlopeBorder, SlopeLength, SlopeSplit};
+pub use slope_split::{ExponentialSlopes, SlopeBorder, SlopeLength, SlopeSplit};
 
 /// Restore by all elements at once: one scene that explains the whole frame. Planes as those that go into the operator, white
 /// being one.

@@ -12,7 +12,7 @@ use crate::frame_model::{FrameModel, Planes};
 use crate::precondition::Preconditioner;
 use crate::recorded::Recorded;
 use crate::scene_statistics::{SceneStatistics, Terms};
-use crate::slopes::bends;
+use crate::slope_split::bends;
 
 /// A* W A of a frame, for independent planes.
 struct DataTerm<'a> {

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use crate::frame_model::Planes;
 use crate::scene_statistics::{Terms, squared_frequencies};
-use crate::slopes::{SlopeBorder, slopes};
+use crate::slope_split::{SlopeBorder, slopes};
 
 /// Pixels between a picture and its periodic copies: beyond them little of it is correlated.
 const BORDER: usize = 40;

@@ -218,7 +218,7 @@ pub fn squared_frequencies(size: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::slopes::{SlopeBorder, slopes};
+    use crate::slope_split::{SlopeBorder, slopes};
 
     #[test]
     fn colours_mix_and_have_their_adjoint() {

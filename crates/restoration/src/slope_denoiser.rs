@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::denoiser::{Denoiser, Schedule};
 use crate::frame_model::Planes;
 use crate::scene_statistics::SceneStatistics;
-use crate::slopes::{SlopeBorder, shrunk, slopes, slopes_adjoint};
+use crate::slope_split::{SlopeBorder, shrunk, slopes, slopes_adjoint};
 
 /// Denoiser by gradients of its dual (Chambolle, J. Math. Imaging Vis. 20, 89 (2004)), for each of the planes that vary
 /// independently.

@@ -5,7 +5,7 @@ use metalith_core::{Progress, Result};
 use crate::frame_model::Planes;
 use crate::normal_system::NormalSystem;
 use crate::scene_statistics::Terms;
-use crate::slopes::{ExponentialSlopes, SlopeBorder, SlopeLength, SlopeSplit};
+use crate::slope_split::{ExponentialSlopes, SlopeBorder, SlopeLength, SlopeSplit};
 use crate::tikhonov;
 
 /// Rounds, and steps of conjugate gradients in each.

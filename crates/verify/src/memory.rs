@@ -109,12 +109,9 @@ fn holdings(design: &Design) -> Vec<Holding> {
 fn largest_spectra_bytes(design: &Design, accuracy: Accuracy) -> Result<usize> {
     let lattice = design.lattice();
     let bytes = |lens: &LensSpec, wavelength_um, landing, accuracy| -> Result<usize> {
-        let window = Window::about(
-            landing,
-            lattice.pitch_um(),
-            design.verify.window_samples,
-            lens.focal_length_um,
-        );
+        let pitches = (lattice.pitch_um(), design.verify.window_samples);
+        let aperture = (lens.radius_um(), lens.focal_length_um);
+        let window = Window::of_psf(landing, pitches, aperture, wavelength_um);
         let fold = FoldedPropagator::plan(lattice, lens.radius_um(), wavelength_um, window, accuracy)?;
         Ok(fold.spectra_bytes())
     };

@@ -142,7 +142,7 @@ pub fn single_psfs(
             .zip(&elements)
             .map_init(Scratch::default, |scratch, (fields, (_, widths))| {
                 progress.check_stopped()?;
-                let window = light.window(widths.lattice);
+                let window = light.window(widths.lattice, widths.circle_um(), wavelength_um);
                 let psf = fields.psf(window, light.accuracy, &light.reported_lp_mm(), scratch)?;
                 let through = |request: &FocusRequest| {
                     let planes = request.planes(wavelength_um, widths.circle_um(), light.distance_um);
@@ -213,8 +213,9 @@ impl Lighting {
         PixelFrequencies::of(self.pixel_um).reported()
     }
 
-    fn window(&self, lattice: Lattice) -> Window {
-        Window::about(self.at_um, lattice.pitch_um(), self.samples, self.distance_um)
+    fn window(&self, lattice: Lattice, radius_um: f64, wavelength_um: f64) -> Window {
+        let pitches = (lattice.pitch_um(), self.samples);
+        Window::of_psf(self.at_um, pitches, (radius_um, self.distance_um), wavelength_um)
     }
 }
 

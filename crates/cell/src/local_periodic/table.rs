@@ -1,4 +1,4 @@
-//! The library of a cell: complex transmission by width and wavelength, made once and kept.
+//! Table of a cell in the local periodic approximation: complex transmission by width and wavelength, made once and cached.
 
 use std::path::{Path, PathBuf};
 

@@ -1,9 +1,9 @@
 //! Measured spectra: reflectance of film stacks against a reference, through an objective.
 
+mod film_reflectance;
 mod model;
 mod page;
 mod set;
-mod stack;
 
 pub use model::SpectrumModel;
 pub(crate) use page::figures;

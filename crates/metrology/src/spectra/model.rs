@@ -5,8 +5,8 @@ use metalith_rcwa::Material;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
+use super::film_reflectance::{Film, reflectance};
 use super::set::{SCALED_BY, SpectrumSet};
-use super::stack::{Film, reflectance};
 
 /// Gauss-Legendre nodes on (-1, 1) with their weights: the squared sine over the cone. Six nodes are exact to 1e-4 at 0.95.
 const NODES: [[f64; 2]; 6] = [

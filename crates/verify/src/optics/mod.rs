@@ -12,7 +12,7 @@ use metalith_cell::{Illumination, Incidence};
 use metalith_core::Progress;
 use metalith_core::Result;
 use metalith_design::phase::ElementPhase;
-use metalith_design::{CellIncidence, Design, Element, FieldAngle};
+use metalith_design::{CellIncidence, Design, Element, FieldAngle, LensSpec};
 use metalith_optics::{CaseOptics, ElementOptics, IncoherentFields, Placement, SimulationCase};
 use metalith_pillars::{Lattice, PillarRows};
 use metalith_wave::propagation::{incident, landing_um};
@@ -227,7 +227,7 @@ impl<'a> ElementSimulator<'a> {
             let wave = arriving(element, wavelength_um, MIDDLE)?;
             let fields = self.in_light(element, &wave, |light| read.cases[0].in_light(light, progress))?;
             let chief = landing_um(&element.wedge, &wave, sensor_um)?;
-            let window = Window::about(chief, self.lattice.pitch_um(), spec.window_samples, sensor_um);
+            let window = self.window(chief, lens, wavelength_um);
             let planes = FocusPlanes::usual(wavelength_um, lens.radius_um(), sensor_um);
             let psfs = fields.psfs_at(
                 window,
@@ -248,6 +248,16 @@ impl<'a> ElementSimulator<'a> {
         spec.wavelengths_um.par_iter().map(series).collect()
     }
 
+    fn window(&self, chief_um: [f64; 2], lens: &LensSpec, wavelength_um: f64) -> Window {
+        let pitches = (self.lattice.pitch_um(), self.design.verify.window_samples);
+        Window::of_psf(
+            chief_um,
+            pitches,
+            (lens.radius_um(), lens.focal_length_um),
+            wavelength_um,
+        )
+    }
+
     fn pair(
         &self,
         task: &Task<'_>,
@@ -259,12 +269,7 @@ impl<'a> ElementSimulator<'a> {
         let Task { field, wave, .. } = task;
         let wavelength_um = wave.wavelength_um;
         let chief = landing_um(&element.wedge, wave, lens.focal_length_um)?;
-        let window = Window::about(
-            chief,
-            self.lattice.pitch_um(),
-            spec.window_samples,
-            lens.focal_length_um,
-        );
+        let window = self.window(chief, lens, wavelength_um);
         let fold = FoldedPropagator::plan(self.lattice, lens.radius_um(), wavelength_um, window, self.accuracy)?;
         let fold = match self.part_bytes {
             Some(bytes) => fold.within(bytes),

@@ -200,7 +200,7 @@ fn method(page: &mut Page, design: &Design, found: &Verification) {
         found.design, found.design_digest, found.accuracy, count(relabelled),
     ));
     page.paragraph(format!(
-        "Simulation model: `{}`, for light {}. Wavelengths: {} nm. Windows: {} x {} samples, one pitch apart, about the chief ray. Sensor pixels: {} um.",
+        "Simulation model: `{}`, for light {}. Wavelengths: {} nm. Windows: {} x {} pitches about the chief ray; samples are a pitch apart, or an equal part of one that is at most lambda / (4 NA). Sensor pixels: {} um.",
         found.fidelity,
         match design.verify.incidence {
             CellIncidence::Normal if found.fidelity == Fidelity::Neighbours => {

@@ -33,6 +33,20 @@ impl Window {
         }
     }
 
+    /// Window of a PSF, as wide as `pitches` pitches of the lattice, with a sample exactly at `point_um`, for light of an aperture
+    /// of this radius (um). The step is a pitch, or an equal part of one: the intensity has frequencies up to 2 NA / lambda, and
+    /// is known between samples only if these are at most lambda / (4 NA) apart (sampling theorem).
+    pub fn of_psf(
+        point_um: [f64; 2],
+        (pitch_um, pitches): (f64, usize),
+        (radius_um, distance_um): (f64, f64),
+        wavelength_um: f64,
+    ) -> Self {
+        let aperture = radius_um / radius_um.hypot(distance_um);
+        let parts = (4.0 * aperture * pitch_um / wavelength_um).ceil().max(1.0);
+        Self::about(point_um, pitch_um / parts, pitches * parts as usize, distance_um)
+    }
+
     /// Place of sample `i` of an axis (0 for x, 1 for y) from the element's centre (um).
     pub fn coordinate_um(&self, axis: usize, i: usize) -> f64 {
         self.centre_um[axis] + (i as f64 - 0.5 * (self.samples as f64 - 1.0)) * self.step_um
