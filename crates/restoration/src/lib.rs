@@ -11,7 +11,7 @@
 //! | what is known of pictures beforehand | `scene_statistics` |
 //! | which methods there are | `method` |
 //! | Tikhonov: the most likely picture where light is normal, as a Wiener filter has it | `tikhonov` |
-//! | total variation, by the alternating direction method of multipliers | `total_variation`, `slopes` |
+//! | total variation, by the alternating direction method of multipliers | `total_variation`, `slope_split` |
 //! | Richardson and Lucy | `richardson_lucy` |
 //! | half-quadratic splitting with any denoiser | `half_quadratic`, `denoiser` |
 //! | denoisers for it: least total variation, and the learnt prior | `slope_denoiser`, `learned` |
