@@ -22,6 +22,13 @@ const WIDE_MAP: f64 = 4.0;
 /// Area of the opening beside the lens, in parts of the lens.
 const WIDE_MARGIN: f64 = 0.6;
 
+/// Share of a wavelength by which the nearest wavelength of [verify] may be off the phase: a lens moves its focus by this share of the
+/// focal length.
+const VERIFIED_NEAR: f64 = 0.05;
+
+/// Sine of the marginal ray beyond which neither the scalar field nor the local periodic approximation is proven.
+const MOST_SINE: f64 = 0.9;
+
 /// Wavelengths that differ by less are one (um): the rounding of a file.
 const ROUNDING_UM: f64 = 1e-7;
 
@@ -33,6 +40,7 @@ impl Design {
     pub fn warnings(&self) -> Result<Vec<Warning>> {
         let mut found = self.mapping_warnings();
         found.extend(self.wavelengths_differ());
+        found.extend(self.beyond_scalar());
         found.extend(self.unwrapped_tables());
         found.extend(self.out_of_focus());
         found.extend(self.wide_maps());
@@ -54,7 +62,7 @@ impl Design {
         self.mapping.identity.warnings(&own).collect()
     }
 
-    /// Wavelengths of phase, mapping and wedges that are not one.
+    /// Wavelengths of phase, mapping and wedges that are not one, or are not near those of [verify].
     fn wavelengths_differ(&self) -> Option<Warning> {
         let elements = self.elements();
         let lenses = elements.iter().map(|e| self.lens_of(e));
@@ -70,10 +78,23 @@ impl Design {
         let wedges: Vec<f64> = distinct(wedges.map(|wedge| wedge.wavelength_um));
         let mapping = vec![self.mapping.wavelength_um];
         let all = distinct([&phases, &mapping, &wedges].into_iter().flatten().copied());
-        if all.len() < 2 {
+        let verified = distinct(self.verify.wavelengths_um.iter().copied());
+        let band = [verified.first(), verified.last()];
+        let is_near = |um: &f64| match band {
+            [Some(first), Some(last)] => (first * (1.0 - VERIFIED_NEAR)..=last * (1.0 + VERIFIED_NEAR)).contains(um),
+            _ => true,
+        };
+        let is_verified = phases.is_empty() || phases.iter().any(is_near);
+        if all.len() < 2 && is_verified {
             return None;
         }
-        let named = [("phase", phases), ("mapping", mapping), ("wedges", wedges)];
+        let far = if is_verified { Vec::new() } else { verified };
+        let named = [
+            ("verify", far),
+            ("phase", phases),
+            ("mapping", mapping),
+            ("wedges", wedges),
+        ];
         let named: Vec<String> = named
             .into_iter()
             .filter(|(_, um)| !um.is_empty())
@@ -88,8 +109,24 @@ impl Design {
                 "parts of the design are for different wavelengths: {}",
                 named.join("; ")
             ),
-            "use one wavelength in [phase], [mapping] and [array], unless this is meant",
+            "use one wavelength in [phase], [mapping], [array] and [verify], unless this is meant",
         ))
+    }
+
+    /// A lens whose marginal ray is steeper than the simulation is proven for.
+    fn beyond_scalar(&self) -> Option<Warning> {
+        let sine = |lens: &LensSpec| lens.radius_um() / lens.radius_um().hypot(lens.focal_length_um);
+        let most = self.lenses().into_iter().map(sine).fold(0.0, f64::max);
+        (most > MOST_SINE).then(|| {
+            Warning::new(
+                "design/na-beyond-scalar",
+                format!(
+                    "the marginal ray has a sine of {most:.3}: beyond {MOST_SINE} neither the scalar field nor the local periodic \
+                     approximation is proven"
+                ),
+                "use a longer focal length or a smaller diameter, or simulate the lens with a solver of the whole vector field",
+            )
+        })
     }
 
     /// Pillars that are not where the lattice has them, because the grid of the files is too coarse.
@@ -357,7 +394,38 @@ mod tests {
     fn wavelengths_that_differ_are_named() {
         let found = warned("tio2_532", &[("wavelength_nm = 532", "wavelength_nm = 633")]);
         let found = found.iter().find(|w| w.id == "design/wavelengths-differ").unwrap();
-        assert!(found.what.ends_with("phase 633 nm; mapping 532 nm"), "{found}");
+        assert!(
+            found.what.ends_with("verify 532 nm; phase 633 nm; mapping 532 nm"),
+            "{found}"
+        );
+    }
+
+    #[test]
+    fn wavelengths_that_the_phase_is_not_for_are_named() {
+        let at = |list: &str| {
+            warned(
+                "tio2_532",
+                &[("wavelengths_nm = [532]", &format!("wavelengths_nm = {list}"))],
+            )
+        };
+        let found = at("[633]");
+        let found = found.iter().find(|w| w.id == "design/wavelengths-differ").unwrap();
+        assert!(
+            found.what.ends_with("verify 633 nm; phase 532 nm; mapping 532 nm"),
+            "{found}"
+        );
+        for near in ["[532]", "[540]", "[450, 650]"] {
+            assert!(!ids(&at(near)).contains(&"design/wavelengths-differ"), "{near}");
+        }
+    }
+
+    #[test]
+    fn a_marginal_ray_beyond_the_scalar_field_is_named() {
+        // 40 um over hypot(40 um, 15 um) is 0.936.
+        let found = warned("tio2_532", &[("focal_length_um = 80", "focal_length_um = 15")]);
+        let found = found.iter().find(|w| w.id == "design/na-beyond-scalar").unwrap();
+        assert!(found.what.contains("a sine of 0.936"), "{found}");
+        assert!(!ids(&warned("tio2_532", &[])).contains(&"design/na-beyond-scalar"));
     }
 
     #[test]

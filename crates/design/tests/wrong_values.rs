@@ -27,8 +27,8 @@ const DESIGNS: [(&str, &[(&str, &str)]); 10] = [
             ("[layout]\n", "[layout]\ncircle_chord_error_nm = 0.5\n"),
             (
                 "[verify.limits]",
-                "[verify.limits]\nmapping_phase_rms_max_rad = 0.3\nstrehl_ratio_min = 0.5\ncentroid_shift_max_um = 1.0\n\
-                 mtf_difference_max = 0.05\npsf_difference_max = 0.5\npolychromatic_mtf_min = 0.05\npolychromatic_mtf_lp_mm = 40\n\
+                "[verify.limits]\nmapping_phase_rms_max_rad = 0.3\nstrehl_ratio_min = 0.5\nstrehl_min = 0.5\n\
+                 centroid_shift_max_um = 1.0\nmtf_difference_max = 0.05\npsf_difference_max = 0.5\npolychromatic_mtf_min = 0.05\npolychromatic_mtf_lp_mm = 40\n\
                  polychromatic_energy_2_pixels_min = 0.05\nrounding_phase_rms_max_rad = 0.05",
             ),
         ],

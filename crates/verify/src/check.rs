@@ -140,16 +140,29 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             checks.push(at_most(format!("{name}, {place}"), key, reached, limit));
         }
     }
-    if limits.strehl_ratio_min > 0.0
-        && let Some((place, least)) = worst(spots().map(|(place, s)| (place, -s.strehl_ratio())))
-    {
-        checks.push(Check {
-            what: format!("Strehl ratio of the layout over the Strehl ratio of the target, {place}"),
-            key: "strehl_ratio_min",
-            reached: -least,
-            limit: limits.strehl_ratio_min,
-            sense: Sense::AtLeast,
-        });
+    let strehls: [Optical<'_>; 2] = [
+        (
+            "Strehl ratio of the layout over the Strehl ratio of the target",
+            "strehl_ratio_min",
+            limits.strehl_ratio_min,
+            &|s| s.strehl_ratio(),
+        ),
+        ("Strehl ratio of the layout", "strehl_min", limits.strehl_min, &|s| {
+            s.judged().metrics.strehl
+        }),
+    ];
+    for (name, key, limit, reached) in strehls {
+        if limit > 0.0
+            && let Some((place, least)) = worst(spots().map(|(place, s)| (place, -reached(s))))
+        {
+            checks.push(Check {
+                what: format!("{name}, {place}"),
+                key,
+                reached: -least,
+                limit,
+                sense: Sense::AtLeast,
+            });
+        }
     }
     let told = found.camera.as_ref().map(|c| c.frequencies().half_nyquist_lp_mm);
     let contrast_lp_mm = limits.polychromatic_mtf_lp_mm.or(told).unwrap_or(f64::NAN);
@@ -204,6 +217,7 @@ fn not_simulated(limits: &LimitSpec, why: &str) -> Vec<Check> {
     ];
     let least = [
         ("strehl_ratio_min", limits.strehl_ratio_min),
+        ("strehl_min", limits.strehl_min),
         ("polychromatic_mtf_min", limits.polychromatic_mtf_min),
         (
             "polychromatic_energy_2_pixels_min",

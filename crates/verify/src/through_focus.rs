@@ -2,7 +2,7 @@
 
 use metalith_core::part;
 use metalith_report::{Cell, Column, Figure, ImageGrid, Table, sig};
-use metalith_wave::psf::ThroughFocus;
+use metalith_wave::psf::{LEAST_STREHL, ThroughFocus};
 
 use super::lens_figures::{focus_cells, focus_columns};
 
@@ -21,6 +21,10 @@ pub fn focal_length_words(series: &ThroughFocus) -> String {
             "focal length {} um (planes {} um apart)",
             sig(um, 5),
             sig(series.plane_spacing_um, 3)
+        ),
+        None if series.greatest_strehl() < LEAST_STREHL => format!(
+            "no focus with a Strehl ratio of {LEAST_STREHL} or more between {first} and {last} um: at most {}",
+            sig(series.greatest_strehl(), 2)
         ),
         None => format!("no focus between {first} and {last} um"),
     }
@@ -57,7 +61,7 @@ pub(super) fn table<'a>(name: &str, all: impl IntoIterator<Item = (String, &'a T
         }
     }
     table.caption(
-        "Planes along z, counted from the pillar tops. Strehl ratios of all planes are against the ideal PSF in the plane of the sensor. The focal length found through focus is the z of the greatest Strehl ratio, by a parabola through the greatest and its two neighbours. It is known to half of the distance of the planes.",
+        "Planes along z, counted from the pillar tops. Strehl ratios of all planes are against the ideal PSF in the plane of the sensor. The focal length found through focus is the z of the greatest Strehl ratio, by a parabola through the greatest and its two neighbours. It is known to half of the distance of the planes. A Strehl ratio below 0.1 is no focus.",
     )
 }
 

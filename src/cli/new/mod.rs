@@ -29,6 +29,9 @@ const MOST_SIDES: u32 = 190;
 /// Finer than this no writer places an edge of metal (nm).
 const FINEST_CHORD_NM: f64 = 5.0;
 
+/// Shorter wavelengths are micrometres (nm).
+const SHORTEST_NM: f64 = 10.0;
+
 /// Steering of arrays where nobody says another (degrees).
 const STEERING_DEG: f64 = 15.0;
 
@@ -317,6 +320,16 @@ pub(crate) fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
             "give another name, or move the file away",
         ));
     }
+    if let Some(nm) = args.wavelength_nm
+        && nm > 0.0
+        && nm < SHORTEST_NM
+    {
+        return Err(Error::refused(
+            "new/out-of-range",
+            format!("a lens for {nm} nm"),
+            format!("nanometres are meant: {}?", (nm * 1e6).round() / 1e3),
+        ));
+    }
     let name = args.design.file_stem().unwrap_or_default().to_string_lossy();
     if let Some(like) = &args.like {
         let rescaled = |text| args.rescaled(text, &args.design, terminal);
@@ -328,7 +341,8 @@ pub(crate) fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let text = args.text(&name, &args.cell(terminal)?);
     // What cannot be is said before a file stands there.
-    Design::parse_without_library(&args.design, &text)?;
+    let design = Design::parse_without_library(&args.design, &text)?;
+    terminal.warnings(&design.warnings()?);
     AtomicFile::write(&args.design, text.as_bytes())?;
     print_line!("{}", args.design.display());
     print_line!("next: metalith run {}", args.design.display());

@@ -72,6 +72,8 @@ pub struct LimitSpec {
     pub rounding_phase_rms_max_rad: f64,
     /// Strehl of the layout over that of the unrounded design phase.
     pub strehl_ratio_min: f64,
+    /// Strehl ratio of the layout, against the ideal PSF.
+    pub strehl_min: f64,
     /// Distance of the centroids (um).
     pub centroid_shift_max_um: f64,
     /// Largest difference of the MTF at half and at all of the finest frequency that the pixels tell.
@@ -232,6 +234,7 @@ impl LimitSpec {
             mapping_phase_rms_max_rad: 0.3,
             rounding_phase_rms_max_rad: 0.05,
             strehl_ratio_min: 0.0,
+            strehl_min: 0.0,
             centroid_shift_max_um: f64::MAX,
             mtf_difference_max: f64::MAX,
             psf_difference_max: f64::MAX,
@@ -264,6 +267,7 @@ impl LimitSpec {
             limits.rounding_phase_rms_max_rad,
         );
         limits.strehl_ratio_min = within("strehl_ratio_min", 2.0, "", limits.strehl_ratio_min);
+        limits.strehl_min = within("strehl_min", 1.0, "", limits.strehl_min);
         limits.centroid_shift_max_um = real("centroid_shift_max_um", "um", limits.centroid_shift_max_um);
         limits.mtf_difference_max = within("mtf_difference_max", 1.0, "", limits.mtf_difference_max);
         limits.psf_difference_max = real("psf_difference_max", "", limits.psf_difference_max);

@@ -3,7 +3,7 @@
 /// What catches wrong values or why they are legitimate, and the values: key and factor.
 pub(crate) const LEGITIMATE: &str = r"
 legitimate: a range that the mapping does not use; `metalith check` holds what is drawn to the process | cell.width_min_nm / 10
-legitimate: the hyperbola follows, and a lens may have any NA that its lattice carries | lens.focal_length_um x 10, lens.focal_length_um / 10
+legitimate: the hyperbola follows, and a lens may have any NA that its lattice carries | lens.focal_length_um x 10
 legitimate: a number names a layer, two purposes on one are refused | layers.pillars.layer / 10, layers.pillar_marks.layer x 10, layers.pillar_marks.layer / 10, layers.apertures.layer x 10, layers.apertures.layer / 10
 legitimate: a number names a layer, two purposes on one are refused | layers.aperture_marks.layer x 10, layers.aperture_marks.layer / 10, layers.outline.layer x 10, layers.label.layer x 10
 legitimate: the opening still holds all pillars | apertures.margin_um / 10
@@ -13,7 +13,7 @@ legitimate: other field angles | verify.field_x_deg / 10
 legitimate: a larger window, at the cost of time | verify.window_samples x 10
 legitimate: another sensor; reports state the pixel | verify.pixel_um x 10, verify.pixel_um / 10
 legitimate: a stricter limit | verify.limits.mapping_phase_rms_max_rad / 10
-legitimate: a limit is the choice of a designer, and the verdict states it | verify.limits.strehl_ratio_min / 10, verify.limits.centroid_shift_max_um x 10, verify.limits.centroid_shift_max_um / 10
+legitimate: a limit is the choice of a designer, and the verdict states it | verify.limits.strehl_ratio_min / 10, verify.limits.strehl_min / 10, verify.limits.centroid_shift_max_um x 10, verify.limits.centroid_shift_max_um / 10
 legitimate: a limit is the choice of a designer, and the verdict states it | verify.limits.mtf_difference_max x 10, verify.limits.mtf_difference_max / 10, verify.limits.psf_difference_max x 10
 legitimate: a limit is the choice of a designer, and the verdict states it | verify.limits.psf_difference_max / 10, verify.limits.polychromatic_mtf_min x 10, verify.limits.polychromatic_mtf_min / 10
 legitimate: a limit is the choice of a designer, and the verdict states it | verify.limits.polychromatic_mtf_lp_mm x 10, verify.limits.polychromatic_mtf_lp_mm / 10, verify.limits.polychromatic_energy_2_pixels_min x 10

@@ -34,7 +34,7 @@ pub use metrics::{FocusMetrics, PsfMetrics};
 pub use mtf::{PixelFrequencies, pixel_mtf};
 pub use orders::order_shares;
 pub use polychromatic::{BandPart, BandSample, Polychromatic, band_otf, polychromatic};
-pub use through_focus::{FOCUS_PLANES, FocusPlane, FocusPlanes, ThroughFocus, depth_of_focus_um};
+pub use through_focus::{FOCUS_PLANES, FocusPlane, FocusPlanes, LEAST_STREHL, ThroughFocus, depth_of_focus_um};
 pub use width::{AIRY_FWHM, FOCUS_FWHM};
 
 /// |E|^2 / |E_inc|^2 on a window of the sensor's plane, E_inc in the medium of incidence.

@@ -15,6 +15,10 @@ const FOCUS_RANGE: f64 = 2.0;
 /// Most of the distance to the sensor that the usual range takes on each side.
 const MOST_OF_DISTANCE: f64 = 0.5;
 
+/// Least Strehl ratio of a focus: without one, small lenses have interference of up to 0.03 somewhere in a window, and a focus that is
+/// so weak sends most of its light elsewhere.
+pub const LEAST_STREHL: f64 = 0.1;
+
 /// Depth of focus of an ideal lens of this radius at this distance (um): the wavelength over the square of the numerical
 /// aperture. Half of it off focus the peak is 81 % of the peak in focus.
 pub fn depth_of_focus_um(wavelength_um: f64, radius_um: f64, distance_um: f64) -> f64 {
@@ -78,7 +82,7 @@ pub struct ThroughFocus {
     pub plane_spacing_um: f64,
     /// Focal length found through focus (um): the distance at which the Strehl ratio is greatest, by a parabola through the
     /// greatest and its neighbours. It lies within half a spacing of the plane of the greatest. None if that is the first or the
-    /// last plane.
+    /// last plane, or if the Strehl ratio there is below [`LEAST_STREHL`].
     pub focal_length_um: Option<f64>,
     pub planes: Vec<FocusPlane>,
     /// PSFs in the planes.
@@ -105,7 +109,7 @@ impl ThroughFocus {
             depth_of_focus_um: depth_of_focus_um(wavelength_um, radius_um, sensor_um),
             sensor_um,
             plane_spacing_um: spacing_um,
-            focal_length_um: greatest(&planes, spacing_um),
+            focal_length_um: greatest(&planes, spacing_um).filter(|_| greatest_strehl(&planes) >= LEAST_STREHL),
             planes,
             psfs,
         }
@@ -116,11 +120,21 @@ impl ThroughFocus {
         widths * (self.wavelength_um * self.depth_of_focus_um).sqrt()
     }
 
+    /// The greatest Strehl ratio of the planes.
+    pub fn greatest_strehl(&self) -> f64 {
+        greatest_strehl(&self.planes)
+    }
+
     /// Distances of the first and of the last plane (um).
     pub fn ends_um(&self) -> [f64; 2] {
         let ends = [self.planes.first(), self.planes.last()];
         ends.map(|plane| plane.map_or(f64::NAN, |plane| plane.distance_um))
     }
+}
+
+/// The greatest Strehl ratio of some planes.
+fn greatest_strehl(planes: &[FocusPlane]) -> f64 {
+    planes.iter().map(|plane| plane.focus.strehl).fold(0.0, f64::max)
 }
 
 /// The place of the greatest peak by a parabola through it and its neighbours (um).
