@@ -11,7 +11,7 @@ use metalith_core::Result;
 use metalith_core::document::load;
 use metalith_design::Design;
 use metalith_drc::Deck;
-use metalith_pillars::{OutlineForm, PillarShape};
+use metalith_pillars::{DatabaseUnit, OutlineForm, PillarShape};
 
 /// The processes that ship with the program.
 static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../processes");
@@ -294,13 +294,14 @@ impl Process {
         (&self.path, &self.text)
     }
 
-    /// A deck of [`CheckSpec`].
+    /// A deck of [`CheckSpec`]; one of the program is on the grid of this database unit.
     ///
     /// # Errors
     /// With every mistake of the file.
-    pub(super) fn deck(&self, rules: &Path) -> Result<Deck> {
+    pub(super) fn deck(&self, rules: &Path, unit: DatabaseUnit) -> Result<Deck> {
         if self.standard {
-            Ok(Deck::shipped(rules).expect("tested with the process of the program"))
+            let deck = Deck::shipped(rules).expect("tested with the process of the program");
+            Ok(deck.on_grid(unit))
         } else {
             Deck::read(rules)
         }
@@ -343,7 +344,10 @@ mod tests {
                     let file = Path::new(env!("CARGO_MANIFEST_DIR"))
                         .join("../../rules")
                         .join(rules.file_name().unwrap());
-                    assert_eq!(name(process.deck(rules).unwrap()), name(Deck::read(&file).unwrap()));
+                    assert_eq!(
+                        name(process.deck(rules, DatabaseUnit::Nanometre).unwrap()),
+                        name(Deck::read(&file).unwrap())
+                    );
                 }
             }
             assert!(process.exposes_pillars());
