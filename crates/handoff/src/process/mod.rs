@@ -307,6 +307,24 @@ impl Process {
         }
     }
 
+    /// Words about the limits of a process of the program, which no lab has confirmed; none for another.
+    pub(super) fn origin(&self) -> &'static str {
+        if self.standard {
+            " (shipped; its limits are assumed: confirm them with the lab, change copies of both files, use --process)"
+        } else {
+            ""
+        }
+    }
+
+    /// The shipped process file to copy for a film that none is for: one with rules for pillars of this shape.
+    pub(super) fn template(shape: PillarShape) -> &'static str {
+        if shape.is_square() {
+            "processes/jbx6300_zep520a.toml"
+        } else {
+            "processes/jbx6300_tio2.toml"
+        }
+    }
+
     /// Description of what remains on the chip where the first step exposes.
     pub fn exposed_becomes(&self) -> &'static str {
         match (self.resist.tone, self.transfer.method) {
@@ -360,6 +378,11 @@ mod tests {
         let thin = Process::of_film("a_si_pierce_1972", 10.0);
         assert_eq!(thin.name, "jbx6300_asi");
         assert_eq!(Process::of_film("no film that is known", 600.0), Process::standard());
+        for shape in [PillarShape::Square, PillarShape::Circle, rectangles] {
+            let file = Path::new(Process::template(shape)).file_name().unwrap();
+            let template = Process::shipped(SHIPPED.get_file(file).unwrap());
+            assert!(template.checks.of_shape(shape).is_some());
+        }
         assert_eq!(Process::standard().resist.dose_uc_cm2, 280.0);
     }
 
