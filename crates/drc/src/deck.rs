@@ -14,7 +14,7 @@ use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::text::quoted;
 use metalith_design::Design;
 use metalith_gds::LayerNumber;
-use metalith_pillars::PillarShape;
+use metalith_pillars::{DatabaseUnit, PillarShape};
 
 /// The decks that ship with the program.
 static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../rules");
@@ -77,12 +77,33 @@ impl Deck {
     }
 
     /// The deck that a design is checked by where no other is named: [`Deck::standard`] for the cell that this is of, and where
-    /// there is no design, else that of the shape of its pillars.
+    /// there is no design, else that of the shape of its pillars, on the grid of its database unit.
     pub fn for_design(design: Option<&Design>) -> Self {
         match design {
-            Some(design) if !design.cell.is_of_the_paper() => Self::for_shape(design.cell.shape),
+            Some(design) if !design.cell.is_of_the_paper() => {
+                Self::for_shape(design.cell.shape).on_grid(design.cell.database_unit)
+            }
             _ => Self::standard(),
         }
+    }
+
+    /// The deck with this unit as the step of its `grid` rules where that is 1 nm.
+    ///
+    /// # Panics
+    /// Never: one number takes the place of another.
+    #[must_use]
+    pub fn on_grid(self, unit: DatabaseUnit) -> Self {
+        if unit.is_nanometre() {
+            return self;
+        }
+        let step = format!("nm = {}", unit.nm());
+        let mut in_grid_rule = false;
+        let lines = self.text.split('\n').map(|line| {
+            in_grid_rule = line == "check = \"grid\"" || in_grid_rule && line != "[[rule]]";
+            if in_grid_rule && line == "nm = 1" { &step } else { line }
+        });
+        let text = lines.collect::<Vec<_>>().join("\n");
+        Self::parse(&self.path, text).expect("a number for a number")
     }
 
     /// The deck of the program whose file has the name at the end of `path`, if there is one.
@@ -277,6 +298,26 @@ mod tests {
         for (name, shape) in PillarShape::CHOICES.into_iter().chain([("rectangle", rectangle)]) {
             let deck = Deck::for_shape(shape);
             assert!(deck.rules().iter().any(|r| r.check == name), "{name}: {}", deck.name);
+        }
+    }
+
+    /// Every shipped rule for the grid follows the database unit; nothing else changes.
+    #[test]
+    fn the_grid_of_a_deck_is_the_database_unit_of_the_design() {
+        for file in SHIPPED.files() {
+            let words = |unit| -> Vec<(String, String)> {
+                let deck = Deck::shipped(file.path()).unwrap().on_grid(unit);
+                let rules = deck.rules().iter();
+                rules.map(|r| (r.check.clone(), r.rule.words())).collect()
+            };
+            let changed = words(DatabaseUnit::Quarter);
+            for (known, new) in words(DatabaseUnit::Nanometre).into_iter().zip(changed) {
+                if known.0 == "grid" {
+                    assert_eq!(new.1, "vertices are on a grid of 0.25 nm");
+                } else {
+                    assert_eq!(new, known);
+                }
+            }
         }
     }
 

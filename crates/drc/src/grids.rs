@@ -76,6 +76,20 @@ impl GridRule {
         };
         off(p.x) || off(p.y)
     }
+
+    /// The violation; with the remedy where the database unit of the design is finer than the grid.
+    fn words_off(&self, what: &str, flat: &FlatLayout<'_>) -> String {
+        let unit_nm = flat.design.map(|design| design.cell.database_unit.nm());
+        let remedy = match unit_nm.filter(|&unit_nm| unit_nm < self.step_nm && unit_nm < 1.0) {
+            Some(unit_nm) => {
+                format!(
+                    ": the database unit of the design is {unit_nm} nm; if the writer can, set `nm = {unit_nm}` in this rule"
+                )
+            }
+            None => String::new(),
+        };
+        format!("a {what} off the grid of {} nm{remedy}", self.step_nm)
+    }
 }
 
 impl Rule for GridRule {
@@ -97,12 +111,12 @@ impl Rule for GridRule {
             for k in 0..loose.rects.len() {
                 let r = loose.rect(k);
                 if self.off(Point::new(r.x0, r.y0), flat.unit_nm) || self.off(Point::new(r.x1, r.y1), flat.unit_nm) {
-                    found.rect(&r, || format!("a corner off the grid of {} nm", self.step_nm));
+                    found.rect(&r, || self.words_off("corner", flat));
                 }
             }
             for p in &loose.polygons {
                 if p.iter().any(|&v| self.off(v, flat.unit_nm)) {
-                    found.at(p, || format!("a vertex off the grid of {} nm", self.step_nm));
+                    found.at(p, || self.words_off("vertex", flat));
                 }
             }
         }
@@ -121,7 +135,7 @@ impl GridRule {
                 };
                 let ends = [Point::new(r.x0, r.y0), Point::new(r.x1, r.y1)];
                 if tilted || ends.iter().any(|p| self.off(*p, flat.unit_nm)) {
-                    found.rect(&r, || format!("a corner off the grid of {} nm", self.step_nm));
+                    found.rect(&r, || self.words_off("corner", flat));
                 }
             });
         }

@@ -71,7 +71,7 @@ fn fill(
     let documents = documents::write(files, design, process, &layouts, &census)?;
     sources.keep(files)?;
     let subjects = rules::subjects(sources, &layouts, &opened);
-    let checked = rules::check(files, &subjects, sources.waivers.as_ref(), progress)?;
+    let checked = rules::check(files, &subjects, process, sources.waivers.as_ref(), progress)?;
     let mut checks = checked.checks;
     checks.push(verification(
         files,

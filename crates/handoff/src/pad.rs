@@ -1,5 +1,7 @@
 //! Pillars of uniform pads: outline, words, and what is measured of them.
 
+use std::collections::BTreeSet;
+
 use metalith_design::Design;
 use metalith_layout::PillarForm;
 use metalith_pillars::{PillarId, PillarShape, Rectangles, RotatedRectangles, UprightRectangles};
@@ -159,12 +161,16 @@ pub(super) fn dose_pads(design: &Design, process: &Process) -> Vec<PadPillar> {
         number,
         by_size: !design.cell.shape.has_one_size(),
     };
-    if let Some(numbers) = standing_for_all(design, &DOSE_ROTATIONS_DEG) {
+    let mut pads: Vec<PadPillar> = if let Some(numbers) = standing_for_all(design, &DOSE_ROTATIONS_DEG) {
         numbers.into_iter().map(pad).collect()
     } else {
         let widths = process.dose_matrix.pad_widths_nm.iter();
         widths.map(|&w| PadPillar::of_width(design, w)).collect()
-    }
+    };
+    // Several widths of the process may be nearest to the same one of the design.
+    let mut known = BTreeSet::new();
+    pads.retain(|pad| known.insert(pad.number));
+    pads
 }
 
 /// Numbers of rectangles that stand for all of a design: those with the rotations nearest to these (degrees), or some sizes; none
@@ -257,4 +263,21 @@ pub(super) fn legal_width(design: &Design, width_nm: f64) -> u16 {
         off(a).total_cmp(&off(b))
     });
     nearest.unwrap_or(design.cell.width_range_nm.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn widths_of_a_dose_matrix_that_are_equal_for_the_design_make_one_pad() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/mini_3x3.toml");
+        let design = Design::read(&path).unwrap();
+        let widest = f64::from(design.cell.width_range_nm.1);
+        let mut process = Process::standard();
+        process.dose_matrix.pad_widths_nm = vec![widest + 50.0, 200.0, widest + 90.0];
+        let widths: Vec<u16> = dose_pads(&design, &process).iter().map(|pad| pad.number).collect();
+        assert_eq!(widths, [legal_width(&design, widest), legal_width(&design, 200.0)]);
+    }
 }

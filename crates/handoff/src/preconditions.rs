@@ -31,7 +31,11 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
                 process.transfer.films.join(", "),
                 process.transfer.etch
             ),
-            "use a process file for this film, or, if its etch is right for it, add the film to `films` in [transfer]",
+            format!(
+                "copy {} within its folder, set `films = [\"{film}\"]` and `etch` in [transfer], confirm the limits of the rules that \
+                 [checks] names, and give the copy to --process",
+                Process::template(design.cell.shape)
+            ),
         ));
     }
     if let (false, Some([low, high])) = (
@@ -55,7 +59,13 @@ pub(super) fn fits(design: &Design, process: &Process) -> Result<()> {
             if design.cell.shape.is_square() {
                 "add `pillar_rules`, `dose_rules` and `test_rules` to [checks]".to_owned()
             } else {
-                format!("add a section [checks.{shapes}] with `pillar_rules`, `dose_rules` and `test_rules`")
+                let file = process.source().0.file_name().unwrap_or_default();
+                format!(
+                    "copy {} within its folder, add a section [checks.{shapes}] with `pillar_rules = \"../rules/{shapes}.toml\"`, \
+                     `dose_rules = \"../rules/dose_{shapes}.toml\"` and `test_rules = \"../rules/test_{shapes}.toml\"`, and give the \
+                     copy to --process",
+                    file.to_string_lossy()
+                )
             },
         ));
     }

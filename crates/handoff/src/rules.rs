@@ -8,11 +8,12 @@ use super::contents::{HandoffCheck, RuleReports};
 use super::inputs::Sources;
 use super::layouts::{Layouts, OfEach};
 use super::listing::Listing;
+use super::process::Process;
 use super::structures::{Structure, middle_of_reference};
 use metalith_core::{AtomicFile, Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
-use metalith_drc::{CheckInput, Date, Deck, DrcReport, Waiver, Waivers};
+use metalith_drc::{CheckInput, Date, Deck, DrcReport, Severity, Waiver, Waivers};
 use metalith_gds::Layout;
 use metalith_report::{Verdict, write_json};
 
@@ -103,6 +104,7 @@ pub(super) struct Checked {
 pub(super) fn check(
     files: &mut Listing,
     subjects: &[Subject<'_>],
+    process: &Process,
     accepted: Option<&Waivers>,
     progress: &dyn Progress,
 ) -> Result<Checked> {
@@ -123,7 +125,11 @@ pub(super) fn check(
         }
     }
     Ok(Checked {
-        checks: reports.iter().map(|(name, report)| summary(name, report)).collect(),
+        checks: reports
+            .iter()
+            .zip(subjects)
+            .map(|((name, report), subject)| summary(name, report, subject.deck, process))
+            .collect(),
         reports,
     })
 }
@@ -224,7 +230,7 @@ fn warn_once(reports: &mut RuleReports) {
     }
 }
 
-fn summary(name: &str, report: &DrcReport) -> HandoffCheck {
+fn summary(name: &str, report: &DrcReport, deck: &Deck, process: &Process) -> HandoffCheck {
     let waived: u64 = report.rules.iter().map(|r| r.waived).sum();
     let mut words = format!(
         "{} rules, {} violations, {waived} waived",
@@ -233,6 +239,21 @@ fn summary(name: &str, report: &DrcReport) -> HandoffCheck {
     );
     if report.not_run() > 0 {
         words.push_str(&format!(", {} rules did not run", report.not_run()));
+    }
+    let broken = report
+        .rules
+        .iter()
+        .filter(|r| r.severity > Severity::Note && r.open() > 0);
+    let broken: Vec<&str> = broken.map(|r| r.id.as_str()).collect();
+    if !broken.is_empty() {
+        let (file, _) = deck.source();
+        words.push_str(&format!(
+            ": {} in {}, which [checks] of process {} names{}",
+            broken.join(", "),
+            file.file_name().unwrap_or_default().to_string_lossy(),
+            process.name,
+            process.origin()
+        ));
     }
     HandoffCheck {
         name: format!("design rules, {}", name.replace('_', " ")),

@@ -11,7 +11,7 @@ use metalith_core::Result;
 use metalith_core::document::load;
 use metalith_design::Design;
 use metalith_drc::Deck;
-use metalith_pillars::{OutlineForm, PillarShape};
+use metalith_pillars::{DatabaseUnit, OutlineForm, PillarShape};
 
 /// The processes that ship with the program.
 static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../processes");
@@ -294,15 +294,34 @@ impl Process {
         (&self.path, &self.text)
     }
 
-    /// A deck of [`CheckSpec`].
+    /// A deck of [`CheckSpec`]; one of the program is on the grid of this database unit.
     ///
     /// # Errors
     /// With every mistake of the file.
-    pub(super) fn deck(&self, rules: &Path) -> Result<Deck> {
+    pub(super) fn deck(&self, rules: &Path, unit: DatabaseUnit) -> Result<Deck> {
         if self.standard {
-            Ok(Deck::shipped(rules).expect("tested with the process of the program"))
+            let deck = Deck::shipped(rules).expect("tested with the process of the program");
+            Ok(deck.on_grid(unit))
         } else {
             Deck::read(rules)
+        }
+    }
+
+    /// Words about the limits of a process of the program, which no lab has confirmed; none for another.
+    pub(super) fn origin(&self) -> &'static str {
+        if self.standard {
+            " (shipped; its limits are assumed: confirm them with the lab, change copies of both files, use --process)"
+        } else {
+            ""
+        }
+    }
+
+    /// The shipped process file to copy for a film that none is for: one with rules for pillars of this shape.
+    pub(super) fn template(shape: PillarShape) -> &'static str {
+        if shape.is_square() {
+            "processes/jbx6300_zep520a.toml"
+        } else {
+            "processes/jbx6300_tio2.toml"
         }
     }
 
@@ -343,7 +362,10 @@ mod tests {
                     let file = Path::new(env!("CARGO_MANIFEST_DIR"))
                         .join("../../rules")
                         .join(rules.file_name().unwrap());
-                    assert_eq!(name(process.deck(rules).unwrap()), name(Deck::read(&file).unwrap()));
+                    assert_eq!(
+                        name(process.deck(rules, DatabaseUnit::Nanometre).unwrap()),
+                        name(Deck::read(&file).unwrap())
+                    );
                 }
             }
             assert!(process.exposes_pillars());
@@ -356,6 +378,11 @@ mod tests {
         let thin = Process::of_film("a_si_pierce_1972", 10.0);
         assert_eq!(thin.name, "jbx6300_asi");
         assert_eq!(Process::of_film("no film that is known", 600.0), Process::standard());
+        for shape in [PillarShape::Square, PillarShape::Circle, rectangles] {
+            let file = Path::new(Process::template(shape)).file_name().unwrap();
+            let template = Process::shipped(SHIPPED.get_file(file).unwrap());
+            assert!(template.checks.of_shape(shape).is_some());
+        }
         assert_eq!(Process::standard().resist.dose_uc_cm2, 280.0);
     }
 

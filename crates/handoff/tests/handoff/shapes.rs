@@ -276,9 +276,9 @@ fn a_process_without_rules_for_a_shape_is_refused() {
     };
     let error = handoff(&options, &Silent).unwrap_err();
     assert_eq!(error.id(), "handoff/no-rules-for-pillars");
-    insta::assert_snapshot!(error, @"
+    insta::assert_snapshot!(error, @r#"
     the pillars of the design are circles, and the process has no decks of rules for them
-      help: add a section [checks.circles] with `pillar_rules`, `dose_rules` and `test_rules`
-    ");
+      help: copy process.toml within its folder, add a section [checks.circles] with `pillar_rules = "../rules/circles.toml"`, `dose_rules = "../rules/dose_circles.toml"` and `test_rules = "../rules/test_circles.toml"`, and give the copy to --process
+    "#);
     assert!(!out.exists());
 }

@@ -86,7 +86,7 @@ fn film_and_process_must_agree() {
     assert_eq!(error.id(), "handoff/film-material-differs");
     insta::assert_snapshot!(error, @r#"
     the film of the design is "alumina_malitson_dodge_1972", but the process etches sin_luke_2015, sin_philipp_1973: reactive ion etch of silicon nitride, stopped on fused silica
-      help: use a process file for this film, or, if its etch is right for it, add the film to `films` in [transfer]
+      help: copy processes/jbx6300_zep520a.toml within its folder, set `films = ["alumina_malitson_dodge_1972"]` and `etch` in [transfer], confirm the limits of the rules that [checks] names, and give the copy to --process
     "#);
     assert!(!options.out.exists());
 }
