@@ -423,8 +423,7 @@ mod tests {
     fn a_marginal_ray_beyond_the_scalar_field_is_named() {
         // 40 um over hypot(40 um, 15 um) is 0.936.
         let found = warned("tio2_532", &[("focal_length_um = 80", "focal_length_um = 15")]);
-        let found = found.iter().find(|w| w.id == "design/na-beyond-scalar").unwrap();
-        assert!(found.what.contains("a sine of 0.936"), "{found}");
+        assert!(ids(&found).contains(&"design/na-beyond-scalar"), "{found:?}");
         assert!(!ids(&warned("tio2_532", &[])).contains(&"design/na-beyond-scalar"));
     }
 

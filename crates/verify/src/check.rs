@@ -46,16 +46,19 @@ impl Check {
     }
 }
 
-/// All limits, each with the worst over elements, wavelengths and field angles. Limits that a design does
-/// not set are not listed.
-pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
-    let at_most = |what: String, key, reached, limit| Check {
+fn at_most(what: String, key: &'static str, reached: f64, limit: f64) -> Check {
+    Check {
         what,
         key,
         reached,
         limit,
         sense: Sense::AtMost,
-    };
+    }
+}
+
+/// All limits, each with the worst over elements, wavelengths and field angles. Limits that a design does
+/// not set are not listed.
+pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
     let wrong: u64 = found.elements.iter().map(|e| e.widths.faults()).sum();
     let mut checks = Vec::new();
     // Pillars as fabricated, or moved on purpose, are not those of the mapping.
