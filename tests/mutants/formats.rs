@@ -191,10 +191,7 @@ fn designs(folder: &Path) -> Vec<Format> {
             "unit cells as text",
             folder.join("cells.txt"),
             Kind::Text,
-            vec![
-                b"radius (m), abs(S21), angle(S21)\n5e-8,0.9,0.1\n6e-8,0.9,0.8\n7e-8,0.9,1.7\n8e-8,0.9,2.8\n".to_vec(),
-                b"width,f,t\n0.1,4.8e14,(0.9+0.1j)\n0.12,4.8e14,(0.5+0.7j)\n0.14,4.8e14,(-0.3+0.9j)\n0.16,4.8e14,(-0.9+0.2j)\n".to_vec(),
-            ],
+            cells_as_text(),
             unit_cells,
         ),
         Format::new(
@@ -205,6 +202,18 @@ fn designs(folder: &Path) -> Vec<Format> {
             Material::read_csv,
         ),
     ]
+}
+
+/// Unit cells of pillars from 100 to 160 nm whose phase rises by half a wave, in the columns of two programs.
+fn cells_as_text() -> Vec<Vec<u8>> {
+    let mut texts = ["radius (m), abs(S21), angle(S21)\n", "width,f,t\n"].map(str::to_owned);
+    for k in 0..=15 {
+        let (nm, phase_rad) = (100.0 + 4.0 * f64::from(k), 0.2 * f64::from(k));
+        let [re, im] = [0.9 * phase_rad.cos(), 0.9 * phase_rad.sin()];
+        texts[0].push_str(&format!("{:e},0.9,{phase_rad}\n", 0.5e-9 * nm));
+        texts[1].push_str(&format!("{},{:e},({re}{im:+}j)\n", 1e-3 * nm, 299_792_458.0 / 0.62e-6));
+    }
+    texts.map(String::into_bytes).into()
 }
 
 /// Reads unit cells as a design does.
