@@ -90,6 +90,7 @@ pub fn verify(
             None => SimulationCases::of_cells(&cells)?,
         };
         let accuracy = if fast { Accuracy::Fast } else { Accuracy::Accurate };
+        let cases = cases.with_through_focus();
         let found = metalith::verify(design, &array, &layout, &cases, accuracy, p)?;
         if let Some(folder) = out {
             metalith::write_report(design, &array, &found, None, &folder)?;
