@@ -15,7 +15,7 @@ pub struct FoundEffect {
     /// 95 % interval of each value.
     pub interval: Value,
     pub parameters: Vec<String>,
-    /// The whole bench, or the kind of group that has values of its own.
+    /// The whole bench, or the kind of group that has separate values.
     pub of: String,
 }
 
@@ -191,8 +191,8 @@ impl Diagnosis {
                 .map(|t| Ranked {
                     name: effects[t.effect].name.clone(),
                     score: t.score,
-                    held_out_gain: t.gain.0,
-                    held_out_gain_interval: t.gain.1,
+                    held_out_gain: t.gain.value,
+                    held_out_gain_interval: t.gain.interval,
                     value: {
                         let slots = effects[t.effect].slots.iter().zip(&t.values);
                         one_or_list(slots.map(|(&s, v)| json!(shown(s, *v))).collect())

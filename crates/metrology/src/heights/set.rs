@@ -34,7 +34,7 @@ pub struct HeightField {
     pub measured: Array2<f32>,
     /// Number of its group.
     pub group: usize,
-    /// Whether it is fitted; if not, it judges.
+    /// True if it is fitted; if not, it judges.
     pub fitted: bool,
 }
 

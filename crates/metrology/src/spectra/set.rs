@@ -31,7 +31,7 @@ pub struct Spectrum {
     pub medium: usize,
     /// Reflectance at each wavelength of the set.
     pub reflectance: Vec<f64>,
-    /// Whether it is fitted; if not, it judges.
+    /// True if it is fitted; if not, it judges.
     pub fitted: bool,
 }
 

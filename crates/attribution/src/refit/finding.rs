@@ -1,0 +1,79 @@
+//! What a selection finds: effects with values and intervals, errors, and reasons for refusals.
+
+use crate::fit::Gain;
+
+/// Errors with some effects: what was fitted, what was left out, what was never fitted.
+#[derive(Clone, Debug)]
+pub struct RefitErrors {
+    /// Root mean square of the fitted residual.
+    pub fitted: f64,
+    /// Root mean square of the residual of measurements left out, in each way; none where nothing is predicted.
+    pub held_out: Vec<Option<f64>>,
+    /// Figures of merit of what was fitted, and of what was never fitted.
+    pub figures: [Vec<f64>; 2],
+    /// Mean square of each measurement when it was left out, in each way.
+    pub(super) own: Vec<Vec<Option<f64>>>,
+}
+
+/// Reason why an effect is not taken.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RefitRejection {
+    /// It lowers the mean square by so small a share.
+    Little(f64),
+    /// Measurements that were left out, in this way, are not surely predicted better.
+    Unsure(String),
+    /// It fits better, and predicts measurements worse that were left out: what they are, the error before and after.
+    Worse { what: String, before: f64, after: f64 },
+    /// The 95 % interval of its values includes those without it.
+    Nothing,
+    /// Its value is at the end of the physical range.
+    Unphysical,
+    /// It changes an effect that was not taken.
+    NoBase(String),
+}
+
+impl RefitRejection {
+    /// One clause for a person.
+    pub fn sentence(&self) -> String {
+        match self {
+            Self::Little(share) => format!("lowers the fitted mean square by {:.1} % only", 100.0 * share),
+            Self::Unsure(way) => format!("the 95 % interval of its gain includes zero where each {way} is left out"),
+            Self::Worse { what, before, after } => {
+                format!("fits better and predicts worse: {what} {before:.4} before, {after:.4} with it")
+            }
+            Self::Nothing => "the 95 % interval of its value includes no effect".into(),
+            Self::Unphysical => "its fitted value is at the end of its physical range".into(),
+            Self::NoBase(name) => format!("it changes `{name}`, which was not found"),
+        }
+    }
+}
+
+/// An effect as it was tried last.
+#[derive(Clone, Debug)]
+pub struct RefitTried {
+    pub effect: usize,
+    /// Share of the fitted mean square that it removes.
+    pub score: f64,
+    /// Gain in mean square of measurements left out, with the ends of its 95 % interval.
+    pub gain: Gain,
+    /// Values of its parameters.
+    pub values: Vec<f64>,
+    pub errors: RefitErrors,
+    /// None if it was taken.
+    pub rejected: Option<RefitRejection>,
+}
+
+/// Outcome of a selection.
+#[derive(Clone, Debug)]
+pub struct RefitFinding {
+    /// Effects in the order in which they were taken.
+    pub chosen: Vec<usize>,
+    /// Errors before, and after each of them.
+    pub ladder: Vec<RefitErrors>,
+    /// All effects as they were tried last, those taken first.
+    pub tried: Vec<RefitTried>,
+    /// Values of all parameters.
+    pub theta: Vec<f64>,
+    /// 95 % interval of each parameter; none of one that was not fitted.
+    pub intervals: Vec<Option<[f64; 2]>>,
+}

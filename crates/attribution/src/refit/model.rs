@@ -1,0 +1,103 @@
+//! What the owner of the measurements provides: effects, a forward model, and which measurements are fitted.
+
+use nalgebra::DMatrix;
+
+/// A parameter of an effect.
+#[derive(Clone, Debug)]
+pub struct RefitParameter {
+    pub name: String,
+    pub unit: &'static str,
+    /// Value without an effect.
+    pub neutral: f64,
+    /// Value that a fit starts from.
+    pub start: f64,
+    /// Physical limits.
+    pub range: (f64, f64),
+    /// Number that is shown for a value, rising with it: the width of a blur for its variance.
+    pub shown: fn(f64) -> f64,
+}
+
+/// An effect that may explain a residual.
+#[derive(Clone, Debug)]
+pub struct RefitEffect {
+    pub name: String,
+    /// Parameters, as slots of the model.
+    pub slots: Vec<usize>,
+    /// Effects that it changes, which must have been taken before.
+    pub after: Vec<usize>,
+    /// Way of leaving out whose groups have a value each, also those that are not fitted. It is tried after all others.
+    pub across: Option<usize>,
+}
+
+/// Normal equations of one measurement over active parameters and the residual, nuisances eliminated.
+pub struct RefitEquations {
+    /// Sums of squares that a fit minimises.
+    pub fit: DMatrix<f64>,
+    /// Sums of squares that a prediction is judged by.
+    pub judged: DMatrix<f64>,
+}
+
+impl RefitEquations {
+    /// Equations by which a prediction is fitted and judged alike.
+    pub fn alike(form: DMatrix<f64>) -> Self {
+        Self {
+            judged: form.clone(),
+            fit: form,
+        }
+    }
+}
+
+/// A forward model of measurements that is fitted in full for each candidate.
+pub trait RefitModel: Sync {
+    /// Parameters of all effects, by slot.
+    fn parameters(&self) -> &[RefitParameter];
+
+    /// Effects that are tried.
+    fn effects(&self) -> &[RefitEffect];
+
+    /// Number of measurements.
+    fn count(&self) -> usize;
+
+    /// Number of points of a measurement.
+    fn points(&self, measurement: usize) -> f64;
+
+    /// Normal equations of a measurement about parameter values.
+    fn equations(&self, measurement: usize, active: &[usize], theta: &[f64]) -> RefitEquations;
+
+    /// Names of the figures of merit that judge a prediction, each with its unit; smaller is better.
+    fn figure_names(&self) -> Vec<(&'static str, &'static str)>;
+
+    /// True if two effects at once are tried wherever none alone helps, and not only at the start: a fit must cost next to
+    /// nothing.
+    fn tries_pairs(&self) -> bool {
+        false
+    }
+
+    /// True if the figure of several measurements is their mean; otherwise it is the root of the mean square.
+    fn is_mean(&self, _figure: usize) -> bool {
+        false
+    }
+
+    /// Figures of merit of a measurement.
+    fn figures(&self, measurement: usize, theta: &[f64]) -> Vec<f64>;
+
+    /// True if a figure refuses an effect: it is of measurements that were never fitted, and the effect makes it worse.
+    fn decides(&self, figure: usize) -> bool;
+}
+
+/// A way of leaving measurements out.
+#[derive(Clone, Debug)]
+pub struct LeaveOut {
+    /// Common noun of a group: plate, field, height.
+    pub name: String,
+    /// Group of each measurement.
+    pub groups: Vec<usize>,
+}
+
+/// Roles of measurements.
+#[derive(Clone, Debug)]
+pub struct RefitPlan {
+    /// True for each measurement that is fitted; the others judge.
+    pub fitted: Vec<bool>,
+    pub ways: Vec<LeaveOut>,
+}

@@ -1,0 +1,363 @@
+//! The course of a selection: which effect is taken next, and why the others are refused.
+
+use metalith_core::{Progress, Result};
+
+use super::finding::{RefitErrors, RefitFinding, RefitRejection, RefitTried};
+use super::fit::State;
+use super::held_out::gain;
+use super::model::{RefitModel, RefitPlan};
+use crate::fit::Gain;
+
+/// Least share of the fitted mean square that an effect removes.
+const LEAST_SHARE: f64 = 0.004;
+
+/// A figure of measurements that were never fitted may grow by this share: rounding, and steps of a fit that end early.
+const MAY_GROW: f64 = 0.002;
+
+/// Two effects are taken at once if they gain by this share more than the best one alone.
+const PAIR_SHARE: f64 = 0.1;
+
+/// Steps of the fit of a candidate.
+const TRIAL_STEPS: usize = 5;
+
+/// Steps of the fit of what was taken.
+const TAKEN_STEPS: usize = 12;
+
+/// A model and the roles of its measurements.
+pub(super) struct Selection<'a> {
+    pub(super) model: &'a dyn RefitModel,
+    pub(super) plan: &'a RefitPlan,
+}
+
+/// State of a selection between two steps.
+struct Course {
+    now: State,
+    /// Effects in the order in which they were taken.
+    chosen: Vec<usize>,
+    /// Errors before, and after each of them.
+    ladder: Vec<RefitErrors>,
+    /// Each effect as it was tried last.
+    last: Vec<Option<RefitTried>>,
+}
+
+/// Errors of a fit, and the 95 % interval of each parameter.
+struct Judged {
+    errors: RefitErrors,
+    intervals: Vec<Option<[f64; 2]>>,
+}
+
+impl Selection<'_> {
+    /// The whole selection.
+    ///
+    /// # Errors
+    /// If the user stopped it.
+    pub(super) fn run(&self, progress: &dyn Progress) -> Result<RefitFinding> {
+        let neutral = self.model.parameters().iter().map(|p| p.neutral).collect();
+        let now = self.at(Vec::new(), neutral);
+        let mut course = Course {
+            ladder: vec![self.errors(&now)],
+            now,
+            chosen: Vec::new(),
+            last: vec![None; self.model.effects().len()],
+        };
+        while self.step(&mut course, progress)? {}
+        self.drop_redundant(&mut course);
+        let mut intervals = self.intervals(&course.now);
+        self.add_values_of_groups(&mut course, &mut intervals);
+        Ok(self.finding(course, intervals))
+    }
+
+    /// Take the effect, or the two, that predict most of what was left out; false if none is taken.
+    fn step(&self, course: &mut Course, progress: &dyn Progress) -> Result<bool> {
+        let effects = self.model.effects();
+        let open: Vec<usize> = (0..effects.len())
+            .filter(|e| effects[*e].across.is_none() && !course.chosen.contains(e) && self.has_base(*e, &course.chosen))
+            .collect();
+        progress.begin(&format!("effects, step {}", course.chosen.len() + 1), open.len() as u64);
+        let before = course.ladder[course.ladder.len() - 1].clone();
+        let mut best: Option<(State, RefitTried)> = None;
+        for &effect in &open {
+            progress.check_stopped()?;
+            progress.note(&effects[effect].name);
+            let state = self.fit(self.with(&course.now, effect), TRIAL_STEPS);
+            let tried = self.try_last(effect, &state, &before);
+            progress.advance(1);
+            if tried.rejected.is_none() && best.as_ref().is_none_or(|(_, most)| tried.gain.value > most.gain.value) {
+                best = Some((state, tried.clone()));
+            }
+            course.last[effect] = Some(tried);
+        }
+        if course.chosen.is_empty() || best.is_none() && self.model.tries_pairs() {
+            let least = best.as_ref().map_or(0.0, |(_, tried)| tried.gain.value);
+            if let Some((pair, state)) = self.pair(&course.now, &open, &before, least, progress)? {
+                let first = self.fit(self.with(&course.now, pair[0]), TAKEN_STEPS);
+                let both = self.fit(state, TAKEN_STEPS);
+                for (effect, state) in [(pair[0], &first), (pair[1], &both)] {
+                    let tried = self.try_last(effect, state, &before);
+                    course.chosen.push(effect);
+                    course.ladder.push(tried.errors.clone());
+                    course.last[effect] = Some(RefitTried {
+                        rejected: None,
+                        ..tried
+                    });
+                }
+                course.now = both;
+                return Ok(true);
+            }
+        }
+        let Some((state, tried)) = best else {
+            return Ok(false);
+        };
+        course.now = self.fit(state, TAKEN_STEPS);
+        let errors = self.errors(&course.now);
+        course.chosen.push(tried.effect);
+        course.last[tried.effect] = Some(RefitTried {
+            errors: errors.clone(),
+            values: self.values(tried.effect, &course.now.theta),
+            ..tried
+        });
+        course.ladder.push(errors);
+        Ok(true)
+    }
+
+    /// The two effects that predict most together what was left out, with their fit; none that gain less than `least` by so much
+    /// that one of them suffices, or that are refused.
+    fn pair(
+        &self,
+        now: &State,
+        open: &[usize],
+        before: &RefitErrors,
+        least: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<([usize; 2], State)>> {
+        let pairs: Vec<[usize; 2]> = { open.iter().enumerate() }
+            .flat_map(|(k, &b)| open[..k].iter().map(move |&a| [a, b]))
+            .collect();
+        progress.begin("pairs of effects", pairs.len() as u64);
+        let mut best: Option<(f64, [usize; 2], State)> = None;
+        for pair in pairs {
+            progress.check_stopped()?;
+            let state = self.fit(self.with(&self.with(now, pair[0]), pair[1]), TRIAL_STEPS);
+            progress.advance(1);
+            // Each of both must hold as if it were tried last.
+            let judged = self.judge(&state);
+            if pair
+                .iter()
+                .any(|&e| self.rejection(e, &state, &judged, before).is_some())
+            {
+                continue;
+            }
+            let gain = self
+                .gains(pair[0], &judged.errors, before)
+                .first()
+                .map_or(0.0, |(_, gain)| gain.value);
+            if gain > best.as_ref().map_or((1.0 + PAIR_SHARE) * least, |(most, ..)| *most) {
+                best = Some((gain, pair, state));
+            }
+        }
+        Ok(best.map(|(_, pair, state)| (pair, state)))
+    }
+
+    /// Drop effects that others made needless, one after the other.
+    fn drop_redundant(&self, course: &mut Course) {
+        let effects = self.model.effects();
+        while let Some(place) = self.redundant(&course.now, &course.chosen) {
+            let effect = course.chosen.remove(place);
+            course.ladder.remove(place + 1);
+            let (mut active, mut theta) = (course.now.active.clone(), course.now.theta.clone());
+            active.retain(|slot| !effects[effect].slots.contains(slot));
+            for &slot in &effects[effect].slots {
+                theta[slot] = self.model.parameters()[slot].neutral;
+            }
+            course.now = self.fit(self.at(active, theta), TAKEN_STEPS);
+            *course.ladder.last_mut().expect("the errors without effects") = self.errors(&course.now);
+            if let Some(tried) = &mut course.last[effect] {
+                tried.rejected = Some(RefitRejection::Nothing);
+            }
+        }
+    }
+
+    /// Place of an effect that others made needless: the intervals of its values include no effect, and none changes it.
+    fn redundant(&self, now: &State, chosen: &[usize]) -> Option<usize> {
+        let (effects, intervals) = (self.model.effects(), self.intervals(now));
+        chosen.iter().position(|&e| {
+            let is_base = chosen.iter().any(|&other| effects[other].after.contains(&e));
+            !is_base
+                && effects[e]
+                    .slots
+                    .iter()
+                    .all(|&slot| self.includes_neutral(slot, &intervals))
+        })
+    }
+
+    /// Take effects that have a value for each group.
+    fn add_values_of_groups(&self, course: &mut Course, intervals: &mut [Option<[f64; 2]>]) {
+        let effects = self.model.effects();
+        let across: Vec<usize> = (0..effects.len())
+            .filter(|&e| effects[e].across.is_some() && self.has_base(e, &course.chosen))
+            .collect();
+        for effect in across {
+            let (tried, theta, own) = self.by_group(effect, &course.now);
+            if tried.rejected.is_none() {
+                course.chosen.push(effect);
+                course.now = self.at(std::mem::take(&mut course.now.active), theta);
+                course.ladder.push(self.errors(&course.now));
+                effects[effect].slots.iter().for_each(|&s| intervals[s] = own[s]);
+            }
+            course.last[effect] = Some(tried);
+        }
+    }
+
+    /// An effect with a value for each group, fitted to all measurements with all else as it was found: no group predicts the
+    /// value of another, so those that were not fitted have theirs too. Single measurements of a group predict the others. With
+    /// the values of all parameters and their intervals.
+    fn by_group(&self, effect: usize, now: &State) -> (RefitTried, Vec<f64>, Vec<Option<[f64; 2]>>) {
+        let plan = RefitPlan {
+            fitted: vec![true; self.model.count()],
+            ways: self.plan.ways.clone(),
+        };
+        let all = Selection {
+            model: self.model,
+            plan: &plan,
+        };
+        let before = all.at(Vec::new(), now.theta.clone());
+        let after = all.fit(all.with(&before, effect), TRIAL_STEPS);
+        let judged = all.judge(&after);
+        let intervals = judged.intervals.clone();
+        let tried = all.tried(effect, &after, judged, &all.errors(&before));
+        (tried, after.theta, intervals)
+    }
+
+    fn finding(&self, course: Course, intervals: Vec<Option<[f64; 2]>>) -> RefitFinding {
+        let effects = self.model.effects();
+        let Course {
+            now,
+            chosen,
+            ladder,
+            mut last,
+        } = course;
+        let before = ladder.last().expect("the errors without effects");
+        let mut order = chosen.clone();
+        order.extend((0..effects.len()).filter(|e| !chosen.contains(e)));
+        let tried = order.into_iter().map(|e| {
+            let missing = effects[e].after.iter().find(|b| !chosen.contains(b));
+            last[e].take().unwrap_or_else(|| RefitTried {
+                effect: e,
+                score: 0.0,
+                gain: NO_GAIN,
+                values: self.values(e, &now.theta),
+                errors: before.clone(),
+                rejected: missing.map(|&b| RefitRejection::NoBase(effects[b].name.clone())),
+            })
+        });
+        RefitFinding {
+            tried: tried.collect(),
+            chosen,
+            ladder,
+            theta: now.theta,
+            intervals,
+        }
+    }
+
+    fn judge(&self, state: &State) -> Judged {
+        Judged {
+            errors: self.errors(state),
+            intervals: self.intervals(state),
+        }
+    }
+
+    /// An effect as if it were tried last.
+    fn try_last(&self, effect: usize, after: &State, before: &RefitErrors) -> RefitTried {
+        self.tried(effect, after, self.judge(after), before)
+    }
+
+    fn tried(&self, effect: usize, after: &State, judged: Judged, before: &RefitErrors) -> RefitTried {
+        let gains = self.gains(effect, &judged.errors, before);
+        RefitTried {
+            effect,
+            score: share_removed(before, &judged.errors),
+            gain: gains.first().map_or(NO_GAIN, |(_, gain)| *gain),
+            values: self.values(effect, &after.theta),
+            rejected: self.rejection(effect, after, &judged, before),
+            errors: judged.errors,
+        }
+    }
+
+    /// Gains in each way of leaving out that judges an effect.
+    fn gains(&self, effect: usize, errors: &RefitErrors, before: &RefitErrors) -> Vec<(usize, Gain)> {
+        let across = self.model.effects()[effect].across;
+        (0..self.plan.ways.len())
+            .filter(|&w| Some(w) != across && errors.held_out[w].is_some())
+            .map(|w| (w, gain(&before.own[w], &errors.own[w])))
+            .collect()
+    }
+
+    fn rejection(&self, effect: usize, after: &State, judged: &Judged, before: &RefitErrors) -> Option<RefitRejection> {
+        let (slots, parameters) = (&self.model.effects()[effect].slots, self.model.parameters());
+        let Judged { errors, intervals } = judged;
+        let gains = self.gains(effect, errors, before);
+        let score = share_removed(before, errors);
+        let at_end = |&slot: &usize| {
+            let (p, v) = (&parameters[slot], after.theta[slot]);
+            (v == p.range.0 || v == p.range.1) && v != p.neutral
+        };
+        let way = |w: usize| &self.plan.ways[w].name;
+        if score < LEAST_SHARE {
+            Some(RefitRejection::Little(score))
+        } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.value < 0.0) {
+            Some(RefitRejection::Worse {
+                what: format!("rms where each {} is left out", way(*w)),
+                before: before.held_out[*w].unwrap_or(0.0),
+                after: errors.held_out[*w].unwrap_or(0.0),
+            })
+        } else if let Some(worse) = self.worse(before, errors) {
+            Some(worse)
+        } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.interval[0] <= 0.0) {
+            Some(RefitRejection::Unsure(way(*w).clone()))
+        } else if slots.iter().any(at_end) {
+            Some(RefitRejection::Unphysical)
+        } else if slots.iter().all(|&slot| self.includes_neutral(slot, intervals)) {
+            Some(RefitRejection::Nothing)
+        } else {
+            None
+        }
+    }
+
+    /// Rejection by a figure of measurements that were never fitted.
+    fn worse(&self, before: &RefitErrors, after: &RefitErrors) -> Option<RefitRejection> {
+        let names = self.model.figure_names();
+        let pairs = before.figures[1].iter().zip(&after.figures[1]).enumerate();
+        let (k, (before, after)) =
+            { pairs }.find(|(k, (b, a))| self.model.decides(*k) && **a > (1.0 + MAY_GROW) * **b)?;
+        Some(RefitRejection::Worse {
+            what: format!("{} of measurements that were not fitted", names[k].0),
+            before: *before,
+            after: *after,
+        })
+    }
+
+    /// True if the effects that an effect changes were taken.
+    fn has_base(&self, effect: usize, chosen: &[usize]) -> bool {
+        let mut after = self.model.effects()[effect].after.iter();
+        after.all(|base| chosen.contains(base))
+    }
+
+    /// True if the interval of a parameter includes its value without an effect.
+    fn includes_neutral(&self, slot: usize, intervals: &[Option<[f64; 2]>]) -> bool {
+        intervals[slot].is_some_and(|[low, high]| (low..=high).contains(&self.model.parameters()[slot].neutral))
+    }
+
+    fn values(&self, effect: usize, theta: &[f64]) -> Vec<f64> {
+        self.model.effects()[effect].slots.iter().map(|&s| theta[s]).collect()
+    }
+}
+
+const NO_GAIN: Gain = Gain {
+    value: 0.0,
+    interval: [0.0; 2],
+};
+
+/// Share of the fitted mean square that is gone.
+fn share_removed(before: &RefitErrors, after: &RefitErrors) -> f64 {
+    1.0 - (after.fitted / before.fitted.max(f64::MIN_POSITIVE)).powi(2)
+}
