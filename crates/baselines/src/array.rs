@@ -74,7 +74,7 @@ impl<'a> ArrayCamera<'a> {
                     .for_each(|p, t, b| *p = if *t > least { *p } else { *b });
             }
         }
-        // Elements that see nothing of the scene have no picture of their own.
+        // Elements that see nothing of the scene have no picture.
         let mut pictures = vec![blend];
         for seen in alone {
             let own = seen.map_or_else(|| pictures[0].clone(), |(picture, _)| picture);

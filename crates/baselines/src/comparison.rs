@@ -55,7 +55,7 @@ pub struct ListedDesign {
     pub name: Option<String>,
     pub design: PathBuf,
     pub layout: PathBuf,
-    /// A camera of its own.
+    /// A separate camera.
     pub camera: Option<PathBuf>,
     /// The field that a photograph fills, if it is another.
     pub field_deg: Option<f64>,

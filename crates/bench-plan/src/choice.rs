@@ -17,7 +17,7 @@ use metalith_attribution::{LEAST_GAIN, covariance, projected};
 /// own model, because what comes back is noisy.
 pub(crate) const NEEDED: f64 = 2.0 * LEAST_GAIN;
 
-/// Least margin that is told from nothing.
+/// Least margin that differs from zero.
 const NOTHING: f64 = 1e-9;
 
 /// Cost of a missing group, equal to that of a margin which is below one by this logarithm: a second colour, element and distance,
@@ -37,7 +37,7 @@ pub(crate) struct Requirement {
     pub slot: usize,
     /// Wanted size.
     pub size: f64,
-    /// The parameters of the effect that it is to be told from; none where it is only to be detected.
+    /// Parameters of the effect that it must be distinguished from; none where it is only to be detected.
     pub beside: Vec<usize>,
 }
 

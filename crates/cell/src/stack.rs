@@ -272,7 +272,7 @@ impl CellStack {
     }
 
     /// Index of the half-space that light arrives from: that of the substrate without its loss, since a wave in a medium that
-    /// absorbs has no power of its own. How much of the light is lost on the way is not counted.
+    /// absorbs has no defined power. How much of the light is lost on the way is not counted.
     ///
     /// # Errors
     /// If the wavelength (um) is outside the range of the substrate, or it absorbs more than [`MOST_SUBSTRATE_K`] there.

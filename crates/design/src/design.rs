@@ -153,7 +153,7 @@ impl Design {
 
     /// Read the files that the design names, after all its own mistakes are known to be none.
     fn with_files(mut self, library: LibraryFile) -> Result<Self> {
-        // A map that is of elements with lenses of their own alone covers these, not the lens that the others share.
+        // A map of elements with separate lenses covers these, not the lens that the others share.
         let indices = self.elements().into_iter().map(|e| e.index);
         let sharing: Vec<_> = indices
             .filter(|index| self.array.placed(*index).is_none_or(|p| p.lens.is_none()))
@@ -327,7 +327,7 @@ impl Design {
         Some(outline.rotated(self.array.rotation_deg(element.index)))
     }
 
-    /// Radius of the openings in the metal around the lenses that have none of their own (um).
+    /// Radius of the openings in the metal around the lenses that state none (um).
     pub fn aperture_radius_um(&self) -> f64 {
         self.around_um(&self.lens)
     }

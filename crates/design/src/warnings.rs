@@ -175,7 +175,7 @@ impl Design {
         })
     }
 
-    /// The lens that all elements share, if one has it, and those that elements have of their own.
+    /// The lens that all elements share, if one has it, and the separate lenses of elements.
     fn lenses(&self) -> Vec<&LensSpec> {
         let mut lenses: Vec<&LensSpec> = Vec::new();
         for element in self.elements() {

@@ -106,7 +106,7 @@ fn the_phase_of_light_along_y_is_that_of_its_section() {
         assert_eq!(x.turns(ix, n / 2), y.turns(n - 1 - ix, n / 2));
     }
     assert!(seen.along_y().is_none());
-    // Without a section of its own, light along y has the phase of light along x.
+    // Without a separate section, light along y has the phase of light along x.
     let from = text().find("[phase.y]").unwrap();
     let to = text().find("[array]").unwrap();
     let alike = Design::parse(&path(), &(text()[..from].to_owned() + &text()[to..])).unwrap();

@@ -95,7 +95,7 @@ fn a_map_that_ends_within_its_aperture_is_refused() {
     insta::assert_snapshot!(round, @"144 by 54 places of 0.5 um reach to 36 and 13.5 um, the lens to 30 and 30 um");
 }
 
-/// A map of an element that has an aperture of its own need not cover the lens that the others share.
+/// A map of an element that has a separate aperture need not cover the lens that the others share.
 #[test]
 fn a_map_covers_the_lenses_of_its_elements_alone() {
     let own = (

@@ -1,4 +1,4 @@
-//! Mappings that a design reads from a file of its own.
+//! Mappings that a design reads from a separate file.
 
 use metalith_cell::{MappingTable, PhaseCurve, PublishedCell};
 use metalith_design::{Design, PillarRule};

@@ -16,7 +16,7 @@ fn light(line: &str) -> PolarisedLight {
     design.verify.light()
 }
 
-/// The only fault of a design, and whether it is told at the line.
+/// The only fault of a design, and whether its line is stated.
 fn fault(name: &str, line: &str) -> String {
     let text = with(name, line);
     let Err(Error::Text(faults)) = Design::parse(&path(name), &text) else {

@@ -158,7 +158,7 @@ impl Frame {
 
     /// Note on pixels at full scale, if there are more than a few; `truth` is the scene in linear sRGB.
     pub fn saturation_note(&self, truth: &Array3<f64>) -> Option<String> {
-        /// Share that is told.
+        /// Share that is reported.
         const TOLD: f64 = 0.01;
         /// Light that a scene has if its white is another number than one.
         const ABOVE_WHITE: f64 = 1.01;

@@ -13,7 +13,7 @@ pub struct OperatorError {
     local: Vec<Array2<f32>>,
 }
 
-/// Share of the light above which the error of an operator is told beside a picture. The arrays that it is made for have 1 %, which is
+/// Share of the light above which the error of an operator is stated beside a picture. The arrays that it is made for have 1 %, which is
 /// the shot noise of ten thousand electrons. Three times that is ten times the variance: it hides more than the noise of a
 /// pixel that is well exposed, and a restoration is no longer limited by its frame.
 const TOLD: f64 = 0.03;

@@ -1,4 +1,4 @@
-//! Elements with a diameter, a lens and a rotation of their own: every pillar of them is read back from every kind of layout.
+//! Elements with a separate diameter, lens and rotation: every pillar of them is read back from every kind of layout.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use metalith_testing::design;
 use metalith_testing::layouts::{each_layout, hologram_of, same_pillars};
 
 /// The shared lens, a smaller and steered one of another focal length, holograms that are rotated by quarter turns and by 30
-/// degrees, and a lens with a phase of its own.
+/// degrees, and a lens with a separate phase.
 const ELEMENTS: &str = r#"
 [[element]]
 x_um = -100

@@ -319,7 +319,7 @@ fn a_sum_of_bytes_is_a_checksum_too() {
     assert!(matches!(fault(&bytes), (_, None, OasisFault::Checksum { .. })));
 }
 
-/// Mutants of this test; `examples/fuzz_oasis.rs` reads as many as it is told.
+/// Mutants of this test; `examples/fuzz_oasis.rs` reads as many as its argument says.
 const MUTANTS: u64 = 20_000;
 
 #[test]

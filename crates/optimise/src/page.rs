@@ -29,7 +29,7 @@ pub struct OptimiseReport {
     pub start: String,
     /// Merit, as optimised.
     pub merit: f64,
-    /// Steps of the rotation (degrees), of rotated rectangles: what is told of widths is then told of rotations, by their number.
+    /// Steps of the rotation (degrees), of rotated rectangles: figures of widths are then those of rotations, by their number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_step_deg: Option<f64>,
     /// Limit on the step (waves).

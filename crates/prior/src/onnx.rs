@@ -1,7 +1,7 @@
 //! Denoisers of a user's own, as ONNX files.
 //!
 //! A file may be of any network that takes pictures `[1, 3, rows, columns]` in sRGB values from 0 to 1, of any size whose sides
-//! are multiples of 32, and answers with clean ones of the same shape. How it is told of the noise is found by trying
+//! are multiples of 32, and answers with clean ones of the same shape. How it takes the noise level is found by trying
 //! ([`Form`]): the way of DRUNet and FFDNet (Zhang et al., IEEE T-PAMI 44, 6360 (2022); IEEE TIP 27, 4608 (2018)), or not
 //! at all.
 

@@ -6,7 +6,7 @@ use metalith_design::Design;
 
 use crate::study_file::Tolerance;
 
-/// Designs of a study at the most: each is a layout and, mostly, tables of cells of its own.
+/// Designs of a study at the most: each is a layout and, mostly, separate tables of cells.
 const MOST_DESIGNS: u64 = 1000;
 
 /// Sections and keys of a design that do not vary in a study, with the reason.
@@ -112,7 +112,7 @@ pub(crate) fn check(
     sections: &[Section<'_, '_>],
     grids: &[DesignGrid],
 ) {
-    // What is wrong with the file as it is, is told by whoever reads it.
+    // The reader of the file reports its other mistakes.
     let (Ok(text), true) = (load(design), root.sound(&["design"])) else {
         return;
     };

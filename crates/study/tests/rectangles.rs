@@ -248,7 +248,7 @@ fn a_second_run_by_a_model_solves_nothing_and_says_the_same() {
     let files = kept();
     assert!(!files.is_empty());
     assert_eq!((run(1.5), kept()), (first.clone(), files.clone()));
-    // Another model has files of its own.
+    // Another model has separate files.
     assert_ne!(run(1.6), first);
     assert!(kept().len() > files.len());
 }

@@ -64,7 +64,7 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     }
 }
 
-/// A draw whose bias leaves nothing of the pillars is told when the study is planned, and not in the middle of it.
+/// A draw whose bias leaves nothing of the pillars is refused when the study is planned, and not in the middle of it.
 #[test]
 fn a_bias_that_pillars_cannot_have_is_refused_before_any_draw() {
     let folder = tempfile::tempdir().unwrap();
@@ -87,7 +87,7 @@ fn a_bias_that_pillars_cannot_have_is_refused_before_any_draw() {
     );
 }
 
-/// Without anything random, a design of a grid and the same design in a file of its own have the same figures to the bit.
+/// Without anything random, a design of a grid and the same design in a separate file have the same figures to the bit.
 #[test]
 #[ignore = "second tier: CPU time, run by .ci/run"]
 fn a_design_of_a_grid_is_the_design_of_its_own_file() {

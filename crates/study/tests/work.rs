@@ -65,7 +65,7 @@ fn pairs_of_shards_are_those_of_one_run() {
     2 of 5 pairs are missing in parts/shards: 2-3
       help: make them with `metalith study run FOLDER --missing`
     ");
-    // Shards make no kernels of their own.
+    // Shards make no kernels.
     fs::rename(at("parts/kernels"), at("aside")).unwrap();
     assert_eq!(run(&[1]).unwrap_err().id(), "dataset/kernels-missing");
     fs::rename(at("aside"), at("parts/kernels")).unwrap();

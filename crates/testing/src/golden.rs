@@ -54,7 +54,7 @@ pub fn changed(name: &str, changes: &[(&str, &str)]) -> String {
     replaced(&fs::read_to_string(design(name)).unwrap(), changes)
 }
 
-/// A design file in a folder: the small one that is shipped, with a section of its own to optimise it.
+/// A design file in a folder: the small one that is shipped, with an `[optimise]` section.
 pub fn optimised(folder: &Path, optimise: &str) -> PathBuf {
     let path = folder.join("lens.toml");
     let text = fs::read_to_string(design("mini_3x3")).unwrap();

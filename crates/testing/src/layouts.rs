@@ -56,7 +56,7 @@ pub fn same_pillars(path: &Path, plan: &ExtractionPlan, array: &PillarArray) -> 
     read
 }
 
-/// The shipped hologram with these elements in place of its own, and without its term for single elements.
+/// The shipped hologram with these elements in place of those shipped, and without its term for single elements.
 pub fn hologram_of(elements: &str) -> String {
     let text = std::fs::read_to_string(crate::design("hologram")).unwrap();
     let (head, rest) = text.split_once("[[phase.term]]").unwrap();

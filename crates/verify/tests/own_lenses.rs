@@ -1,4 +1,4 @@
-//! Elements with lenses of their own are simulated as what they are: each at its own focus and against its own aperture.
+//! Elements with separate lenses are simulated as what they are: each at its own focus and against its own aperture.
 
 use metalith_cell::Fidelity;
 use metalith_core::Silent;

@@ -178,7 +178,7 @@ mod tests {
     use crate::test_model::{ERROR_PERIODS, ERROR_SIZE, ERROR_STEP, LIKENESS, LinearModel, SMOOTH_STEP, Term, setups};
 
     /// An effect that changes a prediction as an error of the model does is not distinguished from it: two groups, each with an
-    /// error of its own and half of the measurements, make an error of the effect of one over the root of two.
+    /// separate error and half of the measurements, make an error of the effect of one over the root of two.
     #[test]
     fn an_effect_like_an_error_of_the_model_has_the_interval_of_that_error() {
         /// Relative: the place of a window follows the pattern a little.

@@ -1,7 +1,7 @@
 //! Patterns: one quantity, fitted free in each group of measurements.
 //!
 //! What no effect explains may be a known quantity that is not the same everywhere. Each parameter is fitted with a value
-//! of its own in each group of measurements, on top of what was found, linear about it; the best patterns are then fitted
+//! in each group of measurements, on top of what was found, linear about it; the best patterns are then fitted
 //! with the surrogate itself. Where one removes much of the residual, its values say which effect is missing.
 
 use nalgebra::DMatrix;

@@ -29,7 +29,7 @@ const STEP_NM: f64 = 25.0;
 /// largest singular value, in steps.
 const STRENGTHS: ([f64; 2], usize) = ([-9.0, -1.0], 17);
 /// Strengths of the pictures that the learnt last stage sees, over the chosen one: that one first. What it does with them is a filter of
-/// singular values of its own, as these pictures can be added with any weights.
+/// separate singular values, as these pictures can be added with any weights.
 const STAGE_STRENGTHS: [f64; PICTURES] = [1.0, 0.1, 10.0, 0.01, 100.0];
 /// Seed of the random scene and of its noise.
 const SEED: u64 = 1;

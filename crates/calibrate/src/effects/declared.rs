@@ -332,7 +332,7 @@ impl Effect for DeclaredEffect {
     }
 
     fn dormant(&self) -> bool {
-        // An amplitude with places and widths of its own, which do nothing where it is zero.
+        // An amplitude with its places and widths, which do nothing where it is zero.
         self.parameters.len() > 1
     }
 

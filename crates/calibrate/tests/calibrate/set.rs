@@ -57,7 +57,7 @@ pub(crate) fn synthetic(parts: &[(&str, &[f64])], seed: u64) -> MeasuredSet {
     SYNTHESIZER.draw(&images, seed)
 }
 
-/// The diagnosis of a session by simulations of its own.
+/// Diagnosis of a session whose frames this test simulates.
 pub(crate) fn diagnosis_of(session: &Session<'_>) -> Diagnosis {
     session
         .diagnose(&session.simulate(&Silent).unwrap(), &Silent)

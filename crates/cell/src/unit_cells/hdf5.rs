@@ -117,7 +117,7 @@ type Message<'a> = (u64, Bytes<'a>);
 impl<'a> File<'a> {
     /// The data sets of numbers of a file; none if it is no HDF5.
     pub(super) fn data_sets(bytes: &'a [u8]) -> Option<Parsed<(Self, Vec<DataSet<'a>>)>> {
-        // MATLAB writes a block of its own before it.
+        // MATLAB writes a user block before it.
         let start = [0, 512, 1024, 2048]
             .into_iter()
             .find(|at| bytes.get(*at..).is_some_and(|b| b.starts_with(SIGNATURE)))?;

@@ -176,7 +176,7 @@ impl Places {
         })
     }
 
-    /// A new folder of its own for this run.
+    /// A new folder for this run alone.
     fn new_part(&self) -> Result<PathBuf> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         loop {

@@ -268,7 +268,7 @@ mod tests {
         }
     }
 
-    /// Comments and empty lines count where a fault is told.
+    /// Comments and empty lines count in the line number of a fault.
     #[test]
     fn a_fault_is_told_by_its_own_line() {
         let folder = tempfile::tempdir().unwrap();

@@ -38,7 +38,7 @@ fn overlap(a: &ElementSite, b: &ElementSite) -> bool {
 
 /// The smallest square lattice with the sites of both, if they are on one; of hexagonal ones the larger, about one middle.
 fn cover(a: &ElementSite, b: &ElementSite) -> Option<ElementSite> {
-    // Places of lattices with another pitch are told from where their design says they are.
+    // Places of lattices with another pitch are reported as their design states them.
     let pitch = i64::from(a.lattice.pitch_nm().whole_nm()?);
     if a.lattice.pitch_nm() != b.lattice.pitch_nm() || a.lattice.kind() != b.lattice.kind() {
         return None;

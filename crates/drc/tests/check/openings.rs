@@ -167,7 +167,7 @@ fn rules_that_are_broken_together() {
         let found = judge(&Draw { extra, ..CLEAN });
         found.into_iter().map(|(id, _)| id).collect()
     };
-    // A second opening needs a lens of its own, or it is one too many.
+    // A second opening needs a second lens, or it is one too many.
     assert_eq!(
         judged(|g| square(g, 50_000, 0, 10_000)),
         ["opening.each", "opening.gap"]

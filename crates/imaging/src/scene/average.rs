@@ -31,7 +31,7 @@ impl SceneView {
 }
 
 impl SceneImage {
-    /// This scene in the larger pixels of a view that [`SceneView::no_finer`] made of its own: means of linear light,
+    /// This scene in the larger pixels of a view that [`SceneView::no_finer`] made from the view of the scene: means of linear light,
     /// and of one over the distance.
     #[must_use]
     pub fn averaged(&self, view: &SceneView) -> Self {

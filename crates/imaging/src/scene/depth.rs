@@ -45,7 +45,7 @@ pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
             "give an NPY of shape (rows, columns) or a grey PNG of 16 bits, distances of a millimetre and more, in millimetres; `inf` in an NPY is far away",
         )
     };
-    // What is read as scenes are is told as a depth map.
+    // A depth map is read as scenes are, and its faults name a depth map.
     let told = |error: Error| match error {
         Error::Table { what, .. } => fault(&what),
         other => other,

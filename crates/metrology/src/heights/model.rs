@@ -411,7 +411,7 @@ fn effects(set: &HeightSet) -> (Vec<RefitParameter>, Vec<RefitEffect>) {
         &["gain"],
         None,
     );
-    // Nuisances hold some of these: what is left is tried.
+    // Nuisances hold some of these effects; only the others are tried.
     let nuisances = set.nuisances;
     let slopes: &[usize] = match (nuisances.plane, nuisances.lines) {
         (true, _) => &[],

@@ -252,7 +252,7 @@ impl RecordBuffer {
         self.put_place(Pair::Geometry, at, repetition);
     }
 
-    /// A circle about a place. Other tools draw a polygon of their own choice.
+    /// A circle about a place. Other tools choose the polygon themselves.
     pub fn circle(&mut self, layer: [u32; 2], at: [i64; 2], radius: i64, repetition: Option<&Repetition>) {
         let repetition = some(repetition);
         self.mode(Pair::Geometry);

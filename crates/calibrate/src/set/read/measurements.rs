@@ -176,7 +176,7 @@ fn nothing(camera: &RelayCamera) -> ExposedFrame {
     }
 }
 
-/// One exposure, with the dark frame of its own, if it has one, and whether one is named, be it sound or not.
+/// One exposure, with its separate dark frame, if it has one, and whether one is named, be it sound or not.
 fn exposure(
     s: &Section<'_, '_>,
     led: LedIndex,

@@ -50,7 +50,7 @@ impl PillarRule {
         }
     }
 
-    /// The common rule of a cell and a mapping, which elements follow that have none of their own.
+    /// The common rule of a cell and a mapping, which elements without a separate one follow.
     pub fn new(cell: &CellSpec, mapping: &MappingSpec) -> Self {
         match (cell.shape, &mapping.pillar_library) {
             (PillarShape::Rectangle(Rectangles::Rotated(pillars)), _) => {

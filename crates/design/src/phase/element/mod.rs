@@ -83,7 +83,7 @@ enum PhaseOfRadius {
 }
 
 impl LensPhase {
-    /// The phase of the lens of a design, and of the lenses that elements have of their own.
+    /// The phase of the lens of a design, and of the separate lenses of elements.
     pub fn of(design: &Design) -> Self {
         let lattice = design.lattice();
         let rows = |outline: LensOutline| outline.rows(&lattice);
