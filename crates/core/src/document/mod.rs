@@ -5,6 +5,7 @@
 //! reading goes on; at its end all faults are reported at once. What depends on a value with a fault is not judged:
 //! it would be a second fault for one mistake, and its advice would be wrong.
 
+mod binary_kind;
 mod fault;
 mod renamed;
 mod scalar;
@@ -20,6 +21,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
+
+use binary_kind::binary_kind;
 
 use crate::error::{Error, Result};
 
@@ -47,7 +50,7 @@ const MOST_HELD: usize = 1000;
 /// # Errors
 /// If it cannot be read, is longer than 4 MiB, or is not UTF-8. Of a file of another kind it is said what it is.
 pub fn load(path: &Path) -> Result<String> {
-    load_text(path).map_err(|error| match crate::file::binary_kind(path) {
+    load_text(path).map_err(|error| match binary_kind(path) {
         Some(kind) => Error::refused(
             "file/not-text",
             format!("{} is {kind}, and a text file is needed here", path.display()),

@@ -4,7 +4,6 @@ mod digest;
 mod direct_io;
 mod folder;
 mod folder_lock;
-mod kind;
 mod part;
 
 use std::fs;
@@ -15,7 +14,6 @@ pub use digest::file_digest;
 pub use direct_io::{Ahead, Block};
 pub use folder::AtomicFolder;
 pub use folder_lock::FolderLock;
-pub(crate) use kind::binary_kind;
 
 use crate::error::{Error, Result};
 

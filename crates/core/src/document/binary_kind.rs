@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// Kind of a file by its first bytes, if it is not one that a person writes.
-pub(crate) fn binary_kind(path: &Path) -> Option<&'static str> {
+pub(super) fn binary_kind(path: &Path) -> Option<&'static str> {
     const KINDS: [(&[u8], &str); 6] = [
         (&[0x00, 0x06, 0x00, 0x02], "a layout in GDSII"),
         (b"%SEMI-OASIS", "a layout in OASIS"),
