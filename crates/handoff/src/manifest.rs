@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use metalith_core::file::read_at_most;
 use metalith_core::text::{hex, printable, quoted};
-use metalith_core::{AtomicFile, Progress};
+use metalith_core::Progress;
 use metalith_core::{Error, Result};
 
 /// Name of the manifest in a hand-off.
@@ -107,9 +107,7 @@ impl Manifest {
     /// # Errors
     /// If the file cannot be written.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
-        let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
-        text.push('\n');
-        AtomicFile::write(&folder.join(NAME), text.as_bytes())
+        metalith_report::write_plain_json(&folder.join(NAME), self)
     }
 
     fn read(folder: &Path) -> Result<Self> {

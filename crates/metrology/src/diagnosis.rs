@@ -1,7 +1,7 @@
 //! The answer for programs: `diagnosis.json`, in the shape that sets of point spread functions have.
 
 use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan};
-use metalith_report::sig;
+use metalith_report::{effect_words, sig};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -65,12 +65,22 @@ pub struct ErrorReport {
     pub noise_floor: Option<f64>,
 }
 
+/// How far effects explain the residual of a set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SetVerdict {
+    NoResidual,
+    Explained,
+    Partly,
+    Unexplained,
+}
+
 /// The answer for a set.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     pub set: String,
     pub kind: String,
-    pub verdict: String,
+    pub verdict: SetVerdict,
     pub effects: Vec<FoundEffect>,
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
@@ -112,7 +122,7 @@ impl Diagnosis {
             FoundEffect {
                 name: own.name.clone(),
                 value: one_or_list(values.collect()),
-                unit: parameters[own.slots[own.slots.len() - 1]].unit.into(),
+                unit: unit(&own.slots.iter().map(|&s| parameters[s].unit).collect::<Vec<_>>()),
                 interval: one_or_list(intervals.collect()),
                 parameters: own.slots.iter().map(|&s| parameters[s].name.clone()).collect(),
                 of: own.across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
@@ -157,10 +167,10 @@ impl Diagnosis {
             held_out: errors.held_out.iter().flatten().copied().fold(0.0, f64::max),
         };
         let verdict = match (found.chosen.is_empty(), facts.noise_floor) {
-            (_, Some(floor)) if first.fitted <= EXPLAINED * floor => "no_residual",
-            (true, _) => "unexplained",
-            (_, Some(floor)) if pair(last).held_out <= EXPLAINED * floor => "explained",
-            _ => "partly",
+            (_, Some(floor)) if first.fitted <= EXPLAINED * floor => SetVerdict::NoResidual,
+            (true, _) => SetVerdict::Unexplained,
+            (_, Some(floor)) if pair(last).held_out <= EXPLAINED * floor => SetVerdict::Explained,
+            _ => SetVerdict::Partly,
         };
         let not_fitted = facts.names.iter().zip(&plan.fitted).filter(|(_, f)| !**f);
         let not_fitted: Vec<String> = not_fitted.map(|(n, _)| n.clone()).collect();
@@ -177,7 +187,7 @@ impl Diagnosis {
         Self {
             set: facts.title.into(),
             kind: facts.kind.into(),
-            verdict: verdict.into(),
+            verdict,
             effects: found.chosen.iter().map(of_effect).collect(),
             error: ErrorReport {
                 measure: facts.measure.into(),
@@ -238,36 +248,27 @@ impl Diagnosis {
     /// One line for a person.
     pub fn sentence(&self) -> String {
         let list: Vec<String> = self.effects.iter().map(FoundEffect::sentence).collect();
-        match self.verdict.as_str() {
-            "no_residual" => "no residual: the measurements agree with what was stated, as repeats do".into(),
-            "explained" => format!("explained by {}", list.join("; ")),
-            "partly" => format!("partly explained by {}", list.join("; ")),
-            _ => "unexplained: there is a residual that no known effect explains".into(),
+        match self.verdict {
+            SetVerdict::NoResidual => "no residual: the measurements agree with what was stated, as repeats do".into(),
+            SetVerdict::Explained => format!("explained by {}", list.join("; ")),
+            SetVerdict::Partly => format!("partly explained by {}", list.join("; ")),
+            SetVerdict::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
         }
     }
+}
+
+/// Unit of the values of an effect: one of each where they differ, 1 for a number.
+fn unit(units: &[&str]) -> String {
+    if units.iter().all(|unit| *unit == units[0]) {
+        return units[0].to_owned();
+    }
+    let each = units.iter().map(|unit| if unit.is_empty() { "1" } else { unit });
+    format!("({})", each.collect::<Vec<_>>().join(", "))
 }
 
 impl FoundEffect {
     /// Values with their unit and intervals.
     pub fn sentence(&self) -> String {
-        let unit = match self.unit.as_str() {
-            "" => String::new(),
-            unit => format!(" {unit}"),
-        };
-        format!(
-            "{} = {}{unit}, interval {}",
-            self.name,
-            rounded(&self.value),
-            rounded(&self.interval)
-        )
-    }
-}
-
-/// Numbers of a value with four digits.
-pub(crate) fn rounded(value: &Value) -> String {
-    match value {
-        Value::Array(items) => format!("[{}]", items.iter().map(rounded).collect::<Vec<_>>().join(", ")),
-        Value::Number(n) => sig(n.as_f64().unwrap_or(f64::NAN), 4),
-        other => other.to_string(),
+        effect_words(&self.name, &self.value, &self.unit, &self.interval)
     }
 }

@@ -19,7 +19,7 @@ mod pattern;
 mod run;
 mod spectra;
 
-pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, Ranked};
+pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, Ranked, SetVerdict};
 pub use heights::{HeightField, HeightModel, HeightSet};
 pub use pattern::NamePattern;
 pub use run::{Answer, SetKind, calibrate, kind_of};

@@ -1,8 +1,8 @@
 //! The answer for people: the parts of the page that all kinds of sets share.
 
-use metalith_report::{Axis, Cell, Chart, Column, Page, Ranking, Table, Verdict, sig};
+use metalith_report::{Axis, Cell, Chart, Column, Page, Ranking, Table, Verdict, number_words, sig};
 
-use crate::diagnosis::{Diagnosis, rounded};
+use crate::diagnosis::{Diagnosis, SetVerdict};
 
 /// The page of a set up to its figures.
 pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
@@ -10,7 +10,7 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         format!("Calibration: {}", diagnosis.set),
         format!("measured {}", diagnosis.kind),
     );
-    let holds = matches!(diagnosis.verdict.as_str(), "explained" | "no_residual");
+    let holds = matches!(diagnosis.verdict, SetVerdict::Explained | SetVerdict::NoResidual);
     page.verdict(if holds { Verdict::Pass } else { Verdict::Fail }, diagnosis.sentence());
     let error = &diagnosis.error;
     let with_unit = |v: f64| format!("{} {unit}", sig(v, 3)).trim().to_owned();
@@ -32,8 +32,8 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         for e in &diagnosis.effects {
             table.row([
                 Cell::code(&e.name),
-                format!("{} {}", rounded(&e.value), e.unit).as_str().into(),
-                rounded(&e.interval).as_str().into(),
+                format!("{} {}", number_words(&e.value), e.unit).as_str().into(),
+                number_words(&e.interval).as_str().into(),
                 e.of.as_str().into(),
             ]);
         }

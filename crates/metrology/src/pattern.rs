@@ -1,6 +1,6 @@
 //! Names of files by patterns: `measured/FOV{plate}{row}{column}.tif`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Values of the names in a pattern.
@@ -103,26 +103,44 @@ impl NamePattern {
 
 /// Values of the names in a text that fits: each as short as the rest allows.
 fn matched(parts: &[Part], text: &str) -> Option<Named> {
+    rest_matched(parts, text, &mut BTreeSet::new())
+}
+
+/// As [`matched`]; `failed` holds numbers of parts and bytes that are known not to fit, so that each is tried once.
+fn rest_matched(parts: &[Part], text: &str, failed: &mut BTreeSet<[usize; 2]>) -> Option<Named> {
     let Some((first, rest)) = parts.split_first() else {
         return text.is_empty().then(Named::new);
     };
-    match first {
-        Part::Literal(literal) => matched(rest, text.strip_prefix(literal.as_str())?),
-        Part::Name(name) => {
-            let allowed = |c: char| c.is_ascii_alphanumeric() || ".+-".contains(c);
-            let longest = text.find(|c| !allowed(c)).unwrap_or(text.len());
-            (1..=longest).find_map(|end| {
-                let mut named = matched(rest, &text[end..])?;
-                named.insert(name.clone(), text[..end].into());
-                Some(named)
-            })
+    let name = match first {
+        Part::Literal(literal) => return rest_matched(rest, text.strip_prefix(literal.as_str())?, failed),
+        Part::Name(name) => name,
+    };
+    let place = [parts.len(), text.len()];
+    if failed.contains(&place) {
+        return None;
+    }
+    let allowed = |c: char| c.is_ascii_alphanumeric() || ".+-".contains(c);
+    let longest = text.find(|c| !allowed(c)).unwrap_or(text.len());
+    for end in 1..=longest {
+        if let Some(mut named) = rest_matched(rest, &text[end..], failed) {
+            named.insert(name.clone(), text[..end].into());
+            return Some(named);
         }
     }
+    failed.insert(place);
+    None
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Each way to cut the name would be tried, if places that do not fit were not known: 10^17 ways.
+    #[test]
+    fn a_long_name_that_fits_nothing_costs_little() {
+        let pattern = NamePattern::parse("{a}{b}{c}{d}{e}{f}{g}{h}{i}{j}.tif", Path::new("set")).unwrap();
+        assert!(matched(&pattern.parts, &"1".repeat(250)).is_none());
+    }
 
     #[test]
     fn names_are_as_short_as_the_rest_allows() {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_attribution::{RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan, select};
+use metalith_attribution::{RefitEffect, RefitModel, RefitPlan, select};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result};
 
@@ -70,7 +70,8 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
     match kind {
         SetKind::Heights => {
             let set = HeightSet::read(&path)?;
-            let model = HeightModel::new(&set);
+            let mut model = HeightModel::new(&set);
+            model.effects = tried(&model.effects, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "heights",
@@ -79,13 +80,14 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 noise_floor: None,
             };
             let plan = model.plan();
-            answer(&model, &plan, &facts, ("nm", out, only), progress, |page, theta| {
+            answer(&model, &plan, &facts, ("nm", out), progress, |page, theta| {
                 heights::figures(page, &set, &model, theta);
             })
         }
         SetKind::Spectra => {
             let set = SpectrumSet::read(&path)?;
-            let model = SpectrumModel::new(&set);
+            let mut model = SpectrumModel::new(&set);
+            model.effects = tried(&model.effects, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "spectra",
@@ -94,64 +96,15 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 noise_floor: set.repeat_rms(),
             };
             let plan = model.plan();
-            answer(&model, &plan, &facts, ("", out, only), progress, |page, theta| {
+            answer(&model, &plan, &facts, ("", out), progress, |page, theta| {
                 spectra::figures(page, &set, &model, theta);
             })
         }
     }
 }
 
-/// A model of which only some effects are tried.
-struct Only<'a> {
-    model: &'a dyn RefitModel,
-    effects: Vec<RefitEffect>,
-}
-
-impl RefitModel for Only<'_> {
-    fn parameters(&self) -> &[RefitParameter] {
-        self.model.parameters()
-    }
-
-    fn effects(&self) -> &[RefitEffect] {
-        &self.effects
-    }
-
-    fn count(&self) -> usize {
-        self.model.count()
-    }
-
-    fn points(&self, measurement: usize) -> f64 {
-        self.model.points(measurement)
-    }
-
-    fn equations(&self, m: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
-        self.model.equations(m, active, theta)
-    }
-
-    fn figure_names(&self) -> Vec<(&'static str, &'static str)> {
-        self.model.figure_names()
-    }
-
-    fn tries_pairs(&self) -> bool {
-        self.model.tries_pairs()
-    }
-
-    fn is_mean(&self, figure: usize) -> bool {
-        self.model.is_mean(figure)
-    }
-
-    fn figures(&self, measurement: usize, theta: &[f64]) -> Vec<f64> {
-        self.model.figures(measurement, theta)
-    }
-
-    fn decides(&self, figure: usize) -> bool {
-        self.model.decides(figure)
-    }
-}
-
 /// The effects that are tried: all, or those that are named with those that they change.
-fn tried<'a>(model: &'a dyn RefitModel, only: &[String]) -> Result<Only<'a>> {
-    let all = model.effects();
+fn tried(all: &[RefitEffect], only: &[String]) -> Result<Vec<RefitEffect>> {
     let known = || all.iter().map(|e| e.name.as_str()).collect::<Vec<_>>().join(", ");
     if let Some(wrong) = only.iter().find(|name| all.iter().all(|e| e.name != **name)) {
         return Err(Error::refused(
@@ -171,23 +124,19 @@ fn tried<'a>(model: &'a dyn RefitModel, only: &[String]) -> Result<Only<'a>> {
         after: e.after.iter().map(|&b| place(b)).collect(),
         ..e.clone()
     });
-    Ok(Only {
-        effects: effects.collect(),
-        model,
-    })
+    Ok(effects.collect())
 }
 
 fn answer(
     model: &dyn RefitModel,
     plan: &RefitPlan,
     facts: &SetFacts<'_>,
-    (unit, out, only): (&str, &Path, &[String]),
+    (unit, out): (&str, &Path),
     progress: &dyn Progress,
     figures: impl FnOnce(&mut metalith_report::Page, &[f64]),
 ) -> Result<Answer> {
-    let model = tried(model, only)?;
-    let found = select(&model, plan, progress)?;
-    let diagnosis = Diagnosis::new(facts, &model, plan, &found);
+    let found = select(model, plan, progress)?;
+    let diagnosis = Diagnosis::new(facts, model, plan, &found);
     let _turn = FolderLock::wait(out, progress, || {
         progress.warn("another run writes into this folder: waiting for it");
     })?;
@@ -195,9 +144,7 @@ fn answer(
     for earlier in ["model.toml", "proposal.toml"] {
         AtomicFile::discard(&out.join(earlier))?;
     }
-    let mut text = serde_json::to_string_pretty(&diagnosis).expect("plain data serialises");
-    text.push('\n');
-    AtomicFile::write(&answer, text.as_bytes())?;
+    metalith_report::write_plain_json(&answer, &diagnosis)?;
     let mut page = page(&diagnosis, unit);
     figures(&mut page, &found.theta);
     page.write(&report)?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::Silent;
-use metalith_metrology::{Diagnosis, FoundEffect, SetKind, calibrate, kind_of};
+use metalith_metrology::{Diagnosis, FoundEffect, SetKind, SetVerdict, calibrate, kind_of};
 use npyz::WriterBuilder;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -216,7 +216,7 @@ not_fitted = ["60"]
 fn spectra_as_stated_have_no_effect_and_known_ones_are_found() {
     let answer = spectra(0.0, 1.0, 1);
     assert!(answer.effects.is_empty(), "{:?}", names(&answer));
-    assert_eq!(answer.verdict, "no_residual");
+    assert_eq!(answer.verdict, SetVerdict::NoResidual);
     // Of eight 95 % intervals, one may miss.
     let mut held = 0;
     for seed in 2..6 {
@@ -227,7 +227,7 @@ fn spectra_as_stated_have_no_effect_and_known_ones_are_found() {
         let effect = |name: &str| answer.effects.iter().find(|e| e.name == name).unwrap();
         held += usize::from(holds(effect("film_thickness"), 8.0));
         held += usize::from(holds(effect("reference_gain"), 0.05));
-        assert_eq!(answer.verdict, "explained");
+        assert_eq!(answer.verdict, SetVerdict::Explained);
     }
     assert!(held >= 7, "{held}");
 }

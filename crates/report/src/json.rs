@@ -36,3 +36,32 @@ pub fn write_json(path: &Path, report: &str, numbers: &impl Serialize) -> Result
     text.push('\n');
     AtomicFile::write(path, text.as_bytes())
 }
+
+/// Write values as an indented JSON file, as they are.
+///
+/// # Errors
+/// If the file cannot be written.
+///
+/// # Panics
+/// If the values have no JSON: a map whose keys are not texts.
+pub fn write_plain_json(path: &Path, values: &impl Serialize) -> Result<()> {
+    let mut text = serde_json::to_string_pretty(values).expect("plain data serialises");
+    text.push('\n');
+    AtomicFile::write(path, text.as_bytes())
+}
+
+/// Words for a number, or for lists of numbers, to four digits.
+pub fn number_words(value: &Value) -> String {
+    match value {
+        Value::Array(items) => format!("[{}]", items.iter().map(number_words).collect::<Vec<_>>().join(", ")),
+        Value::Number(n) => crate::sig(n.as_f64().unwrap_or(f64::NAN), 4),
+        other => other.to_string(),
+    }
+}
+
+/// Clause for an effect: its values with their unit and intervals.
+pub fn effect_words(name: &str, value: &Value, unit: &str, interval: &Value) -> String {
+    let space = if unit.is_empty() { "" } else { " " };
+    let [value, interval] = [value, interval].map(number_words);
+    format!("{name} = {value}{space}{unit}, interval {interval}")
+}

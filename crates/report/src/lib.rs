@@ -62,7 +62,7 @@ pub use colour::{ColourMap, SERIES};
 pub use figure::Figure;
 pub use heat_map::HeatMap;
 pub use images::ImageGrid;
-pub use json::write_json;
+pub use json::{effect_words, number_words, write_json, write_plain_json};
 pub use matrix::Matrix;
 pub use number::{count, counted, exact, fixed, sig};
 pub use page::Page;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use metalith_core::file::read_at_most;
-use metalith_core::{AtomicFile, Error, Result};
+use metalith_core::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -66,9 +66,7 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
     /// # Errors
     /// If the file cannot be written.
     fn write_in(&self, folder: &Path) -> Result<()> {
-        let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
-        text.push('\n');
-        AtomicFile::write(&folder.join(MANIFEST), text.as_bytes())
+        metalith_report::write_plain_json(&folder.join(MANIFEST), self)
     }
 }
 

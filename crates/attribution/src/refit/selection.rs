@@ -302,7 +302,8 @@ impl Selection<'_> {
             (v == p.range.0 || v == p.range.1) && v != p.neutral
         };
         let way = |w: usize| &self.plan.ways[w].name;
-        if score < LEAST_SHARE {
+        // A figure that is no number explains nothing.
+        if score.is_nan() || score < LEAST_SHARE {
             Some(RefitRejection::Little(score))
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.value < 0.0) {
             Some(RefitRejection::Worse {

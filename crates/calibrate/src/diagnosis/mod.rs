@@ -5,7 +5,7 @@ mod pattern;
 
 use std::path::Path;
 
-use metalith_core::{AtomicFile, Result};
+use metalith_core::Result;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -196,26 +196,12 @@ impl Diagnosis {
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut text = serde_json::to_string_pretty(self).expect("plain data serialises");
-        text.push('\n');
-        AtomicFile::write(path, text.as_bytes())
+        metalith_report::write_plain_json(path, self)
     }
 
     /// One line for a person.
     pub fn sentence(&self) -> String {
-        let one = |e: &FoundEffect| {
-            let unit = if e.unit.is_empty() {
-                String::new()
-            } else {
-                format!(" {}", e.unit)
-            };
-            format!(
-                "{} = {}{unit}, interval {}",
-                e.name,
-                rounded(&e.value),
-                rounded(&e.interval)
-            )
-        };
+        let one = |e: &FoundEffect| metalith_report::effect_words(&e.name, &e.value, &e.unit, &e.interval);
         let list: Vec<String> = self.effects.iter().map(one).collect();
         match self.verdict {
             SetVerdict::NoResidual => {
@@ -234,13 +220,5 @@ impl Diagnosis {
             }
             SetVerdict::DataUnfit => format!("data unfit: {} measurements cannot be used", self.left_out.len()),
         }
-    }
-}
-
-fn rounded(value: &Value) -> String {
-    match value {
-        Value::Array(items) => format!("[{}]", items.iter().map(rounded).collect::<Vec<_>>().join(", ")),
-        Value::Number(n) => metalith_report::sig(n.as_f64().unwrap_or(f64::NAN), 4),
-        other => other.to_string(),
     }
 }

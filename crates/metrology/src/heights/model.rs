@@ -34,7 +34,8 @@ const LEVELS: usize = 15;
 pub struct HeightModel<'a> {
     set: &'a HeightSet,
     parameters: Vec<RefitParameter>,
-    effects: Vec<RefitEffect>,
+    /// Effects that are tried.
+    pub(crate) effects: Vec<RefitEffect>,
     /// Spectra of the drawn maps with their margin, transposed.
     spectra: Vec<Vec<Complex<f32>>>,
     inverse: Fft2<f32>,
@@ -194,7 +195,21 @@ impl<'a> HeightModel<'a> {
 
     /// Predicted heights of a field inside the rim (nm).
     pub fn predicted(&self, field: usize, theta: &[f64]) -> Array2<f64> {
-        let relief = self.relief(field, theta, &[]);
+        self.heights(&self.relief(field, theta, &[]), field, theta)
+    }
+
+    /// Root mean square of the residual of a field without its level (nm).
+    pub fn shape_rms(&self, field: usize, theta: &[f64]) -> f64 {
+        self.squares(&self.relief(field, theta, &[]), field, theta)[0].sqrt()
+    }
+
+    /// Mean squares of the residual of a field: of its shape, and of its level (nm^2).
+    fn squares(&self, relief: &Relief, field: usize, theta: &[f64]) -> [f64; 2] {
+        let forms = self.shape_and_level(relief, field, &[], theta);
+        forms.map(|form| form[(0, 0)] / self.points(field))
+    }
+
+    fn heights(&self, relief: &Relief, field: usize, theta: &[f64]) -> Array2<f64> {
         let [rows, cols] = self.inside();
         let values = relief.core.iter().enumerate().map(|(k, core)| {
             let (factor, terms) = Self::over_field(theta, self.place(k));
@@ -209,8 +224,13 @@ impl<'a> HeightModel<'a> {
     }
 
     /// Columns of derivatives and of the residual at the samples that are fitted, and those of nuisances.
-    fn columns(&self, field: usize, active: &[usize], theta: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
-        let relief = self.relief(field, theta, active);
+    fn columns(
+        &self,
+        relief: &Relief,
+        field: usize,
+        active: &[usize],
+        theta: &[f64],
+    ) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let [rows, cols] = self.inside();
         let measured = &self.set.fields[field].measured;
         let (rim, group) = (self.set.rim, self.set.fields[field].group);
@@ -253,8 +273,8 @@ impl<'a> HeightModel<'a> {
     }
 
     /// Normal equations of the shape, nuisances eliminated, and of the mean.
-    fn shape_and_level(&self, field: usize, active: &[usize], theta: &[f64]) -> [DMatrix<f64>; 2] {
-        let (mut columns, mut own) = self.columns(field, active, theta);
+    fn shape_and_level(&self, relief: &Relief, field: usize, active: &[usize], theta: &[f64]) -> [DMatrix<f64>; 2] {
+        let (mut columns, mut own) = self.columns(relief, field, active, theta);
         let size = columns.len();
         let along = self.inside()[1].div_ceil(STRIDE);
         let means: Vec<f64> = columns.iter().map(|c| mean(c)).collect();
@@ -310,7 +330,8 @@ impl RefitModel for HeightModel<'_> {
     }
 
     fn equations(&self, field: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
-        let [shape, level] = self.shape_and_level(field, active, theta);
+        let relief = self.relief(field, theta, active);
+        let [shape, level] = self.shape_and_level(&relief, field, active, theta);
         RefitEquations {
             fit: &shape + &level * LEVEL_WEIGHT,
             judged: shape + level,
@@ -333,12 +354,11 @@ impl RefitModel for HeightModel<'_> {
     }
 
     fn figures(&self, field: usize, theta: &[f64]) -> Vec<f64> {
-        let [shape, level] = self
-            .shape_and_level(field, &[], theta)
-            .map(|form| form[(0, 0)] / self.points(field));
+        let relief = self.relief(field, theta, &[]);
+        let [shape, level] = self.squares(&relief, field, theta);
         let mut out = vec![(shape + level).sqrt(), shape.sqrt()];
         if let Some((plan, measured)) = &self.far_field {
-            let found = plan.intensities(self.predicted(field, theta).view());
+            let found = plan.intensities(self.heights(&relief, field, theta).view());
             out.push(relative_error(&found, &measured[field]));
         }
         out

@@ -1,8 +1,8 @@
 //! Figures of heights: measured, model and residual side by side.
 
-use metalith_attribution::RefitModel;
 use metalith_report::{ImageGrid, Page, sig};
 use ndarray::Array2;
+use rayon::prelude::*;
 
 use super::model::HeightModel;
 use super::set::HeightSet;
@@ -16,8 +16,9 @@ pub(crate) fn figures(page: &mut Page, set: &HeightSet, model: &HeightModel<'_>,
     page.paragraph("The field of each group whose residual is the median of its group. The residual has the level of the field removed.");
     for group in 0..set.groups.len().min(MOST_SHOWN) {
         let mut own: Vec<(f64, usize)> = (0..set.fields.len())
+            .into_par_iter()
             .filter(|&f| set.fields[f].group == group)
-            .map(|f| (model.figures(f, theta)[1], f))
+            .map(|f| (model.shape_rms(f, theta), f))
             .collect();
         own.sort_by(|a, b| a.0.total_cmp(&b.0));
         let Some(&(error, field)) = own.get(own.len() / 2) else {

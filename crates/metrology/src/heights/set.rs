@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
-use metalith_core::text::{quoted, table_rows};
+use metalith_core::text::quoted;
+use metalith_core::{Result, csv_rows};
 use ndarray::Array2;
 
 use super::far_field::FarField;
@@ -58,6 +58,9 @@ pub struct HeightSet {
 
 /// Most samples of all fields: a map of drawn heights takes 20 bytes for each.
 const MOST_SAMPLES: usize = 100_000_000;
+
+/// Largest height (nm): a square of it and sums of squares are numbers.
+const HIGHEST_NM: f32 = 1e9;
 
 impl HeightSet {
     /// Read a set from its `measurement.toml`.
@@ -245,7 +248,7 @@ fn fields(
             }
         }
     }
-    if out.iter().filter(|f| f.fitted).count() < 2 && out.len() > 1 {
+    if out.iter().filter(|f| f.fitted).count() < out.len().min(2) {
         groups.fault(
             "not_fitted",
             "fewer than two fields are fitted",
@@ -283,10 +286,17 @@ fn field(
             .get(&name)
             .ok_or((false, format!("`full_scale` has no row for {name}")))?,
     };
+    let drawn = drawn.mapv(|v| v * drawn_nm as f32);
+    let measured = measured.mapv(|v| v * nm as f32);
+    for (is_drawn, heights) in [(true, &drawn), (false, &measured)] {
+        if !heights.iter().all(|nm| nm.abs() <= HIGHEST_NM) {
+            return Err((is_drawn, format!("{name} has heights beyond {HIGHEST_NM} nm")));
+        }
+    }
     Ok(HeightField {
         name,
-        drawn: drawn.mapv(|v| v * drawn_nm as f32),
-        measured: measured.mapv(|v| v * nm as f32),
+        drawn,
+        measured,
         group: 0,
         fitted: true,
     })
@@ -319,34 +329,24 @@ fn full_scale(s: &Section<'_, '_>, folder: &Path, levels: f64) -> BTreeMap<Strin
             return BTreeMap::new();
         }
     };
-    let mut out = BTreeMap::new();
-    let mut rows = table_rows(&text);
-    if rows.next().is_none_or(|(_, head)| head != "field,full_scale_nm") {
-        s.fault(
-            "full_scale",
-            format!("{}: its header is not field,full_scale_nm", path.display()),
-            hint,
-        );
-        return out;
-    }
-    for (number, row) in rows {
-        let cells = row
-            .split_once(',')
-            .map(|(name, value)| (name.trim(), value.trim().parse::<f64>()));
-        match cells {
-            Some((name, Ok(value))) if value.is_finite() && value > 0.0 => {
-                out.insert(name.to_owned(), value / levels);
+    let refuse = |line: Option<usize>, what: String| {
+        let line = line.map_or_else(String::new, |line| format!(", line {line}"));
+        format!("{}{line}: {what}", path.display())
+    };
+    let rows = csv_rows(&text, "full_scale_nm,field", &refuse).and_then(|rows| {
+        rows.map(|row| {
+            let row = row?;
+            let [nm] = row.numbers()?;
+            if nm > 0.0 {
+                Ok((row.field(1).to_owned(), nm / levels))
+            } else {
+                Err(row.refused(format!("a full scale of {nm} nm")))
             }
-            _ => {
-                let what = format!(
-                    "{}, line {number}: `{}` is no field and positive number",
-                    path.display(),
-                    quoted(row)
-                );
-                s.fault("full_scale", what, hint);
-                return out;
-            }
-        }
-    }
-    out
+        })
+        .collect()
+    });
+    rows.unwrap_or_else(|what: String| {
+        s.fault("full_scale", what, hint);
+        BTreeMap::new()
+    })
 }

@@ -31,11 +31,15 @@ const HEIGHT: usize = 6;
 /// First of three parameters of each layer that is not the object: thickness, scale of the index, offset of the index.
 const LAYERS: usize = 7;
 
+/// Parameters of what acts after the stack of smooth films.
+const AFTER_THE_STACK: [usize; 4] = [ROUGHNESS, REFERENCE, STRAY, RESOLUTION];
+
 /// A set of spectra with its forward model.
 pub struct SpectrumModel<'a> {
     set: &'a SpectrumSet,
     parameters: Vec<RefitParameter>,
-    effects: Vec<RefitEffect>,
+    /// Effects that are tried.
+    pub(crate) effects: Vec<RefitEffect>,
     steps: Vec<f64>,
     /// Mean of the repeats that each spectrum is one of.
     means: Vec<Vec<f64>>,
@@ -173,6 +177,11 @@ impl<'a> SpectrumModel<'a> {
 
     /// Reflectance that the instrument shows of a spectrum, at each wavelength of the set.
     pub fn predicted(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
+        self.shown(&self.smooth_stack(spectrum, theta), theta)
+    }
+
+    /// Reflectance of the stack with smooth films over the cone of the objective, at each wavelength of the set.
+    fn smooth_stack(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
         let own = &self.set.spectra[spectrum];
         let medium = &self.set.media[own.medium].1;
         let height_nm = (own.height_nm + theta[HEIGHT]).max(0.0);
@@ -196,18 +205,25 @@ impl<'a> SpectrumModel<'a> {
                 .collect();
             let substrate = self.set.substrate.as_ref().map_or(Complex64::from(1.5), index);
             let at = |sine2: f64| reflectance(self.set.ambient_index, &films, substrate, nm, sine2);
-            let mean = if aperture2 > 0.0 {
-                NODES
-                    .iter()
-                    .map(|[x, w]| 0.5 * w * at(0.5 * (x + 1.0) * aperture2))
-                    .sum()
+            if aperture2 > 0.0 {
+                let nodes = NODES.iter();
+                nodes.map(|[x, w]| 0.5 * w * at(0.5 * (x + 1.0) * aperture2)).sum()
             } else {
                 at(0.0)
-            };
-            let scattered = (-(4.0 * std::f64::consts::PI / nm).powi(2) * theta[ROUGHNESS]).exp();
-            mean * scattered
+            }
         });
-        let mut values: Vec<f64> = values.collect();
+        values.collect()
+    }
+
+    /// What rough films and the instrument make of the reflectance of smooth ones.
+    fn shown(&self, smooth: &[f64], theta: &[f64]) -> Vec<f64> {
+        let scale = 1.0 + theta[WAVELENGTH];
+        let scattered = |nm: f64| (-(4.0 * std::f64::consts::PI / (nm * scale)).powi(2) * theta[ROUGHNESS]).exp();
+        let mut values: Vec<f64> = smooth
+            .iter()
+            .zip(&self.set.wavelengths_nm)
+            .map(|(v, nm)| v * scattered(*nm))
+            .collect();
         if theta[RESOLUTION] > 0.0 {
             values = self.smoothed(&values, theta[RESOLUTION]);
         }
@@ -253,7 +269,8 @@ impl RefitModel for SpectrumModel<'_> {
     }
 
     fn equations(&self, spectrum: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
-        let base = self.predicted(spectrum, theta);
+        let smooth = self.smooth_stack(spectrum, theta);
+        let base = self.shown(&smooth, theta);
         let measured = &self.set.spectra[spectrum].reflectance;
         let mut columns: Vec<Vec<f64>> = Vec::with_capacity(active.len() + 1);
         for &slot in active {
@@ -266,7 +283,11 @@ impl RefitModel for SpectrumModel<'_> {
                 self.steps[slot]
             };
             moved[slot] += step;
-            let changed = self.predicted(spectrum, &moved);
+            let changed = if AFTER_THE_STACK.contains(&slot) {
+                self.shown(&smooth, &moved)
+            } else {
+                self.predicted(spectrum, &moved)
+            };
             columns.push(changed.iter().zip(&base).map(|(c, b)| (c - b) / step).collect());
         }
         columns.push(measured.iter().zip(&base).map(|(m, b)| m - b).collect());

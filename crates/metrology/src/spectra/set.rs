@@ -287,6 +287,9 @@ fn captures(
     (media, spectra)
 }
 
+/// Largest value of a table (per cent).
+const LARGEST: f64 = 1e6;
+
 /// Rows of two numbers, wavelengths (nm) rising, after some header lines; a fault at the key if there are none.
 fn table(s: &Section<'_, '_>, key: &str, path: &Path, header: usize) -> Vec<[f64; 2]> {
     let mut out: Vec<[f64; 2]> = Vec::new();
@@ -307,12 +310,12 @@ fn table(s: &Section<'_, '_>, key: &str, path: &Path, header: usize) -> Vec<[f64
             .split_once(',')
             .and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
         let wrong = match row {
-            Some(row @ [nm, value]) if f64::is_finite(nm) && f64::is_finite(value) => {
+            Some(row @ [nm, value]) if f64::is_finite(nm) && f64::abs(value) <= LARGEST => {
                 let rises = out.last().is_none_or(|last| last[0] < nm);
                 out.push(row);
                 (!rises).then_some("its wavelength does not rise")
             }
-            _ => Some("it is not two numbers"),
+            _ => Some("it is not two numbers, or one is too large"),
         };
         if let Some(why) = wrong.or_else(|| (out.len() > MOST_ROWS).then_some("the table is too long")) {
             s.fault(
