@@ -107,6 +107,10 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let unnamed = named.is_none() && design.is_none();
     let deck = named.unwrap_or_else(|| Deck::for_design(design.as_ref()));
+    let deck = match &design {
+        Some(design) => deck.for_pillars_of(design),
+        None => deck,
+    };
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);

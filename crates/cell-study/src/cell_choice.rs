@@ -37,6 +37,10 @@ const SMALL_GAP_WAVES: f64 = 0.06;
 /// Largest distance (waves) from one phase that pillars give to the next: beyond it a lens has no full wave of phase.
 pub const WIDEST_GAP_WAVES: f64 = 0.2;
 
+/// The same for a height that was asked for, of a film that is there or of a published lens: `run` judges its mapping by the limit of
+/// the design.
+const WIDEST_ASKED_GAP_WAVES: f64 = 0.3;
+
 /// Least share of the light that the mapping of a cell sends to the first order.
 pub const LEAST_LIGHT: f64 = 0.3;
 
@@ -92,11 +96,6 @@ fn unit_of(pitch: Pitch) -> DatabaseUnit {
     let exact = DatabaseUnit::ALL.into_iter().find(|unit| unit.divides_half(pitch));
     let exact = exact.or_else(|| DatabaseUnit::of_pitch(pitch));
     exact.unwrap_or(DatabaseUnit::Tenth)
-}
-
-/// True if a mapping makes a lens.
-fn works(mapping: &SolvedMapping) -> bool {
-    mapping.gap_waves <= WIDEST_GAP_WAVES && mapping.light.first >= LEAST_LIGHT
 }
 
 /// Light in the first order, less what is given up for low pillars and for phases that have no gap.
@@ -217,7 +216,7 @@ impl CellRequest {
         let asked = |trial: &&Trial| self.height_nm.is_none_or(|height| height == trial.height_nm);
         let working: Vec<&Trial> = trials
             .iter()
-            .filter(|t| works(&t.mapping) && gain_waves(t.height_nm) >= LEAST_GAIN_WAVES)
+            .filter(|t| self.works(&t.mapping) && gain_waves(t.height_nm) >= LEAST_GAIN_WAVES)
             .collect();
         // What few widths and orders say may not hold for all.
         const SOLVED: usize = 3;
@@ -227,7 +226,7 @@ impl CellRequest {
             let all: Vec<u16> = (widths_nm.0..=widths_nm.1).step_by(usize::from(step_nm)).collect();
             let stack = self.stack(trial.pitch_nm, trial.height_nm)?;
             let mapping = SolvedMapping::solve(&stack, self.wavelength_um, &all, cache, progress)?;
-            if !works(&mapping) {
+            if !self.works(&mapping) {
                 refused.get_or_insert(mapping);
                 continue;
             }
@@ -268,9 +267,12 @@ impl CellRequest {
             || format!("every width passes less than {AVOIDED_BELOW} of the light"),
             |m| {
                 format!(
-                    "phases of {:.2} waves with a gap of {:.2} (at most {WIDEST_GAP_WAVES}), and {:.2} of the light in the first order (at least \
+                    "phases of {:.2} waves with a gap of {:.2} (at most {}), and {:.2} of the light in the first order (at least \
                      {LEAST_LIGHT})",
-                    m.span_waves, m.gap_waves, m.light.first
+                    m.span_waves,
+                    m.gap_waves,
+                    self.widest_gap_waves(),
+                    m.light.first
                 )
             },
         );
@@ -299,6 +301,18 @@ impl CellRequest {
             None => "take another material, or leave the pitch out".into(),
         };
         Error::refused("new/no-usable-height", what, hint)
+    }
+
+    /// True if a mapping makes a lens.
+    fn works(&self, mapping: &SolvedMapping) -> bool {
+        mapping.gap_waves <= self.widest_gap_waves() && mapping.light.first >= LEAST_LIGHT
+    }
+
+    fn widest_gap_waves(&self) -> f64 {
+        match self.height_nm {
+            Some(_) => WIDEST_ASKED_GAP_WAVES,
+            None => WIDEST_GAP_WAVES,
+        }
     }
 
     /// Narrowest and widest pillar and the step (nm) on a pitch.

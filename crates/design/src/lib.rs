@@ -7,6 +7,7 @@ mod design;
 mod digest;
 mod lattice_orders;
 pub mod phase;
+mod rays;
 mod spec;
 mod warnings;
 
@@ -17,3 +18,4 @@ pub use design::Design;
 pub use lattice_orders::{AskedLight, LatticeOrders, Medium};
 pub use metalith_cell::NeighbourCell;
 pub use spec::*;
+pub use warnings::MOST_NORMAL_DEG;

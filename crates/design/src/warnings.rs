@@ -1,10 +1,12 @@
 //! Properties of a design that are allowed and easily are mistakes.
 
+use metalith_cell::Fidelity;
 use metalith_core::{Result, Warning};
 use metalith_pillars::{DatabaseUnit, PillarShape, Pitch, Steepness};
 
 use crate::phase::{ElementPhase, LensPhase, RadialPhase, TermForm};
-use crate::{AskedLight, CellSpec, Design, LatticeOrders, LensSpec};
+use crate::rays::Rays;
+use crate::{AskedLight, CellIncidence, CellSpec, Design, LatticeOrders, LensSpec};
 
 /// Sites of a design whose phase is compared with the phase of their neighbours: of larger elements some rows are.
 const MOST_SITES: usize = 1 << 22;
@@ -15,6 +17,20 @@ const FEWEST_ROWS: usize = 16;
 /// Share of the radius that rays of a lens may miss the middle of the sensor by: lenses for a long depth of focus or many wavelengths
 /// miss it by a part of this, a phase that is ten times too flat by 0.6.
 const MOST_MISSED: f64 = 0.4;
+
+/// Depths of focus (wavelength over the square of the numerical aperture) between sensor and focus: at one, an ideal lens has no light
+/// on its axis.
+const MOST_DEPTHS: f64 = 0.75;
+
+/// Share of what rays miss at the sensor that they miss where they meet, if they have a focus.
+const MEETING_SHARE: f64 = 0.25;
+
+/// Angle at which light arrives (degrees) beyond which cells that are solved at normal incidence are too good: at 15 degrees, Strehl
+/// ratios of arrays of TiO2 pillars fall from 0.96 to 0.90.
+pub const MOST_NORMAL_DEG: f64 = 10.0;
+
+/// Height over width of the narrowest pillar that is written: beyond it no lens has been published.
+const MOST_SLENDER: f64 = 20.0;
 
 /// Ratio of the size of a map to that of the lens beyond which its pitch may be wrong.
 const WIDE_MAP: f64 = 4.0;
@@ -49,6 +65,8 @@ impl Design {
         found.extend(self.coarse_circles());
         found.extend(self.rounded_places());
         found.extend(self.steep_phase());
+        found.extend(self.steered_at_normal_incidence());
+        found.extend(self.slender_pillars());
         found.extend(lattice_warning(
             &self.lattice_orders(AskedLight::All)?,
             self.cell.pitch_nm,
@@ -129,6 +147,50 @@ impl Design {
         })
     }
 
+    /// Elements whose light arrives at an angle at which no cell is solved.
+    fn steered_at_normal_incidence(&self) -> Option<Warning> {
+        let verify = &self.verify;
+        if verify.incidence == CellIncidence::Oblique
+            || verify.fidelity != Fidelity::Rigorous
+            || self.cell.shape.basis().is_some()
+        {
+            return None;
+        }
+        let steered = self.elements().into_iter().map(|e| e.wedge.sin_x.hypot(e.wedge.sin_y));
+        let most_deg = steered.fold(0.0, f64::max).min(1.0).asin().to_degrees();
+        (most_deg > MOST_NORMAL_DEG).then(|| {
+            Warning::new(
+                "verify/normal-incidence",
+                format!(
+                    "light of elements arrives at up to {most_deg:.1} degrees, and their cells are solved at normal incidence: Strehl ratios and \
+                     efficiencies of steered elements are too high"
+                ),
+                "use `incidence = \"oblique\"` in [verify], or --oblique",
+            )
+        })
+    }
+
+    /// Pillars that are many times as high as wide.
+    fn slender_pillars(&self) -> Option<Warning> {
+        if self.cell.shape.basis().is_some() {
+            // Rectangles are numbered, and their widths stand in a library.
+            return None;
+        }
+        let (narrowest_nm, _) = self.cell.width_range_nm;
+        let ratio = self.cell.pillar_height_nm / f64::from(narrowest_nm);
+        (ratio > MOST_SLENDER).then(|| {
+            Warning::new(
+                "cell/slender-pillars",
+                format!(
+                    "the narrowest pillars are {narrowest_nm} nm wide and {} nm high, 1 : {ratio:.0}: few processes can make pillars beyond \
+                     1 : {MOST_SLENDER}",
+                    self.cell.pillar_height_nm
+                ),
+                "use a lower height, a larger `width_min_nm`, or a film of higher index; ask the cleanroom for its largest ratio",
+            )
+        })
+    }
+
     /// Pillars that are not where the lattice has them, because the grid of the files is too coarse.
     fn rounded_places(&self) -> Option<Warning> {
         let (lattice, unit) = (self.lattice(), self.cell.database_unit);
@@ -187,33 +249,51 @@ impl Design {
         lenses
     }
 
-    /// A phase over the radius that sends its light elsewhere than to the middle of the sensor, at each wavelength.
+    /// A phase that sends its light elsewhere than to the middle of the sensor, or focuses it in another plane, at each wavelength.
     fn out_of_focus(&self) -> Option<Warning> {
-        let focuses = |lens: &LensSpec| {
+        let step_um = f64::from(self.cell.pitch_nm) * 1e-3;
+        let mut seen: Vec<&LensSpec> = Vec::new();
+        let mut worst: Option<Focus> = None;
+        for element in self.elements() {
+            let lens = self.lens_of(&element);
+            let is_flat = lens.terms.is_empty() && lens.phase == RadialPhase::Flat;
+            if is_flat || seen.iter().any(|known| std::ptr::eq(*known, lens)) {
+                continue;
+            }
+            seen.push(lens);
             let own = lens.focused_um();
-            let at = self.verify.wavelengths_um.iter().copied().chain(own);
-            at.map(|um| missed(lens, um)).fold(f64::INFINITY, f64::min)
-        };
-        let lenses = self
-            .lenses()
-            .into_iter()
-            .filter(|lens| lens.terms.is_empty() && lens.phase != RadialPhase::Flat);
-        let worst = lenses
-            .map(|lens| (focuses(lens), lens))
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let (missed, lens) = worst;
-        (missed > MOST_MISSED).then(|| {
-            Warning::new(
+            let lights = self.verify.wavelengths_um.iter().copied().chain(own);
+            let best = lights
+                .map(|um| Focus::of(lens, element.index, um, step_um))
+                .min_by(|a, b| a.missed.total_cmp(&b.missed))?;
+            if worst.as_ref().is_none_or(|worst| worst.missed < best.missed) {
+                worst = Some(best);
+            }
+        }
+        let worst = worst?;
+        if worst.missed > MOST_MISSED {
+            return Some(Warning::new(
                 "phase/out-of-focus",
                 format!(
                     "rays of the phase miss the middle of the sensor, {} um away, by {:.0} % of the radius of the lens on average, at \
                      each wavelength of [verify]",
-                    lens.focal_length_um,
-                    missed * 100.0
+                    worst.sensor_um,
+                    worst.missed * 100.0
                 ),
-                "check the units and the radius of the phase, and `focal_length_um` of [lens]",
-            )
-        })
+                "check units, sign, order and pitch of the phase, and `focal_length_um` of [lens]; holograms are meant to do this",
+            ));
+        }
+        let (meet_um, depths) = worst.elsewhere()?;
+        Some(Warning::new(
+            "phase/other-focal-length",
+            format!(
+                "rays of the phase at {} nm meet {:.1} um from the pillars, and the sensor is {} um away: {depths:.1} depths of focus",
+                (worst.wavelength_um * 1e6).round() / 1e3,
+                meet_um,
+                worst.sensor_um,
+            ),
+            "use one focal length in [lens] and [phase]; check the pitch of a map",
+        ))
     }
 
     /// Maps of which the lens has a small part.
@@ -320,30 +400,37 @@ impl Design {
     }
 }
 
-/// Distance from the middle of the sensor at which rays of a lens land at a wavelength (um), mean over its area, in parts of its
-/// radius; a ray that does not leave counts as one radius.
-fn missed(lens: &LensSpec, wavelength_um: f64) -> f64 {
-    const RINGS: u32 = 64;
-    let radius_um = lens.radius_um();
-    let width_um = radius_um / f64::from(RINGS);
-    let (mut sum, mut area) = (0.0, 0.0);
-    for ring in 0..RINGS {
-        let inner_um = f64::from(ring) * width_um;
-        let turns = |r: f64| lens.phase.turns(r * r);
-        let (r, slope) = (
-            inner_um + 0.5 * width_um,
-            (turns(inner_um + width_um) - turns(inner_um)) / width_um,
-        );
-        let sine = wavelength_um * slope;
-        let lands_um = if sine.abs() < 1.0 {
-            (r + lens.focal_length_um * sine / (1.0 - sine * sine).sqrt()).abs()
-        } else {
-            radius_um
-        };
-        sum += r * lands_um.min(radius_um);
-        area += r;
+/// Focus of the rays of a lens at one wavelength.
+struct Focus {
+    wavelength_um: f64,
+    radius_um: f64,
+    sensor_um: f64,
+    /// Distance from the middle of the sensor at which rays land, in parts of the radius: mean.
+    missed: f64,
+    /// Distance at which rays meet (um), and what they miss the axis by there, as `missed`.
+    meet: Option<(f64, f64)>,
+}
+
+impl Focus {
+    fn of(lens: &LensSpec, element: (i32, i32), wavelength_um: f64, step_um: f64) -> Self {
+        let rays = Rays::of(lens, element, wavelength_um, step_um);
+        Self {
+            wavelength_um,
+            radius_um: lens.radius_um(),
+            sensor_um: lens.focal_length_um,
+            missed: rays.missed(lens.focal_length_um),
+            meet: rays.meet_um().map(|um| (um, rays.missed(um))),
+        }
     }
-    sum / area / radius_um
+
+    /// Distance at which rays meet (um), and its distance from the sensor in depths of focus; none if they meet at the sensor or
+    /// nowhere: phases for a long depth of focus meet nowhere.
+    fn elsewhere(&self) -> Option<(f64, f64)> {
+        let (meet_um, there) = self.meet?;
+        let sine = self.radius_um / self.radius_um.hypot(self.sensor_um);
+        let depths = (meet_um - self.sensor_um).abs() * sine * sine / self.wavelength_um;
+        (there < MEETING_SHARE * self.missed && depths > MOST_DEPTHS).then_some((meet_um, depths))
+    }
 }
 
 /// Light that the lattice diffracts, and the pitch (nm) that would not.
@@ -425,6 +512,78 @@ mod tests {
         let found = warned("tio2_532", &[("focal_length_um = 80", "focal_length_um = 15")]);
         assert!(ids(&found).contains(&"design/na-beyond-scalar"), "{found:?}");
         assert!(!ids(&warned("tio2_532", &[])).contains(&"design/na-beyond-scalar"));
+    }
+
+    #[test]
+    fn a_phase_that_focuses_elsewhere_is_named_with_both_distances() {
+        let found = warned(
+            "tio2_532",
+            &[("source = \"hyperbola\"", "source = \"hyperbola\"\nfocal_length_um = 95")],
+        );
+        let found = found.iter().find(|w| w.id == "phase/other-focal-length").unwrap();
+        assert!(
+            found
+                .what
+                .starts_with("rays of the phase at 532 nm meet 95.0 um from the pillars, and the sensor is 80 um away"),
+            "{found}"
+        );
+        // A third of a depth of focus, 0.532 um / 0.447^2.
+        let near = warned(
+            "tio2_532",
+            &[(
+                "source = \"hyperbola\"",
+                "source = \"hyperbola\"\nfocal_length_um = 80.8",
+            )],
+        );
+        assert!(!ids(&near).contains(&"phase/other-focal-length"), "{near:?}");
+    }
+
+    #[test]
+    fn pillars_beyond_any_process_are_named() {
+        // 2800 nm over 100 nm is 1 : 28.
+        let text = metalith_testing::accepting(&metalith_testing::changed(
+            "mini_3x3",
+            &[("pillar_height_nm = 700", "pillar_height_nm = 2800")],
+        ));
+        let design = Design::parse(&metalith_testing::design("mini_3x3"), &text).unwrap();
+        let found = design.warnings().unwrap();
+        assert!(ids(&found).contains(&"cell/slender-pillars"), "{found:?}");
+    }
+
+    #[test]
+    fn warnings_of_shipped_designs() {
+        let mut lines = String::new();
+        let folder = std::fs::read_dir(metalith_testing::design("tio2_532").parent().unwrap()).unwrap();
+        let mut files: Vec<_> = folder.map(|entry| entry.unwrap().path()).collect();
+        files.retain(|path| path.extension().is_some_and(|end| end == "toml"));
+        files.sort();
+        for path in files {
+            let name = path.file_stem().unwrap().display();
+            let design = Design::read_without_library(&path).unwrap();
+            let found = design.warnings().unwrap();
+            let found: Vec<String> = ids(&found).into_iter().map(|id| format!(" {id}")).collect();
+            lines += &format!("{name}:{}\n", found.join(","));
+        }
+        insta::assert_snapshot!(lines, @r"
+            array_2x4: design/wavelengths-differ, verify/normal-incidence, lattice/diffracts
+            asi_940:
+            birefringent_532:
+            broadband_3x3: design/wavelengths-differ, lattice/diffracts
+            geometric_phase_532: lattice/diffracts
+            hexagonal_1550:
+            hologram: mapping/difference-accepted
+            imaging_3x3: design/wavelengths-differ, lattice/diffracts
+            lens_10mm: design/wavelengths-differ, lattice/diffracts
+            mini_3x3: design/wavelengths-differ, lattice/diffracts
+            mixed_lenses: design/wavelengths-differ, lattice/diffracts
+            neighbours_3x3: design/wavelengths-differ, lattice/diffracts
+            neural_nano_optics: phase/out-of-focus, phase/steep, lattice/diffracts
+            prototype_3x3: design/wavelengths-differ, lattice/diffracts
+            robust_3x3: design/wavelengths-differ, lattice/diffracts
+            silicon_10600:
+            tio2_532:
+            wide_5x5: design/wavelengths-differ, phase/steep, lattice/diffracts
+            ");
     }
 
     #[test]

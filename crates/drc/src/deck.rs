@@ -106,6 +106,17 @@ impl Deck {
         Self::parse(&self.path, text).expect("a number for a number")
     }
 
+    /// The deck with the height of the pillars of a design in its rules about proportions, in place of the height that the file
+    /// states.
+    ///
+    /// # Panics
+    /// Never: the same text was read before.
+    #[must_use]
+    pub fn for_pillars_of(self, design: &Design) -> Self {
+        let height_nm = design.cell.pillar_height_nm;
+        Self::read_text(&self.path, self.text, Some(height_nm)).expect("it was read before")
+    }
+
     /// The deck of the program whose file has the name at the end of `path`, if there is one.
     pub fn shipped(path: &Path) -> Option<Self> {
         let file = SHIPPED.get_file(path.file_name()?)?;
@@ -120,7 +131,11 @@ impl Deck {
     }
 
     fn parse(path: &Path, text: String) -> Result<Self> {
-        let contents = Document::read(path, &text, read)?;
+        Self::read_text(path, text, None)
+    }
+
+    fn read_text(path: &Path, text: String, height_nm: Option<f64>) -> Result<Self> {
+        let contents = Document::read(path, &text, |root| read(root, height_nm))?;
         Ok(Self {
             name: contents.name,
             pillars: contents.pillars,
@@ -143,7 +158,8 @@ struct DeckContents {
     rules: Vec<DeckRule>,
 }
 
-fn read(root: &Section<'_, '_>) -> DeckContents {
+/// `height_nm`: height of the pillars that is known better than by the file.
+fn read(root: &Section<'_, '_>, height_nm: Option<f64>) -> DeckContents {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     let name = root.text("name");
     let section = root.section("layers");
@@ -173,12 +189,12 @@ fn read(root: &Section<'_, '_>) -> DeckContents {
         pillars.extend(layers.get("pillars"));
     }
     section.finish();
-    let height_nm = root.float("pillar_height_nm", Limits::new(1.0..=100_000.0, "nm"));
+    let stated_nm = root.float("pillar_height_nm", Limits::new(1.0..=100_000.0, "nm"));
     let sections = root.sections("rule");
     let mut context = Context {
         layers,
         pillars: pillars.first().copied().unwrap_or_default(),
-        height_nm,
+        height_nm: height_nm.unwrap_or(stated_nm),
         covered: Vec::new(),
     };
     context.covered = sections

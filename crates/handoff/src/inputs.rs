@@ -58,7 +58,7 @@ impl Sources {
             if decks.iter().any(|(known, _)| known == rules) {
                 continue;
             }
-            let deck = process.deck(rules, design.cell.database_unit)?;
+            let deck = process.deck(rules, design.cell.database_unit)?.for_pillars_of(&design);
             let (path, text) = deck.source();
             kept.push(InputCopy::new(
                 "rules_",

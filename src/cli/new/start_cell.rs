@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use metalith::cell_study::{CellRequest, ChosenCell};
+use metalith::design::MOST_NORMAL_DEG;
 use metalith::rcwa::Material;
 use metalith::text::printable;
 use metalith::{LatticeKind, PillarShape, Result};
@@ -186,7 +187,8 @@ impl StartCell {
 
     /// A cell that was chosen.
     pub(crate) fn chosen(request: &CellRequest, cell: &ChosenCell, materials: &Materials) -> Self {
-        let nm = request.wavelength_um * 1e3;
+        // The digits of the wavelength as stated, without the rounding of its unit.
+        let nm = (request.wavelength_um * 1e9).round() / 1e6;
         let given = |is_given: bool, why: String| if is_given { format!("as asked; {why}") } else { why };
         let index = |material: &Material| material.index(request.wavelength_um).map_or(1.0, |n| n.re);
         let (shape, pillars) = match request.shape {
@@ -278,12 +280,23 @@ impl StartCell {
         let spot_nm = nm / aperture.max(1e-6);
         let samples = (WINDOW * spot_nm / f64::from(cell.pitch_nm)).clamp(SAMPLES[0], SAMPLES[1]);
         let pixel_um = ((0.25 * spot_nm / 100.0).round() / 10.0).clamp(0.1, 100.0);
+        let steered_deg = request.steering_sine.asin().to_degrees();
+        let incidence = if steered_deg > MOST_NORMAL_DEG {
+            line(
+                "incidence",
+                "\"oblique\"",
+                "cells are solved at the angle of arrival: the outermost elements are steered far",
+            )
+        } else {
+            String::new()
+        };
         let verify = [
             line(
                 "fidelity",
                 "\"rigorous\"",
                 "each pillar among equal ones (local periodic approximation)",
             ),
+            incidence,
             line("wavelengths_nm", format!("[{nm}]"), ""),
             line(
                 "field_x_deg",
