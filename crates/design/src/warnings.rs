@@ -1,6 +1,6 @@
 //! Properties of a design that are allowed and easily are mistakes.
 
-use metalith_core::{Result, Warning};
+use metalith_core::{Result, Warning, numerical_aperture};
 use metalith_pillars::{DatabaseUnit, PillarShape, Pitch, Steepness};
 
 use crate::phase::{ElementPhase, LensPhase, RadialPhase, TermForm};
@@ -115,7 +115,7 @@ impl Design {
 
     /// A lens whose marginal ray is steeper than the simulation is proven for.
     fn beyond_scalar(&self) -> Option<Warning> {
-        let sine = |lens: &LensSpec| lens.radius_um() / lens.radius_um().hypot(lens.focal_length_um);
+        let sine = |lens: &LensSpec| numerical_aperture(lens.radius_um(), lens.focal_length_um);
         let most = self.lenses().into_iter().map(sine).fold(0.0, f64::max);
         (most > MOST_SINE).then(|| {
             Warning::new(
