@@ -29,6 +29,10 @@ const VERIFIED_NEAR: f64 = 0.05;
 /// Sine of the marginal ray beyond which neither the scalar field nor the local periodic approximation is proven.
 const MOST_SINE: f64 = 0.9;
 
+/// Standard deviation of the distance to the sensor, in depths of focus of the design (wavelength over the square of the numerical
+/// aperture): two depths off, the axis of an ideal lens is dark.
+const MOST_DEPTHS: f64 = 2.0;
+
 /// Wavelengths that differ by less are one (um): the rounding of a file.
 const ROUNDING_UM: f64 = 1e-7;
 
@@ -49,6 +53,8 @@ impl Design {
         found.extend(self.coarse_circles());
         found.extend(self.rounded_places());
         found.extend(self.steep_phase());
+        found.extend(self.other_pixels());
+        found.extend(self.beyond_focus());
         found.extend(lattice_warning(
             &self.lattice_orders(AskedLight::All)?,
             self.cell.pitch_nm,
@@ -111,6 +117,41 @@ impl Design {
             ),
             "use one wavelength in [phase], [mapping], [array] and [verify], unless this is meant",
         ))
+    }
+
+    /// Images of `metalith optimise` on pixels of another size than those of [verify].
+    fn other_pixels(&self) -> Option<Warning> {
+        let (pixel_um, verified_um) = (self.optimise.views.pixel_um, self.verify.pixel_um);
+        let differ = self.optimise.merit.deconvolution != 0.0 && (pixel_um - verified_um).abs() > ROUNDING_UM;
+        differ.then(|| {
+            Warning::new(
+                "optimise/pixels-differ",
+                format!("images are optimised on pixels of {pixel_um} um and verified on pixels of {verified_um} um"),
+                "give one size as `pixel_um` in [optimise.views] and [verify]",
+            )
+        })
+    }
+
+    /// Errors of the distance of the sensor by which no lens of the design has a focus.
+    fn beyond_focus(&self) -> Option<Warning> {
+        let defocus_um = self.optimise.robust?.defocus_um;
+        let depth_um = |lens: &LensSpec| {
+            self.optimise.band_um.1 / numerical_aperture(lens.radius_um(), lens.focal_length_um).powi(2)
+        };
+        let most_um = self.lenses().into_iter().map(depth_um).fold(0.0, f64::max);
+        (defocus_um > MOST_DEPTHS * most_um).then(|| {
+            Warning::new(
+                "optimise/defocus-beyond-focus",
+                format!(
+                    "a standard deviation of {defocus_um} um of the distance to the sensor is {:.1} depths of focus",
+                    defocus_um / most_um
+                ),
+                format!(
+                    "give at most {:.3} um as `defocus_um` in [optimise.robust]",
+                    MOST_DEPTHS * most_um
+                ),
+            )
+        })
     }
 
     /// A lens whose marginal ray is steeper than the simulation is proven for.
