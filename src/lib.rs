@@ -117,7 +117,8 @@ pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
 pub use metalith_core::{
-    AtomicFile, Error, Fault, FaultKind, Faults, FolderLock, Progress, Result, Silent, Warning, Wedge, text,
+    AtomicFile, Error, Fault, FaultKind, Faults, FolderLock, Progress, Result, Silent, Warning, Wedge,
+    numerical_aperture, text,
 };
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};
 pub use metalith_gds::Layout;

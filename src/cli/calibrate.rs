@@ -1,6 +1,7 @@
 //! `metalith calibrate`: from a measured set to what the model lacks.
 
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::calibrate::{
@@ -12,6 +13,7 @@ use metalith::extract::GdsPillars;
 use metalith::metrology::{self, Answer, SetKind, kind_of};
 use metalith::{Error, Result};
 
+use super::out_folder::OutFolder;
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Find the effects by which a measured set differs from its prediction.
@@ -81,23 +83,20 @@ pub(crate) struct CalibrateArgs {
 
 pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let name = |set: &PathBuf| {
-        let folder = if set.is_dir() {
-            Some(set.as_path())
-        } else {
-            set.parent()
+    let out_of = |set: &PathBuf| {
+        let folder = match set.parent() {
+            Some(parent) if !set.is_dir() => parent,
+            _ => set,
         };
-        folder
-            .and_then(|f| f.file_name())
-            .map_or_else(|| "set".into(), |n| n.to_os_string())
+        let name = folder.file_name().unwrap_or(OsStr::new("set"));
+        let asked = match &args.out {
+            Some(out) if args.sets.len() == 1 => Some(out.clone()),
+            out => out.as_ref().map(|root| root.join(name)),
+        };
+        OutFolder::of(asked.as_deref(), Path::new("out/calibrate").join(name), folder)
     };
-    let outs: Vec<PathBuf> = match &args.out {
-        Some(out) if args.sets.len() == 1 => vec![out.clone()],
-        out => {
-            let root = out.clone().unwrap_or_else(|| PathBuf::from("out").join("calibrate"));
-            args.sets.iter().map(|s| root.join(name(s))).collect()
-        }
-    };
+    let folders = args.sets.iter().map(out_of).collect::<Result<Vec<_>>>()?;
+    let outs: Vec<PathBuf> = folders.iter().map(|folder| folder.path.clone()).collect();
     if let Some(k) = (1..outs.len()).find(|&k| outs[..k].contains(&outs[k])) {
         return Err(Error::refused(
             "calibrate/same-output-folder",
@@ -109,9 +108,16 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
             "calibrate sets whose folders have the same name with one command each, and different --out",
         ));
     }
+    let outcome = calibrate_into(args, &outs, terminal)?;
+    folders.iter().try_for_each(OutFolder::note)?;
+    Ok(outcome)
+}
+
+/// Calibrate or validate the sets, each into its folder.
+fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -> Result<Outcome> {
     let kinds: Vec<_> = args.sets.iter().map(|set| kind_of(set)).collect();
     if kinds.iter().any(Option::is_some) {
-        return run_metrology(args, &kinds, &outs, terminal);
+        return run_metrology(args, &kinds, outs, terminal);
     }
     if args.validate && args.sets.len() > 1 {
         return Err(Error::refused(
@@ -163,7 +169,7 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
         return Ok(Outcome::Fine);
     }
     let mut outcome = Outcome::Fine;
-    for done in calibrate(&args.sets, &outs, &settings, &GdsPillars, terminal)? {
+    for done in calibrate(&args.sets, outs, &settings, &GdsPillars, terminal)? {
         terminal.clear();
         if args.json {
             print_json(&done.diagnosis);

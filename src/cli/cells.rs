@@ -11,6 +11,7 @@ use metalith::cell_study::{
 use metalith::report::{counted, fixed, sig};
 use metalith::{AtomicFile, Design, Error, PolarisationBasis, Progress, Result};
 
+use super::out_folder::OutFolder;
 use super::section_text::with_keys;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -69,10 +70,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let mut design = standard_input::design_without_library(&args.design)?;
     terminal.warnings(&design.mapping_warnings());
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| PathBuf::from("out").join(&design.name));
+    let out = OutFolder::of(args.out.as_deref(), Path::new("out").join(&design.name), &args.design)?;
     match design.cell.shape.basis() {
         Some(_) if args.steered => {
             return Err(Error::refused(
@@ -81,8 +79,8 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
                 "leave out --steered: the coupled model is made of squares only",
             ));
         }
-        Some(PolarisationBasis::Circular) => return rotations(args, &design, &folder, terminal),
-        Some(PolarisationBasis::Linear) => return library(args, &design, &folder, terminal),
+        Some(PolarisationBasis::Circular) => return rotations(args, &design, &out, terminal),
+        Some(PolarisationBasis::Linear) => return library(args, &design, &out, terminal),
         None => {}
     }
     let options = StudyOptions { threshold: args.avoid };
@@ -100,7 +98,8 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         study.steered = study_steered(&design, cache.as_deref(), terminal)?;
         terminal.clear();
     }
-    let _turn = terminal.turn_at(&folder)?;
+    let _turn = out.turn(terminal)?;
+    let folder = out.path;
     write_cell_report(&study, &folder)?;
     if args.json {
         print_json(&study);
@@ -218,10 +217,11 @@ fn write_mapping(path: &Path, design: &Design, best: &MappingStudy) -> Result<()
 }
 
 /// The study of a design of rotated rectangles: a few cells, and no library.
-fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
+fn rotations(args: &CellsArgs, design: &Design, out: &OutFolder, terminal: &Terminal) -> Result<Outcome> {
     let study = RotationStudy::new(design, terminal)?;
     terminal.clear();
-    let _turn = terminal.turn_at(folder)?;
+    let _turn = out.turn(terminal)?;
+    let folder = &out.path;
     write_rotation_report(&study, folder)?;
     if args.json {
         print_json(&study);
@@ -251,14 +251,15 @@ fn rotations(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Termin
 }
 
 /// The study of a design of upright rectangles, and their library.
-fn library(args: &CellsArgs, design: &Design, folder: &Path, terminal: &Terminal) -> Result<Outcome> {
+fn library(args: &CellsArgs, design: &Design, out: &OutFolder, terminal: &Terminal) -> Result<Outcome> {
     if let Some(why) = &design.mapping.pillar_library_refused {
         terminal.warn(&format!("the library that the design names is not judged: {why}"));
     }
     let cache = args.cache.clone().or_else(cache_folder);
     let study = LibraryStudy::new(design, cache.as_deref(), terminal)?;
     terminal.clear();
-    let _turn = terminal.turn_at(folder)?;
+    let _turn = out.turn(terminal)?;
+    let folder = &out.path;
     write_library_report(&study, folder)?;
     if args.json {
         print_json(&study);

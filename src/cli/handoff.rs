@@ -10,6 +10,7 @@ use metalith::{Accuracy, Design, Result};
 
 use super::compensated::judged_as_made;
 use super::layout::FormatArg;
+use super::out_folder::OutFolder;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
@@ -75,21 +76,16 @@ pub(crate) fn run(args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
 
 fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
     judged_as_made("--compensate", args.compensate.as_deref(), args.fidelity)?;
-    let out = if let Some(out) = &args.out {
-        out.clone()
-    } else {
-        let design = Design::read_with(design, terminal)?.name;
-        let name = if args.compensate.is_some() {
-            compensated_name(&design)
-        } else {
-            design
-        };
-        PathBuf::from("out").join(format!("{name}_handoff"))
+    let default = match (&args.out, &args.compensate) {
+        (Some(out), _) => out.clone(),
+        (None, Some(_)) => handoff_of(&compensated_name(&Design::read_with(design, terminal)?.name)),
+        (None, None) => handoff_of(&Design::read_with(design, terminal)?.name),
     };
+    let out = OutFolder::of(args.out.as_deref(), default, design)?;
     let options = HandoffOptions {
         design: design.to_owned(),
         process: args.process.clone(),
-        out,
+        out: out.path.clone(),
         command: std::iter::once("metalith".to_owned())
             .chain(std::env::args().skip(1))
             .collect::<Vec<_>>()
@@ -101,6 +97,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
         accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
     };
     let made = handoff(&options, terminal)?;
+    out.note()?;
     terminal.clear();
     if args.json {
         print_line!(
@@ -116,6 +113,11 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
         tell(&made);
     }
     Ok(outcome(&made))
+}
+
+/// Default folder of the hand-off of a design.
+fn handoff_of(name: &str) -> PathBuf {
+    PathBuf::from("out").join(format!("{name}_handoff"))
 }
 
 fn outcome(made: &Handoff) -> Outcome {

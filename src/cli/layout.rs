@@ -1,6 +1,6 @@
 //! `metalith layout`: a design becomes the files that a cleanroom writes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::CalibratedModel;
@@ -9,6 +9,7 @@ use metalith::layout::{LayoutFormat, OasisEncoding, Written, write_apertures_as,
 use metalith::report::{count, counted, sig};
 use metalith::{Design, Hierarchy, PillarArray, Result, write_layer_properties};
 
+use super::out_folder::OutFolder;
 use super::{Outcome, Terminal, print_line, standard_input};
 
 /// Write the pillar layout, the aperture layout and the layer colours of a design.
@@ -129,16 +130,22 @@ enum HierarchyArg {
 }
 
 impl Target {
-    /// The folder that the files of a design go to.
-    pub(crate) fn folder(&self, design: &Design) -> PathBuf {
-        self.out
-            .clone()
-            .unwrap_or_else(|| PathBuf::from("out").join(&design.name))
+    /// The folder that the files of a design of this name go to, which is read from `path`.
+    ///
+    /// # Errors
+    /// As [`OutFolder::of`].
+    pub(crate) fn folder(&self, name: &str, path: &Path) -> Result<OutFolder> {
+        OutFolder::of(self.out.as_deref(), Path::new("out").join(name), path)
     }
 
-    /// Write all files of a design.
-    pub(crate) fn write(&self, design: &Design, array: &PillarArray, terminal: &Terminal) -> Result<Files> {
-        let folder = self.folder(design);
+    /// Write all files of a design into a folder.
+    pub(crate) fn write(
+        &self,
+        design: &Design,
+        array: &PillarArray,
+        folder: &Path,
+        terminal: &Terminal,
+    ) -> Result<Files> {
         let file = |suffix: &str| folder.join(format!("{}{suffix}", design.name));
         let properties = file(".lyp");
         let format = self.format.asked()?.unwrap_or_default();
@@ -172,22 +179,27 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design, terminal)?;
     let warnings = design.warnings()?;
     terminal.warnings(&warnings);
+    let name = match &args.compensate {
+        Some(_) => compensated_name(&design.name),
+        None => design.name.clone(),
+    };
+    let out = args.target.folder(&name, &args.design)?;
     terminal.stop_on_interrupt();
     let mut array = PillarArray::build(&design, terminal)?;
     let mut compensation = None;
     if let Some(path) = &args.compensate {
         let model = CalibratedModel::read(path)?;
         let compensated = compensate(&design, &array, &model, terminal)?;
-        design.name = compensated_name(&design.name);
+        design.name = name;
         let intended = std::mem::replace(&mut array, compensated.array.clone());
         compensation = Some((model, intended, compensated));
     }
-    let _turn = terminal.turn_at(&args.target.folder(&design))?;
-    let written = args.target.write(&design, &array, terminal)?;
+    let _turn = out.turn(terminal)?;
+    let written = args.target.write(&design, &array, &out.path, terminal)?;
     if let Some((model, intended, compensated)) = &compensation {
-        let folder = args.target.folder(&design);
+        let folder = &out.path;
         let pillars = &written.pillars.path;
-        write_compensation_report(&design, intended, compensated, model, pillars, &folder, terminal)?;
+        write_compensation_report(&design, intended, compensated, model, pillars, folder, terminal)?;
     }
     terminal.clear();
     if args.json {
@@ -232,7 +244,7 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
             for quantity in compensated.not_applied() {
                 print_line!("{quantity}");
             }
-            let report = args.target.folder(&design).join("compensation.html");
+            let report = out.path.join("compensation.html");
             print_line!("{}", report.display());
         }
     }

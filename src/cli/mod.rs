@@ -17,6 +17,7 @@ mod images;
 mod layout;
 mod new;
 mod optimise;
+mod out_folder;
 mod output;
 mod paths;
 mod picture;

@@ -13,6 +13,7 @@ use metalith::report::sig;
 use metalith::study::plan_starts;
 use metalith::{Design, Hierarchy, PillarArray, Result, write_pillars};
 
+use super::out_folder::OutFolder;
 use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -64,12 +65,15 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let design = standard_input::design(&args.design, terminal)?;
     terminal.stop_on_interrupt();
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| PathBuf::from("out").join(&design.name).join("optimise"));
+    let default = Path::new("out").join(&design.name);
+    let out = OutFolder::of(args.out.as_deref(), default, &args.design)?;
+    let folder = match &args.out {
+        Some(out) => out.clone(),
+        None => out.path.join("optimise"),
+    };
     if let Some(starts) = args.plan {
         let plan = plan_starts(&args.design, starts, args.starts_per_shard, &folder, terminal)?;
+        out.note()?;
         terminal.clear();
         print_line!(
             "{} starts in {} shards: {}",
@@ -85,6 +89,7 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     let task = OptimiseTask::of(&design)?;
     let cells = TaskCells::of(&design, !args.no_report, cache_folder().as_deref(), terminal)?;
     let _turn = terminal.turn_at(&folder)?;
+    out.note()?;
     let checkpoint = if args.fresh {
         Checkpoint::begin(&design)
     } else {

@@ -6,6 +6,7 @@ use clap::Args;
 use metalith::bench_plan::{BenchFile, MeasurementPlan};
 use metalith::{Result, plan_session};
 
+use super::out_folder::OutFolder;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Plan a bench session: the fewest measurements that find every effect at a wanted size and distinguish it from the
@@ -43,12 +44,11 @@ pub(crate) fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let design = standard_input::design(&args.design, terminal)?;
     let bench = BenchFile::read(&args.bench)?;
-    let folder = match &args.out {
-        Some(out) => out.clone(),
-        None => Path::new("out").join(format!("{}_session", design.name)),
-    };
+    let default = Path::new("out").join(format!("{}_session", design.name));
+    let out = OutFolder::of(args.out.as_deref(), default, &args.design)?;
     let layout = args.layout.as_deref();
-    let planned = plan_session(&design, &bench, layout, &folder, args.effects.clone(), terminal)?;
+    let planned = plan_session(&design, &bench, layout, &out.path, args.effects.clone(), terminal)?;
+    out.note()?;
     terminal.clear();
     if args.json {
         print_json(&planned);

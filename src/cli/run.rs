@@ -29,20 +29,21 @@ pub(crate) fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let design = standard_input::design(&args.design, terminal)?;
     terminal.warnings(&design.warnings()?);
     // What could not be read back is not written; `metalith layout` writes it.
-    let simulation = args.judging.simulation(&design, &args.target.folder(&design))?;
+    let out = args.target.folder(&design.name, &args.design)?;
+    let folder = &out.path;
+    let simulation = args.judging.simulation(&design, folder)?;
     Judging::announce(&simulation, terminal);
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     args.judging.check_drawn(&design, &array)?;
-    let folder = args.target.folder(&design);
-    let _turn = terminal.turn_at(&folder)?;
+    let _turn = out.turn(terminal)?;
     // A report speaks of the layout beside it: the old one must not stand beside a new layout, whatever happens.
     AtomicFile::discard(&folder.join("report.html"))?;
     AtomicFile::discard(&folder.join("report.json"))?;
-    let written = args.target.write(&design, &array, terminal)?;
+    let written = args.target.write(&design, &array, folder, terminal)?;
     let judged = args
         .judging
-        .judge(&design, &array, &written.pillars.path, &folder, terminal);
+        .judge(&design, &array, &written.pillars.path, folder, terminal);
     if let Err(Error::Interrupted) = &judged {
         terminal.clear();
         terminal.say(&format!(

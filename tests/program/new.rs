@@ -224,3 +224,27 @@ fn a_design_may_come_by_standard_input() {
         "{said}"
     );
 }
+
+/// Two designs may have one name, and would have one folder for their outputs.
+#[test]
+fn outputs_of_a_design_of_the_same_name_are_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| metalith().current_dir(folder.path()).args(arguments).assert();
+    for (design, diameter) in [("a/lens.toml", "60"), ("b/lens.toml", "50")] {
+        fs::create_dir(folder.path().join(design).parent().unwrap()).unwrap();
+        run(&["new", design, "--elements", "1", "--diameter-um", diameter]).success();
+    }
+    run(&["layout", "a/lens.toml"]).success();
+    let layout = || fs::read(folder.path().join("out/lens/lens_pillars.gds")).unwrap();
+    let first = layout();
+    for command in ["layout", "run", "cells", "optimise"] {
+        run(&[command, "b/lens.toml"])
+            .code(2)
+            .stderr(contains(refusal("option/folder-of-another-input")));
+    }
+    assert_eq!(layout(), first);
+    run(&["layout", "a/lens.toml"]).success();
+    run(&["layout", "b/lens.toml", "--out", "out/lens"]).success();
+    assert_ne!(layout(), first);
+    run(&["layout", "b/lens.toml"]).success();
+}

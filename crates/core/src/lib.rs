@@ -31,5 +31,5 @@ pub use memo::Memo;
 pub use plane::part;
 pub use progress::{Progress, Quiet, Silent};
 pub use warning::Warning;
-pub use wedge::{Wedge, turned_sine};
+pub use wedge::{Wedge, numerical_aperture, turned_sine};
 pub use zernike::Zernike;

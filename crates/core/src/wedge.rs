@@ -37,6 +37,11 @@ pub fn turned_sine(sine: f64, by_rad: f64) -> Option<f64> {
     (angle.abs() < FRAC_PI_2).then(|| angle.sin())
 }
 
+/// Numerical aperture in air of a lens of this radius whose focus is at this distance on its axis (the same unit).
+pub fn numerical_aperture(radius: f64, distance: f64) -> f64 {
+    radius / radius.hypot(distance)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

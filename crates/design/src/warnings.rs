@@ -1,7 +1,7 @@
 //! Properties of a design that are allowed and easily are mistakes.
 
 use metalith_cell::Fidelity;
-use metalith_core::{Result, Warning};
+use metalith_core::{Result, Warning, numerical_aperture};
 use metalith_pillars::{DatabaseUnit, PillarShape, Pitch, Steepness};
 
 use crate::phase::{ElementPhase, LensPhase, RadialPhase, TermForm};
@@ -45,6 +45,10 @@ const VERIFIED_NEAR: f64 = 0.05;
 /// Sine of the marginal ray beyond which neither the scalar field nor the local periodic approximation is proven.
 const MOST_SINE: f64 = 0.9;
 
+/// Standard deviation of the distance to the sensor, in depths of focus of the design (wavelength over the square of the numerical
+/// aperture): two depths off, the axis of an ideal lens is dark.
+const MOST_DEPTHS: f64 = 2.0;
+
 /// Wavelengths that differ by less are one (um): the rounding of a file.
 const ROUNDING_UM: f64 = 1e-7;
 
@@ -67,6 +71,8 @@ impl Design {
         found.extend(self.steep_phase());
         found.extend(self.steered_at_normal_incidence());
         found.extend(self.slender_pillars());
+        found.extend(self.other_pixels());
+        found.extend(self.beyond_focus());
         found.extend(lattice_warning(
             &self.lattice_orders(AskedLight::All)?,
             self.cell.pitch_nm,
@@ -131,9 +137,44 @@ impl Design {
         ))
     }
 
+    /// Images of `metalith optimise` on pixels of another size than those of [verify].
+    fn other_pixels(&self) -> Option<Warning> {
+        let (pixel_um, verified_um) = (self.optimise.views.pixel_um, self.verify.pixel_um);
+        let differ = self.optimise.merit.deconvolution != 0.0 && (pixel_um - verified_um).abs() > ROUNDING_UM;
+        differ.then(|| {
+            Warning::new(
+                "optimise/pixels-differ",
+                format!("images are optimised on pixels of {pixel_um} um and verified on pixels of {verified_um} um"),
+                "give one size as `pixel_um` in [optimise.views] and [verify]",
+            )
+        })
+    }
+
+    /// Errors of the distance of the sensor by which no lens of the design has a focus.
+    fn beyond_focus(&self) -> Option<Warning> {
+        let defocus_um = self.optimise.robust?.defocus_um;
+        let depth_um = |lens: &LensSpec| {
+            self.optimise.band_um.1 / numerical_aperture(lens.radius_um(), lens.focal_length_um).powi(2)
+        };
+        let most_um = self.lenses().into_iter().map(depth_um).fold(0.0, f64::max);
+        (defocus_um > MOST_DEPTHS * most_um).then(|| {
+            Warning::new(
+                "optimise/defocus-beyond-focus",
+                format!(
+                    "a standard deviation of {defocus_um} um of the distance to the sensor is {:.1} depths of focus",
+                    defocus_um / most_um
+                ),
+                format!(
+                    "give at most {:.3} um as `defocus_um` in [optimise.robust]",
+                    MOST_DEPTHS * most_um
+                ),
+            )
+        })
+    }
+
     /// A lens whose marginal ray is steeper than the simulation is proven for.
     fn beyond_scalar(&self) -> Option<Warning> {
-        let sine = |lens: &LensSpec| lens.radius_um() / lens.radius_um().hypot(lens.focal_length_um);
+        let sine = |lens: &LensSpec| numerical_aperture(lens.radius_um(), lens.focal_length_um);
         let most = self.lenses().into_iter().map(sine).fold(0.0, f64::max);
         (most > MOST_SINE).then(|| {
             Warning::new(
@@ -427,7 +468,7 @@ impl Focus {
     /// nowhere: phases for a long depth of focus meet nowhere.
     fn elsewhere(&self) -> Option<(f64, f64)> {
         let (meet_um, there) = self.meet?;
-        let sine = self.radius_um / self.radius_um.hypot(self.sensor_um);
+        let sine = numerical_aperture(self.radius_um, self.sensor_um);
         let depths = (meet_um - self.sensor_um).abs() * sine * sine / self.wavelength_um;
         (there < MEETING_SHARE * self.missed && depths > MOST_DEPTHS).then_some((meet_um, depths))
     }

@@ -160,11 +160,11 @@ impl<'e> IncoherentFields<'e> {
             let aperture = field.aperture(&self.light)?;
             let mut psfs = Psf::formed_at(&fold, aperture.as_ref(), &self.light.plane, &as_built, scratch)?;
             psfs.iter_mut().for_each(|psf| self.add_scattered(field, psf));
-            Ok(psfs)
+            Ok(psfs.into_iter())
         };
         let mut fields = self.fields.iter().map(of).collect::<Result<Vec<_>>>()?;
         let plane = |distance_um: &f64| {
-            let psfs = fields.iter_mut().map(|planes| planes.remove(0)).collect();
+            let psfs = fields.iter_mut().filter_map(Iterator::next).collect();
             let mut psf = Psf::sum(psfs, self.weight);
             self.camera.apply(&mut psf);
             psf.window.distance_um = *distance_um;

@@ -118,8 +118,8 @@ pub enum TableError {
     Missing,
     #[error("\"{text}\" is not a number")]
     NotANumber { text: String },
-    #[error("a wavelength, n or k is not physical")]
-    NotPhysical,
+    #[error("{what}")]
+    NotPhysical { what: String },
     #[error("the wavelengths do not rise")]
     NotRising,
     #[error("the table has fewer than two rows")]

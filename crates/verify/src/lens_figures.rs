@@ -1,5 +1,6 @@
 //! Figures of the lens in a few lines: the numbers that papers on metalenses give.
 
+use metalith_core::numerical_aperture;
 use metalith_design::Design;
 use metalith_report::{Cell, Column, exact, sig};
 use metalith_wave::psf::{AIRY_FWHM, FocusMetrics, PsfMetrics};
@@ -81,8 +82,7 @@ fn limit(design: &Design, element: &DistinctElement, spot: &PsfPair) -> String {
     if lens.outline.is_some() || (wedge.sin_x, wedge.sin_y) != (0.0, 0.0) {
         return String::new();
     }
-    let radius_um = lens.radius_um();
-    let aperture = radius_um / radius_um.hypot(lens.focal_length_um);
+    let aperture = numerical_aperture(lens.radius_um(), lens.focal_length_um);
     format!(
         " (diffraction limit {})",
         sig(AIRY_FWHM * spot.wavelength_um / aperture, 3)

@@ -21,6 +21,7 @@ mod polychromatic_page;
 mod psf_metrics;
 mod rotations;
 mod single;
+mod single_memory;
 mod single_white;
 mod site_orders;
 mod steep_phase_errors;
@@ -59,9 +60,8 @@ pub use polychromatic::CameraStatement;
 pub use polychromatic_channels::{Contrast, WhiteChannel};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use rotations::EqualRotations;
-pub use single::{
-    FocusRequest, Lighting, STREHL_AGAINST, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report,
-};
+pub use single::{Lighting, STREHL_AGAINST, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
+pub use single_memory::FocusRequest;
 pub use single_white::{SingleWhite, single_white, white_sampling};
 pub use through_focus::focal_length_words;
 

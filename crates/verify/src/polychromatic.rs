@@ -219,8 +219,10 @@ impl<'a> WhiteSimulator<'a> {
     ) -> Result<BandSample> {
         let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
         let landing = self.point(element).landing_um(um)?;
-        let pitch = self.lattice.pitch_um();
-        let window = Window::about(landing, pitch, spec.window_samples, lens.focal_length_um);
+        let pitches = (self.lattice.pitch_um(), spec.window_samples);
+        // The PSFs of a band have one step.
+        let shortest_um = self.colours.iter().fold(um, |least, colour| least.min(colour.0));
+        let window = Window::of_psf(landing, pitches, (lens.radius_um(), lens.focal_length_um), shortest_um);
         let psf = fields.psf(window, Accuracy::Fast, &self.lp_mm, scratch)?;
         Ok(per_light(landing, psf, arriving_um2))
     }

@@ -11,15 +11,16 @@ use serde::Serialize;
 
 use super::lens_figures::{focus_cells, focus_columns};
 use super::polychromatic::CameraStatement;
+use super::single_memory::FocusRequest;
 use super::single_white::SingleWhite;
 use super::{model_page, polychromatic_page, through_focus};
 use metalith_cell::{Fidelity, Illumination, PolarisedLight};
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_optics::{CaseOptics, ElementOptics, ModelStatement, Placement, SimulationCase};
-use metalith_pillars::{Lattice, LatticeKind, PillarMap};
+use metalith_pillars::{LatticeKind, PillarMap};
 use metalith_report::{Cell, Column, ImageGrid, Page, PillarZoom, Table, count, sig, write_json};
-use metalith_wave::psf::{FocusPlanes, IdealPsf, PixelFrequencies, Psf, PsfMetrics, ThroughFocus};
+use metalith_wave::psf::{IdealPsf, PixelFrequencies, Psf, PsfMetrics, ThroughFocus};
 use metalith_wave::{Accuracy, Pillars, Scratch, Window};
 
 /// Lighting: the light, and the place on the sensor.
@@ -49,52 +50,6 @@ pub struct Lighting {
     pub through_focus: Option<FocusRequest>,
 }
 
-/// Planes along z that are asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FocusRequest {
-    /// Distance of the first and the last plane from the sensor (um); two depths of focus if left out.
-    pub range_um: Option<f64>,
-    pub planes: usize,
-}
-
-impl FocusRequest {
-    /// Most planes: each holds a PSF.
-    pub const PLANES: std::ops::RangeInclusive<usize> = 3..=101;
-
-    /// Check against the distance of the sensor (um).
-    ///
-    /// # Errors
-    /// If there are too few or too many planes, or they reach farther than half of the distance.
-    pub fn check(&self, sensor_um: f64) -> Result<()> {
-        let range = 0.0..=0.5 * sensor_um;
-        let right = self.range_um.is_none_or(|um| um > 0.0 && range.contains(&um));
-        if right && Self::PLANES.contains(&self.planes) {
-            return Ok(());
-        }
-        let range = self
-            .range_um
-            .map_or_else(String::new, |um| format!(", up to {um} um from the sensor"));
-        Err(Error::refused(
-            "psf/through-focus",
-            format!("{} planes{range} through focus", self.planes),
-            format!(
-                "give {} to {} planes, and at most half of the distance to the sensor, {} um",
-                Self::PLANES.start(),
-                Self::PLANES.end(),
-                sig(0.5 * sensor_um, 4)
-            ),
-        ))
-    }
-
-    fn planes(&self, wavelength_um: f64, radius_um: f64, sensor_um: f64) -> FocusPlanes {
-        let usual = FocusPlanes::usual(wavelength_um, radius_um, sensor_um);
-        FocusPlanes {
-            range_um: self.range_um.unwrap_or(usual.range_um),
-            planes: self.planes,
-        }
-    }
-}
-
 /// The PSF of one element of a layout at one wavelength.
 #[derive(Clone, Debug, Serialize)]
 pub struct SinglePsf {
@@ -121,10 +76,21 @@ pub fn single_psfs(
     light: &Lighting,
     progress: &dyn Progress,
 ) -> Result<Vec<SinglePsf>> {
+    let elements = distinct(found);
     if let Some(request) = &light.through_focus {
         request.check(light.distance_um)?;
+        for (um, (_, widths)) in light
+            .wavelengths_um
+            .iter()
+            .flat_map(|um| elements.iter().map(move |e| (um, e)))
+        {
+            let samples = light.window(light.at_um, widths, *um).samples;
+            request.check_samples(samples, samples / light.samples.max(1))?;
+        }
     }
-    let elements = distinct(found);
+    light.check_held(&elements, &light.wavelengths_um, 1)?;
+    // Strehl is against the sites as drawn, whatever they transmit.
+    let open = all_open(&elements);
     progress.begin(
         "simulating elements",
         (elements.len() * light.wavelengths_um.len()) as u64,
@@ -137,38 +103,37 @@ pub fn single_psfs(
         let lit = light.illumination(wavelength_um);
         let fields = read.iter().map(|element| element.in_light(&lit, progress));
         let fields = fields.collect::<Result<Vec<_>>>()?;
+        let full = case.full_transmission(wavelength_um)?;
+        let focus = [light.at_um[0], light.at_um[1], light.distance_um];
         let psfs = fields
             .par_iter()
             .zip(&elements)
-            .map_init(Scratch::default, |scratch, (fields, (_, widths))| {
+            .map_init(Scratch::default, |scratch, (fields, (site, widths))| {
                 progress.check_stopped()?;
-                let window = light.window(widths.lattice, widths.circle_um(), wavelength_um);
+                let window = light.window(light.at_um, widths, wavelength_um);
                 let psf = fields.psf(window, light.accuracy, &light.reported_lp_mm(), scratch)?;
-                let through = |request: &FocusRequest| {
+                let matched = IdealPsf::of(&Pillars::new(*widths, &open)?, focus, wavelength_um, full);
+                let through = |request: &FocusRequest| -> Result<ThroughFocus> {
                     let planes = request.planes(wavelength_um, widths.circle_um(), light.distance_um);
-                    fields.psfs_at(window, &planes.distances_um(light.distance_um), light.accuracy, scratch)
+                    let distances_um = planes.distances_um(light.distance_um);
+                    let psfs = fields.psfs_at(window, &distances_um, light.accuracy, scratch)?;
+                    let size_um = [widths.circle_um(), light.distance_um];
+                    let series = ThroughFocus::of(psfs, &matched, wavelength_um, size_um);
+                    // Planes of many elements do not fit into memory.
+                    Ok(through_focus::shown(series))
                 };
-                let planes = light.through_focus.as_ref().map(through).transpose()?;
+                let through_focus = light.through_focus.as_ref().map(through).transpose()?;
                 progress.advance(1);
-                Ok((psf, planes))
+                Ok(SinglePsf {
+                    through_focus,
+                    element: site.name.clone(),
+                    wavelength_um,
+                    fidelity: case.fidelity(),
+                    metrics: psf.metrics(&matched, light.pixel_um),
+                    psf,
+                })
             });
-        let psfs = psfs.collect::<Result<Vec<_>>>()?;
-        let full = case.full_transmission(wavelength_um)?;
-        let focus = [light.at_um[0], light.at_um[1], light.distance_um];
-        for ((site, widths), (psf, planes)) in elements.iter().zip(psfs) {
-            // Strehl is against the sites as drawn, whatever they transmit.
-            let table = vec![Complex64::ONE; usize::from(largest_number(&elements)) + 1];
-            let matched = IdealPsf::of(&Pillars::new(*widths, &table)?, focus, wavelength_um, full);
-            let size_um = [widths.circle_um(), light.distance_um];
-            all.push(SinglePsf {
-                through_focus: planes.map(|psfs| ThroughFocus::of(psfs, &matched, wavelength_um, size_um)),
-                element: site.name.clone(),
-                wavelength_um,
-                fidelity: case.fidelity(),
-                metrics: psf.metrics(&matched, light.pixel_um),
-                psf,
-            });
-        }
+        all.extend(psfs.collect::<Result<Vec<_>>>()?);
     }
     Ok(all)
 }
@@ -176,6 +141,11 @@ pub fn single_psfs(
 /// The kind of lattice that the elements of a layout stand on.
 pub(super) fn kind_of(elements: &[(&ElementSite, &PillarMap)]) -> LatticeKind {
     elements.first().map_or(LatticeKind::Square, |(_, w)| w.lattice.kind())
+}
+
+/// Transmissions of 1 for all pillars of some elements.
+pub(super) fn all_open(elements: &[(&ElementSite, &PillarMap)]) -> Vec<Complex64> {
+    vec![Complex64::ONE; usize::from(largest_number(elements)) + 1]
 }
 
 pub(super) fn largest_number(elements: &[(&ElementSite, &PillarMap)]) -> u16 {
@@ -213,9 +183,10 @@ impl Lighting {
         PixelFrequencies::of(self.pixel_um).reported()
     }
 
-    fn window(&self, lattice: Lattice, radius_um: f64, wavelength_um: f64) -> Window {
-        let pitches = (lattice.pitch_um(), self.samples);
-        Window::of_psf(self.at_um, pitches, (radius_um, self.distance_um), wavelength_um)
+    /// The window of a PSF of an element about a place (um).
+    pub(super) fn window(&self, at_um: [f64; 2], widths: &PillarMap, wavelength_um: f64) -> Window {
+        let pitches = (widths.lattice.pitch_um(), self.samples);
+        Window::of_psf(at_um, pitches, (widths.circle_um(), self.distance_um), wavelength_um)
     }
 }
 

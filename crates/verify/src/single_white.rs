@@ -1,18 +1,17 @@
 //! White light through the elements of a layout without a design.
 
-use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::polychromatic::{CameraStatement, step_nm};
 use super::polychromatic_channels::{Channels, Point, WhiteChannel, per_light};
-use super::single::{Lighting, distinct, kind_of, largest_number};
+use super::single::{Lighting, all_open, distinct, kind_of, largest_number};
 use metalith_core::{Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
 use metalith_optics::{IncoherentFields, SimulationCase};
 use metalith_sensor::{Camera, Sampling, WavelengthSteps};
 use metalith_wave::psf::{BandSample, IdealPsf};
-use metalith_wave::{Accuracy, Pillars, Scratch, Window};
+use metalith_wave::{Accuracy, Pillars, Scratch};
 
 /// One distinct element of a layout in white light.
 #[derive(Clone, Debug, Serialize)]
@@ -52,9 +51,11 @@ pub fn single_white(
     progress: &dyn Progress,
 ) -> Result<(CameraStatement, Vec<SingleWhite>)> {
     let statement = CameraStatement::of(camera, sampling);
+    let shortest_um = 1e-3 * sampling.wavelengths_nm.iter().copied().fold(f64::INFINITY, f64::min);
     let lp_mm = statement.frequencies().drawn();
     let elements = distinct(found);
-    let widest = largest_number(&elements);
+    light.check_held(&elements, &[shortest_um], sampling.wavelengths_nm.len())?;
+    let ones = all_open(&elements);
     progress.begin(
         "simulating polychromatic light",
         (elements.len() * sampling.wavelengths_nm.len()) as u64,
@@ -64,7 +65,7 @@ pub fn single_white(
         sines: light.incidence_sin,
         distance_um: light.distance_um,
     };
-    let optics = case.optics(kind_of(&elements), widest);
+    let optics = case.optics(kind_of(&elements), largest_number(&elements));
     let mut all = Vec::new();
     for (site, widths) in elements {
         let element = light.read(&optics, site, widths)?;
@@ -78,11 +79,10 @@ pub fn single_white(
         let sample = |scratch: &mut Scratch, (um, fields): &(f64, IncoherentFields<'_>)| {
             progress.check_stopped()?;
             let landing = point().landing_um(*um)?;
-            let pitch = widths.lattice.pitch_um();
-            let window = Window::about(landing, pitch, light.samples, light.distance_um);
+            // The PSFs of a band have one step.
+            let window = light.window(landing, widths, shortest_um);
             let psf = fields.psf(window, Accuracy::Fast, &lp_mm, scratch)?;
             // Sites as drawn, whatever they transmit.
-            let ones = vec![Complex64::ONE; usize::from(widest) + 1];
             let focus = [landing[0], landing[1], light.distance_um];
             let full = case.full_transmission(*um)?;
             let matched = IdealPsf::of(&Pillars::new(widths, &ones)?, focus, *um, full);

@@ -1,5 +1,6 @@
 //! Errors of cells on steep phases, by the truth of blazed rows (`golden/truth`).
 
+use metalith_core::numerical_aperture;
 use metalith_design::{Design, Element};
 use metalith_report::fixed;
 
@@ -47,7 +48,7 @@ impl Slopes {
         // The lens adds its own slope, at its rim as much as sin(atan(R / f)) / wavelength.
         let lens = |e: &Element| {
             let lens = design.lens_of(e);
-            (lens.radius_um() / lens.focal_length_um).atan().sin() / design.mapping.wavelength_um * pitch_um
+            numerical_aperture(lens.radius_um(), lens.focal_length_um) / design.mapping.wavelength_um * pitch_um
         };
         let elements = design.elements();
         let middle = elements.iter().map(wedge).fold(0.0, f64::max);

@@ -2,7 +2,8 @@
 
 use metalith_core::part;
 use metalith_report::{Cell, Column, Figure, ImageGrid, Table, sig};
-use metalith_wave::psf::{LEAST_STREHL, ThroughFocus};
+use metalith_wave::Window;
+use metalith_wave::psf::{LEAST_STREHL, Psf, ThroughFocus};
 
 use super::lens_figures::{focus_cells, focus_columns};
 
@@ -60,9 +61,33 @@ pub(super) fn table<'a>(name: &str, all: impl IntoIterator<Item = (String, &'a T
             table.row(head.into_iter().chain(focus).chain(tail));
         }
     }
-    table.caption(
-        "Planes along z, counted from the pillar tops. Strehl ratios of all planes are against the ideal PSF in the plane of the sensor. The focal length found through focus is the z of the greatest Strehl ratio, by a parabola through the greatest and its two neighbours. It is known to half of the distance of the planes. A Strehl ratio below 0.1 is no focus.",
-    )
+    table.caption(format!(
+        "Planes along z, counted from the pillar tops. Strehl ratios of all planes are against the ideal PSF in the plane of the sensor. The focal length found through focus is the z of the greatest Strehl ratio, by a parabola through the greatest and its two neighbours. It is known to half of the distance of the planes. A Strehl ratio below {LEAST_STREHL} is no focus.",
+    ))
+}
+
+/// A series whose PSFs are the middles of their windows that are shown.
+pub(super) fn shown(mut series: ThroughFocus) -> ThroughFocus {
+    let shown_um = series.shown_um(SHOWN_WIDTHS);
+    series.psfs = series.psfs.iter().map(|psf| middle(psf, shown_um)).collect();
+    series
+}
+
+/// The middle of a PSF, of this edge (um).
+fn middle(psf: &Psf, shown_um: f64) -> Psf {
+    let (window, n) = (psf.window, psf.window.samples);
+    let keep = ((shown_um / window.step_um) as usize).clamp(1, n);
+    let from = (n - keep) / 2;
+    let off = 0.5 * (keep as f64 - 1.0) * window.step_um;
+    Psf {
+        window: Window {
+            centre_um: [0, 1].map(|axis| window.coordinate_um(axis, from) + off),
+            samples: keep,
+            ..window
+        },
+        values: part(psf.values.view(), from..from + keep, from..from + keep).to_owned(),
+        otf: None,
+    }
 }
 
 /// The PSFs of a series side by side, the middle of each window.
@@ -73,14 +98,9 @@ pub(super) fn row(name: &str, series: &ThroughFocus) -> Figure {
         .log(DECADES)
         .side(ROW_WIDTH / count as f64 - 14.0);
     for psf in &series.psfs {
-        let (window, n) = (psf.window, psf.window.samples);
-        let keep = ((series.shown_um(SHOWN_WIDTHS) / window.step_um) as usize).clamp(1, n);
-        let from = (n - keep) / 2;
-        images = images.pixel_um(window.step_um);
-        images.image(
-            format!("{} um", sig(window.distance_um, 5)),
-            part(psf.values.view(), from..from + keep, from..from + keep).to_owned(),
-        );
+        let psf = middle(psf, series.shown_um(SHOWN_WIDTHS));
+        images = images.pixel_um(psf.window.step_um);
+        images.image(format!("{} um", sig(psf.window.distance_um, 5)), psf.values);
     }
     images.caption(format!(
         "PSFs in planes along z: {}; the sensor is at {} um. {DECADES} decades.",

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::cell::cache_folder;
 use metalith::cell_study::{CellRequest, ChosenCell};
-use metalith::{AtomicFile, Design, Error, LatticeKind, PillarShape, Pitch, Result};
+use metalith::{AtomicFile, Design, Error, LatticeKind, PillarShape, Pitch, Result, numerical_aperture};
 
 use super::shipped_designs::ShippedDesign;
 use super::{Outcome, Terminal, print_line};
@@ -249,7 +249,7 @@ impl NewArgs {
                 Some(_) => LatticeKind::Square,
                 None => lattice,
             },
-            numerical_aperture: radius_um / radius_um.hypot(focal_length_um),
+            numerical_aperture: numerical_aperture(radius_um, focal_length_um),
             steering_sine: (steps * steering_deg).to_radians().sin().abs(),
             pitch_nm: self.pitch_nm,
             height_nm: self.pillar_height_nm,

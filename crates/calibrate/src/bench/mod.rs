@@ -16,6 +16,7 @@ use super::optics::{Optic, PixelGrid, Quadrature};
 use super::set::{
     ElementIndex, LedIndex, MeasuredSet, Measurement, MeasurementIndex, PerElement, PerLed, PerMeasurement,
 };
+use metalith_core::numerical_aperture;
 use metalith_optics::{DrawnElement, GeometryChange, KernelFilter, Perturbation, veiled};
 use metalith_sensor::RelayCamera;
 use metalith_wave::propagation::{Distances, DistancesPlan};
@@ -70,8 +71,7 @@ fn resolved_um(set: &MeasuredSet, measurement: &Measurement) -> f64 {
         .filter(|c| (c.element, c.led) == (measurement.element, measurement.led));
     let nearest_um = alike.map(|c| c.distance_um).fold(f64::INFINITY, f64::min);
     let radius_um = 0.5 * set.elements[measurement.element].aperture_diameter_um;
-    let sine = radius_um / radius_um.hypot(nearest_um);
-    OF_NYQUIST * 0.25e-3 * set.leds[measurement.led].centre_nm / sine
+    OF_NYQUIST * 0.25e-3 * set.leds[measurement.led].centre_nm / numerical_aperture(radius_um, nearest_um)
 }
 
 /// Standard deviations of its place by which a window can be moved before its surroundings end.

@@ -233,3 +233,28 @@ fn damaged_hdf5_is_refused() {
     }
     assert_eq!(read(b"\x89HDF\r\n\x1a\n").unwrap_err().id(), "mapping/hdf5");
 }
+
+/// A column without a value keeps its place: the values behind it do not move into it.
+#[test]
+fn an_empty_first_column_is_not_filled_from_the_next() {
+    let text = |first: &str| {
+        let rows = widths().map(|w| {
+            let t = pillar(w, 600.0, 633.0);
+            format!("{w}\t{:.6}\t{:.6}\n", t.norm(), t.arg())
+        });
+        let rows: String = rows.collect();
+        format!("width (nm)\tabs(t)\tphase (rad)\n{}{rows}", first)
+    };
+    assert!(read(&text("")).is_ok());
+    for empty in ["\t90\t0.5\t0.1\n", "\t0.5\t0.1\n"] {
+        let lines = text("70\t0.5\t0.1\n").replacen("80\t", &format!("{empty}80\t"), 1);
+        assert!(read(&lines).is_err(), "{empty:?}");
+    }
+    let words = read(&text("").replacen("\n90\t", "\n\t", 1)).unwrap_err().to_string();
+    assert!(words.contains(":3:") || words.contains("line 3"), "{words}");
+    assert!(words.contains("no number in the column `width (nm)`"), "{words}");
+    // An index without a name, as pandas writes it.
+    let indexed = text("").replace('\n', "\n0\t");
+    let indexed = format!("\t{}", indexed.trim_end_matches("0\t"));
+    assert!(read(&indexed).is_ok());
+}

@@ -73,15 +73,20 @@ pub(super) fn read(path: &Path, text: &str) -> Result<UnitCellTable> {
     for (line, text) in without_mark(text)
         .lines()
         .enumerate()
-        .map(|(k, text)| (k + 1, text.trim()))
+        // A tab before the first value stands behind an empty column.
+        .map(|(k, text)| (k + 1, text.trim_end().trim_start_matches(' ')))
     {
-        let bare = text.trim_start_matches(['#', '%']).trim();
-        let is_note = bare.len() < text.len();
+        let is_note = text.trim_start().starts_with(['#', '%']);
+        let bare = if is_note {
+            text.trim_start().trim_start_matches(['#', '%']).trim()
+        } else {
+            text
+        };
         if bare.is_empty() || (is_note && (!rows.is_empty() || bare.contains('='))) {
             continue;
         }
         let is_number = |field: &&str| complex(field).is_some();
-        if rows.is_empty() && (is_note || !fields(bare).first().is_some_and(is_number)) {
+        if rows.is_empty() && (is_note || !fields(bare).iter().find(|f| !f.is_empty()).is_some_and(is_number)) {
             head = Some((line, bare));
         } else {
             if rows.len() == MOST_CELLS {
@@ -117,7 +122,13 @@ pub(super) fn read(path: &Path, text: &str) -> Result<UnitCellTable> {
         for (column, values) in columns.iter().zip(&mut values) {
             let field = fields[column.index];
             let value = complex(field).filter(|v| v.re.is_finite() && v.im.is_finite());
-            values.push(value.ok_or_else(|| fault(Some(*line), format!("`{}` is no number", quoted(field))))?);
+            values.push(value.ok_or_else(|| {
+                let what = match field {
+                    "" => format!("no number in the column `{}`", quoted(column.name)),
+                    _ => format!("`{}` is no number", quoted(field)),
+                };
+                fault(Some(*line), what)
+            })?);
         }
     }
     let mut words = Vec::new();

@@ -35,4 +35,22 @@ legitimate: a weaker polynomial | element.phase.term.coefficients_rad / 10
 legitimate: the cross still meets no opening, which is refused | mark.x_um / 10, mark.y_um / 10
 legitimate: an aberration may have any size | phase.term.coefficients_waves x 10, phase.term.coefficients_waves / 10
 legitimate: a term may have any size | phase.term.scale x 10, phase.term.scale / 10
+legitimate: a number names a layer, two purposes on one are refused | layers.pillars.datatype x 10, layers.pillars.datatype / 10, layers.pillar_marks.datatype x 10, layers.pillar_marks.datatype / 10, layers.apertures.datatype x 10, layers.apertures.datatype / 10
+legitimate: a number names a layer, two purposes on one are refused | layers.aperture_marks.datatype x 10, layers.aperture_marks.datatype / 10, layers.outline.datatype x 10, layers.outline.datatype / 10, layers.label.datatype x 10, layers.label.datatype / 10
+legitimate: a limit is the choice of a designer, and the verdict states it | verify.limits.wrong_widths_max x 10, verify.limits.wrong_widths_max / 10, verify.limits.foreign_shapes_max x 10, verify.limits.foreign_shapes_max / 10
+legitimate: another seed | optimise.seed x 10, optimise.seed / 10
+legitimate: a longer or shorter search; its page shows whether it still gains | optimise.chains x 10, optimise.hot_sweeps x 10, optimise.hot_sweeps / 10, optimise.temperature x 10, optimise.temperature / 10
+legitimate: a longer or shorter search; its page shows whether it still gains | optimise.blocks x 10, optimise.blocks / 10, optimise.steps x 10, optimise.steps / 10, optimise.rate_waves x 10, optimise.rate_waves / 10
+legitimate: more or fewer wavelengths; the phase that is found is judged between them | optimise.step_nm x 10, optimise.views.step_nm / 10
+legitimate: a stricter limit | optimise.step_limit_waves / 10
+legitimate: a bound; kernels that do not fit are refused | optimise.memory_mb x 10, optimise.memory_mb / 10
+legitimate: weights of merits are the choice of a designer | optimise.merit.sum x 10, optimise.merit.sum / 10, optimise.merit.log x 10, optimise.merit.log / 10, optimise.merit.side_lobes x 10, optimise.merit.side_lobes / 10
+legitimate: weights of merits are the choice of a designer | optimise.merit.deconvolution x 10, optimise.merit.deconvolution / 10
+legitimate: the size of a side lobe is the choice of a designer | optimise.merit.side_lobe_radius_um / 10
+legitimate: a better or worse process; the page states it | optimise.robust.width_bias_nm / 10, optimise.robust.height_percent x 10, optimise.robust.height_percent / 10, optimise.robust.defocus_um / 10
+legitimate: more or fewer draws | optimise.robust.draws x 10, optimise.robust.draws / 10
+legitimate: other viewing angles | optimise.views.angles_deg / 10
+legitimate: a smaller or larger window | optimise.views.pixels / 10
+legitimate: a weight of images | optimise.views.shared_filter / 10
+legitimate: more or fewer draws | optimise.views.drawn x 10
 ";

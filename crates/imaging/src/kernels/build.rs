@@ -1,6 +1,6 @@
 //! Kernels from the field behind each element.
 
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, numerical_aperture};
 use metalith_wave::kernels::FftScratch;
 use metalith_wave::{Accuracy, Scratch, Window};
 use rayon::prelude::*;
@@ -188,7 +188,7 @@ impl Builder<'_> {
         };
         let lit = self.light.lit(wavelength, sines);
         // The PSF has no structure finer than wavelength / (2 NA).
-        let aperture = (lit.radius_um() / view.sensor_um).atan().sin();
+        let aperture = numerical_aperture(lit.radius_um(), view.sensor_um);
         let quarter = self.spec.pixel_um / QUARTERS as f64;
         let within = (quarter * 4.0 * aperture / um).ceil().max(1.0) as usize;
         let window = Window {

@@ -28,9 +28,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
             sample[..2].copy_from_slice(&row.numbers::<2>()?);
         }
         sample[0] *= unit;
-        if sample[0] <= 0.0 || sample[1] <= 0.0 || sample[2] < 0.0 {
-            return Err((number, TableError::NotPhysical));
-        }
+        physical(sample).map_err(|fault| (number, fault))?;
         if samples.last().is_some_and(|last| last[0] >= sample[0]) {
             return Err((number, TableError::NotRising));
         }
@@ -39,7 +37,45 @@ pub(super) fn parse(text: &str) -> Result<Vec<[f64; 3]>, TableFault> {
     if samples.len() < 2 {
         return Err((None, TableError::TooFewRows));
     }
+    no_permittivity(&samples)?;
     Ok(samples)
+}
+
+/// Check a sample: L (um), n, k.
+pub(super) fn physical([um, n, k]: [f64; 3]) -> Result<(), TableError> {
+    let what = if um <= 0.0 {
+        format!("a wavelength of {um} um")
+    } else if n <= 0.0 {
+        format!("n = {n} is not positive. If the numbers are of a permittivity, give n + i k, its square root")
+    } else if k < 0.0 {
+        format!(
+            "k = {k} is negative. Materials that absorb have k > 0 here, for the time factor exp(-i w t): change its sign"
+        )
+    } else {
+        return Ok(());
+    };
+    Err(TableError::NotPhysical { what })
+}
+
+/// Refuse samples that all are what no material has and permittivities of semiconductors are.
+pub(super) fn no_permittivity(samples: &[[f64; 3]]) -> Result<(), TableFault> {
+    /// Greatest index of materials that light passes: 5.9, of lead telluride; with a margin.
+    const MOST_CLEAR: f64 = 7.0;
+    /// Share of n above which k makes a material dark within a wavelength.
+    const DARK: f64 = 0.1;
+    match samples.first() {
+        Some([um, n, _]) if samples.iter().all(|[_, n, k]| *n > MOST_CLEAR && *k < DARK * n) => Err((
+            None,
+            TableError::NotPhysical {
+                what: format!(
+                    "n is above {MOST_CLEAR} everywhere with little loss, {n} at {um} um, which no material has. If the numbers \
+                     are of a permittivity, give n + i k, its square root: n = {:.3}",
+                    n.sqrt()
+                ),
+            },
+        )),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -67,6 +103,25 @@ mod tests {
             parse("k,n,wavelength_um\n0.1,2,0.4\n0.2,2.1,0.5\n").unwrap()[1],
             [0.5, 2.1, 0.2]
         );
+    }
+
+    /// Signs of other conventions, and permittivities.
+    #[test]
+    fn messages_say_how_to_mend_what_is_not_physical() {
+        let said = |rows: &str| match parse(&format!("wavelength_um,n,k\n{rows}\n")) {
+            Err((line, TableError::NotPhysical { what })) => (line, what),
+            other => panic!("{rows}: {other:?}"),
+        };
+        let (line, what) = said("0.5,2,0\n0.6,2,-0.1");
+        assert!(line == Some(3) && what.contains("change its sign"), "{what}");
+        assert!(said("0.5,-11.7,1.2\n0.6,-16,1.1").1.contains("square root"));
+        assert!(said("-0.5,2,0\n0.6,2,0").1.contains("wavelength"));
+        let (_, what) = said("1.5,12.11,0\n1.6,12.09,0.02");
+        assert!(what.contains("n = 3.480"), "{what}");
+        // A resonance of a crystal, and a metal in the infrared.
+        for rows in ["12.0,2.5,0.1\n12.9,9.2,0.5", "10,12.6,54\n11,15.2,59"] {
+            assert!(parse(&format!("wavelength_um,n,k\n{rows}\n")).is_ok(), "{rows}");
+        }
     }
 
     /// Table as spreadsheets save it.

@@ -1,7 +1,7 @@
 //! Files of the refractiveindex.info database, as they are: YAML with tables and dispersion formulas 1 to 9.
 
 use super::dispersion::{Dispersion, IndexOver};
-use super::table::TableFault;
+use super::table::{TableFault, no_permittivity, physical};
 use crate::TableError;
 use metalith_core::text::quoted;
 
@@ -49,7 +49,10 @@ pub(super) fn parse(text: &str) -> Result<Dispersion, TableFault> {
         n.get_or_insert(place);
     }
     match (both, n) {
-        (Some(samples), None) => Ok(Dispersion::Table { samples }),
+        (Some(samples), None) => {
+            no_permittivity(&samples)?;
+            Ok(Dispersion::Table { samples })
+        }
         (Some(samples), Some(n)) => Ok(Dispersion::Parts {
             n,
             k: Some(samples.into_iter().map(|[l, _, k]| [l, k, 0.0]).collect()),
@@ -105,17 +108,16 @@ fn entries(text: &str) -> Vec<Entry<'_>> {
             });
             continue;
         }
-        let Some(entry) = found
-            .last_mut()
-            .filter(|_| !begins || key.starts_with(|c: char| c.is_ascii_digit()))
-        else {
+        // Rows of numbers, and what stands among them and is none: `nan`, a negative wavelength.
+        let is_row = !key.contains(':') && !bare.ends_with('|');
+        let Some(entry) = found.last_mut().filter(|_| !begins || is_row) else {
             continue;
         };
         if let Some(range) = value("wavelength_range:").or_else(|| value("range:")) {
             entry.range = Some((number, range));
         } else if let Some(coefficients) = value("coefficients:") {
             entry.coefficients = Some((number, coefficients));
-        } else if bare.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
+        } else if is_row && entry.kind.starts_with("tabulated") {
             entry.rows.push((number, bare));
         }
     }
@@ -143,10 +145,12 @@ fn table<const N: usize>(entry: &Entry<'_>) -> Result<Vec<[f64; N]>, TableFault>
             .get(..N)
             .and_then(|v| v.try_into().ok())
             .ok_or((Some(row.0), TableError::Missing))?;
-        let is_index = entry.kind != "tabulated k";
-        if values[0] <= 0.0 || values[1..].iter().any(|v| *v < 0.0) || (is_index && values[1] <= 0.0) {
-            return Err((Some(row.0), TableError::NotPhysical));
-        }
+        let sample = match (entry.kind, &values[..]) {
+            ("tabulated k", [um, k, ..]) => [*um, 1.0, *k],
+            (_, [um, n]) => [*um, *n, 0.0],
+            (_, all) => [all[0], all[1], all[2]],
+        };
+        physical(sample).map_err(|fault| (Some(row.0), fault))?;
         match rows.last() {
             Some(last) if last[0] > values[0] => return Err((Some(row.0), TableError::NotRising)),
             // The database has a few wavelengths twice: the first counts.
@@ -249,6 +253,25 @@ mod tests {
         assert_eq!((form.index(0.5).re, form.index(0.5).im), (2.0, 0.1));
         let text = "DATA:\r\n- type: tabulated nk\r\n  data: |\r\n      0.4 2.1 0.01\r\n      0.5 2 0\r\n";
         assert_eq!(parse(text).unwrap().index(0.4).im, 0.01);
+    }
+
+    /// Lines among the rows that are none do not vanish.
+    #[test]
+    fn rows_that_are_no_numbers_are_refused() {
+        for (row, physical) in [
+            ("-0.45 2 0", true),
+            ("nan 2 0", false),
+            ("0.45 - 0", false),
+            ("+0.45 2 -0.1", true),
+        ] {
+            let text =
+                format!("DATA:\n  - type: tabulated nk\n    data: |\n      0.4 2 0\n      {row}\n      0.5 2 0\n");
+            match parse(&text) {
+                Err((Some(5), TableError::NotPhysical { .. })) if physical => {}
+                Err((Some(5), TableError::NotANumber { .. })) if !physical => {}
+                other => panic!("{row}: {other:?}"),
+            }
+        }
     }
 
     #[test]

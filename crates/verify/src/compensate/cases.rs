@@ -104,7 +104,8 @@ fn of_element(
             ..Illumination::from_direction(um, [wave.sin_x, wave.sin_y])
         };
         let chief = landing_um(&element.wedge, &wave, focal_um)?;
-        let window = Window::about(chief, plain.lattice.pitch_um(), design.verify.window_samples, focal_um);
+        let pitches = (plain.lattice.pitch_um(), design.verify.window_samples);
+        let window = Window::of_psf(chief, pitches, (design.lens_of(element).radius_um(), focal_um), um);
         let matched = open_matched(design, element, phase, [chief[0], chief[1], focal_um], um).scaled(colour.full);
         for ((pillars, chip, _), made) in chips.iter().zip(&made) {
             let psf = chip

@@ -5,6 +5,7 @@ mod orders;
 use ndarray::Array2;
 use rayon::prelude::*;
 
+use super::FocusRequest;
 use super::case::SimulationCases;
 use super::distinct_elements::{Chosen, CopyAngle};
 use super::psf_metrics::{PsfImages, PsfPair, PsfResult};
@@ -227,8 +228,11 @@ impl<'a> ElementSimulator<'a> {
             let wave = arriving(element, wavelength_um, MIDDLE)?;
             let fields = self.in_light(element, &wave, |light| read.cases[0].in_light(light, progress))?;
             let chief = landing_um(&element.wedge, &wave, sensor_um)?;
-            let window = self.window(chief, lens, wavelength_um);
             let planes = FocusPlanes::usual(wavelength_um, lens.radius_um(), sensor_um);
+            let whole = self.window(chief, lens, wavelength_um);
+            // A part of a large window, so that the planes fit into memory.
+            let most = (FocusRequest::MOST_SAMPLES / planes.planes).isqrt();
+            let window = Window::about(chief, whole.step_um, whole.samples.min(most), sensor_um);
             let psfs = fields.psfs_at(
                 window,
                 &planes.distances_um(sensor_um),

@@ -64,23 +64,24 @@ impl Hankel {
     pub fn of_lattice(wavelength_um: f64, distance_um: f64, lattice: &Lattice, radius_um: f64) -> Result<Self> {
         let [columns, rows] = lattice.reach();
         // One quadrant: sites at x, y >= 0, each standing for its images.
-        let mut rings: Vec<(f64, u32)> = Vec::new();
+        let mut rings: Vec<(i64, f64, u32)> = Vec::new();
         for iy in lattice.sites() / 2..rows.end {
             let inside = sites_inside(lattice, radius_um, iy);
             for ix in (lattice.sites() / 2..inside.end.min(columns.end)).filter(|ix| lattice.has(*ix, iy)) {
                 let images = [(0, ix), (1, iy)].map(|(axis, i)| if lattice.place_nm(axis, i) == 0.0 { 1 } else { 2 });
-                rings.push((lattice.radius2_nm2(ix, iy), images[0] * images[1]));
+                let radius2_nm2 = lattice.radius2_nm2(ix, iy);
+                rings.push((lattice.units2(ix, iy), radius2_nm2, images[0] * images[1]));
             }
         }
-        rings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        rings.sort_by_key(|ring| ring.0);
         rings.dedup_by(|next, kept| {
             let same = next.0 == kept.0;
-            kept.1 += if same { next.1 } else { 0 };
+            kept.2 += if same { next.2 } else { 0 };
             same
         });
-        let radii = rings.iter().map(|r| r.0.sqrt() * 1e-3).collect();
+        let radii = rings.iter().map(|r| r.1.sqrt() * 1e-3).collect();
         let site = lattice.cell_um2();
-        let areas = rings.iter().map(|r| f64::from(r.1) * site).collect();
+        let areas = rings.iter().map(|r| f64::from(r.2) * site).collect();
         Self::new(wavelength_um, distance_um, radii, areas)
     }
 

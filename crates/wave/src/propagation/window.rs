@@ -1,5 +1,7 @@
 //! Window in which a field is formed.
 
+use metalith_core::numerical_aperture;
+
 use crate::error::{Result, WaveError};
 
 /// Most samples of a window an axis: beyond it memory is the fault that shows.
@@ -42,8 +44,9 @@ impl Window {
         (radius_um, distance_um): (f64, f64),
         wavelength_um: f64,
     ) -> Self {
-        let aperture = radius_um / radius_um.hypot(distance_um);
-        let parts = (4.0 * aperture * pitch_um / wavelength_um).ceil().max(1.0);
+        let parts = (4.0 * numerical_aperture(radius_um, distance_um) * pitch_um / wavelength_um)
+            .ceil()
+            .max(1.0);
         Self::about(point_um, pitch_um / parts, pitches * parts as usize, distance_um)
     }
 

@@ -1,5 +1,6 @@
 //! PSFs in planes along z, and the focal length that they show.
 
+use metalith_core::numerical_aperture;
 use serde::Serialize;
 
 use super::{FocusMetrics, IdealPsf, Psf};
@@ -22,7 +23,7 @@ pub const LEAST_STREHL: f64 = 0.1;
 /// Depth of focus of an ideal lens of this radius at this distance (um): the wavelength over the square of the numerical
 /// aperture. Half of it off focus the peak is 81 % of the peak in focus.
 pub fn depth_of_focus_um(wavelength_um: f64, radius_um: f64, distance_um: f64) -> f64 {
-    let aperture = radius_um / radius_um.hypot(distance_um);
+    let aperture = numerical_aperture(radius_um, distance_um);
     wavelength_um / (aperture * aperture)
 }
 
