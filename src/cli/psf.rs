@@ -20,7 +20,7 @@ use metalith::{
     AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, Layout, PolarisationBasis, Result, extract,
 };
 
-use self::light::PsfLight;
+use self::light::{PsfLight, USUAL_DISTANCE_UM};
 use super::standard_input::InputFile;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
@@ -44,11 +44,14 @@ pub(crate) struct PsfArgs {
     #[arg(long)]
     top: Option<String>,
 
-    /// Distance from the pillar tops to the sensor (um).
-    #[arg(long, default_value_t = 2400.0, value_parser = between(0.1, 1e6))]
+    /// Distance from the pillar tops to the sensor (um). If left out, the focal length of the design that --cell names, else 2400.
+    #[arg(long = "distance-um", value_name = "DISTANCE_UM", value_parser = between(0.1, 1e6))]
+    asked_distance_um: Option<f64>,
+
+    #[arg(skip = USUAL_DISTANCE_UM)]
     distance_um: f64,
 
-    /// Wavelength (nm); may be given several times. 455, 530 and 660 nm if left out; with a --camera that does not
+    /// Wavelength (nm); may be given several times. If left out, those of the design that --cell names, else 455, 530 and 660 nm; with a --camera that does not
     /// count light from 455 to 660 nm, the middle of each of its channels.
     #[arg(long = "wavelength-nm", value_parser = between(150.0, 20_000.0))]
     wavelengths_nm: Vec<f64>,
@@ -334,7 +337,8 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
 
 pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let stated = args.cell.as_deref().map(CellFile::read).transpose()?;
-    let args = &PsfArgs { stated, ..args.clone() };
+    let args = &args.clone().with_design(stated);
+    args.say_guesses(terminal);
     terminal.stop_on_interrupt();
     let layout = Layout::open_with(&InputFile::of(&args.layout)?, ReadLimits::default(), terminal)?;
     let plan = ExtractionPlan {

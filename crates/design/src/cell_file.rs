@@ -4,30 +4,40 @@ use std::path::{Path, PathBuf};
 
 use metalith_cell::CellStack;
 use metalith_core::Result;
-use metalith_core::document::{Document, load};
+use metalith_core::document::{Document, Section, load};
 
 use crate::CellSpec;
+use crate::spec::{FOCAL_LENGTH, WAVELENGTH};
 
-/// The section `[cell]` of a file. Other sections, as those of a design, are not looked at.
+/// The section `[cell]` of a file, and the light of a design if the file is one. Other sections are not looked at.
 #[derive(Clone, Debug)]
 pub struct CellFile {
     pub path: PathBuf,
     pub cell: CellSpec,
+    /// Focal length in `[lens]` (um).
+    pub focal_length_um: Option<f64>,
+    /// Wavelengths in `[verify]` (um).
+    pub wavelengths_um: Vec<f64>,
 }
 
 impl CellFile {
-    /// Read the section `[cell]` of the file at `path`.
+    /// Read the section `[cell]` of the file at `path`, and focal length and wavelengths where it has them.
     ///
     /// # Errors
     /// If the file cannot be read; with every mistake of its section, each with line, column and remedy.
     pub fn read(path: &Path) -> Result<Self> {
-        let cell = Document::read(path, &load(path)?, |root| {
+        Document::read(path, &load(path)?, |root| {
             root.accept_others();
-            CellSpec::read(&root.section("cell"))
-        })?;
-        Ok(Self {
-            path: path.to_owned(),
-            cell,
+            let section = |key: &str| root.optional_section(key).inspect(Section::accept_others);
+            let (lens, verify) = (section("lens"), section("verify"));
+            let stated = verify.filter(|verify| verify.has("wavelengths_nm"));
+            let wavelengths_nm = stated.map_or_else(Vec::new, |verify| verify.floats("wavelengths_nm", WAVELENGTH));
+            Self {
+                path: path.to_owned(),
+                cell: CellSpec::read(&root.section("cell")),
+                focal_length_um: lens.and_then(|lens| lens.optional_float("focal_length_um", FOCAL_LENGTH)),
+                wavelengths_um: wavelengths_nm.into_iter().map(|nm| nm * 1e-3).collect(),
+            }
         })
     }
 

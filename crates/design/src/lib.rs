@@ -5,9 +5,9 @@ mod cell_file;
 mod cells;
 mod design;
 mod digest;
+mod focus;
 mod lattice_orders;
 pub mod phase;
-mod rays;
 mod spec;
 mod warnings;
 

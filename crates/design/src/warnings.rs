@@ -5,7 +5,6 @@ use metalith_core::{Result, Warning, numerical_aperture};
 use metalith_pillars::{DatabaseUnit, PillarShape, Pitch, Steepness};
 
 use crate::phase::{ElementPhase, LensPhase, RadialPhase, TermForm};
-use crate::rays::Rays;
 use crate::{AskedLight, CellIncidence, CellSpec, Design, LatticeOrders, LensSpec};
 
 /// Sites of a design whose phase is compared with the phase of their neighbours: of larger elements some rows are.
@@ -13,17 +12,6 @@ const MOST_SITES: usize = 1 << 22;
 
 /// Rows of an element that are compared at least.
 const FEWEST_ROWS: usize = 16;
-
-/// Share of the radius that rays of a lens may miss the middle of the sensor by: lenses for a long depth of focus or many wavelengths
-/// miss it by a part of this, a phase that is ten times too flat by 0.6.
-const MOST_MISSED: f64 = 0.4;
-
-/// Depths of focus (wavelength over the square of the numerical aperture) between sensor and focus: at one, an ideal lens has no light
-/// on its axis.
-const MOST_DEPTHS: f64 = 0.75;
-
-/// Share of what rays miss at the sensor that they miss where they meet, if they have a focus.
-const MEETING_SHARE: f64 = 0.25;
 
 /// Angle at which light arrives (degrees) beyond which cells that are solved at normal incidence are too good: at 15 degrees, Strehl
 /// ratios of arrays of TiO2 pillars fall from 0.96 to 0.90.
@@ -62,7 +50,7 @@ impl Design {
         found.extend(self.wavelengths_differ());
         found.extend(self.beyond_scalar());
         found.extend(self.unwrapped_tables());
-        found.extend(self.out_of_focus());
+        found.extend(crate::focus::warning(self));
         found.extend(self.wide_maps());
         found.extend(self.other_discs());
         found.extend(self.wide_margins());
@@ -290,53 +278,6 @@ impl Design {
         lenses
     }
 
-    /// A phase that sends its light elsewhere than to the middle of the sensor, or focuses it in another plane, at each wavelength.
-    fn out_of_focus(&self) -> Option<Warning> {
-        let step_um = f64::from(self.cell.pitch_nm) * 1e-3;
-        let mut seen: Vec<&LensSpec> = Vec::new();
-        let mut worst: Option<Focus> = None;
-        for element in self.elements() {
-            let lens = self.lens_of(&element);
-            let is_flat = lens.terms.is_empty() && lens.phase == RadialPhase::Flat;
-            if is_flat || seen.iter().any(|known| std::ptr::eq(*known, lens)) {
-                continue;
-            }
-            seen.push(lens);
-            let own = lens.focused_um();
-            let lights = self.verify.wavelengths_um.iter().copied().chain(own);
-            let best = lights
-                .map(|um| Focus::of(lens, element.index, um, step_um))
-                .min_by(|a, b| a.missed.total_cmp(&b.missed))?;
-            if worst.as_ref().is_none_or(|worst| worst.missed < best.missed) {
-                worst = Some(best);
-            }
-        }
-        let worst = worst?;
-        if worst.missed > MOST_MISSED {
-            return Some(Warning::new(
-                "phase/out-of-focus",
-                format!(
-                    "rays of the phase miss the middle of the sensor, {} um away, by {:.0} % of the radius of the lens on average, at \
-                     each wavelength of [verify]",
-                    worst.sensor_um,
-                    worst.missed * 100.0
-                ),
-                "check units, sign, order and pitch of the phase, and `focal_length_um` of [lens]; holograms are meant to do this",
-            ));
-        }
-        let (meet_um, depths) = worst.elsewhere()?;
-        Some(Warning::new(
-            "phase/other-focal-length",
-            format!(
-                "rays of the phase at {} nm meet {:.1} um from the pillars, and the sensor is {} um away: {depths:.1} depths of focus",
-                (worst.wavelength_um * 1e6).round() / 1e3,
-                meet_um,
-                worst.sensor_um,
-            ),
-            "use one focal length in [lens] and [phase]; check the pitch of a map",
-        ))
-    }
-
     /// Maps of which the lens has a small part.
     fn wide_maps(&self) -> Option<Warning> {
         let mut maps = self.lenses().into_iter().flat_map(|lens| {
@@ -438,39 +379,6 @@ impl Design {
                 "use a smaller pitch, a longer focal length, a smaller diameter, or less steering",
             )
         })
-    }
-}
-
-/// Focus of the rays of a lens at one wavelength.
-struct Focus {
-    wavelength_um: f64,
-    radius_um: f64,
-    sensor_um: f64,
-    /// Distance from the middle of the sensor at which rays land, in parts of the radius: mean.
-    missed: f64,
-    /// Distance at which rays meet (um), and what they miss the axis by there, as `missed`.
-    meet: Option<(f64, f64)>,
-}
-
-impl Focus {
-    fn of(lens: &LensSpec, element: (i32, i32), wavelength_um: f64, step_um: f64) -> Self {
-        let rays = Rays::of(lens, element, wavelength_um, step_um);
-        Self {
-            wavelength_um,
-            radius_um: lens.radius_um(),
-            sensor_um: lens.focal_length_um,
-            missed: rays.missed(lens.focal_length_um),
-            meet: rays.meet_um().map(|um| (um, rays.missed(um))),
-        }
-    }
-
-    /// Distance at which rays meet (um), and its distance from the sensor in depths of focus; none if they meet at the sensor or
-    /// nowhere: phases for a long depth of focus meet nowhere.
-    fn elsewhere(&self) -> Option<(f64, f64)> {
-        let (meet_um, there) = self.meet?;
-        let sine = numerical_aperture(self.radius_um, self.sensor_um);
-        let depths = (meet_um - self.sensor_um).abs() * sine * sine / self.wavelength_um;
-        (there < MEETING_SHARE * self.missed && depths > MOST_DEPTHS).then_some((meet_um, depths))
     }
 }
 
@@ -577,6 +485,42 @@ mod tests {
             )],
         );
         assert!(!ids(&near).contains(&"phase/other-focal-length"), "{near:?}");
+    }
+
+    /// A map of the phase of a lens of 80 um that focuses at 80 um, times a factor and moved along x (um), in radians.
+    #[test]
+    fn rays_of_a_map_are_followed() {
+        let (samples, pitch_um, focus_um) = (301, 0.3, 80.0_f64);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.csv");
+        let found = |factor: f64, moved_um: f64| {
+            let at = |k: i32| (f64::from(k) - 0.5 * f64::from(samples - 1)) * pitch_um;
+            let phase = |x: f64, y: f64| {
+                let r2 = (x - moved_um) * (x - moved_um) + y * y;
+                let turns = (focus_um - (focus_um * focus_um + r2).sqrt()) / 0.532;
+                format!("{:.4}", factor * std::f64::consts::TAU * (turns - turns.floor()))
+            };
+            let row = |iy: i32| {
+                (0..samples)
+                    .map(|ix| phase(at(ix), at(iy)))
+                    .collect::<Vec<_>>()
+                    .join(",")
+            };
+            let rows: Vec<String> = (0..samples).map(row).collect();
+            std::fs::write(&path, rows.join("\n")).unwrap();
+            let map = format!(
+                "source = \"map\"\nfile = \"{}\"\npitch_um = {pitch_um}\nwrapped = \"yes\"",
+                path.display()
+            );
+            let own = "source = \"hyperbola\"\nwavelength_nm = 532";
+            ids(&warned("tio2_532", &[(own, map.as_str())])).join(", ")
+        };
+        assert_eq!(found(1.0, 0.0), "");
+        assert_eq!(found(-1.0, 0.0), "phase/out-of-focus");
+        // Turns, and degrees.
+        assert_eq!(found(1.0 / std::f64::consts::TAU, 0.0), "phase/out-of-focus");
+        assert_eq!(found(57.296, 0.0), "phase/out-of-focus");
+        assert_eq!(found(1.0, 6.0), "phase/beside-the-axis");
     }
 
     #[test]

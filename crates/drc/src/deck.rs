@@ -338,6 +338,23 @@ mod tests {
     }
 
     #[test]
+    fn rules_about_proportions_use_the_height_of_a_design() {
+        let text = metalith_testing::accepting(&metalith_testing::changed(
+            "mini_3x3",
+            &[("pillar_height_nm = 700", "pillar_height_nm = 5100")],
+        ));
+        let design = Design::parse(&metalith_testing::design("mini_3x3"), &text).unwrap();
+        let passes = |deck: &Deck| {
+            let aspect = deck.rules().iter().find(|r| r.check == "aspect_max").unwrap();
+            aspect.rule.passes_square(100.0, true)
+        };
+        // 1 : 7 and 1 : 51.
+        let deck = Deck::standard();
+        assert!(passes(&deck));
+        assert!(!passes(&deck.for_pillars_of(&design)));
+    }
+
+    #[test]
     fn mistakes_have_places() {
         let text = "schema = 1\nname = \"x\"\npillar_height_nm = 700\n[layers]\npillars = \"1-0\"\n\
                     [[rule]]\nid = \"a\"\ncheck = \"gap_min\"\n[[rule]]\nid = \"a\"\ncheck = \"wings\"\n\

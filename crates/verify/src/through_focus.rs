@@ -62,7 +62,7 @@ pub(super) fn table<'a>(name: &str, all: impl IntoIterator<Item = (String, &'a T
         }
     }
     table.caption(format!(
-        "Planes along z, counted from the pillar tops. Strehl ratios of all planes are against the ideal PSF in the plane of the sensor. The focal length found through focus is the z of the greatest Strehl ratio, by a parabola through the greatest and its two neighbours. It is known to half of the distance of the planes. A Strehl ratio below {LEAST_STREHL} is no focus.",
+        "Planes along z, counted from the pillar tops. Strehl ratios of all planes are against the ideal PSF in the plane of the sensor. The focal length found through focus is the z of the greatest Strehl ratio, by a parabola through the greatest and its two neighbours. It is known to half of the distance of the planes. The focusing efficiency of every plane is the power in one circle, of three FWHM of the plane of the greatest peak. A Strehl ratio below {LEAST_STREHL} is no focus.",
     ))
 }
 

@@ -1,14 +1,18 @@
 //! The light that `metalith psf` simulates: wavelengths that were asked for, and what a camera counts.
 
-use metalith::design::{USUAL_PIXEL_UM, VISIBLE_UM, band_about};
+use metalith::design::{CellFile, USUAL_PIXEL_UM, VISIBLE_UM, band_about};
 use metalith::sensor::{Camera, Sampling};
 use metalith::verify::white_sampling;
 use metalith::{Extraction, Result};
 
 use super::{FidelityArg, PsfArgs};
+use crate::cli::Terminal;
 
 /// Wavelengths that are taken where none are named (nm).
 const USUAL_NM: [f64; 3] = [455.0, 530.0, 660.0];
+
+/// Distance from pillar tops to sensor where none is stated (um): the focal length of the paper.
+pub(super) const USUAL_DISTANCE_UM: f64 = 2400.0;
 
 /// The light that a layout is simulated in.
 pub(super) struct PsfLight {
@@ -62,6 +66,43 @@ impl PsfLight {
 }
 
 impl PsfArgs {
+    /// The options with what the design states that `--cell` names, where no option says another.
+    #[must_use]
+    pub(super) fn with_design(mut self, stated: Option<CellFile>) -> Self {
+        let of_design = stated.as_ref().and_then(|file| file.focal_length_um);
+        self.distance_um = self.asked_distance_um.or(of_design).unwrap_or(USUAL_DISTANCE_UM);
+        if let Some(file) = &stated
+            && self.wavelengths_nm.is_empty()
+            && self.camera.is_none()
+        {
+            // Digits as stated, without the rounding of the unit.
+            self.wavelengths_nm = file.wavelengths_um.iter().map(|um| (um * 1e9).round() / 1e6).collect();
+        }
+        self.stated = stated;
+        self
+    }
+
+    /// Say first which values are guesses.
+    pub(super) fn say_guesses(&self, terminal: &Terminal) {
+        if self.extract_only {
+            return;
+        }
+        let of_design = self.stated.as_ref().and_then(|file| file.focal_length_um).is_some();
+        let is_published = matches!(self.fidelity, FidelityArg::Published) && self.model.is_none();
+        let guesses = [
+            (self.stated.is_none() && !is_published).then(|| format!("pillars of {}", self.pillars())),
+            (self.asked_distance_um.is_none() && !of_design).then(|| format!("{USUAL_DISTANCE_UM} um to the sensor")),
+            (self.wavelengths_nm.is_empty() && self.camera.is_none()).then(|| "455, 530 and 660 nm".to_owned()),
+        ];
+        let guesses: Vec<String> = guesses.into_iter().flatten().collect();
+        if !guesses.is_empty() {
+            terminal.say(&format!(
+                "assumed, because no option says it: {}; give `--cell DESIGN.toml`, --distance-um and --wavelength-nm",
+                guesses.join("; ")
+            ));
+        }
+    }
+
     /// The light that the options ask for.
     ///
     /// # Errors
@@ -102,7 +143,6 @@ impl PsfArgs {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
-    use metalith::design::CellFile;
     use metalith::{Design, PillarShape};
 
     use super::*;

@@ -49,7 +49,7 @@ impl PsfArgs {
     }
 
     /// Material of the pillars, in words.
-    fn pillars(&self) -> String {
+    pub(super) fn pillars(&self) -> String {
         let Some(CellFile { cell, .. }) = &self.stated else {
             return format!("{USUAL_HEIGHT_NM} nm of sin_luke_2015 on fused_silica_malitson_1965, lit from there");
         };

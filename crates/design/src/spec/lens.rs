@@ -233,7 +233,7 @@ impl LensSpec {
 }
 
 /// Focal lengths of lenses, and distances of sensors.
-const FOCAL_LENGTH: Limits = Limits {
+pub(crate) const FOCAL_LENGTH: Limits = Limits {
     range: 1.0..=100_000.0,
     unit: "um",
 };
@@ -312,7 +312,7 @@ pub(super) const COEFFICIENT: Limits = Limits {
 };
 
 /// Wavelengths from the ultraviolet to the thermal infrared: a value in um instead of nm falls outside.
-pub(super) const WAVELENGTH: Limits = Limits {
+pub(crate) const WAVELENGTH: Limits = Limits {
     range: 150.0..=20_000.0,
     unit: "nm",
 };

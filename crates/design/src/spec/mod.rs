@@ -17,6 +17,7 @@ pub use array::{ArraySpec, Element, PlacedSpec};
 pub use cell::{CellSpec, TALLEST_NM, UnderSpec};
 pub(crate) use footprint::Footprint;
 pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layers, LayoutLayer, LayoutSpec, MarkSpec};
+pub(crate) use lens::{FOCAL_LENGTH, WAVELENGTH};
 pub use lens::{LensSpec, PhaseAlongY};
 pub(crate) use mapping::LibraryFile;
 pub use mapping::{MappingComparison, MappingSpec};

@@ -66,12 +66,14 @@ impl IndexOver {
         let l2 = um * um;
         let pairs = |from: usize| c[from.min(c.len())..].as_chunks::<2>().0.iter();
         let powers = |from: usize| pairs(from).map(|[a, b]| a * um.powf(*b)).sum::<f64>();
+        // Coefficients that a file leaves out are zero, and a term without a coefficient has no pole.
+        let term = |coefficient: f64, of: f64| if coefficient == 0.0 { 0.0 } else { coefficient * of };
         match number {
             1 => (1.0 + c[0] + pairs(1).map(|[a, b]| a * l2 / (l2 - b * b)).sum::<f64>()).sqrt(),
             2 => (1.0 + c[0] + pairs(1).map(|[a, b]| a * l2 / (l2 - b)).sum::<f64>()).sqrt(),
             3 => (c[0] + powers(1)).sqrt(),
             4 => {
-                let pole = |k: usize| c[k] * um.powf(c[k + 1]) / (l2 - c[k + 2].powf(c[k + 3]));
+                let pole = |k: usize| term(c[k], um.powf(c[k + 1]) / (l2 - c[k + 2].powf(c[k + 3])));
                 (c[0] + pole(1) + pole(5) + powers(9)).sqrt()
             }
             5 => c[0] + powers(1),
@@ -81,12 +83,12 @@ impl IndexOver {
                 c[0] + c[1] * pole + c[2] * pole * pole + l2 * (c[3] + l2 * (c[4] + l2 * c[5]))
             }
             8 => {
-                let share = c[0] + c[1] * l2 / (l2 - c[2]) + c[3] * l2;
+                let share = c[0] + term(c[1], l2 / (l2 - c[2])) + c[3] * l2;
                 ((1.0 + 2.0 * share) / (1.0 - share)).sqrt()
             }
             _ => {
                 let off = um - c[4];
-                (c[0] + c[1] / (l2 - c[2]) + c[3] * off / (off * off + c[5])).sqrt()
+                (c[0] + term(c[1], (l2 - c[2]).recip()) + term(c[3], off / (off * off + c[5]))).sqrt()
             }
         }
     }

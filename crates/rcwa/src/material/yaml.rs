@@ -16,8 +16,8 @@ struct Entry<'t> {
     rows: Vec<(usize, &'t str)>,
 }
 
-/// Least number of coefficients of each formula.
-const LEAST: [usize; 9] = [1, 1, 1, 9, 1, 1, 6, 4, 6];
+/// Coefficients of each formula that have a place of their own: those that a file leaves out at the end are zero.
+const PLACED: [usize; 9] = [1, 1, 1, 9, 1, 1, 6, 4, 6];
 
 fn fault(line: usize, what: impl Into<String>) -> TableFault {
     (Some(line), TableError::NotOfDatabase { what: what.into() })
@@ -173,15 +173,12 @@ fn formula(entry: &Entry<'_>, kind: &str) -> Result<IndexOver, TableFault> {
         ));
     };
     let missing = |key: &str| fault(entry.line, format!("no `{key}` of the formula"));
-    let coefficients = numbers(entry.coefficients.ok_or_else(|| missing("coefficients"))?)?;
-    let least = LEAST[usize::from(number) - 1];
-    if coefficients.len() < least {
-        let found = coefficients.len();
-        return Err(fault(
-            entry.line,
-            format!("{found} coefficients of formula {number}, which has {least} or more"),
-        ));
+    let mut coefficients = numbers(entry.coefficients.ok_or_else(|| missing("coefficients"))?)?;
+    if coefficients.is_empty() {
+        return Err(missing("coefficients"));
     }
+    let placed = PLACED[usize::from(number) - 1];
+    coefficients.resize(placed.max(coefficients.len()), 0.0);
     let range = entry.range.ok_or_else(|| missing("wavelength_range"))?;
     let range_um = match numbers(range)?[..] {
         [low, high] if 0.0 < low && low < high => (low, high),
@@ -217,6 +214,8 @@ mod tests {
             ),
             (3, "2.25 0.01 -2", 0.5, 2.29_f64.sqrt()),
             (4, "2 1 2 0.01 1 0 0 0 1", 0.5, (2.0 + 0.25 / 0.24_f64).sqrt()),
+            // TiO2 (Devore 1951, ordinary): 5.913 + 0.2441 / (um^2 - 0.0803), the rest of the coefficients left out.
+            (4, "5.913 0.2441 0 0.0803 1", 0.5, (5.913 + 0.2441 / 0.1697_f64).sqrt()),
             (5, "1.5 0.01 -2", 0.5, 1.54),
             (6, "0 0.05792105 238.0185 0.00167917 57.362", 0.5876, 1.000_276_89),
             (
@@ -285,8 +284,8 @@ mod tests {
             ("DATA:\n  - type: formula 12\n", Some(2)),
             ("DATA:\n  - type: formula 1\n    wavelength_range: 1 2\n", Some(2)),
             (
-                "DATA:\n  - type: formula 4\n    wavelength_range: 1 2\n    coefficients: 1 2\n",
-                Some(2),
+                "DATA:\n  - type: formula 4\n    wavelength_range: 1 2\n    coefficients: 1 x\n",
+                Some(4),
             ),
             (
                 "DATA:\n  - type: formula 1\n    wavelength_range: 2 1\n    coefficients: 0\n",

@@ -54,9 +54,15 @@ pub struct PsfMetrics {
 impl Psf {
     /// Peak, width and focusing efficiency.
     pub fn focus(&self, matched: &IdealPsf) -> FocusMetrics {
+        self.focus_in(self.fwhm_um(), matched)
+    }
+
+    /// Variant of [`Psf::focus`] with the focusing efficiency in a circle of three of these widths (um): those of the PSF in focus, for a
+    /// plane out of focus, whose own width holds more light the more it is blurred.
+    pub(super) fn focus_in(&self, in_focus_um: [Option<f64>; 2], matched: &IdealPsf) -> FocusMetrics {
         let (peak, peak_um) = self.peak();
         let fwhm_um = self.fwhm_um();
-        let focusing_efficiency = match fwhm_um {
+        let focusing_efficiency = match in_focus_um {
             [Some(x), Some(y)] => {
                 let focus_um = FOCUS_FWHM * (x * y).sqrt();
                 Some(self.power_in_circle_um2(peak_um, focus_um) / matched.power_um2)

@@ -93,12 +93,15 @@ pub struct ThroughFocus {
 
 impl ThroughFocus {
     /// Series of PSFs in planes at equal spacings, nearest first. All Strehl ratios are against the ideal PSF in the plane of the
-    /// sensor, so that they are proportional to the peaks. `radius_um`: of the lens.
+    /// sensor, so that they are proportional to the peaks. Focusing efficiencies of all planes are in one circle: three widths of the
+    /// PSF with the greatest peak. `radius_um`: of the lens.
     pub fn of(psfs: Vec<Psf>, matched: &IdealPsf, wavelength_um: f64, [radius_um, sensor_um]: [f64; 2]) -> Self {
+        let in_focus = psfs.iter().max_by(|a, b| a.peak().0.total_cmp(&b.peak().0));
+        let in_focus_um = in_focus.map_or([None; 2], Psf::fwhm_um);
         let plane = |psf: &Psf| FocusPlane {
             distance_um: psf.window.distance_um,
             peak: psf.peak().0,
-            focus: psf.focus(matched),
+            focus: psf.focus_in(in_focus_um, matched),
         };
         let planes: Vec<FocusPlane> = psfs.iter().map(plane).collect();
         let spacing_um = match planes.as_slice() {
