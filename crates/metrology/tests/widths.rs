@@ -4,8 +4,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use metalith_core::Silent;
-use metalith_metrology::{Diagnosis, FoundEffect, SetKind, SetVerdict, calibrate, kind_of};
-use metalith_optics::CalibratedModel;
+use metalith_design::array::PillarArray;
+use metalith_design::{Design, Hierarchy};
+use metalith_layout::write_pillars;
+use metalith_metrology::{Diagnosis, FoundEffect, SetKind, SetVerdict, WidthSet, calibrate, kind_of};
+use metalith_optics::{CalibratedModel, fill};
+use metalith_pillars::PillarShape;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -151,6 +155,42 @@ fn values(effect: &FoundEffect) -> Vec<(f64, [f64; 2])> {
         .collect()
 }
 
+/// The fill around pillars of a layout is the one that a chip as fabricated is simulated with.
+#[test]
+fn the_fill_of_a_layout_is_that_of_simulations() {
+    let small = [
+        ("diameter_um = 60", "diameter_um = 20"),
+        ("focal_length_um = 144", "focal_length_um = 48"),
+    ];
+    let text = metalith_testing::changed("mini_3x3", &small);
+    let design = Design::parse(&metalith_testing::design("mini_3x3"), &text).unwrap();
+    let array = PillarArray::build(&design, &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let layout = folder.path().join("layout.gds");
+    write_pillars(&design, &array, Hierarchy::Folded, &layout, &Silent).unwrap();
+    let centre = array.placed.iter().find(|p| p.element.index == (0, 0)).unwrap();
+    let map = array.classes[centre.class].widths.map();
+    let lattice = map.lattice;
+    let shown = map.number.indexed_iter().filter(|(_, w)| **w > 0).step_by(97).take(20);
+    let (mut table, mut sites) = ("x_um,y_um,drawn_nm,measured_nm\n".to_owned(), Vec::new());
+    for ((iy, ix), w) in shown {
+        writeln!(table, "{},{},{w},{w}", lattice.place_um(0, ix), lattice.place_um(1, iy)).unwrap();
+        sites.push(iy * lattice.sites() + ix);
+    }
+    std::fs::write(folder.path().join("widths.csv"), table).unwrap();
+    let text = "schema = 1\nkind = \"widths\"\ntitle = \"x\"\n[table]\nfile = \"widths.csv\"\n[fill]\nlayout = \"layout.gds\"\n";
+    std::fs::write(folder.path().join("measurement.toml"), text).unwrap();
+    let set = WidthSet::read(&folder.path().join("measurement.toml"), &Silent).unwrap();
+    for range in [2.0, 8.0] {
+        let simulated = fill(&map, PillarShape::Square, range);
+        for (site, own) in sites.iter().zip(&set.sites) {
+            let (found, want) = (own.fill(range).unwrap(), f64::from(simulated[*site]));
+            // Rings are a quarter of a micrometre wide, and a lens in the layout has neighbours.
+            assert!((found - want).abs() < 0.02 * want + 1e-3, "{range}: {found} {want}");
+        }
+    }
+}
+
 /// Sets without effect of which one was claimed.
 fn claims(seeds: std::ops::Range<u64>) -> usize {
     let claimed = |seed: &u64| {
@@ -239,6 +279,27 @@ fn what_was_found_is_a_model_file_and_what_it_cannot_hold_is_named() {
     assert_eq!(dose.measured_percent, [-10.0, 10.0]);
     let lost: Vec<&str> = found.not_in_model.iter().map(|l| l.effect.as_str()).collect();
     assert_eq!(lost, ["orientation"]);
+}
+
+#[test]
+fn the_example_is_explained_by_what_was_put_in() {
+    let set = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/measured/widths.toml");
+    let out = tempfile::tempdir().unwrap();
+    let done = calibrate(&set, SetKind::Widths, out.path(), &[], &Silent).unwrap();
+    println!("{}", done.diagnosis.sentence());
+    let mut found = names(&done.diagnosis);
+    found.sort_unstable();
+    assert_eq!(found, ["bias", "dose_slope", "proximity"]);
+    assert_eq!(done.diagnosis.verdict, SetVerdict::Explained);
+    let page = std::fs::read_to_string(&done.report).unwrap();
+    for figure in [
+        "Measured and drawn widths",
+        "Residual over dose",
+        "Residual over x",
+        "Ladder of errors",
+    ] {
+        assert!(page.contains(figure), "{figure}");
+    }
 }
 
 #[test]

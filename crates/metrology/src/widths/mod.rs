@@ -2,8 +2,9 @@
 //!
 //! | file | holds |
 //! | --- | --- |
-//! | `set`, `table` | keys of `measurement.toml`; rows of the CSV table |
-//! | `fill` | area fraction around a place, from rectangles or from a layout |
+//! | `set` | keys of `measurement.toml` |
+//! | `table`, `rows` | a CSV table; its rows as sites with repeats |
+//! | `regions`, `fill` | rectangles or a layout; the area fraction around a place |
 //! | `terms`, `model` | effects with their parameters; the forward model |
 //! | `calibrated` | what was found as `model.toml` |
 
@@ -11,6 +12,8 @@ mod calibrated;
 mod fill;
 mod model;
 mod page;
+mod regions;
+mod rows;
 mod set;
 mod table;
 mod terms;

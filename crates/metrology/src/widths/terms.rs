@@ -161,7 +161,7 @@ pub(super) fn effects(set: &WidthSet, terms: &Terms) -> (Vec<RefitParameter>, Ve
     if distinct(&|s| Some(s.dose_percent)).len() > 2 {
         effect("dose_slope", &[DOSE], None, None);
     }
-    if spans(&distinct(&|s| Some(s.surroundings.as_ref()?.fill(start)))) {
+    if spans(&distinct(&|s| s.fill(start))) {
         let stated = fitted().any(|s| matches!(s.surroundings, Some(Surroundings::Stated(_))));
         effect(
             "proximity",
