@@ -288,7 +288,7 @@ mod tests {
         assert_eq!(refused.unwrap_err().id(), "handoff/no-dose-slope");
         model.dose = Some(DoseResponse {
             nm_per_percent: 0.5,
-            measured_percent: [-20.0, 20.0],
+            measured_percent: [-30.0, 30.0],
         });
         let made = write(&mut files, &design, &process, (&array, &model), &Silent).unwrap();
         println!("{}", made.words());
