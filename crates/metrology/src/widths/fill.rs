@@ -33,7 +33,7 @@ pub(super) enum Surroundings {
     Stated(f64),
     /// Rectangles with their edges relative to the place (um): from and to along each axis, and the fill.
     Regions(Vec<([[f64; 2]; 2], f64)>),
-    /// Area of pillars by ring (um^2): ring, and area.
+    /// Pillars by ring: root mean square radius (um), and area (um^2).
     Rings(Vec<(f64, f64)>),
 }
 
@@ -71,17 +71,21 @@ pub(super) fn own_fill(regions: &[FilledRegion], place: [f64; 2]) -> Option<f64>
 /// Surroundings of places among pillars, given by their place and area (um, um^2).
 pub(super) fn rings_around(places: &[[f64; 2]], pillars: &[([f64; 2], f64)]) -> Vec<Surroundings> {
     let around = |place: &[f64; 2]| {
-        let mut areas = vec![0.0; RINGS];
+        let mut sums = vec![[0.0; 2]; RINGS];
         for (at, area) in pillars {
-            let ring = ((at[0] - place[0]).hypot(at[1] - place[1]) / RING_UM) as usize;
-            if let Some(sum) = areas.get_mut(ring) {
-                *sum += area;
+            let radius = (at[0] - place[0]).hypot(at[1] - place[1]);
+            if let Some([areas, squares]) = sums.get_mut((radius / RING_UM) as usize) {
+                *areas += area;
+                *squares += area * radius * radius;
             }
         }
-        // Root mean square radius of a ring: what a Gaussian of a wide range sees of it.
-        let radius = |k: usize| RING_UM * ((k as f64).powi(2) + k as f64 + 0.5).sqrt();
-        let filled = areas.into_iter().enumerate().filter(|(_, area)| *area > 0.0);
-        Surroundings::Rings(filled.map(|(k, area)| (radius(k), area)).collect())
+        // Root mean square radius of the pillars of a ring: their Gaussian weight to first order.
+        let filled = sums.into_iter().filter(|[area, _]| *area > 0.0);
+        Surroundings::Rings(
+            filled
+                .map(|[area, squares]| (f64::sqrt(squares / area), area))
+                .collect(),
+        )
     };
     places.par_iter().map(around).collect()
 }

@@ -129,7 +129,7 @@ impl RowReader<'_> {
             set.sites.push(WidthSite {
                 place,
                 group,
-                dose_percent: row.dose.map_or(0.0, |dose| 100.0 * (dose / nominal - 1.0)),
+                dose_percent: row.dose.map_or(0.0, |dose| 100.0 * (dose - nominal) / nominal),
                 ..row.site
             });
         }
