@@ -80,11 +80,10 @@ impl Doses<'_> {
     fn steps(&self, added_nm: f64) -> (i32, bool) {
         let wanted = -added_nm / self.response.nm_per_percent;
         let [low, high] = self.response.measured_percent;
-        let held = wanted.clamp(low, high);
-        // Towards no change at the ends: a class is within what was measured.
-        let steps = held / self.step_percent;
-        let whole = if held == wanted { steps.round() } else { steps.trunc() };
-        (whole as i32, held != wanted)
+        // A class is within what was measured, also after rounding.
+        let [least, most] = [(low / self.step_percent).ceil(), (high / self.step_percent).floor()];
+        let steps = (wanted / self.step_percent).round().clamp(least.min(most), most);
+        (steps as i32, !(low..=high).contains(&wanted))
     }
 }
 
