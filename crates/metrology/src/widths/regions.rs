@@ -124,7 +124,7 @@ pub(super) fn layout_fill(
             "layout",
             what,
             "give the layout that was written, with its pillar layer in `layer`",
-        )
+        );
     };
     let read = || -> Result<_> {
         Ok(extract(
