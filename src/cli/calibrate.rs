@@ -183,7 +183,7 @@ fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -
     Ok(outcome)
 }
 
-/// Calibrate sets of heights and of spectra.
+/// Calibrate sets of heights, of spectra and of widths.
 fn run_metrology(
     args: &CalibrateArgs,
     kinds: &[Option<SetKind>],
@@ -194,7 +194,7 @@ fn run_metrology(
         return Err(Error::refused(
             "calibrate/kind-has-none",
             "--validate, --adopt and --declare are for sets of kind `psf`",
-            "leave the option out: sets of heights and spectra are judged by what was left out of the fit",
+            "leave the option out: sets of heights, spectra and widths are judged by what was left out of the fit",
         ));
     }
     for ((set, kind), out) in args.sets.iter().zip(kinds).zip(outs) {
@@ -202,7 +202,7 @@ fn run_metrology(
             return Err(Error::refused(
                 "calibrate/kinds",
                 format!(
-                    "{} is not of kind `heights` or `spectra`, another set is",
+                    "{} is not of kind `heights`, `spectra` or `widths`, another set is",
                     set.display()
                 ),
                 "calibrate sets of kind `psf` by a command of their own",
@@ -228,8 +228,14 @@ fn describe_metrology(done: &Answer) {
     for line in &diagnosis.validation {
         print_line!("{line}");
     }
+    for lost in &diagnosis.not_in_model {
+        print_line!("not in model.toml: `{}`, because {}", lost.effect, lost.why);
+    }
     print_line!("{}", done.answer.display());
     print_line!("{}", done.report.display());
+    if let Some(model) = &done.model {
+        print_line!("{}", model.display());
+    }
 }
 
 fn describe(done: &Calibration) {

@@ -44,6 +44,11 @@ pub(crate) struct HandoffArgs {
     #[arg(long, value_name = "MODEL")]
     compensate: Option<PathBuf>,
 
+    /// Also write dose classes that undo the biases of this `model.toml` of a set of widths: a layout with a dose factor for each
+    /// class, for a writer that corrects by dose. The pillar layout stays as intended.
+    #[arg(long, value_name = "MODEL", conflicts_with = "compensate")]
+    dose_classes: Option<PathBuf>,
+
     /// Format of the layouts; GDSII if left out.
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
@@ -92,6 +97,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
             .join(" "),
         waivers: args.waivers.clone(),
         compensate: args.compensate.clone(),
+        dose_classes: args.dose_classes.clone(),
         format: args.format.map_or_else(Default::default, Into::into),
         fidelity: args.fidelity.map(Into::into),
         accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },

@@ -10,7 +10,7 @@ use super::listing::Listing;
 use super::manifest::{Manifest, entry_of, files_below};
 use super::options::HandoffOptions;
 use super::preconditions::{fits, replaceable};
-use super::{documents, front_page, layouts, manifest, rules, zip};
+use super::{documents, dose_classes, front_page, layouts, manifest, rules, zip};
 use metalith_cell::{Fidelity, cache_folder};
 use metalith_core::{AtomicFolder, Error, Progress, Result};
 use metalith_design::array::PillarArray;
@@ -69,10 +69,21 @@ fn fill(
     let opened = layouts.paths.open(progress)?;
     let census = opened.census(progress)?;
     let documents = documents::write(files, design, process, &layouts, &census)?;
+    let dose_classes = sources.dose_model.as_ref().map(|model| {
+        let of = (&layouts.array, model);
+        dose_classes::write(files, design, process, of, progress)
+    });
+    let dose_classes = dose_classes.transpose()?;
     sources.keep(files)?;
     let subjects = rules::subjects(sources, &layouts, &opened);
     let checked = rules::check(files, &subjects, process, sources.waivers.as_ref(), progress)?;
     let mut checks = checked.checks;
+    checks.extend(dose_classes.as_ref().map(|classes| HandoffCheck {
+        name: "dose classes".into(),
+        verdict: Verdict::of(classes.clipped == 0),
+        words: classes.words(),
+        report: Some("dose/dose_classes.csv".into()),
+    }));
     checks.push(verification(
         files,
         options,
@@ -100,6 +111,7 @@ fn fill(
         blocks: layouts.blocks,
         structures: layouts.structures,
         tests_frame: layouts.tests_frame,
+        dose_classes,
         checks,
         rules: checked.reports,
         files: files.files.clone(),

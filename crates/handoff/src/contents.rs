@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::documents::Documents;
+use super::dose_classes::DoseClasses;
 use super::dose_matrix::DoseBlock;
 use super::drawing::RectNm;
 use super::layout_statistics::LayoutStatistics;
@@ -58,6 +59,8 @@ pub(super) struct Contents<'a> {
     pub structures: Vec<Structure>,
     #[serde(skip)]
     pub tests_frame: (RectNm, (i64, i64)),
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dose_classes: Option<DoseClasses>,
     pub checks: Vec<HandoffCheck>,
     /// Result of each rule, by layout.
     pub rules: RuleReports,

@@ -28,6 +28,8 @@ pub(super) struct Sources {
     pub waivers: Option<Waivers>,
     /// Model that the layout is compensated for.
     pub model: Option<CalibratedModel>,
+    /// Model whose biases are undone by dose classes.
+    pub dose_model: Option<CalibratedModel>,
     kept: Vec<InputCopy>,
 }
 
@@ -89,12 +91,22 @@ impl Sources {
                 Some(CalibratedModel::parse(path, &text)?)
             }
         };
+        let dose_model = match &options.dose_classes {
+            None => None,
+            Some(path) => {
+                let text = document::load(path)?;
+                let purpose = "the calibrated model that dose classes are made by";
+                kept.push(InputCopy::new("dose_model_", path, purpose, text.as_bytes()));
+                Some(CalibratedModel::parse(path, &text)?)
+            }
+        };
         Ok(Self {
             design,
             process,
             decks,
             waivers,
             model,
+            dose_model,
             kept,
         })
     }

@@ -26,6 +26,8 @@ pub struct HandoffOptions {
     pub accuracy: Accuracy,
     /// The calibrated model that the layout is compensated for, and judged by, if any.
     pub compensate: Option<PathBuf>,
+    /// The calibrated model whose biases are undone by dose classes; the layout stays as intended.
+    pub dose_classes: Option<PathBuf>,
     /// Violations of the rules that have been accepted.
     pub waivers: Option<PathBuf>,
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::dose::{DoseRow, WriteTime};
+use super::dose_classes::DoseClass;
 use super::dose_matrix::DoseBlock;
 use super::kind_words::KindWords;
 use super::metrology_sites::{Cross, MetrologySite};
@@ -89,6 +90,33 @@ pub(super) fn write_doses(
         ];
         cells.resize(head.len(), String::new());
         csv.row(&cells);
+    }
+    csv.write(path)
+}
+
+/// Dose classes with their areas.
+pub(super) fn write_dose_classes(path: &Path, classes: &[DoseClass], layer: i16) -> Result<()> {
+    let mut csv = Csv::new(&[
+        "class",
+        "layer",
+        "datatype",
+        "factor",
+        "dose_uc_cm2",
+        "pillars",
+        "area_um2",
+        "file",
+    ]);
+    for class in classes {
+        csv.row(&[
+            class.number.to_string(),
+            layer.to_string(),
+            class.number.to_string(),
+            format!("{:.4}", class.factor),
+            format!("{:.2}", class.dose_uc_cm2),
+            class.pillars.to_string(),
+            format!("{:.3}", class.area_um2),
+            class.file.clone(),
+        ]);
     }
     csv.write(path)
 }

@@ -89,6 +89,16 @@ pub struct Diagnosis {
     pub validation: Vec<String>,
     /// Measurements that were never fitted.
     pub not_fitted: Vec<String>,
+    /// Effects that `model.toml` does not hold.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_in_model: Vec<NotInModel>,
+}
+
+/// An effect that `model.toml` does not hold.
+#[derive(Clone, Debug, Serialize)]
+pub struct NotInModel {
+    pub effect: String,
+    pub why: String,
 }
 
 /// The residual is explained up to this multiple of the difference of repeats.
@@ -102,6 +112,8 @@ pub(crate) struct SetFacts<'a> {
     /// Names of the measurements.
     pub(crate) names: Vec<String>,
     pub(crate) noise_floor: Option<f64>,
+    /// True if many measurements tell of an effect that is far below the difference of repeats.
+    pub(crate) averages: bool,
 }
 
 impl Diagnosis {
@@ -167,7 +179,9 @@ impl Diagnosis {
             held_out: errors.held_out.iter().flatten().copied().fold(0.0, f64::max),
         };
         let verdict = match (found.chosen.is_empty(), facts.noise_floor) {
-            (_, Some(floor)) if first.fitted <= EXPLAINED * floor => SetVerdict::NoResidual,
+            (none, Some(floor)) if first.fitted <= EXPLAINED * floor && (none || !facts.averages) => {
+                SetVerdict::NoResidual
+            }
             (true, _) => SetVerdict::Unexplained,
             (_, Some(floor)) if pair(last).held_out <= EXPLAINED * floor => SetVerdict::Explained,
             _ => SetVerdict::Partly,
@@ -213,6 +227,7 @@ impl Diagnosis {
             ladder,
             validation,
             not_fitted,
+            not_in_model: Vec::new(),
         }
     }
 

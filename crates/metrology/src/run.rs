@@ -2,20 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_attribution::{RefitEffect, RefitModel, RefitPlan, select};
+use metalith_attribution::{RefitEffect, RefitFinding, RefitModel, RefitPlan, select};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result};
+use metalith_optics::CalibratedModel;
 
-use crate::diagnosis::{Diagnosis, SetFacts};
+use crate::diagnosis::{Diagnosis, SetFacts, SetVerdict};
 use crate::heights::{self, HeightModel, HeightSet};
 use crate::page::page;
 use crate::spectra::{self, SpectrumModel, SpectrumSet};
+use crate::widths::{self, WidthModel, WidthSet};
 
 /// Kind of a measured set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetKind {
     Heights,
     Spectra,
+    Widths,
 }
 
 /// The files of an answer.
@@ -26,6 +29,8 @@ pub struct Answer {
     pub answer: PathBuf,
     /// `report.html`.
     pub report: PathBuf,
+    /// `model.toml` of widths; none where no effect explains the residual.
+    pub model: Option<PathBuf>,
 }
 
 /// The `measurement.toml` of a set that is named by its folder or by the file.
@@ -48,6 +53,7 @@ pub fn kind_of(set: &Path) -> Option<SetKind> {
     match kind.ok()??.as_str() {
         "heights" => Some(SetKind::Heights),
         "spectra" => Some(SetKind::Spectra),
+        "widths" => Some(SetKind::Widths),
         _ => None,
     }
 }
@@ -78,6 +84,7 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 measure: "height (nm rms)",
                 names: set.fields.iter().map(|f| f.name.clone()).collect(),
                 noise_floor: None,
+                averages: false,
             };
             let plan = model.plan();
             answer(&model, &plan, &facts, ("nm", out), progress, |page, theta| {
@@ -94,11 +101,38 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 measure: "reflectance (rms)",
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
                 noise_floor: set.repeat_rms(),
+                averages: false,
             };
             let plan = model.plan();
             answer(&model, &plan, &facts, ("", out), progress, |page, theta| {
                 spectra::figures(page, &set, &model, theta);
             })
+        }
+        SetKind::Widths => {
+            let set = WidthSet::read(&path, progress)?;
+            let mut model = WidthModel::new(&set);
+            model.effects = tried(&model.effects, only)?;
+            let facts = SetFacts {
+                title: &set.title,
+                kind: "widths",
+                measure: "width (nm rms)",
+                names: (1..=set.sites.len()).map(|n| format!("site {n}")).collect(),
+                noise_floor: set.repeat_rms(),
+                averages: true,
+            };
+            let plan = model.plan();
+            let carry = |found: &RefitFinding, diagnosis: &mut Diagnosis| widths::calibrated(&model, found, diagnosis);
+            write(
+                &model,
+                &plan,
+                &facts,
+                ("nm", out),
+                progress,
+                Some(&carry),
+                |page, theta| {
+                    widths::figures(page, &set, &model, theta);
+                },
+            )
         }
     }
 }
@@ -135,8 +169,25 @@ fn answer(
     progress: &dyn Progress,
     figures: impl FnOnce(&mut metalith_report::Page, &[f64]),
 ) -> Result<Answer> {
+    write(model, plan, facts, (unit, out), progress, None, figures)
+}
+
+/// Maker of the calibrated model; effects that it cannot hold are added to the diagnosis.
+type Carry<'a> = &'a dyn Fn(&RefitFinding, &mut Diagnosis) -> CalibratedModel;
+
+fn write(
+    model: &dyn RefitModel,
+    plan: &RefitPlan,
+    facts: &SetFacts<'_>,
+    (unit, out): (&str, &Path),
+    progress: &dyn Progress,
+    carry: Option<Carry<'_>>,
+    figures: impl FnOnce(&mut metalith_report::Page, &[f64]),
+) -> Result<Answer> {
     let found = select(model, plan, progress)?;
-    let diagnosis = Diagnosis::new(facts, model, plan, &found);
+    let mut diagnosis = Diagnosis::new(facts, model, plan, &found);
+    let learned = diagnosis.verdict != SetVerdict::Unexplained;
+    let calibrated = carry.filter(|_| learned).map(|carry| carry(&found, &mut diagnosis));
     let _turn = FolderLock::wait(out, progress, || {
         progress.warn("another run writes into this folder: waiting for it");
     })?;
@@ -148,9 +199,14 @@ fn answer(
     let mut page = page(&diagnosis, unit);
     figures(&mut page, &found.theta);
     page.write(&report)?;
+    let path = out.join("model.toml");
+    if let Some(calibrated) = &calibrated {
+        calibrated.write(&path)?;
+    }
     Ok(Answer {
         diagnosis,
         answer,
         report,
+        model: calibrated.map(|_| path),
     })
 }

@@ -1,5 +1,6 @@
 //! One element: as it is drawn, and as it is made.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
@@ -33,8 +34,8 @@ pub struct DrawnElement<'a> {
     shape: PillarShape,
     /// Centre of the element on the chip (um).
     centre_um: [f64; 2],
-    /// Area fraction around each site, made when first asked for.
-    fill: OnceLock<Vec<f32>>,
+    /// Area fraction around each site with its range (um), made when first asked for.
+    fill: OnceLock<(f64, Vec<f32>)>,
 }
 
 impl<'a> DrawnElement<'a> {
@@ -66,9 +67,17 @@ impl<'a> DrawnElement<'a> {
         self.pillars
     }
 
-    /// Area fraction around each site, row by row; see [`density::fill`].
-    pub fn fill(&self) -> &[f32] {
-        self.fill.get_or_init(|| density::fill(self.pillars, self.shape))
+    /// Area fraction around each site within the range of a change, row by row; see [`density::fill`]. The range that is asked for
+    /// first is kept.
+    pub fn fill(&self, geometry: &GeometryChange) -> Cow<'_, [f32]> {
+        let range_um = geometry.density_range_um();
+        let made = || density::fill(self.pillars, self.shape, range_um);
+        let (kept_um, kept) = self.fill.get_or_init(|| (range_um, made()));
+        if *kept_um == range_um {
+            Cow::Borrowed(kept)
+        } else {
+            Cow::Owned(made())
+        }
     }
 
     /// Width added to the pillar at a site, counted row by row, by bias, density and declared terms (nm).
@@ -77,15 +86,15 @@ impl<'a> DrawnElement<'a> {
             return geometry.cd_bias_nm;
         }
         let n = self.pillars.lattice.sites();
-        let own = self.added_nm(site / n, geometry, &width_terms(geometry));
+        let own = self.added_nm(site / n, geometry, &self.fill(geometry), &width_terms(geometry));
         geometry.cd_bias_nm + own[site % n]
     }
 
     /// Width that density and declared terms add to a row (nm).
-    fn added_nm(&self, iy: usize, geometry: &GeometryChange, terms: &[CompiledTerm]) -> Vec<f64> {
+    fn added_nm(&self, iy: usize, geometry: &GeometryChange, fill: &[f32], terms: &[CompiledTerm]) -> Vec<f64> {
         let lattice = self.pillars.lattice;
         let n = lattice.sites();
-        let fill: Vec<f64> = self.fill()[iy * n..][..n].iter().map(|f| f64::from(*f)).collect();
+        let fill: Vec<f64> = fill[iy * n..][..n].iter().map(|f| f64::from(*f)).collect();
         let mut added: Vec<f64> = fill.iter().map(|f| geometry.cd_bias_density_nm * f).collect();
         if terms.is_empty() {
             return added;
@@ -107,13 +116,14 @@ impl<'a> DrawnElement<'a> {
     /// Steps of [`BIAS_STEP_NM`] that density and declared terms add to the width at each site, row by row; nothing if
     /// they add none anywhere.
     pub fn site_steps(&self, geometry: &GeometryChange) -> Option<Vec<i32>> {
-        let terms = width_terms(geometry);
-        let row = |iy| self.added_nm(iy, geometry, &terms);
+        if !geometry.varies_by_site() {
+            return None;
+        }
+        let (terms, fill) = (width_terms(geometry), self.fill(geometry));
+        let row = |iy| self.added_nm(iy, geometry, &fill, &terms);
         let steps = |nm: f64| (nm * STEPS_PER_NM).round() as i32;
         let rows = 0..self.pillars.lattice.sites();
-        geometry
-            .varies_by_site()
-            .then(|| rows.flat_map(row).map(steps).collect())
+        Some(rows.flat_map(row).map(steps).collect())
     }
 }
 

@@ -12,6 +12,9 @@ use super::stitching::{self, Stitching};
 /// Most polynomials of a free term: the radial order of Zernike's is then below 8.
 const MOST_TERMS: usize = 36;
 
+/// Ranges of an area fraction (um): below, a fraction is that of single pillars; the sum at a site grows with the range.
+pub const RANGES_UM: RangeInclusive<f64> = 0.5..=300.0;
+
 /// A number of a perturbation that cannot be.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PerturbationFault {
@@ -111,6 +114,9 @@ impl Perturbation {
                 let what = format!("`{}` has {} terms", name(key), terms.len());
                 faults.push(fault(key, what, format!("it has at most {MOST_TERMS}")));
             }
+        }
+        if let Some(range) = g.cd_bias_density_range_um {
+            faults.extend(outside("geometry.cd_bias_density_range_um".into(), range, &RANGES_UM));
         }
         self.boundaries(&mut faults);
         for (part, declared) in [

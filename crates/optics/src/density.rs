@@ -3,7 +3,7 @@
 use metalith_pillars::{PillarId, PillarMap, PillarShape};
 use rayon::prelude::*;
 
-/// Range of the backscattered electrons over which fill is averaged (um): exp(-r^2 / range^2).
+/// Range of the backscattered electrons over which fill is averaged where a model states none (um): exp(-r^2 / range^2).
 pub const RANGE_UM: f64 = 31.0;
 
 /// Ranges after which the Gaussian is cut: 1e-4 of it is left.
@@ -12,9 +12,9 @@ const CUT_RANGES: f64 = 3.0;
 /// Rows or columns that a task copies at once: a few cache lines of either side.
 const STRIP: usize = 16;
 
-/// Area fraction of pillars of a shape around each site, averaged with a Gaussian of [`RANGE_UM`]. Row by row, `sites * sites`
+/// Area fraction of pillars of a shape around each site, averaged with a Gaussian of a range (um). Row by row, `sites * sites`
 /// values, each between 0 and 1; what is around the lattice counts as empty.
-pub fn fill(pillars: &PillarMap, shape: PillarShape) -> Vec<f32> {
+pub fn fill(pillars: &PillarMap, shape: PillarShape, range_um: f64) -> Vec<f32> {
     let lattice = pillars.lattice;
     let n = lattice.sites();
     let steps_nm = lattice.steps_nm();
@@ -27,17 +27,17 @@ pub fn fill(pillars: &PillarMap, shape: PillarShape) -> Vec<f32> {
     let mut plane: Vec<f32> = pillars.number.iter().map(|&w| area(w)).collect();
     // Rows, then columns as the rows of the transposed plane.
     for step_um in lattice.steps_um() {
-        blur_rows(&mut plane, n, &kernel(step_um));
+        blur_rows(&mut plane, n, &kernel(step_um, range_um));
         plane = transposed(&plane, n);
     }
     plane
 }
 
 /// The Gaussian from its middle on, a step of the lattice's grid apart; with its other half it adds up to one.
-fn kernel(step_um: f64) -> Vec<f32> {
-    let reach = (CUT_RANGES * RANGE_UM / step_um).ceil() as usize;
+fn kernel(step_um: f64, range_um: f64) -> Vec<f32> {
+    let reach = (CUT_RANGES * range_um / step_um).ceil() as usize;
     let kernel: Vec<f32> = (0..=reach)
-        .map(|k| (-(k as f64 * step_um / RANGE_UM).powi(2)).exp() as f32)
+        .map(|k| (-(k as f64 * step_um / range_um).powi(2)).exp() as f32)
         .collect();
     let total = kernel[0] + 2.0 * kernel[1..].iter().sum::<f32>();
     kernel.into_iter().map(|k| k / total).collect()
@@ -88,7 +88,7 @@ mod tests {
                 map.number[[iy, ix]] = 175;
             }
         }
-        let fill = fill(&map, PillarShape::Square);
+        let fill = fill(&map, PillarShape::Square, RANGE_UM);
         let at = |ix: usize| f64::from(fill[500 * 1000 + ix]);
         // What the cut of the kernel leaves out, and a step of the lattice at the edge.
         const CUT: f64 = 1e-3;
@@ -107,7 +107,7 @@ mod tests {
                 map.number[[iy, ix]] = 300;
             }
         }
-        let fill = fill(&map, PillarShape::Circle);
+        let fill = fill(&map, PillarShape::Circle, RANGE_UM);
         let share = 0.25 * std::f64::consts::PI * 0.09 / lattice.cell_um2();
         // What the cut of the kernel leaves out, and a step of the lattice at the edge.
         const CUT: f64 = 2e-3;
@@ -128,7 +128,7 @@ mod tests {
         for (i, w) in map.number.iter_mut().enumerate() {
             *w = (i * 7919 % 200) as u16;
         }
-        let fill = fill(&map, PillarShape::Square);
+        let fill = fill(&map, PillarShape::Square, RANGE_UM);
         let along = |k: i64| (-(k as f64 * 0.35 / RANGE_UM).powi(2)).exp();
         let reach = (CUT_RANGES * RANGE_UM / 0.35).ceil() as i64;
         // Sums over a few hundred taps in single precision, three times: along both axes and in the norm.

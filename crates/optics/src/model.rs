@@ -50,7 +50,47 @@ pub struct CalibratedModel {
     /// Differences of chips and bench from what is stated.
     #[serde(alias = "departure")]
     pub perturbation: Perturbation,
+    /// Change of widths with dose, where it was measured. Simulations are of the dose that the perturbation holds at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dose: Option<DoseResponse>,
 }
+
+/// Change of widths with the dose of the writer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DoseResponse {
+    /// Added to a width for each per cent of dose (nm).
+    pub nm_per_percent: f64,
+    /// Least and greatest change of dose that was measured (%).
+    pub measured_percent: [f64; 2],
+}
+
+impl DoseResponse {
+    /// Every number that cannot be, by its key with what is wrong and what to write.
+    fn faults(&self) -> Vec<(String, String, String)> {
+        let slope = (self.nm_per_percent.abs() <= MOST_NM_PER_PERCENT).then_some(());
+        let [low, high] = self.measured_percent;
+        let range = (-100.0 < low && low <= high && high <= MOST_PERCENT).then_some(());
+        let fault = |key: &str, hint: String| (format!("dose.{key}"), format!("`{key}` cannot be this"), hint);
+        let wrong = [
+            slope.is_none().then(|| {
+                let most = MOST_NM_PER_PERCENT;
+                fault("nm_per_percent", format!("it must be a number from -{most} to {most}"))
+            }),
+            range.is_none().then(|| {
+                let hint = format!("give the least and the greatest change, from above -100 to {MOST_PERCENT}");
+                fault("measured_percent", hint)
+            }),
+        ];
+        wrong.into_iter().flatten().collect()
+    }
+}
+
+/// Steepest change of a width with dose (nm for a per cent), several times what any resist has.
+const MOST_NM_PER_PERCENT: f64 = 100.0;
+
+/// Greatest change of dose that is measured (%).
+const MOST_PERCENT: f64 = 1000.0;
 
 impl CalibratedModel {
     /// A model of what was found.
@@ -60,6 +100,7 @@ impl CalibratedModel {
             set,
             finding,
             perturbation,
+            dose: None,
         }
     }
 
@@ -141,14 +182,15 @@ impl CalibratedModel {
             ))));
         }
         let faults = model.perturbation.faults();
-        if !faults.is_empty() {
+        let dose = model.dose.map_or_else(Vec::new, |dose| dose.faults());
+        if !(faults.is_empty() && dose.is_empty()) {
             let section = if text.contains("[perturbation") {
                 "perturbation"
             } else {
                 "departure"
             };
             let placed = |fault: PerturbationFault| (format!("{section}.{}", fault.key), fault.what, fault.hint);
-            let faults = faults.into_iter().map(placed).collect();
+            let faults = faults.into_iter().map(placed).chain(dose).collect();
             return Err(Error::Text(Box::new(Faults::at_keys(path, text, faults))));
         }
         Ok(Self {
@@ -202,6 +244,24 @@ mod tests {
         let path = folder.path().join("model.toml");
         model().write(&path).unwrap();
         assert_eq!(CalibratedModel::read(&path).unwrap(), model());
+        let mut graded = model();
+        graded.perturbation.geometry.cd_bias_density_range_um = Some(12.5);
+        graded.dose = Some(DoseResponse {
+            nm_per_percent: 0.8,
+            measured_percent: [-20.0, 20.0],
+        });
+        graded.write(&path).unwrap();
+        assert_eq!(CalibratedModel::read(&path).unwrap(), graded);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let wrong = text.replace("= 12.5", "= 0.0").replace("= 0.8", "= nan");
+        let Err(Error::Text(faults)) = CalibratedModel::parse(&path, &wrong) else {
+            panic!("numbers that cannot be are read")
+        };
+        let keys: Vec<&str> = faults.faults().iter().map(|f| &*f.key).collect();
+        assert_eq!(
+            keys,
+            ["perturbation.geometry.cd_bias_density_range_um", "dose.nm_per_percent"]
+        );
         std::fs::write(&path, "schema = 7").unwrap();
         let Error::Text(faults) = CalibratedModel::read(&path).unwrap_err() else {
             panic!("a mistake of the text is one at a place");

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::declared::{CompiledTerm, DeclaredQuantity, DeclaredTerm, compiled};
 use super::stitching::Stitching;
-use super::zernike;
+use super::{density, zernike};
 
 /// Differences of chip and bench from what was drawn and stated. The default differs in nothing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,6 +26,9 @@ pub struct GeometryChange {
     pub cd_bias_nm: f64,
     /// Added to a width for each unit of area fraction around it (nm).
     pub cd_bias_density_nm: f64,
+    /// Range of the Gaussian exp(-r^2 / range^2) that the area fraction is averaged with (um); [`super::RANGE_UM`] if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cd_bias_density_range_um: Option<f64>,
     /// Share of the pillars that are missing, at random places.
     pub missing_pillars: f64,
     /// Amplitude of light that passes the aperture without seeing pillars, over that which arrives.
@@ -179,6 +182,11 @@ impl GeometryChange {
     /// Width added to a pillar with this area fraction around it (nm).
     pub fn bias_nm(&self, fill: f64) -> f64 {
         self.cd_bias_nm + self.cd_bias_density_nm * fill
+    }
+
+    /// Range of the Gaussian that the area fraction is averaged with (um).
+    pub fn density_range_um(&self) -> f64 {
+        self.cd_bias_density_range_um.unwrap_or(density::RANGE_UM)
     }
 
     /// True if the bias differs from site to site.

@@ -52,6 +52,7 @@ pub(super) fn write(folder: &Path, c: &Contents<'_>) -> Result<()> {
     chip::cells(&mut page, c);
     chip::stack(&mut page, c);
     writing::doses(&mut page, c);
+    writing::dose_classes(&mut page, c);
     writing::write_time(&mut page, c);
     measuring::tests(&mut page, c);
     measuring::metrology(&mut page, c);

@@ -44,6 +44,35 @@ pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
     page.table(table);
 }
 
+/// Classes of a layout that is corrected by dose.
+pub(super) fn dose_classes(page: &mut Page, c: &Contents<'_>) {
+    let Some(classes) = &c.dose_classes else { return };
+    page.section("Dose classes");
+    page.paragraph(format!(
+        "Write these layouts in place of the pillar layout, each with its dose, and the marks with the base dose. {}.",
+        classes.words()
+    ));
+    let mut table = Table::new([
+        Column::number("Class", ""),
+        Column::number("Factor", ""),
+        Column::number("Dose", "uC/cm2"),
+        Column::number("Pillars", ""),
+        Column::number("Area", "um2"),
+        Column::text("File"),
+    ]);
+    for class in &classes.classes {
+        table.row([
+            class.number.into(),
+            Cell::fixed(class.factor, 4),
+            Cell::fixed(class.dose_uc_cm2, 1),
+            class.pillars.into(),
+            Cell::fixed(class.area_um2, 1),
+            Cell::code(&class.file),
+        ]);
+    }
+    page.table(table);
+}
+
 pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
     page.section("Write time");
     let w = &c.process.writer;

@@ -35,6 +35,7 @@ const PROCESS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../processes/jbx6
 
 fn options(out: &Path) -> HandoffOptions {
     HandoffOptions {
+        dose_classes: None,
         compensate: None,
         design: DESIGN.into(),
         process: Some(PROCESS.into()),

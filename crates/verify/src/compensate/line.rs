@@ -46,17 +46,7 @@ impl Line {
     pub(crate) fn new(design: &Design, model: &CalibratedModel, progress: &dyn Progress) -> Result<Self> {
         let drawn: Vec<u16> = design.cell.widths_nm().collect();
         check_shape(design.cell.shape)?;
-        let directed = model.perturbation.geometry.directed_widths();
-        if !directed.is_empty() {
-            return Err(Error::refused(
-                "compensate/copies-differ",
-                format!(
-                    "the widths that `{}` declares differ between copies of an element",
-                    directed.join("`, `")
-                ),
-                "compensate for widths that depend on `w`, `fill` and `r` alone, or take the term out of the model",
-            ));
-        }
+        check_equal_copies(model)?;
         if model.perturbation.cell.rim_height_nm != 0.0 {
             return Err(Error::refused(
                 "compensate/height-varies",
@@ -174,6 +164,25 @@ fn along_axes(
         CellResponse::Jones(JonesTables::Polarised(PolarisedTables::Axes(tables))) => Ok(tables.along.into()),
         other => unreachable!("pillars that were told apart along both axes: {other:?}"),
     }
+}
+
+/// Succeeds if copies of an element have equal widths as fabricated, so that one correction is of all of them.
+///
+/// # Errors
+/// If the model declares widths that depend on more than the pillar, the fill around it and its distance from the middle.
+pub fn check_equal_copies(model: &CalibratedModel) -> Result<()> {
+    let directed = model.perturbation.geometry.directed_widths();
+    if directed.is_empty() {
+        return Ok(());
+    }
+    Err(Error::refused(
+        "compensate/copies-differ",
+        format!(
+            "the widths that `{}` declares differ between copies of an element",
+            directed.join("`, `")
+        ),
+        "compensate for widths that depend on `w`, `fill` and `r` alone, or take the term out of the model",
+    ))
 }
 
 /// Succeeds if another pillar of a design may come out as the intended one.

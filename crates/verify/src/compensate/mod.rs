@@ -21,6 +21,7 @@ use metalith_optics::{CalibratedModel, NotApplied};
 use metalith_pillars::PillarId;
 
 pub use cases::{CompensationCase, compensation_cases};
+pub use line::check_equal_copies;
 pub use page::write_compensation_report;
 
 /// Passes over the layout: the second sees the density of what the first has drawn.
