@@ -62,7 +62,7 @@ impl Selection<'_> {
         };
         while self.step(&mut course, progress)? {}
         self.drop_redundant(&mut course);
-        let mut intervals = self.intervals(&course.now);
+        let mut intervals = self.intervals(&course.now, true);
         self.add_values_of_groups(&mut course, &mut intervals);
         Ok(self.finding(course, intervals))
     }
@@ -75,20 +75,21 @@ impl Selection<'_> {
             .collect();
         progress.begin(&format!("effects, step {}", course.chosen.len() + 1), open.len() as u64);
         let before = course.ladder[course.ladder.len() - 1].clone();
-        let mut best: Option<(State, RefitTried)> = None;
+        let mut good: Vec<(State, RefitTried)> = Vec::new();
         for &effect in &open {
             progress.check_stopped()?;
             progress.note(&effects[effect].name);
             let state = self.fit(self.with(&course.now, effect), TRIAL_STEPS);
             let tried = self.try_last(effect, &state, &before);
             progress.advance(1);
-            if tried.rejected.is_none() && best.as_ref().is_none_or(|(_, most)| tried.gain.value > most.gain.value) {
-                best = Some((state, tried.clone()));
+            if tried.rejected.is_none() {
+                good.push((state, tried.clone()));
             }
             course.last[effect] = Some(tried);
         }
-        if course.chosen.is_empty() || best.is_none() && self.model.tries_pairs() {
-            let least = best.as_ref().map_or(0.0, |(_, tried)| tried.gain.value);
+        good.sort_by(|(_, a), (_, b)| b.gain.value.total_cmp(&a.gain.value));
+        if course.chosen.is_empty() || good.is_empty() && self.model.tries_pairs() {
+            let least = good.first().map_or(0.0, |(_, tried)| tried.gain.value);
             if let Some((pair, state)) = self.pair(&course.now, &open, &before, least, progress)? {
                 let first = self.fit(self.with(&course.now, pair[0]), TAKEN_STEPS);
                 let both = self.fit(state, TAKEN_STEPS);
@@ -105,19 +106,23 @@ impl Selection<'_> {
                 return Ok(true);
             }
         }
-        let Some((state, tried)) = best else {
-            return Ok(false);
-        };
-        course.now = self.fit(state, TAKEN_STEPS);
-        let errors = self.errors(&course.now);
-        course.chosen.push(tried.effect);
-        course.last[tried.effect] = Some(RefitTried {
-            errors: errors.clone(),
-            values: self.values(tried.effect, &course.now.theta),
-            ..tried
-        });
-        course.ladder.push(errors);
-        Ok(true)
+        for (state, tried) in good {
+            // A fit that goes on may predict worse than one that ended early.
+            let state = self.fit(state, TAKEN_STEPS);
+            let tried = self.try_last(tried.effect, &state, &before);
+            let is_taken = tried.rejected.is_none();
+            if is_taken {
+                course.now = state;
+                course.chosen.push(tried.effect);
+                course.ladder.push(tried.errors.clone());
+            }
+            let effect = tried.effect;
+            course.last[effect] = Some(tried);
+            if is_taken {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// The two effects that predict most together what was left out, with their fit; none that gain less than `least` by so much
@@ -179,7 +184,7 @@ impl Selection<'_> {
 
     /// Place of an effect that others made needless: the intervals of its values include no effect, and none changes it.
     fn redundant(&self, now: &State, chosen: &[usize]) -> Option<usize> {
-        let (effects, intervals) = (self.model.effects(), self.intervals(now));
+        let (effects, intervals) = (self.model.effects(), self.intervals(now, true));
         chosen.iter().position(|&e| {
             let is_base = chosen.iter().any(|&other| effects[other].after.contains(&e));
             !is_base
@@ -262,7 +267,7 @@ impl Selection<'_> {
     fn judge(&self, state: &State) -> Judged {
         Judged {
             errors: self.errors(state),
-            intervals: self.intervals(state),
+            intervals: self.intervals(state, false),
         }
     }
 

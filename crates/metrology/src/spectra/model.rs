@@ -28,8 +28,11 @@ const STRAY: usize = 3;
 const WAVELENGTH: usize = 4;
 const RESOLUTION: usize = 5;
 const HEIGHT: usize = 6;
-/// First of three parameters of each layer that is not the object: thickness, scale of the index, offset of the index.
-const LAYERS: usize = 7;
+const APODISATION: usize = 7;
+/// First of the parameters of each layer that is not the object: thickness, scale and offset of the index, offset of the extinction.
+const LAYERS: usize = 8;
+/// Parameters of a layer.
+const OF_A_LAYER: usize = 4;
 
 /// Parameters of what acts after the stack of smooth films.
 const AFTER_THE_STACK: [usize; 4] = [ROUGHNESS, REFERENCE, STRAY, RESOLUTION];
@@ -96,6 +99,7 @@ impl<'a> SpectrumModel<'a> {
             f64::sqrt,
         );
         add("height_offset".into(), "nm", (0.0, 0.0), (-1e3, 1e3), 1e-2, |v| v);
+        add("pupil_apodisation".into(), "", (0.0, 0.0), (-3.0, 6.0), 1e-3, |v| v);
         let mut effects: Vec<RefitEffect> = Vec::new();
         let names = [
             "numerical_aperture",
@@ -105,6 +109,7 @@ impl<'a> SpectrumModel<'a> {
             "wavelength_scale",
             "resolution",
             "height_offset",
+            "pupil_apodisation",
         ];
         let effect = |name: &str, slot: usize| RefitEffect {
             name: name.into(),
@@ -113,15 +118,19 @@ impl<'a> SpectrumModel<'a> {
             across: None,
         };
         effects.extend(names.iter().enumerate().map(|(slot, name)| effect(name, slot)));
+        if stated == 0.0 {
+            effects[APODISATION].after = vec![APERTURE];
+        }
         for (k, layer) in set.layers.iter().enumerate() {
             let name = &layer.name;
             let own = [
                 (format!("{name}_thickness"), "nm", 1e4, 1e-2),
                 (format!("{name}_index_scale"), "", 0.5, 1e-5),
                 (format!("{name}_index_offset"), "", 1.0, 1e-5),
+                (format!("{name}_extinction_offset"), "", 1.0, 1e-5),
             ];
             for (place, (name, unit, most, step)) in own.into_iter().enumerate() {
-                let slot = LAYERS + 3 * k + place;
+                let slot = LAYERS + OF_A_LAYER * k + place;
                 if let Some(thickness) = layer.thickness_nm {
                     effects.push(effect(&name, slot));
                     let low = if place == 0 { -thickness } else { -most };
@@ -187,6 +196,7 @@ impl<'a> SpectrumModel<'a> {
         let height_nm = (own.height_nm + theta[HEIGHT]).max(0.0);
         let scale = 1.0 + theta[WAVELENGTH];
         let aperture2 = theta[APERTURE].powi(2);
+        let cone = cone(theta[APODISATION]);
         let values = self.set.wavelengths_nm.iter().map(|nm| {
             let nm = nm * scale;
             let index = |m: &Material| m.index(nm * 1e-3).unwrap_or(Complex64::from(1.0));
@@ -197,8 +207,10 @@ impl<'a> SpectrumModel<'a> {
                 .enumerate()
                 .map(|(k, layer)| match (&layer.material, layer.thickness_nm) {
                     (Some(material), Some(thickness)) => {
-                        let [thicker, scaled, more] = [0, 1, 2].map(|p| theta[LAYERS + 3 * k + p]);
-                        (index(material) * (1.0 + scaled) + more, thickness + thicker)
+                        let [thicker, scaled, more, lossy] = [0, 1, 2, 3].map(|p| theta[LAYERS + OF_A_LAYER * k + p]);
+                        let stated = index(material);
+                        let n = Complex64::new(stated.re * (1.0 + scaled) + more, (stated.im + lossy).max(0.0));
+                        (n, thickness + thicker)
                     }
                     _ => (index(medium), height_nm),
                 })
@@ -206,8 +218,7 @@ impl<'a> SpectrumModel<'a> {
             let substrate = self.set.substrate.as_ref().map_or(Complex64::from(1.5), index);
             let at = |sine2: f64| reflectance(self.set.ambient_index, &films, substrate, nm, sine2);
             if aperture2 > 0.0 {
-                let nodes = NODES.iter();
-                nodes.map(|[x, w]| 0.5 * w * at(0.5 * (x + 1.0) * aperture2)).sum()
+                cone.iter().map(|(part, weight)| weight * at(part * aperture2)).sum()
             } else {
                 at(0.0)
             }
@@ -249,6 +260,14 @@ impl<'a> SpectrumModel<'a> {
             })
             .collect()
     }
+}
+
+/// Squared sines over the cone, as shares of that of its border, with their weights: light falls by exp(-apodisation) from the axis
+/// of the pupil to its border.
+fn cone(apodisation: f64) -> [(f64, f64); 6] {
+    let nodes = NODES.map(|[x, w]| (0.5 * (x + 1.0), w * (-0.5 * apodisation * (x + 1.0)).exp()));
+    let sum: f64 = nodes.iter().map(|(_, w)| w).sum();
+    nodes.map(|(part, w)| (part, w / sum))
 }
 
 impl RefitModel for SpectrumModel<'_> {
