@@ -7,20 +7,25 @@
 //! | folder or file | holds | may use |
 //! | --- | --- | --- |
 //! | `pattern` | names of files by patterns | |
-//! | `heights` | drawn maps and measured maps: set, model, figures | `pattern` |
-//! | `spectra` | reflectance of film stacks: set, model, figures | `pattern` |
+//! | `declared` | effects of a file, by expressions | |
+//! | `heights` | drawn maps and measured maps: set, model, figures | `pattern`, `declared` |
+//! | `spectra` | reflectance of film stacks: set, model, figures | `pattern`, `declared` |
+//! | `proposal` | patterns of what no effect explains | `declared`, `heights`, `spectra` |
 //! | `diagnosis`, `page` | the answer for programs and for people | |
 //! | `run` | a set from its files to its answer | all above |
 
+mod declared;
 mod diagnosis;
 mod heights;
 mod page;
 mod pattern;
+mod proposal;
 mod run;
 mod spectra;
 
 pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, Ranked, SetVerdict};
 pub use heights::{HeightField, HeightModel, HeightSet};
 pub use pattern::NamePattern;
+pub use proposal::Proposal;
 pub use run::{Answer, SetKind, calibrate, kind_of};
 pub use spectra::{Spectrum, SpectrumModel, SpectrumSet, StatedLayer};

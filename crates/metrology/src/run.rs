@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_attribution::{RefitEffect, RefitModel, RefitPlan, select};
+use metalith_attribution::{RefitEffect, RefitPlan, select};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result};
 
-use crate::diagnosis::{Diagnosis, SetFacts};
+use crate::declared::{DeclaredEffect, OF_HEIGHTS, OF_SPECTRA};
+use crate::diagnosis::{Diagnosis, SetFacts, SetVerdict};
 use crate::heights::{self, HeightModel, HeightSet};
 use crate::page::page;
+use crate::proposal::{Declares, propose};
 use crate::spectra::{self, SpectrumModel, SpectrumSet};
 
 /// Kind of a measured set.
@@ -60,17 +62,25 @@ pub(crate) fn folder_of(path: &Path, root: &Section<'_, '_>) -> PathBuf {
 }
 
 /// Read a set, find the effects that its model lacks, and write the answer to a folder. Only some effects are tried if these
-/// are named.
+/// are named; those of a file are tried too.
 ///
 /// # Errors
 /// Every mistake of a set at once, and unknown names of effects; else if a file cannot be written, or the user stopped it.
-pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progress: &dyn Progress) -> Result<Answer> {
+pub fn calibrate(
+    set: &Path,
+    kind: SetKind,
+    out: &Path,
+    (only, declared): (&[String], Option<&Path>),
+    progress: &dyn Progress,
+) -> Result<Answer> {
+    let declared_for = |stages| declared.map_or(Ok(Vec::new()), |file| DeclaredEffect::read(file, stages));
     let path = file_of(set);
     progress.begin("files", 0);
     match kind {
         SetKind::Heights => {
             let set = HeightSet::read(&path)?;
             let mut model = HeightModel::new(&set);
+            model.declare(&declared_for(&OF_HEIGHTS)?)?;
             model.effects = tried(&model.effects, only)?;
             let facts = SetFacts {
                 title: &set.title,
@@ -80,24 +90,29 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 noise_floor: None,
             };
             let plan = model.plan();
-            answer(&model, &plan, &facts, ("nm", out), progress, |page, theta| {
-                heights::figures(page, &set, &model, theta);
+            answer(model, &plan, &facts, ("nm", out), progress, |model, page, theta| {
+                heights::figures(page, &set, model, theta);
             })
         }
         SetKind::Spectra => {
             let set = SpectrumSet::read(&path)?;
             let mut model = SpectrumModel::new(&set);
+            model.declare(&declared_for(&OF_SPECTRA)?)?;
             model.effects = tried(&model.effects, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "spectra",
-                measure: "reflectance (rms)",
+                measure: if set.is_transmission {
+                    "transmission (rms)"
+                } else {
+                    "reflectance (rms)"
+                },
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
                 noise_floor: set.repeat_rms(),
             };
             let plan = model.plan();
-            answer(&model, &plan, &facts, ("", out), progress, |page, theta| {
-                spectra::figures(page, &set, &model, theta);
+            answer(model, &plan, &facts, ("", out), progress, |model, page, theta| {
+                spectra::figures(page, &set, model, theta);
             })
         }
     }
@@ -127,26 +142,35 @@ fn tried(all: &[RefitEffect], only: &[String]) -> Result<Vec<RefitEffect>> {
     Ok(effects.collect())
 }
 
-fn answer(
-    model: &dyn RefitModel,
+fn answer<M: Declares>(
+    mut model: M,
     plan: &RefitPlan,
     facts: &SetFacts<'_>,
     (unit, out): (&str, &Path),
     progress: &dyn Progress,
-    figures: impl FnOnce(&mut metalith_report::Page, &[f64]),
+    figures: impl FnOnce(&M, &mut metalith_report::Page, &[f64]),
 ) -> Result<Answer> {
-    let found = select(model, plan, progress)?;
-    let diagnosis = Diagnosis::new(facts, model, plan, &found);
+    let found = select(&model, plan, progress)?;
+    let mut diagnosis = Diagnosis::new(facts, &model, plan, &found);
     let _turn = FolderLock::wait(out, progress, || {
         progress.warn("another run writes into this folder: waiting for it");
     })?;
-    let (answer, report) = (out.join("diagnosis.json"), out.join("report.html"));
-    for earlier in ["model.toml", "proposal.toml"] {
-        AtomicFile::discard(&out.join(earlier))?;
+    let [answer, report, proposal] = ["diagnosis.json", "report.html", "proposal.toml"].map(|name| out.join(name));
+    for earlier in [&out.join("model.toml"), &proposal] {
+        AtomicFile::discard(earlier)?;
+    }
+    let mut theta = found.theta.clone();
+    if matches!(diagnosis.verdict, SetVerdict::Partly | SetVerdict::Unexplained) {
+        let (proposals, text) = propose(&mut model, plan, &found, progress)?;
+        if !proposals.is_empty() {
+            AtomicFile::write(&proposal, text.as_bytes())?;
+        }
+        diagnosis.proposals = proposals;
+        theta.extend(model.parameters().iter().skip(theta.len()).map(|p| p.neutral));
     }
     metalith_report::write_plain_json(&answer, &diagnosis)?;
     let mut page = page(&diagnosis, unit);
-    figures(&mut page, &found.theta);
+    figures(&model, &mut page, &theta);
     page.write(&report)?;
     Ok(Answer {
         diagnosis,

@@ -25,7 +25,9 @@ fn diagnosis(name: &str, kind: SetKind) -> Option<Diagnosis> {
     let set = out.path().join("measurement.toml");
     std::fs::write(&set, text.replace("schema = 1", &schema)).unwrap();
     assert_eq!(kind_of(&set), Some(kind));
-    let answer = calibrate(&set, kind, out.path(), &[], &Silent).unwrap().diagnosis;
+    let answer = calibrate(&set, kind, out.path(), (&[], None), &Silent)
+        .unwrap()
+        .diagnosis;
     println!("{}", answer.sentence());
     for step in &answer.ladder {
         println!(

@@ -120,6 +120,38 @@ impl Selection<'_> {
         }
     }
 
+    /// Value of each active parameter in each group of the first way alone, with all else as it was found.
+    pub(super) fn values_by_group(&self, now: &State) -> Vec<(usize, Vec<(usize, f64)>)> {
+        let Some(way) = self.plan.ways.first() else {
+            return Vec::new();
+        };
+        let last = now.active.len();
+        let of_slot = |(k, &slot): (usize, &usize)| {
+            let (low, high) = self.model.parameters()[slot].range;
+            let own = self.groups(way).into_iter().filter_map(|group| {
+                let members = (0..now.equations.len()).filter(|&m| self.plan.fitted[m] && way.groups[m] == group);
+                let sums = members.map(|m| [now.equations[m].fit[(k, k)], now.equations[m].fit[(k, last)]]);
+                let [information, slope] = sums.fold([0.0, 0.0], |[a, b], [x, y]| [a + x, b + y]);
+                let value = (now.theta[slot] + slope / information).clamp(low, high);
+                (information > UNINFORMED * now.total[(k, k)]).then_some((group, value))
+            });
+            (slot, own.collect())
+        };
+        now.active.iter().enumerate().map(of_slot).collect()
+    }
+
+    /// Group of a way that an effect predicts worse than before, and most so; none if it predicts none worse.
+    pub(super) fn worse_group(&self, way: usize, before: &RefitErrors, after: &RefitErrors) -> Option<String> {
+        let groups = &self.plan.ways[way].groups;
+        let change = |&group: &usize| -> f64 {
+            let own = (0..groups.len()).filter(|&m| groups[m] == group);
+            own.filter_map(|m| Some(after.own[way][m]? - before.own[way][m]?)).sum()
+        };
+        let fitted = self.groups(&self.plan.ways[way]);
+        let worst = fitted.into_iter().max_by(|a, b| change(a).total_cmp(&change(b)))?;
+        (change(&worst) > 0.0).then(|| self.model.group_name(way, worst))
+    }
+
     /// 95 % intervals by leaving out each group in turn (jackknife): the widest of all ways that tell of a parameter. Groups, if
     /// there are few, are left out of a fit in full if so asked, and otherwise of the linear model.
     pub(super) fn intervals(&self, now: &State, in_full: bool) -> Vec<Option<[f64; 2]>> {

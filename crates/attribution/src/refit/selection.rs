@@ -63,8 +63,12 @@ impl Selection<'_> {
         while self.step(&mut course, progress)? {}
         self.drop_redundant(&mut course);
         let mut intervals = self.intervals(&course.now, true);
+        let by_group = self.values_by_group(&course.now);
         self.add_values_of_groups(&mut course, &mut intervals);
-        Ok(self.finding(course, intervals))
+        Ok(RefitFinding {
+            by_group,
+            ..self.finding(course, intervals)
+        })
     }
 
     /// Take the effect, or the two, that predict most of what was left out; false if none is taken.
@@ -233,6 +237,36 @@ impl Selection<'_> {
         (tried, after.theta, intervals)
     }
 
+    /// Effects as each explains what a selection leaves.
+    ///
+    /// # Errors
+    /// If the user stopped it.
+    pub(super) fn beside(
+        &self,
+        found: &RefitFinding,
+        effects: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<Vec<RefitTried>> {
+        let (all, mut theta) = (self.model.effects(), found.theta.clone());
+        theta.extend(self.model.parameters().iter().skip(theta.len()).map(|p| p.neutral));
+        let of_bench = found.chosen.iter().filter(|e| all[**e].across.is_none());
+        let active = of_bench.flat_map(|&e| all[e].slots.clone()).collect();
+        let now = self.at(active, theta);
+        let before = self.errors(&now);
+        progress.begin("patterns of the residual", effects.len() as u64);
+        let try_one = |&effect: &usize| {
+            progress.check_stopped()?;
+            progress.advance(1);
+            Ok(if all[effect].across.is_some() {
+                self.by_group(effect, &now).0
+            } else {
+                let state = self.fit(self.with(&now, effect), TRIAL_STEPS);
+                self.try_last(effect, &state, &before)
+            })
+        };
+        effects.iter().map(try_one).collect()
+    }
+
     fn finding(&self, course: Course, intervals: Vec<Option<[f64; 2]>>) -> RefitFinding {
         let effects = self.model.effects();
         let Course {
@@ -261,6 +295,7 @@ impl Selection<'_> {
             ladder,
             theta: now.theta,
             intervals,
+            by_group: Vec::new(),
         }
     }
 
@@ -311,15 +346,21 @@ impl Selection<'_> {
         if score.is_nan() || score < LEAST_SHARE {
             Some(RefitRejection::Little(score))
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.value < 0.0) {
+            let worst = self
+                .worse_group(*w, before, errors)
+                .map(|group| format!(", most for {group}"));
             Some(RefitRejection::Worse {
-                what: format!("rms where each {} is left out", way(*w)),
+                what: format!("rms where each {} is left out{}", way(*w), worst.unwrap_or_default()),
                 before: before.held_out[*w].unwrap_or(0.0),
                 after: errors.held_out[*w].unwrap_or(0.0),
             })
         } else if let Some(worse) = self.worse(before, errors) {
             Some(worse)
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.interval[0] <= 0.0) {
-            Some(RefitRejection::Unsure(way(*w).clone()))
+            Some(RefitRejection::Unsure {
+                way: way(*w).clone(),
+                worse: self.worse_group(*w, before, errors),
+            })
         } else if slots.iter().any(at_end) {
             Some(RefitRejection::Unphysical)
         } else if slots.iter().all(|&slot| self.includes_neutral(slot, intervals)) {

@@ -5,8 +5,9 @@ use metalith_rcwa::Material;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::film_reflectance::{Film, reflectance};
+use super::film_reflectance::{Film, film_powers};
 use super::set::{SCALED_BY, SpectrumSet};
+use crate::declared::{DeclaredEffect, DeclaredSlots, Stage};
 
 /// Gauss-Legendre nodes on (-1, 1) with their weights: the squared sine over the cone. Six nodes are exact to 1e-4 at 0.95.
 const NODES: [[f64; 2]; 6] = [
@@ -46,6 +47,7 @@ pub struct SpectrumModel<'a> {
     steps: Vec<f64>,
     /// Mean of the repeats that each spectrum is one of.
     means: Vec<Vec<f64>>,
+    declared: DeclaredSlots,
 }
 
 impl<'a> SpectrumModel<'a> {
@@ -119,7 +121,12 @@ impl<'a> SpectrumModel<'a> {
         };
         effects.extend(names.iter().enumerate().map(|(slot, name)| effect(name, slot)));
         if stated == 0.0 {
-            effects[APODISATION].after = vec![APERTURE];
+            // The first of the effects is the numerical aperture.
+            effects[APODISATION].after = vec![0];
+        }
+        if set.is_transmission {
+            // The law of scattering is of reflected light.
+            effects.retain(|e| e.name != "roughness");
         }
         for (k, layer) in set.layers.iter().enumerate() {
             let name = &layer.name;
@@ -153,23 +160,55 @@ impl<'a> SpectrumModel<'a> {
             effects,
             steps,
             means,
+            declared: DeclaredSlots::default(),
         }
+    }
+
+    /// Add effects of a file.
+    pub(crate) fn declare(&mut self, effects: &[DeclaredEffect]) -> metalith_core::Result<()> {
+        let groups = self.heights().len();
+        self.declared
+            .add(effects, groups, (&mut self.parameters, &mut self.effects))?;
+        let new = self.steps.len()..self.parameters.len();
+        self.steps
+            .extend(new.map(|slot| self.declared.step(slot).unwrap_or(1e-3)));
+        Ok(())
+    }
+
+    /// Heights of the object, rising.
+    fn heights(&self) -> Vec<f64> {
+        let mut heights: Vec<f64> = self.set.spectra.iter().map(|s| s.height_nm).collect();
+        heights.sort_by(f64::total_cmp);
+        heights.dedup();
+        heights
+    }
+
+    /// True if the object has more than one medium.
+    fn has_media(&self) -> bool {
+        let spectra = &self.set.spectra;
+        spectra.iter().any(|s| s.medium != spectra[0].medium)
+    }
+
+    /// Number of the height of a spectrum.
+    fn group(&self, spectrum: usize) -> usize {
+        let own = self.set.spectra[spectrum].height_nm;
+        self.heights().iter().position(|h| *h == own).unwrap_or(0)
+    }
+
+    /// First and last wavelength (nm).
+    pub(crate) fn range_nm(&self) -> [f64; 2] {
+        [0, self.set.wavelengths_nm.len() - 1].map(|k| self.set.wavelengths_nm[k])
     }
 
     /// Roles of the spectra: heights, media and single spectra are left out in turn.
     pub fn plan(&self) -> RefitPlan {
         let spectra = &self.set.spectra;
-        let mut heights: Vec<f64> = spectra.iter().map(|s| s.height_nm).collect();
-        heights.sort_by(f64::total_cmp);
-        heights.dedup();
-        let place = |h: f64| heights.iter().position(|own| *own == h).unwrap_or(0);
         let way = |name: &str, groups: Vec<usize>| LeaveOut {
             name: name.into(),
             groups,
         };
-        let mut ways = vec![way("height", spectra.iter().map(|s| place(s.height_nm)).collect())];
-        let fitted_media: Vec<usize> = spectra.iter().filter(|s| s.fitted).map(|s| s.medium).collect();
-        if fitted_media.iter().any(|m| *m != fitted_media[0]) {
+        let mut ways = vec![way("height", (0..spectra.len()).map(|s| self.group(s)).collect())];
+        if self.has_media() {
             ways.push(way("medium", spectra.iter().map(|s| s.medium).collect()));
         }
         ways.push(way("spectrum", (0..spectra.len()).collect()));
@@ -186,7 +225,7 @@ impl<'a> SpectrumModel<'a> {
 
     /// Reflectance that the instrument shows of a spectrum, at each wavelength of the set.
     pub fn predicted(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
-        self.shown(&self.smooth_stack(spectrum, theta), theta)
+        self.shown(spectrum, &self.smooth_stack(spectrum, theta), theta)
     }
 
     /// Reflectance of the stack with smooth films over the cone of the objective, at each wavelength of the set.
@@ -197,8 +236,17 @@ impl<'a> SpectrumModel<'a> {
         let scale = 1.0 + theta[WAVELENGTH];
         let aperture2 = theta[APERTURE].powi(2);
         let cone = cone(theta[APODISATION]);
+        let [from, to] = self.range_nm();
+        let ends = [from * (1.0 - SCALED_BY), to * (1.0 + SCALED_BY)];
+        let (group, is_moved) = (self.group(spectrum), self.declared.acts(Stage::Wavelength, theta));
+        let moved = |nm: f64| match is_moved {
+            true => self
+                .declared
+                .value(Stage::Wavelength, group, &[nm, own.height_nm], theta),
+            false => 0.0,
+        };
         let values = self.set.wavelengths_nm.iter().map(|nm| {
-            let nm = nm * scale;
+            let nm = (nm * scale + moved(*nm)).clamp(ends[0], ends[1]);
             let index = |m: &Material| m.index(nm * 1e-3).unwrap_or(Complex64::from(1.0));
             let films: Vec<Film> = self
                 .set
@@ -216,7 +264,8 @@ impl<'a> SpectrumModel<'a> {
                 })
                 .collect();
             let substrate = self.set.substrate.as_ref().map_or(Complex64::from(1.5), index);
-            let at = |sine2: f64| reflectance(self.set.ambient_index, &films, substrate, nm, sine2);
+            let power = usize::from(self.set.is_transmission);
+            let at = |sine2: f64| film_powers(self.set.ambient_index, &films, substrate, nm, sine2)[power];
             if aperture2 > 0.0 {
                 cone.iter().map(|(part, weight)| weight * at(part * aperture2)).sum()
             } else {
@@ -227,7 +276,7 @@ impl<'a> SpectrumModel<'a> {
     }
 
     /// What rough films and the instrument make of the reflectance of smooth ones.
-    fn shown(&self, smooth: &[f64], theta: &[f64]) -> Vec<f64> {
+    fn shown(&self, spectrum: usize, smooth: &[f64], theta: &[f64]) -> Vec<f64> {
         let scale = 1.0 + theta[WAVELENGTH];
         let scattered = |nm: f64| (-(4.0 * std::f64::consts::PI / (nm * scale)).powi(2) * theta[ROUGHNESS]).exp();
         let mut values: Vec<f64> = smooth
@@ -240,6 +289,16 @@ impl<'a> SpectrumModel<'a> {
         }
         let gain = 1.0 + theta[REFERENCE];
         values.iter_mut().for_each(|v| *v = *v * gain + theta[STRAY]);
+        let (group, height_nm) = (self.group(spectrum), self.set.spectra[spectrum].height_nm);
+        if [Stage::Factor, Stage::Added]
+            .iter()
+            .any(|stage| self.declared.acts(*stage, theta))
+        {
+            for (v, nm) in values.iter_mut().zip(&self.set.wavelengths_nm) {
+                let of = |stage| self.declared.value(stage, group, &[*nm, height_nm], theta);
+                *v = *v * (1.0 + of(Stage::Factor)) + of(Stage::Added);
+            }
+        }
         values
     }
 
@@ -289,7 +348,7 @@ impl RefitModel for SpectrumModel<'_> {
 
     fn equations(&self, spectrum: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
         let smooth = self.smooth_stack(spectrum, theta);
-        let base = self.shown(&smooth, theta);
+        let base = self.shown(spectrum, &smooth, theta);
         let measured = &self.set.spectra[spectrum].reflectance;
         let mut columns: Vec<Vec<f64>> = Vec::with_capacity(active.len() + 1);
         for &slot in active {
@@ -303,7 +362,7 @@ impl RefitModel for SpectrumModel<'_> {
             };
             moved[slot] += step;
             let changed = if AFTER_THE_STACK.contains(&slot) {
-                self.shown(&smooth, &moved)
+                self.shown(spectrum, &smooth, &moved)
             } else {
                 self.predicted(spectrum, &moved)
             };
@@ -315,7 +374,10 @@ impl RefitModel for SpectrumModel<'_> {
     }
 
     fn figure_names(&self) -> Vec<(&'static str, &'static str)> {
-        vec![("reflectance, mean of repeats", "rms"), ("reflectance", "rms")]
+        match self.set.is_transmission {
+            true => vec![("transmission, mean of repeats", "rms"), ("transmission", "rms")],
+            false => vec![("reflectance, mean of repeats", "rms"), ("reflectance", "rms")],
+        }
     }
 
     fn figures(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
@@ -325,6 +387,14 @@ impl RefitModel for SpectrumModel<'_> {
             (squares / base.len() as f64).sqrt()
         };
         vec![rms(self.mean(spectrum)), rms(&self.set.spectra[spectrum].reflectance)]
+    }
+
+    fn group_name(&self, way: usize, group: usize) -> String {
+        match way {
+            0 => self.heights()[group].to_string(),
+            1 if self.has_media() => self.set.media[group].0.clone(),
+            _ => self.set.spectra[group].name.clone(),
+        }
     }
 
     /// A film that is thicker hides the cone of the objective, and the cone hides the film.
