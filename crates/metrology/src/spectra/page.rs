@@ -47,7 +47,9 @@ pub(crate) fn figures(page: &mut Page, set: &SpectrumSet, model: &SpectrumModel<
             along(mean.iter().zip(&predicted).map(|(m, p)| m - p).collect()),
         );
         let role = if spectrum.fitted { "Fitted" } else { "Not fitted" };
-        page.figure(spectra.caption(format!("{role}.")));
-        page.figure(residual.caption("Residual of the mean of the repeats."));
+        page.row([
+            spectra.caption(format!("{role}.")),
+            residual.caption("Residual of the mean of the repeats."),
+        ]);
     }
 }
