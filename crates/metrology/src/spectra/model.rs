@@ -1,12 +1,15 @@
 //! Forward model of spectra: a film stack over the cone of an objective, and what the instrument makes of it.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use metalith_attribution::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
 use metalith_rcwa::Material;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::film_reflectance::{Film, film_powers};
-use super::set::{SCALED_BY, SpectrumSet};
+use super::set::{SCALED_BY, Spectrum, SpectrumSet};
 use crate::declared::{DeclaredEffect, DeclaredSlots, Stage};
 
 /// Gauss-Legendre nodes on (-1, 1) with their weights: the squared sine over the cone. Six nodes are exact to 1e-4 at 0.95.
@@ -38,6 +41,9 @@ const OF_A_LAYER: usize = 4;
 /// Parameters of what acts after the stack of smooth films.
 const AFTER_THE_STACK: [usize; 4] = [ROUGHNESS, REFERENCE, STRAY, RESOLUTION];
 
+/// Most spectra of smooth films that are held.
+const MOST_HELD: usize = 1024;
+
 /// A set of spectra with its forward model.
 pub struct SpectrumModel<'a> {
     set: &'a SpectrumSet,
@@ -48,6 +54,12 @@ pub struct SpectrumModel<'a> {
     /// Mean of the repeats that each spectrum is one of.
     means: Vec<Vec<f64>>,
     declared: DeclaredSlots,
+    /// First spectrum of the object and medium of each spectrum.
+    first: Vec<usize>,
+    /// Number of the height of each spectrum.
+    groups: Vec<usize>,
+    /// Reflectances of smooth films by first spectrum and values: repeats, and derivatives at one place, share them.
+    smooth: Mutex<HashMap<(usize, Vec<u64>), Arc<Vec<f64>>>>,
 }
 
 impl<'a> SpectrumModel<'a> {
@@ -148,12 +160,19 @@ impl<'a> SpectrumModel<'a> {
             }
         }
         let mut means = vec![Vec::new(); set.spectra.len()];
+        let mut first = vec![0; set.spectra.len()];
         for own in set.repeats() {
             let mean: Vec<f64> = (0..set.wavelengths_nm.len())
                 .map(|k| own.iter().map(|&s| set.spectra[s].reflectance[k]).sum::<f64>() / own.len() as f64)
                 .collect();
-            own.iter().for_each(|&s| means[s].clone_from(&mean));
+            own.iter().for_each(|&s| {
+                means[s].clone_from(&mean);
+                first[s] = own[0];
+            });
         }
+        let heights = heights(set);
+        let group = |s: &Spectrum| heights.iter().position(|h| *h == s.height_nm).unwrap_or(0);
+        let groups = set.spectra.iter().map(group).collect();
         Self {
             set,
             parameters,
@@ -161,12 +180,15 @@ impl<'a> SpectrumModel<'a> {
             steps,
             means,
             declared: DeclaredSlots::default(),
+            first,
+            groups,
+            smooth: Mutex::default(),
         }
     }
 
     /// Add effects of a file.
     pub(crate) fn declare(&mut self, effects: &[DeclaredEffect]) -> metalith_core::Result<()> {
-        let groups = self.heights().len();
+        let groups = heights(self.set).len();
         self.declared
             .add(effects, groups, (&mut self.parameters, &mut self.effects))?;
         let new = self.steps.len()..self.parameters.len();
@@ -175,24 +197,10 @@ impl<'a> SpectrumModel<'a> {
         Ok(())
     }
 
-    /// Heights of the object, rising.
-    fn heights(&self) -> Vec<f64> {
-        let mut heights: Vec<f64> = self.set.spectra.iter().map(|s| s.height_nm).collect();
-        heights.sort_by(f64::total_cmp);
-        heights.dedup();
-        heights
-    }
-
     /// True if the object has more than one medium.
     fn has_media(&self) -> bool {
         let spectra = &self.set.spectra;
         spectra.iter().any(|s| s.medium != spectra[0].medium)
-    }
-
-    /// Number of the height of a spectrum.
-    fn group(&self, spectrum: usize) -> usize {
-        let own = self.set.spectra[spectrum].height_nm;
-        self.heights().iter().position(|h| *h == own).unwrap_or(0)
     }
 
     /// First and last wavelength (nm).
@@ -207,7 +215,7 @@ impl<'a> SpectrumModel<'a> {
             name: name.into(),
             groups,
         };
-        let mut ways = vec![way("height", (0..spectra.len()).map(|s| self.group(s)).collect())];
+        let mut ways = vec![way("height", self.groups.clone())];
         if self.has_media() {
             ways.push(way("medium", spectra.iter().map(|s| s.medium).collect()));
         }
@@ -229,7 +237,30 @@ impl<'a> SpectrumModel<'a> {
     }
 
     /// Reflectance of the stack with smooth films over the cone of the objective, at each wavelength of the set.
-    fn smooth_stack(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
+    fn smooth_stack(&self, spectrum: usize, theta: &[f64]) -> Arc<Vec<f64>> {
+        let bits = theta.iter().enumerate();
+        let bits = bits.map(|(slot, v)| {
+            if AFTER_THE_STACK.contains(&slot) {
+                0
+            } else {
+                v.to_bits()
+            }
+        });
+        let key = (self.first[spectrum], bits.collect());
+        let held = || self.smooth.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = held().get(&key) {
+            return Arc::clone(known);
+        }
+        let found = Arc::new(self.stack(spectrum, theta));
+        let mut held = held();
+        if held.len() >= MOST_HELD {
+            held.clear();
+        }
+        held.insert(key, Arc::clone(&found));
+        found
+    }
+
+    fn stack(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
         let own = &self.set.spectra[spectrum];
         let medium = &self.set.media[own.medium].1;
         let height_nm = (own.height_nm + theta[HEIGHT]).max(0.0);
@@ -238,7 +269,7 @@ impl<'a> SpectrumModel<'a> {
         let cone = cone(theta[APODISATION]);
         let [from, to] = self.range_nm();
         let ends = [from * (1.0 - SCALED_BY), to * (1.0 + SCALED_BY)];
-        let (group, is_moved) = (self.group(spectrum), self.declared.acts(Stage::Wavelength, theta));
+        let (group, is_moved) = (self.groups[spectrum], self.declared.acts(Stage::Wavelength, theta));
         let moved = |nm: f64| match is_moved {
             true => self
                 .declared
@@ -289,7 +320,7 @@ impl<'a> SpectrumModel<'a> {
         }
         let gain = 1.0 + theta[REFERENCE];
         values.iter_mut().for_each(|v| *v = *v * gain + theta[STRAY]);
-        let (group, height_nm) = (self.group(spectrum), self.set.spectra[spectrum].height_nm);
+        let (group, height_nm) = (self.groups[spectrum], self.set.spectra[spectrum].height_nm);
         if [Stage::Factor, Stage::Added]
             .iter()
             .any(|stage| self.declared.acts(*stage, theta))
@@ -319,6 +350,14 @@ impl<'a> SpectrumModel<'a> {
             })
             .collect()
     }
+}
+
+/// Heights of the object, rising.
+fn heights(set: &SpectrumSet) -> Vec<f64> {
+    let mut heights: Vec<f64> = set.spectra.iter().map(|s| s.height_nm).collect();
+    heights.sort_by(f64::total_cmp);
+    heights.dedup();
+    heights
 }
 
 /// Squared sines over the cone, as shares of that of its border, with their weights: light falls by exp(-apodisation) from the axis
@@ -391,7 +430,7 @@ impl RefitModel for SpectrumModel<'_> {
 
     fn group_name(&self, way: usize, group: usize) -> String {
         match way {
-            0 => self.heights()[group].to_string(),
+            0 => heights(self.set)[group].to_string(),
             1 if self.has_media() => self.set.media[group].0.clone(),
             _ => self.set.spectra[group].name.clone(),
         }
