@@ -31,9 +31,12 @@ impl Selection<'_> {
     pub(super) fn at(&self, active: Vec<usize>, theta: Vec<f64>) -> State {
         let equations: Vec<_> = (0..self.model.count())
             .into_par_iter()
-            .map(|m| match self.plan.fitted[m] {
-                true => self.model.equations(m, &active, &theta),
-                false => RefitEquations::alike(DMatrix::zeros(0, 0)),
+            .map(|m| {
+                if self.plan.fitted[m] {
+                    self.model.equations(m, &active, &theta)
+                } else {
+                    RefitEquations::alike(DMatrix::zeros(0, 0))
+                }
             })
             .collect();
         let size = active.len() + 1;

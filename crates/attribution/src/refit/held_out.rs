@@ -162,9 +162,12 @@ impl Selection<'_> {
             if groups.len() < 3 {
                 continue;
             }
-            let steps = groups.iter().map(|&g| match in_full && groups.len() <= FEW_GROUPS {
-                true => self.refitted_without(now, way, g),
-                false => self.without(now, way, g),
+            let steps = groups.iter().map(|&g| {
+                if in_full && groups.len() <= FEW_GROUPS {
+                    self.refitted_without(now, way, g)
+                } else {
+                    self.without(now, way, g)
+                }
             });
             let steps: Vec<_> = steps.collect();
             for (k, width) in widths.iter_mut().enumerate() {

@@ -41,6 +41,9 @@ const OF_A_LAYER: usize = 4;
 /// Parameters of what acts after the stack of smooth films.
 const AFTER_THE_STACK: [usize; 4] = [ROUGHNESS, REFERENCE, STRAY, RESOLUTION];
 
+/// First spectrum of an object, and bits of the values that act on its stack.
+type StackKey = (usize, Vec<u64>);
+
 /// Most spectra of smooth films that are held.
 const MOST_HELD: usize = 1024;
 
@@ -59,7 +62,7 @@ pub struct SpectrumModel<'a> {
     /// Number of the height of each spectrum.
     groups: Vec<usize>,
     /// Reflectances of smooth films by first spectrum and values: repeats, and derivatives at one place, share them.
-    smooth: Mutex<HashMap<(usize, Vec<u64>), Arc<Vec<f64>>>>,
+    smooth: Mutex<HashMap<StackKey, Arc<Vec<f64>>>>,
 }
 
 impl<'a> SpectrumModel<'a> {
@@ -270,11 +273,13 @@ impl<'a> SpectrumModel<'a> {
         let [from, to] = self.range_nm();
         let ends = [from * (1.0 - SCALED_BY), to * (1.0 + SCALED_BY)];
         let (group, is_moved) = (self.groups[spectrum], self.declared.acts(Stage::Wavelength, theta));
-        let moved = |nm: f64| match is_moved {
-            true => self
-                .declared
-                .value(Stage::Wavelength, group, &[nm, own.height_nm], theta),
-            false => 0.0,
+        let moved = |nm: f64| {
+            if is_moved {
+                self.declared
+                    .value(Stage::Wavelength, group, &[nm, own.height_nm], theta)
+            } else {
+                0.0
+            }
         };
         let values = self.set.wavelengths_nm.iter().map(|nm| {
             let nm = (nm * scale + moved(*nm)).clamp(ends[0], ends[1]);
@@ -413,9 +418,10 @@ impl RefitModel for SpectrumModel<'_> {
     }
 
     fn figure_names(&self) -> Vec<(&'static str, &'static str)> {
-        match self.set.is_transmission {
-            true => vec![("transmission, mean of repeats", "rms"), ("transmission", "rms")],
-            false => vec![("reflectance, mean of repeats", "rms"), ("reflectance", "rms")],
+        if self.set.is_transmission {
+            vec![("transmission, mean of repeats", "rms"), ("transmission", "rms")]
+        } else {
+            vec![("reflectance, mean of repeats", "rms"), ("reflectance", "rms")]
         }
     }
 
