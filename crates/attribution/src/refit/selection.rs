@@ -61,8 +61,7 @@ impl Selection<'_> {
             last: vec![None; self.model.effects().len()],
         };
         while self.step(&mut course, progress)? {}
-        self.drop_redundant(&mut course);
-        let mut intervals = self.intervals(&course.now, true);
+        let mut intervals = self.drop_redundant(&mut course);
         let by_group = self.values_by_group(&course.now);
         self.add_values_of_groups(&mut course, &mut intervals);
         Ok(RefitFinding {
@@ -167,10 +166,14 @@ impl Selection<'_> {
         Ok(best.map(|(_, pair, state)| (pair, state)))
     }
 
-    /// Drop effects that others made needless, one after the other.
-    fn drop_redundant(&self, course: &mut Course) {
+    /// Drop effects that others made needless, one after the other; intervals of the parameters of the others.
+    fn drop_redundant(&self, course: &mut Course) -> Vec<Option<[f64; 2]>> {
         let effects = self.model.effects();
-        while let Some(place) = self.redundant(&course.now, &course.chosen) {
+        loop {
+            let intervals = self.intervals(&course.now, true);
+            let Some(place) = self.redundant(&intervals, &course.chosen) else {
+                return intervals;
+            };
             let effect = course.chosen.remove(place);
             course.ladder.remove(place + 1);
             let (mut active, mut theta) = (course.now.active.clone(), course.now.theta.clone());
@@ -187,15 +190,15 @@ impl Selection<'_> {
     }
 
     /// Place of an effect that others made needless: the intervals of its values include no effect, and none changes it.
-    fn redundant(&self, now: &State, chosen: &[usize]) -> Option<usize> {
-        let (effects, intervals) = (self.model.effects(), self.intervals(now, true));
+    fn redundant(&self, intervals: &[Option<[f64; 2]>], chosen: &[usize]) -> Option<usize> {
+        let effects = self.model.effects();
         chosen.iter().position(|&e| {
             let is_base = chosen.iter().any(|&other| effects[other].after.contains(&e));
             !is_base
                 && effects[e]
                     .slots
                     .iter()
-                    .all(|&slot| self.includes_neutral(slot, &intervals))
+                    .all(|&slot| self.includes_neutral(slot, intervals))
         })
     }
 

@@ -315,7 +315,13 @@ impl<'a> HeightModel<'a> {
                     step
                 };
                 moved[slot] += step;
-                Some((self.predicted(field, &moved), step))
+                let is_drawn = self.declared.acts(Stage::Drawn, &moved);
+                let changed = if is_drawn {
+                    self.predicted(field, &moved)
+                } else {
+                    self.heights(relief, field, &moved)
+                };
+                Some((changed, step))
             })
             .collect();
         for y in (0..rows).step_by(STRIDE) {
