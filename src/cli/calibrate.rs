@@ -190,10 +190,10 @@ fn run_metrology(
     outs: &[PathBuf],
     terminal: &Terminal,
 ) -> Result<Outcome> {
-    if args.validate || args.adopt || args.declare.is_some() {
+    if args.validate || args.adopt {
         return Err(Error::refused(
             "calibrate/kind-has-none",
-            "--validate, --adopt and --declare are for sets of kind `psf`",
+            "--validate and --adopt are for sets of kind `psf`",
             "leave the option out: sets of heights, spectra and widths are judged by what was left out of the fit",
         ));
     }
@@ -208,7 +208,7 @@ fn run_metrology(
                 "calibrate sets of kind `psf` by a command of their own",
             ));
         };
-        let done = metrology::calibrate(set, *kind, out, &args.effects, terminal)?;
+        let done = metrology::calibrate(set, *kind, out, (&args.effects, args.declare.as_deref()), terminal)?;
         terminal.clear();
         if args.json {
             print_json(&done.diagnosis);

@@ -16,8 +16,10 @@
 //! | `fit` | least squares, cross-validation, intervals, null test | `surrogate` |
 //! | `search` | which effects explain a residual | `fit` |
 //! | `linear_trend`, `extent` | values that are linear over a plane | `fit` |
+//! | `declared_parameter` | parameters of effects that a file declares | |
 //! | `refit` | selection for forward models that are fitted in full for each candidate | `fit` |
 
+mod declared_parameter;
 mod effect;
 mod extent;
 mod fit;
@@ -31,6 +33,7 @@ mod surrogate;
 #[cfg(test)]
 mod test_model;
 
+pub use declared_parameter::{DeclaredParameter, MOST_PARAMETERS};
 pub use effect::{Parameter, Slot, ValueError};
 pub use extent::Extent;
 pub use fit::{
@@ -44,7 +47,7 @@ pub use linear_trend::LinearTrend;
 pub use measurements::{MeasurementEquations, Measurements, ReferenceValue, References, eliminate, own_step};
 pub use refit::{
     LeaveOut, RefitEffect, RefitEquations, RefitErrors, RefitFinding, RefitModel, RefitParameter, RefitPlan,
-    RefitRejection, RefitTried, select,
+    RefitRejection, RefitTried, select, try_beside,
 };
 pub use search::{
     Alternative, EXPLAINED, EndsSearch, Evidence, Finding, LEAST_GAIN, Pattern, REFERENCES_DECIDE, RandomNoise,

@@ -5,6 +5,7 @@ mod csv;
 #[cfg(feature = "documents")]
 pub mod document;
 mod error;
+pub mod expression;
 pub mod file;
 mod lagrange;
 mod layer;

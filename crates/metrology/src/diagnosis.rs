@@ -1,9 +1,13 @@
 //! The answer for programs: `diagnosis.json`, in the shape that sets of point spread functions have.
 
+use std::collections::BTreeSet;
+
 use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan};
 use metalith_report::{effect_words, sig};
 use serde::Serialize;
 use serde_json::{Value, json};
+
+use crate::proposal::Proposal;
 
 /// An effect that was found.
 #[derive(Clone, Debug, Serialize)]
@@ -17,6 +21,8 @@ pub struct FoundEffect {
     pub parameters: Vec<String>,
     /// The whole bench, or the kind of group that has separate values.
     pub of: String,
+    /// Value in each group alone with all else as it was found: one list for each parameter; empty if each group has its own.
+    pub by_group: Vec<Vec<(String, f64)>>,
 }
 
 /// An effect as it was tried last.
@@ -85,6 +91,8 @@ pub struct Diagnosis {
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
     pub ladder: Vec<LadderStep>,
+    /// Patterns that explain a part of what effects leave, those first that predict most.
+    pub proposals: Vec<Proposal>,
     /// What was fitted, what was left out in turn, and what was never fitted.
     pub validation: Vec<String>,
     /// Measurements that were never fitted.
@@ -103,6 +111,9 @@ pub struct NotInModel {
 
 /// The residual is explained up to this multiple of the difference of repeats.
 const EXPLAINED: f64 = 1.5;
+
+/// Most groups that a line names.
+const MOST_NAMED: usize = 12;
 
 /// What a set says of itself.
 pub(crate) struct SetFacts<'a> {
@@ -137,6 +148,15 @@ impl Diagnosis {
                 unit: unit(&own.slots.iter().map(|&s| parameters[s].unit).collect::<Vec<_>>()),
                 interval: one_or_list(intervals.collect()),
                 parameters: own.slots.iter().map(|&s| parameters[s].name.clone()).collect(),
+                by_group: own
+                    .slots
+                    .iter()
+                    .filter_map(|slot| {
+                        let (_, groups) = found.by_group.iter().find(|(s, _)| s == slot)?;
+                        let named = groups.iter().map(|(g, v)| (model.group_name(0, *g), shown(*slot, *v)));
+                        Some(named.collect())
+                    })
+                    .collect(),
                 of: own.across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
             }
         };
@@ -190,10 +210,32 @@ impl Diagnosis {
         let not_fitted: Vec<String> = not_fitted.map(|(n, _)| n.clone()).collect();
         let fitted = facts.names.len() - not_fitted.len();
         let mut validation = vec![format!("{fitted} measurements were fitted")];
-        validation.extend(plan.ways.iter().zip(&last.held_out).map(|(way, error)| match error {
-            Some(_) => format!("each {} was left out in turn", way.name),
-            None => format!("only one {} was fitted, so none was left out", way.name),
-        }));
+        // Groups of a way among measurements that were fitted, or that were not.
+        let groups = |way: usize, fitted: bool| {
+            let own = plan.ways[way].groups.iter().zip(&plan.fitted);
+            let own: BTreeSet<usize> = own.filter(|(_, f)| **f == fitted).map(|(g, _)| *g).collect();
+            own
+        };
+        let named = |way: usize, own: &BTreeSet<usize>| {
+            let names: Vec<String> = own.iter().take(MOST_NAMED).map(|g| model.group_name(way, *g)).collect();
+            let more = if own.len() > MOST_NAMED { ", ..." } else { "" };
+            format!("{}{more}", names.join(", "))
+        };
+        for (w, (way, error)) in plan.ways.iter().zip(&last.held_out).enumerate() {
+            let (own, others) = (groups(w, true), groups(w, false));
+            validation.push(match error {
+                Some(_) => format!("each {} was left out in turn: {}", way.name, named(w, &own)),
+                None => format!(
+                    "only one {} was fitted, so none was left out: {}",
+                    way.name,
+                    named(w, &own)
+                ),
+            });
+            let new: BTreeSet<usize> = others.difference(&own).copied().collect();
+            if !new.is_empty() {
+                validation.push(format!("never fitted, {}: {}", way.name, named(w, &new)));
+            }
+        }
         validation.push(match not_fitted.len() {
             0 => "none was kept out of the fit: name some by `not_fitted`".into(),
             n => format!("{n} were never fitted; they refuse an effect that predicts them worse"),
@@ -225,6 +267,7 @@ impl Diagnosis {
                 })
                 .collect(),
             ladder,
+            proposals: Vec::new(),
             validation,
             not_fitted,
             not_in_model: Vec::new(),
@@ -257,7 +300,8 @@ impl Diagnosis {
                 Some(why) => format!("refused {}: {why}", name.trim_start_matches("+ ")),
             }
         };
-        self.ladder.iter().map(line).collect()
+        let proposed = self.proposals.iter().map(Proposal::sentence);
+        self.ladder.iter().map(line).chain(proposed).collect()
     }
 
     /// One line for a person.

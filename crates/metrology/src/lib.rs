@@ -7,16 +7,20 @@
 //! | folder or file | holds | may use |
 //! | --- | --- | --- |
 //! | `pattern` | names of files by patterns | |
-//! | `heights` | drawn maps and measured maps: set, model, figures | `pattern` |
-//! | `spectra` | reflectance of film stacks: set, model, figures | `pattern` |
 //! | `widths` | tables of widths: set, model, figures, `model.toml` | |
+//! | `declared` | effects of a file, by expressions | |
+//! | `heights` | drawn maps and measured maps: set, model, figures | `pattern`, `declared` |
+//! | `spectra` | reflectance of film stacks: set, model, figures | `pattern`, `declared` |
+//! | `proposal` | patterns of what no effect explains | `declared`, `heights`, `spectra` |
 //! | `diagnosis`, `page` | the answer for programs and for people | |
 //! | `run` | a set from its files to its answer | all above |
 
+mod declared;
 mod diagnosis;
 mod heights;
 mod page;
 mod pattern;
+mod proposal;
 mod run;
 mod spectra;
 mod widths;
@@ -24,6 +28,7 @@ mod widths;
 pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, NotInModel, Ranked, SetVerdict};
 pub use heights::{HeightField, HeightModel, HeightSet};
 pub use pattern::NamePattern;
+pub use proposal::Proposal;
 pub use run::{Answer, SetKind, calibrate, kind_of};
 pub use spectra::{Spectrum, SpectrumModel, SpectrumSet, StatedLayer};
 pub use widths::{WidthModel, WidthSet, WidthSite};

@@ -3,6 +3,10 @@
 use metalith_report::{Axis, Cell, Chart, Column, Page, Ranking, Table, Verdict, number_words, sig};
 
 use crate::diagnosis::{Diagnosis, SetVerdict};
+use crate::proposal::Proposal;
+
+/// Most groups whose values a row shows.
+const MOST_GROUPS: usize = 8;
 
 /// The page of a set up to its figures.
 pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
@@ -28,6 +32,7 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
             Column::text("Value"),
             Column::text("95 % interval"),
             Column::text("Belongs to"),
+            Column::text("In each group alone"),
         ]);
         for e in &diagnosis.effects {
             table.row([
@@ -35,6 +40,7 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
                 format!("{} {}", number_words(&e.value), e.unit).as_str().into(),
                 number_words(&e.interval).as_str().into(),
                 e.of.as_str().into(),
+                by_group(&e.by_group).as_str().into(),
             ]);
         }
         page.table(table);
@@ -52,6 +58,11 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         ranking.bar(&tried.name, tried.score.max(0.0), None, remark, chosen);
     }
     page.figure(ranking.caption("Each effect as it was tried last, on top of those that were taken before."));
+    if !diagnosis.proposals.is_empty() {
+        page.section("Patterns of the residual");
+        page.paragraph("No effect of the list explains these. `proposal.toml` declares them: give it to `--declare`.");
+        page.list(diagnosis.proposals.iter().map(Proposal::sentence));
+    }
     page.list(
         diagnosis
             .ranking
@@ -59,6 +70,18 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
             .filter_map(|t| Some(format!("`{}`: {}", t.name, t.rejected.as_ref()?))),
     );
     page
+}
+
+/// Values in each group alone: of each parameter, groups with their values.
+fn by_group(parameters: &[Vec<(String, f64)>]) -> String {
+    let of_one = |own: &Vec<(String, f64)>| {
+        let each = own
+            .iter()
+            .take(MOST_GROUPS)
+            .map(|(name, v)| format!("{name}: {}", sig(*v, 3)));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    parameters.iter().map(of_one).collect::<Vec<_>>().join("; ")
 }
 
 /// Errors before and after each effect, fitted and left out.

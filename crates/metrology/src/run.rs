@@ -6,10 +6,13 @@ use metalith_attribution::{RefitEffect, RefitFinding, RefitModel, RefitPlan, sel
 use metalith_core::document::{Document, Section, load};
 use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result};
 use metalith_optics::CalibratedModel;
+use metalith_report::Page;
 
+use crate::declared::{DeclaredEffect, OF_HEIGHTS, OF_SPECTRA};
 use crate::diagnosis::{Diagnosis, SetFacts, SetVerdict};
 use crate::heights::{self, HeightModel, HeightSet};
 use crate::page::page;
+use crate::proposal::{Declares, propose};
 use crate::spectra::{self, SpectrumModel, SpectrumSet};
 use crate::widths::{self, WidthModel, WidthSet};
 
@@ -66,17 +69,32 @@ pub(crate) fn folder_of(path: &Path, root: &Section<'_, '_>) -> PathBuf {
 }
 
 /// Read a set, find the effects that its model lacks, and write the answer to a folder. Only some effects are tried if these
-/// are named.
+/// are named; those of a file are tried too.
 ///
 /// # Errors
 /// Every mistake of a set at once, and unknown names of effects; else if a file cannot be written, or the user stopped it.
-pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progress: &dyn Progress) -> Result<Answer> {
+pub fn calibrate(
+    set: &Path,
+    kind: SetKind,
+    out: &Path,
+    (only, declared): (&[String], Option<&Path>),
+    progress: &dyn Progress,
+) -> Result<Answer> {
+    if let (SetKind::Widths, Some(file)) = (kind, declared) {
+        return Err(Error::refused(
+            "calibrate/kind-has-none",
+            format!("{}: no effects are declared for sets of widths", file.display()),
+            "leave --declare out: their effects have names of their own, see docs/guide/measure.md",
+        ));
+    }
+    let declared_for = |stages| declared.map_or(Ok(Vec::new()), |file| DeclaredEffect::read(file, stages));
     let path = file_of(set);
     progress.begin("files", 0);
     match kind {
         SetKind::Heights => {
             let set = HeightSet::read(&path)?;
             let mut model = HeightModel::new(&set);
+            model.declare(&declared_for(&OF_HEIGHTS)?)?;
             model.effects = tried(&model.effects, only)?;
             let facts = SetFacts {
                 title: &set.title,
@@ -87,25 +105,30 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 averages: false,
             };
             let plan = model.plan();
-            answer(&model, &plan, &facts, ("nm", out), progress, |page, theta| {
-                heights::figures(page, &set, &model, theta);
+            answer(model, &plan, &facts, ("nm", out), progress, |model, page, theta| {
+                heights::figures(page, &set, model, theta);
             })
         }
         SetKind::Spectra => {
             let set = SpectrumSet::read(&path)?;
             let mut model = SpectrumModel::new(&set);
+            model.declare(&declared_for(&OF_SPECTRA)?)?;
             model.effects = tried(&model.effects, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "spectra",
-                measure: "reflectance (rms)",
+                measure: if set.is_transmission {
+                    "transmission (rms)"
+                } else {
+                    "reflectance (rms)"
+                },
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
                 noise_floor: set.repeat_rms(),
                 averages: false,
             };
             let plan = model.plan();
-            answer(&model, &plan, &facts, ("", out), progress, |page, theta| {
-                spectra::figures(page, &set, &model, theta);
+            answer(model, &plan, &facts, ("", out), progress, |model, page, theta| {
+                spectra::figures(page, &set, model, theta);
             })
         }
         SetKind::Widths => {
@@ -121,18 +144,13 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 averages: true,
             };
             let plan = model.plan();
-            let carry = |found: &RefitFinding, diagnosis: &mut Diagnosis| widths::calibrated(&model, found, diagnosis);
-            write(
-                &model,
-                &plan,
-                &facts,
-                ("nm", out),
-                progress,
-                Some(&carry),
-                |page, theta| {
-                    widths::figures(page, &set, &model, theta);
-                },
-            )
+            let (found, mut diagnosis) = found(&model, &plan, &facts, progress)?;
+            let learned = diagnosis.verdict != SetVerdict::Unexplained;
+            let calibrated = learned.then(|| widths::calibrated(&model, &found, &mut diagnosis));
+            let files = (None, calibrated);
+            write(diagnosis, files, ("nm", out), progress, |page| {
+                widths::figures(page, &set, &model, &found.theta);
+            })
         }
     }
 }
@@ -161,52 +179,70 @@ fn tried(all: &[RefitEffect], only: &[String]) -> Result<Vec<RefitEffect>> {
     Ok(effects.collect())
 }
 
-fn answer(
+/// The effects of a set, and what is said of them.
+fn found(
     model: &dyn RefitModel,
     plan: &RefitPlan,
     facts: &SetFacts<'_>,
-    (unit, out): (&str, &Path),
     progress: &dyn Progress,
-    figures: impl FnOnce(&mut metalith_report::Page, &[f64]),
-) -> Result<Answer> {
-    write(model, plan, facts, (unit, out), progress, None, figures)
+) -> Result<(RefitFinding, Diagnosis)> {
+    let found = select(model, plan, progress)?;
+    let diagnosis = Diagnosis::new(facts, model, plan, &found);
+    Ok((found, diagnosis))
 }
 
-/// Maker of the calibrated model; effects that it cannot hold are added to the diagnosis.
-type Carry<'a> = &'a dyn Fn(&RefitFinding, &mut Diagnosis) -> CalibratedModel;
-
-fn write(
-    model: &dyn RefitModel,
+/// The answer of a set whose model takes effects of a file: what no effect explains is proposed as such.
+fn answer<M: Declares>(
+    mut model: M,
     plan: &RefitPlan,
     facts: &SetFacts<'_>,
     (unit, out): (&str, &Path),
     progress: &dyn Progress,
-    carry: Option<Carry<'_>>,
-    figures: impl FnOnce(&mut metalith_report::Page, &[f64]),
+    figures: impl FnOnce(&M, &mut Page, &[f64]),
 ) -> Result<Answer> {
-    let found = select(model, plan, progress)?;
-    let mut diagnosis = Diagnosis::new(facts, model, plan, &found);
-    let learned = diagnosis.verdict != SetVerdict::Unexplained;
-    let calibrated = carry.filter(|_| learned).map(|carry| carry(&found, &mut diagnosis));
+    let (found, mut diagnosis) = found(&model, plan, facts, progress)?;
+    let (mut theta, mut proposal) = (found.theta.clone(), None);
+    if matches!(diagnosis.verdict, SetVerdict::Partly | SetVerdict::Unexplained) {
+        let (proposals, text) = propose(&mut model, plan, &found, progress)?;
+        proposal = (!proposals.is_empty()).then_some(text);
+        diagnosis.proposals = proposals;
+        theta.extend(model.parameters().iter().skip(theta.len()).map(|p| p.neutral));
+    }
+    write(diagnosis, (proposal, None), (unit, out), progress, |page| {
+        figures(&model, page, &theta);
+    })
+}
+
+/// Write the files of an answer: the proposal and the calibrated model where there are any, and none of an earlier run.
+fn write(
+    diagnosis: Diagnosis,
+    (proposal, calibrated): (Option<String>, Option<CalibratedModel>),
+    (unit, out): (&str, &Path),
+    progress: &dyn Progress,
+    figures: impl FnOnce(&mut Page),
+) -> Result<Answer> {
     let _turn = FolderLock::wait(out, progress, || {
         progress.warn("another run writes into this folder: waiting for it");
     })?;
-    let (answer, report) = (out.join("diagnosis.json"), out.join("report.html"));
-    for earlier in ["model.toml", "proposal.toml"] {
-        AtomicFile::discard(&out.join(earlier))?;
+    let [answer, report] = ["diagnosis.json", "report.html"].map(|name| out.join(name));
+    let [proposed, model] = ["proposal.toml", "model.toml"].map(|name| out.join(name));
+    for earlier in [&proposed, &model] {
+        AtomicFile::discard(earlier)?;
+    }
+    if let Some(text) = proposal {
+        AtomicFile::write(&proposed, text.as_bytes())?;
     }
     metalith_report::write_plain_json(&answer, &diagnosis)?;
     let mut page = page(&diagnosis, unit);
-    figures(&mut page, &found.theta);
+    figures(&mut page);
     page.write(&report)?;
-    let path = out.join("model.toml");
     if let Some(calibrated) = &calibrated {
-        calibrated.write(&path)?;
+        calibrated.write(&model)?;
     }
     Ok(Answer {
         diagnosis,
         answer,
         report,
-        model: calibrated.map(|_| path),
+        model: calibrated.map(|_| model),
     })
 }

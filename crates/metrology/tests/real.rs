@@ -25,13 +25,18 @@ fn diagnosis(name: &str, kind: SetKind) -> Option<Diagnosis> {
     let set = out.path().join("measurement.toml");
     std::fs::write(&set, text.replace("schema = 1", &schema)).unwrap();
     assert_eq!(kind_of(&set), Some(kind));
-    let answer = calibrate(&set, kind, out.path(), &[], &Silent).unwrap().diagnosis;
+    let answer = calibrate(&set, kind, out.path(), (&[], None), &Silent)
+        .unwrap()
+        .diagnosis;
     println!("{}", answer.sentence());
     for step in &answer.ladder {
         println!(
             "{:?} fit {:.4} {:?} {:?} {:?} {:?}",
             step.effect, step.fit, step.held_out, step.fitted_figures, step.not_fitted_figures, step.rejected
         );
+    }
+    for proposal in &answer.proposals {
+        println!("{}", proposal.sentence());
     }
     Some(answer)
 }
@@ -65,10 +70,10 @@ fn spectra() {
     };
     let aperture = answer.effects.iter().find(|e| e.name == "numerical_aperture").unwrap();
     let ends: Vec<f64> = serde_json::from_value(aperture.interval.clone()).unwrap();
-    // An independent fit found 0.891, and 0.0145 on the heights that were not fitted.
+    // An independent fit found 0.891, and 0.0135 with five effects on the heights that were not fitted.
     assert!(ends[0] < 0.891 && 0.891 < ends[1] && ends[0] > 0.7, "{ends:?}");
     let taken = answer.ladder.iter().rfind(|step| step.rejected.is_none()).unwrap();
-    assert!(taken.not_fitted_figures[0].1 < 0.0146, "{taken:?}");
+    assert!(taken.not_fitted_figures[0].1 < 0.0120, "{taken:?}");
     let offset = answer.ranking.iter().find(|t| t.name == "height_offset").unwrap();
     assert!(
         offset

@@ -60,7 +60,6 @@ mod density;
 mod drawn_optics;
 mod element_optics;
 mod etched_stack;
-pub mod expression;
 mod fields;
 mod light;
 mod model;
@@ -74,6 +73,8 @@ mod shifted_aperture;
 mod simulation_case;
 mod stitching;
 pub mod zernike;
+
+pub use metalith_core::expression;
 
 pub use as_built_chip::{AsBuiltChip, ModelStatement};
 pub use as_built_element::{AsBuiltAperture, AsBuiltElement, BIAS_STEP_NM, DrawnElement, mixed, realised_nm};

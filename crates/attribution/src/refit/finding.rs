@@ -20,8 +20,8 @@ pub struct RefitErrors {
 pub enum RefitRejection {
     /// It lowers the mean square by so small a share.
     Little(f64),
-    /// Measurements that were left out, in this way, are not surely predicted better.
-    Unsure(String),
+    /// Measurements that were left out, in this way, are not surely predicted better: the group that is predicted worse.
+    Unsure { way: String, worse: Option<String> },
     /// It fits better, and predicts measurements worse that were left out: what they are, the error before and after.
     Worse { what: String, before: f64, after: f64 },
     /// The 95 % interval of its values includes those without it.
@@ -37,7 +37,12 @@ impl RefitRejection {
     pub fn sentence(&self) -> String {
         match self {
             Self::Little(share) => format!("lowers the fitted mean square by {:.1} % only", 100.0 * share),
-            Self::Unsure(way) => format!("the 95 % interval of its gain includes zero where each {way} is left out"),
+            Self::Unsure { way, worse } => {
+                let own = format!("the 95 % interval of its gain includes zero where each {way} is left out");
+                worse
+                    .as_ref()
+                    .map_or(own.clone(), |group| format!("{own}: {way} {group} is predicted worse"))
+            }
             Self::Worse { what, before, after } => {
                 format!("fits better and predicts worse: {what} {before:.4} before, {after:.4} with it")
             }
@@ -76,4 +81,7 @@ pub struct RefitFinding {
     pub theta: Vec<f64>,
     /// 95 % interval of each parameter; none of one that was not fitted.
     pub intervals: Vec<Option<[f64; 2]>>,
+    /// Value of each parameter that was fitted in each group of the first way alone, with all else as it was found: slot, and
+    /// groups with their values.
+    pub by_group: Vec<(usize, Vec<(usize, f64)>)>,
 }

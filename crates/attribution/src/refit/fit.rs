@@ -10,7 +10,7 @@ use crate::fit::minimise;
 /// A fit ends when a step lowers the mean square by less than this share.
 const CONVERGED: f64 = 1e-5;
 
-/// A fit: values, and the equations of all measurements about them.
+/// A fit: values, and the equations of all fitted measurements about them.
 pub(super) struct State {
     pub(super) active: Vec<usize>,
     pub(super) theta: Vec<f64>,
@@ -27,11 +27,17 @@ impl State {
 }
 
 impl Selection<'_> {
-    /// Equations of all measurements about some values.
+    /// Equations of all fitted measurements about some values.
     pub(super) fn at(&self, active: Vec<usize>, theta: Vec<f64>) -> State {
         let equations: Vec<_> = (0..self.model.count())
             .into_par_iter()
-            .map(|m| self.model.equations(m, &active, &theta))
+            .map(|m| {
+                if self.plan.fitted[m] {
+                    self.model.equations(m, &active, &theta)
+                } else {
+                    RefitEquations::alike(DMatrix::zeros(0, 0))
+                }
+            })
             .collect();
         let size = active.len() + 1;
         let mut total = DMatrix::zeros(size, size);

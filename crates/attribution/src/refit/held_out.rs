@@ -12,6 +12,12 @@ use crate::fit::{Gain, minimise};
 /// Information on a parameter, relative to that of all measurements, below which others do not predict it.
 const UNINFORMED: f64 = 1e-3;
 
+/// Groups up to which each is left out of a fit in full. One of more moves a fit so little that the linear model holds.
+const FEW_GROUPS: usize = 12;
+
+/// Steps of a fit without a group, which starts from the linear model.
+const LEFT_OUT_STEPS: usize = 6;
+
 impl Selection<'_> {
     /// Steps of the active parameters that all fitted measurements but those of one group ask for. A parameter of which these
     /// tell nothing has no effect.
@@ -41,7 +47,28 @@ impl Selection<'_> {
         at
     }
 
-    /// Number of groups of fitted measurements in a way.
+    /// As [`Self::without`], from a fit in full: a step of the linear model from the fit of all is too short where the model bends.
+    fn refitted_without(&self, now: &State, way: &LeaveOut, group: usize) -> Vec<(usize, f64)> {
+        let mut plan = self.plan.clone();
+        for (fitted, own) in plan.fitted.iter_mut().zip(&way.groups) {
+            *fitted &= *own != group;
+        }
+        let (mut theta, parameters) = (now.theta.clone(), self.model.parameters());
+        for (k, step) in self.without(now, way, group) {
+            theta[now.active[k]] += step;
+        }
+        let told = |slot: &usize| theta[*slot] != parameters[*slot].neutral;
+        let active = now.active.iter().copied().filter(told).collect();
+        let others = Selection {
+            model: self.model,
+            plan: &plan,
+        };
+        let found = others.fit(others.at(active, theta), LEFT_OUT_STEPS).theta;
+        let steps = now.active.iter().map(|&slot| found[slot] - now.theta[slot]);
+        steps.enumerate().collect()
+    }
+
+    /// Groups of fitted measurements in a way.
     fn groups(&self, way: &LeaveOut) -> Vec<usize> {
         let fitted = way.groups.iter().zip(&self.plan.fitted).filter(|(_, f)| **f);
         let mut groups: Vec<usize> = fitted.map(|(g, _)| *g).collect();
@@ -93,8 +120,41 @@ impl Selection<'_> {
         }
     }
 
-    /// 95 % intervals by leaving out each group in turn (jackknife): the widest of all ways that tell of a parameter.
-    pub(super) fn intervals(&self, now: &State) -> Vec<Option<[f64; 2]>> {
+    /// Value of each active parameter in each group of the first way alone, with all else as it was found.
+    pub(super) fn values_by_group(&self, now: &State) -> Vec<(usize, Vec<(usize, f64)>)> {
+        let Some(way) = self.plan.ways.first() else {
+            return Vec::new();
+        };
+        let last = now.active.len();
+        let of_slot = |(k, &slot): (usize, &usize)| {
+            let (low, high) = self.model.parameters()[slot].range;
+            let own = self.groups(way).into_iter().filter_map(|group| {
+                let members = (0..now.equations.len()).filter(|&m| self.plan.fitted[m] && way.groups[m] == group);
+                let sums = members.map(|m| [now.equations[m].fit[(k, k)], now.equations[m].fit[(k, last)]]);
+                let [information, slope] = sums.fold([0.0, 0.0], |[a, b], [x, y]| [a + x, b + y]);
+                let value = (now.theta[slot] + slope / information).clamp(low, high);
+                (information > UNINFORMED * now.total[(k, k)]).then_some((group, value))
+            });
+            (slot, own.collect())
+        };
+        now.active.iter().enumerate().map(of_slot).collect()
+    }
+
+    /// Group of a way that an effect predicts worse than before, and most so; none if it predicts none worse.
+    pub(super) fn worse_group(&self, way: usize, before: &RefitErrors, after: &RefitErrors) -> Option<String> {
+        let groups = &self.plan.ways[way].groups;
+        let change = |&group: &usize| -> f64 {
+            let own = (0..groups.len()).filter(|&m| groups[m] == group);
+            own.filter_map(|m| Some(after.own[way][m]? - before.own[way][m]?)).sum()
+        };
+        let fitted = self.groups(&self.plan.ways[way]);
+        let worst = fitted.into_iter().max_by(|a, b| change(a).total_cmp(&change(b)))?;
+        (change(&worst) > 0.0).then(|| self.model.group_name(way, worst))
+    }
+
+    /// 95 % intervals by leaving out each group in turn (jackknife): the widest of all ways that tell of a parameter. Groups, if
+    /// there are few, are left out of a fit in full if so asked, and otherwise of the linear model.
+    pub(super) fn intervals(&self, now: &State, in_full: bool) -> Vec<Option<[f64; 2]>> {
         let mut out = vec![None; now.theta.len()];
         let mut widths = vec![0.0_f64; now.active.len()];
         for way in &self.plan.ways {
@@ -102,7 +162,14 @@ impl Selection<'_> {
             if groups.len() < 3 {
                 continue;
             }
-            let steps: Vec<_> = groups.iter().map(|&g| self.without(now, way, g)).collect();
+            let steps = groups.iter().map(|&g| {
+                if in_full && groups.len() <= FEW_GROUPS {
+                    self.refitted_without(now, way, g)
+                } else {
+                    self.without(now, way, g)
+                }
+            });
+            let steps: Vec<_> = steps.collect();
             for (k, width) in widths.iter_mut().enumerate() {
                 let informed = |&g: &usize| {
                     let members = (0..now.equations.len()).filter(|&m| self.plan.fitted[m] && way.groups[m] == g);

@@ -24,3 +24,17 @@ pub use model::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParamete
 pub fn select(model: &dyn RefitModel, plan: &RefitPlan, progress: &dyn Progress) -> Result<RefitFinding> {
     selection::Selection { model, plan }.run(progress)
 }
+
+/// Effects as each explains what a selection leaves, beside the effects that were taken: in full, without taking any.
+///
+/// # Errors
+/// If the user stopped it.
+pub fn try_beside(
+    model: &dyn RefitModel,
+    plan: &RefitPlan,
+    found: &RefitFinding,
+    effects: &[usize],
+    progress: &dyn Progress,
+) -> Result<Vec<RefitTried>> {
+    selection::Selection { model, plan }.beside(found, effects, progress)
+}

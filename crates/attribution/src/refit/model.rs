@@ -81,6 +81,11 @@ pub trait RefitModel: Sync {
     /// Figures of merit of a measurement.
     fn figures(&self, measurement: usize, theta: &[f64]) -> Vec<f64>;
 
+    /// Name of a group in a way of leaving out.
+    fn group_name(&self, _way: usize, group: usize) -> String {
+        (group + 1).to_string()
+    }
+
     /// True if a figure refuses an effect: it is of measurements that were never fitted, and the effect makes it worse.
     fn decides(&self, figure: usize) -> bool;
 }

@@ -61,10 +61,13 @@ impl Selection<'_> {
             last: vec![None; self.model.effects().len()],
         };
         while self.step(&mut course, progress)? {}
-        self.drop_redundant(&mut course);
-        let mut intervals = self.intervals(&course.now);
+        let mut intervals = self.drop_redundant(&mut course);
+        let by_group = self.values_by_group(&course.now);
         self.add_values_of_groups(&mut course, &mut intervals);
-        Ok(self.finding(course, intervals))
+        Ok(RefitFinding {
+            by_group,
+            ..self.finding(course, intervals)
+        })
     }
 
     /// Take the effect, or the two, that predict most of what was left out; false if none is taken.
@@ -75,20 +78,21 @@ impl Selection<'_> {
             .collect();
         progress.begin(&format!("effects, step {}", course.chosen.len() + 1), open.len() as u64);
         let before = course.ladder[course.ladder.len() - 1].clone();
-        let mut best: Option<(State, RefitTried)> = None;
+        let mut good: Vec<(State, RefitTried)> = Vec::new();
         for &effect in &open {
             progress.check_stopped()?;
             progress.note(&effects[effect].name);
             let state = self.fit(self.with(&course.now, effect), TRIAL_STEPS);
             let tried = self.try_last(effect, &state, &before);
             progress.advance(1);
-            if tried.rejected.is_none() && best.as_ref().is_none_or(|(_, most)| tried.gain.value > most.gain.value) {
-                best = Some((state, tried.clone()));
+            if tried.rejected.is_none() {
+                good.push((state, tried.clone()));
             }
             course.last[effect] = Some(tried);
         }
-        if course.chosen.is_empty() || best.is_none() && self.model.tries_pairs() {
-            let least = best.as_ref().map_or(0.0, |(_, tried)| tried.gain.value);
+        good.sort_by(|(_, a), (_, b)| b.gain.value.total_cmp(&a.gain.value));
+        if course.chosen.is_empty() || good.is_empty() && self.model.tries_pairs() {
+            let least = good.first().map_or(0.0, |(_, tried)| tried.gain.value);
             if let Some((pair, state)) = self.pair(&course.now, &open, &before, least, progress)? {
                 let first = self.fit(self.with(&course.now, pair[0]), TAKEN_STEPS);
                 let both = self.fit(state, TAKEN_STEPS);
@@ -105,19 +109,23 @@ impl Selection<'_> {
                 return Ok(true);
             }
         }
-        let Some((state, tried)) = best else {
-            return Ok(false);
-        };
-        course.now = self.fit(state, TAKEN_STEPS);
-        let errors = self.errors(&course.now);
-        course.chosen.push(tried.effect);
-        course.last[tried.effect] = Some(RefitTried {
-            errors: errors.clone(),
-            values: self.values(tried.effect, &course.now.theta),
-            ..tried
-        });
-        course.ladder.push(errors);
-        Ok(true)
+        for (state, tried) in good {
+            // A fit that goes on may predict worse than one that ended early.
+            let state = self.fit(state, TAKEN_STEPS);
+            let tried = self.try_last(tried.effect, &state, &before);
+            let is_taken = tried.rejected.is_none();
+            if is_taken {
+                course.now = state;
+                course.chosen.push(tried.effect);
+                course.ladder.push(tried.errors.clone());
+            }
+            let effect = tried.effect;
+            course.last[effect] = Some(tried);
+            if is_taken {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// The two effects that predict most together what was left out, with their fit; none that gain less than `least` by so much
@@ -158,10 +166,14 @@ impl Selection<'_> {
         Ok(best.map(|(_, pair, state)| (pair, state)))
     }
 
-    /// Drop effects that others made needless, one after the other.
-    fn drop_redundant(&self, course: &mut Course) {
+    /// Drop effects that others made needless, one after the other; intervals of the parameters of the others.
+    fn drop_redundant(&self, course: &mut Course) -> Vec<Option<[f64; 2]>> {
         let effects = self.model.effects();
-        while let Some(place) = self.redundant(&course.now, &course.chosen) {
+        loop {
+            let intervals = self.intervals(&course.now, true);
+            let Some(place) = self.redundant(&intervals, &course.chosen) else {
+                return intervals;
+            };
             let effect = course.chosen.remove(place);
             course.ladder.remove(place + 1);
             let (mut active, mut theta) = (course.now.active.clone(), course.now.theta.clone());
@@ -178,15 +190,15 @@ impl Selection<'_> {
     }
 
     /// Place of an effect that others made needless: the intervals of its values include no effect, and none changes it.
-    fn redundant(&self, now: &State, chosen: &[usize]) -> Option<usize> {
-        let (effects, intervals) = (self.model.effects(), self.intervals(now));
+    fn redundant(&self, intervals: &[Option<[f64; 2]>], chosen: &[usize]) -> Option<usize> {
+        let effects = self.model.effects();
         chosen.iter().position(|&e| {
             let is_base = chosen.iter().any(|&other| effects[other].after.contains(&e));
             !is_base
                 && effects[e]
                     .slots
                     .iter()
-                    .all(|&slot| self.includes_neutral(slot, &intervals))
+                    .all(|&slot| self.includes_neutral(slot, intervals))
         })
     }
 
@@ -228,6 +240,36 @@ impl Selection<'_> {
         (tried, after.theta, intervals)
     }
 
+    /// Effects as each explains what a selection leaves.
+    ///
+    /// # Errors
+    /// If the user stopped it.
+    pub(super) fn beside(
+        &self,
+        found: &RefitFinding,
+        effects: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<Vec<RefitTried>> {
+        let (all, mut theta) = (self.model.effects(), found.theta.clone());
+        theta.extend(self.model.parameters().iter().skip(theta.len()).map(|p| p.neutral));
+        let of_bench = found.chosen.iter().filter(|e| all[**e].across.is_none());
+        let active = of_bench.flat_map(|&e| all[e].slots.clone()).collect();
+        let now = self.at(active, theta);
+        let before = self.errors(&now);
+        progress.begin("patterns of the residual", effects.len() as u64);
+        let try_one = |&effect: &usize| {
+            progress.check_stopped()?;
+            progress.advance(1);
+            Ok(if all[effect].across.is_some() {
+                self.by_group(effect, &now).0
+            } else {
+                let state = self.fit(self.with(&now, effect), TRIAL_STEPS);
+                self.try_last(effect, &state, &before)
+            })
+        };
+        effects.iter().map(try_one).collect()
+    }
+
     fn finding(&self, course: Course, intervals: Vec<Option<[f64; 2]>>) -> RefitFinding {
         let effects = self.model.effects();
         let Course {
@@ -256,13 +298,14 @@ impl Selection<'_> {
             ladder,
             theta: now.theta,
             intervals,
+            by_group: Vec::new(),
         }
     }
 
     fn judge(&self, state: &State) -> Judged {
         Judged {
             errors: self.errors(state),
-            intervals: self.intervals(state),
+            intervals: self.intervals(state, false),
         }
     }
 
@@ -306,15 +349,21 @@ impl Selection<'_> {
         if score.is_nan() || score < LEAST_SHARE {
             Some(RefitRejection::Little(score))
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.value < 0.0) {
+            let worst = self
+                .worse_group(*w, before, errors)
+                .map(|group| format!(", most for {group}"));
             Some(RefitRejection::Worse {
-                what: format!("rms where each {} is left out", way(*w)),
+                what: format!("rms where each {} is left out{}", way(*w), worst.unwrap_or_default()),
                 before: before.held_out[*w].unwrap_or(0.0),
                 after: errors.held_out[*w].unwrap_or(0.0),
             })
         } else if let Some(worse) = self.worse(before, errors) {
             Some(worse)
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.interval[0] <= 0.0) {
-            Some(RefitRejection::Unsure(way(*w).clone()))
+            Some(RefitRejection::Unsure {
+                way: way(*w).clone(),
+                worse: self.worse_group(*w, before, errors),
+            })
         } else if slots.iter().any(at_end) {
             Some(RefitRejection::Unphysical)
         } else if slots.iter().all(|&slot| self.includes_neutral(slot, intervals)) {

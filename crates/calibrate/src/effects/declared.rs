@@ -5,29 +5,11 @@ use std::path::Path;
 
 use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
+use metalith_attribution::DeclaredParameter;
 use metalith_core::Result;
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, Section, load};
 use metalith_optics::{CompiledTerm, DeclaredQuantity, DeclaredTerm, Perturbation};
 use metalith_report::sig;
-
-/// Most parameters of one effect: a step of the search fits all of them at once.
-pub(crate) const MOST_PARAMETERS: usize = 6;
-
-/// Largest number that a file may ask for, in any unit.
-const LARGEST: f64 = 1e6;
-
-/// One parameter of a declared effect.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DeclaredParameter {
-    /// Name in the expression.
-    pub name: String,
-    /// Physical limits.
-    pub range: (f64, f64),
-    /// A typical distance from its start.
-    pub prior: f64,
-    /// Value where there is no effect.
-    pub start: f64,
-}
 
 /// An effect of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,14 +83,7 @@ impl DeclaredEffect {
                 quoted(&e.expression)
             ));
             for p in &e.parameters {
-                out.push_str(&format!(
-                    "\n[[effect.parameter]]\nname = {}\nrange = [{:?}, {:?}]\nprior = {:?}\nstart = {:?}\n",
-                    quoted(&p.name),
-                    p.range.0,
-                    p.range.1,
-                    p.prior,
-                    p.start
-                ));
+                out.push_str(&p.text());
             }
             out.push('\n');
         }
@@ -126,18 +101,7 @@ impl DeclaredEffect {
 }
 
 fn declared(s: &Section<'_, '_>) -> DeclaredEffect {
-    let name = s.text("name");
-    let is_word = |name: &str| {
-        name.starts_with(|c: char| c.is_ascii_alphabetic())
-            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-    };
-    if !name.is_empty() && !is_word(&name) {
-        s.fault(
-            "name",
-            format!("`{name}` is no name"),
-            "write letters, digits and _, a letter first",
-        );
-    }
+    let name = DeclaredParameter::name_of_effect(s);
     let unit = s.optional_text("unit").unwrap_or_default();
     let stages = STAGES.map(|(word, _)| (word, word));
     let stage = s.choice("stage", &stages, None);
@@ -173,31 +137,7 @@ fn declared(s: &Section<'_, '_>) -> DeclaredEffect {
     for (other, _) in keys.iter().skip(1) {
         let _ = s.optional_text(other);
     }
-    let parts = s.sections("parameter");
-    let parameters: Vec<DeclaredParameter> = if parts.is_empty() {
-        vec![parameter(s, "a".into())]
-    } else {
-        parts.iter().map(|p| parameter(p, p.text("name"))).collect()
-    };
-    for (p, part) in parameters.iter().zip(&parts) {
-        let taken = quantity.variables().contains(&p.name.as_str())
-            || parameters.iter().filter(|o| o.name == p.name).count() > 1;
-        if taken || !is_word(&p.name) {
-            part.fault(
-                "name",
-                format!("`{}` cannot name a parameter", p.name),
-                "choose another name",
-            );
-        }
-        part.finish();
-    }
-    if parameters.len() > MOST_PARAMETERS {
-        s.fault(
-            "parameter",
-            format!("more than {MOST_PARAMETERS} parameters"),
-            "split it into two effects",
-        );
-    }
+    let parameters = DeclaredParameter::read_all(s, quantity.variables());
     s.finish();
     let effect = DeclaredEffect {
         name,
@@ -278,34 +218,6 @@ fn does_something(term: &CompiledTerm) -> Option<(String, String)> {
             ),
         ))
     })
-}
-
-/// The parameter of a section.
-fn parameter(s: &Section<'_, '_>, name: String) -> DeclaredParameter {
-    let any = || Limits::new(-LARGEST..=LARGEST, "");
-    let [low, high] = s.array("range", any());
-    let prior = s.float("prior", Limits::new(1e-9..=LARGEST, ""));
-    let start = s.optional_float("start", any()).unwrap_or(0.0);
-    if !(low <= start && start <= high && low < high) {
-        s.fault(
-            "range",
-            format!("the start {start} is not within {low} to {high}"),
-            "give the lower end first, and a start between the ends",
-        );
-    }
-    if prior > high - low {
-        s.fault(
-            "prior",
-            format!("a typical value of {prior} in a range from {low} to {high}"),
-            "make the range wider, or the prior smaller",
-        );
-    }
-    DeclaredParameter {
-        name,
-        range: (low, high),
-        prior,
-        start,
-    }
 }
 
 impl Effect for DeclaredEffect {

@@ -12,8 +12,9 @@ mod stitching;
 mod table;
 mod value_error;
 
-pub(crate) use declared::MOST_PARAMETERS;
-pub use declared::{DeclaredEffect, DeclaredParameter};
+pub use declared::DeclaredEffect;
+pub use metalith_attribution::DeclaredParameter;
+pub(crate) use metalith_attribution::MOST_PARAMETERS;
 pub use metalith_attribution::Parameter;
 pub(crate) use metalith_attribution::ValueError;
 pub(crate) use stitching::StitchedFields;

@@ -1,5 +1,7 @@
 //! Forward model of heights: from a drawn map to the relief that the writer and the material make of it.
 
+use std::borrow::Cow;
+
 use metalith_attribution::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
 use nalgebra::DMatrix;
 use ndarray::Array2;
@@ -9,6 +11,7 @@ use rayon::prelude::*;
 use super::far_field::{FarFieldPlan, relative_error};
 use super::fft::{Fft2, frequency};
 use super::set::HeightSet;
+use crate::declared::{DeclaredEffect, DeclaredSlots, Stage};
 
 /// Samples that a drawn map goes on beyond its rim, as its outermost samples are: a blur of 2 um at 0.1 um a sample.
 const MARGIN: usize = 64;
@@ -38,12 +41,14 @@ pub struct HeightModel<'a> {
     pub(crate) effects: Vec<RefitEffect>,
     /// Spectra of the drawn maps with their margin, transposed.
     spectra: Vec<Vec<Complex<f32>>>,
+    forward: Fft2<f32>,
     inverse: Fft2<f32>,
     /// Square of the angular frequency of each element of a spectrum (1/um^2).
     squared: Vec<f32>,
     far_field: Option<(FarFieldPlan, Vec<Vec<f64>>)>,
     /// Middle and half of the span of drawn heights (nm).
     span: [f64; 2],
+    declared: DeclaredSlots,
 }
 
 /// The relief of a field without its level, at all samples inside the rim, and what it is made of.
@@ -89,12 +94,26 @@ impl<'a> HeightModel<'a> {
             parameters,
             effects,
             spectra,
+            forward,
             // Spectra are transposed: so is what comes back.
             inverse: Fft2::new(m, n, true),
             squared,
             far_field,
             span,
+            declared: DeclaredSlots::default(),
         }
+    }
+
+    /// Add effects of a file.
+    pub(crate) fn declare(&mut self, effects: &[DeclaredEffect]) -> metalith_core::Result<()> {
+        let to = (&mut self.parameters, &mut self.effects);
+        self.declared.add(effects, self.set.groups.len(), to)
+    }
+
+    /// Half of the longer edge of a field (um), and the middle and half of the span of drawn heights (nm).
+    pub(crate) fn extent(&self) -> (f64, [f64; 2]) {
+        let longer = self.inside().into_iter().max().unwrap_or(2);
+        (0.5 * (longer - 1) as f64 * self.set.sample_um, self.span)
     }
 
     /// Roles of the fields: groups and single fields are left out in turn.
@@ -121,9 +140,55 @@ impl<'a> HeightModel<'a> {
         [rows, cols].map(|n| n - 2 * self.set.rim)
     }
 
+    /// Spectrum of the drawn map of a field with what a file declares to be added to it.
+    fn drawn(&self, field: usize, theta: &[f64]) -> Cow<'_, [Complex<f32>]> {
+        if !self.declared.acts(Stage::Drawn, theta) {
+            return Cow::Borrowed(&self.spectra[field]);
+        }
+        let own = &self.set.fields[field];
+        let (rows, cols) = own.drawn.dim();
+        let map = Array2::from_shape_fn((rows, cols), |(y, x)| {
+            let h = own.drawn[(y, x)];
+            let at = |k: usize, n: usize| (k as f64 - 0.5 * (n - 1) as f64) * self.set.sample_um;
+            let variables = [at(x, cols), at(y, rows), f64::from(h)];
+            h + self.declared.value(Stage::Drawn, own.group, &variables, theta) as f32
+        });
+        Cow::Owned(self.forward.transposed(with_margin(&map)))
+    }
+
+    /// What files declare to be added to a height (nm) at a stage after the blur, at a sample inside the rim.
+    fn added(&self, stage: Stage, field: usize, k: usize, height: f64, theta: &[f64]) -> f64 {
+        let [rows, cols] = self.inside();
+        let at = |k: usize, n: usize| (k as f64 - 0.5 * (n - 1) as f64) * self.set.sample_um;
+        let variables = [at(k % cols, cols), at(k / cols, rows), height];
+        self.declared
+            .value(stage, self.set.fields[field].group, &variables, theta)
+    }
+
+    /// Predicted height (nm) at a sample inside the rim for its height after the blur.
+    fn height(&self, field: usize, theta: &[f64], k: usize, core: f64, [is_printed, is_measured]: [bool; 2]) -> f64 {
+        let (factor, terms) = Self::over_field(theta, self.place(k));
+        let more = if is_printed {
+            self.added(Stage::Printed, field, k, core, theta)
+        } else {
+            0.0
+        };
+        let height = theta[GAIN] * factor * self.curved(theta, core + more).0 + self.base(field, theta, terms);
+        if is_measured {
+            height + self.added(Stage::Measured, field, k, height, theta)
+        } else {
+            height
+        }
+    }
+
+    /// Whether files declare something that acts on a printed and on a measured map.
+    fn declared_stages(&self, theta: &[f64]) -> [bool; 2] {
+        [Stage::Printed, Stage::Measured].map(|stage| self.declared.acts(stage, theta))
+    }
+
     /// Two real maps: the drawn one through two real transfer functions of the squared frequency.
-    fn filtered(&self, field: usize, transfer: impl Fn(f32) -> (f32, f32)) -> [Vec<f64>; 2] {
-        let product = self.spectra[field].iter().zip(&self.squared).map(|(s, k2)| {
+    fn filtered(&self, drawn: &[Complex<f32>], transfer: impl Fn(f32) -> (f32, f32)) -> [Vec<f64>; 2] {
+        let product = drawn.iter().zip(&self.squared).map(|(s, k2)| {
             let (a, b) = transfer(*k2);
             s * Complex::new(a, b)
         });
@@ -147,10 +212,11 @@ impl<'a> HeightModel<'a> {
         let is = |slot: usize| active.contains(&slot);
         let (short, long) = (gaussian(theta[BLUR]), gaussian(theta[LONG_RANGE]));
         let share = theta[LONG_SHARE];
-        let [mut core, mut by_blur] = self.filtered(field, |k2| (short(k2), -0.5 * k2 * short(k2)));
+        let drawn = self.drawn(field, theta);
+        let [mut core, mut by_blur] = self.filtered(&drawn, |k2| (short(k2), -0.5 * k2 * short(k2)));
         let (mut by_share, mut by_range) = (Vec::new(), Vec::new());
         if share != 0.0 || is(LONG_SHARE) {
-            let [far, by_far] = self.filtered(field, |k2| (long(k2), -0.5 * k2 * long(k2)));
+            let [far, by_far] = self.filtered(&drawn, |k2| (long(k2), -0.5 * k2 * long(k2)));
             by_share = far.iter().zip(&core).map(|(f, c)| f - c).collect();
             by_range = by_far.iter().map(|v| share * v).collect();
             for (c, f) in core.iter_mut().zip(&far) {
@@ -211,10 +277,9 @@ impl<'a> HeightModel<'a> {
 
     fn heights(&self, relief: &Relief, field: usize, theta: &[f64]) -> Array2<f64> {
         let [rows, cols] = self.inside();
-        let values = relief.core.iter().enumerate().map(|(k, core)| {
-            let (factor, terms) = Self::over_field(theta, self.place(k));
-            theta[GAIN] * factor * self.curved(theta, *core).0 + self.base(field, theta, terms)
-        });
+        let stages = self.declared_stages(theta);
+        let values = relief.core.iter().enumerate();
+        let values = values.map(|(k, core)| self.height(field, theta, k, *core, stages));
         Array2::from_shape_vec((rows, cols), values.collect()).expect("as many as inside the rim")
     }
 
@@ -237,14 +302,47 @@ impl<'a> HeightModel<'a> {
         let mut out = vec![Vec::new(); active.len() + 1];
         let nuisances = &self.set.nuisances;
         let mut own = vec![Vec::new(); 4];
+        let stages = self.declared_stages(theta);
+        // Changes with declared parameters, by differences.
+        let changes: Vec<Option<(Array2<f64>, f64)>> = active
+            .iter()
+            .map(|&slot| {
+                let mut moved = theta.to_vec();
+                let step = self.declared.step(slot)?;
+                let step = if theta[slot] + step > self.parameters[slot].range.1 {
+                    -step
+                } else {
+                    step
+                };
+                moved[slot] += step;
+                let is_drawn = self.declared.acts(Stage::Drawn, &moved);
+                let changed = if is_drawn {
+                    self.predicted(field, &moved)
+                } else {
+                    self.heights(relief, field, &moved)
+                };
+                Some((changed, step))
+            })
+            .collect();
         for y in (0..rows).step_by(STRIDE) {
             for x in (0..cols).step_by(STRIDE) {
                 let k = y * cols + x;
                 let place = self.place(k);
                 let (factor, terms) = Self::over_field(theta, place);
-                let (height, slope, curves) = self.curved(theta, relief.core[k]);
+                let core = relief.core[k];
+                let more = if stages[0] {
+                    self.added(Stage::Printed, field, k, core, theta)
+                } else {
+                    0.0
+                };
+                let (height, slope, curves) = self.curved(theta, core + more);
+                let predicted = self.height(field, theta, k, core, stages);
                 let gain = theta[GAIN];
-                for (column, &slot) in out.iter_mut().zip(active) {
+                for ((column, &slot), change) in out.iter_mut().zip(active).zip(&changes) {
+                    if let Some((moved, step)) = change {
+                        column.push((moved[(y, x)] - predicted) / step);
+                        continue;
+                    }
                     column.push(match slot {
                         GAIN => factor * height,
                         LEVEL => 1.0,
@@ -255,7 +353,6 @@ impl<'a> HeightModel<'a> {
                         _ => f64::from(u8::from(slot - LEVELS == group)),
                     });
                 }
-                let predicted = gain * factor * height + self.base(field, theta, terms);
                 out[active.len()].push(f64::from(measured[(y + rim, x + rim)]) - predicted);
                 if nuisances.plane {
                     own[0].push(place[0]);
@@ -362,6 +459,13 @@ impl RefitModel for HeightModel<'_> {
             out.push(relative_error(&found, &measured[field]));
         }
         out
+    }
+
+    fn group_name(&self, way: usize, group: usize) -> String {
+        match way {
+            0 => self.set.groups[group].clone(),
+            _ => self.set.fields[group].name.clone(),
+        }
     }
 
     /// The level of a group that was not fitted is not predicted, so it refuses nothing.

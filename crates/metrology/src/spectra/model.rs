@@ -1,12 +1,16 @@
 //! Forward model of spectra: a film stack over the cone of an objective, and what the instrument makes of it.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use metalith_attribution::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
 use metalith_rcwa::Material;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::film_reflectance::{Film, reflectance};
-use super::set::{SCALED_BY, SpectrumSet};
+use super::film_reflectance::{Film, film_powers};
+use super::set::{SCALED_BY, Spectrum, SpectrumSet};
+use crate::declared::{DeclaredEffect, DeclaredSlots, Stage};
 
 /// Gauss-Legendre nodes on (-1, 1) with their weights: the squared sine over the cone. Six nodes are exact to 1e-4 at 0.95.
 const NODES: [[f64; 2]; 6] = [
@@ -28,11 +32,20 @@ const STRAY: usize = 3;
 const WAVELENGTH: usize = 4;
 const RESOLUTION: usize = 5;
 const HEIGHT: usize = 6;
-/// First of three parameters of each layer that is not the object: thickness, scale of the index, offset of the index.
-const LAYERS: usize = 7;
+const APODISATION: usize = 7;
+/// First of the parameters of each layer that is not the object: thickness, scale and offset of the index, offset of the extinction.
+const LAYERS: usize = 8;
+/// Parameters of a layer.
+const OF_A_LAYER: usize = 4;
 
 /// Parameters of what acts after the stack of smooth films.
 const AFTER_THE_STACK: [usize; 4] = [ROUGHNESS, REFERENCE, STRAY, RESOLUTION];
+
+/// First spectrum of an object, and bits of the values that act on its stack.
+type StackKey = (usize, Vec<u64>);
+
+/// Most spectra of smooth films that are held.
+const MOST_HELD: usize = 1024;
 
 /// A set of spectra with its forward model.
 pub struct SpectrumModel<'a> {
@@ -43,6 +56,13 @@ pub struct SpectrumModel<'a> {
     steps: Vec<f64>,
     /// Mean of the repeats that each spectrum is one of.
     means: Vec<Vec<f64>>,
+    declared: DeclaredSlots,
+    /// First spectrum of the object and medium of each spectrum.
+    first: Vec<usize>,
+    /// Number of the height of each spectrum.
+    groups: Vec<usize>,
+    /// Reflectances of smooth films by first spectrum and values: repeats, and derivatives at one place, share them.
+    smooth: Mutex<HashMap<StackKey, Arc<Vec<f64>>>>,
 }
 
 impl<'a> SpectrumModel<'a> {
@@ -96,6 +116,7 @@ impl<'a> SpectrumModel<'a> {
             f64::sqrt,
         );
         add("height_offset".into(), "nm", (0.0, 0.0), (-1e3, 1e3), 1e-2, |v| v);
+        add("pupil_apodisation".into(), "", (0.0, 0.0), (-3.0, 6.0), 1e-3, |v| v);
         let mut effects: Vec<RefitEffect> = Vec::new();
         let names = [
             "numerical_aperture",
@@ -105,6 +126,7 @@ impl<'a> SpectrumModel<'a> {
             "wavelength_scale",
             "resolution",
             "height_offset",
+            "pupil_apodisation",
         ];
         let effect = |name: &str, slot: usize| RefitEffect {
             name: name.into(),
@@ -113,15 +135,24 @@ impl<'a> SpectrumModel<'a> {
             across: None,
         };
         effects.extend(names.iter().enumerate().map(|(slot, name)| effect(name, slot)));
+        if stated == 0.0 {
+            // The first of the effects is the numerical aperture.
+            effects[APODISATION].after = vec![0];
+        }
+        if set.is_transmission {
+            // The law of scattering is of reflected light.
+            effects.retain(|e| e.name != "roughness");
+        }
         for (k, layer) in set.layers.iter().enumerate() {
             let name = &layer.name;
             let own = [
                 (format!("{name}_thickness"), "nm", 1e4, 1e-2),
                 (format!("{name}_index_scale"), "", 0.5, 1e-5),
                 (format!("{name}_index_offset"), "", 1.0, 1e-5),
+                (format!("{name}_extinction_offset"), "", 1.0, 1e-5),
             ];
             for (place, (name, unit, most, step)) in own.into_iter().enumerate() {
-                let slot = LAYERS + 3 * k + place;
+                let slot = LAYERS + OF_A_LAYER * k + place;
                 if let Some(thickness) = layer.thickness_nm {
                     effects.push(effect(&name, slot));
                     let low = if place == 0 { -thickness } else { -most };
@@ -132,35 +163,63 @@ impl<'a> SpectrumModel<'a> {
             }
         }
         let mut means = vec![Vec::new(); set.spectra.len()];
+        let mut first = vec![0; set.spectra.len()];
         for own in set.repeats() {
             let mean: Vec<f64> = (0..set.wavelengths_nm.len())
                 .map(|k| own.iter().map(|&s| set.spectra[s].reflectance[k]).sum::<f64>() / own.len() as f64)
                 .collect();
-            own.iter().for_each(|&s| means[s].clone_from(&mean));
+            own.iter().for_each(|&s| {
+                means[s].clone_from(&mean);
+                first[s] = own[0];
+            });
         }
+        let heights = heights(set);
+        let group = |s: &Spectrum| heights.iter().position(|h| *h == s.height_nm).unwrap_or(0);
+        let groups = set.spectra.iter().map(group).collect();
         Self {
             set,
             parameters,
             effects,
             steps,
             means,
+            declared: DeclaredSlots::default(),
+            first,
+            groups,
+            smooth: Mutex::default(),
         }
+    }
+
+    /// Add effects of a file.
+    pub(crate) fn declare(&mut self, effects: &[DeclaredEffect]) -> metalith_core::Result<()> {
+        let groups = heights(self.set).len();
+        self.declared
+            .add(effects, groups, (&mut self.parameters, &mut self.effects))?;
+        let new = self.steps.len()..self.parameters.len();
+        self.steps
+            .extend(new.map(|slot| self.declared.step(slot).unwrap_or(1e-3)));
+        Ok(())
+    }
+
+    /// True if the object has more than one medium.
+    fn has_media(&self) -> bool {
+        let spectra = &self.set.spectra;
+        spectra.iter().any(|s| s.medium != spectra[0].medium)
+    }
+
+    /// First and last wavelength (nm).
+    pub(crate) fn range_nm(&self) -> [f64; 2] {
+        [0, self.set.wavelengths_nm.len() - 1].map(|k| self.set.wavelengths_nm[k])
     }
 
     /// Roles of the spectra: heights, media and single spectra are left out in turn.
     pub fn plan(&self) -> RefitPlan {
         let spectra = &self.set.spectra;
-        let mut heights: Vec<f64> = spectra.iter().map(|s| s.height_nm).collect();
-        heights.sort_by(f64::total_cmp);
-        heights.dedup();
-        let place = |h: f64| heights.iter().position(|own| *own == h).unwrap_or(0);
         let way = |name: &str, groups: Vec<usize>| LeaveOut {
             name: name.into(),
             groups,
         };
-        let mut ways = vec![way("height", spectra.iter().map(|s| place(s.height_nm)).collect())];
-        let fitted_media: Vec<usize> = spectra.iter().filter(|s| s.fitted).map(|s| s.medium).collect();
-        if fitted_media.iter().any(|m| *m != fitted_media[0]) {
+        let mut ways = vec![way("height", self.groups.clone())];
+        if self.has_media() {
             ways.push(way("medium", spectra.iter().map(|s| s.medium).collect()));
         }
         ways.push(way("spectrum", (0..spectra.len()).collect()));
@@ -177,18 +236,53 @@ impl<'a> SpectrumModel<'a> {
 
     /// Reflectance that the instrument shows of a spectrum, at each wavelength of the set.
     pub fn predicted(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
-        self.shown(&self.smooth_stack(spectrum, theta), theta)
+        self.shown(spectrum, &self.smooth_stack(spectrum, theta), theta)
     }
 
     /// Reflectance of the stack with smooth films over the cone of the objective, at each wavelength of the set.
-    fn smooth_stack(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
+    fn smooth_stack(&self, spectrum: usize, theta: &[f64]) -> Arc<Vec<f64>> {
+        let bits = theta.iter().enumerate();
+        let bits = bits.map(|(slot, v)| {
+            if AFTER_THE_STACK.contains(&slot) {
+                0
+            } else {
+                v.to_bits()
+            }
+        });
+        let key = (self.first[spectrum], bits.collect());
+        let held = || self.smooth.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = held().get(&key) {
+            return Arc::clone(known);
+        }
+        let found = Arc::new(self.stack(spectrum, theta));
+        let mut held = held();
+        if held.len() >= MOST_HELD {
+            held.clear();
+        }
+        held.insert(key, Arc::clone(&found));
+        found
+    }
+
+    fn stack(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
         let own = &self.set.spectra[spectrum];
         let medium = &self.set.media[own.medium].1;
         let height_nm = (own.height_nm + theta[HEIGHT]).max(0.0);
         let scale = 1.0 + theta[WAVELENGTH];
         let aperture2 = theta[APERTURE].powi(2);
+        let cone = cone(theta[APODISATION]);
+        let [from, to] = self.range_nm();
+        let ends = [from * (1.0 - SCALED_BY), to * (1.0 + SCALED_BY)];
+        let (group, is_moved) = (self.groups[spectrum], self.declared.acts(Stage::Wavelength, theta));
+        let moved = |nm: f64| {
+            if is_moved {
+                self.declared
+                    .value(Stage::Wavelength, group, &[nm, own.height_nm], theta)
+            } else {
+                0.0
+            }
+        };
         let values = self.set.wavelengths_nm.iter().map(|nm| {
-            let nm = nm * scale;
+            let nm = (nm * scale + moved(*nm)).clamp(ends[0], ends[1]);
             let index = |m: &Material| m.index(nm * 1e-3).unwrap_or(Complex64::from(1.0));
             let films: Vec<Film> = self
                 .set
@@ -197,17 +291,19 @@ impl<'a> SpectrumModel<'a> {
                 .enumerate()
                 .map(|(k, layer)| match (&layer.material, layer.thickness_nm) {
                     (Some(material), Some(thickness)) => {
-                        let [thicker, scaled, more] = [0, 1, 2].map(|p| theta[LAYERS + 3 * k + p]);
-                        (index(material) * (1.0 + scaled) + more, thickness + thicker)
+                        let [thicker, scaled, more, lossy] = [0, 1, 2, 3].map(|p| theta[LAYERS + OF_A_LAYER * k + p]);
+                        let stated = index(material);
+                        let n = Complex64::new(stated.re * (1.0 + scaled) + more, (stated.im + lossy).max(0.0));
+                        (n, thickness + thicker)
                     }
                     _ => (index(medium), height_nm),
                 })
                 .collect();
             let substrate = self.set.substrate.as_ref().map_or(Complex64::from(1.5), index);
-            let at = |sine2: f64| reflectance(self.set.ambient_index, &films, substrate, nm, sine2);
+            let power = usize::from(self.set.is_transmission);
+            let at = |sine2: f64| film_powers(self.set.ambient_index, &films, substrate, nm, sine2)[power];
             if aperture2 > 0.0 {
-                let nodes = NODES.iter();
-                nodes.map(|[x, w]| 0.5 * w * at(0.5 * (x + 1.0) * aperture2)).sum()
+                cone.iter().map(|(part, weight)| weight * at(part * aperture2)).sum()
             } else {
                 at(0.0)
             }
@@ -216,7 +312,7 @@ impl<'a> SpectrumModel<'a> {
     }
 
     /// What rough films and the instrument make of the reflectance of smooth ones.
-    fn shown(&self, smooth: &[f64], theta: &[f64]) -> Vec<f64> {
+    fn shown(&self, spectrum: usize, smooth: &[f64], theta: &[f64]) -> Vec<f64> {
         let scale = 1.0 + theta[WAVELENGTH];
         let scattered = |nm: f64| (-(4.0 * std::f64::consts::PI / (nm * scale)).powi(2) * theta[ROUGHNESS]).exp();
         let mut values: Vec<f64> = smooth
@@ -229,6 +325,16 @@ impl<'a> SpectrumModel<'a> {
         }
         let gain = 1.0 + theta[REFERENCE];
         values.iter_mut().for_each(|v| *v = *v * gain + theta[STRAY]);
+        let (group, height_nm) = (self.groups[spectrum], self.set.spectra[spectrum].height_nm);
+        if [Stage::Factor, Stage::Added]
+            .iter()
+            .any(|stage| self.declared.acts(*stage, theta))
+        {
+            for (v, nm) in values.iter_mut().zip(&self.set.wavelengths_nm) {
+                let of = |stage| self.declared.value(stage, group, &[*nm, height_nm], theta);
+                *v = *v * (1.0 + of(Stage::Factor)) + of(Stage::Added);
+            }
+        }
         values
     }
 
@@ -251,6 +357,22 @@ impl<'a> SpectrumModel<'a> {
     }
 }
 
+/// Heights of the object, rising.
+fn heights(set: &SpectrumSet) -> Vec<f64> {
+    let mut heights: Vec<f64> = set.spectra.iter().map(|s| s.height_nm).collect();
+    heights.sort_by(f64::total_cmp);
+    heights.dedup();
+    heights
+}
+
+/// Squared sines over the cone, as shares of that of its border, with their weights: light falls by exp(-apodisation) from the axis
+/// of the pupil to its border.
+fn cone(apodisation: f64) -> [(f64, f64); 6] {
+    let nodes = NODES.map(|[x, w]| (0.5 * (x + 1.0), w * (-0.5 * apodisation * (x + 1.0)).exp()));
+    let sum: f64 = nodes.iter().map(|(_, w)| w).sum();
+    nodes.map(|(part, w)| (part, w / sum))
+}
+
 impl RefitModel for SpectrumModel<'_> {
     fn parameters(&self) -> &[RefitParameter] {
         &self.parameters
@@ -270,7 +392,7 @@ impl RefitModel for SpectrumModel<'_> {
 
     fn equations(&self, spectrum: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
         let smooth = self.smooth_stack(spectrum, theta);
-        let base = self.shown(&smooth, theta);
+        let base = self.shown(spectrum, &smooth, theta);
         let measured = &self.set.spectra[spectrum].reflectance;
         let mut columns: Vec<Vec<f64>> = Vec::with_capacity(active.len() + 1);
         for &slot in active {
@@ -284,7 +406,7 @@ impl RefitModel for SpectrumModel<'_> {
             };
             moved[slot] += step;
             let changed = if AFTER_THE_STACK.contains(&slot) {
-                self.shown(&smooth, &moved)
+                self.shown(spectrum, &smooth, &moved)
             } else {
                 self.predicted(spectrum, &moved)
             };
@@ -296,7 +418,11 @@ impl RefitModel for SpectrumModel<'_> {
     }
 
     fn figure_names(&self) -> Vec<(&'static str, &'static str)> {
-        vec![("reflectance, mean of repeats", "rms"), ("reflectance", "rms")]
+        if self.set.is_transmission {
+            vec![("transmission, mean of repeats", "rms"), ("transmission", "rms")]
+        } else {
+            vec![("reflectance, mean of repeats", "rms"), ("reflectance", "rms")]
+        }
     }
 
     fn figures(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
@@ -306,6 +432,14 @@ impl RefitModel for SpectrumModel<'_> {
             (squares / base.len() as f64).sqrt()
         };
         vec![rms(self.mean(spectrum)), rms(&self.set.spectra[spectrum].reflectance)]
+    }
+
+    fn group_name(&self, way: usize, group: usize) -> String {
+        match way {
+            0 => heights(self.set)[group].to_string(),
+            1 if self.has_media() => self.set.media[group].0.clone(),
+            _ => self.set.spectra[group].name.clone(),
+        }
     }
 
     /// A film that is thicker hides the cone of the objective, and the cone hides the film.

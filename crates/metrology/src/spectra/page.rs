@@ -11,6 +11,11 @@ const MOST_SHOWN: usize = 24;
 /// Add the spectra of each object to a page.
 pub(crate) fn figures(page: &mut Page, set: &SpectrumSet, model: &SpectrumModel<'_>, theta: &[f64]) {
     page.section("Measured, model, residual");
+    let measured = if set.is_transmission {
+        "transmission"
+    } else {
+        "reflectance"
+    };
     page.paragraph("The band is the range of the repeats about their mean.");
     for own in set.repeats().iter().take(MOST_SHOWN) {
         let first = own[0];
@@ -20,7 +25,7 @@ pub(crate) fn figures(page: &mut Page, set: &SpectrumSet, model: &SpectrumModel<
         let (medium, _) = &set.media[spectrum.medium];
         let title = format!("{} nm, {medium}", spectrum.height_nm);
         let axis = || Axis::linear("wavelength", "nm");
-        let mut spectra = Chart::new(title.clone(), axis(), Axis::linear("reflectance", "")).size(460.0, 300.0);
+        let mut spectra = Chart::new(title.clone(), axis(), Axis::linear(measured, "")).size(460.0, 300.0);
         spectra.line("measured, mean of repeats", along(mean.to_vec()));
         spectra.line("model", along(predicted.clone()));
         let mut residual = Chart::new(
@@ -42,7 +47,9 @@ pub(crate) fn figures(page: &mut Page, set: &SpectrumSet, model: &SpectrumModel<
             along(mean.iter().zip(&predicted).map(|(m, p)| m - p).collect()),
         );
         let role = if spectrum.fitted { "Fitted" } else { "Not fitted" };
-        page.figure(spectra.caption(format!("{role}.")));
-        page.figure(residual.caption("Residual of the mean of the repeats."));
+        page.row([
+            spectra.caption(format!("{role}.")),
+            residual.caption("Residual of the mean of the repeats."),
+        ]);
     }
 }

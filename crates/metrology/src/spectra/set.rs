@@ -1,4 +1,4 @@
-//! A set of kind `spectra`: reflectance of film stacks with an object of known height.
+//! A set of kind `spectra`: reflectance or transmission of film stacks with an object of known height.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ pub struct Spectrum {
     pub height_nm: f64,
     /// Number of the medium in the object.
     pub medium: usize,
-    /// Reflectance at each wavelength of the set.
+    /// Reflectance, or transmission, at each wavelength of the set.
     pub reflectance: Vec<f64>,
     /// True if it is fitted; if not, it judges.
     pub fitted: bool,
@@ -41,6 +41,8 @@ pub struct SpectrumSet {
     pub path: PathBuf,
     pub title: String,
     pub wavelengths_nm: Vec<f64>,
+    /// True if the light was measured that the substrate receives, and not what comes back.
+    pub is_transmission: bool,
     pub ambient_index: f64,
     /// Layers from the light inwards; one is the object.
     pub layers: Vec<StatedLayer>,
@@ -121,6 +123,8 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> SpectrumSet {
     let ambient_index = stack
         .optional_float("ambient_index", Limits::new(1.0..=3.0, ""))
         .unwrap_or(1.0);
+    let measured = [("reflectance", false), ("transmission", true)];
+    let is_transmission = stack.choice("measured", &measured, Some(false));
     let substrate = material(&stack, "substrate", &folder, &wavelengths_nm);
     let numerical_aperture = stack
         .optional_float("numerical_aperture", Limits::new(0.0..=0.98, ""))
@@ -135,6 +139,7 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> SpectrumSet {
         path: path.to_owned(),
         title,
         wavelengths_nm,
+        is_transmission,
         ambient_index,
         layers,
         substrate,

@@ -129,7 +129,7 @@ mod tests {
                 "min(x, y) + max(x, y) + abs(y) + pi",
                 y + x + y.abs() + std::f64::consts::PI,
             ),
-            ("zernike(6, x, y)", crate::zernike::value(6, x, y)),
+            ("zernike(6, x, y)", evaluate::zernike(6, x, y)),
         ] {
             assert_eq!(value(text, [x, y, a]), want, "{text}");
         }

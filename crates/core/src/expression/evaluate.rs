@@ -1,7 +1,7 @@
 //! Evaluation of an expression, for one site or for a row of them at once.
 
 use super::{Expression, One, Step, Two};
-use crate::zernike;
+use crate::Zernike;
 
 /// Values of a variable along a row.
 #[derive(Clone, Copy)]
@@ -16,6 +16,12 @@ pub enum Input<'a> {
 enum Entry {
     Scalar(f64),
     Row(Vec<f64>),
+}
+
+/// Noll's polynomial of a number at a place of the unit disc, with an rms of one.
+pub(super) fn zernike(j: u32, x: f64, y: f64) -> f64 {
+    let polynomial = Zernike::noll(j);
+    polynomial.norm() * polynomial.value(x, y)
 }
 
 impl One {
@@ -121,7 +127,7 @@ impl Expression {
                 }
                 Step::Zernike(j) => {
                     let (b, a) = (pop(&mut stack), pop(&mut stack));
-                    a.two(b, |x, y| zernike::value(j, x, y))
+                    a.two(b, |x, y| zernike(j, x, y))
                 }
             };
             stack.push(entry);
