@@ -188,7 +188,7 @@ fn run_metrology(
         return Err(Error::refused(
             "calibrate/kind-has-none",
             "--validate, --adopt and --declare are for sets of kind `psf`",
-            "leave the option out: sets of heights and spectra are judged by what was left out of the fit",
+            "leave the option out: sets of heights, spectra and stacks are judged by what was left out of the fit",
         ));
     }
     for ((set, kind), out) in args.sets.iter().zip(kinds).zip(outs) {
@@ -196,7 +196,7 @@ fn run_metrology(
             return Err(Error::refused(
                 "calibrate/kinds",
                 format!(
-                    "{} is not of kind `heights` or `spectra`, another set is",
+                    "{} is not of kind `heights`, `spectra` or `psf_stack`, another set is",
                     set.display()
                 ),
                 "calibrate sets of kind `psf` by a command of their own",
@@ -216,6 +216,9 @@ fn run_metrology(
 fn describe_metrology(done: &Answer) {
     let diagnosis = &done.diagnosis;
     print_line!("{}: {}", diagnosis.set, diagnosis.sentence());
+    for line in &diagnosis.remarks {
+        print_line!("{line}");
+    }
     for line in diagnosis.ladder_lines() {
         print_line!("{line}");
     }

@@ -44,7 +44,7 @@ pub use linear_trend::LinearTrend;
 pub use measurements::{MeasurementEquations, Measurements, ReferenceValue, References, eliminate, own_step};
 pub use refit::{
     LeaveOut, RefitEffect, RefitEquations, RefitErrors, RefitFinding, RefitModel, RefitParameter, RefitPlan,
-    RefitRejection, RefitTried, select,
+    RefitRejection, RefitScope, RefitTried, select,
 };
 pub use search::{
     Alternative, EXPLAINED, EndsSearch, Evidence, Finding, LEAST_GAIN, Pattern, REFERENCES_DECIDE, RandomNoise,

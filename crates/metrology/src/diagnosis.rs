@@ -1,6 +1,6 @@
 //! The answer for programs: `diagnosis.json`, in the shape that sets of point spread functions have.
 
-use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan};
+use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan, RefitScope};
 use metalith_report::{effect_words, sig};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -81,6 +81,9 @@ pub struct Diagnosis {
     pub set: String,
     pub kind: String,
     pub verdict: SetVerdict,
+    /// What was found in the files before any fit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
     pub effects: Vec<FoundEffect>,
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
@@ -102,6 +105,7 @@ pub(crate) struct SetFacts<'a> {
     /// Names of the measurements.
     pub(crate) names: Vec<String>,
     pub(crate) noise_floor: Option<f64>,
+    pub(crate) remarks: &'a [String],
 }
 
 impl Diagnosis {
@@ -125,7 +129,10 @@ impl Diagnosis {
                 unit: unit(&own.slots.iter().map(|&s| parameters[s].unit).collect::<Vec<_>>()),
                 interval: one_or_list(intervals.collect()),
                 parameters: own.slots.iter().map(|&s| parameters[s].name.clone()).collect(),
-                of: own.across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
+                of: match (model.scope(e), own.across) {
+                    (RefitScope::One { way, group }, _) => model.group(way, group).0,
+                    (_, across) => across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
+                },
             }
         };
         let names = model.figure_names();
@@ -188,6 +195,7 @@ impl Diagnosis {
             set: facts.title.into(),
             kind: facts.kind.into(),
             verdict,
+            remarks: facts.remarks.to_vec(),
             effects: found.chosen.iter().map(of_effect).collect(),
             error: ErrorReport {
                 measure: facts.measure.into(),

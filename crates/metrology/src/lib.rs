@@ -1,6 +1,6 @@
-//! Measured heights and spectra of known objects: from a set of files to the effects that its stated model lacks.
+//! Measured heights, spectra and point spread functions of known objects: from a set of files to the effects that its stated model lacks.
 //!
-//! A set is a `measurement.toml` whose `kind` is `heights` or `spectra`. Its files are found by patterns of their names. The
+//! A set is a `measurement.toml` whose `kind` is `heights`, `spectra` or `psf_stack`. Its files are found by patterns of their names. The
 //! model as stated predicts each measurement; effects are selected by `metalith-attribution`; the answer is a
 //! `diagnosis.json` and a page.
 //!
@@ -9,6 +9,7 @@
 //! | `pattern` | names of files by patterns | |
 //! | `heights` | drawn maps and measured maps: set, model, figures | `pattern` |
 //! | `spectra` | reflectance of film stacks: set, model, figures | `pattern` |
+//! | `psf_stack` | stacks of point spread functions of reliefs and complex transmissions: set, light, sensor, model, figures | `pattern`, the transforms of `heights` |
 //! | `diagnosis`, `page` | the answer for programs and for people | |
 //! | `run` | a set from its files to its answer | all above |
 
@@ -16,11 +17,13 @@ mod diagnosis;
 mod heights;
 mod page;
 mod pattern;
+mod psf_stack;
 mod run;
 mod spectra;
 
 pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, Ranked, SetVerdict};
 pub use heights::{HeightField, HeightModel, HeightSet};
 pub use pattern::NamePattern;
+pub use psf_stack::{ApertureShape, StackBench, StackModel, StackObject, StackPlane, StackSet, ThinLens, Transmission};
 pub use run::{Answer, SetKind, calibrate, kind_of};
 pub use spectra::{Spectrum, SpectrumModel, SpectrumSet, StatedLayer};

@@ -9,6 +9,7 @@ use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result};
 use crate::diagnosis::{Diagnosis, SetFacts};
 use crate::heights::{self, HeightModel, HeightSet};
 use crate::page::page;
+use crate::psf_stack::{self, StackModel, StackSet};
 use crate::spectra::{self, SpectrumModel, SpectrumSet};
 
 /// Kind of a measured set.
@@ -16,6 +17,7 @@ use crate::spectra::{self, SpectrumModel, SpectrumSet};
 pub enum SetKind {
     Heights,
     Spectra,
+    PsfStack,
 }
 
 /// The files of an answer.
@@ -43,11 +45,19 @@ pub fn kind_of(set: &Path) -> Option<SetKind> {
     let text = load(&path).ok()?;
     let kind = Document::read(&path, &text, |root| {
         root.accept_others();
-        root.optional_text("kind")
+        // The reader of stacks says what is wrong where objects stand under another kind.
+        let is_stack = root.has("object") && !root.has("layout");
+        let kind = root.optional_text("kind").unwrap_or_else(|| "psf".into());
+        if is_stack && kind == "psf" {
+            "psf_stack".into()
+        } else {
+            kind
+        }
     });
-    match kind.ok()??.as_str() {
+    match kind.ok()?.as_str() {
         "heights" => Some(SetKind::Heights),
         "spectra" => Some(SetKind::Spectra),
+        "psf_stack" => Some(SetKind::PsfStack),
         _ => None,
     }
 }
@@ -78,6 +88,7 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 measure: "height (nm rms)",
                 names: set.fields.iter().map(|f| f.name.clone()).collect(),
                 noise_floor: None,
+                remarks: &[],
             };
             let plan = model.plan();
             answer(&model, &plan, &facts, ("nm", out), progress, |page, theta| {
@@ -94,10 +105,30 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
                 measure: "reflectance (rms)",
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
                 noise_floor: set.repeat_rms(),
+                remarks: &[],
             };
             let plan = model.plan();
             answer(&model, &plan, &facts, ("", out), progress, |page, theta| {
                 spectra::figures(page, &set, &model, theta);
+            })
+        }
+        SetKind::PsfStack => {
+            let mut set = StackSet::read(&path)?;
+            progress.begin("orientation", 0);
+            let prepared = psf_stack::prepare(&mut set)?;
+            let mut model = StackModel::new(&set, &prepared.sampling, prepared.focus_um);
+            model.keep(&tried(&model.own.effects, only)?);
+            let facts = SetFacts {
+                title: &set.title,
+                kind: "psf_stack",
+                measure: "residual over measured norm (rms)",
+                names: set.planes.iter().map(|p| p.name.clone()).collect(),
+                noise_floor: Some(prepared.noise),
+                remarks: &set.remarks,
+            };
+            let plan = model.plan();
+            answer(&model, &plan, &facts, ("", out), progress, |page, theta| {
+                psf_stack::figures(page, &set, &model, theta);
             })
         }
     }

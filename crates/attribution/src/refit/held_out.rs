@@ -42,7 +42,7 @@ impl Selection<'_> {
     }
 
     /// Number of groups of fitted measurements in a way.
-    fn groups(&self, way: &LeaveOut) -> Vec<usize> {
+    pub(super) fn groups(&self, way: &LeaveOut) -> Vec<usize> {
         let fitted = way.groups.iter().zip(&self.plan.fitted).filter(|(_, f)| **f);
         let mut groups: Vec<usize> = fitted.map(|(g, _)| *g).collect();
         groups.sort_unstable();

@@ -15,7 +15,7 @@ mod tests;
 use metalith_core::{Progress, Result};
 
 pub use finding::{RefitErrors, RefitFinding, RefitRejection, RefitTried};
-pub use model::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
+pub use model::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan, RefitScope};
 
 /// Select the effects that explain measurements.
 ///

@@ -5,7 +5,7 @@ use metalith_core::{Progress, Result};
 use super::finding::{RefitErrors, RefitFinding, RefitRejection, RefitTried};
 use super::fit::State;
 use super::held_out::gain;
-use super::model::{RefitModel, RefitPlan};
+use super::model::{RefitModel, RefitPlan, RefitScope};
 use crate::fit::Gain;
 
 /// Least share of the fitted mean square that an effect removes.
@@ -16,6 +16,9 @@ const MAY_GROW: f64 = 0.002;
 
 /// Two effects are taken at once if they gain by this share more than the best one alone.
 const PAIR_SHARE: f64 = 0.1;
+
+/// Candidates that are fitted in each step where a fit is costly and one of them is taken.
+const MOST_TRIED: usize = 6;
 
 /// Steps of the fit of a candidate.
 const TRIAL_STEPS: usize = 5;
@@ -76,10 +79,18 @@ impl Selection<'_> {
         progress.begin(&format!("effects, step {}", course.chosen.len() + 1), open.len() as u64);
         let before = course.ladder[course.ladder.len() - 1].clone();
         let mut best: Option<(State, RefitTried)> = None;
-        for &effect in &open {
+        for (k, (effect, start)) in self
+            .promising(&course.now, open.clone(), progress)?
+            .into_iter()
+            .enumerate()
+        {
+            if self.model.is_costly() && k >= MOST_TRIED && best.is_some() {
+                break;
+            }
             progress.check_stopped()?;
             progress.note(&effects[effect].name);
-            let state = self.fit(self.with(&course.now, effect), TRIAL_STEPS);
+            let start = start.unwrap_or_else(|| self.with(&course.now, effect));
+            let state = self.fit(start, TRIAL_STEPS);
             let tried = self.try_last(effect, &state, &before);
             progress.advance(1);
             if tried.rejected.is_none() && best.as_ref().is_none_or(|(_, most)| tried.gain.value > most.gain.value) {
@@ -87,7 +98,8 @@ impl Selection<'_> {
             }
             course.last[effect] = Some(tried);
         }
-        if course.chosen.is_empty() || best.is_none() && self.model.tries_pairs() {
+        let pairs = course.chosen.is_empty() && !self.model.is_costly();
+        if pairs || best.is_none() && self.model.tries_pairs() {
             let least = best.as_ref().map_or(0.0, |(_, tried)| tried.gain.value);
             if let Some((pair, state)) = self.pair(&course.now, &open, &before, least, progress)? {
                 let first = self.fit(self.with(&course.now, pair[0]), TAKEN_STEPS);
@@ -118,6 +130,25 @@ impl Selection<'_> {
         });
         course.ladder.push(errors);
         Ok(true)
+    }
+
+    /// Candidates, each with the state that its fit starts from if that is known; where a fit is costly, those that promise most
+    /// come first.
+    fn promising(&self, now: &State, open: Vec<usize>, progress: &dyn Progress) -> Result<Vec<(usize, Option<State>)>> {
+        if !self.model.is_costly() {
+            return Ok(open.into_iter().map(|effect| (effect, None)).collect());
+        }
+        let mut out = Vec::new();
+        for effect in open {
+            progress.check_stopped()?;
+            let start = self.with(now, effect);
+            out.push((start.promised(), effect, start));
+        }
+        out.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Ok(out
+            .into_iter()
+            .map(|(_, effect, start)| (effect, Some(start)))
+            .collect())
     }
 
     /// The two effects that predict most together what was left out, with their fit; none that gain less than `least` by so much
@@ -285,7 +316,10 @@ impl Selection<'_> {
 
     /// Gains in each way of leaving out that judges an effect.
     fn gains(&self, effect: usize, errors: &RefitErrors, before: &RefitErrors) -> Vec<(usize, Gain)> {
-        let across = self.model.effects()[effect].across;
+        let across = match self.model.scope(effect) {
+            RefitScope::One { way, .. } => Some(way),
+            _ => self.model.effects()[effect].across,
+        };
         (0..self.plan.ways.len())
             .filter(|&w| Some(w) != across && errors.held_out[w].is_some())
             .map(|w| (w, gain(&before.own[w], &errors.own[w])))
@@ -311,6 +345,8 @@ impl Selection<'_> {
                 before: before.held_out[*w].unwrap_or(0.0),
                 after: errors.held_out[*w].unwrap_or(0.0),
             })
+        } else if let Some(worse) = self.worse_in_a_group(effect, before, errors) {
+            Some(worse)
         } else if let Some(worse) = self.worse(before, errors) {
             Some(worse)
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.interval[0] <= 0.0) {
@@ -322,6 +358,35 @@ impl Selection<'_> {
         } else {
             None
         }
+    }
+
+    /// Rejection by one of the groups that an effect has to hold in: its measurements, as they are left out in the first way.
+    fn worse_in_a_group(&self, effect: usize, before: &RefitErrors, after: &RefitErrors) -> Option<RefitRejection> {
+        let RefitScope::Every { way } = self.model.scope(effect) else {
+            return None;
+        };
+        let own = &self.plan.ways[way];
+        let mut groups = self.groups(own);
+        groups.sort_by_key(|&group| self.model.group(way, group).1);
+        let rms = |errors: &RefitErrors, group: usize| {
+            let left = errors.own[0].iter().zip(&own.groups).filter(|(_, g)| **g == group);
+            let (sum, n) = left
+                .filter_map(|(v, _)| *v)
+                .fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+            (sum / f64::max(n, 1.0)).sqrt()
+        };
+        let worse = |&group: &usize| rms(after, group) > (1.0 + MAY_GROW) * rms(before, group);
+        let group = groups.into_iter().find(worse)?;
+        Some(RefitRejection::Worse {
+            what: format!(
+                "{} `{}` where each {} is left out",
+                own.name,
+                self.model.group(way, group).0,
+                self.plan.ways[0].name
+            ),
+            before: rms(before, group),
+            after: rms(after, group),
+        })
     }
 
     /// Rejection by a figure of measurements that were never fitted.
