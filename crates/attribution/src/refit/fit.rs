@@ -20,7 +20,7 @@ pub(super) struct State {
 }
 
 impl State {
-    fn sum_of_squares(&self) -> f64 {
+    pub(super) fn sum_of_squares(&self) -> f64 {
         let last = self.total.nrows() - 1;
         self.total[(last, last)]
     }

@@ -7,6 +7,7 @@
 mod finding;
 mod fit;
 mod held_out;
+mod joint;
 mod model;
 mod selection;
 #[cfg(test)]

@@ -90,9 +90,19 @@ pub trait RefitModel: Sync {
         false
     }
 
+    /// Least share of the fitted mean square that an effect removes; below it is the error of a model.
+    fn least_share(&self) -> f64 {
+        0.004
+    }
+
     /// Groups in which an effect has to hold.
     fn scope(&self, _effect: usize) -> RefitScope {
         RefitScope::Bench
+    }
+
+    /// Effect of all groups of which this is the effect of one group.
+    fn common(&self, _effect: usize) -> Option<usize> {
+        None
     }
 
     /// Name of a group of a way of leaving out, and its place in the order in which groups judge.

@@ -8,9 +8,6 @@ use super::held_out::gain;
 use super::model::{RefitModel, RefitPlan, RefitScope};
 use crate::fit::Gain;
 
-/// Least share of the fitted mean square that an effect removes.
-const LEAST_SHARE: f64 = 0.004;
-
 /// A figure of measurements that were never fitted may grow by this share: rounding, and steps of a fit that end early.
 const MAY_GROW: f64 = 0.002;
 
@@ -21,10 +18,10 @@ const PAIR_SHARE: f64 = 0.1;
 const MOST_TRIED: usize = 6;
 
 /// Steps of the fit of a candidate.
-const TRIAL_STEPS: usize = 5;
+pub(super) const TRIAL_STEPS: usize = 5;
 
 /// Steps of the fit of what was taken.
-const TAKEN_STEPS: usize = 12;
+pub(super) const TAKEN_STEPS: usize = 12;
 
 /// A model and the roles of its measurements.
 pub(super) struct Selection<'a> {
@@ -33,14 +30,14 @@ pub(super) struct Selection<'a> {
 }
 
 /// State of a selection between two steps.
-struct Course {
-    now: State,
+pub(super) struct Course {
+    pub(super) now: State,
     /// Effects in the order in which they were taken.
-    chosen: Vec<usize>,
+    pub(super) chosen: Vec<usize>,
     /// Errors before, and after each of them.
-    ladder: Vec<RefitErrors>,
+    pub(super) ladder: Vec<RefitErrors>,
     /// Each effect as it was tried last.
-    last: Vec<Option<RefitTried>>,
+    pub(super) last: Vec<Option<RefitTried>>,
 }
 
 /// Errors of a fit, and the 95 % interval of each parameter.
@@ -64,6 +61,9 @@ impl Selection<'_> {
             last: vec![None; self.model.effects().len()],
         };
         while self.step(&mut course, progress)? {}
+        if self.take_for_groups(&mut course, progress)? {
+            while self.step(&mut course, progress)? {}
+        }
         self.drop_redundant(&mut course);
         let mut intervals = self.intervals(&course.now);
         self.add_values_of_groups(&mut course, &mut intervals);
@@ -79,24 +79,32 @@ impl Selection<'_> {
         progress.begin(&format!("effects, step {}", course.chosen.len() + 1), open.len() as u64);
         let before = course.ladder[course.ladder.len() - 1].clone();
         let mut best: Option<(State, RefitTried)> = None;
-        for (k, (effect, start)) in self
-            .promising(&course.now, open.clone(), progress)?
-            .into_iter()
-            .enumerate()
-        {
-            if self.model.is_costly() && k >= MOST_TRIED && best.is_some() {
+        // Effects of one group are tried where no other helps.
+        let (common, own): (Vec<usize>, Vec<usize>) =
+            { open.iter() }.partition(|&&e| !matches!(self.model.scope(e), RefitScope::One { .. }));
+        for (pass, open) in [common.clone(), own].into_iter().enumerate() {
+            if best.is_some() {
                 break;
             }
-            progress.check_stopped()?;
-            progress.note(&effects[effect].name);
-            let start = start.unwrap_or_else(|| self.with(&course.now, effect));
-            let state = self.fit(start, TRIAL_STEPS);
-            let tried = self.try_last(effect, &state, &before);
-            progress.advance(1);
-            if tried.rejected.is_none() && best.as_ref().is_none_or(|(_, most)| tried.gain.value > most.gain.value) {
-                best = Some((state, tried.clone()));
+            if pass == 1 && self.model.is_costly() && self.take_together(course, &common, progress)? {
+                return Ok(true);
             }
-            course.last[effect] = Some(tried);
+            for (k, (effect, start)) in { self.promising(&course.now, open, progress)?.into_iter() }.enumerate() {
+                if self.model.is_costly() && k >= MOST_TRIED && best.is_some() {
+                    break;
+                }
+                progress.check_stopped()?;
+                progress.note(&effects[effect].name);
+                let start = start.unwrap_or_else(|| self.with(&course.now, effect));
+                let state = self.fit(start, TRIAL_STEPS);
+                let tried = self.try_last(effect, &state, &before);
+                progress.advance(1);
+                if tried.rejected.is_none() && best.as_ref().is_none_or(|(_, most)| tried.gain.value > most.gain.value)
+                {
+                    best = Some((state, tried.clone()));
+                }
+                course.last[effect] = Some(tried);
+            }
         }
         let pairs = course.chosen.is_empty() && !self.model.is_costly();
         if pairs || best.is_none() && self.model.tries_pairs() {
@@ -134,7 +142,12 @@ impl Selection<'_> {
 
     /// Candidates, each with the state that its fit starts from if that is known; where a fit is costly, those that promise most
     /// come first.
-    fn promising(&self, now: &State, open: Vec<usize>, progress: &dyn Progress) -> Result<Vec<(usize, Option<State>)>> {
+    pub(super) fn promising(
+        &self,
+        now: &State,
+        open: Vec<usize>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<(usize, Option<State>)>> {
         if !self.model.is_costly() {
             return Ok(open.into_iter().map(|effect| (effect, None)).collect());
         }
@@ -298,7 +311,7 @@ impl Selection<'_> {
     }
 
     /// An effect as if it were tried last.
-    fn try_last(&self, effect: usize, after: &State, before: &RefitErrors) -> RefitTried {
+    pub(super) fn try_last(&self, effect: usize, after: &State, before: &RefitErrors) -> RefitTried {
         self.tried(effect, after, self.judge(after), before)
     }
 
@@ -337,7 +350,7 @@ impl Selection<'_> {
         };
         let way = |w: usize| &self.plan.ways[w].name;
         // A figure that is no number explains nothing.
-        if score.is_nan() || score < LEAST_SHARE {
+        if score.is_nan() || score < self.model.least_share() {
             Some(RefitRejection::Little(score))
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.value < 0.0) {
             Some(RefitRejection::Worse {
@@ -424,6 +437,6 @@ const NO_GAIN: Gain = Gain {
 };
 
 /// Share of the fitted mean square that is gone.
-fn share_removed(before: &RefitErrors, after: &RefitErrors) -> f64 {
+pub(super) fn share_removed(before: &RefitErrors, after: &RefitErrors) -> f64 {
     1.0 - (after.fitted / before.fitted.max(f64::MIN_POSITIVE)).powi(2)
 }

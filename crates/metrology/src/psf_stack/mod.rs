@@ -9,8 +9,11 @@ mod model;
 mod orientation;
 mod page;
 mod sampling;
+mod selection;
 mod set;
 mod setting;
+#[cfg(test)]
+mod tests;
 
 use metalith_core::Result;
 

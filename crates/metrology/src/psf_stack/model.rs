@@ -1,9 +1,10 @@
 //! Forward model of stacks.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use metalith_attribution::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan, RefitScope};
+use metalith_attribution::{LeaveOut, RefitEffect, RefitPlan};
 use ndarray::Array2;
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -12,44 +13,51 @@ use super::detector::{Detector, Images, Measured, eliminated};
 use super::light::{Light, Place};
 use super::sampling::Sampling;
 use super::set::StackSet;
-use super::setting::{self, BY_OBJECT, Effects, Setting};
+use super::setting::{self, Effects, Setting};
 
 /// Memory for predictions that are kept (bytes).
 const KEPT_BYTES: usize = 400_000_000;
 
-/// Planes of each object by which a fit finds where to start.
-const SCANNED: usize = 3;
-
-/// Share by which another start has to be better.
-const BETTER_START: f64 = 0.005;
+/// Steps of a derivative by which a parameter may move before derivatives are taken anew.
+const NEAR: f64 = 6.0;
 
 /// Whole pixels by which a pattern may wander from where the stated model has it, while effects are tried.
 const WANDERS: usize = 5;
 
+/// Change of a prediction with a parameter, and the values of all parameters where it was taken.
+pub(super) struct Change {
+    theta: Vec<f64>,
+    pub(super) values: Vec<f32>,
+}
+
 /// A set of stacks with its forward model.
 pub struct StackModel<'a> {
-    set: &'a StackSet,
+    pub(super) set: &'a StackSet,
     light: Light<'a>,
     detector: Detector,
     /// Parameters and effects that are tried.
     pub(crate) own: Effects,
-    measured: Vec<Measured>,
+    pub(super) measured: Vec<Measured>,
     /// Whole pixels by which each frame is displaced from the stated model.
     origins: Vec<[f64; 2]>,
     /// Middle of the positions of the planes (um).
     middle_um: f64,
     kept: Vec<Mutex<Vec<Arc<Base>>>>,
     keep: usize,
+    /// Times that starts of each effect were compared.
+    pub(super) scans: Vec<AtomicUsize>,
 }
 
 /// Prediction of a plane for a setting.
-struct Base {
+pub(super) struct Base {
     setting: Setting,
+    /// Values of all parameters.
+    theta: Vec<f64>,
     shift: [f64; 2],
-    images: Images,
+    pub(super) images: Images,
     gain: f32,
-    residual: Vec<f32>,
-    columns: Mutex<BTreeMap<usize, Arc<Vec<f32>>>>,
+    pub(super) residual: Vec<f32>,
+    columns: Mutex<BTreeMap<usize, Arc<Change>>>,
 }
 
 impl<'a> StackModel<'a> {
@@ -73,7 +81,9 @@ impl<'a> StackModel<'a> {
             middle_um: 0.5 * (low + high),
             kept: set.planes.iter().map(|_| Mutex::default()).collect(),
             keep: keep.clamp(1, 5),
+            scans: Vec::new(),
         };
+        out.scans = out.own.effects.iter().map(|_| AtomicUsize::new(0)).collect();
         if set.bench.shift {
             let mut theta = vec![0.0; out.own.parameters.len()];
             theta[setting::FOCUS] = focus_um;
@@ -146,7 +156,8 @@ impl<'a> StackModel<'a> {
     }
 
     /// Prediction of a plane, registered to its frame.
-    fn predict(&self, m: usize, setting: &Setting) -> Base {
+    pub(super) fn predict(&self, m: usize, theta: &[f64]) -> Base {
+        let setting = &self.setting(theta, self.set.planes[m].object);
         let spectrum = self.spectrum(m, setting);
         let measured = &self.measured[m];
         let (shift, images) = if self.set.bench.shift {
@@ -170,6 +181,7 @@ impl<'a> StackModel<'a> {
         }
         Base {
             setting: *setting,
+            theta: theta.to_vec(),
             shift,
             images,
             gain,
@@ -178,11 +190,12 @@ impl<'a> StackModel<'a> {
         }
     }
 
-    fn base(&self, m: usize, setting: &Setting) -> Arc<Base> {
+    pub(super) fn base(&self, m: usize, theta: &[f64]) -> Arc<Base> {
+        let setting = &self.setting(theta, self.set.planes[m].object);
         let mut kept = self.kept[m].lock().unwrap_or_else(PoisonError::into_inner);
         let base = match kept.iter().position(|b| b.setting == *setting) {
             Some(at) => kept.remove(at),
-            None => Arc::new(self.predict(m, setting)),
+            None => Arc::new(self.predict(m, theta)),
         };
         if kept.len() >= self.keep {
             kept.remove(0);
@@ -192,7 +205,7 @@ impl<'a> StackModel<'a> {
     }
 
     /// Square of the relative error of a plane.
-    fn error(&self, m: usize, base: &Base) -> f64 {
+    pub(super) fn error(&self, m: usize, base: &Base) -> f64 {
         let used = &self.measured[m].used;
         base.residual
             .iter()
@@ -202,7 +215,7 @@ impl<'a> StackModel<'a> {
     }
 
     /// Change of the prediction with a parameter; none if there is no change.
-    fn column(&self, m: usize, base: &Base, slot: usize, theta: &[f64]) -> Option<Arc<Vec<f32>>> {
+    pub(super) fn column(&self, m: usize, base: &Base, slot: usize, theta: &[f64]) -> Option<Arc<Change>> {
         let step = self.own.steps[slot];
         let mut moved = theta.to_vec();
         moved[slot] += step;
@@ -211,19 +224,41 @@ impl<'a> StackModel<'a> {
         if setting == base.setting {
             return None;
         }
+        let near = self.near(m, base, slot);
         let mut columns = base.columns.lock().unwrap_or_else(PoisonError::into_inner);
         let column = columns.entry(slot).or_insert_with(|| {
+            if let Some(near) = near {
+                return near;
+            }
             let there = self.detector.image(&self.spectrum(m, &setting), base.shift);
             let factor = base.gain / step as f32;
-            let change = there.iter().zip(&base.images.value).map(|(a, b)| (a - b) * factor);
-            Arc::new(change.collect())
+            let change = { there.iter().zip(&base.images.value) }.map(|(a, b)| (a - b) * factor);
+            Arc::new(Change {
+                theta: theta.to_vec(),
+                values: change.collect(),
+            })
         });
         Some(column.clone())
     }
 
+    /// The change with a parameter at a prediction so near that it is almost equal.
+    fn near(&self, m: usize, base: &Base, slot: usize) -> Option<Arc<Change>> {
+        let kept = self.kept[m].lock().unwrap_or_else(PoisonError::into_inner);
+        let is_near = |change: &Change| {
+            let moved = base.theta.iter().zip(&change.theta).zip(&self.own.steps);
+            { moved }.all(|((a, b), step)| (a - b).abs() <= NEAR * step)
+        };
+        let others = kept.iter().rev().filter(|other| !std::ptr::eq(&***other, base));
+        let change = |other: &Arc<Base>| {
+            let columns = other.columns.lock().unwrap_or_else(PoisonError::into_inner);
+            columns.get(&slot).filter(|c| is_near(c)).cloned()
+        };
+        { others }.find_map(change)
+    }
+
     /// A predicted frame and the measured one, both over the norm of the measured one.
     pub(crate) fn pair(&self, m: usize, theta: &[f64]) -> [Array2<f64>; 2] {
-        let base = self.base(m, &self.setting(theta, self.set.planes[m].object));
+        let base = self.base(m, theta);
         let shape = self.set.planes[m].frame.dim();
         let measured = &self.measured[m].values;
         let predicted = measured
@@ -233,167 +268,5 @@ impl<'a> StackModel<'a> {
             .collect();
         let measured = measured.iter().map(|v| f64::from(*v)).collect();
         [measured, predicted].map(|v| Array2::from_shape_vec(shape, v).expect("as many as pixels"))
-    }
-
-    /// Planes by which starts are compared: the planes of objects that an effect changes.
-    fn scanned(&self, effect: usize) -> Vec<usize> {
-        let planes = &self.set.planes;
-        let objects = 0..self.set.objects.len();
-        let of = |object: usize| -> Vec<usize> {
-            let own: Vec<usize> = (0..planes.len())
-                .filter(|&m| planes[m].object == object && planes[m].fitted)
-                .collect();
-            let n = own.len();
-            let mut picked: Vec<usize> = (0..SCANNED.min(n))
-                .map(|k| own[(2 * k + 1) * n / (2 * SCANNED.min(n))])
-                .collect();
-            picked.dedup();
-            picked
-        };
-        match self.own.scopes[effect] {
-            RefitScope::One { group, .. } => of(group),
-            _ => objects.flat_map(of).collect(),
-        }
-    }
-}
-
-impl RefitModel for StackModel<'_> {
-    fn parameters(&self) -> &[RefitParameter] {
-        &self.own.parameters
-    }
-
-    fn effects(&self) -> &[RefitEffect] {
-        &self.own.effects
-    }
-
-    fn count(&self) -> usize {
-        self.set.planes.len()
-    }
-
-    /// Frames have norm one, so that a root mean square is the relative error.
-    fn points(&self, _: usize) -> f64 {
-        1.0
-    }
-
-    fn equations(&self, m: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
-        let base = self.base(m, &self.setting(theta, self.set.planes[m].object));
-        let none = vec![0.0_f32; base.residual.len()];
-        let columns: Vec<_> = active.iter().map(|&slot| self.column(m, &base, slot, theta)).collect();
-        let mut all: Vec<&[f32]> = columns
-            .iter()
-            .map(|c| c.as_ref().map_or(&none[..], |c| &c[..]))
-            .collect();
-        all.push(&base.residual);
-        let ones = vec![1.0_f32; none.len()];
-        let mut own: Vec<&[f32]> = vec![&base.images.value];
-        if self.set.bench.background {
-            own.push(&ones);
-        }
-        if self.set.bench.shift {
-            own.extend(base.images.along.iter().map(|v| &v[..]));
-        }
-        let mut form = eliminated(&all, &own, &self.measured[m].used);
-        let last = active.len();
-        form[(last, last)] = self.error(m, &base);
-        RefitEquations::alike(form)
-    }
-
-    fn figure_names(&self) -> Vec<(&'static str, &'static str)> {
-        vec![
-            ("residual over measured norm", ""),
-            ("residual over measured norm, each at its peak", ""),
-            ("1 - correlation", ""),
-        ]
-    }
-
-    fn is_mean(&self, figure: usize) -> bool {
-        figure == 2
-    }
-
-    fn figures(&self, m: usize, theta: &[f64]) -> Vec<f64> {
-        let base = self.base(m, &self.setting(theta, self.set.planes[m].object));
-        let measured = &self.measured[m];
-        let own = || {
-            measured
-                .values
-                .iter()
-                .zip(&base.images.value)
-                .zip(&measured.used)
-                .filter(|(_, u)| **u > 0.0)
-        };
-        let top = own().map(|((_, i), _)| f64::from(*i)).fold(f64::MIN_POSITIVE, f64::max);
-        let scale = measured.peak / top;
-        let at_peak: f64 = own()
-            .map(|((v, i), _)| (f64::from(*v) - scale * f64::from(*i)).powi(2))
-            .sum();
-        let count = own().count().max(1) as f64;
-        let mean = |part: &dyn Fn(f64, f64) -> f64| {
-            own().map(|((v, i), _)| part(f64::from(*v), f64::from(*i))).sum::<f64>() / count
-        };
-        let (v, i) = (mean(&|v, _| v), mean(&|_, i| i));
-        let [vv, ii, vi] = [
-            mean(&|v, _| v * v) - v * v,
-            mean(&|_, i| i * i) - i * i,
-            mean(&|v, i| v * i) - v * i,
-        ];
-        let correlation = vi / (vv * ii).sqrt().max(f64::MIN_POSITIVE);
-        vec![self.error(m, &base).sqrt(), at_peak.sqrt(), 1.0 - correlation]
-    }
-
-    fn decides(&self, figure: usize) -> bool {
-        figure == 0
-    }
-
-    fn is_costly(&self) -> bool {
-        true
-    }
-
-    fn scope(&self, effect: usize) -> RefitScope {
-        self.own.scopes[effect]
-    }
-
-    /// Objects without a mask judge an effect of the lens first.
-    fn group(&self, way: usize, group: usize) -> (String, usize) {
-        match self.set.objects.get(group).filter(|_| way == BY_OBJECT) {
-            Some(object) => (object.name.clone(), usize::from(object.transmission.is_some())),
-            None => (group.to_string(), group),
-        }
-    }
-
-    fn start(&self, effect: usize, theta: &[f64]) -> Vec<f64> {
-        let slots = &self.own.effects[effect].slots;
-        let from: Vec<f64> = slots.iter().map(|&s| self.own.parameters[s].start).collect();
-        let Some((step, n)) = self.own.scans[effect] else {
-            return from;
-        };
-        let planes = self.scanned(effect);
-        let line = (-n..=n).map(|k| f64::from(k) * step);
-        let candidates: Vec<Vec<f64>> = if slots.len() == 1 {
-            line.map(|v| vec![v]).collect()
-        } else {
-            let ys = line.clone();
-            line.flat_map(|x| ys.clone().map(move |y| vec![x, y])).collect()
-        };
-        let errors: Vec<f64> = candidates
-            .par_iter()
-            .map(|values| {
-                let mut theta = theta.to_vec();
-                slots.iter().zip(values).for_each(|(&s, v)| theta[s] += v);
-                let error = |&m: &usize| {
-                    let setting = self.setting(&theta, self.set.planes[m].object);
-                    self.error(m, &self.predict(m, &setting))
-                };
-                planes.iter().map(error).sum()
-            })
-            .collect();
-        let middle = errors[errors.len() / 2];
-        let best = (0..errors.len())
-            .min_by(|&a, &b| errors[a].total_cmp(&errors[b]))
-            .unwrap_or(0);
-        if errors[best] < (1.0 - BETTER_START) * middle {
-            candidates[best].clone()
-        } else {
-            from
-        }
     }
 }

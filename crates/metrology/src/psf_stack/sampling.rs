@@ -7,12 +7,15 @@ use super::set::StackSet;
 /// Most samples across the light that are simulated.
 const MOST_SAMPLES: usize = 2048;
 
+/// Fewest samples across the light: the rim of a round opening is cut roughly by fewer.
+const FEWEST_SAMPLES: usize = 96;
+
 /// Most points along a pixel.
 const MOST_FINE: usize = 8;
 
 /// Window that a Fourier sum repeats after, over the window of the sensor: what an average over samples takes off the rim of the
-/// window is then below 5 %.
-const PERIOD: f64 = 3.0;
+/// window is then below 7 % of the amplitude.
+const PERIOD: f64 = 2.5;
 
 /// Largest half angle of the light (rad): propagation is paraxial.
 const LARGEST_ANGLE: f64 = 0.3;
@@ -151,10 +154,14 @@ impl Sampling {
                 "a pixel up to 4 spots wide is simulated: use a smaller pixel, or bin less",
             );
         }
+        n = fft_size(n.max(FEWEST_SAMPLES).next_multiple_of(2));
+        if method == Method::FourierSum && !at_lens {
+            dx_um = GROWTH * light_um / n as f64;
+        }
         let middle = 0.5 * (nearest + farthest);
         let mut out = Self {
             method,
-            n: fft_size(n.max(64).next_multiple_of(2)),
+            n,
             dx_um,
             fine,
             padded,

@@ -199,7 +199,7 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
     let several = set.planes.iter().any(|p| p.number != set.planes[0].number);
     let every = RefitScope::Every { way: BY_OBJECT };
     let focus = Some((2.0 * depth_um, 8));
-    let shift = Some((0.04 * sampling.aperture_um, 3));
+    let shift = Some((0.06 * sampling.aperture_um, 2));
     b.effect("focus_offset".into(), vec![FOCUS], every, focus);
     if several {
         b.effect(
@@ -226,7 +226,7 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
     }
     b.effect("aperture_scale".into(), vec![APERTURE], RefitScope::Bench, None);
     for (group, object) in set.objects.iter().enumerate() {
-        let end = format!("_of_{}", object.name);
+        let end = end_of(&object.name);
         let first = BENCH + OWN * group;
         b.common(&end, [true, true]);
         b.zernikes(&end);
@@ -256,6 +256,12 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
         b.wavefront(["", &end], first + OWN_ZERNIKE, one);
     }
     b.out
+}
+
+/// End of the names of the effects of one object.
+pub(super) fn end_of(object: &str) -> String {
+    let letters = object.chars().map(|c| if c.is_alphanumeric() { c } else { '_' });
+    format!("_of_{}", letters.collect::<String>())
 }
 
 /// Number of parameters of a set.
