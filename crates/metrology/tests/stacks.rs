@@ -35,8 +35,10 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
 
+type Phase = fn(f64, f64) -> f64;
+
 /// Phases (rad) of the objects over places in units of the radius; the first is the open aperture.
-const OBJECTS: [(&str, fn(f64, f64) -> f64); 3] = [
+const OBJECTS: [(&str, Phase); 3] = [
     ("open", |_, _| 0.0),
     ("cubic", |x, y| 7.0 * (x * x * x + y * y * y)),
     ("lobes", |x, y| {

@@ -60,7 +60,7 @@ pub(crate) struct Sampling {
 fn fft_size(n: usize) -> usize {
     let smooth = |mut k: usize| {
         for p in [2, 3, 5] {
-            while k % p == 0 {
+            while k.is_multiple_of(p) {
                 k /= p;
             }
         }
