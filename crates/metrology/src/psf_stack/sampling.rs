@@ -86,7 +86,7 @@ impl Sampling {
         let light_um = b.lens.filter(|_| at_lens).map_or(b.aperture_um, |l| l.diameter_um);
         let least_um = b.wavelengths.iter().map(|w| w[0]).fold(f64::MAX, f64::min);
         let middle_um: f64 = b.wavelengths.iter().map(|[um, w]| um * w).sum();
-        let refused = |what: String, hint: &str| Err(Error::refused("psf_stack/sampling", what, hint));
+        let refused = |what: String, hint: &str| Err(Error::refused("stacks/not-sampled", what, hint));
         let distances: Vec<f64> = set.planes.iter().map(|p| b.sensor_um + p.position_um).collect();
         let nearest = distances.iter().copied().fold(f64::MAX, f64::min);
         let farthest = distances.iter().copied().fold(f64::MIN, f64::max);
