@@ -26,6 +26,9 @@ pub(super) fn frames(path: &Path) -> Result<Vec<Array2<f32>>, String> {
         "csv" | "txt" => vec![from_csv(path)?],
         _ => from_npy(path)?,
     };
+    if frames.is_empty() {
+        return Err("it has no frame".into());
+    }
     let wrong = frames.iter().flatten().filter(|v| !v.is_finite()).count();
     match wrong {
         0 => Ok(frames),
