@@ -174,9 +174,7 @@ not_fitted = [2]
     std::fs::write(folder.path().join("measurement.toml"), text).unwrap();
     let out = folder.path().join("out");
     assert_eq!(kind_of(folder.path()), Some(SetKind::PsfStack));
-    let only: Vec<String> =
-        std::env::var("ONLY").map_or_else(|_| Vec::new(), |v| v.split(',').map(String::from).collect());
-    let answer = calibrate(folder.path(), SetKind::PsfStack, &out, &only, &Silent)
+    let answer = calibrate(folder.path(), SetKind::PsfStack, &out, &[], &Silent)
         .unwrap()
         .diagnosis;
     println!("{}", answer.sentence());

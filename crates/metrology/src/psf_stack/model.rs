@@ -248,7 +248,10 @@ impl<'a> StackModel<'a> {
             let moved = base.theta.iter().zip(&change.theta).zip(&self.own.steps);
             { moved }.all(|((a, b), step)| (a - b).abs() <= NEAR * step)
         };
-        let others = kept.iter().rev().filter(|other| !std::ptr::eq(Arc::as_ptr(other), base));
+        let others = kept
+            .iter()
+            .rev()
+            .filter(|other| !std::ptr::eq(Arc::as_ptr(other), base));
         let change = |other: &Arc<Base>| {
             let columns = other.columns.lock().unwrap_or_else(PoisonError::into_inner);
             columns.get(&slot).filter(|c| is_near(c)).cloned()
