@@ -194,7 +194,7 @@ fn run_metrology(
         return Err(Error::refused(
             "calibrate/kind-has-none",
             "--validate and --adopt are for sets of kind `psf`",
-            "leave the option out: sets of heights, spectra and widths are judged by what was left out of the fit",
+            "leave the option out: sets of heights, spectra, widths and stacks are judged by what was left out of the fit",
         ));
     }
     for ((set, kind), out) in args.sets.iter().zip(kinds).zip(outs) {
@@ -202,7 +202,7 @@ fn run_metrology(
             return Err(Error::refused(
                 "calibrate/kinds",
                 format!(
-                    "{} is not of kind `heights`, `spectra` or `widths`, another set is",
+                    "{} is not of kind `heights`, `spectra`, `widths` or `psf_stack`, another set is",
                     set.display()
                 ),
                 "calibrate sets of kind `psf` by a command of their own",
@@ -222,6 +222,9 @@ fn run_metrology(
 fn describe_metrology(done: &Answer) {
     let diagnosis = &done.diagnosis;
     print_line!("{}: {}", diagnosis.set, diagnosis.sentence());
+    for line in &diagnosis.remarks {
+        print_line!("{line}");
+    }
     for line in diagnosis.ladder_lines() {
         print_line!("{line}");
     }

@@ -47,7 +47,7 @@ pub use linear_trend::LinearTrend;
 pub use measurements::{MeasurementEquations, Measurements, ReferenceValue, References, eliminate, own_step};
 pub use refit::{
     LeaveOut, RefitEffect, RefitEquations, RefitErrors, RefitFinding, RefitModel, RefitParameter, RefitPlan,
-    RefitRejection, RefitTried, select, try_beside,
+    RefitRejection, RefitScope, RefitTried, select, try_beside,
 };
 pub use search::{
     Alternative, EXPLAINED, EndsSearch, Evidence, Finding, LEAST_GAIN, Pattern, REFERENCES_DECIDE, RandomNoise,

@@ -34,6 +34,8 @@ pub enum NpyError {
     Type,
     #[error("its entries are neither float32, float64, complex64 nor complex128")]
     NoPhase,
+    #[error("its entries are neither complex64 nor complex128")]
+    NoField,
     #[error("it ends early: {0}")]
     Short(io::Error),
 }
@@ -66,6 +68,34 @@ pub fn read_phases(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Ar
         return Err(NpyError::NotAFile);
     }
     phases_from(BufReader::new(File::open(path)?), takes)
+}
+
+/// Read complex64 or complex128 fields of two axes, in C or Fortran order: real part and imaginary part in turn.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_fields(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(NpyError::NotAFile);
+    }
+    let (npy, shape, columns_first) = opened(BufReader::new(File::open(path)?), |shape, _| takes(shape))?;
+    let fields: io::Result<Vec<Complex64>> = match npy.try_data::<Complex64>() {
+        Ok(data) => data.collect(),
+        Err(npy) => {
+            let data = npy.try_data::<Complex32>().map_err(|_| NpyError::NoField)?;
+            data.map(|v| v.map(|v| Complex64::new(v.re.into(), v.im.into())))
+                .collect()
+        }
+    };
+    let fields = fields.map_err(NpyError::Short)?;
+    let part =
+        |of: fn(&Complex64) -> f64| rows_first(shape.clone(), columns_first, fields.iter().map(of).collect()).values;
+    let (real, imaginary) = (part(|v| v.re), part(|v| v.im));
+    Ok(Array {
+        shape: shape.clone(),
+        values: real.into_iter().zip(imaginary).flat_map(|(a, b)| [a, b]).collect(),
+        whole: false,
+    })
 }
 
 fn phases_from(from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {

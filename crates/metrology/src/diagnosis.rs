@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan};
+use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan, RefitScope};
 use metalith_report::{effect_words, sig};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -87,6 +87,9 @@ pub struct Diagnosis {
     pub set: String,
     pub kind: String,
     pub verdict: SetVerdict,
+    /// What was found in the files before any fit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
     pub effects: Vec<FoundEffect>,
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
@@ -125,6 +128,7 @@ pub(crate) struct SetFacts<'a> {
     pub(crate) noise_floor: Option<f64>,
     /// True if many measurements tell of an effect that is far below the difference of repeats.
     pub(crate) averages: bool,
+    pub(crate) remarks: &'a [String],
 }
 
 impl Diagnosis {
@@ -157,7 +161,10 @@ impl Diagnosis {
                         Some(named.collect())
                     })
                     .collect(),
-                of: own.across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
+                of: match (model.scope(e), own.across) {
+                    (RefitScope::One { way, group }, _) => model.group(way, group).0,
+                    (_, across) => across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
+                },
             }
         };
         let names = model.figure_names();
@@ -244,6 +251,7 @@ impl Diagnosis {
             set: facts.title.into(),
             kind: facts.kind.into(),
             verdict,
+            remarks: facts.remarks.to_vec(),
             effects: found.chosen.iter().map(of_effect).collect(),
             error: ErrorReport {
                 measure: facts.measure.into(),

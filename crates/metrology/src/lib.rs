@@ -1,6 +1,8 @@
-//! Measured heights, spectra and widths of known objects: from a set of files to the effects that its stated model lacks.
+//! Measured heights, spectra, widths and point spread functions of known objects: from a set of files to the effects that its stated
+//! model lacks.
 //!
-//! A set is a `measurement.toml` whose `kind` is `heights`, `spectra` or `widths`. Its files are found by patterns of their names. The
+//! A set is a `measurement.toml` whose `kind` is `heights`, `spectra`, `widths` or `psf_stack`. Its files are found by patterns of
+//! their names. The
 //! model as stated predicts each measurement; effects are selected by `metalith-attribution`; the answer is a
 //! `diagnosis.json` and a page.
 //!
@@ -12,6 +14,7 @@
 //! | `heights` | drawn maps and measured maps: set, model, figures | `pattern`, `declared` |
 //! | `spectra` | reflectance of film stacks: set, model, figures | `pattern`, `declared` |
 //! | `proposal` | patterns of what no effect explains | `declared`, `heights`, `spectra` |
+//! | `psf_stack` | stacks of point spread functions of reliefs and complex transmissions: set, light, sensor, model, figures | `pattern`, the transforms of `heights` |
 //! | `diagnosis`, `page` | the answer for programs and for people | |
 //! | `run` | a set from its files to its answer | all above |
 
@@ -21,6 +24,7 @@ mod heights;
 mod page;
 mod pattern;
 mod proposal;
+mod psf_stack;
 mod run;
 mod spectra;
 mod widths;
@@ -29,6 +33,7 @@ pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, NotInModel, Ranked, SetV
 pub use heights::{HeightField, HeightModel, HeightSet};
 pub use pattern::NamePattern;
 pub use proposal::Proposal;
+pub use psf_stack::{ApertureShape, StackBench, StackModel, StackObject, StackPlane, StackSet, ThinLens, Transmission};
 pub use run::{Answer, SetKind, calibrate, kind_of};
 pub use spectra::{Spectrum, SpectrumModel, SpectrumSet, StatedLayer};
 pub use widths::{WidthModel, WidthSet, WidthSite};

@@ -25,6 +25,9 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         ("Left out, after", with_unit(error.after.held_out)),
     ]);
     page.list(&diagnosis.validation);
+    if !diagnosis.remarks.is_empty() {
+        page.list(&diagnosis.remarks);
+    }
     if !diagnosis.effects.is_empty() {
         page.section("Effects found");
         let mut table = Table::new([

@@ -13,6 +13,7 @@ use crate::diagnosis::{Diagnosis, SetFacts, SetVerdict};
 use crate::heights::{self, HeightModel, HeightSet};
 use crate::page::page;
 use crate::proposal::{Declares, propose};
+use crate::psf_stack::{self, StackModel, StackSet};
 use crate::spectra::{self, SpectrumModel, SpectrumSet};
 use crate::widths::{self, WidthModel, WidthSet};
 
@@ -22,6 +23,7 @@ pub enum SetKind {
     Heights,
     Spectra,
     Widths,
+    PsfStack,
 }
 
 /// The files of an answer.
@@ -51,12 +53,20 @@ pub fn kind_of(set: &Path) -> Option<SetKind> {
     let text = load(&path).ok()?;
     let kind = Document::read(&path, &text, |root| {
         root.accept_others();
-        root.optional_text("kind")
+        // The reader of stacks says what is wrong where objects stand under another kind.
+        let is_stack = root.has("object") && !root.has("layout");
+        let kind = root.optional_text("kind").unwrap_or_else(|| "psf".into());
+        if is_stack && kind == "psf" {
+            "psf_stack".into()
+        } else {
+            kind
+        }
     });
-    match kind.ok()??.as_str() {
+    match kind.ok()?.as_str() {
         "heights" => Some(SetKind::Heights),
         "spectra" => Some(SetKind::Spectra),
         "widths" => Some(SetKind::Widths),
+        "psf_stack" => Some(SetKind::PsfStack),
         _ => None,
     }
 }
@@ -80,10 +90,13 @@ pub fn calibrate(
     (only, declared): (&[String], Option<&Path>),
     progress: &dyn Progress,
 ) -> Result<Answer> {
-    if let (SetKind::Widths, Some(file)) = (kind, declared) {
+    if let (SetKind::Widths | SetKind::PsfStack, Some(file)) = (kind, declared) {
         return Err(Error::refused(
             "calibrate/kind-has-none",
-            format!("{}: no effects are declared for sets of widths", file.display()),
+            format!(
+                "{}: no effects are declared for sets of widths and stacks",
+                file.display()
+            ),
             "leave --declare out: their effects have names of their own, see docs/guide/measure.md",
         ));
     }
@@ -103,6 +116,7 @@ pub fn calibrate(
                 names: set.fields.iter().map(|f| f.name.clone()).collect(),
                 noise_floor: None,
                 averages: false,
+                remarks: &[],
             };
             let plan = model.plan();
             answer(model, &plan, &facts, ("nm", out), progress, |model, page, theta| {
@@ -125,6 +139,7 @@ pub fn calibrate(
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
                 noise_floor: set.repeat_rms(),
                 averages: false,
+                remarks: &[],
             };
             let plan = model.plan();
             answer(model, &plan, &facts, ("", out), progress, |model, page, theta| {
@@ -142,6 +157,7 @@ pub fn calibrate(
                 names: (1..=set.sites.len()).map(|n| format!("site {n}")).collect(),
                 noise_floor: set.repeat_rms(),
                 averages: true,
+                remarks: &[],
             };
             let plan = model.plan();
             let (found, mut diagnosis) = found(&model, &plan, &facts, progress)?;
@@ -150,6 +166,27 @@ pub fn calibrate(
             let files = (None, calibrated);
             write(diagnosis, files, ("nm", out), progress, |page| {
                 widths::figures(page, &set, &model, &found.theta);
+            })
+        }
+        SetKind::PsfStack => {
+            let mut set = StackSet::read(&path)?;
+            progress.begin("orientation", 0);
+            let prepared = psf_stack::prepare(&mut set)?;
+            let mut model = StackModel::new(&set, &prepared.sampling, prepared.focus_um);
+            model.keep(&tried(&model.own.effects, only)?);
+            let facts = SetFacts {
+                title: &set.title,
+                kind: "psf_stack",
+                measure: "residual over measured norm (rms)",
+                names: set.planes.iter().map(|p| p.name.clone()).collect(),
+                noise_floor: Some(prepared.noise),
+                averages: false,
+                remarks: &set.remarks,
+            };
+            let plan = model.plan();
+            let (found, diagnosis) = found(&model, &plan, &facts, progress)?;
+            write(diagnosis, (None, None), ("", out), progress, |page| {
+                psf_stack::figures(page, &set, &model, &found.theta);
             })
         }
     }

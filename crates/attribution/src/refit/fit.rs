@@ -20,9 +20,15 @@ pub(super) struct State {
 }
 
 impl State {
-    fn sum_of_squares(&self) -> f64 {
+    pub(super) fn sum_of_squares(&self) -> f64 {
         let last = self.total.nrows() - 1;
         self.total[(last, last)]
+    }
+
+    /// Sum of squares that the equations promise after one step.
+    pub(super) fn promised(&self) -> f64 {
+        let free: Vec<usize> = (0..self.active.len()).collect();
+        minimise(&self.total, &free).1
     }
 }
 
@@ -55,9 +61,10 @@ impl Selection<'_> {
     /// A state with one effect more, where its fit begins.
     pub(super) fn with(&self, now: &State, effect: usize) -> State {
         let (mut active, mut theta) = (now.active.clone(), now.theta.clone());
-        for &slot in &self.model.effects()[effect].slots {
+        let start = self.model.start(effect, &theta);
+        for (&slot, start) in self.model.effects()[effect].slots.iter().zip(start) {
             active.push(slot);
-            theta[slot] = self.model.parameters()[slot].start;
+            theta[slot] = start;
         }
         self.at(active, theta)
     }

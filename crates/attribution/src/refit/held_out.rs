@@ -57,8 +57,8 @@ impl Selection<'_> {
         for (k, step) in self.without(now, way, group) {
             theta[now.active[k]] += step;
         }
-        let told = |slot: &usize| theta[*slot] != parameters[*slot].neutral;
-        let active = now.active.iter().copied().filter(told).collect();
+        let informed = |slot: &usize| theta[*slot] != parameters[*slot].neutral;
+        let active = now.active.iter().copied().filter(informed).collect();
         let others = Selection {
             model: self.model,
             plan: &plan,
@@ -69,7 +69,7 @@ impl Selection<'_> {
     }
 
     /// Groups of fitted measurements in a way.
-    fn groups(&self, way: &LeaveOut) -> Vec<usize> {
+    pub(super) fn groups(&self, way: &LeaveOut) -> Vec<usize> {
         let fitted = way.groups.iter().zip(&self.plan.fitted).filter(|(_, f)| **f);
         let mut groups: Vec<usize> = fitted.map(|(g, _)| *g).collect();
         groups.sort_unstable();

@@ -7,6 +7,7 @@
 mod finding;
 mod fit;
 mod held_out;
+mod joint;
 mod model;
 mod selection;
 #[cfg(test)]
@@ -15,7 +16,7 @@ mod tests;
 use metalith_core::{Progress, Result};
 
 pub use finding::{RefitErrors, RefitFinding, RefitRejection, RefitTried};
-pub use model::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
+pub use model::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan, RefitScope};
 
 /// Select the effects that explain measurements.
 ///

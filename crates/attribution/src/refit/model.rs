@@ -29,6 +29,17 @@ pub struct RefitEffect {
     pub across: Option<usize>,
 }
 
+/// Groups of a way of leaving out in which an effect has to hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RefitScope {
+    /// All measurements together.
+    Bench,
+    /// Each group of a way: it may make none worse.
+    Every { way: usize },
+    /// One group of a way, so that the other groups do not predict it.
+    One { way: usize, group: usize },
+}
+
 /// Normal equations of one measurement over active parameters and the residual, nuisances eliminated.
 pub struct RefitEquations {
     /// Sums of squares that a fit minimises.
@@ -71,6 +82,38 @@ pub trait RefitModel: Sync {
     /// nothing.
     fn tries_pairs(&self) -> bool {
         false
+    }
+
+    /// True if a fit costs so much that pairs are not tried, and only the candidates that promise most are fitted in each step;
+    /// in the last step all are.
+    fn is_costly(&self) -> bool {
+        false
+    }
+
+    /// Least share of the fitted mean square that an effect removes; below it is the error of a model.
+    fn least_share(&self) -> f64 {
+        0.004
+    }
+
+    /// Groups in which an effect has to hold.
+    fn scope(&self, _effect: usize) -> RefitScope {
+        RefitScope::Bench
+    }
+
+    /// Effect of all groups of which this is the effect of one group.
+    fn common(&self, _effect: usize) -> Option<usize> {
+        None
+    }
+
+    /// Name of a group of a way of leaving out, and its place in the order in which groups judge.
+    fn group(&self, _way: usize, group: usize) -> (String, usize) {
+        (group.to_string(), group)
+    }
+
+    /// Values of the parameters of an effect from which a fit starts, all others as they are.
+    fn start(&self, effect: usize, _theta: &[f64]) -> Vec<f64> {
+        let slots = self.effects()[effect].slots.iter();
+        slots.map(|&slot| self.parameters()[slot].start).collect()
     }
 
     /// True if the figure of several measurements is their mean; otherwise it is the root of the mean square.

@@ -5,11 +5,8 @@ use metalith_core::{Progress, Result};
 use super::finding::{RefitErrors, RefitFinding, RefitRejection, RefitTried};
 use super::fit::State;
 use super::held_out::gain;
-use super::model::{RefitModel, RefitPlan};
+use super::model::{RefitModel, RefitPlan, RefitScope};
 use crate::fit::Gain;
-
-/// Least share of the fitted mean square that an effect removes.
-const LEAST_SHARE: f64 = 0.004;
 
 /// A figure of measurements that were never fitted may grow by this share: rounding, and steps of a fit that end early.
 const MAY_GROW: f64 = 0.002;
@@ -17,11 +14,14 @@ const MAY_GROW: f64 = 0.002;
 /// Two effects are taken at once if they gain by this share more than the best one alone.
 const PAIR_SHARE: f64 = 0.1;
 
+/// Candidates that are fitted in each step where a fit is costly and one of them is taken.
+const MOST_TRIED: usize = 6;
+
 /// Steps of the fit of a candidate.
-const TRIAL_STEPS: usize = 5;
+pub(super) const TRIAL_STEPS: usize = 5;
 
 /// Steps of the fit of what was taken.
-const TAKEN_STEPS: usize = 12;
+pub(super) const TAKEN_STEPS: usize = 12;
 
 /// A model and the roles of its measurements.
 pub(super) struct Selection<'a> {
@@ -30,14 +30,14 @@ pub(super) struct Selection<'a> {
 }
 
 /// State of a selection between two steps.
-struct Course {
-    now: State,
+pub(super) struct Course {
+    pub(super) now: State,
     /// Effects in the order in which they were taken.
-    chosen: Vec<usize>,
+    pub(super) chosen: Vec<usize>,
     /// Errors before, and after each of them.
-    ladder: Vec<RefitErrors>,
+    pub(super) ladder: Vec<RefitErrors>,
     /// Each effect as it was tried last.
-    last: Vec<Option<RefitTried>>,
+    pub(super) last: Vec<Option<RefitTried>>,
 }
 
 /// Errors of a fit, and the 95 % interval of each parameter.
@@ -61,6 +61,9 @@ impl Selection<'_> {
             last: vec![None; self.model.effects().len()],
         };
         while self.step(&mut course, progress)? {}
+        if self.take_for_groups(&mut course, progress)? {
+            while self.step(&mut course, progress)? {}
+        }
         let mut intervals = self.drop_redundant(&mut course);
         let by_group = self.values_by_group(&course.now);
         self.add_values_of_groups(&mut course, &mut intervals);
@@ -79,19 +82,35 @@ impl Selection<'_> {
         progress.begin(&format!("effects, step {}", course.chosen.len() + 1), open.len() as u64);
         let before = course.ladder[course.ladder.len() - 1].clone();
         let mut good: Vec<(State, RefitTried)> = Vec::new();
-        for &effect in &open {
-            progress.check_stopped()?;
-            progress.note(&effects[effect].name);
-            let state = self.fit(self.with(&course.now, effect), TRIAL_STEPS);
-            let tried = self.try_last(effect, &state, &before);
-            progress.advance(1);
-            if tried.rejected.is_none() {
-                good.push((state, tried.clone()));
+        // Effects of one group are tried where no other helps.
+        let (common, own): (Vec<usize>, Vec<usize>) =
+            { open.iter() }.partition(|&&e| !matches!(self.model.scope(e), RefitScope::One { .. }));
+        for (pass, open) in [common.clone(), own].into_iter().enumerate() {
+            if !good.is_empty() {
+                break;
             }
-            course.last[effect] = Some(tried);
+            if pass == 1 && self.model.is_costly() && self.take_together(course, &common, progress)? {
+                return Ok(true);
+            }
+            for (k, (effect, start)) in { self.promising(&course.now, open, progress)?.into_iter() }.enumerate() {
+                if self.model.is_costly() && k >= MOST_TRIED && !good.is_empty() {
+                    break;
+                }
+                progress.check_stopped()?;
+                progress.note(&effects[effect].name);
+                let start = start.unwrap_or_else(|| self.with(&course.now, effect));
+                let state = self.fit(start, TRIAL_STEPS);
+                let tried = self.try_last(effect, &state, &before);
+                progress.advance(1);
+                if tried.rejected.is_none() {
+                    good.push((state, tried.clone()));
+                }
+                course.last[effect] = Some(tried);
+            }
         }
         good.sort_by(|(_, a), (_, b)| b.gain.value.total_cmp(&a.gain.value));
-        if course.chosen.is_empty() || good.is_empty() && self.model.tries_pairs() {
+        let pairs = course.chosen.is_empty() && !self.model.is_costly();
+        if pairs || good.is_empty() && self.model.tries_pairs() {
             let least = good.first().map_or(0.0, |(_, tried)| tried.gain.value);
             if let Some((pair, state)) = self.pair(&course.now, &open, &before, least, progress)? {
                 let first = self.fit(self.with(&course.now, pair[0]), TAKEN_STEPS);
@@ -126,6 +145,30 @@ impl Selection<'_> {
             }
         }
         Ok(false)
+    }
+
+    /// Candidates, each with the state that its fit starts from if that is known; where a fit is costly, those that promise most
+    /// come first.
+    pub(super) fn promising(
+        &self,
+        now: &State,
+        open: Vec<usize>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<(usize, Option<State>)>> {
+        if !self.model.is_costly() {
+            return Ok(open.into_iter().map(|effect| (effect, None)).collect());
+        }
+        let mut out = Vec::new();
+        for effect in open {
+            progress.check_stopped()?;
+            let start = self.with(now, effect);
+            out.push((start.promised(), effect, start));
+        }
+        out.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Ok(out
+            .into_iter()
+            .map(|(_, effect, start)| (effect, Some(start)))
+            .collect())
     }
 
     /// The two effects that predict most together what was left out, with their fit; none that gain less than `least` by so much
@@ -170,7 +213,7 @@ impl Selection<'_> {
     fn drop_redundant(&self, course: &mut Course) -> Vec<Option<[f64; 2]>> {
         let effects = self.model.effects();
         loop {
-            let intervals = self.intervals(&course.now, true);
+            let intervals = self.intervals(&course.now, !self.model.is_costly());
             let Some(place) = self.redundant(&intervals, &course.chosen) else {
                 return intervals;
             };
@@ -310,7 +353,7 @@ impl Selection<'_> {
     }
 
     /// An effect as if it were tried last.
-    fn try_last(&self, effect: usize, after: &State, before: &RefitErrors) -> RefitTried {
+    pub(super) fn try_last(&self, effect: usize, after: &State, before: &RefitErrors) -> RefitTried {
         self.tried(effect, after, self.judge(after), before)
     }
 
@@ -328,7 +371,10 @@ impl Selection<'_> {
 
     /// Gains in each way of leaving out that judges an effect.
     fn gains(&self, effect: usize, errors: &RefitErrors, before: &RefitErrors) -> Vec<(usize, Gain)> {
-        let across = self.model.effects()[effect].across;
+        let across = match self.model.scope(effect) {
+            RefitScope::One { way, .. } => Some(way),
+            _ => self.model.effects()[effect].across,
+        };
         (0..self.plan.ways.len())
             .filter(|&w| Some(w) != across && errors.held_out[w].is_some())
             .map(|w| (w, gain(&before.own[w], &errors.own[w])))
@@ -346,7 +392,7 @@ impl Selection<'_> {
         };
         let way = |w: usize| &self.plan.ways[w].name;
         // A figure that is no number explains nothing.
-        if score.is_nan() || score < LEAST_SHARE {
+        if score.is_nan() || score < self.model.least_share() {
             Some(RefitRejection::Little(score))
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.value < 0.0) {
             let worst = self
@@ -357,6 +403,8 @@ impl Selection<'_> {
                 before: before.held_out[*w].unwrap_or(0.0),
                 after: errors.held_out[*w].unwrap_or(0.0),
             })
+        } else if let Some(worse) = self.worse_in_a_group(effect, before, errors) {
+            Some(worse)
         } else if let Some(worse) = self.worse(before, errors) {
             Some(worse)
         } else if let Some((w, _)) = gains.iter().find(|(_, gain)| gain.interval[0] <= 0.0) {
@@ -371,6 +419,35 @@ impl Selection<'_> {
         } else {
             None
         }
+    }
+
+    /// Rejection by one of the groups that an effect has to hold in: its measurements, as they are left out in the first way.
+    fn worse_in_a_group(&self, effect: usize, before: &RefitErrors, after: &RefitErrors) -> Option<RefitRejection> {
+        let RefitScope::Every { way } = self.model.scope(effect) else {
+            return None;
+        };
+        let own = &self.plan.ways[way];
+        let mut groups = self.groups(own);
+        groups.sort_by_key(|&group| self.model.group(way, group).1);
+        let rms = |errors: &RefitErrors, group: usize| {
+            let left = errors.own[0].iter().zip(&own.groups).filter(|(_, g)| **g == group);
+            let (sum, n) = left
+                .filter_map(|(v, _)| *v)
+                .fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+            (sum / f64::max(n, 1.0)).sqrt()
+        };
+        let worse = |&group: &usize| rms(after, group) > (1.0 + MAY_GROW) * rms(before, group);
+        let group = groups.into_iter().find(worse)?;
+        Some(RefitRejection::Worse {
+            what: format!(
+                "{} `{}` where each {} is left out",
+                own.name,
+                self.model.group(way, group).0,
+                self.plan.ways[0].name
+            ),
+            before: rms(before, group),
+            after: rms(after, group),
+        })
     }
 
     /// Rejection by a figure of measurements that were never fitted.
@@ -408,6 +485,6 @@ const NO_GAIN: Gain = Gain {
 };
 
 /// Share of the fitted mean square that is gone.
-fn share_removed(before: &RefitErrors, after: &RefitErrors) -> f64 {
+pub(super) fn share_removed(before: &RefitErrors, after: &RefitErrors) -> f64 {
     1.0 - (after.fitted / before.fitted.max(f64::MIN_POSITIVE)).powi(2)
 }

@@ -6,15 +6,15 @@ use num_complex::Complex;
 use rustfft::{Fft, FftNum, FftPlanner};
 
 /// Transforms of arrays of one size, row by row.
-pub(super) struct Fft2<T: FftNum> {
-    pub(super) rows: usize,
-    pub(super) cols: usize,
+pub(crate) struct Fft2<T: FftNum> {
+    pub(crate) rows: usize,
+    pub(crate) cols: usize,
     along: [Arc<dyn Fft<T>>; 2],
 }
 
 impl<T: FftNum> Fft2<T> {
     /// Transforms of `rows` x `cols` numbers, forward or inverse (not normalised).
-    pub(super) fn new(rows: usize, cols: usize, inverse: bool) -> Self {
+    pub(crate) fn new(rows: usize, cols: usize, inverse: bool) -> Self {
         let mut planner = FftPlanner::new();
         let mut plan = |n| {
             if inverse {
@@ -31,7 +31,7 @@ impl<T: FftNum> Fft2<T> {
     }
 
     /// Transform; the answer is transposed: `cols` rows of `rows` numbers.
-    pub(super) fn transposed(&self, mut values: Vec<Complex<T>>) -> Vec<Complex<T>> {
+    pub(crate) fn transposed(&self, mut values: Vec<Complex<T>>) -> Vec<Complex<T>> {
         self.along[0].process(&mut values);
         let mut turned = transpose(&values, self.rows, self.cols);
         self.along[1].process(&mut turned);
@@ -40,7 +40,7 @@ impl<T: FftNum> Fft2<T> {
 }
 
 /// Rows as columns.
-pub(super) fn transpose<V: Copy>(values: &[V], rows: usize, cols: usize) -> Vec<V> {
+pub(crate) fn transpose<V: Copy>(values: &[V], rows: usize, cols: usize) -> Vec<V> {
     /// Edge of a tile that stays in the cache.
     const TILE: usize = 16;
     let mut out = values.to_vec();
@@ -57,7 +57,7 @@ pub(super) fn transpose<V: Copy>(values: &[V], rows: usize, cols: usize) -> Vec<
 }
 
 /// Frequency of the sample `k` of `n`, in cycles per sample.
-pub(super) fn frequency(k: usize, n: usize) -> f64 {
+pub(crate) fn frequency(k: usize, n: usize) -> f64 {
     let k = k as f64;
     let n = n as f64;
     (if k > n / 2.0 { k - n } else { k }) / n

@@ -1,7 +1,7 @@
 //! Measured heights: maps of a printed or etched relief beside the maps that were drawn.
 
 mod far_field;
-mod fft;
+pub(crate) mod fft;
 mod map;
 mod model;
 mod page;

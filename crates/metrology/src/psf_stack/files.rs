@@ -1,0 +1,190 @@
+//! Frames and maps from NPY, TIFF, PNG and CSV files.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use metalith_core::npy;
+use ndarray::Array2;
+use num_complex::Complex64;
+use tiff::ColorType;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+
+/// Most samples of a map or frame along an axis, and fewest.
+const MOST: usize = 8192;
+const FEWEST: usize = 8;
+
+/// Most samples of all frames of a file.
+const MOST_SAMPLES: usize = 1 << 27;
+
+/// Frames of a file, one or many, all of one size. What is wrong comes back in words.
+pub(super) fn frames(path: &Path) -> Result<Vec<Array2<f32>>, String> {
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    let frames = match ending.to_ascii_lowercase().as_str() {
+        "tif" | "tiff" => from_tiff(path)?,
+        "png" => vec![from_png(path)?],
+        "csv" | "txt" => vec![from_csv(path)?],
+        _ => from_npy(path)?,
+    };
+    if frames.is_empty() {
+        return Err("it has no frame".into());
+    }
+    let wrong = frames.iter().flatten().filter(|v| !v.is_finite()).count();
+    match wrong {
+        0 => Ok(frames),
+        _ => Err(format!("{wrong} of its samples are not finite numbers")),
+    }
+}
+
+/// One map.
+pub(super) fn map(path: &Path) -> Result<Array2<f32>, String> {
+    let mut all = frames(path)?;
+    match (all.pop(), all.len()) {
+        (Some(map), 0) => Ok(map),
+        (_, more) => Err(format!("it has {} pages, a map has one", more + 1)),
+    }
+}
+
+/// Complex values from an NPY file.
+pub(super) fn fields(path: &Path) -> Result<Array2<Complex64>, String> {
+    let array = npy::read_fields(path, |shape| {
+        shape.len() == 2 && shape.iter().all(|&n| along(n as usize))
+    });
+    let array = array.map_err(|e| e.to_string())?;
+    let values: Vec<_> = array
+        .values
+        .chunks_exact(2)
+        .map(|v| Complex64::new(v[0], v[1]))
+        .collect();
+    if values.iter().any(|v| !v.is_finite()) {
+        return Err("some of its samples are not finite numbers".into());
+    }
+    Array2::from_shape_vec((array.shape[0] as usize, array.shape[1] as usize), values).map_err(|e| e.to_string())
+}
+
+fn along(n: usize) -> bool {
+    (FEWEST..=MOST).contains(&n)
+}
+
+fn check_size(rows: usize, cols: usize) -> Result<(), String> {
+    if along(rows) && along(cols) {
+        Ok(())
+    } else {
+        Err(format!(
+            "it has {rows} x {cols} samples; {FEWEST} to {MOST} along each axis are read"
+        ))
+    }
+}
+
+fn shaped(rows: usize, cols: usize, values: Vec<f32>) -> Result<Array2<f32>, String> {
+    check_size(rows, cols)?;
+    Array2::from_shape_vec((rows, cols), values).map_err(|_| "its size differs from the number of its samples".into())
+}
+
+fn from_npy(path: &Path) -> Result<Vec<Array2<f32>>, String> {
+    let takes = |shape: &[u64]| {
+        let n = shape.len();
+        let total = shape.iter().try_fold(1u64, |all, n| all.checked_mul(*n));
+        (2..=3).contains(&n)
+            && shape[n - 2..].iter().all(|&n| along(n as usize))
+            && total.is_some_and(|n| n <= MOST_SAMPLES as u64)
+    };
+    let array = npy::read(path, takes).map_err(|e| e.to_string())?;
+    let [rows, cols] = [array.shape.len() - 2, array.shape.len() - 1].map(|k| array.shape[k] as usize);
+    let frames = array.values.chunks_exact(rows * cols);
+    frames
+        .map(|own| shaped(rows, cols, own.iter().map(|&v| v as f32).collect()))
+        .collect()
+}
+
+fn from_png(path: &Path) -> Result<Array2<f32>, String> {
+    let wrong = |e: png::DecodingError| format!("it is no PNG file that can be read: {e}");
+    let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
+    let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(wrong)?;
+    let info = reader.info();
+    let (rows, cols) = (info.height as usize, info.width as usize);
+    check_size(rows, cols)?;
+    let bytes = match (info.color_type, info.bit_depth) {
+        (png::ColorType::Grayscale, png::BitDepth::Eight) => 1,
+        (png::ColorType::Grayscale, png::BitDepth::Sixteen) => 2,
+        (colour, depth) => {
+            return Err(format!(
+                "its pixels are {colour:?} of {depth:?} bits, not grey of 8 or 16"
+            ));
+        }
+    };
+    let mut data = vec![0; bytes * rows * cols];
+    if reader.output_buffer_size() != Some(data.len()) {
+        return Err("its size differs from the number of its pixels".into());
+    }
+    reader.next_frame(&mut data).map_err(wrong)?;
+    let value = |b: &[u8]| b.iter().fold(0.0, |sum, byte| 256.0 * sum + f32::from(*byte));
+    shaped(rows, cols, data.chunks_exact(bytes).map(value).collect())
+}
+
+fn from_csv(path: &Path) -> Result<Array2<f32>, String> {
+    let text = metalith_core::document::load(path).map_err(|e| e.to_string())?;
+    let (mut values, mut rows, mut cols) = (Vec::new(), 0, 0);
+    for (k, line) in text.lines().enumerate() {
+        let line = line.trim().trim_start_matches('\u{feff}');
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let before = values.len();
+        for field in line.split([',', ';', '\t']).filter(|f| !f.trim().is_empty()) {
+            let v: f32 = field
+                .trim()
+                .parse()
+                .map_err(|_| format!("line {}: a field is no number", k + 1))?;
+            values.push(v);
+        }
+        let own = values.len() - before;
+        if rows > 0 && own != cols || values.len() > MOST_SAMPLES {
+            return Err(format!("line {} has {own} fields, the lines before have {cols}", k + 1));
+        }
+        (rows, cols) = (rows + 1, own);
+    }
+    shaped(rows, cols, values)
+}
+
+fn from_tiff(path: &Path) -> Result<Vec<Array2<f32>>, String> {
+    let wrong = |e: tiff::TiffError| format!("it is no TIFF file that can be read: {e}");
+    let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = 1 << 30;
+    limits.intermediate_buffer_size = 1 << 30;
+    let mut decoder = Decoder::new(BufReader::new(file)).map_err(wrong)?.with_limits(limits);
+    let mut out = Vec::new();
+    loop {
+        let (width, height) = decoder.dimensions().map_err(wrong)?;
+        let (rows, cols) = (height as usize, width as usize);
+        check_size(rows, cols)?;
+        let colour = decoder.colortype().map_err(wrong)?;
+        if !matches!(colour, ColorType::Gray(_)) {
+            return Err(format!("its samples are {colour:?}, not grey"));
+        }
+        let values: Vec<f32> = match decoder.read_image().map_err(wrong)? {
+            DecodingResult::U8(v) => v.into_iter().map(f32::from).collect(),
+            DecodingResult::U16(v) => v.into_iter().map(f32::from).collect(),
+            DecodingResult::U32(v) => v.into_iter().map(|v| v as f32).collect(),
+            DecodingResult::F32(v) => v,
+            DecodingResult::F64(v) => v.into_iter().map(|v| v as f32).collect(),
+            _ => {
+                return Err(format!(
+                    "its samples are {colour:?}; 8, 16 or 32 bits are read, or a decimal point"
+                ));
+            }
+        };
+        out.push(shaped(rows, cols, values)?);
+        if out[0].dim() != (rows, cols) {
+            return Err(format!("page {} has another size than the first", out.len()));
+        }
+        if !decoder.more_images() {
+            return Ok(out);
+        }
+        if (out.len() + 1) * rows * cols > MOST_SAMPLES {
+            return Err(format!("it has more than {} pages", out.len()));
+        }
+        decoder.next_image().map_err(wrong)?;
+    }
+}
