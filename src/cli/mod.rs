@@ -22,6 +22,7 @@ mod paths;
 mod picture;
 mod plan;
 mod psf;
+mod reading;
 mod renamed;
 mod restore;
 mod run;
