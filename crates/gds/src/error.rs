@@ -315,7 +315,7 @@ impl LayoutError {
             Self::NoCells => "is this the right file?".into(),
             Self::NoSuchCell { tops, .. } => format!("cells at the top: {}", tops.join(", ")),
             Self::SeveralTops { .. } => {
-                "write the one to be read to a separate file, or name it where a command takes --top".into()
+                "name the one to be read by --top, or write it to a separate file".into()
             }
             Self::Limit { limit, .. } => limit.remedy().into(),
         }

@@ -9,9 +9,9 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use sha2::{Digest, Sha256};
 
-use metalith_core::Progress;
 use metalith_core::file::read_at_most;
 use metalith_core::text::{hex, printable, quoted};
+use metalith_core::Progress;
 use metalith_core::{Error, Result};
 
 /// Name of the manifest in a hand-off.
