@@ -13,7 +13,7 @@ const LEVEL: u32 = 6;
 /// A file that replaces the old one when all of it is written.
 pub(super) enum Output {
     Plain(BufWriter<AtomicFile>),
-    Gzip(GzEncoder<BufWriter<AtomicFile>>),
+    Gzip(Box<GzEncoder<BufWriter<AtomicFile>>>),
 }
 
 impl Output {
@@ -21,7 +21,7 @@ impl Output {
     pub(crate) fn create(path: &Path) -> Result<Self> {
         let file = BufWriter::new(AtomicFile::create(path)?);
         Ok(if crate::format::is_gzip(path) {
-            Self::Gzip(GzEncoder::new(file, Compression::new(LEVEL)))
+            Self::Gzip(Box::new(GzEncoder::new(file, Compression::new(LEVEL))))
         } else {
             Self::Plain(file)
         })
