@@ -9,6 +9,7 @@ use metalith::{AtomicFile, Error, Layout, Result};
 
 use super::compensated::CompensatedFor;
 use super::output::is_standard_output;
+use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line, standard_input};
 
@@ -34,6 +35,9 @@ pub(crate) struct CheckArgs {
     /// The design that the layout should contain; activates the rules that compare with it.
     #[arg(long, value_name = "DESIGN.toml")]
     design: Option<PathBuf>,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
 
     #[command(flatten)]
     compensated: CompensatedFor,
@@ -114,7 +118,7 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);
-    let layout = open(&file)?;
+    let layout = args.reading.open(&file, terminal)?;
     let with = args.with.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
     let array = match &mut design {
         Some(design) if args.compensated.model.is_some() => Some(args.compensated.array(design, terminal)?),

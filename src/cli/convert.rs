@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::gds::ReadLimits;
+use metalith::Result;
 use metalith::layout::{LayoutFormat, convert};
-use metalith::{Layout, Result};
 
 use super::layout::FormatArg;
+use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
@@ -21,19 +21,22 @@ pub(crate) struct ConvertArgs {
     /// The layout to read, `-` for standard input; its first bytes show its format.
     from: PathBuf,
 
-    /// The layout to write, in OASIS if its name ends in .oas.
+    /// The layout to write, in OASIS if its name ends in .oas; compressed if it ends in .gz.
     to: PathBuf,
 
     /// Format to write; if left out, the ending of the name decides.
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
 }
 
 pub(crate) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<Outcome> {
     super::paths::apart([args.from.as_path()], &[&args.to])?;
     let format = args.format.map_or_else(|| LayoutFormat::of_name(&args.to), Into::into);
     terminal.stop_on_interrupt();
-    let layout = Layout::open_with(&InputFile::of(&args.from)?, ReadLimits::default(), terminal)?;
+    let layout = args.reading.open(&InputFile::of(&args.from)?, terminal)?;
     let written = convert(&layout, format, &args.to, terminal)?;
     terminal.clear();
     for remark in &written.remarks {

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::Result;
 use metalith::diff::{self, DiffPlan};
-use metalith::gds::{LayerNumber, ReadLimits};
-use metalith::{Layout, Result};
+use metalith::gds::LayerNumber;
 
 use super::psf::layer;
+use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
@@ -25,6 +26,9 @@ pub(crate) struct DiffArgs {
     /// Layer of the pillars.
     #[arg(long, value_name = "LAYER/DATATYPE", default_value = "1/0", value_parser = layer)]
     layer: LayerNumber,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
 
     /// Largest number of changes in the list; all are counted.
     #[arg(long, value_name = "N", default_value_t = 1000)]
@@ -44,7 +48,7 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     super::paths::apart([args.a.as_path(), &args.b], &report)?;
     terminal.stop_on_interrupt();
     let files = [InputFile::of(&args.a)?, InputFile::of(&args.b)?];
-    let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);
+    let open = |path: &Path| args.reading.open(path, terminal);
     let plan = DiffPlan {
         pillar_layer: args.layer,
         listed: args.listed,

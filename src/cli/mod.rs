@@ -23,6 +23,7 @@ mod paths;
 mod picture;
 mod plan;
 mod psf;
+mod reading;
 mod renamed;
 mod restore;
 mod run;

@@ -9,18 +9,17 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use metalith::cell::{Analyser, Fidelity, Handedness, Polarisation};
 use metalith::design::CellFile;
-use metalith::gds::{LayerNumber, ReadLimits};
+use metalith::gds::LayerNumber;
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
     STREHL_AGAINST, SimulationCase, SinglePsfReport, focal_length_words, focus_words, plane_words, single_psfs,
     single_white, write_single_psf_report,
 };
 use metalith::wave::psf::FOCUS_PLANES;
-use metalith::{
-    AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, Layout, PolarisationBasis, Result, extract,
-};
+use metalith::{AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, PolarisationBasis, Result, extract};
 
 use self::light::{PsfLight, USUAL_DISTANCE_UM};
+use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
@@ -40,9 +39,8 @@ pub(crate) struct PsfArgs {
     #[arg(long, default_value = "1/0", value_parser = layer)]
     layer: LayerNumber,
 
-    /// Cell to start from; the top cell if there is only one.
-    #[arg(long)]
-    top: Option<String>,
+    #[command(flatten)]
+    reading: ReadingArgs,
 
     /// Distance from the pillar tops to the sensor (um). If left out, the focal length of the design that --cell names, else 2400.
     #[arg(long = "distance-um", value_name = "DISTANCE_UM", value_parser = between(0.1, 1e6))]
@@ -51,8 +49,8 @@ pub(crate) struct PsfArgs {
     #[arg(skip = USUAL_DISTANCE_UM)]
     distance_um: f64,
 
-    /// Wavelength (nm); may be given several times. If left out, those of the design that --cell names, else 455, 530 and 660 nm; with a --camera that does not
-    /// count light from 455 to 660 nm, the middle of each of its channels.
+    /// Wavelength (nm); may be given several times. If left out, those of the design that --cell names, else 455, 530 and 660 nm;
+    /// with a --camera that does not count light from 455 to 660 nm, the middle of each of its channels.
     #[arg(long = "wavelength-nm", value_parser = between(150.0, 20_000.0))]
     wavelengths_nm: Vec<f64>,
 
@@ -340,11 +338,8 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let args = &args.clone().with_design(stated);
     args.say_guesses(terminal);
     terminal.stop_on_interrupt();
-    let layout = Layout::open_with(&InputFile::of(&args.layout)?, ReadLimits::default(), terminal)?;
-    let plan = ExtractionPlan {
-        top: args.top.clone(),
-        ..ExtractionPlan::discover(args.layer)
-    };
+    let layout = args.reading.open(&InputFile::of(&args.layout)?, terminal)?;
+    let plan = ExtractionPlan::discover(args.layer);
     let found = extract(&layout, &plan, terminal)?;
     mostly_pillars(args, &found)?;
     one_kind(args, &found)?;

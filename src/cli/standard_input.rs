@@ -6,10 +6,12 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use metalith::layout::{LayoutFormat, convert};
 use metalith::{Design, Error, Result};
 use tempfile::TempDir;
 
 use super::Terminal;
+use super::reading::ReadingArgs;
 
 /// Name of standard input in messages.
 const NAME: &str = "standard input";
@@ -74,6 +76,25 @@ impl InputFile {
         let path = folder.path().join(NAME);
         let copied = File::create(&path).and_then(|mut copy| io::copy(&mut input, &mut copy));
         copied.map_err(Error::io("copy standard input to", &path))?;
+        Ok(Self {
+            path,
+            _copy: Some(folder),
+        })
+    }
+
+    /// The layout below the cell that is asked for, in a copy that is removed with this; the file as it is if none is.
+    ///
+    /// # Errors
+    /// If it cannot be read or has no such cell, or there is no room for the copy.
+    pub(crate) fn below(self, reading: &ReadingArgs, terminal: &Terminal) -> Result<Self> {
+        if reading.top.is_none() {
+            reading.apply(terminal);
+            return Ok(self);
+        }
+        let layout = reading.open(&self, terminal)?;
+        let folder = TempDir::new().map_err(Error::io("create a folder in", &std::env::temp_dir()))?;
+        let path = folder.path().join(self.file_name().unwrap_or_else(|| NAME.as_ref()));
+        convert(&layout, LayoutFormat::of_name(&path), &path, terminal)?;
         Ok(Self {
             path,
             _copy: Some(folder),

@@ -1,7 +1,9 @@
 //! Progress that the program shows while it works: bars on a terminal, a line now and then where there is none.
 
+use std::collections::BTreeSet;
 use std::io::IsTerminal;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -26,8 +28,11 @@ const MOST_WARNINGS: usize = 3;
 /// The user's terminal, or the log that standard error goes to.
 pub struct Terminal {
     quiet: bool,
+    strict: AtomicBool,
     bar: Mutex<Option<ProgressBar>>,
     log: Mutex<Log>,
+    /// Warnings that were printed: a layout may be opened more than once.
+    warned: Mutex<BTreeSet<String>>,
 }
 
 /// Log of the progress of work.
@@ -122,8 +127,10 @@ impl Terminal {
     pub fn new(quiet: bool) -> Self {
         Self {
             quiet,
+            strict: AtomicBool::new(false),
             bar: Mutex::new(None),
             log: Mutex::new(Log::new(Instant::now())),
+            warned: Mutex::new(BTreeSet::new()),
         }
     }
 
@@ -152,6 +159,11 @@ impl Terminal {
             let others: Vec<String> = others.iter().map(|warning| format!("[{}]", warning.id)).collect();
             self.say(&format!("and {} warnings more: {}", others.len(), others.join(" ")));
         }
+    }
+
+    /// Refuse layouts that depart from their format.
+    pub fn set_strict(&self, strict: bool) {
+        self.strict.store(strict, Ordering::Relaxed);
     }
 
     /// True if nothing but errors and requested output is printed.
@@ -239,7 +251,14 @@ impl Progress for Terminal {
     }
 
     fn warn(&self, text: &str) {
-        self.say(text);
+        let mut warned = self.warned.lock().unwrap_or_else(PoisonError::into_inner);
+        if warned.insert(text.to_owned()) {
+            self.say(text);
+        }
+    }
+
+    fn strict(&self) -> bool {
+        self.strict.load(Ordering::Relaxed)
     }
 
     fn stopped(&self) -> bool {

@@ -16,6 +16,7 @@ use metalith::{
 };
 
 use super::compensated::{CompensatedFor, judged_as_made};
+use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -35,6 +36,9 @@ pub(crate) struct VerifyArgs {
     /// Folder for `report.html` and `report.json`; the folder of the layout if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
 
     #[command(flatten)]
     compensated: CompensatedFor,
@@ -314,7 +318,7 @@ fn print_failed(found: &Verification) {
 pub(crate) fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design, terminal)?;
     terminal.warnings(&design.warnings()?);
-    let layout = InputFile::of(&args.layout)?;
+    let layout = InputFile::of(&args.layout)?.below(&args.reading, terminal)?;
     judged_as_made(
         "--compensated",
         args.compensated.model.as_deref(),

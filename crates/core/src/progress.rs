@@ -19,6 +19,11 @@ pub trait Progress: Sync {
         self.note(text);
     }
 
+    /// True if departures from a file format that a reader can read over are errors, not warnings.
+    fn strict(&self) -> bool {
+        false
+    }
+
     /// True if the user asked to stop; long work asks between steps and then returns
     /// [`Error::Interrupted`], or the best result so far where that is of use.
     fn stopped(&self) -> bool {
@@ -55,6 +60,10 @@ impl Progress for Quiet<'_> {
     fn begin(&self, _what: &str, _steps: u64) {}
 
     fn advance(&self, _steps: u64) {}
+
+    fn strict(&self) -> bool {
+        self.0.strict()
+    }
 
     fn stopped(&self) -> bool {
         self.0.stopped()

@@ -3,7 +3,7 @@
 use super::input::Input;
 use super::limits::ReadLimits;
 use super::record::{Record, data, kind};
-use super::shape::Point;
+use super::shape::{Point, Rect, rectangle_of};
 use super::transform::Transform;
 use crate::error::{Error, LayoutError, Limit, Result};
 use metalith_core::LayerNumber;
@@ -34,6 +34,29 @@ impl ElementKind {
             _ => return None,
         })
     }
+
+    /// Its name in messages.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Boundary => "BOUNDARY",
+            Self::Box => "BOX",
+            Self::Path => "PATH",
+            Self::Text => "TEXT",
+            Self::Node => "NODE",
+            Self::Reference => "SREF",
+            Self::Array => "AREF",
+        }
+    }
+
+    /// Fewest and most points that it may have.
+    fn points(self) -> std::ops::RangeInclusive<usize> {
+        match self {
+            Self::Boundary | Self::Box => 3..=usize::MAX,
+            Self::Path | Self::Node => 1..=usize::MAX,
+            Self::Text | Self::Reference => 1..=1,
+            Self::Array => 3..=3,
+        }
+    }
 }
 
 /// The content of one element. Kept and filled again, so that reading allocates nothing.
@@ -56,7 +79,8 @@ pub(super) struct ElementContent {
     pub path_type: i16,
     pub extensions: [i32; 2],
     pub properties: u32,
-    absolute: bool,
+    /// Place of the STRANS record with absolute magnification or angle.
+    absolute: Option<u64>,
 }
 
 impl Default for ElementContent {
@@ -77,7 +101,7 @@ impl Default for ElementContent {
             path_type: 0,
             extensions: [0; 2],
             properties: 0,
-            absolute: false,
+            absolute: None,
         }
     }
 }
@@ -143,7 +167,7 @@ impl ElementContent {
                     let body = input.checked(record, data::BITS, 2)?;
                     let bits = u16::from_be_bytes([body[0], body[1]]);
                     self.mirror = bits & 0x8000 != 0;
-                    self.absolute = bits & 6 != 0;
+                    self.absolute = (bits & 6 != 0).then_some(record.offset);
                 }
                 kind::MAG => self.magnification = input.real8(record, 0)?,
                 kind::ANGLE => self.angle_deg = input.real8(record, 0)?,
@@ -196,16 +220,9 @@ impl ElementContent {
     }
 
     /// Checks that everything that this element needs was there.
-    fn check(&self, input: &Input, has_layer: bool, has_datatype: bool) -> Result<()> {
-        let (element, points) = match self.kind {
-            ElementKind::Boundary => ("BOUNDARY", 3..=usize::MAX),
-            ElementKind::Box => ("BOX", 3..=usize::MAX),
-            ElementKind::Path => ("PATH", 1..=usize::MAX),
-            ElementKind::Text => ("TEXT", 1..=1),
-            ElementKind::Node => ("NODE", 1..=usize::MAX),
-            ElementKind::Reference => ("SREF", 1..=1),
-            ElementKind::Array => ("AREF", 3..=3),
-        };
+    fn check(&mut self, input: &mut Input, has_layer: bool, has_datatype: bool) -> Result<()> {
+        self.mend(input)?;
+        let (element, points) = (self.kind.name(), self.kind.points());
         let fail = |cause: LayoutError| Err(input.fault(self.offset, cause));
         if !points.contains(&self.points.len()) {
             let points = self.points.len();
@@ -218,13 +235,6 @@ impl ElementContent {
                     lacks: "SNAME",
                 });
             }
-            let (columns, rows) = (self.columns as i16, self.rows as i16);
-            if self.kind == ElementKind::Array && (columns <= 0 || rows <= 0) {
-                return fail(LayoutError::ArraySize { columns, rows });
-            }
-            if self.absolute && (self.magnification != 1.0 || self.angle_deg != 0.0) {
-                return fail(LayoutError::Absolute { element });
-            }
             if self.transform().is_none() {
                 return fail(LayoutError::Magnification {
                     element,
@@ -235,6 +245,61 @@ impl ElementContent {
         } else if !has_layer || !has_datatype {
             let lacks = if has_layer { "its datatype" } else { "LAYER" };
             return fail(LayoutError::Lacks { element, lacks });
+        }
+        Ok(())
+    }
+
+    /// Put right what departs from the format and has one reading, as other programs read it.
+    fn mend(&mut self, input: &mut Input) -> Result<()> {
+        let (element, points) = (self.kind.name(), self.points.len());
+        let most = *self.kind.points().end();
+        if points > most {
+            let taken = if most == 1 {
+                "the first was taken"
+            } else {
+                "the first three were taken"
+            };
+            input.odd(self.offset, LayoutError::Points { element, points }, taken)?;
+            self.points.truncate(most);
+        }
+        if self.kind == ElementKind::Boundary && (1..3).contains(&points) {
+            input.odd(self.offset, LayoutError::Points { element, points }, "it was left out")?;
+            self.points.resize(3, self.points[0]);
+            self.kind = ElementKind::Node;
+        }
+        if self.kind == ElementKind::Box && points >= 2 && rectangle_of(&self.points).is_none() {
+            let r = Rect::around(&self.points);
+            if points >= 4 {
+                input.odd(
+                    self.offset,
+                    LayoutError::BoxForm { points },
+                    "its bounding box was taken",
+                )?;
+            } else {
+                input.odd(
+                    self.offset,
+                    LayoutError::Points { element, points },
+                    "their bounding box was taken",
+                )?;
+            }
+            self.points.clear();
+            let corners = [(r.x0, r.y0), (r.x1, r.y0), (r.x1, r.y1), (r.x0, r.y1), (r.x0, r.y0)];
+            self.points.extend(corners.map(|(x, y)| Point::new(x, y)));
+        }
+        if self.kind == ElementKind::Array {
+            let (columns, rows) = (self.columns as i16, self.rows as i16);
+            let cause = LayoutError::ArraySize { columns, rows };
+            if columns == 0 || rows == 0 {
+                input.odd(self.offset, cause, "1 was taken for 0")?;
+            } else if columns < 0 || rows < 0 {
+                input.odd(self.offset, cause, "the numbers were taken without sign")?;
+            }
+            (self.columns, self.rows) = (self.columns.max(1), self.rows.max(1));
+        }
+        if let Some(offset) = self.absolute.take()
+            && (self.magnification != 1.0 || self.angle_deg != 0.0)
+        {
+            input.odd(offset, LayoutError::Absolute { element }, "they were taken as relative")?;
         }
         Ok(())
     }

@@ -85,6 +85,12 @@ pub enum LayoutError {
     NotText { kind: u8, data: u8 },
     #[error("the file does not begin with HEADER")]
     NoHeader,
+    #[error("this is {format}, which is not read as a layout")]
+    OtherFormat { format: &'static str, remedy: &'static str },
+    #[error("a file compressed by gzip that does not unpack: {0}")]
+    Gzip(String),
+    #[error("a file compressed by gzip of more than {most} bytes unpacked")]
+    Unpacked { most: u64 },
     #[error("the file has no UNITS")]
     NoUnits,
     #[error("a cell begins before UNITS")]
@@ -110,6 +116,10 @@ pub enum LayoutError {
     Points { element: &'static str, points: usize },
     #[error("a {element} without {lacks}")]
     Lacks { element: &'static str, lacks: &'static str },
+    #[error("a BOX of {points} points that is no upright rectangle")]
+    BoxForm { points: usize },
+    #[error("an element of type 0x{kind:02X}, which is not GDSII")]
+    PrivateElement { kind: u8 },
     #[error("an AREF of {columns} x {rows}")]
     ArraySize { columns: i16, rows: i16 },
     #[error("a {element} with absolute magnification or angle")]
@@ -269,7 +279,10 @@ impl LayoutError {
             Self::NotText { .. } => {
                 "it must be text (data type 6): the tool that wrote this file breaks the format".into()
             }
-            Self::NoHeader => "is this a GDSII or OASIS file? Compressed files are not read".into(),
+            Self::NoHeader => "is this a GDSII or OASIS file? Of compressed files those of gzip are read".into(),
+            Self::OtherFormat { remedy, .. } => (*remedy).into(),
+            Self::Gzip(_) => CUT_SHORT.into(),
+            Self::Unpacked { .. } => "is this the layout that was meant? Unpack it by gunzip, then read it".into(),
             Self::Oasis { fault, .. } => fault.remedy().into(),
             Self::LayerNumber { .. } => "layers and datatypes up to 65535 are read".into(),
             Self::CellNumber { .. } => "numbers of cells below 2^56 are read".into(),
@@ -280,6 +293,8 @@ impl LayoutError {
             | Self::NoCellName { .. }
             | Self::Points { .. }
             | Self::Lacks { .. }
+            | Self::BoxForm { .. }
+            | Self::PrivateElement { .. }
             | Self::ArraySize { .. } => REPORT.into(),
             Self::UnitSize { .. } => "database units from 1e-13 to 1e-3 m are read; layouts are in 1e-9".into(),
             Self::UnitRatio { .. } => "write the layout with a database unit of 1 nm".into(),
@@ -300,7 +315,7 @@ impl LayoutError {
             Self::NoCells => "is this the right file?".into(),
             Self::NoSuchCell { tops, .. } => format!("cells at the top: {}", tops.join(", ")),
             Self::SeveralTops { .. } => {
-                "write the one to be read to a separate file, or name it where a command takes --top".into()
+                "name the one to be read by --top, or write it to a separate file".into()
             }
             Self::Limit { limit, .. } => limit.remedy().into(),
         }

@@ -6,10 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::cells::FileFormat;
+use super::gzip;
 use super::oasis::ReadSeek;
+use super::read_warnings::Tolerance;
 use super::record::{self, Record};
 use crate::error::{Error, LayoutError, Result};
 use metalith_core::file::{Ahead, Block};
+use tempfile::TempPath;
 
 /// Bytes read at a time: enough that the kernel's copy is the cost, not the call. No mapping of the file:
 /// mapped pages count as memory of the process.
@@ -24,8 +27,16 @@ const LONGEST: usize = 1 << 16;
 /// A layout that can be read again and again.
 #[derive(Clone, Debug)]
 pub(super) enum Source {
-    File { path: PathBuf, bytes: u64 },
-    Memory { name: PathBuf, bytes: Arc<[u8]> },
+    File {
+        path: PathBuf,
+        bytes: u64,
+        /// The file that is read instead: what a compressed one holds.
+        unpacked: Option<Arc<TempPath>>,
+    },
+    Memory {
+        name: PathBuf,
+        bytes: Arc<[u8]>,
+    },
 }
 
 enum Stream {
@@ -39,9 +50,15 @@ impl Source {
         if !meta.is_file() {
             return Err(Error::NotAFile { path: path.to_owned() });
         }
+        let unpacked = gzip::unpacked(path, meta.len())?.map(Arc::new);
+        let bytes = match &unpacked {
+            Some(file) => std::fs::metadata(&**file).map_err(Error::io("read", path))?.len(),
+            None => meta.len(),
+        };
         Ok(Self::File {
             path: path.to_owned(),
-            bytes: meta.len(),
+            bytes,
+            unpacked,
         })
     }
 
@@ -49,6 +66,16 @@ impl Source {
         match self {
             Self::File { path, .. } => path,
             Self::Memory { name, .. } => name,
+        }
+    }
+
+    /// Path of the file that is read.
+    fn read_path(&self) -> &Path {
+        match self {
+            Self::File {
+                unpacked: Some(file), ..
+            } => file,
+            _ => self.path(),
         }
     }
 
@@ -62,7 +89,7 @@ impl Source {
     /// The file as it is, to be read in OASIS.
     pub(crate) fn raw(&self) -> Result<Box<dyn ReadSeek>> {
         Ok(match self {
-            Self::File { path, bytes } => Box::new(unchanged(path, *bytes)?),
+            Self::File { bytes, .. } => Box::new(unchanged(self.read_path(), *bytes)?),
             Self::Memory { bytes, .. } => Box::new(Cursor::new(bytes.clone())),
         })
     }
@@ -83,7 +110,8 @@ impl Source {
     /// Start reading at the first byte.
     pub(crate) fn open(&self) -> Result<Input> {
         let stream = match self {
-            Self::File { path, bytes } => {
+            Self::File { bytes, .. } => {
+                let path = self.read_path();
                 let file = unchanged(path, *bytes)?;
                 let large = (*bytes >= LARGE).then(|| Ahead::open(path, LONGEST)).flatten();
                 large.map_or_else(|| Stream::Plain(Box::new(file)), Stream::Large)
@@ -99,6 +127,7 @@ impl Source {
             block,
             begin: 0,
             ended: false,
+            tolerance: Tolerance::Known,
         })
     }
 }
@@ -128,6 +157,8 @@ pub(super) struct Input {
     /// Place in the file of the block's stretch; before it is what was left of the one before.
     begin: u64,
     ended: bool,
+    /// Treatment of warnings from the format.
+    pub tolerance: Tolerance,
 }
 
 impl Input {
@@ -143,6 +174,17 @@ impl Input {
             offset,
             cause,
         }
+    }
+
+    /// Read over a departure from the format at a place, if they are read over.
+    #[cold]
+    pub(crate) fn odd(&mut self, offset: u64, cause: LayoutError, taken: &'static str) -> Result<()> {
+        let path = &self.path;
+        self.tolerance.meet(offset, cause, taken, |cause| Error::Layout {
+            path: path.clone(),
+            offset,
+            cause,
+        })
     }
 
     /// The bytes at hand: at least one whole record, unless the file ends before.
@@ -221,8 +263,27 @@ impl Input {
     /// The next record.
     ///
     /// # Errors
-    /// If the file ends before it is complete, or its length is impossible.
+    /// If the file ends before it is complete, its length is impossible, or its type is not of the format.
+    #[inline]
     pub(crate) fn next(&mut self) -> Result<Record> {
+        let record = self.next_of_any()?;
+        if record.kind > record::kind::LAST {
+            return Err(self.unknown(record));
+        }
+        Ok(record)
+    }
+
+    /// Error for a record type that is not of the format.
+    #[cold]
+    pub(crate) fn unknown(&self, record: Record) -> Error {
+        self.fault(record.offset, LayoutError::RecordKind { kind: record.kind })
+    }
+
+    /// The next record, of whatever type.
+    ///
+    /// # Errors
+    /// If the file ends before it is complete, or its length is impossible.
+    pub(crate) fn next_of_any(&mut self) -> Result<Record> {
         let offset = self.offset();
         let window = self.window()?;
         let held = window.len();
@@ -230,15 +291,19 @@ impl Input {
             return Err(self.fault(offset, LayoutError::EndsEarly { held }));
         };
         let length = usize::from(u16::from_be_bytes([high, low]));
-        if length < 4 || length % 2 != 0 {
-            let first = offset == 0;
+        let first = offset == 0;
+        if length < 4 {
             return Err(self.fault(offset, LayoutError::RecordLength { length, first }));
         }
         if length > held {
             return Err(self.fault(offset, LayoutError::EndsInRecord { kind, length, held }));
         }
-        if kind > record::kind::LAST {
-            return Err(self.fault(offset, LayoutError::RecordKind { kind }));
+        if length % 2 != 0 {
+            self.odd(
+                offset,
+                LayoutError::RecordLength { length, first },
+                "its bytes were taken as they are",
+            )?;
         }
         let from = self.from + 4;
         self.from += length;

@@ -31,9 +31,10 @@ pub enum CellItem<'a> {
         string: &'a [u8],
         at: Point,
     },
-    /// A cell, by its index in [`Layout::cells`].
+    /// A cell by its name, and its index in [`Layout::cells`] if the file has it.
     Reference {
-        cell: usize,
+        name: &'a [u8],
+        cell: Option<usize>,
         at: Point,
         mirrored: bool,
         magnification: f64,
@@ -80,9 +81,11 @@ impl Layout {
     /// properties and nodes are left out.
     ///
     /// # Errors
-    /// If the tree of cells has faults, if the file cannot be read again, and what the consumer returns.
+    /// If references lead round in a circle or two cells have one name, if the file cannot be read again, and what the
+    /// consumer returns.
     pub fn cell_items<C: CellConsumer>(&self, consumer: &mut C, progress: &dyn Progress) -> Result<()> {
-        self.sound()?;
+        self.no_circles()?;
+        self.no_doubled()?;
         let mut input = self.reopen()?;
         let mut walk = Walk::new(self.limits(), progress);
         progress.begin("reading cells again", self.bytes());
@@ -116,11 +119,6 @@ struct Pass<'a, C> {
 }
 
 impl<C: CellConsumer> Pass<'_, C> {
-    fn cell_of(&self, name: &[u8]) -> Option<usize> {
-        let number = self.layout.names().find(name)?;
-        self.layout.tree().definitions[number as usize]
-    }
-
     fn put(&mut self, element: &ElementContent, repetition: Option<&Repetition>) -> Result<(), SinkError> {
         let layer = element.layer;
         let item = match element.kind {
@@ -160,11 +158,13 @@ impl<C: CellConsumer> Pass<'_, C> {
                 at: element.points[0],
             },
             ElementKind::Reference | ElementKind::Array => {
-                let Some(cell) = self.cell_of(&element.name) else {
+                let layout = self.layout;
+                let Some(number) = layout.names().find(&element.name) else {
                     return Ok(());
                 };
                 CellItem::Reference {
-                    cell,
+                    name: layout.names().name(number),
+                    cell: layout.tree().definitions[number as usize],
                     at: element.points[0],
                     mirrored: element.mirror,
                     magnification: element.magnification,
@@ -184,16 +184,15 @@ impl<C: CellConsumer> Sink for Pass<'_, C> {
 
     fn plain_reference(&mut self, _offset: u64, key: u64, at: Point) -> Result<(), SinkError> {
         let layout = self.layout;
-        let cell = self.recent.number(key, |name| {
-            let number = layout.names().find(name);
-            let cell = number.and_then(|n| layout.tree().definitions[n as usize]);
-            cell.map_or(u32::MAX, |c| c as u32)
-        });
-        if cell == u32::MAX {
+        let number = self
+            .recent
+            .number(key, |name| layout.names().find(name).unwrap_or(u32::MAX));
+        if number == u32::MAX {
             return Ok(());
         }
         let item = CellItem::Reference {
-            cell: cell as usize,
+            name: layout.names().name(number),
+            cell: layout.tree().definitions[number as usize],
             at,
             mirrored: false,
             magnification: 1.0,

@@ -7,7 +7,9 @@ use super::cells::{CellInput, FileFormat};
 use super::input::Source;
 use super::limits::ReadLimits;
 use super::names::Names;
+use super::notes;
 use super::oasis::Texts;
+use super::read_warnings::ReadWarnings;
 use super::scan::{Scan, scan};
 use super::tree::{self, Tree};
 use super::visit::Selection;
@@ -30,6 +32,11 @@ pub struct Layout {
     trailing: (u64, bool),
     format: FileFormat,
     texts: Texts,
+    warnings: ReadWarnings,
+    /// Number of the name of each cell.
+    numbers: Vec<u32>,
+    /// Places of the cells of notes, which are no layout.
+    pub(super) notes: Vec<std::ops::Range<u64>>,
 }
 
 /// A reference that leads nowhere or round in a circle, or a second cell of the same name.
@@ -77,10 +84,12 @@ impl Layout {
 
     fn of(source: Source, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
         let scan = scan(&source, &limits, progress)?;
+        scan.warnings.report(source.path(), progress);
         Ok(Self::from_scan(source, limits, scan))
     }
 
     pub(super) fn from_scan(source: Source, limits: ReadLimits, mut scan: Scan) -> Self {
+        let notes = notes::take(&mut scan);
         let tree = tree::resolve(&mut scan.cells, &scan.names, &scan.numbers);
         Self {
             source,
@@ -93,6 +102,9 @@ impl Layout {
             trailing: scan.trailing,
             format: scan.format,
             texts: scan.texts,
+            warnings: scan.warnings,
+            numbers: scan.numbers,
+            notes,
         }
     }
 
@@ -109,6 +121,11 @@ impl Layout {
     /// Bytes behind ENDLIB, and whether any of them is not zero.
     pub fn trailing(&self) -> (u64, bool) {
         self.trailing
+    }
+
+    /// ReadWarnings from the format that were read over.
+    pub fn warnings(&self) -> &ReadWarnings {
+        &self.warnings
     }
 
     /// Format that it is in.
@@ -159,6 +176,38 @@ impl Layout {
     /// Indices of cells that no other refers to.
     pub fn tops(&self) -> &[usize] {
         &self.tree.tops
+    }
+
+    /// The layout below one cell: the cell, and the cells that it refers to, as if the file had no others.
+    ///
+    /// # Errors
+    /// If there is no such cell.
+    pub fn below(mut self, top: &str) -> Result<Self> {
+        let top = self.roots(&Selection {
+            top: Some(top.to_owned()),
+            lenient: true,
+            ..Selection::default()
+        })?[0];
+        let mut wanted = vec![false; self.cells.len()];
+        let mut next = vec![top];
+        while let Some(cell) = next.pop() {
+            if !std::mem::replace(&mut wanted[cell], true) {
+                next.extend(self.cells[cell].children.iter().filter_map(|c| c.cell));
+            }
+        }
+        let mut kept = wanted.iter();
+        self.cells.retain(|_| kept.next().is_some_and(|&k| k));
+        let mut kept = wanted.iter();
+        self.numbers.retain(|_| kept.next().is_some_and(|&k| k));
+        let children = self.cells.iter_mut().flat_map(|cell| &mut cell.children);
+        children.for_each(|child| child.cut = false);
+        self.tree = tree::resolve(&mut self.cells, &self.names, &self.numbers);
+        Ok(self)
+    }
+
+    /// Bytes of the name of a cell.
+    pub fn name_bytes(&self, cell: usize) -> &[u8] {
+        self.names.name(self.numbers[cell])
     }
 
     /// Index of the cell with this name: its bytes, or as it is printed.
@@ -245,17 +294,28 @@ impl Layout {
 
     /// Checks that every reference leads to a cell, and none round in a circle.
     pub(super) fn sound(&self) -> Result<()> {
-        let cause = |f: Faulty, of: fn(String, String) -> LayoutError| self.fault(f.offset, of(f.cell, f.name));
-        if let Some(f) = self.circles().into_iter().next() {
-            return Err(cause(f, |cell, name| LayoutError::Circle { cell, name }));
-        }
+        self.no_circles()?;
         if let Some(f) = self.dangling().into_iter().next() {
-            return Err(cause(f, |cell, name| LayoutError::Dangling { cell, name }));
+            let (cell, name) = (f.cell, f.name);
+            return Err(self.fault(f.offset, LayoutError::Dangling { cell, name }));
         }
-        if let Some(f) = self.doubled().into_iter().next() {
-            return Err(cause(f, |_, name| LayoutError::Doubled { name }));
+        self.no_doubled()
+    }
+
+    /// Checks that no reference leads round in a circle.
+    pub(super) fn no_circles(&self) -> Result<()> {
+        match self.circles().into_iter().next() {
+            Some(Faulty { cell, name, offset }) => Err(self.fault(offset, LayoutError::Circle { cell, name })),
+            None => Ok(()),
         }
-        Ok(())
+    }
+
+    /// Checks that no two cells have one name.
+    pub(super) fn no_doubled(&self) -> Result<()> {
+        match self.doubled().into_iter().next() {
+            Some(Faulty { name, offset, .. }) => Err(self.fault(offset, LayoutError::Doubled { name })),
+            None => Ok(()),
+        }
     }
 
     /// The first cells at the top.
@@ -284,6 +344,10 @@ impl Layout {
 
     pub(super) fn tree(&self) -> &Tree {
         &self.tree
+    }
+
+    pub(super) fn source(&self) -> &Source {
+        &self.source
     }
 
     pub(super) fn names(&self) -> &Names {

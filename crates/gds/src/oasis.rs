@@ -8,13 +8,14 @@ use std::sync::Arc;
 use metalith_core::{LayerNumber, Progress};
 use metalith_oasis::{
     CellReference, NameTable, OasisElement, OasisError, OasisFault, OasisItem, OasisLimit, OasisLimits, OasisPlace,
-    OasisReader, OasisShape, Repetition,
+    OasisReader, OasisShape, OasisWarning, Repetition, StringKind,
 };
 
 use super::cell::LayoutCell;
 use super::element::{ElementContent, ElementKind};
 use super::input::Source;
 use super::limits::ReadLimits;
+use super::read_warnings::{ReadWarning, ReadWarnings};
 use super::scan::{Scan, Tally};
 use super::shape::Point;
 use super::walk::{Sink, SinkError};
@@ -65,6 +66,12 @@ fn put_numbered(number: u64, name: &mut Vec<u8>) {
     name.extend_from_slice(&bytes[..length]);
 }
 
+/// The bytes of a name that stands in a record; one that would read as a number as it is.
+fn inline_name(name: &[u8]) -> std::borrow::Cow<'_, [u8]> {
+    let bytes = StringKind::Name.unescaped(name);
+    if numbered(&bytes).is_some() { name.into() } else { bytes }
+}
+
 /// The number that a name stands for.
 pub(super) fn numbered(name: &[u8]) -> Option<u64> {
     let (&first, rest) = name.split_first()?;
@@ -85,7 +92,8 @@ pub(super) struct OasisCells {
 impl OasisCells {
     pub(crate) fn open(source: &Source, texts: Texts) -> Result<Self> {
         let reader = OasisReader::unverified(source.raw()?, OasisLimits::default());
-        Ok(Self::of(reader.map_err(located(source.path()))?, source, texts, true))
+        let reader = reader.map_err(located(source.path()))?.tolerant(true);
+        Ok(Self::of(reader, source, texts, true))
     }
 
     fn of(reader: OasisReader<Box<dyn ReadSeek>>, source: &Source, texts: Texts, resolve: bool) -> Self {
@@ -226,7 +234,7 @@ fn feed<S: Sink>(
                 CellReference::Name(name) if name.len() > limits.name_bytes => {
                     return Err(LayoutError::ReferenceName { bytes: name.len() }.into());
                 }
-                CellReference::Name(name) => content.name.extend_from_slice(name),
+                CellReference::Name(name) => content.name.extend_from_slice(&inline_name(name)),
             }
             content.points.push(at);
             (content.mirror, content.magnification, content.angle_deg) = (mirrored, magnification, angle_deg);
@@ -263,7 +271,7 @@ fn feed<S: Sink>(
             content.points.push(at);
             content.layer = layer()?;
             match string {
-                CellReference::Name(text) => content.string.extend_from_slice(text),
+                CellReference::Name(text) => content.string.extend_from_slice(&StringKind::Text.unescaped(text)),
                 CellReference::Number(number) => match texts.get(&number) {
                     Some(text) => content.string.extend_from_slice(text),
                     None if resolve => return Err(LayoutError::TextNumber { number }.into()),
@@ -319,6 +327,7 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
     let path = source.path();
     progress.begin("reading cells", source.bytes());
     let reader = OasisReader::new(source.raw()?, OasisLimits::default()).map_err(located(path))?;
+    let reader = reader.tolerant(!progress.strict());
     let grid_per_um = reader.grid_per_um();
     let mut tally = Tally::new(*limits);
     let mut cells = OasisCells::of(reader, source, Texts::default(), false);
@@ -355,7 +364,7 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
                     CellReference::Number(number) => put_numbered(number, &mut name),
                     CellReference::Name(bytes) => {
                         name.clear();
-                        name.extend_from_slice(bytes);
+                        name.extend_from_slice(&inline_name(bytes));
                     }
                 }
                 begun = true;
@@ -381,7 +390,21 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
         }
     }
     let units = [1.0 / grid_per_um, 1e-6 / grid_per_um];
-    Ok(tally.finish_numbered(units, &tables.cells, tables.texts))
+    let mut scan = tally.finish_numbered(units, &tables.cells, tables.texts);
+    let (listed, count) = cells.reader.warnings();
+    let warning = |warning: &OasisWarning| {
+        let (inner, fault) = (None, warning.fault.clone());
+        ReadWarning {
+            offset: warning.offset,
+            cause: LayoutError::Oasis { inner, fault },
+            taken: warning.taken,
+        }
+    };
+    scan.warnings = ReadWarnings {
+        listed: listed.iter().map(warning).collect(),
+        count,
+    };
+    Ok(scan)
 }
 
 /// Names and texts by number.
@@ -403,9 +426,9 @@ impl Tables {
     }
 
     fn add(&mut self, table: NameTable, number: u64, name: &[u8]) -> Result<(), LayoutError> {
-        let entries = match table {
-            NameTable::Cells => &mut self.cells,
-            NameTable::Texts => &mut self.texts,
+        let (entries, kind) = match table {
+            NameTable::Cells => (&mut self.cells, StringKind::Name),
+            NameTable::Texts => (&mut self.texts, StringKind::Text),
             _ => return Ok(()),
         };
         if table == NameTable::Cells && name.len() > self.limits.name_bytes {
@@ -419,7 +442,9 @@ impl Tables {
                 most: self.limits.cells as u64,
             });
         }
-        entries.entry(number).or_insert_with(|| name.to_vec());
+        entries
+            .entry(number)
+            .or_insert_with(|| kind.unescaped(name).into_owned());
         Ok(())
     }
 }

@@ -24,13 +24,18 @@ pub(super) fn outline(line: &[Point], width: i64, path_type: i16, extensions: [i
     let half = width.unsigned_abs() as f64 / 2.0;
     // Nothing, or the pen's own shape where its ends reach out.
     let dot = |at: [f64; 2], out: &mut Vec<Point>| {
-        let reach = if path_type == 0 || path_type == 4 { 0.0 } else { half };
+        // Without a direction ends reach out along x.
+        let [left, right] = match path_type {
+            0 => [0.0; 2],
+            4 => extensions.map(f64::from),
+            _ => [half; 2],
+        };
         let corners = [
-            [-reach, -half],
-            [reach, -half],
-            [reach, half],
-            [-reach, half],
-            [-reach, -half],
+            [-left, -half],
+            [right, -half],
+            [right, half],
+            [-left, half],
+            [-left, -half],
         ];
         out.extend(corners.map(|c| rounded([at[0] + c[0], at[1] + c[1]])));
     };

@@ -37,6 +37,8 @@ pub(super) mod kind {
     pub(crate) const ENDEXTN: u8 = 0x31;
     /// Last number that release 6 gives a meaning.
     pub(crate) const LAST: u8 = 0x3B;
+    /// Last number that elements of other programs' own are passed over for.
+    pub(crate) const LAST_PRIVATE: u8 = 0x7F;
 }
 
 /// Data types by number.

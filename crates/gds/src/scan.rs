@@ -5,11 +5,13 @@ use std::collections::HashMap;
 use super::cell::{Child, LayerTally, LayoutCell};
 use super::cells::FileFormat;
 use super::element::{ElementContent, ElementKind};
+use super::foreign;
 use super::input::{Input, Source};
 use super::limits::ReadLimits;
 use super::names::{Names, Recent};
 use super::oasis::{self, Copies, Texts};
 use super::path_outline::outline;
+use super::read_warnings::{ReadWarnings, Tolerance};
 use super::record::{self, kind};
 use super::shape::{Point, Rect};
 use super::walk::{Sink, SinkError, Walk};
@@ -29,6 +31,8 @@ pub(super) struct Scan {
     /// Bytes behind ENDLIB, and whether any of them is not zero.
     pub trailing: (u64, bool),
     pub format: FileFormat,
+    /// ReadWarnings from the format.
+    pub warnings: ReadWarnings,
     /// Texts that elements refer to by number.
     pub texts: Texts,
 }
@@ -39,6 +43,7 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
         return oasis::scan(source, limits, progress);
     }
     let mut input = source.open()?;
+    input.tolerance = Tolerance::of(progress);
     progress.begin("reading cells", source.bytes());
     let mut walk = Walk::new(limits, progress);
     scan_with(&mut input, source.bytes(), &mut walk)
@@ -49,7 +54,8 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
     if let &[_, _, first, ..] = input.window()?
         && first != kind::HEADER
     {
-        return Err(input.fault(0, LayoutError::NoHeader));
+        let cause = foreign::format_of(input.window()?).unwrap_or(LayoutError::NoHeader);
+        return Err(input.fault(0, cause));
     }
     input.next()?;
     let mut title = String::new();
@@ -96,6 +102,7 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
         numbers: tally.numbers,
         trailing: (trailing, nonzero),
         format: FileFormat::Gds,
+        warnings: std::mem::replace(&mut input.tolerance, Tolerance::Known).into_listed(),
         texts: Texts::default(),
     })
 }
@@ -233,6 +240,7 @@ impl Tally {
             numbers: self.numbers,
             trailing: (0, false),
             format: FileFormat::Oasis,
+            warnings: ReadWarnings::default(),
             texts: Texts::new(texts),
         }
     }

@@ -6,7 +6,7 @@ use super::input::Input;
 use super::limits::ReadLimits;
 use super::oasis::Copies;
 use super::pillar_records;
-use super::record::kind;
+use super::record::{Record, kind};
 use super::shape::Point;
 use crate::error::{Error, LayoutError, Result};
 use metalith_core::{LayerNumber, Progress};
@@ -47,6 +47,29 @@ impl From<Error> for SinkError {
 impl From<metalith_core::Error> for SinkError {
     fn from(error: metalith_core::Error) -> Self {
         Self::With(error.into())
+    }
+}
+
+/// Pass over an element of another program's own, such as the paths of a moving stage that Raith writes: a record of a
+/// type above those of the format, without a body, and all up to ENDEL.
+#[cold]
+fn skip_private(input: &mut Input, head: Record) -> Result<()> {
+    let kind = head.kind;
+    if head.data != 0 || !input.body(head).is_empty() || kind > kind::LAST_PRIVATE {
+        return Err(input.unknown(head));
+    }
+    input.odd(head.offset, LayoutError::PrivateElement { kind }, "it was left out")?;
+    loop {
+        let record = input.next_of_any()?;
+        match record.kind {
+            kind::ENDEL => return Ok(()),
+            kind::ENDSTR | kind::ENDLIB | kind::BGNSTR | kind::BGNLIB | kind::HEADER => {
+                let (kind, begin) = (record.kind, head.offset);
+                return Err(input.fault(record.offset, LayoutError::ElementNotEnded { kind, begin }));
+            }
+            other if other > kind::LAST_PRIVATE => return Err(input.unknown(record)),
+            _ => {}
+        }
     }
 }
 
@@ -108,7 +131,7 @@ impl<'a> Walk<'a> {
             if self.fast {
                 self.fast_run(input, sink)?;
             }
-            let record = input.next()?;
+            let record = input.next_of_any()?;
             if let Some(kind) = ElementKind::of(record.kind) {
                 self.element.read(input, record, kind, self.limits)?;
                 sink.element(&self.element).map_err(|error| match error {
@@ -120,6 +143,8 @@ impl<'a> Walk<'a> {
             } else if matches!(record.kind, kind::BGNSTR | kind::ENDLIB | kind::BGNLIB | kind::HEADER) {
                 let kind = record.kind;
                 return Err(input.fault(record.offset, LayoutError::CellNotEnded { kind }));
+            } else if record.kind > kind::LAST {
+                skip_private(input, record)?;
             }
         }
     }

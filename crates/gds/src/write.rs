@@ -3,6 +3,11 @@
 use crate::LayerNumber;
 use crate::pillar_records::BOUNDARY_BYTES;
 
+/// The bytes of a real number, as records MAG and ANGLE have it.
+pub fn real8(value: f64) -> [u8; 8] {
+    crate::real::encode(value)
+}
+
 /// Offset at which the points of a BOUNDARY without optional record begin.
 const POINTS: usize = 20;
 

@@ -34,9 +34,15 @@ impl LayoutFormat {
         }
     }
 
-    /// The format that a name of a file asks for by its end: OASIS for `.oas` and `.oasis`, in any case of letters.
+    /// The format that a name of a file asks for by its end: OASIS for `.oas` and `.oasis`, in any case of letters, also
+    /// before `.gz`.
     pub fn of_name(path: &Path) -> Self {
-        let oasis = path
+        let unpacked = if is_gzip(path) {
+            path.with_extension("")
+        } else {
+            path.to_owned()
+        };
+        let oasis = unpacked
             .extension()
             .is_some_and(|end| end.eq_ignore_ascii_case("oas") || end.eq_ignore_ascii_case("oasis"));
         if oasis {
@@ -45,4 +51,9 @@ impl LayoutFormat {
             Self::Gds
         }
     }
+}
+
+/// True if the name of a file asks for compression by gzip.
+pub(crate) fn is_gzip(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("gz"))
 }

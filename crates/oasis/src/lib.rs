@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod error;
+mod escape;
 mod limits;
 mod number;
 mod read;
@@ -10,9 +11,11 @@ mod trapezoid;
 mod write;
 
 pub use error::{OasisError, OasisFault, OasisLimit};
+pub use escape::StringKind;
 pub use limits::OasisLimits;
 pub use read::{
     CellReference, NameEntry, NameTable, OasisElement, OasisItem, OasisPlace, OasisReader, OasisShape, OasisValue,
+    OasisWarning,
 };
 pub use repetition::Repetition;
 pub use trapezoid::compact_trapezoid;

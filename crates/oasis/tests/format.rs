@@ -339,3 +339,42 @@ fn no_damage_makes_the_reader_panic() {
     // Damage that leaves the file readable is common, and so is damage that does not.
     assert!((MUTANTS / 100..MUTANTS).contains(&readable), "{readable}");
 }
+
+/// Compact trapezoids of one side set the modal state of the other: the rectangle behind one, of which nothing is said,
+/// has it.
+#[test]
+fn compact_trapezoids_set_the_implied_side() {
+    let cases = [
+        (16, 100),
+        (17, 100),
+        (18, 100),
+        (19, 100),
+        (25, 100),
+        (22, 200),
+        (23, 200),
+        (20, 200),
+        (21, 200),
+    ];
+    for (form, implied) in cases {
+        // A rectangle of 30 x 40, the form with its own side of 100, a rectangle of the modal state.
+        let own = if matches!(form, 20 | 21) { 0x20 } else { 0x40 };
+        let mut records = vec![14, 1, b'A', 20, 0x63, 1, 0, 30, 40];
+        records.extend([26, 0x80 | own, form, 100, 20, 0]);
+        let bytes = metalith_testing::oasis::around(&records);
+        let mut reader = OasisReader::new(Cursor::new(bytes), OasisLimits::default()).unwrap();
+        let mut last = None;
+        loop {
+            match reader.read_item().unwrap() {
+                OasisItem::Element(element) => {
+                    if let OasisShape::Rectangle { size } = element.shape {
+                        last = Some(size);
+                    }
+                }
+                OasisItem::End => break,
+                _ => {}
+            }
+        }
+        let size = if own == 0x20 { [implied, 100] } else { [100, implied] };
+        assert_eq!(last, Some(size), "{form}");
+    }
+}

@@ -170,19 +170,12 @@ const CASES: &[Case] = &[
     ),
     (
         "outline.winding",
-        |c| {
-            remove(c, 5, 5);
-            let (x, y) = (site(5), site(5));
-            let p = [
-                (x - 80, y - 80),
-                (x - 80, y + 80),
-                (x + 80, y + 80),
-                (x + 80, y - 80),
-                (x - 80, y - 80),
-            ];
-            c.extra.polygon(1, &p);
-        },
-        &[],
+        clockwise,
+        &[(
+            "[[rule]]\nid = \"outline.vertices\"",
+            "[[rule]]\nid = \"outline.winding\"\ncheck = \"winding\"\ndirection = \"counter_clockwise\"\n\n\
+             [[rule]]\nid = \"outline.vertices\"",
+        )],
     ),
     (
         "outline.vertices",
@@ -346,6 +339,20 @@ const CASES: &[Case] = &[
     ("budget.write_time", |_| {}, &[("hours = 24", "hours = 0.0001")]),
 ];
 
+/// One pillar drawn clockwise.
+fn clockwise(c: &mut Chip) {
+    remove(c, 5, 5);
+    let (x, y) = (site(5), site(5));
+    let p = [
+        (x - 80, y - 80),
+        (x - 80, y + 80),
+        (x + 80, y + 80),
+        (x + 80, y - 80),
+        (x - 80, y - 80),
+    ];
+    c.extra.polygon(1, &p);
+}
+
 fn remove(c: &mut Chip, ix: i32, iy: i32) {
     c.pillars.retain(|p| (p.0, p.1) != (ix, iy));
 }
@@ -426,6 +433,14 @@ fn bytes_behind_the_end() {
     assert_eq!(broken(&check(bytes.clone(), &[])), []);
     bytes.push(7);
     assert_eq!(broken(&check(bytes, &[])), [("file.end", 1)]);
+}
+
+/// GDSII gives the direction of an outline no meaning: KLayout writes all of them clockwise.
+#[test]
+fn clockwise_outlines_are_no_finding() {
+    let mut chip = Chip::clean();
+    clockwise(&mut chip);
+    assert_eq!(broken(&check(chip.bytes(), &[])), []);
 }
 
 /// Circles and turned squares are no squares, whichever other rule looks at their sides.

@@ -1,5 +1,6 @@
 //! The reader and the extraction: hand-built bytes, files of other tools, random trees, damaged bytes.
 
+mod departures;
 mod folded;
 mod oasis;
 mod pillars;
@@ -123,13 +124,13 @@ fn faults_name_the_byte() {
         assert!(offset <= cut as u64, "{cause}");
     }
     let head = Gds::library().0.len() as u64;
-    let mut odd = Gds::library();
-    odd.cell("A").record(0x08, 0, &[0]).end_cell();
-    let odd_length = LayoutError::RecordLength {
-        length: 5,
+    let mut short = Gds::library();
+    short.cell("A").0.extend([0, 2, 0x08, 0]);
+    let length = LayoutError::RecordLength {
+        length: 2,
         first: false,
     };
-    assert_eq!(fault_of(odd.end()), (head + 28 + 6, odd_length));
+    assert_eq!(fault_of(short.end()), (head + 28 + 6, length));
     let mut unknown = Gds::library();
     unknown.record(0x77, 0, &[]);
     assert_eq!(fault_of(unknown.end()).0, head);

@@ -1,40 +1,62 @@
 //! A layout from one format into the other, cell by cell, with its hierarchy.
 
+mod cut;
+mod output;
 mod to_gds;
 mod to_oasis;
 
 use std::path::Path;
 
+use metalith_core::text::printable_bytes;
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::{FileFormat, Layout};
 
 use super::{LayoutFormat, Written};
 
-/// Write the layout that was read to `path` in a format: the same cells with the same content. Properties are left out,
-/// and so are nodes of GDSII and private records of OASIS; paths with round ends or odd widths become polygons, circles
-/// too. OASIS is written as it comes, whatever encoding of pillars is asked for: cells are copied, not made.
+/// Write the layout that was read to `path` in a format: the same cells with the same content, compressed if the name
+/// ends in `.gz`. Properties are left out, and so are nodes of GDSII and private records of OASIS; paths with round ends
+/// or odd widths become polygons, circles too. OASIS is written as it comes, whatever encoding of pillars is asked for:
+/// cells are copied, not made. References to cells that are not in the file are kept; bytes of names and texts are too,
+/// and OASIS, which has printable ASCII only, holds others as `\x` and two digits. The notes of KLayout are kept from
+/// GDSII to GDSII.
 ///
 /// Both files are streamed; nothing is held but one block. GDSII has no lists of copies: a layout of more copies than are
 /// read of a file of its size is not written in it.
 ///
 /// # Errors
-/// If the tree of cells has faults, if something does not fit the format, or if a file cannot be read or written; the
-/// old file is then as it was.
+/// If references lead round in a circle or two cells have one name, if something does not fit the format, or if a file
+/// cannot be read or written; the old file is then as it was.
 pub fn convert(layout: &Layout, format: LayoutFormat, path: &Path, progress: &dyn Progress) -> Result<Written> {
-    let tops: Vec<&str> = layout.tops().iter().map(|&t| layout.cells()[t].name.as_str()).collect();
+    let mut changes = Changes::default();
     let bytes = match format {
         LayoutFormat::Gds => {
             // Lists of copies are written one by one.
             layout.copies_fit()?;
-            to_gds::write(layout, path, progress)?
+            to_gds::write(layout, path, &mut changes, progress)?
         }
-        LayoutFormat::Oasis(_) => to_oasis::write(layout, &tops, path, progress)?,
+        LayoutFormat::Oasis(_) => to_oasis::write(layout, path, &mut changes, progress)?,
     };
-    let mut remarks = Vec::new();
+    let bytes = if crate::format::is_gzip(path) {
+        std::fs::metadata(path).map_err(Error::io("read", path))?.len()
+    } else {
+        bytes
+    };
+    let mut remarks = changes.remarks();
     let with_properties: u64 = layout.cells().iter().map(|c| c.with_properties).sum();
     if with_properties > 0 {
         remarks.push(format!(
             "{with_properties} elements have properties, which are not written"
+        ));
+    }
+    if layout.has_notes() && (layout.format() == FileFormat::Oasis || format != LayoutFormat::Gds) {
+        remarks.push("the notes in cell $$$CONTEXT_INFO$$$ are no layout and are not written in OASIS".into());
+    }
+    let missing = layout.dangling();
+    if let Some(first) = missing.first() {
+        let (cell, name) = (&first.cell, &first.name);
+        let count = missing.len();
+        remarks.push(format!(
+            "{count} references are to cells that are not in the file, such as that of {cell} to {name}: they were kept"
         ));
     }
     if layout.format() == FileFormat::Oasis && format == LayoutFormat::Gds {
@@ -45,10 +67,11 @@ pub fn convert(layout: &Layout, format: LayoutFormat, path: &Path, progress: &dy
             )
         }));
     }
+    let top = layout.tops().first().map(|&t| layout.cells()[t].name.clone());
     Ok(Written {
         path: path.to_owned(),
         bytes,
-        top_cell: tops.first().map_or_else(String::new, |&t| t.to_owned()),
+        top_cell: top.unwrap_or_default(),
         remarks,
         beside: Vec::new(),
     })
@@ -56,6 +79,48 @@ pub fn convert(layout: &Layout, format: LayoutFormat, path: &Path, progress: &dy
 
 /// Characters of a cell name that every reader of GDSII takes.
 const LONGEST_NAME: usize = 32;
+
+/// Changes that a format asked for.
+#[derive(Default)]
+struct Changes {
+    /// Outlines that were cut, the points of the largest, and the parts of all.
+    outlines: u64,
+    most_points: usize,
+    parts: usize,
+    /// Names and texts that were escaped, and the first of them.
+    strings: u64,
+    first: Option<String>,
+}
+
+impl Changes {
+    fn cut(&mut self, points: usize, parts: usize) {
+        self.outlines += 1;
+        self.most_points = self.most_points.max(points);
+        self.parts += parts;
+    }
+
+    fn escape(&mut self, string: &[u8]) {
+        self.strings += 1;
+        self.first.get_or_insert_with(|| printable_bytes(string));
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let cut = (self.outlines > 0).then(|| {
+            format!(
+                "{} outlines of up to {} points were cut along lines into {} parts: GDSII has 8191 points an outline",
+                self.outlines, self.most_points, self.parts
+            )
+        });
+        let escaped = self.first.as_ref().map(|first| {
+            format!(
+                "{} names and texts hold bytes that OASIS has not, such as \"{first}\": each byte was written as \\x and \
+                 two hexadecimal digits, and is read back as the byte",
+                self.strings
+            )
+        });
+        cut.into_iter().chain(escaped).collect()
+    }
+}
 
 /// Error for content that does not fit the format that is written.
 fn does_not_fit(what: String, hint: &str) -> Error {

@@ -1,143 +1,196 @@
 //! Cells as GDSII.
 
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
-use gds21::{GdsArrayRef, GdsBoundary, GdsDateTimes, GdsElement, GdsLibrary, GdsPath, GdsPoint, GdsStrans};
-use gds21::{GdsStruct, GdsStructRef, GdsTextElem, GdsUnits};
-use metalith_core::{AtomicFile, Error, LayerNumber, Progress, Result};
+use gds21::{GdsDateTimes, GdsLibrary, GdsUnits};
+use metalith_core::text::printable_bytes;
+use metalith_core::{Error, LayerNumber, Progress, Result};
+use metalith_gds::write::real8;
 use metalith_gds::{CellConsumer, CellItem, Layout, LayoutCell, Point};
 use metalith_oasis::Repetition;
 
-use super::does_not_fit;
+use super::cut::cut;
+use super::output::Output;
+use super::{Changes, does_not_fit};
 use crate::gds_frame::encode;
 
-/// Elements that gds21 encodes at a time.
-const AT_A_TIME: usize = 4096;
+/// Bytes that are written at a time.
+const AT_A_TIME: usize = 1 << 18;
 /// Points of one XY record.
 const MOST_POINTS: usize = 8191;
+/// Bytes of a string: the length of a record has 16 bits and is even.
+const MOST_STRING: usize = 0xFFFE - 4;
 /// Columns and rows of an array.
 const MOST_COLUMNS: u64 = i16::MAX as u64;
 /// Records ENDSTR and ENDLIB.
 const END: usize = 4;
-/// Record ENDSTR.
-const END_OF_CELL: [u8; 4] = [0, 4, 7, 0];
 /// Record ENDLIB.
 const END_OF_LIBRARY: [u8; 4] = [0, 4, 4, 0];
 
-/// Write all cells. Returns the length of the file.
-pub(super) fn write(layout: &Layout, path: &Path, progress: &dyn Progress) -> Result<u64> {
+/// Types of records, each with its type of data.
+mod record {
+    pub(super) const BGNSTR: u16 = 0x0502;
+    pub(super) const STRNAME: u16 = 0x0606;
+    pub(super) const ENDSTR: u16 = 0x0700;
+    pub(super) const BOUNDARY: u16 = 0x0800;
+    pub(super) const PATH: u16 = 0x0900;
+    pub(super) const SREF: u16 = 0x0A00;
+    pub(super) const AREF: u16 = 0x0B00;
+    pub(super) const TEXT: u16 = 0x0C00;
+    pub(super) const LAYER: u16 = 0x0D02;
+    pub(super) const DATATYPE: u16 = 0x0E02;
+    pub(super) const WIDTH: u16 = 0x0F03;
+    pub(super) const XY: u16 = 0x1003;
+    pub(super) const ENDEL: u16 = 0x1100;
+    pub(super) const SNAME: u16 = 0x1206;
+    pub(super) const COLROW: u16 = 0x1302;
+    pub(super) const TEXTTYPE: u16 = 0x1602;
+    pub(super) const STRING: u16 = 0x1906;
+    pub(super) const STRANS: u16 = 0x1A01;
+    pub(super) const MAG: u16 = 0x1B05;
+    pub(super) const ANGLE: u16 = 0x1C05;
+    pub(super) const PATHTYPE: u16 = 0x2102;
+    pub(super) const BGNEXTN: u16 = 0x3003;
+    pub(super) const ENDEXTN: u16 = 0x3103;
+}
+
+/// Write all cells. Returns the length of what was written, before compression.
+pub(super) fn write(layout: &Layout, path: &Path, changes: &mut Changes, progress: &dyn Progress) -> Result<u64> {
     let mut target = Target {
         layout,
-        out: BufWriter::new(AtomicFile::create(path)?),
+        out: Output::create(path)?,
         path,
         bytes: 0,
-        elements: Vec::new(),
-        name: None,
+        buffer: Vec::new(),
+        dates: Vec::new(),
+        open: false,
+        changes,
     };
-    let head = encode(&library(layout))?;
-    target.put(&head[..head.len() - END])?;
-    layout.cell_items(&mut target, progress)?;
-    target.end()?;
-    target.put(&END_OF_LIBRARY)?;
-    let io = |error| Error::io("write", path)(error);
-    target.out.flush().map_err(io)?;
-    target.out.into_inner().map_err(|e| io(e.into_error()))?.commit()?;
-    Ok(target.bytes)
-}
-
-/// The date of everything: a file must not depend on when it was written.
-fn dates() -> GdsDateTimes {
-    let date = chrono::DateTime::UNIX_EPOCH.naive_utc();
-    GdsDateTimes {
-        modified: date,
-        accessed: date,
-    }
-}
-
-fn library(layout: &Layout) -> GdsLibrary {
     let mut library = GdsLibrary::new("LIB");
     library.units = GdsUnits::new(layout.user_unit(), layout.unit_nm() * 1e-9);
-    library.dates = dates();
-    library
+    // The date of everything: a file must not depend on when it was written.
+    let date = chrono::DateTime::UNIX_EPOCH.naive_utc();
+    library.dates = GdsDateTimes {
+        modified: date,
+        accessed: date,
+    };
+    let head = encode(&library)?;
+    // The body of BGNLIB, behind HEADER.
+    target.dates = head[10..34].to_vec();
+    target.buffer.extend(&head[..head.len() - END]);
+    // KLayout reads notes where they are the first cell.
+    layout.copy_notes(&mut |bytes| {
+        target.buffer.extend(bytes);
+        target.flush_above(AT_A_TIME)
+    })?;
+    layout.cell_items(&mut target, progress)?;
+    target.end();
+    target.buffer.extend(END_OF_LIBRARY);
+    target.flush_above(0)?;
+    let bytes = target.bytes;
+    target.out.commit(path)?;
+    Ok(bytes)
 }
 
 struct Target<'a> {
     layout: &'a Layout,
-    out: BufWriter<AtomicFile>,
+    out: Output,
     path: &'a Path,
     bytes: u64,
-    elements: Vec<GdsElement>,
-    /// Name of the cell that is open, and whether its head was written.
-    name: Option<(String, bool)>,
+    buffer: Vec<u8>,
+    dates: Vec<u8>,
+    /// True if a cell is open.
+    open: bool,
+    changes: &'a mut Changes,
 }
 
 impl Target<'_> {
-    fn put(&mut self, bytes: &[u8]) -> Result<()> {
-        self.bytes += bytes.len() as u64;
-        self.out.write_all(bytes).map_err(Error::io("write", self.path))
-    }
-
-    /// Write the elements at hand, with the head of their cell if that was not written.
-    fn flush(&mut self) -> Result<()> {
-        let Some((name, begun)) = &mut self.name else {
-            return Ok(());
-        };
-        let mut library = library(self.layout);
-        let head = encode(&library)?.len() - END;
-        let cell = |elems| GdsStruct {
-            name: name.clone(),
-            dates: dates(),
-            elems,
-        };
-        library.structs.push(cell(Vec::new()));
-        let empty = encode(&library)?;
-        library.structs[0] = cell(std::mem::take(&mut self.elements));
-        let full = encode(&library)?;
-        // From the head of the cell, or from behind it, to before ENDSTR and ENDLIB.
-        let from = if std::mem::replace(begun, true) {
-            empty.len() - 2 * END
-        } else {
-            head
-        };
-        self.put(&full[from..full.len() - 2 * END])
-    }
-
-    fn end(&mut self) -> Result<()> {
-        if self.name.is_some() {
-            self.flush()?;
-            self.name = None;
-            self.put(&END_OF_CELL)?;
+    /// Write what is in the buffer if it is more than so many bytes.
+    fn flush_above(&mut self, bytes: usize) -> Result<()> {
+        if self.buffer.len() > bytes {
+            self.bytes += self.buffer.len() as u64;
+            self.out
+                .write_all(&self.buffer)
+                .map_err(Error::io("write", self.path))?;
+            self.buffer.clear();
         }
         Ok(())
     }
 
-    fn push(&mut self, element: GdsElement) -> Result<()> {
-        self.elements.push(element);
-        if self.elements.len() >= AT_A_TIME {
-            self.flush()
-        } else {
-            Ok(())
+    fn record(&mut self, kind: u16, body: &[u8]) {
+        self.buffer.extend((body.len() as u16 + 4).to_be_bytes());
+        self.buffer.extend(kind.to_be_bytes());
+        self.buffer.extend(body);
+    }
+
+    fn string(&mut self, kind: u16, string: &[u8]) -> Result<()> {
+        if string.len() > MOST_STRING {
+            let start = printable_bytes(&string[..16]);
+            return Err(does_not_fit(
+                format!("a string of {} bytes, {start}...", string.len()),
+                "a string of GDSII has at most 65530 bytes: shorten it",
+            ));
+        }
+        self.record(kind, string);
+        if !string.len().is_multiple_of(2) {
+            let length = string.len() as u16 + 5;
+            let at = self.buffer.len() - string.len() - 4;
+            self.buffer[at..at + 2].copy_from_slice(&length.to_be_bytes());
+            self.buffer.push(0);
+        }
+        Ok(())
+    }
+
+    fn layers(&mut self, layer: LayerNumber, kind: u16) {
+        self.record(record::LAYER, &layer.layer.to_be_bytes());
+        self.record(kind, &layer.datatype.to_be_bytes());
+    }
+
+    fn points(&mut self, points: impl ExactSizeIterator<Item = Point>, by: [i64; 2]) -> Result<()> {
+        if points.len() > MOST_POINTS {
+            return Err(does_not_fit(
+                format!("a path of {} points", points.len()),
+                "an element of GDSII has at most 8191: split the path",
+            ));
+        }
+        self.buffer.extend((8 * points.len() as u16 + 4).to_be_bytes());
+        self.buffer.extend(record::XY.to_be_bytes());
+        for p in points {
+            for value in [p.x + by[0], p.y + by[1]] {
+                self.buffer.extend(coordinate(value)?.to_be_bytes());
+            }
+        }
+        Ok(())
+    }
+
+    fn strans(&mut self, mirrored: bool, magnification: f64, angle_deg: f64) {
+        if mirrored || magnification != 1.0 || angle_deg != 0.0 {
+            self.record(record::STRANS, &[if mirrored { 0x80 } else { 0 }, 0]);
+            if magnification != 1.0 {
+                self.record(record::MAG, &real8(magnification));
+            }
+            if angle_deg != 0.0 {
+                self.record(record::ANGLE, &real8(angle_deg));
+            }
+        }
+    }
+
+    fn end(&mut self) {
+        if std::mem::take(&mut self.open) {
+            self.record(record::ENDSTR, &[]);
         }
     }
 
     /// One copy of an item, farther by a step.
     fn copy(&mut self, item: &CellItem<'_>, by: [i64; 2]) -> Result<()> {
-        let element = match *item {
+        match *item {
             CellItem::Area { layer, points } => {
-                let (layer, datatype) = numbers(layer)?;
-                let mut xy = moved(points, by)?;
-                if xy.first() != xy.last() {
-                    xy.push(xy[0].clone());
-                }
-                fits(xy.len())?;
-                GdsBoundary {
-                    layer,
-                    datatype,
-                    xy,
-                    ..Default::default()
-                }
-                .into()
+                self.record(record::BOUNDARY, &[]);
+                self.layers(layer, record::DATATYPE);
+                let closing = points.first().filter(|p| points.last() != Some(p));
+                let all: Vec<Point> = points.iter().chain(closing).copied().collect();
+                self.points(all.into_iter(), by)?;
             }
             CellItem::Line {
                 layer,
@@ -145,105 +198,111 @@ impl Target<'_> {
                 width,
                 extensions,
             } => {
-                let (layer, datatype) = numbers(layer)?;
-                let xy = moved(points, by)?;
-                fits(xy.len())?;
+                self.record(record::PATH, &[]);
+                self.layers(layer, record::DATATYPE);
                 let plain = extensions == [0, 0];
-                GdsPath {
-                    layer,
-                    datatype,
-                    xy,
-                    width: Some(coordinate(width)?),
-                    path_type: Some(if plain { 0 } else { 4 }),
-                    begin_extn: (!plain).then(|| coordinate(extensions[0])).transpose()?,
-                    end_extn: (!plain).then(|| coordinate(extensions[1])).transpose()?,
-                    ..Default::default()
+                self.record(record::PATHTYPE, &[0, if plain { 0 } else { 4 }]);
+                self.record(record::WIDTH, &coordinate(width)?.to_be_bytes());
+                if !plain {
+                    self.record(record::BGNEXTN, &coordinate(extensions[0])?.to_be_bytes());
+                    self.record(record::ENDEXTN, &coordinate(extensions[1])?.to_be_bytes());
                 }
-                .into()
+                self.points(points.iter().copied(), by)?;
             }
             CellItem::Text { layer, string, at } => {
-                let (layer, texttype) = numbers(layer)?;
-                GdsTextElem {
-                    string: metalith_core::text::printable_bytes(string),
-                    layer,
-                    texttype,
-                    xy: moved(&[at], by)?.remove(0),
-                    ..Default::default()
-                }
-                .into()
+                self.record(record::TEXT, &[]);
+                self.layers(layer, record::TEXTTYPE);
+                self.points([at].into_iter(), by)?;
+                self.string(record::STRING, string)?;
             }
-            CellItem::Reference { cell, at, .. } => GdsStructRef {
-                name: self.layout.cells()[cell].name.clone(),
-                xy: moved(&[at], by)?.remove(0),
-                strans: strans(item),
-                ..Default::default()
+            CellItem::Reference {
+                name,
+                at,
+                mirrored,
+                magnification,
+                angle_deg,
+                ..
+            } => {
+                self.record(record::SREF, &[]);
+                self.string(record::SNAME, name)?;
+                self.strans(mirrored, magnification, angle_deg);
+                self.points([at].into_iter(), by)?;
             }
-            .into(),
+        }
+        self.record(record::ENDEL, &[]);
+        self.flush_above(AT_A_TIME)
+    }
+
+    /// An array of references, in as many AREF records as it takes.
+    fn array(&mut self, item: &CellItem<'_>, count: [u64; 2], step: [[i64; 2]; 2]) -> Result<()> {
+        let CellItem::Reference {
+            name,
+            at,
+            mirrored,
+            magnification,
+            angle_deg,
+            ..
+        } = *item
+        else {
+            return Ok(());
         };
-        self.push(element)
+        let pieces = |count: u64| (0..count).step_by(MOST_COLUMNS as usize);
+        for (row, column) in pieces(count[1]).flat_map(|row| pieces(count[0]).map(move |column| (row, column))) {
+            let first: [i64; 2] =
+                std::array::from_fn(|axis| column as i64 * step[0][axis] + row as i64 * step[1][axis]);
+            let counts = [count[0] - column, count[1] - row].map(|n| n.min(MOST_COLUMNS) as i64);
+            let [along, up] = [0, 1].map(|k: usize| step[k].map(|s| counts[k] * s));
+            self.record(record::AREF, &[]);
+            self.string(record::SNAME, name)?;
+            self.strans(mirrored, magnification, angle_deg);
+            let counts = counts.map(|n| (n as i16).to_be_bytes()).concat();
+            self.record(record::COLROW, &counts);
+            let corners = [[0, 0], along, up].map(|[x, y]| Point::new(at.x + x, at.y + y));
+            self.points(corners.into_iter(), first)?;
+            self.record(record::ENDEL, &[]);
+            self.flush_above(AT_A_TIME)?;
+        }
+        Ok(())
     }
 }
 
 impl CellConsumer for Target<'_> {
-    fn cell(&mut self, _index: usize, cell: &LayoutCell) -> Result<()> {
-        self.end()?;
-        self.name = Some((cell.name.clone(), false));
-        Ok(())
+    fn cell(&mut self, index: usize, _cell: &LayoutCell) -> Result<()> {
+        self.end();
+        let dates = std::mem::take(&mut self.dates);
+        self.record(record::BGNSTR, &dates);
+        self.dates = dates;
+        self.open = true;
+        let layout = self.layout;
+        self.string(record::STRNAME, layout.name_bytes(index))
     }
 
     fn item(&mut self, item: &CellItem<'_>, repetition: Option<&Repetition>) -> Result<()> {
-        let Some(repetition) = repetition else {
-            return self.copy(item, [0, 0]);
-        };
-        if let (CellItem::Reference { cell, at, .. }, Repetition::Grid { count, step }) = (item, repetition)
-            && count.iter().all(|&n| n <= MOST_COLUMNS)
+        if let CellItem::Area { layer, points } = *item
+            && points.len() + usize::from(points.first() != points.last()) > MOST_POINTS
         {
-            let [columns, rows] = count.map(|n| n as i64);
-            let along = [columns * step[0][0], columns * step[0][1]];
-            let up = [rows * step[1][0], rows * step[1][1]];
-            let corner = |by: [i64; 2]| Ok::<_, Error>(moved(&[*at], by)?.remove(0));
-            return self.push(
-                GdsArrayRef {
-                    name: self.layout.cells()[*cell].name.clone(),
-                    xy: [corner([0, 0])?, corner(along)?, corner(up)?],
-                    cols: columns as i16,
-                    rows: rows as i16,
-                    strans: strans(item),
-                    ..Default::default()
-                }
-                .into(),
-            );
+            let corners: Vec<[i64; 2]> = points.iter().map(|p| [p.x, p.y]).collect();
+            let parts = cut(&corners, MOST_POINTS - 1).ok_or_else(|| {
+                does_not_fit(
+                    format!("an outline of {} points that cuts do not shorten", points.len()),
+                    "an element of GDSII has at most 8191: split the polygon",
+                )
+            })?;
+            self.changes.cut(points.len(), parts.len());
+            for part in parts {
+                let points: Vec<Point> = part.iter().map(|&[x, y]| Point::new(x, y)).collect();
+                self.item(&CellItem::Area { layer, points: &points }, repetition)?;
+            }
+            return Ok(());
         }
-        // So many copies fit: see `Layout::copies_fit`.
-        repetition.each(|by| self.copy(item, by))
-    }
-}
-
-fn strans(item: &CellItem<'_>) -> Option<GdsStrans> {
-    let CellItem::Reference {
-        mirrored,
-        magnification,
-        angle_deg,
-        ..
-    } = *item
-    else {
-        return None;
-    };
-    (mirrored || magnification != 1.0 || angle_deg != 0.0).then(|| GdsStrans {
-        reflected: mirrored,
-        mag: (magnification != 1.0).then_some(magnification),
-        angle: (angle_deg != 0.0).then_some(angle_deg),
-        ..Default::default()
-    })
-}
-
-fn numbers(layer: LayerNumber) -> Result<(i16, i16)> {
-    match (i16::try_from(layer.layer), i16::try_from(layer.datatype)) {
-        (Ok(layer), Ok(datatype)) => Ok((layer, datatype)),
-        _ => Err(does_not_fit(
-            format!("layer {layer}"),
-            "GDSII has layers and datatypes up to 32767: renumber it",
-        )),
+        match repetition {
+            None => self.copy(item, [0, 0]),
+            Some(&Repetition::Grid { count, step }) if matches!(item, CellItem::Reference { .. }) => {
+                self.array(item, count, step)
+            }
+            // So many copies fit: see `Layout::copies_fit`.
+            Some(repetition) => repetition.each(|by| self.copy(item, by)),
+        }
     }
 }
 
@@ -254,21 +313,4 @@ fn coordinate(value: i64) -> Result<i32> {
             "coordinates of GDSII have 32 bits: write the layout about the origin, or on a coarser grid",
         )
     })
-}
-
-fn moved(points: &[Point], by: [i64; 2]) -> Result<Vec<GdsPoint>> {
-    points
-        .iter()
-        .map(|p| Ok(GdsPoint::new(coordinate(p.x + by[0])?, coordinate(p.y + by[1])?)))
-        .collect()
-}
-
-fn fits(points: usize) -> Result<()> {
-    if points > MOST_POINTS {
-        return Err(does_not_fit(
-            format!("an outline of {points} points"),
-            "an element of GDSII has at most 8191: split the polygon",
-        ));
-    }
-    Ok(())
 }

@@ -383,7 +383,7 @@ impl Elements<'_, '_> {
         let mut numbers = vec![0; counts.len()];
         for (width, _) in counts.iter().enumerate().skip(1).filter(|(_, count)| **count > 0) {
             numbers[width] = *self.width_cells[width]
-                .get_or_insert_with(|| self.file.writer.cell_number(&self.form.cell_name(width as u16)));
+                .get_or_insert_with(|| self.file.writer.cell_number(self.form.cell_name(width as u16)));
         }
         numbers
     }

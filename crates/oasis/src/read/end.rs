@@ -20,8 +20,12 @@ pub(super) fn read<R: Read + Seek>(
 ) -> Result<(), OasisError> {
     let begin = input.record().offset;
     let before_end = input.file_bytes().saturating_sub(begin);
-    if before_end != END_BYTES as u64 {
+    if before_end < END_BYTES as u64 {
         return Err(input.fault(OasisFault::EndPlace { before_end }));
+    }
+    if before_end > END_BYTES as u64 {
+        let fault = OasisFault::EndPlace { before_end };
+        input.odd(fault, "the bytes behind it were not read")?;
     }
     if with_offsets {
         tables.read_offsets(input)?;
@@ -37,7 +41,7 @@ pub(super) fn read<R: Read + Seek>(
         validation::CRC32 | validation::CHECKSUM32 => drop(input.array::<CHECKSUM>()?),
         other => return Err(input.fault(OasisFault::Validation(other))),
     }
-    if input.offset() != input.file_bytes() {
+    if input.offset() != begin + END_BYTES as u64 {
         return Err(input.fault(OasisFault::EndLength));
     }
     Ok(())

@@ -4,7 +4,7 @@ use std::io::{Read, Seek, SeekFrom};
 
 use flate2::{Decompress, FlushDecompress, Status};
 
-use super::OasisPlace;
+use super::{OasisPlace, OasisWarning};
 use crate::error::{OasisError, OasisFault, OasisLimit};
 use crate::limits::OasisLimits;
 
@@ -12,6 +12,9 @@ use crate::limits::OasisLimits;
 const FILE_BYTES: usize = 1 << 18;
 /// Bytes of a CBLOCK that are unpacked at a time.
 const BLOCK_BYTES: usize = 1 << 16;
+
+/// Departures from the format that are listed.
+const LISTED: usize = 8;
 
 /// Bits of the longest integer that is padded: all of END.
 const PADDED_BITS: u32 = 7 * 256;
@@ -66,6 +69,10 @@ pub(super) struct Input<R> {
     most_unpacked: u64,
     /// Place where the record that is being read begins.
     record: OasisPlace,
+    /// True if departures from the format that can be read over are no errors.
+    pub tolerant: bool,
+    listed: Vec<OasisWarning>,
+    warnings: u64,
 }
 
 impl<R: Read + Seek> Input<R> {
@@ -82,6 +89,9 @@ impl<R: Read + Seek> Input<R> {
             unpacked: 0,
             most_unpacked: limits.unpacked_of(file_bytes),
             record: OasisPlace::default(),
+            tolerant: false,
+            listed: Vec::new(),
+            warnings: 0,
         })
     }
 
@@ -151,6 +161,25 @@ impl<R: Read + Seek> Input<R> {
             inner: self.record.inner,
             fault,
         }
+    }
+
+    /// Read over a departure from the format in the record that is being read, or make it an error.
+    #[cold]
+    pub(crate) fn odd(&mut self, fault: OasisFault, taken: &'static str) -> Result<(), OasisError> {
+        if !self.tolerant {
+            return Err(self.fault(fault));
+        }
+        self.warnings += 1;
+        if self.listed.len() < LISTED {
+            let offset = self.record.offset;
+            self.listed.push(OasisWarning { offset, fault, taken });
+        }
+        Ok(())
+    }
+
+    /// The first departures from the format that were read over, and the number of all.
+    pub(crate) fn warnings(&self) -> (&[OasisWarning], u64) {
+        (&self.listed, self.warnings)
     }
 
     /// Begin a record: leave a CBLOCK that is at its end. None at the end of the file.

@@ -1,6 +1,17 @@
 //! Items that reading returns.
 
+use crate::error::OasisFault;
 use crate::repetition::Repetition;
+
+/// A departure from the format that was read over.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OasisWarning {
+    /// Place of the record in the file, of the CBLOCK if it is in one.
+    pub offset: u64,
+    pub fault: OasisFault,
+    /// What was taken instead.
+    pub taken: &'static str,
+}
 
 /// Place where a record begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -10,7 +10,9 @@ mod table;
 
 use std::io::{Read, Seek};
 
-pub use item::{CellReference, NameEntry, NameTable, OasisElement, OasisItem, OasisPlace, OasisShape, OasisValue};
+pub use item::{
+    CellReference, NameEntry, NameTable, OasisElement, OasisItem, OasisPlace, OasisShape, OasisValue, OasisWarning,
+};
 
 use crate::MAGIC;
 use crate::error::{OasisError, OasisFault};
@@ -109,6 +111,18 @@ impl<R: Read + Seek> OasisReader<R> {
     /// Place where the record read last begins.
     pub fn place(&self) -> OasisPlace {
         self.input.record()
+    }
+
+    /// Read over departures from the format that have one reading, and list them, instead of an error.
+    #[must_use]
+    pub fn tolerant(mut self, tolerant: bool) -> Self {
+        self.input.tolerant = tolerant;
+        self
+    }
+
+    /// The first departures from the format that were read over, and the number of all.
+    pub fn warnings(&self) -> (&[OasisWarning], u64) {
+        self.input.warnings()
     }
 
     /// An error at the record read last.

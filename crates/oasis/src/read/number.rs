@@ -142,8 +142,11 @@ impl<R: Read + Seek> Input<R> {
         }
         // Alternating lists of a polygon close by one more corner.
         let fewest = if closed { 2 } else { 1 };
-        if found < fewest || (closed && list < 2 && !found.is_multiple_of(2)) {
+        if found < fewest {
             return Err(self.fault(OasisFault::Points { kind, found }));
+        }
+        if closed && list < 2 && !found.is_multiple_of(2) {
+            self.odd(OasisFault::Points { kind, found }, "the points were taken as they are")?;
         }
         out.clear();
         out.push([0, 0]);
@@ -182,7 +185,11 @@ impl<R: Read + Seek> Input<R> {
             out.push(at);
         }
         if closed && list < 2 {
-            out.push(if list == 0 { [0, at[1]] } else { [at[0], 0] });
+            // An odd list may end on it.
+            let corner = if list == 0 { [0, at[1]] } else { [at[0], 0] };
+            if corner != at || found.is_multiple_of(2) {
+                out.push(corner);
+            }
         }
         Ok(())
     }

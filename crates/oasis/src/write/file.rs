@@ -22,7 +22,7 @@ pub enum CellBounds {
 
 /// Entry of a cell in the tables.
 struct CellEntry {
-    name: String,
+    name: Vec<u8>,
     written: Option<(u64, CellBounds)>,
 }
 
@@ -55,10 +55,10 @@ pub struct OasisWriter<W> {
     crc: Crc,
     offset: u64,
     cells: Vec<CellEntry>,
-    cell_numbers: HashMap<String, u64>,
-    texts: Vec<String>,
-    text_numbers: HashMap<String, u64>,
-    tops: Vec<String>,
+    cell_numbers: HashMap<Vec<u8>, u64>,
+    texts: Vec<Vec<u8>>,
+    text_numbers: HashMap<Vec<u8>, u64>,
+    tops: Vec<Vec<u8>>,
     open: Option<(u64, u64)>,
 }
 
@@ -68,7 +68,7 @@ impl<W: Write> OasisWriter<W> {
     ///
     /// # Errors
     /// If the bytes cannot be written.
-    pub fn new(out: W, grid_per_um: f64, tops: &[&str], boxes: bool) -> io::Result<Self> {
+    pub fn new(out: W, grid_per_um: f64, tops: &[impl AsRef<[u8]>], boxes: bool) -> io::Result<Self> {
         let mut writer = Self {
             out,
             crc: Crc::new(),
@@ -77,7 +77,7 @@ impl<W: Write> OasisWriter<W> {
             cell_numbers: HashMap::new(),
             texts: Vec::new(),
             text_numbers: HashMap::new(),
-            tops: tops.iter().map(|&t| t.to_owned()).collect(),
+            tops: tops.iter().map(|t| t.as_ref().to_owned()).collect(),
             open: None,
         };
         let mut start = MAGIC.to_vec();
@@ -105,7 +105,8 @@ impl<W: Write> OasisWriter<W> {
     }
 
     /// Number of the cell with this name, to refer to it before or after it is written.
-    pub fn cell_number(&mut self, name: &str) -> u64 {
+    pub fn cell_number(&mut self, name: impl AsRef<[u8]>) -> u64 {
+        let name = name.as_ref();
         if let Some(&number) = self.cell_numbers.get(name) {
             return number;
         }
@@ -119,7 +120,8 @@ impl<W: Write> OasisWriter<W> {
     }
 
     /// Number of a text.
-    pub fn text_number(&mut self, text: &str) -> u64 {
+    pub fn text_number(&mut self, text: impl AsRef<[u8]>) -> u64 {
+        let text = text.as_ref();
         if let Some(&number) = self.text_numbers.get(text) {
             return number;
         }
@@ -180,7 +182,7 @@ impl<W: Write> OasisWriter<W> {
         let texts = std::mem::take(&mut self.texts);
         self.table(&mut end, texts.iter(), |out, text| {
             out.push(kind::TEXTSTRING);
-            put_string(out, text.as_bytes());
+            put_string(out, text);
         })?;
         self.table(&mut end, PROPERTIES.iter(), |out, name| {
             out.push(kind::PROPNAME);
@@ -189,7 +191,7 @@ impl<W: Write> OasisWriter<W> {
         let tops = std::mem::take(&mut self.tops);
         self.table(&mut end, tops.iter(), |out, name| {
             out.push(kind::PROPSTRING);
-            put_string(out, name.as_bytes());
+            put_string(out, name);
         })?;
         // No LAYERNAME and no XNAME.
         end.extend([1, 0, 1, 0]);
@@ -229,7 +231,7 @@ fn put_property(out: &mut Vec<u8>, property: u64, values: u8) {
 
 fn put_cell(out: &mut Vec<u8>, cell: &CellEntry) {
     out.push(kind::CELLNAME);
-    put_string(out, cell.name.as_bytes());
+    put_string(out, &cell.name);
     let Some((offset, bounds)) = cell.written else { return };
     if bounds != CellBounds::Unknown {
         put_bounds(out, bounds);

@@ -118,20 +118,21 @@ impl<R: Read + Seek> OasisReader<R> {
         }
         let form = self.modal(kind::CTRAPEZOID, "the type", self.modal.trapezoid)?;
         self.box_size(bits)?;
-        let [needs_width, needs_height] = match form {
-            16..=19 | 22 | 23 | 25 => [true, false],
-            20 | 21 => [false, true],
-            _ => [true, true],
+        // Forms of one side set the modal state of the other.
+        let (width, height) = (self.modal.width, self.modal.height);
+        match form {
+            16..=19 | 25 => self.modal.height = width,
+            22 | 23 => self.modal.height = width.map(|width| 2 * width),
+            20 | 21 => self.modal.width = height.map(|height| 2 * height),
+            _ => {}
+        }
+        let (what_width, what_height) = match form {
+            20 | 21 => ("the height", "the height"),
+            16..=19 | 22 | 23 | 25 => ("the width", "the width"),
+            _ => ("the width", "the height"),
         };
-        let size = |needed: bool, what, value: Option<i64>| {
-            if needed {
-                self.modal(kind::CTRAPEZOID, what, value)
-            } else {
-                Ok(0)
-            }
-        };
-        let width = size(needs_width, "the width", self.modal.width)?;
-        let height = size(needs_height, "the height", self.modal.height)?;
+        let width = self.modal(kind::CTRAPEZOID, what_width, self.modal.width)?;
+        let height = self.modal(kind::CTRAPEZOID, what_height, self.modal.height)?;
         self.stand_area(kind::CTRAPEZOID, bits)?;
         let Some(corners) = compact_trapezoid(form, width, height) else {
             let kind = form;

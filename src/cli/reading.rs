@@ -1,0 +1,42 @@
+//! How a command reads a layout that is named to it.
+
+use std::path::Path;
+
+use clap::Args;
+use metalith::gds::ReadLimits;
+use metalith::{Layout, Result};
+
+use super::Terminal;
+
+/// Options of every command that reads a layout of any program.
+#[derive(Args, Clone)]
+pub(crate) struct ReadingArgs {
+    /// Cell to start from; the top cell if there is only one.
+    #[arg(long, value_name = "CELL")]
+    pub(crate) top: Option<String>,
+
+    /// Refuse a layout that departs from its format. If left out, records that other programs read with a warning are read
+    /// with a warning, which says what was taken.
+    #[arg(long)]
+    strict: bool,
+}
+
+impl ReadingArgs {
+    /// Read from here on as asked.
+    pub(crate) fn apply(&self, terminal: &Terminal) {
+        terminal.set_strict(self.strict);
+    }
+
+    /// Open a layout, below the cell to start from.
+    ///
+    /// # Errors
+    /// If it cannot be read, or has no such cell.
+    pub(crate) fn open(&self, path: &Path, terminal: &Terminal) -> Result<Layout> {
+        self.apply(terminal);
+        let layout = Layout::open_with(path, ReadLimits::default(), terminal)?;
+        Ok(match &self.top {
+            Some(top) => layout.below(top)?,
+            None => layout,
+        })
+    }
+}
