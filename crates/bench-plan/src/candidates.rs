@@ -154,6 +154,7 @@ fn session(
             index: index_of(element),
             centre_um: element.centre_um(),
             aperture_diameter_um: 2.0 * design.aperture_radius_of_um(element),
+            axis_um: [0.0; 2],
             pillars,
         })
         .collect();

@@ -50,7 +50,9 @@ pub(super) fn measurements(
         );
         let aoi_deg: [f64; 2] = s.array("aoi_deg", Limits::new(-80.0..=80.0, "degrees"));
         let distance_um = s.float("distance_um", DISTANCE_UM);
-        let window_centre_um = s.array("window_centre_um", WINDOW_CENTRE_UM);
+        let window_centre_um: [f64; 2] = s.array("window_centre_um", WINDOW_CENTRE_UM);
+        let axis_um = elements.get(element).map_or([0.0; 2], |e| e.axis_um);
+        let window_centre_um = [0, 1].map(|axis| window_centre_um[axis] + axis_um[axis]);
         let filter = camera.filter.pixels_of(leds.get(led).and_then(|l| l.channel));
         let (path, exposures) = exposures(&s, led, &mut darks);
         s.finish();

@@ -6,12 +6,12 @@ mod measurements;
 use std::path::Path;
 
 use super::{BenchLed, MeasuredSet, PerElement, PerLed, Stack};
-use elements::elements;
+use elements::{LayoutPillars, elements};
 use measurements::{measurements, widths};
 use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{LayerNumber, Progress, Result};
-use metalith_pillars::{DatabaseUnit, ElementSite, LatticeKind, PillarReader, PillarShape};
+use metalith_pillars::{DatabaseUnit, LatticeKind, PillarReader, PillarShape};
 use metalith_rcwa::CellLattice;
 use metalith_sensor::frame::{self, Recorded, SensorFrame, SensorFrames};
 use metalith_sensor::{Colour, ColourFilter, RelayCamera};
@@ -74,8 +74,14 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
     let leds: PerLed<_> = leds(root, camera.filter, is_known.then_some(&stack.cell)).into();
     let layout = root.file("layout");
     let elements: PerElement<_> = {
-        let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, stack.cell.shape, sites, progress);
-        elements(root, &stack, &layout, &read).into()
+        let pillars = LayoutPillars {
+            reader: layouts,
+            file: &layout,
+            layer: pillar_layer,
+            shape: stack.cell.shape,
+            progress,
+        };
+        elements(root, &stack, &pillars).into()
     };
     let measurements = measurements(root, &camera, &frames, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
