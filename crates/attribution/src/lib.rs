@@ -16,6 +16,7 @@
 //! | `fit` | least squares, cross-validation, intervals, null test | `surrogate` |
 //! | `search` | which effects explain a residual | `fit` |
 //! | `linear_trend`, `extent` | values that are linear over a plane | `fit` |
+//! | `names`, `verdict` | names of effects as users write them, verdict on a set | |
 //! | `refit` | selection for forward models that are fitted in full for each candidate | `fit` |
 
 mod effect;
@@ -25,11 +26,13 @@ mod forward_model;
 mod index;
 mod linear_trend;
 mod measurements;
+mod names;
 mod refit;
 mod search;
 mod surrogate;
 #[cfg(test)]
 mod test_model;
+mod verdict;
 
 pub use effect::{Parameter, Slot, ValueError};
 pub use extent::Extent;
@@ -42,6 +45,7 @@ pub use forward_model::{ForwardModel, Model, ParameterPoint, SmoothGroups, Smoot
 pub use index::{MeasurementIndex, PerMeasurement};
 pub use linear_trend::LinearTrend;
 pub use measurements::{MeasurementEquations, Measurements, ReferenceValue, References, eliminate, own_step};
+pub use names::{ConditionalEffect, RENAMED, check_names};
 pub use refit::{
     LeaveOut, RefitEffect, RefitEquations, RefitErrors, RefitFinding, RefitModel, RefitParameter, RefitPlan,
     RefitRejection, RefitTried, select,
@@ -51,3 +55,4 @@ pub use search::{
     Rejection, SearchState, TriedEffect, attribute_set, cosines, fit_of, may_leave,
 };
 pub use surrogate::{Surrogate, check_fits_into_memory};
+pub use verdict::SetVerdict;

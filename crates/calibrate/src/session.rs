@@ -3,8 +3,8 @@
 
 use std::path::PathBuf;
 
-use metalith_attribution::RandomNoise;
-use metalith_core::{Error, Progress, Result};
+use metalith_attribution::{RandomNoise, check_names};
+use metalith_core::{Progress, Result};
 
 use crate::bench::{Bench, BenchSampling};
 use crate::cells::{CellSource, RigorousCells};
@@ -13,7 +13,6 @@ use crate::diagnosis::Diagnosis;
 use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
 use crate::interval_parts::WidthParts;
-use crate::nearest_names::unknown_names;
 use crate::screening::{UnusableMeasurement, unusable_measurements};
 use crate::set::{MeasuredSet, PerMeasurement};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
@@ -287,11 +286,8 @@ fn tried_effects(set: &MeasuredSet, settings: &Settings) -> Result<Vec<Box<dyn E
 /// Refuse names that no effect of a set has.
 ///
 /// # Errors
-/// With all unknown names at once, the nearest known names and the list of these.
+/// As [`check_names`].
 pub fn check_effects(known: &[Box<dyn Effect>], wanted: &[String]) -> Result<()> {
     let known: Vec<String> = known.iter().map(|e| e.name()).collect();
-    unknown_names(&known, wanted).map_or(Ok(()), |what| {
-        let hint = format!("known effects are {}", known.join(", "));
-        Err(Error::refused("effects/unknown", what, hint))
-    })
+    check_names(&known, &effects::CONDITIONAL, wanted)
 }

@@ -19,8 +19,9 @@ mod pattern;
 mod run;
 mod spectra;
 
-pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, Ranked, SetVerdict};
+pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, Ranked};
 pub use heights::{HeightField, HeightModel, HeightSet};
+pub use metalith_attribution::SetVerdict;
 pub use pattern::NamePattern;
 pub use run::{Answer, SetKind, calibrate, kind_of};
 pub use spectra::{Spectrum, SpectrumModel, SpectrumSet, StatedLayer};

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_attribution::{RefitEffect, RefitModel, RefitPlan, select};
+use metalith_attribution::{ConditionalEffect, RefitEffect, RefitModel, RefitPlan, check_names, select};
 use metalith_core::document::{Document, Section, load};
-use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result};
+use metalith_core::{AtomicFile, FolderLock, Progress, Result};
 
 use crate::diagnosis::{Diagnosis, SetFacts};
 use crate::heights::{self, HeightModel, HeightSet};
@@ -71,7 +71,7 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
         SetKind::Heights => {
             let set = HeightSet::read(&path)?;
             let mut model = HeightModel::new(&set);
-            model.effects = tried(&model.effects, only)?;
+            model.effects = tried(&model.effects, &heights::CONDITIONAL, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "heights",
@@ -87,7 +87,7 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
         SetKind::Spectra => {
             let set = SpectrumSet::read(&path)?;
             let mut model = SpectrumModel::new(&set);
-            model.effects = tried(&model.effects, only)?;
+            model.effects = tried(&model.effects, &spectra::CONDITIONAL, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "spectra",
@@ -104,15 +104,9 @@ pub fn calibrate(set: &Path, kind: SetKind, out: &Path, only: &[String], progres
 }
 
 /// The effects that are tried: all, or those that are named with those that they change.
-fn tried(all: &[RefitEffect], only: &[String]) -> Result<Vec<RefitEffect>> {
-    let known = || all.iter().map(|e| e.name.as_str()).collect::<Vec<_>>().join(", ");
-    if let Some(wrong) = only.iter().find(|name| all.iter().all(|e| e.name != **name)) {
-        return Err(Error::refused(
-            "calibrate/unknown-effect",
-            format!("no effect of this set is called `{wrong}`"),
-            format!("known here: {}", known()),
-        ));
-    }
+fn tried(all: &[RefitEffect], conditional: &[ConditionalEffect], only: &[String]) -> Result<Vec<RefitEffect>> {
+    let known: Vec<String> = all.iter().map(|e| e.name.clone()).collect();
+    check_names(&known, conditional, only)?;
     let mut kept: Vec<bool> = all.iter().map(|e| only.is_empty() || only.contains(&e.name)).collect();
     for e in (0..all.len()).rev() {
         if kept[e] {

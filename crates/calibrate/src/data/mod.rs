@@ -104,6 +104,15 @@ impl Data {
         }
     }
 
+    /// Sum of squares of the images of some measurements over their noise, without the noise.
+    pub(crate) fn energy(&self, used: &PerMeasurement<bool>) -> f64 {
+        let of = |c: MeasurementIndex| {
+            let pairs = self.signal[c].iter().zip(&self.weight[c]);
+            pairs.map(|(v, w)| f64::from(v * w).powi(2)).sum::<f64>() - self.points(c) as f64
+        };
+        self.indices().filter(|&c| used[c]).map(of).sum::<f64>().max(0.0)
+    }
+
     /// All LEDs as stated: a relative flux of one.
     pub fn stated_flux(&self) -> PerLed<f64> {
         vec![1.0; self.leds].into()

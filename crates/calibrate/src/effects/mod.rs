@@ -14,6 +14,7 @@ mod value_error;
 
 pub(crate) use declared::MOST_PARAMETERS;
 pub use declared::{DeclaredEffect, DeclaredParameter};
+use metalith_attribution::ConditionalEffect;
 pub use metalith_attribution::Parameter;
 pub(crate) use metalith_attribution::ValueError;
 pub(crate) use stitching::StitchedFields;
@@ -163,6 +164,30 @@ fn table() -> Vec<Box<dyn Effect>> {
     let all = table::TABLE.iter();
     all.map(|own| Box::new(*own) as Box<dyn Effect>).collect()
 }
+
+/// Effects that are tried on some sets only.
+pub(crate) const CONDITIONAL: [ConditionalEffect; 5] = [
+    ConditionalEffect {
+        name: StitchedFields::NAMES[0],
+        needs: "`field_boundary_um` of `[writer]`",
+    },
+    ConditionalEffect {
+        name: StitchedFields::NAMES[1],
+        needs: "`field_boundary_um` of `[writer]`",
+    },
+    ConditionalEffect {
+        name: table::CORNER_ROUNDING,
+        needs: "`shape = \"square\"` of `[stack]`",
+    },
+    ConditionalEffect {
+        name: "sensor_tilt*",
+        needs: "`[[element]]` sections whose `centre_um` differ along its direction, along x and y for `sensor_tilt`",
+    },
+    ConditionalEffect {
+        name: "led_centre_*",
+        needs: "an `[[led]]` whose `centre_nm` is the number in its name",
+    },
+];
 
 /// All effects that are tried on a set.
 pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {

@@ -9,7 +9,7 @@ use measurements::{SIGMAS, measurements, widths};
 use ndarray::Array2;
 use residual::{confusable, nuisances, smooth_residual};
 
-use crate::diagnosis::{Diagnosis, FreePattern, Ranked, SetVerdict};
+use crate::diagnosis::{Diagnosis, FreePattern, Ranked};
 use crate::interval_parts::WidthParts;
 use crate::session::{Session, Simulations};
 use crate::statistics::Evidence;
@@ -35,9 +35,8 @@ pub(crate) fn write_page(
             session.set().path.display()
         ),
     );
-    let holds = matches!(diagnosis.verdict, SetVerdict::NoResidual | SetVerdict::Explained);
     page.verdict(
-        if holds { Verdict::Pass } else { Verdict::Fail },
+        Verdict::of(diagnosis.verdict.is_explained()),
         capitalised(&diagnosis.sentence()),
     );
     let error = &diagnosis.error;

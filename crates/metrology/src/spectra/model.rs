@@ -1,6 +1,8 @@
 //! Forward model of spectra: a film stack over the cone of an objective, and what the instrument makes of it.
 
-use metalith_attribution::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
+use metalith_attribution::{
+    ConditionalEffect, LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan,
+};
 use metalith_rcwa::Material;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -44,6 +46,25 @@ pub struct SpectrumModel<'a> {
     /// Mean of the repeats that each spectrum is one of.
     means: Vec<Vec<f64>>,
 }
+
+/// Condition of the effects of a film.
+const OF_A_FILM: &str = "a `[[layer]]` of this name with `material` and `thickness_nm`";
+
+/// Effects that are tried on some sets only.
+pub(crate) const CONDITIONAL: [ConditionalEffect; 3] = [
+    ConditionalEffect {
+        name: "*_thickness",
+        needs: OF_A_FILM,
+    },
+    ConditionalEffect {
+        name: "*_index_scale",
+        needs: OF_A_FILM,
+    },
+    ConditionalEffect {
+        name: "*_index_offset",
+        needs: OF_A_FILM,
+    },
+];
 
 impl<'a> SpectrumModel<'a> {
     /// A model of a set that was read.
