@@ -174,6 +174,7 @@ fn session(
         sem_offset_sigma_nm: bench.sem.map_or(1.0, |s| s.offset_sigma_nm),
         elements,
         measurements: PerMeasurement::default(),
+        free_scale: false,
         field_boundary_um: bench.field_boundary_um,
     })
 }

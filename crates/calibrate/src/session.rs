@@ -13,7 +13,7 @@ use crate::diagnosis::Diagnosis;
 use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
 use crate::interval_parts::WidthParts;
-use crate::screening::{UnusableMeasurement, unusable_measurements};
+use crate::screening::{UnusableMeasurement, recognise, unusable_measurements};
 use crate::set::{MeasuredSet, PerMeasurement};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::speckle::DefectNoise;
@@ -66,6 +66,10 @@ pub struct Simulations {
 pub struct Screening {
     pub used: PerMeasurement<bool>,
     pub unusable: Vec<UnusableMeasurement>,
+    /// Mistakes of frames that were recognised and masked, or that the user may correct.
+    pub warnings: Vec<String>,
+    /// The data without pixels that are masked; none where none is.
+    masked: Option<Data>,
     /// The nuisances fitted to all measurements, nothing else.
     pub fit: Fit,
 }
@@ -177,16 +181,30 @@ impl<'a> Session<'a> {
         FitProblem::new(&self.simulator, simulations.surrogate.clone(), &self.data)
     }
 
-    /// Find the measurements that cannot be used.
-    pub fn screen(&self, simulations: &Simulations) -> Screening {
+    /// Find the pixels and the measurements that cannot be used.
+    ///
+    /// # Errors
+    /// If the frames are mirrored, turned or transposed.
+    pub fn screen(&self, simulations: &Simulations) -> Result<Screening> {
         let problem = self.problem(simulations);
+        let recognised = recognise(self.set(), &problem)?;
+        let problem = FitProblem {
+            data: recognised.data.as_ref().unwrap_or(&self.data),
+            ..problem
+        };
         let fit = problem.nuisance_fit();
-        let unusable = unusable_measurements(self.set(), &problem, &fit.nuisances);
+        let unusable = unusable_measurements(self.set(), &problem, &fit.nuisances, &recognised);
         let mut used = problem.used;
         for u in &unusable {
             used[u.measurement] = false;
         }
-        Screening { used, unusable, fit }
+        Ok(Screening {
+            used,
+            unusable,
+            warnings: recognised.warnings,
+            masked: recognised.data,
+            fit,
+        })
     }
 
     /// Attribute the residual of the measurements that can be used; `ends` may end the search before all is tried.
@@ -248,10 +266,12 @@ impl<'a> Session<'a> {
         simulations: &Simulations,
         progress: &dyn Progress,
     ) -> Result<(Diagnosis, Option<Evidence>)> {
-        let screening = self.screen(simulations);
+        let screening = self.screen(simulations)?;
         if screening.is_data_unfit() {
             let error = screening.fit.chi2 / self.screened(simulations, &screening).points().max(1.0);
-            return Ok((Diagnosis::data_unfit(self.set(), error, &screening.unusable), None));
+            let mut diagnosis = Diagnosis::data_unfit(self.set(), error, &screening.unusable);
+            diagnosis.warnings = screening.warnings;
+            return Ok((diagnosis, None));
         }
         let ladder = if self.settings.compare_fidelities {
             let problem = self.screened(simulations, &screening);
@@ -260,13 +280,15 @@ impl<'a> Session<'a> {
             Vec::new()
         };
         let evidence = self.attribute(simulations, &screening, ends, progress)?;
-        let diagnosis = Diagnosis::new(&self.simulator, &evidence, &screening.unusable, ladder);
+        let mut diagnosis = Diagnosis::new(&self.simulator, &evidence, &screening.unusable, ladder);
+        diagnosis.warnings = screening.warnings;
         Ok((diagnosis, Some(evidence)))
     }
 
-    fn screened(&self, simulations: &Simulations, screening: &Screening) -> FitProblem<'_> {
+    fn screened<'s>(&'s self, simulations: &Simulations, screening: &'s Screening) -> FitProblem<'s> {
         FitProblem {
             used: screening.used.clone(),
+            data: screening.masked.as_ref().unwrap_or(&self.data),
             ..self.problem(simulations)
         }
     }

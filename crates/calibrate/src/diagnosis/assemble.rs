@@ -94,6 +94,7 @@ impl Diagnosis {
             remainder: (verdict == SetVerdict::ExplainedButFor).then_some(remainder),
             missing_by_speckle: evidence.amount_by_noise,
             left_out: left_out(set, unusable),
+            warnings: Vec::new(),
             measurements: measurements.collect(),
             ladder,
         }
@@ -125,6 +126,7 @@ impl Diagnosis {
             remainder: None,
             missing_by_speckle: None,
             left_out: left_out(set, unusable),
+            warnings: Vec::new(),
             measurements: Vec::new(),
             ladder: Vec::new(),
         }

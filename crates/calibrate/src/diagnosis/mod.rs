@@ -124,6 +124,9 @@ pub struct Diagnosis {
     /// Share of missing pillars by their speckle, where the speckle counts as noise in the error after.
     pub missing_by_speckle: Option<f64>,
     pub left_out: Vec<LeftOut>,
+    /// Mistakes of frames that were recognised before anything was fitted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// Held-out error of each measurement before and after.
     pub measurements: Vec<MeasurementError>,
     /// The three fidelities of the cell, nuisances fitted.

@@ -53,6 +53,10 @@ pub(crate) fn write_page(
     page.paragraph(
         "Errors are reduced chi-square per pixel; noise alone gives 1. Held out: the measurement is predicted by a fit to measurements of other colours, elements or distances, and only registration, flux and black level are adjusted. Null test: held-out error with random smooth terms in place of effects.",
     );
+    if !diagnosis.warnings.is_empty() {
+        page.section("Frames");
+        page.list(&diagnosis.warnings);
+    }
     if let Some(share) = diagnosis.missing_by_speckle {
         page.paragraph(format!(
             "Pillars that are missing at random places make a speckle that no fit can predict. The variance of the speckle is known. It counts as noise in the errors after the fit. Speckle-based missing fraction: {} % of the pillars.",

@@ -31,6 +31,8 @@ pub struct MeasuredSet {
     pub leds: PerLed<BenchLed>,
     pub elements: PerElement<MeasuredElement>,
     pub measurements: PerMeasurement<Measurement>,
+    /// True if `scale_dn` of each measurement is fitted: it is a nuisance of each.
+    pub free_scale: bool,
     /// Place of a boundary of write fields across x and across y, from the middle of every lens (um), if it is stated.
     pub field_boundary_um: Option<[f64; 2]>,
     /// Widths seen from above; empty where none were taken.
