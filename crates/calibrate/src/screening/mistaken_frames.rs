@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use crate::data::{Data, Nuisances};
+use crate::data::{Data, MeasurementSetup, Nuisances};
 use crate::optics::PixelGrid;
 use crate::set::{LedIndex, MeasuredSet, MeasurementIndex, PerMeasurement};
 use crate::statistics::FitProblem;
@@ -24,6 +24,9 @@ const ALIKE: f64 = 1.1;
 
 /// The image of another colour fits far better if it leaves this share: a wrong distance makes colours alike, but not by as much.
 const OF_CHI2_BY_COLOUR: f64 = 0.2;
+
+/// A single frame of another colour fits worse than most frames by this factor: an effect changes them alike.
+const FAR_WORSE: f64 = 4.0;
 
 /// Measurements that orientations are tried on: the brightest ones of each element.
 const OF_EACH_ELEMENT: usize = 3;
@@ -102,32 +105,35 @@ pub(super) struct OtherColour {
     pub led: LedIndex,
     /// Reduced chi-square as stated, and as the other colour.
     pub chi2: [f64; 2],
-    /// True if most measurements of the stated LED are so: a wrong distance or a wrong LED may be the cause.
+    /// True if all measurements of the stated LED are so: a wrong distance or a wrong LED may be the cause.
     pub is_common: bool,
 }
 
-/// Measurements that the image of another LED fits far better.
+/// Measurements that the image of another LED fits far better, and that fit far worse than most; or all of an LED.
 pub(super) fn other_colours(set: &MeasuredSet, problem: &FitProblem<'_>) -> Vec<OtherColour> {
     let data = problem.data;
     let image = |c| problem.prediction(&problem.surrogate.about, c);
+    let misfit = |c, of| misfits(data, &[(c, &image(of))], Orientation::Upright)[0];
+    let own: PerMeasurement<f64> = data.indices().map(|c| misfit(c, c)).collect();
+    let mut sorted = own.raw.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
     let mut found: Vec<OtherColour> = Vec::new();
     for (c, beam) in data.beam.iter_enumerated() {
-        let own = misfits(data, &[(c, &image(c))], Orientation::Upright)[0];
-        if own < FITS / OF_CHI2_BY_COLOUR {
+        if own[c] < FITS / OF_CHI2_BY_COLOUR {
             continue;
         }
-        let others = data.beam.iter_enumerated().filter(|(_, other)| {
-            let place = |b: &crate::data::MeasurementSetup| (b.element, b.aoi_rad, b.distance_um);
-            other.led != beam.led && place(other) == place(beam)
-        });
+        let place = |b: &MeasurementSetup| (b.element, b.aoi_rad, b.distance_um);
+        let others = data.beam.iter_enumerated();
+        let others = others.filter(|(_, other)| other.led != beam.led && place(other) == place(beam));
         let best = others
-            .map(|(o, other)| (other.led, misfits(data, &[(c, &image(o))], Orientation::Upright)[0]))
+            .map(|(o, other)| (other.led, misfit(c, o)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((led, as_other)) = best.filter(|(_, m)| *m < OF_CHI2_BY_COLOUR * own) {
+        if let Some((led, as_other)) = best.filter(|(_, m)| *m < OF_CHI2_BY_COLOUR * own[c]) {
             found.push(OtherColour {
                 measurement: c,
                 led,
-                chi2: [own, as_other],
+                chi2: [own[c], as_other],
                 is_common: false,
             });
         }
@@ -137,8 +143,9 @@ pub(super) fn other_colours(set: &MeasuredSet, problem: &FitProblem<'_>) -> Vec<
         let all = data.indices().filter(|&c| of_led(c)).count();
         let odd = found.iter().filter(|f| of_led(f.measurement)).count();
         for own in found.iter_mut().filter(|f| of_led(f.measurement)) {
-            own.is_common = 2 * odd >= all;
+            own.is_common = odd == all;
         }
     }
+    found.retain(|f| f.is_common || f.chi2[0] > FAR_WORSE * usual);
     found
 }

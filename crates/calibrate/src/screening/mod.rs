@@ -101,7 +101,7 @@ pub(crate) fn recognise(set: &MeasuredSet, problem: &FitProblem<'_>) -> Result<R
     for own in found.colours.iter().filter(|o| o.is_common) {
         let stated = set.leds[set.measurements[own.measurement].led].name();
         let words = format!(
-            "images of {} nm fit most measurements of {stated} nm far better than its own: correct `led_nm` if frames were exchanged",
+            "images of {} nm fit all measurements of {stated} nm far better than its own: correct `led_nm` if frames were exchanged",
             set.leds[own.led].name()
         );
         if !common.contains(&words) {

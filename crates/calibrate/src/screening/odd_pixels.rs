@@ -1,5 +1,7 @@
 //! Hot and dead pixels: single pixels that stand out of their neighbours where the model has no such detail.
 
+use std::collections::BTreeSet;
+
 use ndarray::Array2;
 
 use crate::data::Data;
@@ -48,46 +50,66 @@ fn neighbours(
             Some(at + stride).filter(|p| *p < size),
         ]
     };
-    let mut near: Vec<f32> = Vec::with_capacity(8);
+    let (mut near, mut n) = ([0.0; 9], 0);
     for ny in along(y, rows).into_iter().flatten() {
         for nx in along(x, cols).into_iter().flatten() {
             if (ny, nx) != (y, x) && counts((ny, nx)) {
-                near.push(values[(ny, nx)]);
+                near[n] = values[(ny, nx)];
+                n += 1;
             }
         }
     }
-    near.sort_by(f32::total_cmp);
-    let n = near.len();
+    near[..n].sort_unstable_by(f32::total_cmp);
     (n >= FEWEST).then(|| [near[n - 2], near[1], near[n / 2]])
 }
 
-/// Pixels of each measurement that stand out.
+/// Pixels of each measurement that stand out. A pixel is dead only if it is so wherever its neighbours have light, twice at least:
+/// the middle of an image out of focus may be dark.
 pub(super) fn candidates(set: &MeasuredSet, data: &Data) -> PerMeasurement<Vec<OddPixel>> {
     // Next to a pixel under a filter are others, under the second next are its like.
     let stride = if set.camera.filter == ColourFilter::None { 1 } else { 2 };
-    let of = |c: MeasurementIndex| {
-        let (signal, weight) = (&data.signal[c], &data.weight[c]);
-        let mut odd = Vec::new();
-        for (at, &value) in signal.indexed_iter().filter(|(at, _)| weight[*at] > 0.0) {
-            let Some([high, low, expected]) = neighbours(signal, |p| weight[p] > 0.0, at, stride) else {
-                continue;
-            };
+    let mut found: PerMeasurement<Vec<OddPixel>> = data.indices().map(|c| odd_pixels(data, c, stride)).collect();
+    let dead: BTreeSet<(usize, usize)> = found.iter().flatten().filter(|p| !p.is_hot).map(|p| p.at).collect();
+    for at in dead {
+        let is_lit = |c: MeasurementIndex| {
+            let (signal, weight) = (&data.signal[c], &data.weight[c]);
+            let light = neighbours(signal, |p| weight[p] > 0.0, at, stride);
+            weight[at] > 0.0 && light.is_some_and(|[_, low, _]| SHARE * low > SIGMAS * weight[at].recip())
+        };
+        let lit = data.indices().filter(|&c| is_lit(c)).count();
+        let is_here = |p: &OddPixel| p.at == at && !p.is_hot;
+        let times = found.iter().filter(|own| own.iter().any(is_here)).count();
+        if times < 2 || 2 * times < lit {
+            found.iter_mut().for_each(|own| own.retain(|p| !is_here(p)));
+        }
+    }
+    found
+}
+
+/// Pixels of a measurement that stand out.
+fn odd_pixels(data: &Data, c: MeasurementIndex, stride: usize) -> Vec<OddPixel> {
+    let (signal, weight) = (&data.signal[c], &data.weight[c]);
+    let counts = |p| weight[p] > 0.0;
+    let mut odd = Vec::new();
+    for (at, &value) in signal.indexed_iter().filter(|(at, _)| counts(*at)) {
+        let Some([high, low, expected]) = neighbours(signal, counts, at, stride) else {
+            continue;
+        };
+        let clear = SIGMAS * weight[at].recip();
+        let is_hot = value - high > clear.max(SHARE * value);
+        let is_dead = || {
             // A dead pixel has less noise than its light would have.
-            let sigma = weight[at].recip();
-            let of_light =
-                neighbours(weight, |p| weight[p] > 0.0, at, stride).map_or(sigma, |[_, least, _]| least.recip());
-            let clear = SIGMAS * sigma.max(of_light);
-            let is_hot = value - high > clear.max(SHARE * value);
-            if is_hot || low - value > clear.max(SHARE * low) {
-                odd.push(OddPixel { at, is_hot, expected });
-            }
+            let of_light = neighbours(weight, counts, at, stride).map_or(0.0, |[_, least, _]| SIGMAS * least.recip());
+            low - value > clear.max(of_light).max(SHARE * low)
+        };
+        if is_hot || (low - value > clear && is_dead()) {
+            odd.push(OddPixel { at, is_hot, expected });
         }
-        if odd.len() as f64 > MOST * signal.len() as f64 {
-            odd.clear();
-        }
-        odd
-    };
-    data.indices().map(of).collect()
+    }
+    if odd.len() as f64 > MOST * signal.len() as f64 {
+        odd.clear();
+    }
+    odd
 }
 
 /// True if an image of the model has such a detail at the place of a pixel, or beside it.
