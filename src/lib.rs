@@ -82,6 +82,8 @@ extern crate self as metalith;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
+mod frame_names;
+mod new_set;
 mod session;
 
 pub use metalith_attribution as attribution;
@@ -131,4 +133,5 @@ pub use metalith_pillars::{
 };
 pub use metalith_verify::{SimulationCase, SimulationCases, Verification, verify, write_report};
 pub use metalith_wave::Accuracy;
+pub use new_set::{NewSet, new_set};
 pub use session::plan_session;

@@ -63,7 +63,7 @@ class Diagnosis:
     """What a measured set says of a chip."""
 
     verdict: str
-    """``no_residual``, ``explained``, ``one_of``, ``partly``, ``unexplained`` or ``data_unfit``."""
+    """``no_residual``, ``explained``, ``one_of``, ``explained_but_for``, ``partly``, ``unexplained`` or ``data_unfit``."""
     effects: tuple[FoundEffect, ...]
     ranking: tuple[RankedEffect, ...] = field(repr=False)
     """Candidates of the first step, the best first."""

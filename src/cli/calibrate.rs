@@ -243,6 +243,9 @@ fn describe_metrology(done: &Answer) {
 
 fn describe(done: &Calibration) {
     let error = &done.diagnosis.error;
+    for warning in &done.diagnosis.warnings {
+        print_line!("warning: {warning}");
+    }
     print_line!("{}: {}", done.diagnosis.set, done.diagnosis.sentence());
     print_line!(
         "{} on measurements left out: {:.4} before, {:.4} after; noise alone gives 1",

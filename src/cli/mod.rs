@@ -16,6 +16,7 @@ mod handoff;
 mod images;
 mod layout;
 mod new;
+mod new_set;
 mod optimise;
 mod out_folder;
 mod output;
@@ -112,6 +113,7 @@ enum Command {
     Diff(diff::DiffArgs),
     Convert(convert::ConvertArgs),
     Plan(plan::PlanArgs),
+    NewSet(new_set::NewSetArgs),
     Calibrate(calibrate::CalibrateArgs),
     Study(study::StudyArgs),
     Completions(completions::CompletionsArgs),
@@ -216,6 +218,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Diff(args) => diff::run(args, terminal),
         Command::Convert(args) => convert::run(args, terminal),
         Command::Plan(args) => plan::run(args, terminal),
+        Command::NewSet(args) => new_set::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
         Command::Study(args) => study::run(args, terminal),
         Command::Completions(args) => completions::run(args, terminal),

@@ -17,6 +17,7 @@
 //! | `search` | which effects explain a residual | `fit` |
 //! | `linear_trend`, `extent` | values that are linear over a plane | `fit` |
 //! | `declared_parameter` | parameters of effects that a file declares | |
+//! | `names`, `verdict` | names of effects as users write them, verdict on a set | |
 //! | `refit` | selection for forward models that are fitted in full for each candidate | `fit` |
 
 mod declared_parameter;
@@ -27,11 +28,13 @@ mod forward_model;
 mod index;
 mod linear_trend;
 mod measurements;
+mod names;
 mod refit;
 mod search;
 mod surrogate;
 #[cfg(test)]
 mod test_model;
+mod verdict;
 
 pub use declared_parameter::{DeclaredParameter, MOST_PARAMETERS};
 pub use effect::{Parameter, Slot, ValueError};
@@ -45,6 +48,7 @@ pub use forward_model::{ForwardModel, Model, ParameterPoint, SmoothGroups, Smoot
 pub use index::{MeasurementIndex, PerMeasurement};
 pub use linear_trend::LinearTrend;
 pub use measurements::{MeasurementEquations, Measurements, ReferenceValue, References, eliminate, own_step};
+pub use names::{ConditionalEffect, RENAMED, check_names};
 pub use refit::{
     LeaveOut, RefitEffect, RefitEquations, RefitErrors, RefitFinding, RefitModel, RefitParameter, RefitPlan,
     RefitRejection, RefitScope, RefitTried, select, try_beside,
@@ -54,3 +58,4 @@ pub use search::{
     Rejection, SearchState, TriedEffect, attribute_set, cosines, fit_of, may_leave,
 };
 pub use surrogate::{Surrogate, check_fits_into_memory};
+pub use verdict::SetVerdict;

@@ -154,6 +154,7 @@ fn session(
             index: index_of(element),
             centre_um: element.centre_um(),
             aperture_diameter_um: 2.0 * design.aperture_radius_of_um(element),
+            axis_um: [0.0; 2],
             pillars,
         })
         .collect();
@@ -173,6 +174,7 @@ fn session(
         sem_offset_sigma_nm: bench.sem.map_or(1.0, |s| s.offset_sigma_nm),
         elements,
         measurements: PerMeasurement::default(),
+        free_scale: false,
         field_boundary_um: bench.field_boundary_um,
     })
 }

@@ -44,6 +44,11 @@ impl CellError {
         by_effect: false,
     };
 
+    /// Relative error of images: light is the square of the field, whose relative error doubles at most.
+    pub(crate) fn of_images(&self) -> f64 {
+        2.0 * self.amplitude.hypot(self.phase_rad)
+    }
+
     /// Errors in the form of the statistics: amplitudes and phases, as [`SmoothShape`](crate::smooth_shape::SmoothShape) has them.
     pub(crate) fn of_model(&self) -> ModelError {
         ModelError {

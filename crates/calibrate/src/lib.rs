@@ -26,7 +26,6 @@ mod effects;
 mod fidelity;
 mod grouping;
 mod interval_parts;
-mod nearest_names;
 mod optics;
 mod page;
 mod proposal;
@@ -47,12 +46,12 @@ pub use cells::{CellSource, RigorousCells};
 pub use data::{Data, Nuisances};
 pub use diagnosis::{
     Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, GroupValue, LeftOut, PatternTrend, Proposal, Ranked,
-    SetVerdict, Slope,
+    Remainder, Slope,
 };
 pub use effects::{DeclaredEffect, DeclaredParameter, Effect, Parameter, Stage, all as all_effects, of_any_chip};
 pub use fidelity::FidelityError;
 pub use interval_parts::WidthParts;
-pub use nearest_names::RENAMED as RENAMED_EFFECTS;
+pub use metalith_attribution::{RENAMED as RENAMED_EFFECTS, SetVerdict};
 pub use proposal::{FieldBoundary, Proposed, boundary_of_fields, propose};
 pub use run::{Calibration, calibrate};
 pub use session::{Screening, Session, Settings, Simulations, check_effects};

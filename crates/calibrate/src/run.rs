@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::boundary_search::search_about_boundaries;
-use crate::diagnosis::{Diagnosis, Proposal, SetVerdict};
+use crate::diagnosis::{Diagnosis, Proposal};
 use crate::effects::{self, DeclaredEffect};
 use crate::page::write_page;
 use crate::proposal::{Proposed, propose};
@@ -145,11 +145,8 @@ fn write(
     let report = out.join("report.html");
     diagnosis.write(&answer)?;
     write_page(&report, session, simulations, &diagnosis, evidence.as_ref())?;
-    let learned = matches!(
-        diagnosis.verdict,
-        SetVerdict::NoResidual | SetVerdict::Explained | SetVerdict::OneOf | SetVerdict::Partly
-    );
-    let model = match evidence.filter(|_| learned) {
+    let has_a_model = diagnosis.verdict.has_a_model();
+    let model = match evidence.filter(|_| has_a_model) {
         None => None,
         Some(evidence) => {
             let perturbation = session.simulator.perturbation(&evidence.finding.after.theta);

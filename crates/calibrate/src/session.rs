@@ -3,8 +3,8 @@
 
 use std::path::PathBuf;
 
-use metalith_attribution::RandomNoise;
-use metalith_core::{Error, Progress, Result};
+use metalith_attribution::{RandomNoise, check_names};
+use metalith_core::{Progress, Result};
 
 use crate::bench::{Bench, BenchSampling};
 use crate::cells::{CellSource, RigorousCells};
@@ -13,8 +13,7 @@ use crate::diagnosis::Diagnosis;
 use crate::effects::{self, DeclaredEffect, Effect};
 use crate::fidelity::compare_fidelities;
 use crate::interval_parts::WidthParts;
-use crate::nearest_names::unknown_names;
-use crate::screening::{UnusableMeasurement, unusable_measurements};
+use crate::screening::{UnusableMeasurement, recognise, unusable_measurements};
 use crate::set::{MeasuredSet, PerMeasurement};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::speckle::DefectNoise;
@@ -67,6 +66,10 @@ pub struct Simulations {
 pub struct Screening {
     pub used: PerMeasurement<bool>,
     pub unusable: Vec<UnusableMeasurement>,
+    /// Mistakes of frames that were recognised and masked, or that the user may correct.
+    pub warnings: Vec<String>,
+    /// The data without pixels that are masked; none where none is.
+    masked: Option<Data>,
     /// The nuisances fitted to all measurements, nothing else.
     pub fit: Fit,
 }
@@ -178,16 +181,30 @@ impl<'a> Session<'a> {
         FitProblem::new(&self.simulator, simulations.surrogate.clone(), &self.data)
     }
 
-    /// Find the measurements that cannot be used.
-    pub fn screen(&self, simulations: &Simulations) -> Screening {
+    /// Find the pixels and the measurements that cannot be used.
+    ///
+    /// # Errors
+    /// If the frames are mirrored, turned or transposed.
+    pub fn screen(&self, simulations: &Simulations) -> Result<Screening> {
         let problem = self.problem(simulations);
+        let recognised = recognise(self.set(), &problem)?;
+        let problem = FitProblem {
+            data: recognised.data.as_ref().unwrap_or(&self.data),
+            ..problem
+        };
         let fit = problem.nuisance_fit();
-        let unusable = unusable_measurements(self.set(), &problem, &fit.nuisances);
+        let unusable = unusable_measurements(self.set(), &problem, &fit.nuisances, &recognised);
         let mut used = problem.used;
         for u in &unusable {
             used[u.measurement] = false;
         }
-        Screening { used, unusable, fit }
+        Ok(Screening {
+            used,
+            unusable,
+            warnings: recognised.warnings,
+            masked: recognised.data,
+            fit,
+        })
     }
 
     /// Attribute the residual of the measurements that can be used; `ends` may end the search before all is tried.
@@ -249,10 +266,12 @@ impl<'a> Session<'a> {
         simulations: &Simulations,
         progress: &dyn Progress,
     ) -> Result<(Diagnosis, Option<Evidence>)> {
-        let screening = self.screen(simulations);
+        let screening = self.screen(simulations)?;
         if screening.is_data_unfit() {
             let error = screening.fit.chi2 / self.screened(simulations, &screening).points().max(1.0);
-            return Ok((Diagnosis::data_unfit(self.set(), error, &screening.unusable), None));
+            let mut diagnosis = Diagnosis::data_unfit(self.set(), error, &screening.unusable);
+            diagnosis.warnings = screening.warnings;
+            return Ok((diagnosis, None));
         }
         let ladder = if self.settings.compare_fidelities {
             let problem = self.screened(simulations, &screening);
@@ -261,13 +280,15 @@ impl<'a> Session<'a> {
             Vec::new()
         };
         let evidence = self.attribute(simulations, &screening, ends, progress)?;
-        let diagnosis = Diagnosis::new(&self.simulator, &evidence, &screening.unusable, ladder);
+        let mut diagnosis = Diagnosis::new(&self.simulator, &evidence, &screening.unusable, ladder);
+        diagnosis.warnings = screening.warnings;
         Ok((diagnosis, Some(evidence)))
     }
 
-    fn screened(&self, simulations: &Simulations, screening: &Screening) -> FitProblem<'_> {
+    fn screened<'s>(&'s self, simulations: &Simulations, screening: &'s Screening) -> FitProblem<'s> {
         FitProblem {
             used: screening.used.clone(),
+            data: screening.masked.as_ref().unwrap_or(&self.data),
             ..self.problem(simulations)
         }
     }
@@ -287,11 +308,8 @@ fn tried_effects(set: &MeasuredSet, settings: &Settings) -> Result<Vec<Box<dyn E
 /// Refuse names that no effect of a set has.
 ///
 /// # Errors
-/// With all unknown names at once, the nearest known names and the list of these.
+/// As [`check_names`].
 pub fn check_effects(known: &[Box<dyn Effect>], wanted: &[String]) -> Result<()> {
     let known: Vec<String> = known.iter().map(|e| e.name()).collect();
-    unknown_names(&known, wanted).map_or(Ok(()), |what| {
-        let hint = format!("known effects are {}", known.join(", "));
-        Err(Error::refused("effects/unknown", what, hint))
-    })
+    check_names(&known, &effects::CONDITIONAL, wanted)
 }

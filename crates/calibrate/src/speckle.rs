@@ -77,7 +77,7 @@ impl DefectNoise {
         let grid = problem.prediction(&fit.theta, c);
         let light = grid.pixels(fit.nuisances.shift_um[c]);
         let residual = fit.nuisances.residual(data, &grid, c);
-        let scale = (data.scale[c] * fit.nuisances.flux[data.beam[c].led]) as f32;
+        let scale = fit.nuisances.dn(data, c) as f32;
         let Speckle { by_light, floor } = self.measurements[c];
         let pixels = light.iter().zip(&residual).zip(&data.weight[c]);
         pixels

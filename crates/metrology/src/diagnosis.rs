@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan, RefitScope};
+use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan, RefitScope, SetVerdict};
 use metalith_report::{effect_words, sig};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -69,16 +69,6 @@ pub struct ErrorReport {
     pub after: ErrorPair,
     /// Root mean square by which repeats differ; none where there are none.
     pub noise_floor: Option<f64>,
-}
-
-/// How far effects explain the residual of a set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SetVerdict {
-    NoResidual,
-    Explained,
-    Partly,
-    Unexplained,
 }
 
 /// The answer for a set.
@@ -162,7 +152,7 @@ impl Diagnosis {
                     })
                     .collect(),
                 of: match (model.scope(e), own.across) {
-                    (RefitScope::One { way, group }, _) => model.group(way, group).0,
+                    (RefitScope::One { way, group }, _) => model.group_name(way, group),
                     (_, across) => across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
                 },
             }
@@ -315,12 +305,13 @@ impl Diagnosis {
     /// One line for a person.
     pub fn sentence(&self) -> String {
         let list: Vec<String> = self.effects.iter().map(FoundEffect::sentence).collect();
-        match self.verdict {
-            SetVerdict::NoResidual => "no residual: the measurements agree with what was stated, as repeats do".into(),
-            SetVerdict::Explained => format!("explained by {}", list.join("; ")),
-            SetVerdict::Partly => format!("partly explained by {}", list.join("; ")),
-            SetVerdict::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
-        }
+        let unit = self
+            .error
+            .measure
+            .split_once(" (")
+            .map_or("", |(_, unit)| unit.trim_end_matches(')'));
+        let remainder = format!("{} {unit}", sig(self.error.after.held_out, 3));
+        self.verdict.sentence(&list, &remainder)
     }
 }
 

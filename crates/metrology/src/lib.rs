@@ -29,8 +29,9 @@ mod run;
 mod spectra;
 mod widths;
 
-pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, NotInModel, Ranked, SetVerdict};
+pub use diagnosis::{Diagnosis, FoundEffect, LadderStep, NotInModel, Ranked};
 pub use heights::{HeightField, HeightModel, HeightSet};
+pub use metalith_attribution::SetVerdict;
 pub use pattern::NamePattern;
 pub use proposal::Proposal;
 pub use psf_stack::{ApertureShape, StackBench, StackModel, StackObject, StackPlane, StackSet, ThinLens, Transmission};

@@ -2,7 +2,7 @@
 
 use metalith_report::{Axis, Cell, Chart, Column, Page, Ranking, Table, Verdict, number_words, sig};
 
-use crate::diagnosis::{Diagnosis, SetVerdict};
+use crate::diagnosis::Diagnosis;
 use crate::proposal::Proposal;
 
 /// Most groups whose values a row shows.
@@ -14,8 +14,7 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         format!("Calibration: {}", diagnosis.set),
         format!("measured {}", diagnosis.kind),
     );
-    let holds = matches!(diagnosis.verdict, SetVerdict::Explained | SetVerdict::NoResidual);
-    page.verdict(if holds { Verdict::Pass } else { Verdict::Fail }, diagnosis.sentence());
+    page.verdict(Verdict::of(diagnosis.verdict.is_explained()), diagnosis.sentence());
     let error = &diagnosis.error;
     let with_unit = |v: f64| format!("{} {unit}", sig(v, 3)).trim().to_owned();
     page.facts(&[

@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_attribution::{RefitEffect, RefitFinding, RefitModel, RefitPlan, select};
+use metalith_attribution::{
+    ConditionalEffect, RefitEffect, RefitFinding, RefitModel, RefitPlan, SetVerdict, check_names, select,
+};
 use metalith_core::document::{Document, Section, load};
 use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result};
 use metalith_optics::CalibratedModel;
 use metalith_report::Page;
 
 use crate::declared::{DeclaredEffect, OF_HEIGHTS, OF_SPECTRA};
-use crate::diagnosis::{Diagnosis, SetFacts, SetVerdict};
+use crate::diagnosis::{Diagnosis, SetFacts};
 use crate::heights::{self, HeightModel, HeightSet};
 use crate::page::page;
 use crate::proposal::{Declares, propose};
@@ -108,7 +110,7 @@ pub fn calibrate(
             let set = HeightSet::read(&path)?;
             let mut model = HeightModel::new(&set);
             model.declare(&declared_for(&OF_HEIGHTS)?)?;
-            model.effects = tried(&model.effects, only)?;
+            model.effects = tried(&model.effects, &heights::CONDITIONAL, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "heights",
@@ -127,7 +129,7 @@ pub fn calibrate(
             let set = SpectrumSet::read(&path)?;
             let mut model = SpectrumModel::new(&set);
             model.declare(&declared_for(&OF_SPECTRA)?)?;
-            model.effects = tried(&model.effects, only)?;
+            model.effects = tried(&model.effects, &spectra::CONDITIONAL, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "spectra",
@@ -149,7 +151,7 @@ pub fn calibrate(
         SetKind::Widths => {
             let set = WidthSet::read(&path, progress)?;
             let mut model = WidthModel::new(&set);
-            model.effects = tried(&model.effects, only)?;
+            model.effects = tried(&model.effects, &widths::CONDITIONAL, only)?;
             let facts = SetFacts {
                 title: &set.title,
                 kind: "widths",
@@ -173,7 +175,7 @@ pub fn calibrate(
             progress.begin("orientation", 0);
             let prepared = psf_stack::prepare(&mut set)?;
             let mut model = StackModel::new(&set, &prepared.sampling, prepared.focus_um);
-            model.keep(&tried(&model.own.effects, only)?);
+            model.keep(&tried(&model.own.effects, &[], only)?);
             let facts = SetFacts {
                 title: &set.title,
                 kind: "psf_stack",
@@ -193,15 +195,9 @@ pub fn calibrate(
 }
 
 /// The effects that are tried: all, or those that are named with those that they change.
-fn tried(all: &[RefitEffect], only: &[String]) -> Result<Vec<RefitEffect>> {
-    let known = || all.iter().map(|e| e.name.as_str()).collect::<Vec<_>>().join(", ");
-    if let Some(wrong) = only.iter().find(|name| all.iter().all(|e| e.name != **name)) {
-        return Err(Error::refused(
-            "calibrate/unknown-effect",
-            format!("no effect of this set is called `{wrong}`"),
-            format!("known here: {}", known()),
-        ));
-    }
+fn tried(all: &[RefitEffect], conditional: &[ConditionalEffect], only: &[String]) -> Result<Vec<RefitEffect>> {
+    let known: Vec<String> = all.iter().map(|e| e.name.clone()).collect();
+    check_names(&known, conditional, only)?;
     let mut kept: Vec<bool> = all.iter().map(|e| only.is_empty() || only.contains(&e.name)).collect();
     for e in (0..all.len()).rev() {
         if kept[e] {

@@ -174,7 +174,7 @@ not_fitted = [2]
     std::fs::write(folder.path().join("measurement.toml"), text).unwrap();
     let out = folder.path().join("out");
     assert_eq!(kind_of(folder.path()), Some(SetKind::PsfStack));
-    let answer = calibrate(folder.path(), SetKind::PsfStack, &out, &[], &Silent)
+    let answer = calibrate(folder.path(), SetKind::PsfStack, &out, (&[], None), &Silent)
         .unwrap()
         .diagnosis;
     println!("{}", answer.sentence());

@@ -130,7 +130,7 @@ fn answer(truth: &Truth, seed: u64) -> (Diagnosis, Option<CalibratedModel>) {
     write_set(folder.path(), truth, seed);
     assert_eq!(kind_of(folder.path()), Some(SetKind::Widths));
     let out = folder.path().join("out");
-    let done = calibrate(folder.path(), SetKind::Widths, &out, &[], &Silent).unwrap();
+    let done = calibrate(folder.path(), SetKind::Widths, &out, (&[], None), &Silent).unwrap();
     let model = done.model.map(|path| CalibratedModel::read(&path).unwrap());
     (done.diagnosis, model)
 }
@@ -285,7 +285,7 @@ fn what_was_found_is_a_model_file_and_what_it_cannot_hold_is_named() {
 fn the_example_is_explained_by_what_was_put_in() {
     let set = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/measured/widths.toml");
     let out = tempfile::tempdir().unwrap();
-    let done = calibrate(&set, SetKind::Widths, out.path(), &[], &Silent).unwrap();
+    let done = calibrate(&set, SetKind::Widths, out.path(), (&[], None), &Silent).unwrap();
     println!("{}", done.diagnosis.sentence());
     let mut found = names(&done.diagnosis);
     found.sort_unstable();
@@ -313,12 +313,12 @@ fn numbers_that_cannot_be_are_named_with_line_and_column_at_once() {
     lines[8] = "P0,-5,nan,120.0,120.0,1".into();
     lines[9] = "P0,120".into();
     std::fs::write(&table, lines.join("\n")).unwrap();
-    let error = calibrate(folder.path(), SetKind::Widths, folder.path(), &[], &Silent).unwrap_err();
+    let error = calibrate(folder.path(), SetKind::Widths, folder.path(), (&[], None), &Silent).unwrap_err();
     let said = error.to_string();
     assert!(said.contains("widths.csv, line 10"), "{said}");
     lines.remove(9);
     std::fs::write(&table, lines.join("\n")).unwrap();
-    let error = calibrate(folder.path(), SetKind::Widths, folder.path(), &[], &Silent).unwrap_err();
+    let error = calibrate(folder.path(), SetKind::Widths, folder.path(), (&[], None), &Silent).unwrap_err();
     let said = error.to_string();
     for wanted in [
         "widths.csv, line 4, column `measured_x_nm`: `abc`",

@@ -34,6 +34,8 @@ pub struct DrawnElement<'a> {
     shape: PillarShape,
     /// Centre of the element on the chip (um).
     centre_um: [f64; 2],
+    /// Centre of the opening from the centre of the lattice (um).
+    axis_um: [f64; 2],
     /// Area fraction around each site with its range (um), made when first asked for.
     fill: OnceLock<(f64, Vec<f32>)>,
 }
@@ -46,6 +48,7 @@ impl<'a> DrawnElement<'a> {
             aperture_radius_um,
             shape: PillarShape::default(),
             centre_um: [0.0; 2],
+            axis_um: [0.0; 2],
             fill: OnceLock::new(),
         }
     }
@@ -54,6 +57,12 @@ impl<'a> DrawnElement<'a> {
     #[must_use]
     pub fn placed(self, centre_um: [f64; 2]) -> Self {
         Self { centre_um, ..self }
+    }
+
+    /// This element with the centre of its opening at a place from the centre of the lattice (um), instead of on it.
+    #[must_use]
+    pub fn with_axis(self, axis_um: [f64; 2]) -> Self {
+        Self { axis_um, ..self }
     }
 
     /// This element with pillars of another shape, on which the area that they fill depends.
@@ -195,7 +204,8 @@ impl AsBuiltElement {
         let lattice = drawn.pillars.lattice;
         let n = lattice.sites();
         let steps = drawn.site_steps(geometry);
-        let aperture = ShiftedAperture::new(lattice, drawn.aperture_radius_um, geometry.aperture_offset_um);
+        let offset_um = [0, 1].map(|axis| drawn.axis_um[axis] + geometry.aperture_offset_um[axis]);
+        let aperture = ShiftedAperture::new(lattice, drawn.aperture_radius_um, offset_um);
         let covered = |site: usize| aperture.as_ref().is_some_and(|a| a.passes(site) == 0.0);
         // Rectangles are told by their number, and both edges are off by the same.
         let rectangles = !drawn.shape.has_width();

@@ -9,10 +9,11 @@
 //! | `distance_um` | added to the distance of the sensor from an element (um) | `X Y` |
 //! | `spectrum` | factor of the spectrum of each lamp, which keeps its power | `wavelength centre` |
 //! | `kernel` | light at x, y from where it belongs, over what belongs there (1/um^2) | `x y` |
+//! | `transfer` | factor of the transfer of the camera at a spatial frequency | `fx fy` |
 //!
 //! `x y r` from the element's centre and its aperture radius `R`, `X Y` from the centre of the chip to that of the
 //! element (um); `theta` (rad) counts from +x to +y; `wavelength` and `centre` of the lamp (nm), drawn width `w` (nm),
-//! area fraction `fill` around the site. Where an expression has no finite value it counts as zero.
+//! area fraction `fill` around the site, spatial frequency `fx fy` on the sensor (1/um). Where an expression has no finite value it counts as zero.
 
 use std::collections::BTreeMap;
 
@@ -32,6 +33,7 @@ pub enum DeclaredQuantity {
     DistanceUm,
     Spectrum,
     Kernel,
+    Transfer,
 }
 
 /// An expression with values for its parameters.
@@ -60,7 +62,7 @@ const WIDTH: [&str; 9] = ["w", "fill", "x", "y", "r", "theta", "R", "X", "Y"];
 
 impl DeclaredQuantity {
     /// All of them by the key that they are declared by.
-    pub const ALL: [(&'static str, Self); 7] = [
+    pub const ALL: [(&'static str, Self); 8] = [
         ("opd_nm", Self::OpdNm),
         ("phase_rad", Self::PhaseRad),
         ("amplitude", Self::Amplitude),
@@ -68,6 +70,7 @@ impl DeclaredQuantity {
         ("distance_um", Self::DistanceUm),
         ("spectrum", Self::Spectrum),
         ("kernel", Self::Kernel),
+        ("transfer", Self::Transfer),
     ];
 
     /// Names of its variables.
@@ -78,6 +81,7 @@ impl DeclaredQuantity {
             Self::DistanceUm => &["X", "Y"],
             Self::Spectrum => &["wavelength", "centre"],
             Self::Kernel => &["x", "y"],
+            Self::Transfer => &["fx", "fy"],
         }
     }
 

@@ -273,7 +273,7 @@ impl Perturbation {
         match term.quantity {
             DeclaredQuantity::DistanceUm => self.path.declared.push(term),
             DeclaredQuantity::Spectrum => self.light.declared.push(term),
-            DeclaredQuantity::Kernel => self.camera.declared.push(term),
+            DeclaredQuantity::Kernel | DeclaredQuantity::Transfer => self.camera.declared.push(term),
             _ => self.geometry.declared.push(term),
         }
     }

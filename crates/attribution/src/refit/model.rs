@@ -105,9 +105,9 @@ pub trait RefitModel: Sync {
         None
     }
 
-    /// Name of a group of a way of leaving out, and its place in the order in which groups judge.
-    fn group(&self, _way: usize, group: usize) -> (String, usize) {
-        (group.to_string(), group)
+    /// Place of a group of a way of leaving out in the order in which groups judge.
+    fn group_order(&self, _way: usize, group: usize) -> usize {
+        group
     }
 
     /// Values of the parameters of an effect from which a fit starts, all others as they are.

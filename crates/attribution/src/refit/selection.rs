@@ -428,7 +428,7 @@ impl Selection<'_> {
         };
         let own = &self.plan.ways[way];
         let mut groups = self.groups(own);
-        groups.sort_by_key(|&group| self.model.group(way, group).1);
+        groups.sort_by_key(|&group| self.model.group_order(way, group));
         let rms = |errors: &RefitErrors, group: usize| {
             let left = errors.own[0].iter().zip(&own.groups).filter(|(_, g)| **g == group);
             let (sum, n) = left
@@ -442,7 +442,7 @@ impl Selection<'_> {
             what: format!(
                 "{} `{}` where each {} is left out",
                 own.name,
-                self.model.group(way, group).0,
+                self.model.group_name(way, group),
                 self.plan.ways[0].name
             ),
             before: rms(before, group),

@@ -273,6 +273,7 @@ mod tests {
                 index: [element.index.0.into(), element.index.1.into()],
                 centre_um: element.centre_um(),
                 aperture_diameter_um: 2.0 * design.aperture_radius_of_um(&element),
+                axis_um: [0.0; 2],
                 pillars,
             })
             .collect();

@@ -155,6 +155,7 @@ impl<'a> Bench<'a> {
                     DrawnElement::new(&e.pillars, 0.5 * e.aperture_diameter_um)
                         .of_shape(set.stack.cell.shape)
                         .placed(e.centre_um)
+                        .with_axis(e.axis_um)
                 })
                 .collect(),
             follows: true,

@@ -13,11 +13,16 @@ use metalith_wave::kernels::sum_of_products;
 /// Axes along which a window is registered: its columns stand first.
 const AXES: usize = 2;
 
-/// Inner products of the whitened columns of one measurement, in this order: registration along x and y, flux of
-/// every LED, black level, further parameters, and the residual last.
+/// Relative standard deviation of a scale that nobody states: far more than any change of a step.
+const FREE_SCALE: f64 = 1e3;
+
+/// Inner products of the whitened columns of one measurement, in this order: registration along x and y, its scale if this is
+/// free, flux of every LED, black level, further parameters, and the residual last.
 #[derive(Clone)]
 pub struct FrameEquations {
     gram: DMatrix<f64>,
+    /// Columns of this measurement alone, which stand first.
+    own: usize,
     /// Shift of the window that follows the image, for a unit of each further parameter (um).
     follows_um: Vec<[f64; 2]>,
 }
@@ -39,15 +44,19 @@ impl FrameEquations {
         let column =
             |a: &Array2<f32>, factor: f32| -> Vec<f32> { a.iter().zip(weight).map(|(v, w)| factor * v * w).collect() };
         let mut columns = vec![column(&lines[1], scaled), column(&lines[2], scaled)];
+        let own = AXES + usize::from(data.free_scale);
+        if data.free_scale {
+            columns.push(column(&lines[0], scaled));
+        }
         columns.push(column(&lines[0], scale));
         columns.push(weight.iter().copied().collect());
         columns.extend(more.iter().map(|m| column(m, scaled)));
         columns.push(residual.iter().copied().collect());
         // Where each column goes: only this measurement's own LED has a flux column.
-        let size = 2 + data.leds + 1 + more.len() + 1;
-        let place: Vec<usize> = [0, 1, 2 + usize::from(led)]
-            .into_iter()
-            .chain(2 + data.leds..size)
+        let size = own + data.leds + 1 + more.len() + 1;
+        let place: Vec<usize> = (0..own)
+            .chain([own + usize::from(led)])
+            .chain(own + data.leds..size)
             .collect();
         let mut gram = DMatrix::zeros(size, size);
         for (i, a) in columns.iter().enumerate() {
@@ -58,7 +67,10 @@ impl FrameEquations {
             }
         }
         let prior = data.registration_um.powi(-2);
-        let first = 2 + data.leds + 1;
+        let first = own + data.leds + 1;
+        if data.free_scale {
+            gram[(AXES, AXES)] += FREE_SCALE.powi(-2);
+        }
         for axis in [0, 1] {
             // The place of the window is known: what its derivatives are by shift and further parameters, and what it is off by.
             let off = now.shift_um[c][axis] + grid.off_um()[axis];
@@ -72,13 +84,14 @@ impl FrameEquations {
                 }
             }
         }
-        Self { gram, follows_um }
+        Self { gram, own, follows_um }
     }
 
-    /// The best step of registration (um) after the others have moved by `step` (flux, black level, further).
-    pub fn registration(&self, step: &DVector<f64>) -> [f64; 2] {
-        let step = own_step(&self.gram, AXES, step);
-        [step[0], step[1]]
+    /// The best step of registration (um), and of the scale by a factor, after the others have moved by `step` (flux, black
+    /// level, further).
+    pub fn own_step(&self, step: &DVector<f64>) -> ([f64; 2], f64) {
+        let step = own_step(&self.gram, self.own, step);
+        ([step[0], step[1]], 1.0 + step.get(AXES).copied().unwrap_or(0.0))
     }
 
     /// Shift of the window that follows the image after such a step of the others (um).
@@ -95,6 +108,6 @@ impl FrameEquations {
 impl MeasurementEquations for FrameEquations {
     /// The products after registration has been eliminated: flux, black level, further parameters, residual.
     fn reduced(&self) -> DMatrix<f64> {
-        eliminate(&self.gram, AXES)
+        eliminate(&self.gram, self.own)
     }
 }

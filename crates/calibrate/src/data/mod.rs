@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, Zip};
 
 pub(crate) use equations::FrameEquations;
+pub(crate) use nuisances::BLACK_SIGMA_DN;
 pub use nuisances::Nuisances;
 
 use crate::grouping::Grouping;
@@ -46,6 +47,8 @@ pub struct Data {
     pub registration_um: f64,
     /// Relative standard deviation of the flux of each LED.
     pub flux_sigma: f64,
+    /// True if each measurement has a scale of its own that nobody states.
+    pub free_scale: bool,
     /// Widths by SEM, measured less designed (nm).
     pub references: References,
 }
@@ -97,11 +100,48 @@ impl Data {
             pixel_um: camera.pixel_um,
             registration_um: camera.registration_sigma_px * camera.pixel_um,
             flux_sigma: camera.flux_sigma,
+            free_scale: set.free_scale,
             references: References {
                 values: widths.collect(),
                 offset_sigma: set.sem_offset_sigma_nm,
             },
         }
+    }
+
+    /// The same bench without measurements and widths.
+    pub(crate) fn empty(&self) -> Self {
+        Self {
+            weight: PerMeasurement::default(),
+            signal: PerMeasurement::default(),
+            beam: PerMeasurement::default(),
+            scale: PerMeasurement::default(),
+            references: References {
+                values: Vec::new(),
+                ..self.references
+            },
+            ..*self
+        }
+    }
+
+    /// Sum of squares of the images of some measurements over their noise, without the noise.
+    pub(crate) fn energy(&self, used: &PerMeasurement<bool>) -> f64 {
+        let of = |c: MeasurementIndex| {
+            let pairs = self.signal[c].iter().zip(&self.weight[c]);
+            pairs.map(|(v, w)| f64::from(v * w).powi(2)).sum::<f64>() - self.points(c) as f64
+        };
+        self.indices().filter(|&c| used[c]).map(of).sum::<f64>().max(0.0)
+    }
+
+    /// Scale of a measurement over what is stated by which an image fits it best; one where no light is.
+    fn scale_of(&self, c: MeasurementIndex, image: &Array2<f32>) -> f64 {
+        let mut sums = [0.0; 2];
+        for ((v, m), w) in self.signal[c].iter().zip(image).zip(&self.weight[c]) {
+            let [v, m] = [v, m].map(|a| f64::from(a * w));
+            sums[0] += v * m;
+            sums[1] += m * m;
+        }
+        let scale = sums[0] / sums[1] / self.scale[c];
+        if scale > 0.0 && scale.is_finite() { scale } else { 1.0 }
     }
 
     /// All LEDs as stated: a relative flux of one.
@@ -268,6 +308,7 @@ mod tests {
             pixel_um: PIXEL_UM,
             registration_um: 2.0,
             flux_sigma: 0.01,
+            free_scale: false,
             references: References {
                 values: Vec::new(),
                 offset_sigma: 1.0,

@@ -24,6 +24,9 @@ impl Nuisances {
             let shift = whole_pixel_shift(&data.signal[c], &images[c].pixels([0.0; 2]));
             shift.map(|pixels| pixels * data.pixel_um)
         });
+        if data.free_scale {
+            now.scale = data.for_each(|c| data.scale_of(c, &images[c].pixels(now.shift_um[c])));
+        }
         now
     }
 
@@ -63,8 +66,10 @@ impl Nuisances {
     /// Move by a step of the shared nuisances and further parameters; registration follows it.
     pub fn advance(&mut self, data: &Data, equations: &PerMeasurement<FrameEquations>, step: &DVector<f64>) {
         let most = LARGEST_SHIFT * data.registration_um;
-        for (shift, measurement) in self.shift_um.iter_mut().zip(equations) {
-            let (by, following) = (measurement.registration(step), measurement.following(step));
+        for ((shift, scale), measurement) in self.shift_um.iter_mut().zip(&mut self.scale).zip(equations) {
+            let ((by, factor), following) = (measurement.own_step(step), measurement.following(step));
+            // A scale is positive, and a step that would double it is too long for slopes.
+            *scale *= factor.clamp(0.5, 2.0);
             for axis in [0, 1] {
                 // Slopes hold as far as the image moves in the window.
                 shift[axis] += (by[axis] + following[axis]).clamp(-most, most) - following[axis];

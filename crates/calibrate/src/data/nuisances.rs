@@ -1,7 +1,7 @@
-//! Nuisance parameters: the registration of each window, the flux of each LED, the black level.
+//! Nuisance parameters: the registration of each window, its scale where this is free, the flux of each LED, the black level.
 //!
 //! They are fitted together with everything else, within what the lab states of them, and are never a finding.
-//! Registration belongs to one measurement alone and is eliminated there; flux and black level are shared.
+//! Registration and scale belong to one measurement alone and are eliminated there; flux and black level are shared.
 
 use nalgebra::DMatrix;
 use ndarray::Array2;
@@ -20,6 +20,8 @@ pub struct Nuisances {
     pub shift_um: PerMeasurement<[f64; 2]>,
     /// Flux of each LED over what is stated.
     pub flux: PerLed<f64>,
+    /// Scale of each measurement over what is stated, besides the flux of its LED; one where scales are known.
+    pub scale: PerMeasurement<f64>,
     /// Black level less what is stated (DN).
     pub black_dn: f64,
 }
@@ -30,8 +32,14 @@ impl Nuisances {
         Self {
             shift_um: vec![[0.0; 2]; data.signal.len()].into(),
             flux: data.stated_flux(),
+            scale: vec![1.0; data.signal.len()].into(),
             black_dn: 0.0,
         }
+    }
+
+    /// DN of a measurement for unit intensity.
+    pub fn dn(&self, data: &Data, c: MeasurementIndex) -> f64 {
+        data.scale[c] * self.scale[c] * self.flux[data.beam[c].led]
     }
 
     /// Prior knowledge of flux and black level, as normal equations of `size` columns about the present values.
@@ -60,7 +68,7 @@ impl Nuisances {
 
     /// The same against the pixels of a model.
     pub fn whitened(&self, data: &Data, c: MeasurementIndex, model: &Array2<f32>) -> Array2<f32> {
-        let factor = (data.scale[c] * self.flux[data.beam[c].led]) as f32;
+        let factor = self.dn(data, c) as f32;
         let black = self.black_dn as f32;
         let mut out = data.signal[c].clone();
         ndarray::Zip::from(&mut out)

@@ -2,13 +2,15 @@
 
 use std::collections::BTreeSet;
 
+use metalith_attribution::SetVerdict;
 use serde::Serialize;
 use serde_json::Value;
 
 use super::pattern::{untold_colours, untold_tilt};
 use super::{
-    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, MeasurementError, Ranked, SetVerdict,
+    Diagnosis, ErrorPair, ErrorReport, FoundEffect, FreePattern, LeftOut, MeasurementError, Ranked, Remainder,
 };
+use crate::cell_error::CellError;
 use crate::effects::Effect;
 use crate::fidelity::FidelityError;
 use crate::interval_parts::WidthParts;
@@ -26,6 +28,9 @@ const MEASURE: &str = "reduced chi-square per pixel";
 
 /// If a larger share is left, the residual is unexplained.
 const MOSTLY_LEFT: f64 = 0.4;
+
+/// Up to this share the effects that were found are the cause: another effect would be a hundred times weaker.
+const HARDLY_LEFT: f64 = 0.01;
 
 /// Least error above noise that shares are relative to, where there is none.
 const LEAST_ABOVE_NOISE: f64 = 1e-9;
@@ -52,8 +57,11 @@ impl Diagnosis {
             null_test_held_out: finding.null_held_out,
         };
         let unexplained_share = unexplained_share(&error, finding);
-        let may_be_left = may_leave(&evidence.problem(simulator), &finding.after);
-        let verdict = verdict(&error, finding, (unexplained_share, may_be_left));
+        let problem = evidence.problem(simulator);
+        let may_be_left = may_leave(&problem, &finding.after);
+        let images = problem.data.energy(&problem.used) / pixels;
+        let remainder = Remainder::of(error.after.held_out, images);
+        let verdict = verdict(&error, finding, (unexplained_share, may_be_left), &remainder);
         let patterns = if verdict.leaves_a_residual() {
             evidence.patterns(simulator)
         } else {
@@ -83,8 +91,10 @@ impl Diagnosis {
             patterns: patterns.iter().map(|p| FreePattern::new(simulator, p)).collect(),
             proposal: None,
             unexplained_share,
+            remainder: (verdict == SetVerdict::ExplainedButFor).then_some(remainder),
             missing_by_speckle: evidence.amount_by_noise,
             left_out: left_out(set, unusable),
+            warnings: Vec::new(),
             measurements: measurements.collect(),
             ladder,
         }
@@ -113,8 +123,10 @@ impl Diagnosis {
             patterns: Vec::new(),
             proposal: None,
             unexplained_share: 1.0,
+            remainder: None,
             missing_by_speckle: None,
             left_out: left_out(set, unusable),
+            warnings: Vec::new(),
             measurements: Vec::new(),
             ladder: Vec::new(),
         }
@@ -130,7 +142,28 @@ fn unexplained_share(error: &ErrorReport, finding: &Finding) -> f64 {
     ((error.after.held_out - 1.0).max(0.0) / above).clamp(0.0, 1.0)
 }
 
-fn verdict(error: &ErrorReport, finding: &Finding, (unexplained_share, may_be_left): (f64, f64)) -> SetVerdict {
+impl Remainder {
+    /// The remainder with such a reduced chi-square, in images of such a mean square over the noise.
+    fn of(chi2: f64, images: f64) -> Self {
+        let share = ((chi2 - 1.0).max(0.0) / images.max(f64::MIN_POSITIVE)).sqrt();
+        Self {
+            percent: 100.0 * share,
+            model_error_percent: 100.0 * CellError::MEASURED.of_images(),
+        }
+    }
+
+    /// True if the model may err by as much.
+    fn is_below_the_model(&self) -> bool {
+        self.percent < self.model_error_percent
+    }
+}
+
+fn verdict(
+    error: &ErrorReport,
+    finding: &Finding,
+    (unexplained_share, may_be_left): (f64, f64),
+    remainder: &Remainder,
+) -> SetVerdict {
     if finding.chosen.is_empty() {
         return if error.before.held_out <= EXPLAINED {
             SetVerdict::NoResidual
@@ -142,6 +175,8 @@ fn verdict(error: &ErrorReport, finding: &Finding, (unexplained_share, may_be_le
     let unambiguous = finding.alternatives.iter().all(Vec::is_empty);
     if !fits && unexplained_share > MOSTLY_LEFT {
         SetVerdict::Unexplained
+    } else if !fits && unexplained_share <= HARDLY_LEFT && remainder.is_below_the_model() {
+        SetVerdict::ExplainedButFor
     } else if !fits {
         SetVerdict::Partly
     } else if finding.chosen.len() == 1 && !unambiguous {
@@ -304,6 +339,15 @@ fn listed<T: Serialize>(values: &[T]) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A reduced chi-square of 1.06 is a small part of bright images, and a large part of dim ones.
+    #[test]
+    fn a_remainder_is_compared_with_the_error_of_the_model() {
+        let of = |images: f64| Remainder::of(1.06, images);
+        assert!((of(6e4).percent - 0.1).abs() < 1e-9);
+        assert!(of(6e4).is_below_the_model() && !of(6e2).is_below_the_model());
+        assert_eq!(Remainder::of(0.99, 6e4).percent, 0.0);
+    }
 
     #[test]
     fn a_table_says_in_which_step_an_effect_was_taken() {

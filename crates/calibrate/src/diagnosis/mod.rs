@@ -5,7 +5,9 @@ mod pattern;
 
 use std::path::Path;
 
+use metalith_attribution::SetVerdict;
 use metalith_core::Result;
+use metalith_report::sig;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -13,31 +15,6 @@ pub use pattern::{FreePattern, GroupValue, PatternTrend, Slope};
 
 use crate::fidelity::FidelityError;
 use crate::interval_parts::WidthParts;
-
-/// The verdict on a set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SetVerdict {
-    /// The measurements agree with what was stated, to within their noise.
-    NoResidual,
-    /// The effects that were found explain the residual.
-    Explained,
-    /// One of a few effects that this set cannot distinguish.
-    OneOf,
-    /// The effects that were found explain a part of the residual.
-    Partly,
-    /// There is a residual that no known effect explains.
-    Unexplained,
-    /// More than half of the measurements cannot be used, or there is one alone.
-    DataUnfit,
-}
-
-impl SetVerdict {
-    /// True if there is something that no effect which was found explains.
-    pub fn leaves_a_residual(self) -> bool {
-        matches!(self, Self::Partly | Self::Unexplained)
-    }
-}
 
 /// An effect that was found.
 #[derive(Clone, Debug, Serialize)]
@@ -113,6 +90,15 @@ pub struct LeftOut {
     pub reason: String,
 }
 
+/// Part of the images that effects do not explain.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Remainder {
+    /// Root mean square above noise, over that of the images (%).
+    pub percent: f64,
+    /// The same of the error of the model (%).
+    pub model_error_percent: f64,
+}
+
 /// The answer for a set.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
@@ -132,9 +118,15 @@ pub struct Diagnosis {
     pub proposal: Option<Proposal>,
     /// Share of the error above noise that is left.
     pub unexplained_share: f64,
+    /// The remainder that is below the error of the model; none with another verdict.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remainder: Option<Remainder>,
     /// Share of missing pillars by their speckle, where the speckle counts as noise in the error after.
     pub missing_by_speckle: Option<f64>,
     pub left_out: Vec<LeftOut>,
+    /// Mistakes of frames that were recognised before anything was fitted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// Held-out error of each measurement before and after.
     pub measurements: Vec<MeasurementError>,
     /// The three fidelities of the cell, nuisances fitted.
@@ -170,7 +162,7 @@ impl Proposal {
             .map(|e| e.name.as_str())
             .filter(|name| self.effects.iter().any(|own| own == name))
             .collect();
-        let [without, with] = [without, diagnosis.error.after.held_out].map(|error| metalith_report::sig(error, 4));
+        let [without, with] = [without, diagnosis.error.after.held_out].map(|error| sig(error, 4));
         if taken.is_empty() {
             format!("proposed for the residual, tried and not taken: {names}")
         } else {
@@ -203,22 +195,16 @@ impl Diagnosis {
     pub fn sentence(&self) -> String {
         let one = |e: &FoundEffect| metalith_report::effect_words(&e.name, &e.value, &e.unit, &e.interval);
         let list: Vec<String> = self.effects.iter().map(one).collect();
+        let remainder = match self.remainder {
+            Some(remainder) => format!("{} % of the images (rms)", sig(remainder.percent, 2)),
+            None => format!("{} % of the error above noise", sig(100.0 * self.unexplained_share, 2)),
+        };
         match self.verdict {
-            SetVerdict::NoResidual => {
-                "no residual: the measurements agree with what was stated, to within their noise".into()
-            }
-            SetVerdict::Explained => format!("explained by {}", list.join("; ")),
-            SetVerdict::OneOf => format!("one of these, which this set cannot distinguish: {}", list.join("; ")),
-            SetVerdict::Partly => format!(
-                "partly explained by {}; {:.0} % of the error above noise is left",
-                list.join("; "),
-                100.0 * self.unexplained_share
-            ),
-            SetVerdict::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
             SetVerdict::DataUnfit if self.left_out.is_empty() => {
                 "data unfit: one measurement alone leaves nothing to judge a finding by; take others, of another colour, element or distance".into()
             }
             SetVerdict::DataUnfit => format!("data unfit: {} measurements cannot be used", self.left_out.len()),
+            verdict => verdict.sentence(&list, &remainder),
         }
     }
 }

@@ -23,12 +23,13 @@ pub struct DeclaredEffect {
 }
 
 /// Stage at which an expression acts, by the word of the file.
-const STAGES: [(&str, Stage); 5] = [
+const STAGES: [(&str, Stage); 6] = [
     ("pupil", Stage::Geometry),
     ("width", Stage::Geometry),
     ("distance", Stage::Diffraction),
     ("spectrum", Stage::Source),
     ("kernel", Stage::Camera),
+    ("transfer", Stage::Camera),
 ];
 
 /// The word for where a quantity acts.
@@ -39,6 +40,7 @@ fn stage_word(quantity: DeclaredQuantity) -> &'static str {
         DeclaredQuantity::DistanceUm => "distance",
         DeclaredQuantity::Spectrum => "spectrum",
         DeclaredQuantity::Kernel => "kernel",
+        DeclaredQuantity::Transfer => "transfer",
     }
 }
 
@@ -174,6 +176,8 @@ fn tried(variable: &str) -> &'static [f64] {
         "w" => &[90.0, 150.0, 240.0],
         "fill" => &[0.1, 0.35, 0.6, 0.8],
         "centre" => &[450.0, 533.0, 660.0],
+        "fx" => &[0.0, 0.07, -0.31, 0.9],
+        "fy" => &[0.0, -0.05, 0.23, 0.6, 1.1],
         _ => &[0.0],
     }
 }
@@ -186,6 +190,7 @@ const PLACES: usize = 420;
 fn does_something(term: &CompiledTerm) -> Option<(String, String)> {
     let (nothing, example) = match term.quantity {
         DeclaredQuantity::Spectrum => (1.0, "such as `1 + a * (wavelength - centre)`"),
+        DeclaredQuantity::Transfer => (1.0, "such as `exp(-2 * pi^2 * a * fx^2)`"),
         _ => (0.0, "such as `a` times a shape"),
     };
     let variables = term.quantity.variables();
@@ -346,6 +351,7 @@ start = 5.0
             ),
             ("distance", "distance_um = \"a * X + 0.01 * Y\"", "Y = "),
             ("width", "width_nm = \"a + (fill - 0.3)\"", "fill = "),
+            ("transfer", "transfer = \"a * fx^2\"", "not 1"),
         ] {
             let error = with(stage, expression).unwrap_err().to_string();
             assert!(error.contains(part), "{part} is not in:\n{error}");
@@ -353,6 +359,7 @@ start = 5.0
         for (stage, expression) in [
             ("spectrum", "spectrum = \"1 + a * (wavelength - centre) / 100\""),
             ("pupil", "amplitude = \"cos(a * x / R) - 1\""),
+            ("transfer", "transfer = \"exp(-2 * pi^2 * a * fx^2)\""),
             ("width", "width_nm = \"a * w / 150\""),
             ("distance", "distance_um = \"a * step(1 - hypot(X - 400, Y))\""),
         ] {

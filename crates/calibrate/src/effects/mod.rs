@@ -13,6 +13,7 @@ mod table;
 mod value_error;
 
 pub use declared::DeclaredEffect;
+use metalith_attribution::ConditionalEffect;
 pub use metalith_attribution::DeclaredParameter;
 pub(crate) use metalith_attribution::MOST_PARAMETERS;
 pub use metalith_attribution::Parameter;
@@ -164,6 +165,30 @@ fn table() -> Vec<Box<dyn Effect>> {
     let all = table::TABLE.iter();
     all.map(|own| Box::new(*own) as Box<dyn Effect>).collect()
 }
+
+/// Effects that are tried on some sets only.
+pub(crate) const CONDITIONAL: [ConditionalEffect; 5] = [
+    ConditionalEffect {
+        name: StitchedFields::NAMES[0],
+        needs: "`field_boundary_um` of `[writer]`",
+    },
+    ConditionalEffect {
+        name: StitchedFields::NAMES[1],
+        needs: "`field_boundary_um` of `[writer]`",
+    },
+    ConditionalEffect {
+        name: table::CORNER_ROUNDING,
+        needs: "`shape = \"square\"` of `[stack]`",
+    },
+    ConditionalEffect {
+        name: "sensor_tilt*",
+        needs: "`[[element]]` sections whose `centre_um` differ along its direction, along x and y for `sensor_tilt`",
+    },
+    ConditionalEffect {
+        name: "led_centre_*",
+        needs: "an `[[led]]` whose `centre_nm` is the number in its name",
+    },
+];
 
 /// All effects that are tried on a set.
 pub fn all(set: &MeasuredSet) -> Vec<Box<dyn Effect>> {

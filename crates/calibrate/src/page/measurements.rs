@@ -44,7 +44,7 @@ pub(super) fn measurements(page: &mut Page, session: &Session<'_>, simulations: 
                 .side(180.0);
             for &c in group {
                 let name = format!("{} um", fixed(set.measurements[c].distance_um, 0));
-                let factor = data.scale[c] * finding.after.nuisances.flux[data.beam[c].led];
+                let factor = finding.after.nuisances.dn(data, c);
                 let model = problem
                     .prediction(&finding.after.theta, c)
                     .pixels(finding.after.nuisances.shift_um[c]);

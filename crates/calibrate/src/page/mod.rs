@@ -9,7 +9,7 @@ use measurements::{SIGMAS, measurements, widths};
 use ndarray::Array2;
 use residual::{confusable, nuisances, smooth_residual};
 
-use crate::diagnosis::{Diagnosis, FreePattern, Ranked, SetVerdict};
+use crate::diagnosis::{Diagnosis, FreePattern, Ranked};
 use crate::interval_parts::WidthParts;
 use crate::session::{Session, Simulations};
 use crate::statistics::Evidence;
@@ -35,9 +35,8 @@ pub(crate) fn write_page(
             session.set().path.display()
         ),
     );
-    let holds = matches!(diagnosis.verdict, SetVerdict::NoResidual | SetVerdict::Explained);
     page.verdict(
-        if holds { Verdict::Pass } else { Verdict::Fail },
+        Verdict::of(diagnosis.verdict.is_explained()),
         capitalised(&diagnosis.sentence()),
     );
     let error = &diagnosis.error;
@@ -54,6 +53,10 @@ pub(crate) fn write_page(
     page.paragraph(
         "Errors are reduced chi-square per pixel; noise alone gives 1. Held out: the measurement is predicted by a fit to measurements of other colours, elements or distances, and only registration, flux and black level are adjusted. Null test: held-out error with random smooth terms in place of effects.",
     );
+    if !diagnosis.warnings.is_empty() {
+        page.section("Frames");
+        page.list(&diagnosis.warnings);
+    }
     if let Some(share) = diagnosis.missing_by_speckle {
         page.paragraph(format!(
             "Pillars that are missing at random places make a speckle that no fit can predict. The variance of the speckle is known. It counts as noise in the errors after the fit. Speckle-based missing fraction: {} % of the pillars.",

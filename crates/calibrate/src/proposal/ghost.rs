@@ -141,7 +141,7 @@ pub(super) fn strongest(problem: &FitProblem<'_>, fit: &Fit, progress: &dyn Prog
         .map(|c| {
             let pixels = problem.prediction(&fit.theta, c).pixels(fit.nuisances.shift_um[c]);
             let residual = fit.nuisances.whitened(data, c, &pixels);
-            let dn = (data.scale[c] * fit.nuisances.flux[data.beam[c].led]) as f32;
+            let dn = fit.nuisances.dn(data, c) as f32;
             Frame::new(pixels.mapv(|v| v * dn), &data.weight[c], &residual)
         })
         .collect();

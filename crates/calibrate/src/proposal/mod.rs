@@ -19,6 +19,9 @@ pub use write_fields::{FieldBoundary, boundary_of_fields};
 /// A shape is proposed if it removes this share of the chi-square above noise: less is a part of something else.
 pub(crate) const WORTH_PROPOSING: f64 = 0.3;
 
+/// And if it changes the images by this share (rms) or more: no measurement distinguishes less from the error of the model.
+const LEAST_CHANGE: f64 = 1e-3;
+
 /// An effect that may explain what a finding leaves.
 #[derive(Clone, Debug)]
 pub struct Proposed {
@@ -59,7 +62,8 @@ pub fn propose(session: &Session<'_>, evidence: &Evidence, progress: &dyn Progre
         };
         found.extend(by_element::declared(&session.simulator, pattern).map(|effect| (removed, vec![of(effect)])));
     }
-    found.retain(|(removed, _)| *removed > WORTH_PROPOSING * above_noise);
+    let least = LEAST_CHANGE.powi(2) * problem.data.energy(&problem.used);
+    found.retain(|(removed, _)| *removed > (WORTH_PROPOSING * above_noise).max(least));
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let is_new = |p: &Proposed| session.simulator.effects.iter().all(|e| e.name() != p.effect.name);
     Ok(found.into_iter().flat_map(|(_, own)| own).filter(is_new).collect())

@@ -31,6 +31,8 @@ pub struct MeasuredSet {
     pub leds: PerLed<BenchLed>,
     pub elements: PerElement<MeasuredElement>,
     pub measurements: PerMeasurement<Measurement>,
+    /// True if `scale_dn` of each measurement is fitted: it is a nuisance of each.
+    pub free_scale: bool,
     /// Place of a boundary of write fields across x and across y, from the middle of every lens (um), if it is stated.
     pub field_boundary_um: Option<[f64; 2]>,
     /// Widths seen from above; empty where none were taken.
@@ -66,7 +68,15 @@ impl MeasuredSet {
         let elements = |set: &Self| -> Vec<_> {
             set.elements
                 .iter()
-                .map(|e| (e.index, e.centre_um, e.aperture_diameter_um, e.pillars.clone()))
+                .map(|e| {
+                    (
+                        e.index,
+                        e.centre_um,
+                        e.aperture_diameter_um,
+                        e.axis_um,
+                        e.pillars.clone(),
+                    )
+                })
                 .collect()
         };
         self.stack == other.stack
@@ -88,6 +98,11 @@ pub struct Stack {
 }
 
 impl Stack {
+    /// Diameter of the lenses (nm).
+    pub fn diameter_nm(&self) -> u32 {
+        (self.lens_diameter_um * 1e3).round() as u32
+    }
+
     /// True if it is the cell of the published polynomials, whatever its film was measured to be.
     pub fn is_of_the_paper(&self) -> bool {
         self.cell.is_of_the_paper()
@@ -121,6 +136,9 @@ pub struct MeasuredElement {
     pub index: [i64; 2],
     pub centre_um: [f64; 2],
     pub aperture_diameter_um: f64,
+    /// Centre of the element from the centre of the lattice of its pillars (um): zero, but where the layout has neither a site
+    /// nor the middle of four sites at the centre.
+    pub axis_um: [f64; 2],
     /// Pillars as the layout has them.
     pub pillars: PillarMap,
 }
@@ -129,6 +147,7 @@ impl MeasuredElement {
     /// The lattice site nearest to a place from the middle (um), row by row; none beyond the lattice.
     pub fn site_at(&self, at_um: [f64; 2]) -> Option<usize> {
         let lattice = self.pillars.lattice;
+        let at_um = [0, 1].map(|axis| at_um[axis] + self.axis_um[axis]);
         lattice.site_at(at_um).map(|[ix, iy]| iy * lattice.sites() + ix)
     }
 }
@@ -144,7 +163,7 @@ pub struct Measurement {
     pub aoi_rad: [f64; 2],
     /// Distance from the pillar tops to the sensor (um).
     pub distance_um: f64,
-    /// Middle of the window from the element's axis (um).
+    /// Middle of the window from the centre of the element's lattice (um).
     pub window_centre_um: [f64; 2],
     /// DN for |E|^2 / |E_inc|^2 = 1.
     pub scale_dn: f64,
@@ -174,5 +193,46 @@ mod tests {
         assert!(!set.same_plan(&stitched));
         moved.elements.iter_mut().for_each(|e| e.centre_um[0] += 100.0);
         assert!(!set.same_plan(&moved));
+    }
+
+    /// A lens whose axis is on a pillar, one whose axis is at no such place, and a wrong pitch.
+    #[test]
+    fn the_lattice_is_taken_from_the_layout() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = metalith_testing::session::small_set(folder.path());
+        let text = std::fs::read_to_string(&path).unwrap();
+        let read = |text: String| {
+            std::fs::write(&path, text).unwrap();
+            MeasuredSet::read(folder.path(), &GdsPillars, &Silent)
+        };
+        let usual = read(text.clone()).unwrap().elements[ElementIndex::from(0)].clone();
+        let first = "centre_um = [0.0, 0.0]";
+        let moved = |x: f64, y: f64| {
+            let set = read(text.replacen(first, &format!("centre_um = [{x:?}, {y:?}]"), 1)).unwrap();
+            let window = set.measurements[MeasurementIndex::from(0)].window_centre_um;
+            (set.elements[ElementIndex::from(0)].clone(), window)
+        };
+        let sites = usual.pillars.lattice.sites();
+        let (on_a_pillar, window) = moved(0.175, -0.175);
+        assert_eq!(
+            (on_a_pillar.pillars.lattice.sites(), on_a_pillar.axis_um),
+            (sites + 1, [0.0; 2])
+        );
+        assert_eq!(window, [0.0; 2]);
+        // As many but those beyond the lattice, which has as many places and is moved by half a pitch.
+        assert!(on_a_pillar.pillars.pillars() as f64 > 0.99 * usual.pillars.pillars() as f64);
+        let (beside, window) = moved(0.1, 0.0);
+        assert_eq!(beside.pillars.pillars(), usual.pillars.pillars());
+        let width = |e: &MeasuredElement, at| e.pillars.number.as_slice().unwrap()[e.site_at(at).unwrap()];
+        assert_eq!(width(&beside, [2.625, 0.175]), width(&usual, [2.725, 0.175]));
+        for (axis, off) in [0.1, 0.0].into_iter().enumerate() {
+            assert!((beside.axis_um[axis] - off).abs() < 1e-9 && (window[axis] - off).abs() < 1e-9);
+        }
+        let error = read(text.replace("pitch_nm = 350", "pitch_nm = 360"))
+            .unwrap_err()
+            .to_string();
+        for part in ["no pillars of element [0, 0]", "square of 350 nm"] {
+            assert!(error.contains(part), "{part} is not in:\n{error}");
+        }
     }
 }

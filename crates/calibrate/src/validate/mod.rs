@@ -18,7 +18,7 @@ pub use coverage::{ClaimedNumber, Coverage};
 pub use page::write_validation;
 pub use summary::{DetectionLimit, Validation};
 
-use crate::diagnosis::{Diagnosis, SetVerdict};
+use crate::diagnosis::Diagnosis;
 use crate::effects::Effect;
 use crate::session::{Session, Settings, check_effects};
 use crate::set::{MeasuredSet, MeasurementIndex};
@@ -26,6 +26,7 @@ use crate::smooth_residual::SmoothResidual;
 use crate::statistics::{Evidence, Measurements};
 use chips::{AppliedEffect, SyntheticChip};
 use journal::Journal;
+use metalith_attribution::SetVerdict;
 use metalith_core::{Progress, Result};
 use metalith_rcwa::Orders;
 use synthetic::{Synthesizer, SyntheticImages, UnlistedEffect};

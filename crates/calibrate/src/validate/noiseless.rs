@@ -2,8 +2,9 @@
 
 use super::chips::AppliedEffect;
 use super::{ClaimedNumber, ValidationTrial};
-use crate::diagnosis::{FoundEffect, SetVerdict};
+use crate::diagnosis::FoundEffect;
 use crate::session::{Session, Simulations};
+use metalith_attribution::SetVerdict;
 use metalith_core::{Progress, Result};
 
 impl ValidationTrial {

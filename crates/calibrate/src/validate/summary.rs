@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::chips::NOTHING;
 use super::{ClaimedNumber, Coverage, ValidationTrial};
-use crate::diagnosis::SetVerdict;
 use crate::statistics::LEAST_GAIN;
+use metalith_attribution::SetVerdict;
 use metalith_report::sig;
 
 /// The column that a set without a claim counts in.

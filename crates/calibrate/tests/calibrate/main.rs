@@ -4,5 +4,6 @@ mod bench;
 mod listed;
 mod recorded;
 mod set;
+mod spoiled;
 mod unlisted;
 mod validation;

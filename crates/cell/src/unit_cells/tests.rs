@@ -243,7 +243,7 @@ fn an_empty_first_column_is_not_filled_from_the_next() {
             format!("{w}\t{:.6}\t{:.6}\n", t.norm(), t.arg())
         });
         let rows: String = rows.collect();
-        format!("width (nm)\tabs(t)\tphase (rad)\n{}{rows}", first)
+        format!("width (nm)\tabs(t)\tphase (rad)\n{first}{rows}")
     };
     assert!(read(&text("")).is_ok());
     for empty in ["\t90\t0.5\t0.1\n", "\t0.5\t0.1\n"] {

@@ -113,6 +113,16 @@ impl PillarReader for GdsPillars {
         let found = extract(&file, &plan, progress)?;
         Ok(found.elements.into_iter().map(|e| e.widths).collect())
     }
+
+    fn elements(
+        &self,
+        layout: &Path,
+        layer: LayerNumber,
+        progress: &dyn Progress,
+    ) -> metalith_core::Result<Vec<ElementSite>> {
+        let file = Layout::open(layout)?;
+        Ok(sites_of(&file, &ExtractionPlan::discover(layer), progress)?.sites)
+    }
 }
 
 /// Read the pillars of every element out of a layout.

@@ -7,6 +7,7 @@ mod model;
 mod page;
 mod set;
 
+pub(crate) use model::CONDITIONAL;
 pub use model::HeightModel;
 pub(crate) use page::figures;
 pub use set::{HeightField, HeightSet};

@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 
-use metalith_attribution::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
+use metalith_attribution::{
+    ConditionalEffect, LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan,
+};
 use nalgebra::DMatrix;
 use ndarray::Array2;
 use num_complex::Complex;
@@ -473,6 +475,18 @@ impl RefitModel for HeightModel<'_> {
         figure > 0
     }
 }
+
+/// Effects that are tried on some sets only.
+pub(crate) const CONDITIONAL: [ConditionalEffect; 2] = [
+    ConditionalEffect {
+        name: "slope",
+        needs: "`each_field` of `[nuisances]` without `plane`",
+    },
+    ConditionalEffect {
+        name: "level_by_*",
+        needs: "the name in braces after `level_by_` as `by` of `[groups]`, with two groups or more",
+    },
+];
 
 fn effects(set: &HeightSet) -> (Vec<RefitParameter>, Vec<RefitEffect>) {
     let parameter = |name: &str, unit, neutral, start, range, shown| RefitParameter {

@@ -157,10 +157,17 @@ impl RefitModel for StackModel<'_> {
     }
 
     /// Objects without a mask judge an effect of the lens first.
-    fn group(&self, way: usize, group: usize) -> (String, usize) {
+    fn group_order(&self, way: usize, group: usize) -> usize {
         match self.set.objects.get(group).filter(|_| way == BY_OBJECT) {
-            Some(object) => (object.name.clone(), usize::from(object.transmission.is_some())),
-            None => (group.to_string(), group),
+            Some(object) => usize::from(object.transmission.is_some()),
+            None => group,
+        }
+    }
+
+    fn group_name(&self, way: usize, group: usize) -> String {
+        match self.set.objects.get(group).filter(|_| way == BY_OBJECT) {
+            Some(object) => object.name.clone(),
+            None => (group + 1).to_string(),
         }
     }
 

@@ -5,6 +5,7 @@ mod model;
 mod page;
 mod set;
 
+pub(crate) use model::CONDITIONAL;
 pub use model::SpectrumModel;
 pub(crate) use page::figures;
 pub use set::{Spectrum, SpectrumSet, StatedLayer};

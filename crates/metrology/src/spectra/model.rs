@@ -3,7 +3,9 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use metalith_attribution::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan};
+use metalith_attribution::{
+    ConditionalEffect, LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan,
+};
 use metalith_rcwa::Material;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -64,6 +66,29 @@ pub struct SpectrumModel<'a> {
     /// Reflectances of smooth films by first spectrum and values: repeats, and derivatives at one place, share them.
     smooth: Mutex<HashMap<StackKey, Arc<Vec<f64>>>>,
 }
+
+/// Condition of the effects of a film.
+const OF_A_FILM: &str = "a `[[layer]]` of this name with `material` and `thickness_nm`";
+
+/// Effects that are tried on some sets only.
+pub(crate) const CONDITIONAL: [ConditionalEffect; 4] = [
+    ConditionalEffect {
+        name: "*_thickness",
+        needs: OF_A_FILM,
+    },
+    ConditionalEffect {
+        name: "*_index_scale",
+        needs: OF_A_FILM,
+    },
+    ConditionalEffect {
+        name: "*_index_offset",
+        needs: OF_A_FILM,
+    },
+    ConditionalEffect {
+        name: "*_extinction_offset",
+        needs: OF_A_FILM,
+    },
+];
 
 impl<'a> SpectrumModel<'a> {
     /// A model of a set that was read.

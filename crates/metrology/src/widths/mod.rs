@@ -22,3 +22,4 @@ pub(crate) use calibrated::calibrated;
 pub use model::WidthModel;
 pub(crate) use page::figures;
 pub use set::{WidthSet, WidthSite};
+pub(crate) use terms::CONDITIONAL;

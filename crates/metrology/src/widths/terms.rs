@@ -1,6 +1,6 @@
 //! What is added to a drawn width: effects with their parameters, and what each is a factor of at a site.
 
-use metalith_attribution::{Extent, RefitEffect, RefitParameter};
+use metalith_attribution::{ConditionalEffect, Extent, RefitEffect, RefitParameter};
 use metalith_optics::{RANGE_UM, RANGES_UM};
 use nalgebra::{DMatrix, DVector};
 
@@ -111,6 +111,32 @@ impl Terms {
         linear.map(|slot| factors[slot] * theta[slot]).sum::<f64>() + theta.get(GROUPS + site.group).unwrap_or(&0.0)
     }
 }
+
+/// Effects that need more than drawn and measured widths.
+pub(crate) const CONDITIONAL: [ConditionalEffect; 9] = {
+    const PLACES: &str = "more than two places: columns `x_um` and `y_um`, or pads of `[fill] regions`";
+    const FIELDS: &str = "a section `[field]`, and places";
+    const fn of(name: &'static str, needs: &'static str) -> ConditionalEffect {
+        ConditionalEffect { name, needs }
+    }
+    [
+        of("dose_slope", "a column `dose` with three doses or more"),
+        of(
+            "proximity",
+            "a column `fill`, or a section `[fill]`, and places of different fill",
+        ),
+        of(
+            "loading",
+            "a column `open_area`, or a section `[fill]`, and places of different loading",
+        ),
+        of("width_*", "four drawn widths or more"),
+        of("orientation", "widths along x and along y, or a column `orientation`"),
+        of("chip_*", PLACES),
+        of("field_slope", FIELDS),
+        of("field_radial", FIELDS),
+        of("field_border", FIELDS),
+    ]
+};
 
 /// Parameters of all effects, and the effects that a set can tell of.
 pub(super) fn effects(set: &WidthSet, terms: &Terms) -> (Vec<RefitParameter>, Vec<RefitEffect>) {

@@ -4,7 +4,7 @@ use ndarray::Array2;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use crate::declared::CompiledTerm;
+use crate::declared::{CompiledTerm, DeclaredQuantity};
 use crate::expression::Input;
 
 /// A kernel is evaluated at so many places for each sample of an image, along each axis: the spot of a ghost may be much
@@ -23,6 +23,10 @@ impl KernelFilter {
     pub(super) fn new(terms: &[CompiledTerm], shape: [usize; 2], step_um: f64) -> Self {
         let mut spectrum = Array2::from_elem(shape.map(|n| 2 * n), Complex64::ONE);
         for term in terms {
+            if term.quantity == DeclaredQuantity::Transfer {
+                transfer_of(term, &mut spectrum, step_um);
+                continue;
+            }
             let own = spectrum_of(term, shape, step_um);
             spectrum.zip_mut_with(&own, |all, own| *all *= Complex64::ONE + own);
         }
@@ -38,6 +42,19 @@ impl KernelFilter {
         transform(&mut light, true);
         let scale = 1.0 / self.spectrum.len() as f64;
         image.indexed_iter_mut().for_each(|(at, v)| *v = light[at].re * scale);
+    }
+}
+
+/// Multiply a spectrum by a transfer factor. Images stay real: a frequency and its opposite have the mean of both factors.
+fn transfer_of(term: &CompiledTerm, spectrum: &mut Array2<Complex64>, step_um: f64) {
+    let (rows, cols) = spectrum.dim();
+    let frequency = |k: usize, n: usize| {
+        let signed = if k <= n / 2 { k as f64 } else { k as f64 - n as f64 };
+        signed / (n as f64 * step_um)
+    };
+    for ((ky, kx), v) in spectrum.indexed_iter_mut() {
+        let (fx, fy) = (frequency(kx, cols), frequency(ky, rows));
+        *v *= 0.5 * (term.value(&[fx, fy]) + term.value(&[-fx, -fy]));
     }
 }
 
@@ -189,5 +206,40 @@ mod tests {
             twice[[index(y), index(x)]]
         };
         assert!(at(3.0, 2.0) > 10.0 * at(-3.0, 2.0).abs().max(ROUNDING));
+    }
+
+    /// A Gaussian that vibrates along a direction at 30 degrees is as wide as before across it.
+    #[test]
+    fn a_transfer_blurs_along_one_direction() {
+        const BLUR_UM: f64 = 0.9;
+        const TOLERANCE: f64 = 1e-3;
+        let mut change = CameraChange::default();
+        change.declared.push(DeclaredTerm {
+            name: "vibration".into(),
+            quantity: DeclaredQuantity::Transfer,
+            expression: "exp(-2 * pi^2 * a * (fx * cos(b * pi / 180) + fy * sin(b * pi / 180))^2)".into(),
+            values: [("a".to_owned(), BLUR_UM * BLUR_UM), ("b".to_owned(), 30.0)].into(),
+        });
+        let mut image = gaussian(IMAGE_UM, [0.0; 2]);
+        let light = image.sum();
+        change.kernels(image.dim(), STEP_UM).unwrap().apply(&mut image);
+        assert!((image.sum() / light - 1.0).abs() < TOLERANCE);
+        let place = |i: usize| (i as f64 - 0.5 * (SAMPLES as f64 - 1.0)) * STEP_UM;
+        let variance = |angle: f64| {
+            let squares = image.indexed_iter().map(|((iy, ix), v)| {
+                let along = place(ix) * angle.cos() + place(iy) * angle.sin();
+                v * along * along
+            });
+            squares.sum::<f64>() / light
+        };
+        let along = std::f64::consts::FRAC_PI_6;
+        let across = along + std::f64::consts::FRAC_PI_2;
+        for (angle, expected) in [(along, IMAGE_UM.powi(2) + BLUR_UM.powi(2)), (across, IMAGE_UM.powi(2))] {
+            assert!(
+                (variance(angle) / expected - 1.0).abs() < TOLERANCE,
+                "{} {expected}",
+                variance(angle)
+            );
+        }
     }
 }

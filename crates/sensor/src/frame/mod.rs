@@ -2,12 +2,14 @@
 
 mod expected;
 mod merge_exposures;
+mod orientation;
 mod png;
 mod sensor;
 mod tiff;
 
 pub use expected::expected;
 pub use merge_exposures::{ExposedFrame, joined};
+pub use orientation::Orientation;
 pub use sensor::{DarkPixels, SensorFrame, SensorFrames, SensorPixels};
 
 use std::path::Path;
@@ -36,6 +38,8 @@ pub struct Recorded {
     pub pages: u32,
     /// True if the file holds whole numbers alone.
     whole: bool,
+    /// Largest power of two that divides all its values; one for values that are no whole numbers.
+    pub step_dn: u32,
 }
 
 impl Recorded {
@@ -49,6 +53,22 @@ impl Recorded {
         }
     }
 }
+
+/// Largest power of two that divides every value of these frames; one where values are no whole numbers.
+/// A camera that writes 12 bits at the left of 16 has 16.
+fn step_of(values: &[Vec<f32>]) -> u32 {
+    let mut all = 0;
+    for v in values.iter().flatten() {
+        if v.fract() != 0.0 || *v < 0.0 || *v > MOST_SHIFTED {
+            return 1;
+        }
+        all |= *v as u32;
+    }
+    if all == 0 { 1 } else { 1 << all.trailing_zeros() }
+}
+
+/// Largest number of 16 bits.
+const MOST_SHIFTED: f32 = 65_535.0;
 
 /// Variance of a number that is rounded to whole ones.
 const OF_ROUNDING: f64 = 1.0 / 12.0;
@@ -85,7 +105,33 @@ pub fn read(path: &Path, rows: usize, cols: usize, saturation_dn: f64) -> Result
         dn: mean(&pages.values, rows, cols, saturation_dn)?,
         pages: pages.values.len() as u32,
         whole: pages.largest.is_some(),
+        step_dn: step_of(&pages.values),
     })
+}
+
+/// Rows and columns of the frames of a file.
+///
+/// # Errors
+/// What is wrong with the file, in words.
+pub fn size(path: &Path) -> Result<(usize, usize), String> {
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let file = || std::fs::File::open(path).map_err(|e| format!("it cannot be read: {e}"));
+    match ending.to_ascii_lowercase().as_str() {
+        "png" => png::size(file()?),
+        "tif" | "tiff" => tiff::size(file()?),
+        _ => {
+            let mut size = None;
+            // The shape is all that is wanted: no array is read.
+            let read = npy::read(path, |shape| {
+                size = match shape {
+                    [.., rows, cols] if shape.len() <= 3 => Some((*rows as usize, *cols as usize)),
+                    _ => None,
+                };
+                false
+            });
+            size.ok_or_else(|| read.err().map_or_else(String::new, |e| e.to_string()))
+        }
+    }
 }
 
 fn from_npy(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {

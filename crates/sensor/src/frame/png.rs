@@ -6,6 +6,13 @@ use std::path::Path;
 
 use super::{Pages, other_size};
 
+/// Rows and columns of a PNG.
+pub(crate) fn size(file: File) -> Result<(usize, usize), String> {
+    let reader = png::Decoder::new(BufReader::new(file)).read_info();
+    let reader = reader.map_err(|e| format!("it is no PNG file that can be read: {e}"))?;
+    Ok((reader.info().height as usize, reader.info().width as usize))
+}
+
 /// The values of a grey PNG of 8 or 16 bits.
 pub(crate) fn read(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
     let wrong = |e: png::DecodingError| format!("it is no PNG file that can be read: {e}");

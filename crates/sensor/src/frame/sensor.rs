@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, Zip};
 
-use super::saturated;
+use super::{Orientation, saturated};
 use crate::{Colour, ColourPixels, RelayCamera};
 
 /// A mean frame of the sensor by itself.
@@ -52,6 +52,8 @@ pub struct SensorFrames {
     pub flat: Option<SensorFrame>,
     /// True if the dark frame holds for exposures of any time.
     pub dark_of_any_exposure: bool,
+    /// Orientation of frames in their files.
+    pub orientation: Orientation,
 }
 
 impl SensorFrames {
@@ -236,6 +238,7 @@ pub(super) mod tests {
             dark: frame(dark),
             flat: frame(flat),
             dark_of_any_exposure: false,
+            orientation: Orientation::Upright,
         }
     }
 

@@ -9,6 +9,14 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 
 use super::{MOST_PIXELS, Pages, other_size};
 
+/// Rows and columns of the first page.
+pub(crate) fn size(file: File) -> Result<(usize, usize), String> {
+    let wrong = |e: tiff::TiffError| format!("it is no TIFF file that can be read: {e}");
+    let mut decoder = Decoder::new(BufReader::new(file)).map_err(wrong)?;
+    let (width, height) = decoder.dimensions().map_err(wrong)?;
+    Ok((height as usize, width as usize))
+}
+
 /// The values of each page: grey of 8 or 16 bits, or of 32 bits with a decimal point.
 pub(crate) fn read(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
     let wrong = |e: tiff::TiffError| format!("it is no TIFF file that can be read: {e}");

@@ -5,21 +5,21 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 
-use super::{DISTANCE_UM, WINDOW_CENTRE_UM, holds_its_pages, sensor_frame, whole};
+use super::{DISTANCE_UM, WINDOW_CENTRE_UM, holds_its_pages, recorded, sensor_frame, whole};
 use crate::set::{BenchLed, ElementIndex, LedIndex, MeasuredElement, Measurement, PerElement, PerLed, SemSite, sem};
 use metalith_core::document::{Limits, Section};
 use metalith_sensor::RelayCamera;
-use metalith_sensor::frame::{self, DarkPixels, ExposedFrame, SensorFrames};
+use metalith_sensor::frame::{self, DarkPixels, ExposedFrame, Orientation, SensorFrames};
 
 pub(super) fn measurements(
     root: &Section<'_, '_>,
-    camera: &RelayCamera,
+    (camera, free_scale): (&RelayCamera, bool),
     frames: &SensorFrames,
     leds: &PerLed<BenchLed>,
     elements: &PerElement<MeasuredElement>,
 ) -> Vec<Measurement> {
     let sensor = frames.pixels(camera);
-    let mut darks = DarkFrames::new(camera, frames);
+    let mut darks = DarkFrames::new((camera, free_scale), frames);
     let mut measurements = Vec::new();
     for s in root.sections("capture") {
         let index = whole(&s, "element", Limits::new(-1000.0..=1000.0, ""));
@@ -50,7 +50,9 @@ pub(super) fn measurements(
         );
         let aoi_deg: [f64; 2] = s.array("aoi_deg", Limits::new(-80.0..=80.0, "degrees"));
         let distance_um = s.float("distance_um", DISTANCE_UM);
-        let window_centre_um = s.array("window_centre_um", WINDOW_CENTRE_UM);
+        let window_centre_um: [f64; 2] = s.array("window_centre_um", WINDOW_CENTRE_UM);
+        let axis_um = elements.get(element).map_or([0.0; 2], |e| e.axis_um);
+        let window_centre_um = [0, 1].map(|axis| window_centre_um[axis] + axis_um[axis]);
         let filter = camera.filter.pixels_of(leds.get(led).and_then(|l| l.channel));
         let (path, exposures) = exposures(&s, led, &mut darks);
         s.finish();
@@ -83,6 +85,8 @@ const UNLIKE: f64 = 1.25;
 /// Dark frames of single exposures, and what that of the camera has served so far.
 struct DarkFrames<'a> {
     camera: &'a RelayCamera,
+    free_scale: bool,
+    orientation: Orientation,
     /// Frames that were read: one that several exposures name is one object.
     known: Vec<Arc<DarkPixels>>,
     /// True if there is one of the camera that is of one exposure.
@@ -92,9 +96,11 @@ struct DarkFrames<'a> {
 }
 
 impl<'a> DarkFrames<'a> {
-    fn new(camera: &'a RelayCamera, frames: &SensorFrames) -> Self {
+    fn new((camera, free_scale): (&'a RelayCamera, bool), frames: &SensorFrames) -> Self {
         Self {
             camera,
+            free_scale,
+            orientation: frames.orientation,
             known: Vec::new(),
             is_of_one: frames.dark.is_some() && !frames.dark_of_any_exposure,
             served: Vec::new(),
@@ -103,7 +109,7 @@ impl<'a> DarkFrames<'a> {
 
     /// The dark frame that a section names, if it names one.
     fn of(&mut self, s: &Section<'_, '_>) -> Option<Arc<DarkPixels>> {
-        let frame = sensor_frame(s, self.camera, "dark_frame", "dark_frames")?;
+        let frame = sensor_frame(s, (self.camera, self.orientation), "dark_frame", "dark_frames")?;
         let own = DarkPixels::new(&frame, self.camera);
         if let Some(known) = self.known.iter().find(|known| ***known == own) {
             return Some(Arc::clone(known));
@@ -142,14 +148,14 @@ impl<'a> DarkFrames<'a> {
 fn exposures(s: &Section<'_, '_>, led: LedIndex, darks: &mut DarkFrames<'_>) -> (PathBuf, Vec<ExposedFrame>) {
     let (of_measurement, is_named) = (darks.of(s), s.has("dark_frame"));
     if !s.has("exposure") {
-        let (path, only) = exposure(s, led, (of_measurement, is_named), darks);
+        let (path, only) = exposure(s, led, (of_measurement, is_named, false), darks);
         return (path, vec![only]);
     }
     let mut name = None;
     let mut all = Vec::new();
     for own in s.sections("exposure") {
         let dark = darks.of(&own).or_else(|| of_measurement.clone());
-        let (path, exposure) = exposure(&own, led, (dark, is_named || own.has("dark_frame")), darks);
+        let (path, exposure) = exposure(&own, led, (dark, is_named || own.has("dark_frame"), true), darks);
         own.finish();
         name.get_or_insert(path);
         all.push(exposure);
@@ -180,14 +186,19 @@ fn nothing(camera: &RelayCamera) -> ExposedFrame {
 fn exposure(
     s: &Section<'_, '_>,
     led: LedIndex,
-    (dark, is_named): (Option<Arc<DarkPixels>>, bool),
+    (dark, is_named, is_joined): (Option<Arc<DarkPixels>>, bool, bool),
     darks: &mut DarkFrames<'_>,
 ) -> (PathBuf, ExposedFrame) {
     let camera = darks.camera;
     let path = s.file("file");
-    let scale_dn = s.float("scale_dn", Limits::new(f64::MIN_POSITIVE..=1e12, "DN"));
+    let scale = Limits::new(f64::MIN_POSITIVE..=1e12, "DN");
+    let scale_dn = if darks.free_scale && !is_joined {
+        s.optional_float("scale_dn", scale).unwrap_or(1.0)
+    } else {
+        s.float("scale_dn", scale)
+    };
     let frames = s.integer("frames", 1..=1_000_000, "frames") as u32;
-    let recorded = frame::read(&path, camera.rows, camera.cols, camera.saturation_dn).map_err(|what| {
+    let recorded = recorded(&path, camera, darks.orientation).map_err(|what| {
         // A file that is not there has been named as such already.
         if path.is_file() {
             s.fault(

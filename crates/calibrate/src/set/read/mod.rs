@@ -6,14 +6,14 @@ mod measurements;
 use std::path::Path;
 
 use super::{BenchLed, MeasuredSet, PerElement, PerLed, Stack};
-use elements::elements;
+use elements::{LayoutPillars, elements};
 use measurements::{measurements, widths};
 use metalith_cell::{CellStack, Material, UniformLayer};
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{LayerNumber, Progress, Result};
-use metalith_pillars::{DatabaseUnit, ElementSite, LatticeKind, PillarReader, PillarShape};
+use metalith_pillars::{DatabaseUnit, LatticeKind, PillarReader, PillarShape};
 use metalith_rcwa::CellLattice;
-use metalith_sensor::frame::{self, Recorded, SensorFrame, SensorFrames};
+use metalith_sensor::frame::{self, Orientation, Recorded, SensorFrame, SensorFrames};
 use metalith_sensor::{Colour, ColourFilter, RelayCamera};
 use ndarray::Array2;
 
@@ -70,14 +70,22 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
 
     let (stack, is_known) = stack(&root.section("stack"), path.parent().unwrap_or(Path::new("")));
     let divergence_rad = source(&root.section("source"));
-    let (camera, frames) = camera(&root.section("camera"));
+    let bench = root.section("camera");
+    let free_scale = bench.choice("scale", &SCALE, Some(false));
+    let (camera, frames) = camera(&bench);
     let leds: PerLed<_> = leds(root, camera.filter, is_known.then_some(&stack.cell)).into();
     let layout = root.file("layout");
     let elements: PerElement<_> = {
-        let read = |sites: &[ElementSite]| layouts.pillars(&layout, pillar_layer, stack.cell.shape, sites, progress);
-        elements(root, &stack, &layout, &read).into()
+        let pillars = LayoutPillars {
+            reader: layouts,
+            file: &layout,
+            layer: pillar_layer,
+            shape: stack.cell.shape,
+            progress,
+        };
+        elements(root, &stack, &pillars).into()
     };
-    let measurements = measurements(root, &camera, &frames, &leds, &elements);
+    let measurements = measurements(root, (&camera, free_scale), &frames, &leds, &elements);
     let (sem, sem_offset_sigma_nm) = widths(root, &elements);
     let field_boundary_um = field_boundary(root);
     MeasuredSet {
@@ -90,6 +98,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, pro
         leds,
         elements,
         measurements: measurements.into(),
+        free_scale,
         field_boundary_um,
         sem,
         sem_offset_sigma_nm,
@@ -260,17 +269,60 @@ fn check_flat(s: &Section<'_, '_>, camera: &RelayCamera, frames: &SensorFrames) 
     }
 }
 
+/// True if the scale of each measurement is fitted.
+const SCALE: [(&str, bool); 2] = [("stated", false), ("free", true)];
+
 /// True if the dark frame of a camera is that of any exposure, by what it is said to hold for.
 const DARK_HOLDS_FOR: [(&str, bool); 2] = [("its_exposure", false), ("any_exposure", true)];
 
+/// Frames may be a power of two too bright by their bits alone if every value is a multiple of this, or more.
+const SHIFTED: u32 = 4;
+
+/// A file whose darkest pixel is this many times the black level has its bits at the left.
+const TOO_BRIGHT: f64 = 4.0;
+
+/// A frame of a camera, upright.
+///
+/// # Errors
+/// What is wrong with the file, in words.
+fn recorded(path: &Path, camera: &RelayCamera, orientation: Orientation) -> std::result::Result<Recorded, String> {
+    let (rows, cols) = if orientation.is_transposed() {
+        (camera.cols, camera.rows)
+    } else {
+        (camera.rows, camera.cols)
+    };
+    let mut recorded = frame::read(path, rows, cols, camera.saturation_dn)?;
+    let ends = recorded
+        .dn
+        .iter()
+        .fold((f32::MAX, 0f32), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (least, most) = (f64::from(ends.0), f64::from(ends.1));
+    let black = camera.black_level_dn;
+    if recorded.step_dn >= SHIFTED && (most > camera.saturation_dn || (black > 0.0 && least > TOO_BRIGHT * black)) {
+        return Err(format!(
+            "all its values are multiples of {step}, up to {most}, and `saturation_dn` is {}: its bits are at the left of 16; \
+             divide the values by {step}, or give black level, saturation and read noise times {step}, and `gain_e_per_dn` over \
+             {step}",
+            camera.saturation_dn,
+            step = recorded.step_dn
+        ));
+    }
+    recorded.dn = orientation.upright(&recorded.dn);
+    Ok(recorded)
+}
+
 /// A frame of the sensor by itself, and of how many it is the mean, by the keys of both; none where it is not named.
-fn sensor_frame(s: &Section<'_, '_>, camera: &RelayCamera, key: &str, count: &str) -> Option<SensorFrame> {
+fn sensor_frame(
+    s: &Section<'_, '_>,
+    (camera, orientation): (&RelayCamera, Orientation),
+    key: &str,
+    count: &str,
+) -> Option<SensorFrame> {
     if !s.has(key) {
         return None;
     }
     let (path, frames) = (s.file(key), s.integer(count, 1..=1_000_000, "frames") as u32);
-    let read = |path: &Path| frame::read(path, camera.rows, camera.cols, camera.saturation_dn);
-    let recorded = path.is_file().then(|| read(&path))?;
+    let recorded = path.is_file().then(|| recorded(&path, camera, orientation))?;
     let recorded = recorded.map_err(|what| s.fault(key, what, "give a frame as large as the captures"));
     let recorded = recorded.ok()?;
     holds_its_pages(s, count, &recorded, frames);
@@ -298,9 +350,12 @@ pub fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
             .unwrap_or(0.0),
         filter: s.choice("bayer", &ColourFilter::BAYER, Some(ColourFilter::None)),
     };
+    let orientation = s.choice("orientation", &Orientation::ALL, Some(Orientation::Upright));
+    let own = (&camera, orientation);
     let frames = SensorFrames {
-        dark: sensor_frame(s, &camera, "dark_frame", "dark_frames"),
-        flat: sensor_frame(s, &camera, "flat_frame", "flat_frames"),
+        orientation,
+        dark: sensor_frame(s, own, "dark_frame", "dark_frames"),
+        flat: sensor_frame(s, own, "flat_frame", "flat_frames"),
         dark_of_any_exposure: s.choice("dark_holds_for", &DARK_HOLDS_FOR, Some(false)),
     };
     check_flat(s, &camera, &frames);

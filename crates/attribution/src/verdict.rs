@@ -1,0 +1,59 @@
+//! Verdict on a set of measurements, whatever their kind.
+
+use serde::Serialize;
+
+/// How far effects explain the residual of a set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SetVerdict {
+    /// The measurements agree with what was stated, to within their noise: there is nothing to explain.
+    NoResidual,
+    /// The effects that were found explain the residual.
+    Explained,
+    /// They explain it but for a remainder below the error of the model.
+    ExplainedButFor,
+    /// One of a few effects that this set cannot distinguish.
+    OneOf,
+    /// The effects that were found explain a part of the residual.
+    Partly,
+    /// There is a residual that no known effect explains.
+    Unexplained,
+    /// More than half of the measurements cannot be used, or there is one alone.
+    DataUnfit,
+}
+
+impl SetVerdict {
+    /// True if there is something that no effect which was found explains, however little.
+    pub fn leaves_a_residual(self) -> bool {
+        matches!(self, Self::ExplainedButFor | Self::Partly | Self::Unexplained)
+    }
+
+    /// True if the model with the effects that were found predicts the set, to within its noise or the error of the model.
+    pub fn is_explained(self) -> bool {
+        matches!(
+            self,
+            Self::NoResidual | Self::Explained | Self::ExplainedButFor | Self::OneOf
+        )
+    }
+
+    /// True if the effects that were found make a model of the chip.
+    pub fn has_a_model(self) -> bool {
+        !matches!(self, Self::Unexplained | Self::DataUnfit)
+    }
+
+    /// One line for a person, with the effects in words and the remainder in words.
+    pub fn sentence(self, effects: &[String], remainder: &str) -> String {
+        let list = effects.join("; ");
+        match self {
+            Self::NoResidual => {
+                "nothing to explain: the measurements agree with what was stated, to within their noise".into()
+            }
+            Self::Explained => format!("explained by {list}"),
+            Self::ExplainedButFor => format!("explained by {list} but for {remainder}, below the error of the model"),
+            Self::OneOf => format!("one of these, which this set cannot distinguish: {list}"),
+            Self::Partly => format!("partly explained by {list}; {remainder} remains"),
+            Self::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
+            Self::DataUnfit => "data unfit: too few measurements can be used".into(),
+        }
+    }
+}

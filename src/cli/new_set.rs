@@ -1,0 +1,65 @@
+//! `metalith new-set`: a measured set begun from a layout and frames.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metalith::gds::LayerNumber;
+use metalith::{NewSet, Result, new_set};
+
+use super::psf::layer;
+use super::{Outcome, Terminal, print_line};
+
+/// Begin a measured set: write measurement.toml from a layout and a folder of frames.
+///
+/// Elements, pitch and lattice are taken from the layout; colour, distance, element, angle and exposure from the names of the frames,
+/// such as `e10_530nm_z336um_20ms.tif`. Keys that neither states are commented and marked `state this`.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  metalith new-set layout.gds captures/ --out session/measurement.toml\n\nWrites the file, and beside it a page of the frames with what was recognised."
+)]
+pub(crate) struct NewSetArgs {
+    /// The layout that was fabricated.
+    layout: PathBuf,
+
+    /// Frames (NPY, PNG, TIFF), or their folders.
+    #[arg(required = true)]
+    frames: Vec<PathBuf>,
+
+    /// The file to write. An existing file is never replaced.
+    #[arg(long, short, value_name = "FILE", default_value = "measurement.toml")]
+    out: PathBuf,
+
+    /// Layer of the pillars.
+    #[arg(long, default_value = "1/0", value_parser = layer)]
+    layer: LayerNumber,
+}
+
+pub(crate) fn run(args: &NewSetArgs, terminal: &Terminal) -> Result<Outcome> {
+    terminal.stop_on_interrupt();
+    let begun = new_set(&args.layout, args.layer, &args.frames, &args.out, terminal)?;
+    terminal.clear();
+    describe(&begun);
+    Ok(Outcome::Fine)
+}
+
+fn describe(begun: &NewSet) {
+    let head = ["frame"].into_iter().chain(NewSet::COLUMNS).map(String::from).collect();
+    let rows: Vec<Vec<String>> = std::iter::once(head)
+        .chain(begun.frames.iter().map(|f| {
+            let words = f.words().into_iter().map(|w| if w.is_empty() { "-".into() } else { w });
+            std::iter::once(f.name()).chain(words).collect()
+        }))
+        .collect();
+    let columns = rows[0].len();
+    let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    for row in &rows {
+        let cells = row.iter().zip(&widths).map(|(cell, width)| format!("{cell:width$}"));
+        print_line!("{}", cells.collect::<Vec<_>>().join("  ").trim_end());
+    }
+    print_line!("state these in {}:", begun.file.display());
+    for key in &begun.open {
+        print_line!("  {key}");
+    }
+    print_line!("{}", begun.page.display());
+}
