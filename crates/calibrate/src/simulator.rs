@@ -115,6 +115,9 @@ impl<'a> Simulator<'a> {
             }
         }
         // Cells first: they bring their own progress.
+        let changes = steps.iter().map(|step| &perturbations[step[0]].cell);
+        let changes = changes.flat_map(|change| [Some(change.in_the_middle()), change.at_the_rim()]);
+        self.cells.prepare(&changes.flatten().collect::<Vec<_>>(), progress)?;
         let mut work = Vec::new();
         for step in steps {
             let change = &perturbations[step[0]].cell;
