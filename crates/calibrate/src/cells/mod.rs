@@ -35,8 +35,14 @@ const COARSE: usize = 9;
 /// Number of orders for tapered walls, which take six layers and are close to upright ones.
 const LEANING: usize = 7;
 
+/// And for those of them that are near narrow resonances, which the stated cell does not correct.
+const LEANING_RESONANT: usize = 11;
+
 /// And for pillars with unequal sides, which only synthetic sets contain.
 const ANISOTROPIC: usize = 9;
+
+/// Name of the work on tables, in progress.
+pub(crate) const TABLE: &str = "cells as etched";
 
 /// Step of the tabulated widths (nm); resonances are a few nanometres wide.
 const STEP_NM: f64 = 2.0;
@@ -160,7 +166,12 @@ impl RigorousCells {
             None => self.cached(alike, coarse as f64, || Ok(solved.remove(0)))?,
         };
         let stacks: Vec<CellStack> = changes.iter().map(|change| perturbed(&self.stack, change)).collect();
-        let orders = Orders::new(self.fine)?;
+        let is_leaning = changes.iter().any(|change| change.taper_deg != 0.0);
+        let orders = Orders::new(if is_leaning {
+            LEANING_RESONANT.min(self.fine)
+        } else {
+            self.fine
+        })?;
         let rows = (0..self.wavelengths_nm.len()).into_par_iter().map(|l| {
             let each = solved
                 .iter()
@@ -186,6 +197,27 @@ impl RigorousCells {
             }
         });
         Ok(each.collect())
+    }
+
+    /// A table as this one of a changed cell, by the orders of changed pillars instead of the many of the stated cell: the ratio of both
+    /// is that of the stated cell. None where these orders are not fewer.
+    ///
+    /// # Errors
+    /// As [`RigorousCells::table`].
+    pub fn with_few_orders(&self, table: &PillarTable, progress: &dyn Progress) -> Result<Option<PillarTable>> {
+        if self.coarse >= self.fine {
+            return Ok(None);
+        }
+        let stated = CellChange::default();
+        let [many, few] = [self.fine, self.coarse].map(|orders| self.solved(&stated, orders, progress));
+        let (many, few) = (many?, few?);
+        let mut out = table.clone();
+        for (row, (many, few)) in out.t.iter_mut().zip(many.t.iter().zip(&few.t)) {
+            for (t, (many, few)) in row.iter_mut().zip(many.iter().zip(few)) {
+                *t += few - many;
+            }
+        }
+        Ok(Some(out))
     }
 
     /// Tables for light polarised along x and along y, of pillars that are `nm` wider along x and narrower
@@ -291,7 +323,7 @@ impl RigorousCells {
         let orders = Orders::new(orders)?;
         let stacks: Vec<CellStack> = changes.iter().map(|change| perturbed(&self.stack, change)).collect();
         let pillars: Vec<&CellStack> = stacks.iter().collect();
-        progress.begin("cells as etched", self.wavelengths_nm.len() as u64);
+        progress.begin(TABLE, self.wavelengths_nm.len() as u64);
         let rows: Vec<Vec<(Vec<Complex64>, Complex64)>> = self
             .wavelengths_nm
             .par_iter()
@@ -347,6 +379,9 @@ impl RigorousCells {
         hash.update(serde_json::to_vec(&self.stack).expect("plain data serialises"));
         if carried {
             hash.update((self.fine as u64).to_le_bytes());
+            if f64::from_bits(key[2]) != 0.0 {
+                hash.update((LEANING_RESONANT as u64).to_le_bytes());
+            }
         }
         let numbers = self
             .wavelengths_nm
