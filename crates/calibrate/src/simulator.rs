@@ -25,6 +25,10 @@ const OF_ORDERS: f64 = 0.5;
 const OF_WIDTHS: f64 = 1.0 / 15.0;
 const OF_WAVELENGTHS: f64 = 1.0 / 3.0;
 
+/// Distance by which the places of declared kernels are moved, and the share of the change: an edge may be anywhere between two.
+const HALF_A_PLACE: f64 = 0.5;
+const OF_PLACES: f64 = 0.5;
+
 /// A bench, its cells and the effects that are tried on it.
 pub struct Simulator<'a> {
     pub bench: Bench<'a>,
@@ -186,7 +190,7 @@ impl<'a> Simulator<'a> {
     }
 
     /// Predicted frames under a perturbation, and those by fewer orders, by a table of every second width, and by every second
-    /// wavelength, which follow from what is solved already. None of cells that are not rigorous, and of higher pillars at the rim.
+    /// wavelength, which follow from what is solved already; with declared kernels, those by other places of them. None of cells that are not rigorous, and of higher pillars at the rim.
     ///
     /// # Errors
     /// If a cell cannot be solved, or the user stopped it.
@@ -215,16 +219,25 @@ impl<'a> Simulator<'a> {
             scatter: None,
         };
         let (few, thin) = (Arc::new(few), Arc::new(fine.thinned()));
-        let parts = [(&few, 1, OF_ORDERS), (&thin, 1, OF_WIDTHS), (&fine, 2, OF_WAVELENGTHS)];
-        let all = std::iter::once(chip(&fine, 1)).chain(parts.iter().map(|(cells, every, _)| chip(cells, *every)));
-        let grids = |chip| -> Result<Vec<PixelGrid>> {
-            let light = self.bench.intensities(&[chip], &perturbation.path, progress)?;
-            Ok(self.bench.grids(&light[0][0], perturbation))
+        let parts = [
+            (&few, 1, 0.0, OF_ORDERS),
+            (&thin, 1, 0.0, OF_WIDTHS),
+            (&fine, 2, 0.0, OF_WAVELENGTHS),
+            (&fine, 1, HALF_A_PLACE, OF_PLACES),
+        ];
+        let kernels = usize::from(!perturbation.camera.declared.is_empty());
+        let parts = &parts[..parts.len() - 1 + kernels];
+        let grids = |cells, every, moved| -> Result<Vec<PixelGrid>> {
+            let light = self
+                .bench
+                .intensities(&[chip(cells, every)], &perturbation.path, progress)?;
+            Ok(self.bench.grids_with(&light[0][0], perturbation, moved))
         };
-        let mut all = all.map(grids).collect::<Result<Vec<_>>>()?.into_iter();
-        Ok(all.next().map(|fine| Coarser {
-            fine,
-            coarse: parts.iter().map(|(_, _, share)| *share).zip(all).collect(),
+        let coarse = parts.iter();
+        let coarse = coarse.map(|(cells, every, moved, share)| Ok((*share, grids(cells, *every, *moved)?)));
+        Ok(Some(Coarser {
+            coarse: coarse.collect::<Result<_>>()?,
+            fine: grids(&fine, 1, 0.0)?,
         }))
     }
 
