@@ -44,6 +44,14 @@ pub struct ModelError {
     pub by_effect: bool,
 }
 
+/// Predictions, and those of models that are sampled more coarsely.
+#[derive(Clone, Debug)]
+pub struct Coarser<P> {
+    pub fine: P,
+    /// Each with the share of its difference that the model may err by.
+    pub coarse: Vec<(f64, P)>,
+}
+
 /// Place at which a forward model is evaluated.
 #[derive(Clone, Debug)]
 pub struct ParameterPoint {
@@ -134,6 +142,24 @@ pub trait ForwardModel: Send + Sync {
     /// Largest error of the model: a claim must hold in spite of it.
     fn cautious_model_error(&self) -> ModelError {
         self.model_error()
+    }
+
+    /// True if a search has taken all the work that it may: it ends, and keeps the best that it found.
+    fn is_spent(&self) -> bool {
+        false
+    }
+
+    /// Predictions at some parameters, and the same with each part of the model sampled more coarsely, with the share of the
+    /// difference that the model itself may err by, as one standard deviation. None where no part can be sampled so.
+    ///
+    /// # Errors
+    /// If a simulation fails, or the user stopped it.
+    fn coarser(
+        &self,
+        _theta: &[f64],
+        _progress: &dyn Progress,
+    ) -> Result<Option<Coarser<PerMeasurement<Self::Prediction>>>> {
+        Ok(None)
     }
 
     /// Predictions of all measurements at each point, before nuisances.

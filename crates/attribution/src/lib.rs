@@ -44,7 +44,7 @@ pub use fit::{
     change_energy, cluster_groups, covariance, error_of_measurement, gain, half_widths, held_out, mean_error, minimise,
     null_gain, projected,
 };
-pub use forward_model::{ForwardModel, Model, ParameterPoint, SmoothGroups, SmoothTerm};
+pub use forward_model::{Coarser, ForwardModel, Model, ParameterPoint, SmoothGroups, SmoothTerm};
 pub use index::{MeasurementIndex, PerMeasurement};
 pub use linear_trend::LinearTrend;
 pub use measurements::{MeasurementEquations, Measurements, ReferenceValue, References, eliminate, own_step};

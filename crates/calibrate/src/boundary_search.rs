@@ -43,7 +43,7 @@ pub(crate) fn search_about_boundaries<T>(
     let (early, asked) = (RefCell::new(None), Cell::new(0));
     let ends = |now: &SearchState<'_>| -> Result<bool> {
         asked.set(asked.get() + 1);
-        if asked.get() > MOST_ASKED {
+        if asked.get() > MOST_ASKED || session.simulator.work.is_spent() {
             return Ok(false);
         }
         let boundary = boundary_of_fields(session, &now.problem, &now.fit, progress)?;
@@ -58,7 +58,9 @@ pub(crate) fn search_about_boundaries<T>(
     if let Some((at_um, found_so_far)) = early.take() {
         let set = with_boundary(session.set(), at_um);
         let (wider, simulations_there, own) = search(&set, (session, simulations), Some(&found_so_far), progress)?;
-        if boundary_found(&own.0, &set).is_some() && !own.0.verdict.leaves_a_residual() {
+        let explains = boundary_found(&own.0, &set).is_some() && !own.0.verdict.leaves_a_residual();
+        // Where no more may be simulated it is the best that there is.
+        if explains || wider.simulator.work.is_spent() {
             return conclude(&wider, &simulations_there, own);
         }
         // It does not explain all: what else may be is tried first.
@@ -84,7 +86,7 @@ fn about<T>(
     conclude: &Conclude<'_, T>,
     progress: &dyn Progress,
 ) -> Result<T> {
-    let Some(at_um) = place.filter(|_| rounds > 0) else {
+    let Some(at_um) = place.filter(|_| rounds > 0 && !session.simulator.work.is_spent()) else {
         return conclude(session, simulations, found);
     };
     let set = with_boundary(session.set(), at_um);
@@ -114,7 +116,8 @@ fn search<'s>(
     found: Option<&Surrogate>,
     progress: &dyn Progress,
 ) -> Result<(Session<'s>, Simulations, Found)> {
-    let session = Session::new(set, like.settings.clone())?;
+    let mut session = Session::new(set, like.settings.clone())?;
+    session.simulator.work = like.simulator.work.clone();
     let simulations = session.simulate_beyond((like, known), found, progress)?;
     let found = session.diagnose(&simulations, progress)?;
     Ok((session, simulations, found))
@@ -147,7 +150,8 @@ fn late_boundary(
     (diagnosis, evidence): &Found,
     progress: &dyn Progress,
 ) -> Result<Option<[f64; 2]>> {
-    let Some(evidence) = evidence.as_ref().filter(|_| diagnosis.verdict.leaves_a_residual()) else {
+    let is_open = diagnosis.verdict.leaves_a_residual() && !session.simulator.work.is_spent();
+    let Some(evidence) = evidence.as_ref().filter(|_| is_open) else {
         return Ok(None);
     };
     let problem = evidence.problem(&session.simulator);

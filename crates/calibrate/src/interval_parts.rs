@@ -15,6 +15,8 @@ pub struct WidthParts {
     pub change: f64,
     /// Known error of values of this effect.
     pub value: f64,
+    /// Orders of cells, samples of spectra and steps of tables, which are finite.
+    pub sampling: f64,
     /// How far another estimate of the same number is, where there is one: no half-width is less.
     pub least: f64,
 }
@@ -36,6 +38,7 @@ impl WidthParts {
             model: vec![self.cell_amplitude, self.cell_phase],
             change: self.change,
             value: self.value,
+            sampling: self.sampling,
             least: self.least,
         }
     }
@@ -46,6 +49,7 @@ impl WidthParts {
         let each = |pick: fn(&Self) -> f64| of(&parts.iter().map(pick).collect::<Vec<_>>());
         let (noise, amplitude, phase) = (each(|p| p.noise), each(|p| p.cell_amplitude), each(|p| p.cell_phase));
         let (change, value, least) = (each(|p| p.change), each(|p| p.value), each(|p| p.least));
+        let sampling = each(|p| p.sampling);
         (0..noise.len())
             .map(|k| Self {
                 noise: noise[k],
@@ -53,6 +57,7 @@ impl WidthParts {
                 cell_phase: phase[k],
                 change: change[k],
                 value: value[k],
+                sampling: sampling[k],
                 least: least[k],
             })
             .collect()
@@ -68,6 +73,7 @@ impl From<&IntervalParts> for WidthParts {
             cell_phase: of_cell(1),
             change: parts.change,
             value: parts.value,
+            sampling: parts.sampling,
             least: parts.least,
         }
     }
@@ -85,6 +91,7 @@ mod tests {
             cell_phase: 4.0,
             change: 6.0,
             value: 8.0,
+            sampling: 0.0,
             least: 0.5,
         };
         assert_eq!(parts.half_width(), 11.0);

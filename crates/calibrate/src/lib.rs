@@ -8,12 +8,12 @@
 //! | --- | --- | --- |
 //! | `set` | the measured set and its files | |
 //! | `effects` | what chips and benches are known to do to light | `set` |
-//! | `bench`, `cells`, `optics`, `simulator` | the simulated bench | `set`, `effects` |
+//! | `bench`, `cells`, `optics`, `simulator`, `search_work` | the simulated bench, and the bound of a search | `set`, `effects` |
 //! | `data`, `screening`, `speckle`, `grouping` | measurements, nuisances and noise as `metalith-attribution` needs them | `bench` |
 //! | `simulator_model`, `smooth_shape`, `cell_error` | the simulated bench as its forward model | `data` |
 //! | `statistics` | the types of `metalith-attribution` for these measurements | `data` |
 //! | `proposal` | effects for the residual | `statistics`, `session` |
-//! | `session`, `diagnosis`, `boundary_search`, `page`, `run` | a set from its files to its answer | all above |
+//! | `session`, `diagnosis`, `boundary_search`, `page`, `run`, `whole_progress` | a set from its files to its answer | all above |
 //! | `validate` | the calibration judged on synthetic sets | all above |
 
 mod bench;
@@ -31,6 +31,7 @@ mod page;
 mod proposal;
 mod run;
 mod screening;
+mod search_work;
 mod session;
 mod set;
 mod simulator;
@@ -40,6 +41,7 @@ mod smooth_shape;
 mod speckle;
 mod statistics;
 mod validate;
+mod whole_progress;
 
 pub use bench::{Bench, BenchSampling};
 pub use cells::{CellSource, RigorousCells};
@@ -54,6 +56,7 @@ pub use interval_parts::WidthParts;
 pub use metalith_attribution::{RENAMED as RENAMED_EFFECTS, SetVerdict};
 pub use proposal::{FieldBoundary, Proposed, boundary_of_fields, propose};
 pub use run::{Calibration, calibrate};
+pub use search_work::{MOST_SIMULATIONS, SearchWork};
 pub use session::{Screening, Session, Settings, Simulations, check_effects};
 pub use set::SEM_COLUMNS;
 pub use set::read as set_format;

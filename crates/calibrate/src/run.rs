@@ -10,6 +10,7 @@ use crate::proposal::{Proposed, propose};
 use crate::session::{Session, Settings, Simulations, check_effects};
 use crate::set::MeasuredSet;
 use crate::statistics::{Evidence, LEAST_GAIN};
+use crate::whole_progress::WholeProgress;
 use metalith_core::{AtomicFile, FolderLock, Progress, Result};
 use metalith_optics::CalibratedModel;
 use metalith_pillars::PillarReader;
@@ -43,11 +44,11 @@ pub fn calibrate(
     outs: &[PathBuf],
     settings: &Settings,
     layouts: &dyn PillarReader,
-    progress: &dyn Progress,
+    outer: &dyn Progress,
 ) -> Result<Vec<Calibration>> {
     let sets = paths
         .iter()
-        .map(|p| MeasuredSet::read(p, layouts, progress))
+        .map(|p| MeasuredSet::read(p, layouts, outer))
         .collect::<Result<Vec<_>>>()?;
     for set in &sets {
         check_effects(&effects::with_declared(set, &settings.declared)?, &settings.only)?;
@@ -56,11 +57,14 @@ pub fn calibrate(
     let mut done = Vec::new();
     for (place, (set, out)) in sets.iter().zip(outs).enumerate() {
         let session = Session::new(set, settings.clone())?;
+        let (simulations, tables) = session.planned();
+        let progress = &WholeProgress::new(outer, simulations + IN_A_SEARCH, tables);
         let shared = known.take().filter(|(other, _)| sets[*other].same_plan(set));
         let (other, simulations) = match shared {
             Some(known) => known,
             None => (place, session.simulate(progress)?),
         };
+        session.simulator.work.restart();
         let conclude = |session: &Session<'_>, simulations: &Simulations, found| {
             conclude(session, simulations, found, out, progress)
         };
@@ -69,6 +73,9 @@ pub fn calibrate(
     }
     Ok(done)
 }
+
+/// Simulations of a search that finds an effect or two, about: for the progress alone.
+const IN_A_SEARCH: usize = 100;
 
 /// Rounds in which the residual is searched for further effects where these are adopted: a strong one hides a weak one.
 const ADOPTIONS: usize = 2;
@@ -105,7 +112,7 @@ fn conclude(
         }
         let effects: Vec<DeclaredEffect> = next.iter().map(|p| p.effect.clone()).collect();
         proposed.extend(next);
-        if !session.settings.adopt {
+        if !session.settings.adopt || session.simulator.work.is_spent() {
             break;
         }
         let wider = session.adopting(effects)?;

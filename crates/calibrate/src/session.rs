@@ -10,14 +10,17 @@ use crate::bench::{Bench, BenchSampling};
 use crate::cells::{CellSource, RigorousCells};
 use crate::data::Data;
 use crate::diagnosis::Diagnosis;
-use crate::effects::{self, DeclaredEffect, Effect};
+use crate::effects::{self, DeclaredEffect, Effect, Stage};
 use crate::fidelity::compare_fidelities;
 use crate::interval_parts::WidthParts;
 use crate::screening::{UnusableMeasurement, recognise, unusable_measurements};
 use crate::set::{MeasuredSet, PerMeasurement};
 use crate::simulator::{Simulator, WIDTH_ROOM_NM};
 use crate::speckle::DefectNoise;
-use crate::statistics::{EndsSearch, Evidence, Fit, FitProblem, Surrogate, attribute_set, fit_of, half_widths};
+use crate::statistics::{EndsSearch, Evidence, Fit, FitProblem, Slot, Surrogate, attribute_set, fit_of, half_widths};
+
+/// Values at which a parameter is simulated before a search, about.
+const NODES_OF_PARAMETER: usize = 4;
 
 /// Settings of the work on a set.
 #[derive(Clone, Debug)]
@@ -120,7 +123,20 @@ impl<'a> Session<'a> {
             settings.only.extend(proposed.iter().map(|e| e.name.clone()));
         }
         settings.declared.extend(proposed);
-        Self::new(self.set(), settings)
+        let mut wider = Self::new(self.set(), settings)?;
+        wider.simulator.work = self.simulator.work.clone();
+        Ok(wider)
+    }
+
+    /// Number of simulations that a search about all effects is begun with, and of tables of cells.
+    pub fn planned(&self) -> (usize, usize) {
+        let slots = &self.simulator.slots;
+        let changes_cells = |slot: &&Slot| self.simulator.effects[slot.effect].stage() == Stage::Stack;
+        let nodes = NODES_OF_PARAMETER;
+        (
+            nodes * slots.len(),
+            2 + nodes * slots.iter().filter(changes_cells).count(),
+        )
     }
 
     /// The set.

@@ -8,7 +8,7 @@ use crate::optics::PixelGrid;
 use crate::set::PerMeasurement;
 use crate::simulator::Simulator;
 use crate::smooth_shape::{SmoothShape, TRANSMISSION_TERMS};
-use crate::statistics::{ForwardModel, ModelError, ParameterPoint, Slot, SmoothGroups, SmoothTerm};
+use crate::statistics::{Coarser, ForwardModel, ModelError, ParameterPoint, Slot, SmoothGroups, SmoothTerm};
 use metalith_optics::{Perturbation, zernike};
 
 /// Cells are solved at multiples of this share of a typical size; the surrogate covers the difference.
@@ -127,6 +127,18 @@ impl ForwardModel for Simulator<'_> {
 
     fn cautious_model_error(&self) -> ModelError {
         CellError::CAUTIOUS.of_model()
+    }
+
+    fn is_spent(&self) -> bool {
+        self.work.is_spent()
+    }
+
+    fn coarser(&self, theta: &[f64], progress: &dyn Progress) -> Result<Option<Coarser<PerMeasurement<PixelGrid>>>> {
+        let found = self.expose_coarser(&self.perturbation(theta), progress)?;
+        Ok(found.map(|Coarser { fine, coarse }| Coarser {
+            fine: fine.into(),
+            coarse: coarse.into_iter().map(|(share, own)| (share, own.into())).collect(),
+        }))
     }
 
     fn predictions(

@@ -1,7 +1,7 @@
 //! The statistics of attribution, of the measurements of a set.
 
 pub(crate) use metalith_attribution::{
-    EXPLAINED, ForwardModel, HeldOutErrors, IntervalParts, LEAST_GAIN, LinearTrend, Measurements, ModelError,
+    Coarser, EXPLAINED, ForwardModel, HeldOutErrors, IntervalParts, LEAST_GAIN, LinearTrend, Measurements, ModelError,
     ParameterPoint, Pattern, Rejection, SIGMAS_95, Slot, SmoothGroups, SmoothTerm, TriedEffect, attribute_set,
     cluster_groups, cosines, covariance, error_of_measurement, fit_of, half_widths, held_out, may_leave, mean_error,
     minimise,

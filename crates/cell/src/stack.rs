@@ -9,6 +9,7 @@ use metalith_core::{Error, Result};
 use metalith_pillars::{OutlineForm, PillarShape};
 use metalith_rcwa::{
     CellLattice, Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve, solve_each, transmit,
+    transmit_each,
 };
 
 /// A pillar on its substrate, as etched: everything that decides its transmission but its width.
@@ -176,6 +177,20 @@ impl CellStack {
             Side::Below,
             orders,
         )?)
+    }
+
+    /// [`CellStack::transmission`] of pillars of several stacks, each of its own width (nm): the modes of layers that they have in
+    /// common are found once.
+    ///
+    /// # Errors
+    /// As [`CellStack::transmission`], the first in order.
+    pub fn transmission_each(pillars: &[(&Self, f64)], wavelength_um: f64, orders: Orders) -> Result<Vec<Complex64>> {
+        let of = |(stack, width_nm): &(&Self, f64)| {
+            Self::check_width(*width_nm)?;
+            stack.layers(*width_nm, wavelength_um)
+        };
+        let stacks = pillars.iter().map(of).collect::<Result<Vec<_>>>()?;
+        Ok(transmit_each(&stacks, wavelength_um, Side::Below, orders)?)
     }
 
     /// [`CellStack::transmission`] of a pillar at several heights (nm): most of the work is done once. The mean of both

@@ -17,9 +17,15 @@ use metalith_wave::Psf;
 impl CameraChange {
     /// Filter of the declared kernels for images of `rows` x `cols` samples `step_um` apart; `None` where none is
     /// declared.
-    pub fn kernels(&self, (rows, cols): (usize, usize), step_um: f64) -> Option<KernelFilter> {
+    pub fn kernels(&self, shape: (usize, usize), step_um: f64) -> Option<KernelFilter> {
+        self.kernels_on_places(shape, step_um, 0.0)
+    }
+
+    /// The same with the places at which kernels are evaluated moved by `moved` of the distance between two: what this changes, they
+    /// do not resolve.
+    pub fn kernels_on_places(&self, (rows, cols): (usize, usize), step_um: f64, moved: f64) -> Option<KernelFilter> {
         let terms = compiled(&self.declared, |_| true);
-        (!terms.is_empty()).then(|| KernelFilter::new(&terms, [rows, cols], step_um))
+        (!terms.is_empty()).then(|| KernelFilter::new(&terms, [rows, cols], step_um, moved))
     }
 
     /// Blur a PSF and spread the stray share of its light evenly over its window. The energy in the window stays.

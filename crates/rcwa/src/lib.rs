@@ -224,6 +224,29 @@ fn solve_once(
 /// # Errors
 /// As [`solve`]; also if a pillar tells x from y.
 pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orders) -> Result<Complex64> {
+    transmit_with(stack, wavelength_um, side, orders, &mut KnownModes::default())
+}
+
+/// The transmissions of several stacks. Those that have layers in common, whatever their heights, have the modes of these in common,
+/// which are most of the work; the answers are those of [`transmit`].
+///
+/// # Errors
+/// As [`transmit`].
+pub fn transmit_each(stacks: &[LayerStack], wavelength_um: f64, side: Side, orders: Orders) -> Result<Vec<Complex64>> {
+    let layers = stacks.iter().map(|stack| stack.layers.len()).max();
+    let mut known = KnownModes::of_layers(layers.unwrap_or(0));
+    let each = stacks.iter();
+    each.map(|stack| transmit_with(stack, wavelength_um, side, orders, &mut known))
+        .collect()
+}
+
+fn transmit_with(
+    stack: &LayerStack,
+    wavelength_um: f64,
+    side: Side,
+    orders: Orders,
+    known: &mut KnownModes,
+) -> Result<Complex64> {
     stack.check()?;
     let polarisations = match stack.lattice {
         CellLattice::Square if !stack.is_square() => return Err(Error::Polarising),
@@ -233,11 +256,11 @@ pub fn transmit(stack: &LayerStack, wavelength_um: f64, side: Side, orders: Orde
     };
     off_cutoff(wavelength_um, |wavelength_um| {
         let problem = Problem::new(stack, &Incidence::normal(wavelength_um, side), orders)?;
-        let along = |axis: usize| -> Result<Complex64> {
+        let mut along = |axis: usize| -> Result<Complex64> {
             let space = [Space::Even, Space::Odd][axis];
             let mut arriving = [Complex64::ZERO; 2];
             arriving[axis] = Complex64::ONE;
-            let part = problem.part(Family::Product(space, space), &[arriving], &mut KnownModes::default())?;
+            let part = problem.part(Family::Product(space, space), &[arriving], known)?;
             response::finite(part.amplitude(&part.ends.transmitted, 0, 0, 0)[axis])
         };
         match polarisations {

@@ -5,12 +5,14 @@
 //! two effects of it that almost cancel. The difference is therefore added to the intervals: the smooth terms of the model,
 //! each kind with its own standard deviation, are propagated through the fit; and a share of what was found.
 
+use metalith_core::{Progress, Result};
 use nalgebra::DVector;
 
 use super::normal_equations::{SIGMAS_95, covariance, projected};
 use super::problem::{Fit, FitProblem};
 use crate::effect::Slot;
-use crate::forward_model::ModelError;
+use crate::forward_model::{Coarser, ModelError};
+use crate::index::PerMeasurement;
 use crate::measurements::Measurements;
 
 /// Parts of a 95 % half-width: its size by each cause alone.
@@ -24,6 +26,8 @@ pub struct IntervalParts {
     pub change: f64,
     /// Known error of values of this effect.
     pub value: f64,
+    /// Finite samples of the model: orders of a cell, samples of a spectrum, steps of a table.
+    pub sampling: f64,
     /// How far another estimate of the same number is, where there is one: no half-width is less.
     pub least: f64,
 }
@@ -37,7 +41,11 @@ impl IntervalParts {
 
     /// Error of the model.
     pub fn of_model(&self) -> f64 {
-        let all = self.model.iter().copied().chain([self.change, self.value]);
+        let all = self
+            .model
+            .iter()
+            .copied()
+            .chain([self.change, self.value, self.sampling]);
         all.fold(0.0, f64::hypot)
     }
 
@@ -61,6 +69,7 @@ impl IntervalParts {
             model: self.model.iter().map(|own| share * own).collect(),
             change: share * self.change,
             value: share * self.value,
+            sampling: share * self.sampling,
             least: self.least.min(most),
         }
     }
@@ -149,6 +158,36 @@ pub(crate) fn model_half_widths<M: Measurements>(
         .collect()
 }
 
+/// Part of 95 % half-widths that the finite samples of the model give each active parameter of a fit: what the fit would make of
+/// the difference to coarser samples, times the share of it that is left with those of the model. None where these are not known.
+///
+/// # Errors
+/// As [`ForwardModel::coarser`](crate::ForwardModel::coarser).
+pub(crate) fn sampling_half_widths<M: Measurements>(
+    problem: &FitProblem<'_, M>,
+    fit: &Fit<M>,
+    progress: &dyn Progress,
+) -> Result<Option<Vec<f64>>> {
+    if fit.active.is_empty() {
+        return Ok(None);
+    }
+    let Some(Coarser { fine, coarse }) = problem.model.coarser(&fit.theta, progress)? else {
+        return Ok(None);
+    };
+    let equations = problem.equations_with(fit, |c, _| {
+        let change = |(share, to): &(f64, PerMeasurement<M::Prediction>)| {
+            M::combine(&[(&to[c], *share as f32), (&fine[c], -*share as f32)])
+        };
+        coarse.iter().map(change).collect()
+    });
+    let form = problem.total(&equations, &fit.nuisances);
+    let (shared, first) = (problem.shared(), form.nrows() - 1 - coarse.len());
+    let inverse = covariance(&form, &(0..first).collect::<Vec<_>>());
+    let taken = inverse * form.view((0, first), (first, coarse.len()));
+    let width = |k| SIGMAS_95 * taken.row(shared + k).norm();
+    Ok(Some((0..fit.active.len()).map(width).collect()))
+}
+
 /// Least energy of a unit of a term, as a share of the noise of one point, that shows at all.
 const VISIBLE: f64 = 1e-6;
 
@@ -231,6 +270,7 @@ mod tests {
             model: vec![2.0, 4.0],
             change: 6.0,
             value: 8.0,
+            sampling: 0.0,
             least: 0.5,
         };
         assert_eq!(parts.half_width(), 11.0);

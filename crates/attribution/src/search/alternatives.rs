@@ -14,8 +14,8 @@ pub const REFERENCES_DECIDE: f64 = 9.0;
 /// Errors on measurements left out that differ by more than this are not equal, however wide the interval.
 const ALIKE_WITHIN: f64 = 0.02;
 
-/// An explanation that leaves so much more on the surrogate, relative to what the best removes, is not refined
-/// for the comparison.
+/// An explanation that leaves so much more on the surrogate, relative to what the effect removes in whose place it is, is not
+/// refined for the comparison.
 const WORTH_REFINING: f64 = 0.1;
 
 /// Another effect that explains as much.
@@ -83,13 +83,16 @@ pub(crate) fn alternatives<M: Measurements>(
         } else {
             runners_up.get(place)
         };
-        let far = mean_error(before) - now.error();
+        let far = error_without(now, chosen, place, before) - now.error();
         let mut best = Substitute {
             effect: chosen[place],
             state: now.clone(),
         };
         let mut others = Vec::new();
         for &other in runners_up.into_iter().flatten().filter(|o| !chosen.contains(o)) {
+            if now.problem.model.is_spent() {
+                break;
+            }
             let mut set = chosen.to_vec();
             set[place] = other;
             let mut substitute = Substitute::new(now, chosen[place], other, &set);
@@ -113,6 +116,21 @@ pub(crate) fn alternatives<M: Measurements>(
         *now = best.state;
     }
     Ok(out)
+}
+
+/// The error on measurements left out without the effect at `place`; `before` is that without any.
+fn error_without<M: Measurements>(
+    now: &SearchState<'_, M>,
+    chosen: &[usize],
+    place: usize,
+    before: &HeldOutErrors,
+) -> f64 {
+    let rest: Vec<usize> = chosen.iter().copied().filter(|&e| e != chosen[place]).collect();
+    if rest.is_empty() {
+        return mean_error(before);
+    }
+    let fit = refit(now, chosen[place], &rest);
+    mean_error(&held_out(&now.problem, &fit.equations, &fit)).min(mean_error(before))
 }
 
 /// The fit of a set of effects after one was `removed`.

@@ -10,7 +10,7 @@ use super::recentred_leaders::follow_leaders_anew;
 use super::residual::LEAST_GAIN;
 use super::state::{EndsSearch, MORE_IS_LEFT, SearchState};
 use super::stepwise::{Rejection, TriedEffect, step_forward};
-use crate::fit::{Fit, FitProblem, HeldOutErrors, IntervalParts, half_widths, mean_error};
+use crate::fit::{Fit, FitProblem, HeldOutErrors, IntervalParts, half_widths, mean_error, sampling_half_widths};
 use crate::index::PerMeasurement;
 use crate::measurements::Measurements;
 use crate::surrogate::Surrogate;
@@ -157,7 +157,13 @@ pub(crate) fn attribute<M: Measurements>(
         let (runners_up, before) = (&history.runners_up, &history.held_before);
         alternatives(&mut now, &mut history.chosen, runners_up, before, full, progress)?
     };
-    let widths = half_widths(&now.problem, &now.fit);
+    let mut widths = half_widths(&now.problem, &now.fit);
+    if full && let Some(sampling) = sampling_half_widths(&now.problem, &now.fit, progress)? {
+        widths
+            .iter_mut()
+            .zip(sampling)
+            .for_each(|(own, width)| own.sampling = width);
+    }
     Ok(Finding {
         chosen: history.chosen,
         alternatives,
@@ -183,7 +189,7 @@ fn add_effects<M: Measurements>(
     ends: Option<&EndsSearch<'_, M>>,
     progress: &dyn Progress,
 ) -> Result<bool> {
-    while history.chosen.len() < MOST_EFFECTS {
+    while history.chosen.len() < MOST_EFFECTS && !now.problem.model.is_spent() {
         let step = step_forward(now, &history.chosen, full, progress)?;
         let explained = step
             .taken
@@ -237,7 +243,7 @@ fn add_effects<M: Measurements>(
             }
         }
         let awake = history.chosen.last().is_some_and(|&e| now.problem.model.dormant(e));
-        if full && (awake || now.leaves_more_than(MORE_IS_LEFT)) {
+        if full && !now.problem.model.is_spent() && (awake || now.leaves_more_than(MORE_IS_LEFT)) {
             // Between what was simulated and what was found, polynomials err; what dormant parameters change depends on the others.
             now.settle(progress)?;
             if now.leaves_more_than(MORE_IS_LEFT) {
@@ -262,7 +268,8 @@ fn try_pairs_from_start<'a, M: Measurements>(
     progress: &dyn Progress,
 ) -> Result<()> {
     // Where no pair was found from the start, or all that was found stands on it, none takes its place.
-    if history.chosen.is_empty() || history.pairs_tried_from_start || !now.leaves_more_than(LEAST_LEFT) {
+    let is_spent = start.problem.model.is_spent();
+    if history.chosen.is_empty() || is_spent || history.pairs_tried_from_start || !now.leaves_more_than(LEAST_LEFT) {
         return Ok(());
     }
     if let Some(found) = find_pair(start, &[], full, progress)?

@@ -139,7 +139,7 @@ fn attribute_with_noise<M: Measurements>(
     }
     let mut data = noise.added_to(&of_plain, &fit, amount);
     for _ in 0..ROUNDS {
-        if !noise.is_estimate(amount) {
+        if !noise.is_estimate(amount) || model.is_spent() {
             break;
         }
         let with_noise = FitProblem {

@@ -58,6 +58,9 @@ pub(crate) fn find_exchange<'a, M: Measurements>(
         .flat_map(|(place, a)| a.iter().map(move |t| (place, t)));
     let mut best: Option<Exchange<'a, M>> = None;
     for (place, other) in others.filter(|(_, t)| !chosen.contains(&t.effect)).take(FOLLOWED) {
+        if now.problem.model.is_spent() {
+            break;
+        }
         let mut set = chosen.to_vec();
         set[place] = other.effect;
         let mut state = replaced(now, chosen[place], other, &set, full, progress)?;

@@ -71,6 +71,9 @@ pub(crate) fn find_pair<'a, M: Measurements>(
     fits.sort_by_key(|(pair, _, fit, _)| is_dear(pair, fit));
     let mut best: Option<FoundTogether<'a, M>> = None;
     for (pair, score, fit, held) in fits {
+        if problem.model.is_spent() {
+            break;
+        }
         let may_leave = |found: &FoundTogether<'_, M>| {
             let FoundTogether { state, .. } = found;
             let of_model = change_energy(&state.problem, &state.fit) / state.problem.points().max(1.0);

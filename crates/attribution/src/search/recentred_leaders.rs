@@ -40,6 +40,9 @@ pub(crate) fn follow_leaders_anew<'a, M: Measurements>(
     leaders.truncate(FOLLOWED);
     let runners_up: Vec<usize> = leaders.iter().map(|l| l.0).collect();
     for (effect, score, fit) in leaders {
+        if problem.model.is_spent() {
+            break;
+        }
         let mut state = now.clone();
         state.fit = fit;
         state.recentre(progress)?;

@@ -122,6 +122,12 @@ pub(crate) fn step_forward<M: Measurements>(
     progress: &dyn Progress,
 ) -> Result<SelectionStep<M>> {
     let mut candidates = fitted_candidates(state, chosen);
+    let tried: Vec<String> = candidates
+        .iter()
+        .filter(|c| c.fitted.is_some())
+        .map(|c| state.problem.model.effect_name(c.tried.effect))
+        .collect();
+    progress.note(&format!("trying {}", tried.join(", ")));
     if extend {
         follow_leaders(state, &mut candidates, progress)?;
     }

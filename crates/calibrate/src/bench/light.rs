@@ -32,6 +32,8 @@ pub struct IlluminatedChip<'a> {
     pub rim: Option<Arc<PillarTable>>,
     pub geometry: &'a GeometryChange,
     pub lights: Vec<&'a LightChange>,
+    /// Every so many wavelengths of each spectrum are taken: 1 for all.
+    pub every: usize,
     /// Seed of the random positions of missing pillars; without one, their mean effect is used.
     pub scatter: Option<u64>,
 }
@@ -143,7 +145,7 @@ impl Bench<'_> {
         let weights: Vec<Vec<Vec<f64>>> = chips
             .iter()
             .map(|chip| {
-                let of = |l: &&LightChange| quadrature.weights(group.led.into(), l);
+                let of = |l: &&LightChange| quadrature.weights(group.led.into(), l, chip.every);
                 chip.lights.iter().map(of).collect()
             })
             .collect();
@@ -341,13 +343,14 @@ mod tests {
             rim: None,
             geometry: &geometry,
             lights: vec![&light],
+            every: 1,
             scatter: None,
         };
         let found = bench.intensities(std::slice::from_ref(&chip), &path, &Silent).unwrap();
         for group in &bench.groups {
             let element = bench.element(group.element, &chip).unwrap();
             let quadrature = &bench.quadratures[group.led];
-            let weights = quadrature.weights(group.led.into(), &light);
+            let weights = quadrature.weights(group.led.into(), &light, 1);
             let (n, step) = (group.plan.window(), group.plan.step_um());
             let at = |i: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * step;
             for &measurement in &group.measurements {

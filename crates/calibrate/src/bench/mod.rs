@@ -202,6 +202,16 @@ impl<'a> Bench<'a> {
 
     /// Pixel values of each measurement, before registration, flux and black level are applied.
     pub fn grids(&self, intensities: &PerMeasurement<Vec<f32>>, perturbation: &Perturbation) -> Vec<PixelGrid> {
+        self.grids_with(intensities, perturbation, 0.0)
+    }
+
+    /// The same with the places at which declared kernels are evaluated moved by `moved` of the distance between two.
+    pub fn grids_with(
+        &self,
+        intensities: &PerMeasurement<Vec<f32>>,
+        perturbation: &Perturbation,
+        moved: f64,
+    ) -> Vec<PixelGrid> {
         let camera = &self.set.camera;
         let work: Vec<(&FocusSeries, MeasurementIndex)> = {
             let mut work: Vec<_> = self
@@ -217,7 +227,7 @@ impl<'a> Bench<'a> {
         for plan in self.groups.iter().map(|g| &g.plan) {
             let (n, step) = (plan.window(), plan.step_um());
             if !kernels.iter().any(|k| (k.0, k.1) == (n, step)) {
-                kernels.push((n, step, perturbation.camera.kernels((n, n), step)));
+                kernels.push((n, step, perturbation.camera.kernels_on_places((n, n), step, moved)));
             }
         }
         work.par_iter()

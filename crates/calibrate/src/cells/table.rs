@@ -29,6 +29,19 @@ impl PillarTable {
         row[i - 1..i + 3].iter().zip(weights).map(|(t, w)| t * w).sum()
     }
 
+    /// Every second width of it.
+    pub fn thinned(&self) -> Self {
+        Self {
+            step_nm: 2.0 * self.step_nm,
+            t: self
+                .t
+                .iter()
+                .map(|row| row.iter().step_by(2).copied().collect())
+                .collect(),
+            ..self.clone()
+        }
+    }
+
     /// The bytes of the cached file: the inputs, the version of the solver that made it, and a checksum.
     pub fn bytes(&self, solver: u32) -> Vec<u8> {
         let count = self.t.first().map_or(0, Vec::len);

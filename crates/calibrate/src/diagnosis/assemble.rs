@@ -84,6 +84,7 @@ impl Diagnosis {
             set: set.title.clone(),
             verdict,
             remarks: remarks(simulator, evidence, verdict),
+            stopped_after: simulator.work.is_spent().then(|| simulator.work.simulations()),
             effects: found_effects(simulator, finding, verdict),
             error,
             ranking: ranked(1, &finding.ranking),
@@ -111,6 +112,7 @@ impl Diagnosis {
             verdict: SetVerdict::DataUnfit,
             effects: Vec::new(),
             remarks: Vec::new(),
+            stopped_after: None,
             error: ErrorReport {
                 measure: MEASURE.into(),
                 before: pair,

@@ -107,6 +107,9 @@ pub struct Diagnosis {
     pub effects: Vec<FoundEffect>,
     /// Properties of them that these measurements cannot determine, besides other effects.
     pub remarks: Vec<String>,
+    /// Number of simulations after which the search was stopped; none where it ended before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stopped_after: Option<u64>,
     pub error: ErrorReport,
     pub ranking: Vec<Ranked>,
     /// Candidates on top of each effect that was taken.
@@ -193,6 +196,19 @@ impl Diagnosis {
 
     /// One line for a person.
     pub fn sentence(&self) -> String {
+        let found = self.found();
+        match self.stopped_after {
+            Some(simulations) => {
+                format!(
+                    "{found}; the search was stopped after {simulations} simulations, and this is the best finding so far"
+                )
+            }
+            None => found,
+        }
+    }
+
+    /// The finding in one line.
+    fn found(&self) -> String {
         let one = |e: &FoundEffect| metalith_report::effect_words(&e.name, &e.value, &e.unit, &e.interval);
         let list: Vec<String> = self.effects.iter().map(one).collect();
         let remainder = match self.remainder {

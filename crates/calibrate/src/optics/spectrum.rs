@@ -40,14 +40,21 @@ impl Quadrature {
     }
 
     /// Weights, with a sum of one, of this LED, the `led`-th of its set, where lamps are changed: shifted, scaled in
-    /// width, and as declared.
-    pub(crate) fn weights(&self, led: usize, change: &LightChange) -> Vec<f64> {
+    /// width, and as declared; of wavelengths `every` so many, and zero between them.
+    pub(crate) fn weights(&self, led: usize, change: &LightChange, every: usize) -> Vec<f64> {
         let (sigma, centre) = (self.led.sigma_nm() * (1.0 + change.led_width), self.led.centre_nm);
         let gaussian = |l: &f64| (-0.5 * ((l - centre - change.shift_nm(led)) / sigma).powi(2)).exp();
         let raw: Vec<f64> = self
             .wavelengths_nm
             .iter()
-            .map(|l| gaussian(l) * change.spectral_factor(*l, centre))
+            .enumerate()
+            .map(|(k, l)| {
+                if k.is_multiple_of(every) {
+                    gaussian(l) * change.spectral_factor(*l, centre)
+                } else {
+                    0.0
+                }
+            })
             .collect();
         let sum = raw.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         raw.iter().map(|w| w / sum).collect()
@@ -73,7 +80,7 @@ mod tests {
             led_shift_nm: vec![5.0],
             ..LightChange::default()
         };
-        let weights = quadrature.weights(0, &change);
+        let weights = quadrature.weights(0, &change, 1);
         let mean: f64 = quadrature.wavelengths_nm.iter().zip(&weights).map(|(l, w)| l * w).sum();
         assert!((mean - 535.0).abs() < CUT_NM, "{mean}");
     }

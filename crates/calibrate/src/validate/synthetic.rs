@@ -155,6 +155,7 @@ impl<'a> Synthesizer<'a> {
                     rim: None,
                     geometry: &perturbation.geometry,
                     lights: vec![&perturbation.light],
+                    every: 1,
                     scatter: None,
                 });
                 let planes = self.simulator.bench.intensities(&chips, &perturbation.path, progress)?;

@@ -19,15 +19,16 @@ pub struct KernelFilter {
 }
 
 impl KernelFilter {
-    /// Kernels on images of this shape, rows along +y.
-    pub(super) fn new(terms: &[CompiledTerm], shape: [usize; 2], step_um: f64) -> Self {
+    /// Kernels on images of this shape, rows along +y. The places at which they are evaluated are moved by `moved` of the distance
+    /// between two of them.
+    pub(super) fn new(terms: &[CompiledTerm], shape: [usize; 2], step_um: f64, moved: f64) -> Self {
         let mut spectrum = Array2::from_elem(shape.map(|n| 2 * n), Complex64::ONE);
         for term in terms {
             if term.quantity == DeclaredQuantity::Transfer {
                 transfer_of(term, &mut spectrum, step_um);
                 continue;
             }
-            let own = spectrum_of(term, shape, step_um);
+            let own = spectrum_of(term, shape, step_um, moved);
             spectrum.zip_mut_with(&own, |all, own| *all *= Complex64::ONE + own);
         }
         Self { spectrum }
@@ -60,16 +61,20 @@ fn transfer_of(term: &CompiledTerm, spectrum: &mut Array2<Complex64>, step_um: f
 
 /// The spectrum of a kernel up to the highest frequency that samples hold. The kernel is evaluated on [`FINER`] times as
 /// many places along each axis, one lattice of the step of the samples after the other, each with the phase of its place.
-fn spectrum_of(term: &CompiledTerm, [rows, cols]: [usize; 2], step_um: f64) -> Array2<Complex64> {
+fn spectrum_of(term: &CompiledTerm, [rows, cols]: [usize; 2], step_um: f64, moved: f64) -> Array2<Complex64> {
     let shape = [2 * rows, 2 * cols];
     let fine_um = step_um / FINER as f64;
     let mut sum = Array2::from_elem(shape, Complex64::ZERO);
     let mut values = vec![0.0; shape[1]];
-    let phases = shape.map(|n| (0..FINER).map(|part| phases(n, part)).collect::<Vec<_>>());
+    let phases = shape.map(|n| {
+        (0..FINER)
+            .map(|part| phases(n, part as f64 + moved))
+            .collect::<Vec<_>>()
+    });
     for (part_y, along_y) in phases[0].iter().enumerate() {
-        let places_y = places(shape[0], part_y, fine_um);
+        let places_y = places(shape[0], part_y as f64 + moved, fine_um);
         for (part_x, along_x) in phases[1].iter().enumerate() {
-            let places_x = places(shape[1], part_x, fine_um);
+            let places_x = places(shape[1], part_x as f64 + moved, fine_um);
             let mut own = Array2::from_elem(shape, Complex64::ZERO);
             for (mut row, y) in own.rows_mut().into_iter().zip(&places_y) {
                 term.row(&[Input::Row(&places_x), Input::Scalar(*y)], &mut values);
@@ -87,16 +92,16 @@ fn spectrum_of(term: &CompiledTerm, [rows, cols]: [usize; 2], step_um: f64) -> A
 }
 
 /// Places of one lattice (um): sample 0 is in the middle, and the second half stands before it.
-fn places(samples: usize, part: usize, fine_um: f64) -> Vec<f64> {
+fn places(samples: usize, part: f64, fine_um: f64) -> Vec<f64> {
     let place = |i: usize| i as f64 - if i < samples / 2 { 0.0 } else { samples as f64 };
     (0..samples)
-        .map(|i| (place(i) * FINER as f64 + part as f64) * fine_um)
+        .map(|i| (place(i) * FINER as f64 + part) * fine_um)
         .collect()
 }
 
 /// The phase at each frequency of a lattice that stands `part` fine steps off.
-fn phases(samples: usize, part: usize) -> Vec<Complex64> {
-    let turn = |k: f64| -std::f64::consts::TAU * k * part as f64 / (samples * FINER) as f64;
+fn phases(samples: usize, part: f64) -> Vec<Complex64> {
+    let turn = |k: f64| -std::f64::consts::TAU * k * part / (samples * FINER) as f64;
     let half = samples / 2;
     (0..samples)
         .map(|k| match k {
@@ -174,6 +179,30 @@ mod tests {
             let worst = (&got - &want).fold(0.0, |worst: f64, v| worst.max(v.abs()));
             assert!(worst < ALIASED, "{sigma} {at:?}: {worst:e}");
         }
+    }
+
+    /// Places moved by half of their distance: a smooth kernel is the same, one with an edge is as much longer as places are apart.
+    #[test]
+    fn moved_places_tell_how_well_a_kernel_is_sampled() {
+        let light = |text: &str, moved: f64| {
+            let change = CameraChange {
+                declared: vec![DeclaredTerm {
+                    name: "k".into(),
+                    quantity: DeclaredQuantity::Kernel,
+                    expression: text.into(),
+                    values: [("a".to_owned(), 0.2)].into(),
+                }],
+                ..CameraChange::default()
+            };
+            let mut image = gaussian(IMAGE_UM, [0.0; 2]);
+            let kernels = change.kernels_on_places(image.dim(), STEP_UM, moved).unwrap();
+            kernels.apply(&mut image);
+            image.sum()
+        };
+        let differ = |text: &str| (light(text, 0.5) / light(text, 0.0) - 1.0).abs();
+        assert!(differ("a * exp(-(x^2 + y^2))") < 1e-9);
+        // 21 and 20 places of 0.125 um on each axis: what is added differs by a tenth.
+        assert!(differ("a * step(1.26 - abs(x)) * step(1.26 - abs(y))") > 1e-2);
     }
 
     #[test]
