@@ -211,7 +211,7 @@ impl Design {
             Warning::new(
                 "cell/slender-pillars",
                 format!(
-                    "the narrowest pillars are {narrowest_nm} nm wide and {} nm high, 1 : {ratio:.0}: few processes can make pillars beyond \
+                    "pillars may be as narrow as {narrowest_nm} nm and are {} nm high, 1 : {ratio:.0}: few processes can make pillars beyond \
                      1 : {MOST_SLENDER}",
                     self.cell.pillar_height_nm
                 ),
@@ -470,11 +470,9 @@ mod tests {
             &[("source = \"hyperbola\"", "source = \"hyperbola\"\nfocal_length_um = 95")],
         );
         let found = found.iter().find(|w| w.id == "phase/other-focal-length").unwrap();
-        assert!(
-            found
-                .what
-                .starts_with("rays of the phase at 532 nm meet 95.0 um from the pillars, and the sensor is 80 um away"),
-            "{found}"
+        insta::assert_snapshot!(
+            found.what,
+            @"rays of the phase at 532 nm meet 95.0 um from the pillars, and the sensor is 80 um away: 5.6 depths of focus"
         );
         // A third of a depth of focus, 0.532 um / 0.447^2.
         let near = warned(

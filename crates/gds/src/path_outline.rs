@@ -24,10 +24,10 @@ pub(super) fn outline(line: &[Point], width: i64, path_type: i16, extensions: [i
     let half = width.unsigned_abs() as f64 / 2.0;
     // Nothing, or the pen's own shape where its ends reach out.
     let dot = |at: [f64; 2], out: &mut Vec<Point>| {
-        // Without a direction ends reach out along x.
+        // Without a direction ends reach out along x; an end that took all away reaches nowhere.
         let [left, right] = match path_type {
             0 => [0.0; 2],
-            4 => extensions.map(f64::from),
+            4 => extensions.map(|reach| f64::from(reach).max(0.0)),
             _ => [half; 2],
         };
         let corners = [

@@ -335,8 +335,8 @@ fn mistakes_of_declared_effects_have_their_line() {
     let error = heights_in(folder.path(), as_drawn, Some(&file), 1)
         .unwrap_err()
         .to_string();
-    for part in [":4:18", "`q` is not known", ":10:", "not 0"] {
-        assert!(error.contains(part), "{part} is not in:\n{error}");
+    for place in [":4:18", ":10:"] {
+        assert!(error.contains(place), "{place} is not in:\n{error}");
     }
 }
 

@@ -320,12 +320,12 @@ fn numbers_that_cannot_be_are_named_with_line_and_column_at_once() {
     std::fs::write(&table, lines.join("\n")).unwrap();
     let error = calibrate(folder.path(), SetKind::Widths, folder.path(), (&[], None), &Silent).unwrap_err();
     let said = error.to_string();
-    for wanted in [
+    for place in [
         "widths.csv, line 4, column `measured_x_nm`: `abc`",
         "line 9, column `drawn_nm`: `-5`",
         "line 9, column `dose`: `nan`",
     ] {
-        assert!(said.contains(wanted), "{wanted}: {said}");
+        assert!(said.contains(place), "{place}: {said}");
     }
 }
 

@@ -129,12 +129,6 @@ mod tests {
         assert!(refused(&bytes).contains("no numbers"));
         // A denoiser is no last stage.
         let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../prior/weights/denoiser.safetensors");
-        assert!(
-            PostProcessor::read(&shipped)
-                .map(|_| ())
-                .unwrap_err()
-                .to_string()
-                .contains("trained for")
-        );
+        assert!(PostProcessor::read(&shipped).is_err());
     }
 }

@@ -2,7 +2,6 @@
 
 /// What catches wrong values or why they are legitimate, and the values: key and factor.
 pub(crate) const LEGITIMATE: &str = r"
-legitimate: a range that the mapping does not use; `metalith check` holds what is drawn to the process | cell.width_min_nm / 10
 legitimate: the hyperbola follows, and a lens may have any NA that its lattice carries | lens.focal_length_um x 10
 legitimate: a number names a layer, two purposes on one are refused | layers.pillars.layer / 10, layers.pillar_marks.layer x 10, layers.pillar_marks.layer / 10, layers.apertures.layer x 10, layers.apertures.layer / 10
 legitimate: a number names a layer, two purposes on one are refused | layers.aperture_marks.layer x 10, layers.aperture_marks.layer / 10, layers.outline.layer x 10, layers.label.layer x 10
@@ -22,7 +21,7 @@ legitimate: a limit is the choice of a designer, and the verdict states it | ver
 limit, rounding_phase_rms_max_rad: steps of 10 degrees are 0.1 rad rms | cell.rotation_step_deg x 10
 legitimate: at most 0.02 rad of phase, stated on the page of `run` | mapping.rotation_sines_deg x 10, mapping.rotation_sines_deg / 10
 legitimate: at most 0.04 rad of phase, stated on the page of `run` | mapping.rotation_cosines_deg x 10, mapping.rotation_cosines_deg / 10
-legitimate: a focus may be anywhere; figures are for the target phase | phase.term.centre_um x 10, phase.term.centre_um / 10, phase.y.term.centre_um x 10, phase.y.term.centre_um / 10
+legitimate: a focus may be anywhere; figures are for the target phase | phase.term.centre_um / 10, phase.y.term.centre_um x 10, phase.y.term.centre_um / 10
 legitimate: newer readers take 8191 vertices | apertures.max_vertices x 10
 legitimate: a smaller cross | mark.length_um / 10
 legitimate: a wider cross | mark.width_um x 10
@@ -33,8 +32,8 @@ legitimate: the hyperbola follows, and the page of `run` states it | element.foc
 legitimate: another polynomial | element.phase.term.powers_x x 10, element.phase.term.powers_x / 10, element.phase.term.powers_y x 10, element.phase.term.powers_y / 10
 legitimate: a weaker polynomial | element.phase.term.coefficients_rad / 10
 legitimate: the cross still meets no opening, which is refused | mark.x_um / 10, mark.y_um / 10
-legitimate: an aberration may have any size | phase.term.coefficients_waves x 10, phase.term.coefficients_waves / 10
-legitimate: a term may have any size | phase.term.scale x 10, phase.term.scale / 10
+legitimate: an aberration may have any size | phase.term.coefficients_waves / 10
+legitimate: a term may have any size | phase.term.scale / 10
 legitimate: a number names a layer, two purposes on one are refused | layers.pillars.datatype x 10, layers.pillars.datatype / 10, layers.pillar_marks.datatype x 10, layers.pillar_marks.datatype / 10, layers.apertures.datatype x 10, layers.apertures.datatype / 10
 legitimate: a number names a layer, two purposes on one are refused | layers.aperture_marks.datatype x 10, layers.aperture_marks.datatype / 10, layers.outline.datatype x 10, layers.outline.datatype / 10, layers.label.datatype x 10, layers.label.datatype / 10
 legitimate: a limit is the choice of a designer, and the verdict states it | verify.limits.wrong_widths_max x 10, verify.limits.wrong_widths_max / 10, verify.limits.foreign_shapes_max x 10, verify.limits.foreign_shapes_max / 10

@@ -113,7 +113,11 @@ mod tests {
             other => panic!("{rows}: {other:?}"),
         };
         let (line, what) = said("0.5,2,0\n0.6,2,-0.1");
-        assert!(line == Some(3) && what.contains("change its sign"), "{what}");
+        assert_eq!(line, Some(3));
+        insta::assert_snapshot!(
+            what,
+            @"k = -0.1 is negative. Materials that absorb have k > 0 here, for the time factor exp(-i w t): change its sign"
+        );
         assert!(said("0.5,-11.7,1.2\n0.6,-16,1.1").1.contains("square root"));
         assert!(said("-0.5,2,0\n0.6,2,0").1.contains("wavelength"));
         let (_, what) = said("1.5,12.11,0\n1.6,12.09,0.02");

@@ -298,7 +298,8 @@ fn recorded(path: &Path, camera: &RelayCamera, orientation: Orientation) -> std:
         .fold((f32::MAX, 0f32), |(a, b), v| (a.min(*v), b.max(*v)));
     let (least, most) = (f64::from(ends.0), f64::from(ends.1));
     let black = camera.black_level_dn;
-    if recorded.step_dn >= SHIFTED && (most > camera.saturation_dn || (black > 0.0 && least > TOO_BRIGHT * black)) {
+    let is_shifted = recorded.step_dn >= SHIFTED && is_varied(&recorded.dn);
+    if is_shifted && (most > camera.saturation_dn || (black > 0.0 && least > TOO_BRIGHT * black)) {
         return Err(format!(
             "all its values are multiples of {step}, up to {most}, and `saturation_dn` is {}: its bits are at the left of 16; \
              divide the values by {step}, or give black level, saturation and read noise times {step}, and `gain_e_per_dn` over \
@@ -309,6 +310,22 @@ fn recorded(path: &Path, camera: &RelayCamera, orientation: Orientation) -> std:
     }
     recorded.dn = orientation.upright(&recorded.dn);
     Ok(recorded)
+}
+
+/// True if a frame has several values: those of a uniform one may be multiples of anything.
+fn is_varied(dn: &Array2<f32>) -> bool {
+    /// Values that are multiples of four by chance once in a hundred thousand frames.
+    const SEVERAL: usize = 8;
+    let mut seen: Vec<f32> = Vec::new();
+    for value in dn {
+        if !seen.contains(value) {
+            seen.push(*value);
+        }
+        if seen.len() >= SEVERAL {
+            return true;
+        }
+    }
+    false
 }
 
 /// A frame of the sensor by itself, and of how many it is the mean, by the keys of both; none where it is not named.
