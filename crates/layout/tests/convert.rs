@@ -185,7 +185,7 @@ fn long_outlines_are_cut_and_large_arrays_divided() {
     // A circle in two XY records, as some programs write what the format has not.
     let corner = |k: i32| {
         let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 9000.0).sin_cos();
-        [(1e6 * cos).round() as i32, (1e6 * sin).round() as i32]
+        [(1e8 * cos).round() as i32, (1e8 * sin).round() as i32]
     };
     let circle: Vec<i32> = (0..=9000).flat_map(|k| corner(k % 9000)).collect();
     gds.cell("TOP").empty(0x08).int2(0x0D, &[2]).int2(0x0E, &[0]);

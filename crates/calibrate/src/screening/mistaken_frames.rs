@@ -9,10 +9,13 @@ use crate::statistics::FitProblem;
 use metalith_attribution::Measurements;
 use metalith_sensor::frame::Orientation;
 
-/// Reduced chi-square below which frames are what they are said to be: nothing else can fit far better.
+/// Reduced chi-square below which a frame has the colour that is stated: no other one can fit far better.
 const FITS: f64 = 3.0;
 
-/// Another orientation fits far better if it leaves this share of chi-square, or less. An effect that makes a mirrored image fit
+/// The same for orientations, over the brightest frames: frames of symmetric lenses fit in each of them.
+const MISFIT: f64 = 1.5;
+
+/// Another orientation fits far better if it leaves this share of chi-square above noise, or less. An effect that makes a mirrored image fit
 /// better must undo the asymmetry of the lens.
 const OF_CHI2: f64 = 0.5;
 
@@ -79,7 +82,9 @@ pub(super) fn orientations(problem: &FitProblem<'_>, used: &PerMeasurement<bool>
     let seen: Vec<_> = tried.iter().copied().zip(&images).collect();
     let upright = misfits(data, &seen, Orientation::Upright);
     let sum = |misfits: &[f64]| misfits.iter().sum::<f64>();
-    if seen.is_empty() || sum(&upright) < FITS * seen.len() as f64 {
+    // Above the noise, which no orientation takes away.
+    let excess = |misfits: &[f64]| misfits.iter().map(|m| (m - 1.0).max(0.0)).sum::<f64>();
+    if seen.is_empty() || sum(&upright) < MISFIT * seen.len() as f64 {
         return None;
     }
     let is_square = data.signal[tried[0]].is_square();
@@ -88,7 +93,7 @@ pub(super) fn orientations(problem: &FitProblem<'_>, used: &PerMeasurement<bool>
         .map(|(_, o)| o)
         .filter(|o| *o != Orientation::Upright && (is_square || !o.is_transposed()))
         .map(|o| (o, misfits(data, &seen, o)))
-        .filter(|(_, m)| sum(m) < OF_CHI2 * sum(&upright))
+        .filter(|(_, m)| excess(m) < OF_CHI2 * excess(&upright))
         .filter(|(_, m)| m.iter().zip(&upright).all(|(a, b)| *a < NO_WORSE * b))
         .map(|(o, m)| (o, sum(&m)))
         .collect();

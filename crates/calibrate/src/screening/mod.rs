@@ -70,6 +70,7 @@ pub(crate) fn recognise(set: &MeasuredSet, problem: &FitProblem<'_>) -> Result<R
             own.retain(|pixel| !odd_pixels::is_of_the_model(pixel, &model));
         }
         found.warnings.extend(odd_pixels::described(&odd));
+        odd_pixels::mask_everywhere(problem.data, &mut odd);
         if odd.iter().any(|own| !own.is_empty()) {
             found.data = Some(odd_pixels::without(problem.data, &odd));
         }

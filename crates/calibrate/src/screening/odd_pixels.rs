@@ -112,6 +112,29 @@ fn odd_pixels(data: &Data, c: MeasurementIndex, stride: usize) -> Vec<OddPixel> 
     odd
 }
 
+/// Mask a pixel in all measurements if it stands out in two or more and in half of them or more: in the others light hides it.
+pub(super) fn mask_everywhere(data: &Data, odd: &mut PerMeasurement<Vec<OddPixel>>) {
+    let places: BTreeSet<(usize, usize)> = odd.iter().flatten().map(|p| p.at).collect();
+    for at in places {
+        let times = odd.iter().filter(|own| own.iter().any(|p| p.at == at)).count();
+        if times < 2 || 2 * times < odd.len() {
+            continue;
+        }
+        for (c, own) in odd.iter_mut_enumerated() {
+            if own.iter().all(|p| p.at != at) {
+                let signal = &data.signal[c];
+                let expected =
+                    neighbours(signal, |p| data.weight[c][p] > 0.0, at, 1).map_or(signal[at], |near| near[2]);
+                own.push(OddPixel {
+                    at,
+                    is_hot: true,
+                    expected,
+                });
+            }
+        }
+    }
+}
+
 /// True if an image of the model has such a detail at the place of a pixel, or beside it.
 pub(super) fn is_of_the_model(odd: &OddPixel, model: &Array2<f32>) -> bool {
     let (rows, cols) = model.dim();
