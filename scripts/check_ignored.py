@@ -24,10 +24,8 @@ FULL = {
     "with_as_many_orders_it_is_the_truth",
     # Calibrations and plans.
     "a_displaced_part_of_every_lens_is_found",
-    "a_displaced_part_is_found_where_nobody_says_where_fields_meet",
     "what_is_planned_for_is_found_in_what_comes_back",
     "what_measurements_cannot_split_is_named_with_what_can",
-    "a_session_of_a_hexagonal_lens_is_planned_and_diagnosed",
     # Studies and other work in shards.
     "pairs_of_shards_are_those_of_one_run",
     "starts_of_the_optimiser_are_runs_with_their_seeds",
