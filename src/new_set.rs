@@ -426,7 +426,7 @@ impl RecognisedFrame {
 }
 
 impl NewSet {
-    /// Names of the columns of [`RecognisedFrame::words`].
+    /// Names of the columns of a table of frames.
     pub const COLUMNS: [&str; 6] = ["element", "colour", "distance", "angle", "exposure", "pixels"];
 }
 
