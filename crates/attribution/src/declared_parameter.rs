@@ -1,6 +1,9 @@
 //! Parameters of effects that a person declares in a file: name, physical limits, typical size, start.
 
-use metalith_core::document::{Limits, Section};
+use std::path::Path;
+
+use metalith_core::Result;
+use metalith_core::document::{Document, Limits, Section, load};
 
 /// Most parameters of one effect: a step of the search fits all of them at once.
 pub const MOST_PARAMETERS: usize = 6;
@@ -24,6 +27,35 @@ pub struct DeclaredParameter {
 /// True for letters, digits and `_`, a letter first.
 fn is_word(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+/// The effects of a file, each from its section `[[effect]]` by `read`; none of a section that has faults without a value.
+///
+/// # Errors
+/// All faults of the file at once, each with its line and column.
+pub fn read_declared_effects<E>(
+    path: &Path,
+    read: impl Fn(&Section<'_, '_>) -> Option<E>,
+    name: impl Fn(&E) -> &str,
+) -> Result<Vec<E>> {
+    let text = load(path)?;
+    Document::read(path, &text, |root| {
+        let sections = root.sections("effect");
+        if sections.is_empty() {
+            root.fault("effect", "no effect is declared", "add one [[effect]] for each");
+        }
+        let mut effects: Vec<E> = Vec::new();
+        for section in &sections {
+            let Some(effect) = read(section) else {
+                continue;
+            };
+            if effects.iter().any(|e| name(e) == name(&effect)) {
+                section.fault("name", format!("`{}` is declared twice", name(&effect)), "rename one");
+            }
+            effects.push(effect);
+        }
+        effects
+    })
 }
 
 impl DeclaredParameter {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// How far effects explain the residual of a set.
+/// Verdict on a set: the part of its residual that effects explain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SetVerdict {

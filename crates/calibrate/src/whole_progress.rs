@@ -7,8 +7,8 @@ use metalith_core::Progress;
 /// Steps of a table of cells, which takes as long as so many simulations.
 const STEPS_OF_TABLE: f64 = 10.0;
 
-/// Steps that are told of; the last one is the end.
-const TOLD: f64 = 1000.0;
+/// Steps that are reported; the last one is the end.
+const REPORTED: f64 = 1000.0;
 
 /// Progress of pieces of work as one.
 pub(crate) struct WholeProgress<'p> {
@@ -31,7 +31,7 @@ struct Progressed {
 impl<'p> WholeProgress<'p> {
     /// Begin work of about so many simulations and tables of cells.
     pub(crate) fn new(inner: &'p dyn Progress, simulations: usize, tables: usize) -> Self {
-        inner.begin("calibration", TOLD as u64);
+        inner.begin("calibration", REPORTED as u64);
         Self {
             inner,
             state: Mutex::new(Progressed {
@@ -48,8 +48,8 @@ impl<'p> WholeProgress<'p> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         of(&mut state);
         // What takes longer than expected stays just below the end.
-        let share = (state.done / state.steps).min(1.0 - 1.0 / TOLD);
-        let now = (share * TOLD) as u64;
+        let share = (state.done / state.steps).min(1.0 - 1.0 / REPORTED);
+        let now = (share * REPORTED) as u64;
         let (more, note) = (now.saturating_sub(state.told), state.text());
         state.told = state.told.max(now);
         drop(state);
@@ -100,7 +100,7 @@ impl Progress for WholeProgress<'_> {
 mod tests {
     use super::*;
 
-    /// Keeps what it is told.
+    /// Record of all reports.
     #[derive(Default)]
     struct Told {
         begun: Mutex<Vec<String>>,

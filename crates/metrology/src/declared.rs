@@ -14,9 +14,9 @@
 
 use std::path::Path;
 
-use metalith_attribution::{DeclaredParameter, RefitEffect, RefitParameter};
+use metalith_attribution::{DeclaredParameter, RefitEffect, RefitParameter, read_declared_effects};
 use metalith_core::Result;
-use metalith_core::document::{Document, Section, load};
+use metalith_core::document::Section;
 use metalith_core::expression::Expression;
 
 /// Where an expression acts.
@@ -107,24 +107,7 @@ impl DeclaredEffect {
     /// # Errors
     /// All faults of the file at once, each with its line and column.
     pub(crate) fn read(path: &Path, stages: &Stages) -> Result<Vec<Self>> {
-        let text = load(path)?;
-        Document::read(path, &text, |root| {
-            let sections = root.sections("effect");
-            if sections.is_empty() {
-                root.fault("effect", "no effect is declared", "add one [[effect]] for each");
-            }
-            let mut effects: Vec<Self> = Vec::new();
-            for section in &sections {
-                let Some(effect) = declared(section, stages) else {
-                    continue;
-                };
-                if effects.iter().any(|e| e.name == effect.name) {
-                    section.fault("name", format!("`{}` is declared twice", effect.name), "rename one");
-                }
-                effects.push(effect);
-            }
-            effects
-        })
+        read_declared_effects(path, |section| declared(section, stages), |effect| &effect.name)
     }
 
     /// An effect of one parameter `a` of a typical size and a largest one, as a file would declare it; none if the expression has a

@@ -162,7 +162,7 @@ pub(crate) fn model_half_widths<M: Measurements>(
 /// the difference to coarser samples, times the share of it that is left with those of the model. None where these are not known.
 ///
 /// # Errors
-/// As [`ForwardModel::coarser`](crate::ForwardModel::coarser).
+/// Predictions with coarser samples, see [`ForwardModel::coarser`](crate::ForwardModel::coarser).
 pub(crate) fn sampling_half_widths<M: Measurements>(
     problem: &FitProblem<'_, M>,
     fit: &Fit<M>,

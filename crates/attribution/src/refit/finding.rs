@@ -1,4 +1,4 @@
-//! What a selection finds: effects with values and intervals, errors, and reasons for refusals.
+//! Result of a selection: effects with values and intervals, errors, and reasons for refusals.
 
 use crate::fit::Gain;
 

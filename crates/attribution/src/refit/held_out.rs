@@ -47,7 +47,7 @@ impl Selection<'_> {
         at
     }
 
-    /// As [`Self::without`], from a fit in full: a step of the linear model from the fit of all is too short where the model bends.
+    /// Steps of the active parameters by a full fit without one group: a step of the linear model from the fit of all is too short where the model bends.
     fn refitted_without(&self, now: &State, way: &LeaveOut, group: usize) -> Vec<(usize, f64)> {
         let mut plan = self.plan.clone();
         for (fitted, own) in plan.fitted.iter_mut().zip(&way.groups) {

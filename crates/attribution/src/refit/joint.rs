@@ -15,7 +15,7 @@ const FITTED: usize = 3;
 /// Least share of the sum of squares that each removes while the others are sought.
 const SHARE: f64 = 0.05;
 
-/// Share by which what is left out may grow if one effect stands for those of several groups.
+/// Relative growth of the held-out error that is allowed if one common effect replaces effects of several groups.
 const SIMPLER: f64 = 0.01;
 
 impl Selection<'_> {

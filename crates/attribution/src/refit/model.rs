@@ -1,4 +1,4 @@
-//! What the owner of the measurements provides: effects, a forward model, and which measurements are fitted.
+//! Input of a selection: effects, a forward model, and the measurements that are fitted.
 
 use nalgebra::DMatrix;
 

@@ -205,7 +205,7 @@ impl<'a> Bench<'a> {
         self.grids_with(intensities, perturbation, 0.0)
     }
 
-    /// The same with the places at which declared kernels are evaluated moved by `moved` of the distance between two.
+    /// Images with the places at which declared kernels are evaluated moved by `moved` of the distance between two.
     pub fn grids_with(
         &self,
         intensities: &PerMeasurement<Vec<f32>>,

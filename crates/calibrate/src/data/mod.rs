@@ -47,7 +47,7 @@ pub struct Data {
     pub registration_um: f64,
     /// Relative standard deviation of the flux of each LED.
     pub flux_sigma: f64,
-    /// True if each measurement has a scale of its own that nobody states.
+    /// True if the scale of each measurement is fitted separately, because it is not stated.
     pub free_scale: bool,
     /// Widths by SEM, measured less designed (nm).
     pub references: References,

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
-use metalith_attribution::DeclaredParameter;
+use metalith_attribution::{DeclaredParameter, read_declared_effects};
 use metalith_core::Result;
-use metalith_core::document::{Document, Section, load};
+use metalith_core::document::Section;
 use metalith_optics::{CompiledTerm, DeclaredQuantity, DeclaredTerm, Perturbation};
 use metalith_report::sig;
 
@@ -50,22 +50,7 @@ impl DeclaredEffect {
     /// # Errors
     /// All faults of the file at once, each with its line and column.
     pub fn read(path: &Path) -> Result<Vec<Self>> {
-        let text = load(path)?;
-        Document::read(path, &text, |root| {
-            let sections = root.sections("effect");
-            if sections.is_empty() {
-                root.fault("effect", "no effect is declared", "add one [[effect]] for each");
-            }
-            let mut effects: Vec<Self> = Vec::new();
-            for section in &sections {
-                let effect = declared(section);
-                if effects.iter().any(|e| e.name == effect.name) {
-                    section.fault("name", format!("`{}` is declared twice", effect.name), "rename one");
-                }
-                effects.push(effect);
-            }
-            effects
-        })
+        read_declared_effects(path, |section| Some(declared(section)), |effect| &effect.name)
     }
 
     /// The effects as a file that [`DeclaredEffect::read`] reads.

@@ -22,7 +22,7 @@ const OF_CHI2: f64 = 0.5;
 /// No measurement may fit worse by this factor in it.
 const NO_WORSE: f64 = 1.2;
 
-/// Orientations that leave as little but for this factor cannot be distinguished.
+/// Largest ratio of chi-square of orientations that cannot be distinguished from the best one.
 const ALIKE: f64 = 1.1;
 
 /// The image of another colour fits far better if it leaves this share: a wrong distance makes colours alike, but not by as much.

@@ -12,7 +12,8 @@ use metalith_sensor::ColourFilter;
 /// A pixel stands out by this many standard deviations of its noise: of a million pixels none does by chance.
 const SIGMAS: f32 = 10.0;
 
-/// And by this share of its own light, or a dead one of that of its neighbours: no effect changes one pixel alone by so much.
+/// Least difference of a hot pixel from its neighbours, as a share of its signal; of a dead pixel, as a share of the signal of its
+/// neighbours. No effect changes one pixel alone by so much.
 const SHARE: f32 = 0.5;
 
 /// A model that has half of that at this place, or beside it, shows such a detail.
