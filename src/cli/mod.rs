@@ -14,6 +14,7 @@ mod denoise;
 mod diff;
 mod handoff;
 mod images;
+mod info;
 mod layout;
 mod new;
 mod new_set;
@@ -109,6 +110,7 @@ enum Command {
     Psf(Box<psf::PsfArgs>),
     Handoff(handoff::HandoffArgs),
     Cells(cells::CellsArgs),
+    Info(info::InfoArgs),
     Check(check::CheckArgs),
     Diff(diff::DiffArgs),
     Convert(convert::ConvertArgs),
@@ -214,6 +216,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::Verify(args) => verify::run(args, terminal),
         Command::Psf(args) => psf::run(args, terminal),
         Command::Cells(args) => cells::run(args, terminal),
+        Command::Info(args) => info::run(args, terminal),
         Command::Check(args) => check::run(args, terminal),
         Command::Diff(args) => diff::run(args, terminal),
         Command::Convert(args) => convert::run(args, terminal),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 use metalith::gds::ReadLimits;
-use metalith::{Layout, Result};
+use metalith::{Layout, Progress, Result};
 
 use super::Terminal;
 
@@ -21,6 +21,9 @@ pub(crate) struct ReadingArgs {
     strict: bool,
 }
 
+/// A way to open a layout.
+type Open = fn(&Path, ReadLimits, &dyn Progress) -> metalith::gds::Result<Layout>;
+
 impl ReadingArgs {
     /// Read from here on as asked.
     pub(crate) fn apply(&self, terminal: &Terminal) {
@@ -32,8 +35,20 @@ impl ReadingArgs {
     /// # Errors
     /// If it cannot be read, or has no such cell.
     pub(crate) fn open(&self, path: &Path, terminal: &Terminal) -> Result<Layout> {
+        self.below_top(Layout::open_with, path, terminal)
+    }
+
+    /// Variant of [`Self::open`] for an inventory.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) fn open_counted(&self, path: &Path, terminal: &Terminal) -> Result<Layout> {
+        self.below_top(Layout::open_counted, path, terminal)
+    }
+
+    fn below_top(&self, open: Open, path: &Path, terminal: &Terminal) -> Result<Layout> {
         self.apply(terminal);
-        let layout = Layout::open_with(path, ReadLimits::default(), terminal)?;
+        let layout = open(path, ReadLimits::default(), terminal)?;
         Ok(match &self.top {
             Some(top) => layout.below(top)?,
             None => layout,

@@ -1,5 +1,6 @@
 //! Record of a cell after the first reading: numbers, not shapes.
 
+use super::inventory::CellCounts;
 use super::shape::Rect;
 use metalith_core::LayerNumber;
 
@@ -25,6 +26,8 @@ pub struct LayoutCell {
     pub(super) inner: Option<u64>,
     /// Small and without references: placed shape by shape.
     pub(super) inline: bool,
+    /// Counts for an inventory, if it was opened for one.
+    pub(super) counts: Option<Box<CellCounts>>,
 }
 
 impl LayoutCell {

@@ -79,6 +79,10 @@ impl Source {
         }
     }
 
+    pub(crate) fn is_gzip(&self) -> bool {
+        matches!(self, Self::File { unpacked: Some(_), .. })
+    }
+
     pub(crate) fn bytes(&self) -> u64 {
         match self {
             Self::File { bytes, .. } => *bytes,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::cell::LayoutCell;
 use super::cells::{CellInput, FileFormat};
 use super::input::Source;
+use super::inventory::{Counter, FormatDetails};
 use super::limits::ReadLimits;
 use super::names::Names;
 use super::notes;
@@ -33,6 +34,7 @@ pub struct Layout {
     format: FileFormat,
     texts: Texts,
     warnings: ReadWarnings,
+    details: FormatDetails,
     /// Number of the name of each cell.
     numbers: Vec<u32>,
     /// Places of the cells of notes, which are no layout.
@@ -83,9 +85,22 @@ impl Layout {
     }
 
     fn of(source: Source, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
-        let scan = scan(&source, &limits, progress)?;
+        Self::scanned(source, limits, None, progress)
+    }
+
+    fn scanned(source: Source, limits: ReadLimits, counter: Option<Counter>, progress: &dyn Progress) -> Result<Self> {
+        let scan = scan(&source, &limits, counter, progress)?;
         scan.warnings.report(source.path(), progress);
         Ok(Self::from_scan(source, limits, scan))
+    }
+
+    /// Variant of [`Layout::open_with`] that counts kinds of shapes and extents of references too, for
+    /// [`Layout::inventory`].
+    ///
+    /// # Errors
+    /// As [`Layout::open`].
+    pub fn open_counted(path: &Path, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
+        Self::scanned(Source::file(path)?, limits, Some(Counter::new()), progress)
     }
 
     pub(super) fn from_scan(source: Source, limits: ReadLimits, mut scan: Scan) -> Self {
@@ -103,6 +118,7 @@ impl Layout {
             format: scan.format,
             texts: scan.texts,
             warnings: scan.warnings,
+            details: scan.details,
             numbers: scan.numbers,
             notes,
         }
@@ -126,6 +142,16 @@ impl Layout {
     /// ReadWarnings from the format that were read over.
     pub fn warnings(&self) -> &ReadWarnings {
         &self.warnings
+    }
+
+    /// Details of its format.
+    pub fn details(&self) -> &FormatDetails {
+        &self.details
+    }
+
+    /// True if the file is compressed by gzip.
+    pub fn is_gzip(&self) -> bool {
+        self.source.is_gzip()
     }
 
     /// Format that it is in.

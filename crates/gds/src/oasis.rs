@@ -14,6 +14,7 @@ use metalith_oasis::{
 use super::cell::LayoutCell;
 use super::element::{ElementContent, ElementKind};
 use super::input::Source;
+use super::inventory::{Counter, FormatDetails};
 use super::limits::ReadLimits;
 use super::read_warnings::{ReadWarning, ReadWarnings};
 use super::scan::{Scan, Tally};
@@ -275,6 +276,8 @@ fn feed<S: Sink>(
                 CellReference::Number(number) => match texts.get(&number) {
                     Some(text) => content.string.extend_from_slice(text),
                     None if resolve => return Err(LayoutError::TextNumber { number }.into()),
+                    // Until the table of texts is read.
+                    None if number <= MOST_NUMBER => put_numbered(number, &mut content.string),
                     None => {}
                 },
             }
@@ -323,13 +326,20 @@ fn circle(centre: Point, radius: i64, out: &mut Vec<Point>) {
 }
 
 /// Read the file once.
-pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress) -> Result<Scan> {
+pub(super) fn scan(
+    source: &Source,
+    limits: &ReadLimits,
+    counter: Option<Counter>,
+    progress: &dyn Progress,
+) -> Result<Scan> {
     let path = source.path();
     progress.begin("reading cells", source.bytes());
     let reader = OasisReader::new(source.raw()?, OasisLimits::default()).map_err(located(path))?;
     let reader = reader.tolerant(!progress.strict());
     let grid_per_um = reader.grid_per_um();
-    let mut tally = Tally::new(*limits);
+    let units = [1.0 / grid_per_um, 1e-6 / grid_per_um];
+    let mut tally = Tally::new(*limits, counter);
+    tally.unit(units);
     let mut cells = OasisCells::of(reader, source, Texts::default(), false);
     let mut tables = Tables::new(limits);
     let (mut in_cell, mut with_properties, mut reported, mut name) = (false, true, 0, Vec::new());
@@ -389,8 +399,8 @@ pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress
             progress.check_stopped()?;
         }
     }
-    let units = [1.0 / grid_per_um, 1e-6 / grid_per_um];
-    let mut scan = tally.finish_numbered(units, &tables.cells, tables.texts);
+    let details = FormatDetails::Oasis(cells.reader.details());
+    let mut scan = tally.finish_numbered(units, &tables.cells, tables.texts, details);
     let (listed, count) = cells.reader.warnings();
     let warning = |warning: &OasisWarning| {
         let (inner, fault) = (None, warning.fault.clone());

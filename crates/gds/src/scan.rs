@@ -7,6 +7,7 @@ use super::cells::FileFormat;
 use super::element::{ElementContent, ElementKind};
 use super::foreign;
 use super::input::{Input, Source};
+use super::inventory::{Counter, FormatDetails};
 use super::limits::ReadLimits;
 use super::names::{Names, Recent};
 use super::oasis::{self, Copies, Texts};
@@ -35,37 +36,45 @@ pub(super) struct Scan {
     pub warnings: ReadWarnings,
     /// Texts that elements refer to by number.
     pub texts: Texts,
+    pub details: FormatDetails,
 }
 
-/// Read the file once.
-pub(super) fn scan(source: &Source, limits: &ReadLimits, progress: &dyn Progress) -> Result<Scan> {
+/// Read the file once; `counter` counts for an inventory.
+pub(super) fn scan(
+    source: &Source,
+    limits: &ReadLimits,
+    counter: Option<Counter>,
+    progress: &dyn Progress,
+) -> Result<Scan> {
     if source.format()? == FileFormat::Oasis {
-        return oasis::scan(source, limits, progress);
+        return oasis::scan(source, limits, counter, progress);
     }
     let mut input = source.open()?;
     input.tolerance = Tolerance::of(progress);
     progress.begin("reading cells", source.bytes());
     let mut walk = Walk::new(limits, progress);
-    scan_with(&mut input, source.bytes(), &mut walk)
+    scan_with(&mut input, source.bytes(), counter, &mut walk)
 }
 
 /// Variant of [`scan`] with a walk that may be set to use the grammar alone.
-pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> Result<Scan> {
+pub(super) fn scan_with(input: &mut Input, bytes: u64, counter: Option<Counter>, walk: &mut Walk<'_>) -> Result<Scan> {
     if let &[_, _, first, ..] = input.window()?
         && first != kind::HEADER
     {
         let cause = foreign::format_of(input.window()?).unwrap_or(LayoutError::NoHeader);
         return Err(input.fault(0, cause));
     }
-    input.next()?;
+    let header = input.next()?;
+    let version = input.body(header).first_chunk().map(|b| u16::from_be_bytes(*b));
     let mut title = String::new();
-    let mut units = None;
-    let mut tally = Tally::new(*walk.limits);
+    let (mut units, mut modified) = (None, None);
+    let mut tally = Tally::new(*walk.limits, counter);
     loop {
         let record = input.next()?;
         match record.kind {
             kind::LIBNAME => title = printable_bytes(input.text(record)?),
-            kind::UNITS => units = Some(read_units(input, record)?),
+            kind::UNITS => units = Some(tally.unit(read_units(input, record)?)),
+            kind::BGNLIB => modified = date(input.body(record)),
             kind::BGNSTR => {
                 if units.is_none() {
                     return Err(input.fault(record.offset, LayoutError::UnitsMissingBeforeCell));
@@ -104,7 +113,14 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, walk: &mut Walk<'_>) -> R
         format: FileFormat::Gds,
         warnings: std::mem::replace(&mut input.tolerance, Tolerance::Known).into_listed(),
         texts: Texts::default(),
+        details: FormatDetails::Gds { version, modified },
     })
+}
+
+/// The first date of a BGNLIB record: year, month, day, hour, minute, second.
+fn date(body: &[u8]) -> Option<[u16; 6]> {
+    let bytes: &[u8; 12] = body.first_chunk()?;
+    Some([0, 2, 4, 6, 8, 10].map(|k| u16::from_be_bytes([bytes[k], bytes[k + 1]])))
 }
 
 fn stray(input: &Input, record: record::Record) -> Error {
@@ -144,10 +160,12 @@ pub(super) struct Tally {
     /// not defined.
     absolute: bool,
     magnified: bool,
+    /// Counter for an inventory.
+    counter: Option<Box<Counter>>,
 }
 
 impl Tally {
-    pub(crate) fn new(limits: ReadLimits) -> Self {
+    pub(crate) fn new(limits: ReadLimits, counter: Option<Counter>) -> Self {
         Self {
             limits,
             cells: Vec::new(),
@@ -162,7 +180,16 @@ impl Tally {
             path: Vec::new(),
             absolute: false,
             magnified: false,
+            counter: counter.map(Box::new),
         }
+    }
+
+    /// Database unit in user units and in metres.
+    pub(crate) fn unit(&mut self, units: [f64; 2]) -> [f64; 2] {
+        if let Some(counter) = &mut self.counter {
+            counter.unit(units[1]);
+        }
+        units
     }
 
     /// A cell begins: read its name.
@@ -196,6 +223,7 @@ impl Tally {
             depth: 0,
             inner,
             inline: false,
+            counts: None,
         });
         self.layers.clear();
         self.last = usize::MAX;
@@ -213,6 +241,7 @@ impl Tally {
         units: [f64; 2],
         names: &HashMap<u64, Vec<u8>>,
         texts: HashMap<u64, Vec<u8>>,
+        details: FormatDetails,
     ) -> Scan {
         let (resolved, renumbered) = self.names.resolve(names);
         for number in &mut self.numbers {
@@ -231,6 +260,16 @@ impl Tally {
                     tally.text_bytes = tally.text_bytes.max(longest.saturating_mul(tally.texts));
                 }
             }
+            if let Some(counts) = &mut cell.counts {
+                for reach in &mut counts.reaches {
+                    reach.number = renumbered[reach.number as usize];
+                }
+                for text in &mut counts.texts {
+                    if let Some(string) = oasis::numbered(&text.string).and_then(|number| texts.get(&number)) {
+                        text.string.clone_from(string);
+                    }
+                }
+            }
         }
         Scan {
             title: String::new(),
@@ -242,6 +281,7 @@ impl Tally {
             format: FileFormat::Oasis,
             warnings: ReadWarnings::default(),
             texts: Texts::new(texts),
+            details,
         }
     }
 
@@ -249,6 +289,10 @@ impl Tally {
     pub(crate) fn end(&mut self, offset: u64) {
         let cell = self.cells.last_mut().expect("a cell was begun");
         cell.bytes.end = offset;
+        cell.counts = self
+            .counter
+            .as_mut()
+            .map(|counter| Box::new(counter.end(&self.touched)));
         for number in self.touched.drain(..) {
             let (references, copies, offset) = std::mem::take(&mut self.counts[number as usize]);
             cell.children.push(Child {
@@ -322,14 +366,21 @@ impl Sink for Tally {
         if points[4] != points[0] {
             tally.bounds.include(points[4]);
         }
+        if let Some(counter) = &mut self.counter {
+            counter.five_points(self.last, points);
+        }
         Ok(())
     }
 
     #[inline]
-    fn plain_reference(&mut self, offset: u64, key: u64, _at: Point) -> Result<(), SinkError> {
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), SinkError> {
         let names = &mut self.names;
         let number = self.recent.number(key, |name| names.number(name));
-        Ok(self.reference(number, 1, offset)?)
+        self.reference(number, 1, offset)?;
+        if let Some(counter) = &mut self.counter {
+            counter.plain(number, at);
+        }
+        Ok(())
     }
 
     fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
@@ -353,8 +404,11 @@ impl Tally {
         }
         if refers {
             let number = self.names.number(&element.name);
-            let copies = element.copies().saturating_mul(copies);
-            return self.reference(number, copies, element.offset);
+            self.reference(number, element.copies().saturating_mul(copies), element.offset)?;
+            if let Some(counter) = &mut self.counter {
+                counter.reference(number, element, reach);
+            }
+            return Ok(());
         }
         if element.kind == ElementKind::Path {
             let width = i64::from(element.width);
@@ -367,6 +421,10 @@ impl Tally {
             );
         }
         let path = Rect::around(&self.path);
+        self.layer(element.layer)?;
+        if let Some(counter) = &mut self.counter {
+            counter.element(self.last, element, copies);
+        }
         let tally = self.layer(element.layer)?;
         let count = match element.kind {
             ElementKind::Boundary => &mut tally.boundaries,
@@ -480,7 +538,7 @@ mod tests {
         let numbers = |walk: Walk<'_>| {
             let mut walk = walk;
             let mut input = source.open().unwrap();
-            scan_with(&mut input, bytes.len() as u64, &mut walk).unwrap()
+            scan_with(&mut input, bytes.len() as u64, Some(Counter::new()), &mut walk).unwrap()
         };
         let (fast, slow) = (
             numbers(Walk::new(&limits, &Silent)),

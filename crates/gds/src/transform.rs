@@ -71,6 +71,22 @@ impl Transform {
         }
     }
 
+    /// The rotation, mirror and magnification alone.
+    pub(super) fn without_shift(self) -> Self {
+        match self {
+            Self::Square { orientation, .. } => Self::Square {
+                orientation,
+                dx: 0,
+                dy: 0,
+            },
+            Self::General { matrix, .. } => Self::General {
+                matrix,
+                dx: 0.0,
+                dy: 0.0,
+            },
+        }
+    }
+
     /// Place of a point of the cell.
     #[inline]
     pub fn apply(&self, p: Point) -> Point {

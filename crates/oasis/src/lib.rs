@@ -14,8 +14,8 @@ pub use error::{OasisError, OasisFault, OasisLimit};
 pub use escape::StringKind;
 pub use limits::OasisLimits;
 pub use read::{
-    CellReference, NameEntry, NameTable, OasisElement, OasisItem, OasisPlace, OasisReader, OasisShape, OasisValue,
-    OasisWarning,
+    CellReference, NameEntry, NameTable, OasisDetails, OasisElement, OasisItem, OasisPlace, OasisReader, OasisShape,
+    OasisValue, OasisWarning,
 };
 pub use repetition::Repetition;
 pub use trapezoid::compact_trapezoid;

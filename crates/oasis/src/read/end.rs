@@ -12,12 +12,12 @@ use crate::record::{END_BYTES, kind, validation};
 /// Bytes of a checksum.
 const CHECKSUM: usize = 4;
 
-/// Read the rest of END, which must end the file.
+/// Read the rest of END, which must end the file. Returns its validation scheme.
 pub(super) fn read<R: Read + Seek>(
     input: &mut Input<R>,
     with_offsets: bool,
     tables: &mut Tables,
-) -> Result<(), OasisError> {
+) -> Result<u64, OasisError> {
     let begin = input.record().offset;
     let before_end = input.file_bytes().saturating_sub(begin);
     if before_end < END_BYTES as u64 {
@@ -36,7 +36,8 @@ pub(super) fn read<R: Read + Seek>(
         return Err(input.fault(OasisFault::EndLength));
     }
     input.bytes(padding as usize, &mut Vec::new())?;
-    match input.unsigned()? {
+    let scheme = input.unsigned()?;
+    match scheme {
         validation::NONE => {}
         validation::CRC32 | validation::CHECKSUM32 => drop(input.array::<CHECKSUM>()?),
         other => return Err(input.fault(OasisFault::Validation(other))),
@@ -44,7 +45,7 @@ pub(super) fn read<R: Read + Seek>(
     if input.offset() != begin + END_BYTES as u64 {
         return Err(input.fault(OasisFault::EndLength));
     }
-    Ok(())
+    Ok(scheme)
 }
 
 /// Compare the file with the checksum in its last bytes. A file whose end is not whole is left to the reading, which

@@ -13,6 +13,19 @@ pub struct OasisWarning {
     pub taken: &'static str,
 }
 
+/// Details of the format of a file that was read to its end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OasisDetails {
+    /// CBLOCK records.
+    pub compressed_blocks: u64,
+    /// True if the offsets of the tables of names are in END, not in START.
+    pub table_offsets_in_end: bool,
+    /// True if some table of names is in strict mode: all of its records stand at its offset.
+    pub strict_tables: bool,
+    /// Checksum in END.
+    pub checksum: Option<&'static str>,
+}
+
 /// Place where a record begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct OasisPlace {

@@ -11,13 +11,14 @@ mod table;
 use std::io::{Read, Seek};
 
 pub use item::{
-    CellReference, NameEntry, NameTable, OasisElement, OasisItem, OasisPlace, OasisShape, OasisValue, OasisWarning,
+    CellReference, NameEntry, NameTable, OasisDetails, OasisElement, OasisItem, OasisPlace, OasisShape, OasisValue,
+    OasisWarning,
 };
 
 use crate::MAGIC;
 use crate::error::{OasisError, OasisFault};
 use crate::limits::OasisLimits;
-use crate::record::kind;
+use crate::record::{kind, validation};
 use input::Input;
 use item::Step;
 use modal::Modal;
@@ -40,6 +41,9 @@ pub struct OasisReader<R> {
     modal: Modal,
     in_cell: bool,
     ended: bool,
+    /// CBLOCK records that were entered, and the validation scheme of END.
+    blocks: u64,
+    validation: u64,
     /// The CELL record read last, if nothing was read since.
     at_cell: Option<OasisPlace>,
     /// It is to be handed out again.
@@ -93,6 +97,8 @@ impl<R: Read + Seek> OasisReader<R> {
             modal: Modal::default(),
             in_cell: false,
             ended: false,
+            blocks: 0,
+            validation: validation::NONE,
             at_cell: None,
             again: false,
         })
@@ -123,6 +129,20 @@ impl<R: Read + Seek> OasisReader<R> {
     /// The first departures from the format that were read over, and the number of all.
     pub fn warnings(&self) -> (&[OasisWarning], u64) {
         self.input.warnings()
+    }
+
+    /// Details of the format, after END was read.
+    pub fn details(&self) -> OasisDetails {
+        OasisDetails {
+            compressed_blocks: self.blocks,
+            table_offsets_in_end: self.offsets_in_end,
+            strict_tables: self.tables.strict(),
+            checksum: match self.validation {
+                validation::CRC32 => Some("CRC32"),
+                validation::CHECKSUM32 => Some("CHECKSUM32"),
+                _ => None,
+            },
+        }
     }
 
     /// An error at the record read last.
@@ -164,6 +184,7 @@ impl<R: Read + Seek> OasisReader<R> {
         if compression != 0 {
             return Err(self.input.fault(OasisFault::Compression(compression)));
         }
+        self.blocks += 1;
         let (unpacked, packed) = (self.input.unsigned_padded()?, self.input.unsigned_padded()?);
         self.input.enter_block(unpacked, packed)
     }
@@ -225,7 +246,7 @@ impl<R: Read + Seek> OasisReader<R> {
                 Ok(None)
             }
             kind::END if !self.input.in_block() => {
-                end::read(&mut self.input, self.offsets_in_end, &mut self.tables)?;
+                self.validation = end::read(&mut self.input, self.offsets_in_end, &mut self.tables)?;
                 self.ended = true;
                 Ok(Some(Step::End))
             }

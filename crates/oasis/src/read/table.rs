@@ -52,6 +52,11 @@ impl Tables {
         Ok(())
     }
 
+    /// True if the table of offsets says that all names of some table stand in one place.
+    pub(crate) fn strict(&self) -> bool {
+        self.states.iter().any(|state| state.strict_offset.is_some())
+    }
+
     /// Checks that the tables stand where their offsets say.
     pub(crate) fn check_offsets<R: Read + Seek>(&self, input: &Input<R>) -> Result<(), OasisError> {
         for (table, state) in ALL.into_iter().zip(&self.states) {

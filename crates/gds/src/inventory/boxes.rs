@@ -1,0 +1,99 @@
+//! Boxes around everything below a cell, by layer, from the bottom up: nothing is expanded.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::layout::Layout;
+use crate::limits::FARTHEST;
+use crate::shape::{Point, Rect};
+use crate::transform::Transform;
+use metalith_core::LayerNumber;
+
+/// Boxes that are placed at most: each layer of each cell once for each rotation by which another refers to it.
+const MOST_BOXES: usize = 1 << 23;
+
+/// Boxes around areas, by layer.
+pub(super) type LayerBoxes = BTreeMap<LayerNumber, Rect>;
+
+/// Boxes of some cells.
+pub(super) struct Boxes {
+    /// Around all areas of each cell, in its coordinates.
+    pub cells: Vec<Rect>,
+    /// Around the areas on each layer, of all roots together.
+    pub layers: LayerBoxes,
+}
+
+/// Boxes of everything below these cells; `None` if there are too many to be found.
+pub(super) fn boxes(layout: &Layout, roots: &[usize]) -> Option<Boxes> {
+    let (cells, tree) = (layout.cells(), layout.tree());
+    let mut users = vec![0u32; cells.len()];
+    let mut found: Vec<LayerBoxes> = vec![LayerBoxes::new(); cells.len()];
+    let mut out = Boxes {
+        cells: vec![Rect::EMPTY; cells.len()],
+        layers: LayerBoxes::new(),
+    };
+    for child in cells.iter().flat_map(|cell| &cell.children) {
+        if let (Some(target), false) = (child.cell, child.cut) {
+            users[target] += 1;
+        }
+    }
+    let mut placed = 0;
+    for &index in tree.order.iter().rev() {
+        let cell = &cells[index];
+        let counts = cell.counts.as_deref()?;
+        if counts.incomplete {
+            return None;
+        }
+        let own = cell.layers.iter().filter(|(_, tally)| !tally.bounds.is_empty());
+        let mut boxes: LayerBoxes = own.map(|(layer, tally)| (*layer, tally.bounds)).collect();
+        // Circles and dangling names are rare, and so is this map.
+        let whole = cell.children.iter().all(|child| child.cell.is_some() && !child.cut);
+        let followed = cell.children.iter().filter(|child| !whole && !child.cut);
+        let followed: HashMap<u32, Option<usize>> = followed.map(|child| (child.number, child.cell)).collect();
+        for reach in &counts.reaches {
+            let target = if whole {
+                tree.definitions[reach.number as usize]
+            } else {
+                followed.get(&reach.number).copied().flatten()
+            };
+            let Some(target) = target else { continue };
+            placed += found[target].len();
+            if placed > MOST_BOXES {
+                return None;
+            }
+            for (&layer, area) in &found[target] {
+                let around = swept(&reach.turn, area, &reach.shifts);
+                boxes.entry(layer).or_insert(Rect::EMPTY).unite(&around);
+            }
+        }
+        for child in cell.children.iter().filter(|child| !child.cut) {
+            if let Some(target) = child.cell {
+                users[target] -= 1;
+                if users[target] == 0 && !roots.contains(&target) {
+                    found[target].clear();
+                }
+            }
+        }
+        boxes.values().for_each(|area| out.cells[index].unite(area));
+        found[index] = boxes;
+    }
+    for &root in roots {
+        for (&layer, area) in &found[root] {
+            out.layers.entry(layer).or_insert(Rect::EMPTY).unite(area);
+        }
+    }
+    Some(out)
+}
+
+/// The box around a box that is turned, then shifted by everything in `shifts`.
+fn swept(turn: &Transform, area: &Rect, shifts: &Rect) -> Rect {
+    let mut around = Rect::EMPTY;
+    for shift in [Point::new(shifts.x0, shifts.y0), Point::new(shifts.x1, shifts.y1)] {
+        let placed = turn.moved(shift);
+        let [a, b, c, d, _] = area.outline();
+        for corner in [a, b, c, d].map(|corner| placed.apply(corner)) {
+            let [x, y] = [corner.x, corner.y].map(|v| v.clamp(-FARTHEST, FARTHEST));
+            around.include(Point::new(x, y));
+        }
+    }
+    around
+}
