@@ -37,12 +37,14 @@ pub fn check(
 ) -> PyResult<(String, bool)> {
     let design = design.map(|d| &d.design);
     work(py, progress, |p| {
-        let deck = rules
-            .as_deref()
-            .map_or_else(|| Ok(Deck::for_design(design)), Deck::read)?;
+        let deck = match (rules.as_deref(), design) {
+            (Some(path), _) => Some(Deck::read(path)?),
+            (None, Some(design)) => Some(Deck::for_design(design)),
+            (None, None) => None,
+        };
         let waivers = waivers.as_deref().map(Waivers::read).transpose()?;
         let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), p);
-        let file = open(&layout)?;
+        let file = Layout::open_counted(&layout, ReadLimits::default(), p)?;
         let with = with_layouts.iter().map(open).collect::<Result<Vec<_>, _>>()?;
         let input = CheckInput {
             with: with.iter().collect(),
@@ -52,7 +54,10 @@ pub fn check(
             today: Date::today(),
             markers,
         };
-        let report = drc::check(&file, &deck, &input, p)?;
+        let report = match &deck {
+            Some(deck) => drc::check(&file, deck, &input, p)?,
+            None => drc::check_generic(&file, &input, p)?,
+        };
         Ok((json(&report), report.exit_code() == 0))
     })
 }

@@ -23,10 +23,14 @@ pub(crate) struct CheckArgs {
     /// The layout, in any hierarchy, of any program; `-` for standard input.
     layout: PathBuf,
 
-    /// Rules file; if left out a shipped one: sin_pillars.toml, or for a design of another cell squares.toml,
-    /// circles.toml or rectangles.toml.
+    /// Rules file. If left out a shipped one: squares.toml, circles.toml or rectangles.toml, whichever the pillars are; with a
+    /// design of the published cell sin_pillars.toml.
     #[arg(long, value_name = "RULES.toml")]
     rules: Option<PathBuf>,
+
+    /// Write a rules file with the pitch, widths and gaps that the layout holds, instead of checking it.
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["rules", "design", "waivers", "with", "lyrdb", "junit", "sarif", "json"])]
+    new_rules: Option<PathBuf>,
 
     /// Another layout on the same substrate, such as the pillars when apertures are checked.
     #[arg(long, value_name = "FILE.gds")]
@@ -75,9 +79,9 @@ impl CheckArgs {
     fn paths_are_apart(&self) -> Result<()> {
         let inputs = [&self.rules, &self.design, &self.waivers, &self.compensated.model];
         let inputs = inputs.into_iter().flatten().chain(&self.with).chain([&self.layout]);
-        let (printed, files): (Vec<&Path>, Vec<&Path>) = self
-            .outputs()
-            .map(|(path, _)| path)
+        let outputs = self.outputs().map(|(path, _)| path);
+        let (printed, files): (Vec<&Path>, Vec<&Path>) = outputs
+            .chain(self.new_rules.as_deref())
             .partition(|path| is_standard_output(path));
         if printed.len() + usize::from(self.json) > 1 {
             return Err(Error::refused(
@@ -109,16 +113,22 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         let read = |path| standard_input::design(path, terminal);
         args.design.as_deref().map(read).transpose()?
     };
-    let unnamed = named.is_none() && design.is_none();
-    let deck = named.unwrap_or_else(|| Deck::for_design(design.as_ref()));
-    let deck = match &design {
-        Some(design) => deck.for_pillars_of(design),
-        None => deck,
-    };
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);
-    let layout = args.reading.open(&file, terminal)?;
+    let deck = match (named, &design) {
+        (Some(deck), Some(design)) => Some(deck.for_pillars_of(design)),
+        (Some(deck), None) => Some(deck),
+        (None, Some(design)) => Some(Deck::for_design(design).for_pillars_of(design)),
+        (None, None) => None,
+    };
+    let layout = match deck {
+        Some(_) => args.reading.open(&file, terminal)?,
+        None => args.reading.open_counted(&file, terminal)?,
+    };
+    if let Some(path) = &args.new_rules {
+        return write_rules(&layout, path, terminal);
+    }
     let with = args.with.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
     let array = match &mut design {
         Some(design) if args.compensated.model.is_some() => Some(args.compensated.array(design, terminal)?),
@@ -132,16 +142,11 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         today: Date::today(),
         markers: args.markers,
     };
-    let report = drc::check(&layout, &deck, &input, terminal)?;
+    let report = match &deck {
+        Some(deck) => drc::check(&layout, deck, &input, terminal)?,
+        None => drc::check_generic(&layout, &input, terminal)?,
+    };
     terminal.clear();
-    if unnamed && !report.shape.is_square() {
-        let own = Deck::for_shape(report.shape);
-        terminal.say(&format!(
-            "the pillars are {}, and the rules in force are those of squares: give `--design DESIGN.toml`, or `--rules {}`",
-            report.shape.plural(),
-            own.source().0.display()
-        ));
-    }
     let mut text: Form = if args.json { json } else { drc::text };
     for (path, form) in args.outputs() {
         if is_standard_output(path) {
@@ -156,6 +161,19 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         1 => Outcome::OutsideLimits,
         _ => Outcome::NotDone,
     })
+}
+
+/// Write the rules that a layout keeps.
+fn write_rules(layout: &Layout, path: &Path, terminal: &Terminal) -> Result<Outcome> {
+    let rules = drc::new_rules(layout, None, terminal)?;
+    AtomicFile::write(path, rules.text.as_bytes())?;
+    terminal.clear();
+    let left_out = match rules.left_out {
+        0 => String::new(),
+        n => format!(", {n} more as comments: the layout breaks them"),
+    };
+    print_line!("{}: {} rules{left_out}", path.display(), rules.in_force);
+    Ok(Outcome::Fine)
 }
 
 fn json(report: &DrcReport) -> String {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use metalith::Result;
 use metalith::gds::inventory::{FormatInventory, Inventory, LayerInventory};
-use metalith::report::{count, counted, exact, sig};
+use metalith::report::{count, counted, exact};
 use metalith::text::printable;
 
 use super::reading::ReadingArgs;
@@ -15,6 +15,12 @@ use super::{Outcome, Terminal, print_line};
 
 /// Cells, texts, elements and faults that the summary lists; `--json` has the first thousand of each.
 const SHOWN: usize = 12;
+
+/// Characters of a text that the summary shows.
+const LONGEST_TEXT: usize = 80;
+
+/// Decimals of a micrometre in the summary: a hundredth of a nanometre.
+const DECIMALS: usize = 5;
 
 /// Say what a layout holds: its cells, layers, texts, lattices of pillars, and the details of its format.
 #[derive(Args)]
@@ -101,13 +107,20 @@ fn head(found: &Inventory, out: &mut String) {
             format!(", library {}", found.library)
         }
     );
+    let copies = if found.references > 0 {
+        format!(
+            ", {} to {} in {}",
+            counted(found.references as usize, "reference"),
+            counted(found.copies as usize, "copy").replace("copys", "copies"),
+            counted(found.depth as usize + 1, "level"),
+        )
+    } else {
+        String::new()
+    };
     let _ = writeln!(
         out,
-        "{}, {} that place {} copies, up to {} deep; {}: {}",
+        "{}{copies}; {}: {}",
         counted(found.cell_count as usize, "cell"),
-        counted(found.references as usize, "reference"),
-        count(found.copies),
-        counted(found.depth as usize, "level"),
         counted(found.tops.len(), "top cell"),
         some(found.tops.iter().map(String::as_str), found.tops.len(), ", "),
     );
@@ -123,6 +136,24 @@ fn head(found: &Inventory, out: &mut String) {
             out,
             "notes of KLayout or gdsfactory in the cell $$$CONTEXT_INFO$$$, which is no layout"
         );
+    }
+}
+
+/// A length in nanometres, exact to a hundredth.
+fn length(nm: f64) -> String {
+    trimmed(&format!("{nm:.2}"))
+}
+
+/// A length in micrometres of one in nanometres.
+fn um(nm: f64) -> String {
+    trimmed(&format!("{:.DECIMALS$}", nm * 1e-3))
+}
+
+/// A number without zeros at the end of its decimals.
+fn trimmed(number: &str) -> String {
+    match number.trim_end_matches('0').trim_end_matches('.') {
+        "-0" => "0".to_owned(),
+        other => other.to_owned(),
     }
 }
 
@@ -170,12 +201,12 @@ fn layers(found: &Inventory, out: &mut String) {
             let _ = write!(out, "{:>14}", count(of(layer)));
         }
         let sides = match layer.sides_nm {
-            Some([a, b]) if a == b => exact(a),
-            Some([a, b]) => format!("{} to {}", exact(a), exact(b)),
+            Some([a, b]) if a == b => length(a),
+            Some([a, b]) => format!("{} to {}", length(a), length(b)),
             None => "-".into(),
         };
         let bounds = match layer.bounds_nm {
-            Some(b) => b.map(|v| exact(v * 1e-3)).join(", "),
+            Some(b) => b.map(um).join(", "),
             None if layer.shapes > 0 => "not computed".into(),
             None => "-".into(),
         };
@@ -202,11 +233,11 @@ fn lattices(found: &Inventory, out: &mut String) {
                 out,
                 "  {} lattice of {} nm, {} x {} sites around ({}, {}) um",
                 element.lattice,
-                sig(element.pitch_nm, 6),
+                exact(element.pitch_nm),
                 count(element.columns as u64),
                 count(element.rows as u64),
-                exact(element.centre_nm[0] as f64 * 1e-3),
-                exact(element.centre_nm[1] as f64 * 1e-3),
+                um(element.centre_nm[0] as f64),
+                um(element.centre_nm[1] as f64),
             );
         }
         if lattice.element_count > SHOWN {

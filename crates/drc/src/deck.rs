@@ -72,19 +72,48 @@ impl Deck {
     /// # Panics
     /// Never: it is tested.
     pub fn for_shape(shape: PillarShape) -> Self {
-        let name = format!("{}.toml", shape.plural());
+        Self::named(shape.plural())
+    }
+
+    /// The deck of the program for pillars of this shape, in the plural.
+    pub(super) fn named(plural: &str) -> Self {
+        let name = format!("{plural}.toml");
         Self::shipped(Path::new(&name)).expect("it is in the list")
     }
 
-    /// The deck that a design is checked by where no other is named: [`Deck::standard`] for the cell that this is of, and where
-    /// there is no design, else that of the shape of its pillars, on the grid of its database unit.
-    pub fn for_design(design: Option<&Design>) -> Self {
-        match design {
-            Some(design) if !design.cell.is_of_the_paper() => {
-                Self::for_shape(design.cell.shape).on_grid(design.cell.database_unit)
-            }
-            _ => Self::standard(),
+    /// A deck of one rule on pillars of these layers, which no file has.
+    pub(super) fn of_rule(name: &str, pillars: Vec<LayerNumber>, rule: Box<dyn Rule>) -> Self {
+        let rule = DeckRule {
+            id: name.to_owned(),
+            check: name.to_owned(),
+            severity: Severity::Note,
+            always: true,
+            rule,
+        };
+        Self {
+            name: name.to_owned(),
+            pillars,
+            path: PathBuf::from(name),
+            text: String::new(),
+            rules: Arc::new([rule]),
         }
+    }
+
+    /// A deck of the text of a file that is yet to be written to `path`.
+    ///
+    /// # Errors
+    /// As [`Deck::read`].
+    pub(super) fn of_text(path: &Path, text: String) -> Result<Self> {
+        Self::parse(path, text)
+    }
+
+    /// The deck that a design is checked by where no other is named: [`Deck::standard`] for the cell that this is of, else the deck
+    /// of the shape of its pillars, on the grid of its database unit. Without a design: [`super::check_generic`].
+    pub fn for_design(design: &Design) -> Self {
+        if design.cell.is_of_the_paper() {
+            return Self::standard();
+        }
+        Self::for_shape(design.cell.shape).on_grid(design.cell.database_unit)
     }
 
     /// The deck with this unit as the step of its `grid` rules where that is 1 nm.

@@ -35,6 +35,14 @@ pub enum Status {
 }
 
 impl Status {
+    /// Reason why it did not run.
+    pub(super) fn reason(&self) -> Option<&str> {
+        match self {
+            Self::Skipped(why) | Self::NotApplicable(why) | Self::Failed(why) => Some(why),
+            Self::Run | Self::NotInForce => None,
+        }
+    }
+
     /// Status in one word.
     pub fn word(&self) -> &'static str {
         match self {

@@ -10,7 +10,7 @@ use super::tolerance::ROUNDING_NM;
 use metalith_core::document::{Limits, Section};
 use metalith_design::Design;
 use metalith_gds::LayerNumber;
-use metalith_pillars::{LatticeKind, PillarId, PillarRows};
+use metalith_pillars::{Lattice, LatticeKind, PillarId, PillarRows};
 use metalith_rcwa::CellLattice;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -144,6 +144,14 @@ const SQUARE: &[(usize, isize)] = &[(0, 1), (1, 0), (1, 1), (1, -1)];
 /// pitch away.
 const HEXAGONAL: &[(usize, isize)] = &[(0, 2), (1, 1), (1, -1)];
 
+/// Steps up and right to half of the nearest neighbours on a lattice: of two neighbours each pair is met once.
+pub(super) fn neighbours(lattice: &Lattice) -> &'static [(usize, isize)] {
+    match lattice.kind() {
+        LatticeKind::Square => SQUARE,
+        LatticeKind::Hexagonal => HEXAGONAL,
+    }
+}
+
 /// Share of the pitch below which gaps to farther ones than these are not.
 const HEXAGONAL_REACH: f64 = 0.73;
 
@@ -189,9 +197,10 @@ fn on_lattices(
     for (k, e) in flat.elements.iter().enumerate() {
         let pitch = f64::from(e.site.lattice.pitch_nm());
         let lattice = e.site.lattice;
-        let (neighbours, reach) = match lattice.kind() {
-            LatticeKind::Square => (SQUARE, pitch),
-            LatticeKind::Hexagonal => (HEXAGONAL, HEXAGONAL_REACH * pitch),
+        let neighbours = neighbours(&lattice);
+        let reach = match lattice.kind() {
+            LatticeKind::Square => pitch,
+            LatticeKind::Hexagonal => HEXAGONAL_REACH * pitch,
         };
         if nm > reach {
             return Err(format!(

@@ -292,3 +292,52 @@ fn areas_cut_up_differently_are_the_same() {
     });
     assert!(!of_chips(&whole, &gap).same_geometry);
 }
+
+/// Cells of other files are compared by name and place; what stands beside them is compared as ever.
+#[test]
+fn references_to_missing_cells_are_compared_by_name_and_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let chip = |missing: &[(&str, i32)], width: i32| {
+        let mut gds = Gds::library();
+        gds.cell("UNDER").square(2, 0, 0, width);
+        for &(name, x) in missing {
+            gds.sref(name, x, 0);
+        }
+        gds.end_cell()
+            .cell("TOP")
+            .sref("UNDER", 0, 0)
+            .placed("UNDER", 5000, 0, false, 1.0, 90.0);
+        gds.end_cell().end()
+    };
+    let file = |name: &str, bytes| write(folder.path(), name, bytes);
+    let a = file("a.gds", chip(&[("ELSEWHERE", 300)], 100));
+    let same = compare(&a, &file("b.gds", chip(&[("ELSEWHERE", 300)], 100)));
+    assert!(same.same_geometry, "{}", text(&same));
+    assert_eq!((same.missing.in_both, same.missing.apart), (2, [0, 0]));
+    let moved = compare(&a, &file("c.gds", chip(&[("ELSEWHERE", 301)], 100)));
+    assert!(!moved.same_geometry);
+    assert_eq!((moved.missing.in_both, moved.missing.apart), (0, [2, 2]));
+    let turned = moved.missing.only_in_b.iter().find(|m| m.at_nm == [5000.0, 301.0]);
+    assert_eq!(turned.map(|m| m.cell.as_str()), Some("ELSEWHERE"));
+    let without = compare(&a, &file("d.gds", chip(&[], 120)));
+    assert_eq!((without.missing.apart, without.layers[0].only_in_b), ([2, 0], 2));
+    let html = page(&without).html();
+    assert!(html.contains("reference to ELSEWHERE, which the file does not have"));
+    assert!(text(&without).contains("only in a: a reference to ELSEWHERE"));
+}
+
+/// No row passes where the pillars of its layer differ, and places far from the first change are drawn.
+#[test]
+fn the_page_agrees_with_itself_and_draws_what_is_far_apart() {
+    let a = Chip::clean();
+    let mut b = Chip::clean();
+    b.at(3, 4).4 += 6;
+    b.at(110, 100).4 -= 8;
+    let found = of_chips(&a, &b);
+    let html = page(&found).html();
+    assert!(html.contains("1: changes near") && html.contains("2: changes near"));
+    assert!(!html.contains("3: changes near"));
+    let layers = html.split("Layers").last().unwrap();
+    let row = layers.split("<tr").find(|row| row.contains("1/0")).unwrap();
+    assert!(row.to_lowercase().contains("fail"), "{row}");
+}

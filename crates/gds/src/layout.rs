@@ -295,7 +295,11 @@ impl Layout {
     /// If there is no such cell, more than one to choose from, or a fault in the tree, unless lenient.
     pub fn roots(&self, selection: &Selection) -> Result<Vec<usize>> {
         if !selection.lenient {
-            self.sound()?;
+            self.no_circles()?;
+            if !selection.without_missing {
+                self.no_dangling()?;
+            }
+            self.no_doubled()?;
         }
         if let Some(name) = &selection.top {
             let index = self.cell_index(name).ok_or_else(|| {
@@ -318,14 +322,12 @@ impl Layout {
         }
     }
 
-    /// Checks that every reference leads to a cell, and none round in a circle.
-    pub(super) fn sound(&self) -> Result<()> {
-        self.no_circles()?;
-        if let Some(f) = self.dangling().into_iter().next() {
-            let (cell, name) = (f.cell, f.name);
-            return Err(self.fault(f.offset, LayoutError::Dangling { cell, name }));
+    /// Checks that every reference leads to a cell.
+    fn no_dangling(&self) -> Result<()> {
+        match self.dangling().into_iter().next() {
+            Some(Faulty { cell, name, offset }) => Err(self.fault(offset, LayoutError::Dangling { cell, name })),
+            None => Ok(()),
         }
-        self.no_doubled()
     }
 
     /// Checks that no reference leads round in a circle.

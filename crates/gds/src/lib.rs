@@ -45,6 +45,7 @@ pub use limits::ReadLimits;
 pub use metalith_core::LayerNumber;
 pub use outline_memo::{BoxMemo, OutlineMemo};
 pub use pillar::{DrawnPillar, PillarFinder, drawn_corners, pillar_of};
+pub use placements::MissingCell;
 pub use read_warnings::{ReadWarning, ReadWarnings};
 pub use rectangle::{TiltedRectangle, tilted_rectangle_of};
 pub use shape::{Outline, Point, Rect, Shape, ShapeKind, Text};

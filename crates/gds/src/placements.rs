@@ -9,7 +9,7 @@ use super::shape::Point;
 use super::transform::Transform;
 use super::tree;
 use super::walk::{Sink, SinkError, Walk};
-use crate::error::{Error, LayoutError, Result};
+use crate::error::{Error, LayoutError, Limit, Result};
 use metalith_core::{LayerNumber, Silent};
 
 /// Placements of each cell that is not placed shape by shape, by index of the cell.
@@ -148,6 +148,120 @@ impl Sink for Placer<'_> {
         if let Some(child) = self.target_of(element) {
             copies.each(|place| {
                 self.push(child, element, element.copy(0).moved(place));
+                Ok::<_, SinkError>(())
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// A reference to a cell that the file does not have, with all references above it followed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MissingCell {
+    /// Bytes of the name.
+    pub name: Vec<u8>,
+    pub transform: Transform,
+}
+
+impl Layout {
+    /// All places below these cells at which a cell stands that the file does not have.
+    ///
+    /// # Errors
+    /// If they are beyond the limits of reading, or the file cannot be read again.
+    pub fn missing_cells(&self, roots: &[usize]) -> Result<Vec<MissingCell>> {
+        let cells = self.cells();
+        let (counts, depths) = tree::count(cells, &self.tree().order, roots);
+        let open = |index: &usize| counts[*index] > 0 && cells[*index].children.iter().any(|c| c.cell.is_none());
+        let parents: Vec<usize> = (0..cells.len()).filter(open).collect();
+        if parents.is_empty() {
+            return Ok(Vec::new());
+        }
+        if let Some(cause) = tree::beyond(cells, &counts, &depths, self.limits(), self.bytes()) {
+            return Err(self.fault(0, cause));
+        }
+        let copies = |index: &usize| {
+            let missing = cells[*index].children.iter().filter(|c| c.cell.is_none());
+            missing
+                .fold(0u64, |sum, c| sum.saturating_add(c.copies))
+                .saturating_mul(counts[*index])
+        };
+        let (found, most) = (
+            parents.iter().map(copies).fold(0, u64::saturating_add),
+            self.limits().placements,
+        );
+        if found > most {
+            let limit = Limit::Placements;
+            return Err(self.fault(0, LayoutError::Limit { limit, found, most }));
+        }
+        let mut input = self.reopen()?;
+        let placed = placements(self, &mut input, roots)?;
+        let mut walk = Walk::new(self.limits(), &Silent);
+        let mut out = Vec::new();
+        for index in parents {
+            let mut missing = MissingReferences {
+                layout: self,
+                found: Vec::new(),
+                recent: Recent::new(),
+            };
+            input.seek(&cells[index])?;
+            walk.cell(&mut input, &mut missing)?;
+            for (number, own, offset) in missing.found {
+                for parent in &placed[index] {
+                    let transform = parent.after(&own).ok_or_else(|| magnified(self, offset))?;
+                    let name = self.names().name(number).to_vec();
+                    out.push(MissingCell { name, transform });
+                }
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// References of one cell to cells that the file does not have: number of the name, transform, place in the file.
+struct MissingReferences<'a> {
+    layout: &'a Layout,
+    found: Vec<(u32, Transform, u64)>,
+    recent: Recent,
+}
+
+impl MissingReferences<'_> {
+    fn push(&mut self, number: Option<u32>, transform: Transform, offset: u64) {
+        let missing = number.filter(|&n| self.layout.tree().definitions[n as usize].is_none());
+        self.found.extend(missing.map(|number| (number, transform, offset)));
+    }
+}
+
+impl Sink for MissingReferences<'_> {
+    fn five_points(&mut self, _offset: u64, _layer: LayerNumber, _points: &[Point; 5]) -> Result<(), SinkError> {
+        Ok(())
+    }
+
+    fn plain_reference(&mut self, offset: u64, key: u64, at: Point) -> Result<(), SinkError> {
+        let names = self.layout.names();
+        let number = self.recent.number(key, |name| names.find(name).unwrap_or(u32::MAX));
+        self.push(
+            (number != u32::MAX).then_some(number),
+            Transform::IDENTITY.moved(at),
+            offset,
+        );
+        Ok(())
+    }
+
+    fn element(&mut self, element: &ElementContent) -> Result<(), SinkError> {
+        if matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
+            let number = self.layout.names().find(&element.name);
+            for k in 0..element.copies() {
+                self.push(number, element.copy(k), element.offset);
+            }
+        }
+        Ok(())
+    }
+
+    fn repeated(&mut self, element: &ElementContent, copies: &Copies<'_>) -> Result<(), SinkError> {
+        if matches!(element.kind, ElementKind::Reference | ElementKind::Array) {
+            let number = self.layout.names().find(&element.name);
+            copies.each(|place| {
+                self.push(number, element.copy(0).moved(place), element.offset);
                 Ok::<_, SinkError>(())
             })?;
         }

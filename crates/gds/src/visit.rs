@@ -52,6 +52,8 @@ pub struct Selection {
     /// Go round circles and dangling references, and start from every top cell, instead of an error: for
     /// rules that report these faults themselves.
     pub lenient: bool,
+    /// Go round references to cells that the file does not have, instead of an error.
+    pub without_missing: bool,
 }
 
 impl Layout {

@@ -1,9 +1,11 @@
 //! Two contents side by side.
 
+use std::collections::BTreeMap;
+
 use super::DiffPlan;
 use super::area::{MOST_SIDES, Sides};
 use super::content::{Content, Outlines, Ring, TextCopy};
-use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff};
+use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, MissingDiff, TextAt, TreeDiff};
 use metalith_core::text::printable_bytes;
 use metalith_gds::extract::{ExtractedElement, StoredPillars};
 use metalith_gds::{LayerNumber, Point, Rect};
@@ -18,6 +20,7 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
         plan: *plan,
         total: 0,
         listed: Vec::new(),
+        examples: BTreeMap::new(),
         map: map_over(&a, &b, unit_nm),
     };
     let elements: Vec<ElementDiff> = a
@@ -59,13 +62,16 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
         same_bytes: false,
         same_geometry: elements.iter().all(|e| e.changed() == 0) && layers.iter().all(same) && texts_apart == [0, 0],
         tree: TreeDiff::default(),
+        pillar_layer: plan.pillar_layer,
         elements,
         layers,
         texts_apart,
         texts_only_in_a,
         texts_only_in_b,
+        missing: MissingDiff::default(),
         changes: changes.total,
         listed: changes.listed,
+        examples: changes.examples.into_values().collect(),
         map: changes.map,
     }
 }
@@ -74,6 +80,8 @@ struct Changes {
     plan: DiffPlan,
     total: u64,
     listed: Vec<Change>,
+    /// The first change in each tile of the map.
+    examples: BTreeMap<usize, Change>,
     map: ChangeMap,
 }
 
@@ -91,14 +99,17 @@ impl Changes {
         };
         let column = tile(bounds_nm[0], bounds_nm[2], x0, x1, map.columns);
         let row = tile(bounds_nm[1], bounds_nm[3], y0, y1, map.rows);
-        map.counts[row * map.columns + column] += 1;
+        let tile = row * map.columns + column;
+        map.counts[tile] += 1;
+        let change = || Change {
+            what,
+            layer,
+            bounds_nm,
+            width_nm,
+        };
+        self.examples.entry(tile).or_insert_with(change);
         if self.listed.len() < self.plan.listed {
-            self.listed.push(Change {
-                what,
-                layer,
-                bounds_nm,
-                width_nm,
-            });
+            self.listed.push(change());
         }
     }
 }
@@ -276,7 +287,7 @@ fn corners(r: &[i32; 4]) -> [Point; 4] {
 }
 
 /// Difference of two sorted lists as multisets.
-fn apart<'a, T: Ord>(a: &'a [T], b: &'a [T]) -> (Vec<&'a T>, Vec<&'a T>) {
+pub(super) fn apart<'a, T: Ord>(a: &'a [T], b: &'a [T]) -> (Vec<&'a T>, Vec<&'a T>) {
     let (mut only_a, mut only_b) = (Vec::new(), Vec::new());
     let (mut i, mut j) = (0, 0);
     while i < a.len() && j < b.len() {

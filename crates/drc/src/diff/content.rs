@@ -7,8 +7,8 @@ use super::super::work::Allowance;
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{ElementSite, ExtractedElement, Filler, Scale, StoredPillars, Why};
 use metalith_gds::{
-    DrawnPillar, LayerNumber, Layout, LayoutCell, PillarFinder, Point, Rect, Selection, Shape, Text, Transform,
-    Visitor, drawn_corners, rectangle_of, simplified,
+    DrawnPillar, LayerNumber, Layout, LayoutCell, PillarFinder, Point, Rect, Shape, Text, Transform, Visitor,
+    drawn_corners, rectangle_of, simplified,
 };
 use metalith_pillars::{OutlineForm, PillarShape};
 
@@ -115,7 +115,7 @@ impl Content {
             counts: BTreeMap::new(),
             texts: Vec::new(),
         };
-        layout.visit(&Selection::default(), &mut reader, progress)?;
+        layout.visit(&super::everything(), &mut reader, progress)?;
         for outlines in reader.outlines.values_mut() {
             outlines.rects.sort_unstable();
             outlines.rings.sort_unstable();

@@ -7,13 +7,14 @@
 mod area;
 mod compare;
 mod content;
+mod missing;
 mod picture;
 mod report;
 mod sites;
 mod tree;
 
 pub use picture::page;
-pub use report::{Change, ElementDiff, LayerDiff, LayoutDiff, TextAt, TreeDiff, text};
+pub use report::{Change, ElementDiff, LayerDiff, LayoutDiff, MissingAt, MissingDiff, TextAt, TreeDiff, text};
 
 use std::io::Read;
 
@@ -45,10 +46,10 @@ impl Default for DiffPlan {
 /// Compare two layouts.
 ///
 /// # Errors
-/// If a layout has no single top cell or references that lead nowhere, or cannot be read again.
+/// If a layout has no single top cell or references that lead round in a circle, or cannot be read again.
 pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) -> Result<LayoutDiff> {
     let identical = same_bytes(a, b)?;
-    let everything = Selection::default();
+    let everything = everything();
     // One unit for both: a whole fraction of a nanometre, and whole factors to it.
     let ((num_a, den_a), (num_b, den_b)) = (a.unit_ratio_nm()?, b.unit_ratio_nm()?);
     let den = den_a / gcd(den_a, den_b) * den_b;
@@ -91,11 +92,21 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     let (mut first, mut second) = (content(a, factors[0])?, content(b, factors[1])?);
     let strings = strings.sorted([&mut first, &mut second]);
     let mut report = compare::compare(first, second, &strings, 1.0 / den as f64, plan);
+    report.missing = missing::compare([a, b], factors, 1.0 / den as f64, plan.listed)?;
+    report.same_geometry &= report.missing.apart == [0, 0];
     report.a = a.path().display().to_string();
     report.b = b.path().display().to_string();
     report.same_bytes = identical;
     report.tree = tree::compare(a, b, plan.listed);
     Ok(report)
+}
+
+/// Everything that a layout has. References to cells that it does not have are compared by their names and places.
+fn everything() -> Selection {
+    Selection {
+        without_missing: true,
+        ..Selection::default()
+    }
 }
 
 /// Shape of the pillars of two layouts: the shape of the first, for upright rectangles with the lengths of both.

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use metalith_pillars::Pitch;
+use metalith_report::counted;
 use serde::Serialize;
 
 use metalith_gds::LayerNumber;
@@ -63,6 +64,31 @@ pub struct TextAt {
     pub at_nm: [f64; 2],
 }
 
+/// A reference to a cell that the layout does not have.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MissingAt {
+    pub cell: String,
+    pub at_nm: [f64; 2],
+}
+
+/// References to cells that the layouts do not have: compared by name and place, since nothing is known of what they hold.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct MissingDiff {
+    pub in_both: u64,
+    /// References that only one of the layouts has, all of them.
+    pub apart: [u64; 2],
+    /// The first of them.
+    pub only_in_a: Vec<MissingAt>,
+    pub only_in_b: Vec<MissingAt>,
+}
+
+impl MissingDiff {
+    /// True if all cells that are referred to are there.
+    pub fn is_none(&self) -> bool {
+        self.in_both == 0 && self.apart == [0, 0]
+    }
+}
+
 /// One place that differs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
@@ -118,6 +144,9 @@ pub struct LayoutDiff {
     /// Every layer covers the same area with as many exposures, and all texts are the same.
     pub same_geometry: bool,
     pub tree: TreeDiff,
+    /// Layer that the pillars of the elements are on.
+    #[serde(skip)]
+    pub pillar_layer: LayerNumber,
     pub elements: Vec<ElementDiff>,
     pub layers: Vec<LayerDiff>,
     /// Texts that only one of the layouts has, all of them.
@@ -125,10 +154,15 @@ pub struct LayoutDiff {
     /// The first of them.
     pub texts_only_in_a: Vec<TextAt>,
     pub texts_only_in_b: Vec<TextAt>,
+    #[serde(skip_serializing_if = "MissingDiff::is_none")]
+    pub missing: MissingDiff,
     /// Places that differ, all of them.
     pub changes: u64,
     /// The first of them.
     pub listed: Vec<Change>,
+    /// The first of each tile of the map, tile by tile.
+    #[serde(skip)]
+    pub examples: Vec<Change>,
     pub map: ChangeMap,
 }
 
@@ -192,6 +226,27 @@ pub fn text(diff: &LayoutDiff) -> String {
     for (which, count) in [("a", diff.texts_apart[0]), ("b", diff.texts_apart[1])] {
         if count > SHOWN as u64 {
             let _ = writeln!(out, "and {} more texts only in {which}", count - SHOWN as u64);
+        }
+    }
+    if diff.missing.in_both > 0 {
+        let _ = writeln!(
+            out,
+            "{} to cells that neither file has, the same in both; what they hold was not compared",
+            counted(diff.missing.in_both as usize, "reference")
+        );
+    }
+    let missing = [&diff.missing.only_in_a, &diff.missing.only_in_b];
+    for ((which, list), count) in ["a", "b"].into_iter().zip(missing).zip(diff.missing.apart) {
+        for m in list.iter().take(SHOWN) {
+            let [x, y] = m.at_nm.map(|v| v * 1e-3);
+            let _ = writeln!(
+                out,
+                "only in {which}: a reference to {}, which the file does not have, at ({x:.3}, {y:.3}) um",
+                m.cell
+            );
+        }
+        if count > SHOWN as u64 {
+            let _ = writeln!(out, "and {} more such references only in {which}", count - SHOWN as u64);
         }
     }
     for c in diff.listed.iter().take(SHOWN) {

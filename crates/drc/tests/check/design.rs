@@ -164,7 +164,7 @@ fn shipped_designs_of_other_arrays_and_phases_hold() {
 fn by_its_own_rules(name: &str, changes: &[(&str, &str)]) -> DrcReport {
     let text = metalith_testing::accepting(&metalith_testing::changed(name, changes));
     let design = Design::parse(&metalith_testing::design(name), &text).unwrap();
-    as_written(&design, &Deck::for_design(Some(&design)))
+    as_written(&design, &Deck::for_design(&design))
 }
 
 fn rule<'a>(report: &'a DrcReport, id: &str) -> &'a metalith_drc::RuleReport {

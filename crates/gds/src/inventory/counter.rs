@@ -55,6 +55,12 @@ impl KindTally {
             .fold(0, u64::saturating_add)
     }
 
+    /// Smallest and largest side of squares and rectangles and diameter of circles, as drawn in their cells; a database unit
+    /// is so long (nm).
+    pub fn sides_nm(&self, unit_nm: f64) -> Option<[f64; 2]> {
+        (self.sides[0] <= self.sides[1]).then(|| self.sides.map(|side| side as f64 * unit_nm))
+    }
+
     /// Count an upright rectangle.
     #[inline]
     fn rectangle(&mut self, rect: &Rect, copies: u64) {

@@ -39,7 +39,7 @@ pub struct LayerLattices {
     pub layer: LayerNumber,
     pub top: String,
     /// Shape of most pillars, in the plural.
-    pub pillars: String,
+    pub pillars: &'static str,
     pub element_count: usize,
     /// The first elements.
     pub elements: Vec<FoundElement>,
@@ -91,7 +91,7 @@ pub(super) fn find(
                 Ok(seen) => found.push(LayerLattices {
                     layer,
                     top: top.clone(),
-                    pillars: seen.shape.plural().to_string(),
+                    pillars: seen.shape.plural(),
                     element_count: seen.sites.len(),
                     elements: seen.sites.iter().take(LISTED).map(FoundElement::of).collect(),
                 }),

@@ -5,7 +5,7 @@ mod boxes;
 mod counter;
 mod lattices;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -238,6 +238,25 @@ impl Layout {
         })
     }
 
+    /// Areas on a layer by what they are, from all top cells. None are known of a layout that was not opened by
+    /// [`Layout::open_counted`].
+    pub fn kinds_on(&self, layer: LayerNumber) -> KindTally {
+        let mut sum = KindTally::default();
+        for cell in self.cells().iter().filter(|cell| cell.placements > 0) {
+            let kinds = cell.counts.iter().flat_map(|counts| &counts.kinds);
+            let on_layer = cell.layers.iter().zip(kinds).filter(|((l, _), _)| *l == layer);
+            on_layer.for_each(|(_, kinds)| sum.add(kinds, cell.placements));
+        }
+        sum
+    }
+
+    /// Layers with areas or texts below the top cells, in order.
+    pub fn used_layers(&self) -> Vec<LayerNumber> {
+        let cells = self.cells().iter().filter(|cell| cell.placements > 0);
+        let layers: BTreeSet<LayerNumber> = cells.flat_map(|cell| cell.layers.iter().map(|(l, _)| *l)).collect();
+        layers.into_iter().collect()
+    }
+
     fn layers(&self, counts: &[u64], boxes: Option<&boxes::LayerBoxes>) -> Vec<LayerInventory> {
         let mut sums: BTreeMap<LayerNumber, (u64, u64, KindTally)> = BTreeMap::new();
         for (cell, &times) in self.cells().iter().zip(counts).filter(|(_, times)| **times > 0) {
@@ -255,7 +274,7 @@ impl Layout {
             layer,
             shapes,
             texts,
-            sides_nm: (kinds.sides[0] <= kinds.sides[1]).then(|| kinds.sides.map(|side| side as f64 * unit)),
+            sides_nm: kinds.sides_nm(unit),
             bounds_nm: boxes
                 .and_then(|boxes| boxes.get(&layer))
                 .filter(|r| !r.is_empty())
@@ -297,4 +316,168 @@ fn references(faulty: Vec<Faulty>) -> Vec<Reference> {
         byte: fault.offset,
     });
     each.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::{Path, PathBuf};
+
+    use super::*;
+    use crate::extract::{ExtractionPlan, extract};
+    use crate::limits::ReadLimits;
+    use crate::record::kind;
+    use metalith_core::Silent;
+
+    fn golden(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../golden/mini_3x3")
+            .join(name)
+    }
+
+    fn inventory(path: &Path) -> Inventory {
+        let layout = Layout::open_counted(path, ReadLimits::default(), &Silent).unwrap();
+        layout.inventory(&Silent).unwrap()
+    }
+
+    /// What arithmetic on cells says is what reading every shape says.
+    #[test]
+    fn counts_and_boxes_are_those_of_all_shapes_one_by_one() {
+        let path = golden("flat.gds.gz");
+        let found = inventory(&path);
+        let layout = Layout::open(&path).unwrap();
+        let plan = ExtractionPlan::discover(LayerNumber::new(1, 0));
+        let read = extract(&layout, &plan, &Silent).unwrap();
+        assert_eq!(found.layers.len(), read.survey.layers.len());
+        for (own, other) in found.layers.iter().zip(&read.survey.layers) {
+            assert_eq!(
+                (own.layer, own.shapes, own.texts),
+                (other.layer, other.shapes, other.texts)
+            );
+            assert_eq!(own.bounds_nm, other.bounds_nm);
+            let kinds = own.kinds;
+            let sum = kinds.pillar_like() + kinds.polygons + kinds.paths;
+            assert_eq!(sum, own.shapes);
+        }
+        assert_eq!(found.lattices.len(), 1);
+        assert_eq!(found.lattices[0].element_count, read.elements.len());
+        let texts: Vec<&str> = found.texts.iter().map(|t| t.string.as_str()).collect();
+        let want: Vec<&str> = read.survey.texts.iter().map(|t| t.string.as_str()).collect();
+        assert_eq!(texts, want);
+        assert!(found.gzip);
+    }
+
+    /// A GDSII file of records.
+    struct Records(Vec<u8>);
+
+    impl Records {
+        fn new() -> Self {
+            let mut records = Self(Vec::new());
+            records.put(kind::HEADER, 2, &[2, 0x58]);
+            let units = [0x3E41_8937_4BC6_A7F0u64, 0x3944_B82F_A09B_5A54].map(u64::to_be_bytes);
+            records.put(kind::UNITS, 5, units.concat().as_slice());
+            records
+        }
+
+        fn put(&mut self, kind: u8, data: u8, body: &[u8]) -> &mut Self {
+            self.0.extend((body.len() as u16 + 4).to_be_bytes());
+            self.0.extend([kind, data]);
+            self.0.extend(body);
+            self
+        }
+
+        fn cell(&mut self, name: &str) -> &mut Self {
+            self.put(kind::BGNSTR, 2, &[0; 24])
+                .put(kind::STRNAME, 6, name.as_bytes())
+        }
+
+        fn xy(&mut self, points: &[[i32; 2]]) -> &mut Self {
+            let bytes: Vec<u8> = points.iter().flatten().flat_map(|v| v.to_be_bytes()).collect();
+            self.put(kind::XY, 3, &bytes).put(kind::ENDEL, 0, &[])
+        }
+
+        fn outline(&mut self, points: &[[i32; 2]]) -> &mut Self {
+            self.put(kind::BOUNDARY, 0, &[])
+                .put(kind::LAYER, 2, &[0, 1])
+                .put(kind::DATATYPE, 2, &[0, 0])
+                .xy(points)
+        }
+
+        fn inventory(&mut self) -> Inventory {
+            self.put(kind::ENDLIB, 0, &[]);
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), &self.0).unwrap();
+            inventory(file.path())
+        }
+    }
+
+    const SQUARE: [[i32; 2]; 5] = [[0, 0], [100, 0], [100, 100], [0, 100], [0, 0]];
+
+    /// Each outline is counted as what it is, and a box of an array of 60,000 x 30,000 copies is exact.
+    #[test]
+    fn kinds_are_told_and_arrays_of_arrays_are_not_expanded() {
+        let circle: Vec<[i32; 2]> = (0..=24)
+            .map(|k| {
+                let angle = std::f64::consts::TAU * f64::from(k % 24) / 24.0;
+                [angle.cos(), angle.sin()].map(|v| (100.0 * v).round() as i32)
+            })
+            .collect();
+        let mut records = Records::new();
+        records
+            .cell("AA")
+            .outline(&SQUARE)
+            .outline(&[[0, 0], [100, 0], [100, 50], [0, 50], [0, 0]])
+            .outline(&[[0, 0], [80, 60], [20, 140], [-60, 80], [0, 0]])
+            .outline(&circle)
+            .outline(&[[0, 0], [300, 0], [0, 300], [0, 0]])
+            .put(kind::ENDSTR, 0, &[]);
+        records.cell("BB");
+        for _ in 0..2 {
+            records
+                .put(kind::AREF, 0, &[])
+                .put(kind::SNAME, 6, b"AA")
+                .put(kind::COLROW, 2, &[[0x75, 0x30], [0x75, 0x30]].concat())
+                .xy(&[[1000, 2000], [1000 + 30_000 * 400, 2000], [1000, 2000 + 30_000 * 500]]);
+        }
+        let found = records.put(kind::ENDSTR, 0, &[]).inventory();
+        let copies = 2 * 30_000 * 30_000;
+        let layer = &found.layers[0];
+        assert_eq!(layer.shapes, 5 * copies);
+        let kinds = layer.kinds;
+        for count in [
+            kinds.squares,
+            kinds.rectangles,
+            kinds.rotated_rectangles,
+            kinds.circles,
+            kinds.polygons,
+        ] {
+            assert_eq!(count, copies);
+        }
+        assert_eq!(layer.sides_nm, Some([50.0, 200.0]));
+        let [right, top] = [1000.0 + 29_999.0 * 400.0 + 300.0, 2000.0 + 29_999.0 * 500.0 + 300.0];
+        assert_eq!(layer.bounds_nm, Some([900.0, 1900.0, right, top]));
+        assert!(found.lattices_left_out.is_some_and(|why| why.contains("shapes")));
+        assert_eq!(
+            (found.tops.as_slice(), found.copies),
+            (["BB".to_owned()].as_slice(), copies)
+        );
+    }
+
+    /// References that lead nowhere and round in circles are named; what can be counted is.
+    #[test]
+    fn faults_of_the_tree_are_named() {
+        let mut records = Records::new();
+        for (cell, child) in [("AA", "BB"), ("BB", "AA"), ("TT", "NO")] {
+            records
+                .cell(cell)
+                .outline(&SQUARE)
+                .put(kind::SREF, 0, &[])
+                .put(kind::SNAME, 6, child.as_bytes())
+                .xy(&[[500, 0]])
+                .put(kind::ENDSTR, 0, &[]);
+        }
+        let found = records.inventory();
+        assert_eq!((found.dangling.len(), found.circular.len()), (1, 1));
+        assert_eq!(found.dangling[0].to, "NO");
+        assert!(found.layers[0].shapes >= 2);
+    }
 }

@@ -1,0 +1,47 @@
+//! The check of a layout of which nothing is known but what it holds: by the rules that every layout of its pillars must keep.
+
+use super::deck::Deck;
+use super::input::CheckInput;
+use super::report::DrcReport;
+use metalith_core::{Progress, Result};
+use metalith_gds::{LayerNumber, Layout};
+use metalith_pillars::DatabaseUnit;
+
+/// Word for the shape of most pillars, as in the name of a deck.
+fn plural(layout: &Layout, layer: LayerNumber) -> &'static str {
+    let kinds = layout.kinds_on(layer);
+    let rectangles = kinds.rectangles.saturating_add(kinds.rotated_rectangles);
+    if rectangles > kinds.squares.saturating_add(kinds.circles) {
+        "rectangles"
+    } else if kinds.circles > kinds.squares {
+        "circles"
+    } else {
+        "squares"
+    }
+}
+
+/// The deck of the program for a layout without a design: squares, circles or rectangles, whichever most of its pillars are, on
+/// the grid of its database unit. What they are is known of layouts of [`Layout::open_counted`].
+fn deck_of(name: &str, layout: &Layout) -> Deck {
+    let deck = Deck::named(name);
+    match DatabaseUnit::of_nm(layout.unit_nm()) {
+        Some(unit) => deck.on_grid(unit),
+        None => deck,
+    }
+}
+
+/// Check a layout without a design against the deck of the shape of its pillars.
+///
+/// # Errors
+/// As [`super::check`].
+pub fn check_generic(layout: &Layout, input: &CheckInput<'_>, progress: &dyn Progress) -> Result<DrcReport> {
+    let name = plural(layout, Deck::named("squares").pillars[0]);
+    let deck = deck_of(name, layout);
+    let report = super::check(layout, &deck, input, progress)?;
+    // Pillars may be told apart from other shapes by their lattice alone.
+    if report.elements == 0 || report.shape.plural() == name {
+        return Ok(report);
+    }
+    let deck = deck_of(report.shape.plural(), layout);
+    super::check(layout, &deck, input, progress)
+}
