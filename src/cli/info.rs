@@ -257,15 +257,15 @@ fn texts(found: &Inventory, out: &mut String) {
     }
     let _ = writeln!(out, "\n{}", counted(found.text_count as usize, "text"));
     for text in found.texts.iter().take(SHOWN) {
-        let [x, y] = text.at_nm.map(|v| exact(v * 1e-3));
-        let _ = writeln!(
-            out,
-            "  {} \"{}\" at ({x}, {y}) um in {}",
-            text.layer, text.string, text.cell
-        );
+        let [x, y] = text.at_nm.map(um);
+        let mut string: String = text.string.chars().take(LONGEST_TEXT).collect();
+        if string.len() < text.string.len() {
+            string.push_str("...");
+        }
+        let _ = writeln!(out, "  {} \"{string}\" at ({x}, {y}) um in {}", text.layer, text.cell);
     }
     if found.texts.len() > SHOWN {
-        let _ = writeln!(out, "  and more, see --json");
+        let _ = writeln!(out, "  --json lists {}", counted(found.texts.len(), "text"));
     }
 }
 

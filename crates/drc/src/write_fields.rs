@@ -9,6 +9,10 @@ use metalith_core::document::{Limits, Section};
 use metalith_gds::Rect;
 use metalith_gds::extract::{ExtractedElement, StoredPillars};
 use metalith_pillars::PillarRows;
+use metalith_report::exact;
+
+/// Multiples of the pitch that are tried on either side of the size of a field that cuts pillars.
+const SIZES_TRIED: u32 = 8;
 
 /// Fields of one size, in a grid about the centre of each element or of the layout.
 struct FieldRule {
@@ -88,23 +92,71 @@ impl FieldRule {
             .collect()
     }
 
+    /// True if no boundary comes nearer to the middle of a row or column than half the widest pillar of the element.
+    fn is_between_pillars(&self, flat: &FlatLayout<'_>) -> bool {
+        flat.elements.iter().enumerate().all(|(k, e)| {
+            let numbers = e.widths.histogram().len();
+            let halves = (0..numbers as u16).map(|number| flat.half_nm(number));
+            let widest = halves.fold([0.0, 0.0], |most, half| [0, 1].map(|a| f64::max(most[a], half[a])));
+            (0..2).all(|axis| {
+                let mut lines = self.reaching(flat, k, axis).into_iter();
+                lines.all(|(_, distance)| distance >= widest[axis] - ROUNDING_NM)
+            })
+        })
+    }
+
+    /// The nearest smaller and larger size of which no boundary cuts a pillar on a lattice (um): multiples of a step of the
+    /// lattice.
+    fn sizes_between_pillars(&self, flat: &FlatLayout<'_>) -> Vec<f64> {
+        let Some(first) = flat.elements.first() else {
+            return Vec::new();
+        };
+        let pitch = first.site.lattice.pitch_nm().nm();
+        let steps = self.size_nm / pitch;
+        let with = |steps: f64| Self {
+            size_nm: steps * pitch,
+            offset_nm: self.offset_nm,
+            about_elements: self.about_elements,
+            want: BoundaryRule::NoCut,
+        };
+        let fits = |steps: &f64| *steps >= 1.0 && with(*steps).is_between_pillars(flat);
+        let below = (0..SIZES_TRIED).map(|k| steps.floor() - f64::from(k)).find(fits);
+        let above = (0..SIZES_TRIED).map(|k| steps.ceil() + f64::from(k)).find(fits);
+        let um = |steps: f64| steps * pitch * 1e-3;
+        below.into_iter().chain(above).map(um).collect()
+    }
+
+    /// The violation, with sizes that have none.
+    fn words_cut(&self, flat: &FlatLayout<'_>) -> String {
+        let sizes = self.sizes_between_pillars(flat);
+        let sizes: Vec<String> = sizes.into_iter().map(exact).collect();
+        if sizes.is_empty() {
+            return "cut by a field boundary".into();
+        }
+        format!(
+            "cut by a field boundary: fields of {} um, multiples of the pitch, cut no pillar",
+            sizes.join(" or ")
+        )
+    }
+
     fn cut_on_lattices(&self, flat: &FlatLayout<'_>, found: &mut Findings) {
+        let mut said: Option<String> = None;
         for (k, e) in flat.elements.iter().enumerate() {
             let columns = self.reaching(flat, k, 0);
             let rows = self.reaching(flat, k, 1);
             let (n, mut room) = (e.site.lattice.sites(), Vec::new());
             let cut = |w: u16, axis: usize, distance: f64| w != 0 && distance < flat.half_nm(w)[axis] - ROUNDING_NM;
-            let words = || "cut by a field boundary".to_owned();
+            let mut words = || said.get_or_insert_with(|| self.words_cut(flat)).clone();
             for &(column, distance) in &columns {
                 for row in (0..n).filter(|&row| cut(e.widths.number(column, row), 0, distance)) {
-                    found.rect(&flat.pillar(k, row, column), words);
+                    found.rect(&flat.pillar(k, row, column), &mut words);
                 }
             }
             for &(row, distance) in &rows {
                 let line = e.widths.row(row, 0..n, &mut room).iter();
                 for (column, &w) in line.enumerate().filter(|(_, w)| cut(**w, 1, distance)) {
                     if !columns.iter().any(|&(c, d)| c == column && cut(w, 0, d)) {
-                        found.rect(&flat.pillar(k, row, column), words);
+                        found.rect(&flat.pillar(k, row, column), &mut words);
                     }
                 }
             }
