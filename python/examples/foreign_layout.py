@@ -70,7 +70,7 @@ assert layout.pillars == np.count_nonzero(widths)
 assert np.array_equal(drawn(layout.widths[0]), drawn(widths))
 
 # %% [markdown]
-# Design rules: those of the program ask for marks and an outline, which this layout does not have.
+# Design rules: those that every layout of square pillars must keep, since no design is named.
 
 # %%
 report = ml.check(folder / "foreign.gds")

@@ -50,8 +50,8 @@ def check(
     markers: int = 100,
     progress: Progress | None = None,
 ) -> CheckReport:
-    """Check a layout against design rules: those of the program if ``rules`` is left out. ``design`` puts the rules in
-    force that compare with it."""
+    """Check a layout against design rules: those of the program for the shape of its pillars, or for the ``design``, if
+    ``rules`` is left out. ``design`` puts the rules in force that compare with it."""
     native = design._native if design is not None else None
     most = _arguments.whole("markers", markers, 0, _arguments.MOST_32)
     text, clean = _native.check(layout, rules, native, list(with_layouts), waivers, most, progress)
