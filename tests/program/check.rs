@@ -114,7 +114,15 @@ fn rules_from_a_layout_find_a_narrower_gap() {
         rules.as_ref(),
     ])
     .code(0);
-    let check = |layout: &Path| run(&["check".as_ref(), layout.as_ref(), "--rules".as_ref(), rules.as_ref()]);
+    let check = |layout: &Path| {
+        run(&[
+            "check".as_ref(),
+            layout.as_ref(),
+            "--rules".as_ref(),
+            rules.as_ref(),
+            "--json".as_ref(),
+        ])
+    };
     check(&layout).code(0);
     // The widest pillar, and the one beside it: 2 nm each.
     let mut narrow = Chip::clean();
@@ -129,8 +137,13 @@ fn rules_from_a_layout_find_a_narrower_gap() {
     let beside = if ix > 0 { ix - 1 } else { ix + 1 };
     narrow.at(beside, iy).4 = widest;
     let out = check(&write("narrow.gds", &narrow)).code(1);
-    let said = String::from_utf8_lossy(&out.get_output().stdout).into_owned();
-    assert!(said.contains("a gap of"), "{said}");
+    let found: serde_json::Value = serde_json::from_slice(&out.get_output().stdout).unwrap();
+    let judged = found["rules"].as_array().unwrap();
+    assert!(
+        judged
+            .iter()
+            .any(|rule| rule["id"] == "gap.min" && rule["violations"] != 0)
+    );
     run(&[
         "check".as_ref(),
         layout.as_ref(),

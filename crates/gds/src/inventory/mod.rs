@@ -455,7 +455,7 @@ mod tests {
         assert_eq!(layer.sides_nm, Some([50.0, 200.0]));
         let [right, top] = [1000.0 + 29_999.0 * 400.0 + 300.0, 2000.0 + 29_999.0 * 500.0 + 300.0];
         assert_eq!(layer.bounds_nm, Some([900.0, 1900.0, right, top]));
-        assert!(found.lattices_left_out.is_some_and(|why| why.contains("shapes")));
+        assert!(found.lattices.is_empty() && found.lattices_left_out.is_some());
         assert_eq!(
             (found.tops.as_slice(), found.copies),
             (["BB".to_owned()].as_slice(), copies)
