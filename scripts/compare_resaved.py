@@ -182,7 +182,7 @@ def calibrate(program, session, out):
         if path != session / name:
             shutil.copy(path, target)
         (copy / "measurement.toml").write_text(text.replace(f'"{name}"', f'"{target.name}"'))
-        done = run(program, "calibrate", copy, "--json", "--effects", "gap", "--out", copy / "out", codes=(0, 1))
+        done = run(program, "calibrate", copy, "--json", "--effects", "defocus", "--out", copy / "out", codes=(0, 1))
         found[key] = json.loads(done.stdout)
         same("calibrate", found["original"], found[key], path)
     print(f"{session.name}: the same diagnosis of {len(found) - 1} layouts saved again", flush=True)

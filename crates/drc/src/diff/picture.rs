@@ -9,6 +9,8 @@ use metalith_report::{Axis, Cell, Column, HeatMap, Page, Plan, Table, Verdict, c
 const DRAWN: usize = 400;
 /// Figures of changes near one another.
 const PLACES: usize = 6;
+/// Least width of what a figure shows around its first change (um).
+const AROUND_UM: f64 = 1.0;
 /// Texts and references that the page lists of each layout.
 const LABELS: usize = 50;
 /// Distance from the first change of a figure to the farthest that it draws (nm): changes far apart would be dots.
@@ -59,10 +61,6 @@ pub fn page(diff: &LayoutDiff) -> Page {
 /// Changes near one another, the first change first, then those farthest from all before them.
 fn places(diff: &LayoutDiff) -> Vec<Vec<&Change>> {
     let all: Vec<&Change> = diff.listed.iter().chain(&diff.examples).collect();
-    let apart = |a: &Change, b: &Change| {
-        let along = |axis: usize| (a.bounds_nm[axis] - b.bounds_nm[axis]).abs();
-        along(0).max(along(1))
-    };
     let mut places: Vec<&Change> = all.first().copied().into_iter().collect();
     let mut nearest = vec![f64::INFINITY; all.len()];
     while let (Some(last), true) = (places.last(), places.len() < PLACES) {
@@ -75,18 +73,28 @@ fn places(diff: &LayoutDiff) -> Vec<Vec<&Change>> {
             None => break,
         }
     }
-    let near = |place: &Change| {
-        let mut own: Vec<&Change> = all.iter().copied().filter(|c| apart(place, c) < SPAN_NM).collect();
-        // An example may be listed too.
-        own.sort_by(|a, b| {
-            a.bounds_nm
-                .partial_cmp(&b.bounds_nm)
-                .unwrap_or(std::cmp::Ordering::Equal)
-        });
-        own.dedup();
-        own
-    };
-    places.into_iter().map(near).collect()
+    places.into_iter().map(|place| near(place, &all)).collect()
+}
+
+/// Extent along x or y, whichever is more, from one change to another (nm).
+fn apart(a: &Change, b: &Change) -> f64 {
+    let along = |axis: usize| (a.bounds_nm[axis] - b.bounds_nm[axis]).abs();
+    along(0).max(along(1))
+}
+
+/// A change and those near it.
+fn near<'d>(place: &'d Change, all: &[&'d Change]) -> Vec<&'d Change> {
+    let mut own: Vec<&Change> = all.iter().copied().filter(|c| apart(place, c) < SPAN_NM).collect();
+    // An example may be listed too.
+    own.sort_by(|a, b| {
+        a.bounds_nm
+            .partial_cmp(&b.bounds_nm)
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    own.dedup();
+    own.retain(|c| *c != place);
+    own.insert(0, place);
+    own
 }
 
 fn heat(diff: &LayoutDiff, places: &[Vec<&Change>]) -> metalith_report::Figure {
@@ -127,8 +135,12 @@ fn shapes(diff: &LayoutDiff, changes: &[&Change], place: usize) -> metalith_repo
         let b = c.bounds_nm.map(|v| v * 1e-3);
         plan.rectangle(layer, (b[0], b[1]), (b[2], b[3]));
     }
+    // One pillar alone would fill the figure.
+    let [left, bottom, right, top] = changes[0].bounds_nm.map(|v| v * 1e-3);
+    plan.reach(left - AROUND_UM, bottom - AROUND_UM)
+        .reach(right + AROUND_UM, top + AROUND_UM);
     plan.caption(format!(
-        "{drawn} of {} changes, all within 20 um of one another along an axis.",
+        "{drawn} of {} changes, all within 20 um of the mark along x and y.",
         count(diff.changes)
     ))
 }
