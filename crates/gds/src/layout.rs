@@ -19,8 +19,8 @@ use metalith_core::{Progress, Silent};
 /// Cells at the top that a message names.
 const TOPS_NAMED: usize = 8;
 
-/// A GDSII or OASIS file of which every byte has been looked at once: cells in number, their tree, their faults.
-/// Shapes are not held; [`Layout::visit`] reads them again.
+/// A GDSII or OASIS file, or a drawing in DXF, of which every byte has been looked at once: cells in number, their tree, their
+/// faults. Shapes are not held; [`Layout::visit`] reads them again.
 pub struct Layout {
     source: Source,
     limits: ReadLimits,
@@ -35,6 +35,8 @@ pub struct Layout {
     warnings: ReadWarnings,
     /// Number of the name of each cell.
     numbers: Vec<u32>,
+    /// True if cells that are not in the file count as empty.
+    missing_are_empty: bool,
     /// Places of the cells of notes, which are no layout.
     pub(super) notes: Vec<std::ops::Range<u64>>,
 }
@@ -59,15 +61,26 @@ impl Layout {
     /// # Errors
     /// If it cannot be read, is neither GDSII nor OASIS, or is beyond [`ReadLimits::default`].
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_with(path, ReadLimits::default(), &Silent)
+        Self::of(Source::file(path)?, ReadLimits::default(), &Silent)
     }
 
-    /// Read the file at `path` once, within `limits`.
+    /// Read the file at `path` once, within `limits`. Unless `progress` is strict, it is warned of cells that are referred to and
+    /// are not in the file, and they count as empty.
     ///
     /// # Errors
     /// As [`Layout::open`].
     pub fn open_with(path: &Path, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
-        Self::of(Source::file(path)?, limits, progress)
+        let mut layout = Self::of(Source::file(path)?, limits, progress)?;
+        if let Some(Faulty { cell, name, offset }) = layout.dangling().into_iter().next().filter(|_| !progress.strict())
+        {
+            let cause = LayoutError::Dangling { cell, name };
+            progress.warn(&format!(
+                "warning[layout/odd]: {}, byte {offset}: {cause}; such cells were taken as empty",
+                path.display()
+            ));
+            layout.missing_are_empty = true;
+        }
+        Ok(layout)
     }
 
     /// A layout from bytes in memory; `name` stands for the path in messages.
@@ -83,6 +96,19 @@ impl Layout {
     }
 
     fn of(source: Source, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
+        if let Some(drawing) = source.drawing() {
+            if let Some(cause) = drawing.fault().filter(|_| progress.strict()) {
+                return Err(Error::Layout {
+                    path: source.path().to_owned(),
+                    offset: 0,
+                    cause,
+                });
+            }
+            let name = source.path().display();
+            drawing
+                .texts()
+                .for_each(|text| progress.warn(&text.replacen(": ", &format!(": {name}: "), 1)));
+        }
         let scan = scan(&source, &limits, progress)?;
         scan.warnings.report(source.path(), progress);
         Ok(Self::from_scan(source, limits, scan))
@@ -105,6 +131,7 @@ impl Layout {
             warnings: scan.warnings,
             numbers: scan.numbers,
             notes,
+            missing_are_empty: false,
         }
     }
 
@@ -295,7 +322,7 @@ impl Layout {
     /// Checks that every reference leads to a cell, and none round in a circle.
     pub(super) fn sound(&self) -> Result<()> {
         self.no_circles()?;
-        if let Some(f) = self.dangling().into_iter().next() {
+        if let Some(f) = self.dangling().into_iter().next().filter(|_| !self.missing_are_empty) {
             let (cell, name) = (f.cell, f.name);
             return Err(self.fault(f.offset, LayoutError::Dangling { cell, name }));
         }
