@@ -306,6 +306,6 @@ mod tests {
             Err(format!("{page} {size:?}"))
         });
         assert_eq!(refuses.unwrap_err(), "0 [2, 4, 1]");
-        assert!(values(b"II*\0nothing".to_vec()).unwrap_err().contains("no TIFF"));
+        assert!(values(b"II*\0nothing".to_vec()).is_err());
     }
 }

@@ -4,15 +4,16 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use metalith_core::file::read_at_most;
-use metalith_core::{Error, Result, npy, srgb};
+use metalith_core::{Error, Result, file_kind, npy, srgb, tiff};
 use ndarray::{Array3, Axis};
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
+use super::colours::Colours;
 use super::pixel_count::{SIDES, sides_words};
-use super::{SceneImage, cube};
+use super::{SceneImage, cube, exr};
 use crate::geometry::SceneView;
 
 /// Longest file (bytes): a cube of 1024 x 1024 with 31 bands in double precision, and some more.
@@ -43,8 +44,9 @@ pub fn read_far_scene(path: &Path, field_deg: f64) -> Result<SceneImage> {
     })
 }
 
-/// Read a scene: PNG of 8 or 16 bits or JPEG in sRGB; NPY of linear light, `[row, column]` or `[row, column, colour]`;
-/// NPY `[row, column, band]` of reflectance with the wavelengths of its bands.
+/// Read a scene: PNG, JPEG or TIFF of 8 or 16 bits, in sRGB or with a colour profile; TIFF with a decimal point, EXR or NPY of
+/// linear light, `[row, column]` or `[row, column, colour]`; NPY `[row, column, band]` of reflectance with the wavelengths
+/// of its bands.
 ///
 /// # Errors
 /// If the file cannot be read or holds something else; the text says what is wrong and what to give.
@@ -89,7 +91,10 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
             let rgb = if is_npy {
                 grey_or_colour(path, light(path, &bytes)?)?
             } else {
-                values(path, &bytes)?.mapv(srgb::linear)
+                match stored(path, &bytes)? {
+                    Stored::Srgb(values) => values.mapv(srgb::linear),
+                    Stored::Light(light) => light,
+                }
             };
             Ok(SceneImage::of_rgb(&name, &rgb, file.field_deg, file.distance_um))
         }
@@ -105,37 +110,117 @@ pub fn read_picture(path: &Path) -> Result<Array3<f64>> {
     if is_npy(&bytes) {
         return Ok(grey_or_colour(path, light(path, &bytes)?)?.mapv(srgb::encoded));
     }
-    values(path, &bytes)
+    Ok(match stored(path, &bytes)? {
+        Stored::Srgb(values) => values,
+        Stored::Light(light) => light.mapv(srgb::encoded),
+    })
 }
 
 fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x93NUMPY")
 }
 
-/// Values of an image file as they are stored, full scale being one.
-fn values(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
-    if bytes.starts_with(b"\x89PNG") {
-        Ok(png_values(path, bytes)?.0)
-    } else if bytes.starts_with(&[0xff, 0xd8]) {
-        jpeg(path, bytes)
-    } else {
-        Err(fault(path, "it is neither PNG, JPEG nor NPY"))
+/// Pixels of an image file.
+enum Stored {
+    /// Values in sRGB, full scale being one.
+    Srgb(Array3<f64>),
+    /// Linear sRGB, white being one.
+    Light(Array3<f64>),
+}
+
+impl Stored {
+    fn of(values: Array3<f64>, colours: &Colours) -> Self {
+        if colours.is_srgb() {
+            Self::Srgb(values)
+        } else {
+            Self::Light(colours.light(&values))
+        }
     }
 }
 
+fn stored(path: &Path, bytes: &[u8]) -> Result<Stored> {
+    if bytes.starts_with(b"\x89PNG") {
+        let png = png_values(path, bytes)?;
+        let colours = png.colours.map_err(|what| fault(path, what))?;
+        Ok(Stored::of(upright(png.values, png.orientation), &colours))
+    } else if bytes.starts_with(&[0xff, 0xd8]) {
+        jpeg(path, bytes)
+    } else if [&b"II*\0"[..], b"MM\0*", b"II+\0", b"MM\0+"]
+        .iter()
+        .any(|m| bytes.starts_with(m))
+    {
+        tiff_values(path, bytes)
+    } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        let (light, colours) =
+            exr::light(bytes, |rows, columns| sides(rows, columns)).map_err(|what| fault(path, what))?;
+        finite(path, &light)?;
+        Ok(Stored::Light(colours.light(&light)))
+    } else {
+        let named = file_kind::words(bytes);
+        Err(fault(
+            path,
+            named.unwrap_or("it is neither PNG, JPEG, TIFF, EXR nor NPY"),
+        ))
+    }
+}
+
+fn finite(path: &Path, light: &Array3<f64>) -> Result<()> {
+    if light.iter().all(|v| v.is_finite()) {
+        Ok(())
+    } else {
+        Err(fault(path, "it holds light that is no number"))
+    }
+}
+
+/// Pixels of the first page of a TIFF: whole numbers are values in sRGB or of the profile, others are linear light.
+fn tiff_values(path: &Path, bytes: &[u8]) -> Result<Stored> {
+    let read = tiff::read(Cursor::new(bytes), |page, [rows, columns, _]| match page {
+        0 => sides(rows, columns),
+        _ => Err("it has several pages: write the one that is meant".into()),
+    });
+    let read = read.map_err(|what| fault(path, what))?;
+    let page = &read.pages[0];
+    let full = page.largest.map_or(1.0, f64::from);
+    let (own, colours) = (page.channels, if page.channels < 3 { 1 } else { 3 });
+    let value = |y: usize, x: usize, c: usize| f64::from(page.values[(y * page.columns + x) * own + c]) / full;
+    let (rows, columns) = (page.rows, page.columns);
+    if own > colours && (0..rows).any(|y| (0..columns).any(|x| value(y, x, colours) < 1.0)) {
+        return Err(fault(path, TRANSPARENT));
+    }
+    let values = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| value(y, x, c.min(colours - 1)));
+    finite(path, &values)?;
+    let colours = match (&read.profile, page.largest) {
+        (Some(profile), _) => Some(Colours::of_profile(profile).map_err(|what| fault(path, what))?),
+        (None, Some(_)) => None,
+        (None, None) => Some(Colours::linear(None)),
+    };
+    let values = upright(values, read.orientation);
+    Ok(match colours {
+        Some(colours) => Stored::of(values, &colours),
+        None => Stored::Srgb(values),
+    })
+}
+
+/// Word on a picture that is not opaque.
+const TRANSPARENT: &str = "parts of it are transparent";
+
 fn fault(path: &Path, what: impl Into<String>) -> Error {
     let hint = format!(
-        "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
+        "give a PNG or TIFF (8 or 16 bits, opaque) or a JPEG, in sRGB or with a colour profile, an EXR, TIFF or NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
         sides_words()
     );
     Error::table(path, None, what, hint)
 }
 
 fn check_sides(path: &Path, rows: usize, columns: usize) -> Result<()> {
+    sides(rows, columns).map_err(|what| fault(path, what))
+}
+
+fn sides(rows: usize, columns: usize) -> Result<(), String> {
     if SIDES.contains(&rows) && SIDES.contains(&columns) {
         return Ok(());
     }
-    Err(fault(path, format!("it has {columns} x {rows} pixels")))
+    Err(format!("it has {columns} x {rows} pixels"))
 }
 
 /// An array of two or three axes, and whether it has whole numbers; one of two axes gets a third of one entry.
@@ -156,7 +241,7 @@ pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
 fn light(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     let (array, whole) = array(path, bytes)?;
     if whole {
-        let what = "it has whole numbers (uint8 or uint16), and linear light of which white is 1 has fractions";
+        let what = "it has whole numbers, and linear light of which white is 1 has fractions";
         let hint = "divide it by its white and save it as float32 or float64: `numpy.save(file, values / white)`; of values in sRGB make a PNG";
         return Err(Error::table(path, None, what, hint));
     }
@@ -178,8 +263,19 @@ fn grey_or_colour(path: &Path, array: Array3<f64>) -> Result<Array3<f64>> {
     }
 }
 
-/// Red, green and blue of an opaque PNG as they are stored, full scale being one; and whether values have 16 bits.
-pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
+/// An opaque PNG.
+pub(super) struct Png {
+    /// Red, green and blue as they are stored, full scale being one.
+    pub values: Array3<f64>,
+    /// True if values have 16 bits.
+    pub deep: bool,
+    /// What the values are in light, or what is wrong with it.
+    colours: Result<Colours, String>,
+    /// As EXIF numbers it.
+    orientation: u16,
+}
+
+pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<Png> {
     let wrong = |e: png::DecodingError| fault(path, e.to_string());
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND);
@@ -202,15 +298,23 @@ pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool
         }
     };
     if samples % 2 == 0 && (0..rows).any(|y| (0..columns).any(|x| value(y, x, samples - 1) < 1.0)) {
-        return Err(fault(path, "parts of it are transparent"));
+        return Err(fault(path, TRANSPARENT));
     }
-    let colours = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
+    let values = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
         value(y, x, if samples < 3 { 0 } else { c })
     });
-    Ok((colours, deep))
+    // EXIF may stand behind the pixels; what is damaged there is no fault of them.
+    let _ = reader.finish();
+    let info = reader.info();
+    Ok(Png {
+        values,
+        deep,
+        colours: Colours::of_png(info),
+        orientation: info.exif_metadata.as_deref().map_or(1, orientation),
+    })
 }
 
-fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
+fn jpeg(path: &Path, bytes: &[u8]) -> Result<Stored> {
     let options = DecoderOptions::default()
         .jpeg_set_out_colorspace(ColorSpace::RGB)
         .set_max_width(*SIDES.end())
@@ -225,7 +329,14 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     let stored = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
         f64::from(data[(y * columns + x) * 3 + c]) / 255.0
     });
-    Ok(upright(stored, decoder.exif().map_or(1, |exif| orientation(exif))))
+    let stored = upright(stored, decoder.exif().map_or(1, |exif| orientation(exif)));
+    Ok(match decoder.icc_profile() {
+        Some(profile) => Stored::of(
+            stored,
+            &Colours::of_profile(&profile).map_err(|what| fault(path, what))?,
+        ),
+        None => Stored::Srgb(stored),
+    })
 }
 
 /// Orientation in which a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if the file does not
@@ -272,6 +383,7 @@ fn upright(mut stored: Array3<f64>, orientation: u16) -> Array3<f64> {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::colours::tests::{P3, curve_of_srgb, profile};
     use super::*;
 
     fn file(path: &Path, nm: Option<Vec<f64>>) -> SceneFile {
@@ -403,6 +515,128 @@ pub(super) mod tests {
         );
     }
 
+    /// A PNG of one colour, with chunks behind its head.
+    fn png_with(colour: [u8; 3], chunks: impl FnOnce(&mut png::Info<'_>)) -> Vec<u8> {
+        let mut info = png::Info::with_size(16, 20);
+        info.color_type = png::ColorType::Rgb;
+        info.bit_depth = png::BitDepth::Eight;
+        chunks(&mut info);
+        let mut bytes = Vec::new();
+        let encoder = png::Encoder::with_info(&mut bytes, info).unwrap();
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&colour.repeat(16 * 20)).unwrap();
+        writer.finish().unwrap();
+        bytes
+    }
+
+    /// Profiles, gamma and rotation of PNG, and profiles of JPEG and TIFF, are used.
+    #[test]
+    fn colours_are_those_that_a_file_states() {
+        /// Digits of a profile.
+        const TOLERANCE: f64 = 5e-4;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.bin");
+        let scene = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            read_scene(&file(&path, None)).unwrap()
+        };
+        let light = |bytes: &[u8]| {
+            let rgb = scene(bytes).rgb();
+            [0, 1, 2].map(|c| rgb[[0, 0, c]])
+        };
+        let near = |found: [f64; 3], want: [f64; 3]| {
+            let apart = (0..3).map(|c| (found[c] - want[c]).abs()).fold(0.0, f64::max);
+            assert!(apart < TOLERANCE, "{found:?} {want:?}");
+        };
+        let grey = 100.0 / 255.0;
+        near(
+            light(&png_with([100; 3], |info| {
+                info.source_gamma = Some(png::ScaledFloat::new(1.0))
+            })),
+            [grey; 3],
+        );
+        near(
+            light(&png_with([100; 3], |info| {
+                info.source_gamma = Some(png::ScaledFloat::new(0.45455))
+            })),
+            [srgb::linear(grey); 3],
+        );
+        let p3 = profile(P3, &curve_of_srgb());
+        let red = [1.22494, 0.0, 0.0];
+        near(
+            light(&png_with([255, 0, 0], |info| {
+                info.icc_profile = Some(p3.clone().into())
+            })),
+            red,
+        );
+        // A picture is cut to what sRGB has.
+        let values = read_picture(&path).unwrap();
+        assert!((values[[0, 0, 0]] - 1.0).abs() < 1e-6 && values[[0, 0, 1]] == 0.0);
+        let odd = png_with([255, 0, 0], |info| info.icc_profile = Some(b"no profile".into()));
+        std::fs::write(&path, odd).unwrap();
+        assert!(read_scene(&file(&path, None)).is_err());
+        let exif = [&b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0"[..], &[0; 4]].concat();
+        let turned = scene(&png_with([9; 3], |info| info.exif_metadata = Some(exif.into())));
+        assert_eq!((turned.view.rows, turned.view.columns), (16, 20));
+
+        let plain = std::fs::read("../../tests/mutants/small.jpg").unwrap();
+        let chunk = [&b"ICC_PROFILE\0\x01\x01"[..], &p3].concat();
+        let length = (chunk.len() as u16 + 2).to_be_bytes();
+        let marked = [&plain[..2], &[0xff, 0xe2], &length, &chunk, &plain[2..]].concat();
+        let (of_srgb, of_p3) = (scene(&plain).rgb(), scene(&marked).rgb());
+        let colours = Colours::of_profile(&p3).unwrap();
+        let wanted = colours.light(&of_srgb.mapv(srgb::encoded));
+        assert!(of_p3.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < TOLERANCE));
+        assert!(
+            of_p3
+                .iter()
+                .zip(&of_srgb)
+                .any(|(a, b)| (a - b).abs() > 10.0 * TOLERANCE)
+        );
+    }
+
+    #[test]
+    fn tiff_and_exr_are_read() {
+        use ::exr::prelude::{f16, write_rgb_file};
+        use ::tiff::encoder::{TiffEncoder, colortype};
+        /// Digits of half precision.
+        const HALF: f64 = 5e-4;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.bin");
+        let half = srgb::linear(188.0 / 255.0);
+        let check = |want: f64| {
+            let rgb = read_scene(&file(&path, None)).unwrap().rgb();
+            assert!(rgb.iter().all(|v| (v - want).abs() < HALF), "{} {want}", rgb[[0, 0, 0]]);
+        };
+        fn encoded<C: ::tiff::encoder::colortype::ColorType>(path: &Path, values: &[C::Inner])
+        where
+            [C::Inner]: ::tiff::encoder::TiffValue,
+        {
+            let mut encoder = TiffEncoder::new(std::fs::File::create(path).unwrap()).unwrap();
+            encoder.write_image::<C>(16, 16, values).unwrap();
+        }
+        encoded::<colortype::RGB8>(&path, &[188; 768]);
+        check(half);
+        encoded::<colortype::Gray16>(&path, &[48316; 256]);
+        check(half);
+        encoded::<colortype::RGB32Float>(&path, &[half as f32; 768]);
+        check(half);
+        encoded::<colortype::RGBA8>(&path, &[7; 1024]);
+        assert!(read_scene(&file(&path, None)).is_err());
+        let exr = folder.path().join("scene.exr");
+        let write = |value: f32| write_rgb_file(&exr, 16, 16, |_, _| [value; 3].map(f16::from_f32).into()).unwrap();
+        write(half as f32);
+        std::fs::copy(&exr, &path).unwrap();
+        check(half);
+        // White is 1, and light may be more.
+        write(7.5);
+        std::fs::copy(&exr, &path).unwrap();
+        check(7.5);
+        write(f32::NAN);
+        std::fs::copy(&exr, &path).unwrap();
+        assert!(read_scene(&file(&path, None)).is_err());
+    }
+
     #[test]
     fn odd_files_are_refused_with_a_reason() {
         let folder = tempfile::tempdir().unwrap();
@@ -412,7 +646,12 @@ pub(super) mod tests {
             let error = read_scene(&file(&path, nm)).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
         };
-        refused(b"GIF89a", None, "neither");
+        refused(b"unknown", None, "neither");
+        refused(b"GIF89a", None, "GIF");
+        refused(b"RIFF\0\0\0\0WEBPVP8 ", None, "dwebp");
+        refused(b"\0\0\0\x1cftypavif", None, "avifdec");
+        refused(b"II*\0\x08\0\0\0", None, "TIFF");
+        refused(&[0x76, 0x2f, 0x31, 0x01, 2, 0], None, "EXR");
         refused(&npy_bytes("(16, 16, 4)", &[0.1; 1024]), None, "bands");
         refused(
             &npy_bytes("(16, 16, 4)", &[0.1; 1024]),
