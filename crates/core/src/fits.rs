@@ -86,8 +86,12 @@ impl Header {
 /// # Errors
 /// What is wrong with the file, in words, and what `takes` says.
 pub fn read(mut from: impl Read, takes: impl FnOnce([usize; 3]) -> Result<(), String>) -> Result<Frames, String> {
-    for _ in 0..MOST_PARTS {
-        let header = Header::read(&mut from)?;
+    for part in 0..MOST_PARTS {
+        let header = match Header::read(&mut from) {
+            // The end of the file.
+            Err(_) if part > 0 => break,
+            header => header?,
+        };
         if header.text("ZIMAGE") == Some("T") {
             return Err("its frames are compressed: write it without, by `funpack`".into());
         }

@@ -1,10 +1,10 @@
 //! Numbers and pictures from TIFF files.
 
-use std::io::{Read, Seek};
+use std::io::{Read, Seek, SeekFrom};
 
 use tiff::ColorType;
 use tiff::decoder::{Decoder, Limits};
-use tiff::tags::{ByteOrder, SampleFormat, Tag};
+use tiff::tags::{SampleFormat, Tag};
 
 /// A page as the file has it.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,6 +120,22 @@ fn page<R: Read + Seek>(
 ) -> Result<Page, String> {
     let layout = decoder.image_buffer_layout().map_err(wrong)?;
     let of = Samples::of(layout.sample_format, bits)?;
+    if matches!(of, Samples::Whole(9..=15)) {
+        let mut values = Vec::with_capacity(rows * columns * channels);
+        for row in packed_rows(decoder, [rows, columns, channels], bits)? {
+            let mut own = vec![0.0; columns * channels];
+            of.read(&row, own.iter_mut());
+            values.extend(own);
+        }
+        let largest = of.largest();
+        return Ok(Page {
+            rows,
+            columns,
+            channels,
+            values,
+            largest,
+        });
+    }
     let planes = layout.planes.max(1);
     let in_row = columns * channels / planes;
     let row = (in_row * usize::from(bits)).div_ceil(8);
@@ -132,15 +148,10 @@ fn page<R: Read + Seek>(
     }
     let mut bytes = vec![0; layout.complete_len];
     decoder.read_image_bytes(&mut bytes).map_err(wrong)?;
-    let swapped = !of.is_aligned() && bits > 8 && decoder.byte_order() != ByteOrder::native();
     let mut values = vec![0.0; rows * columns * channels];
     for y in 0..rows {
         for k in 0..planes {
-            let own = &mut bytes[k * plane + y * stride..][..row];
-            if swapped {
-                // The decoder takes packed numbers for pairs of bytes.
-                own.chunks_exact_mut(2).for_each(|pair| pair.swap(0, 1));
-            }
+            let own = &bytes[k * plane + y * stride..][..row];
             let to = values[y * columns * channels..].iter_mut().skip(k).step_by(planes);
             of.read(own, to.take(in_row));
         }
@@ -152,6 +163,42 @@ fn page<R: Read + Seek>(
         values,
         largest: of.largest(),
     })
+}
+
+/// Rows of numbers of 9 to 15 bits one behind the other, each row from a new byte, which the decoder does not read.
+fn packed_rows<R: Read + Seek>(
+    decoder: &mut Decoder<R>,
+    [rows, columns, channels]: [usize; 3],
+    bits: u8,
+) -> Result<Vec<Vec<u8>>, String> {
+    let mut number = |tag, default: usize| match decoder.find_tag_unsigned::<u32>(tag) {
+        Ok(found) => Ok(found.map_or(default, |v| v as usize)),
+        Err(error) => Err(wrong(error)),
+    };
+    let compressed = number(Tag::Compression, 1)? != 1;
+    if compressed || number(Tag::FillOrder, 1)? != 1 || channels > 1 && number(Tag::PlanarConfiguration, 1)? != 1 {
+        return Err(format!(
+            "its numbers of {bits} bits are compressed, in several planes or in reverse order: write them as 16 bits"
+        ));
+    }
+    let in_strip = number(Tag::RowsPerStrip, rows)?.clamp(1, rows.max(1));
+    let strips = decoder.get_tag_u64_vec(Tag::StripOffsets).map_err(wrong)?;
+    if strips.len() < rows.div_ceil(in_strip) {
+        return Err("its size is not that of its pixels".into());
+    }
+    let row = (columns * channels * usize::from(bits)).div_ceil(8);
+    let early = |e: std::io::Error| format!("it ends early: {e}");
+    let mut out = Vec::with_capacity(rows);
+    for y in 0..rows {
+        if y % in_strip == 0 {
+            let place = SeekFrom::Start(strips[y / in_strip]);
+            decoder.inner().seek(place).map_err(early)?;
+        }
+        let mut own = vec![0; row];
+        decoder.inner().read_exact(&mut own).map_err(early)?;
+        out.push(own);
+    }
+    Ok(out)
 }
 
 /// Form of the numbers.
@@ -176,11 +223,6 @@ impl Samples {
                 "its pixels are {format:?} of {bits} bits; 1 to 16 and 32 bits are read, or 16, 32 and 64 with a decimal point"
             )),
         }
-    }
-
-    /// True if each number begins with a byte.
-    fn is_aligned(self) -> bool {
-        !matches!(self, Self::Whole(bits) if bits % 8 != 0)
     }
 
     fn largest(self) -> Option<f32> {

@@ -208,6 +208,11 @@ impl<W: Write> Cells<'_, W> {
             };
             match drawn(entity, &fields, unit)? {
                 Drawn::Polygon(points) => self.polygon(layer, &mut onto(&points)?, line)?,
+                Drawn::Polygons(all) => {
+                    for points in all {
+                        self.polygon(layer, &mut onto(&points)?, line)?;
+                    }
+                }
                 Drawn::Open(points) if !points.is_empty() => {
                     let mut points = onto(&points)?;
                     points.dedup();

@@ -20,6 +20,7 @@ pub(super) enum Kind {
     Face,
     Insert,
     Text,
+    Hatch,
     Unread,
 }
 
@@ -48,6 +49,7 @@ impl Kind {
             b"INSERT" => Self::Insert,
             b"TEXT" | b"MTEXT" => Self::Text,
             other if SILENT.contains(&other) => return None,
+            b"HATCH" => Self::Hatch,
             _ => Self::Unread,
         })
     }
@@ -123,7 +125,7 @@ impl<'a> Drawing<'a> {
             let Pair { code, value, line } = pair;
             match (code, value) {
                 (0, b"EOF") => break,
-                (0, b"ENDSEC") => (section, block) = (Section::Other, None),
+                (0, b"ENDSEC") => (section, block, held) = (Section::Other, None, false),
                 (0, b"BLOCK") if section == Section::Blocks => {
                     block = Some(drawing.blocks.len());
                     drawing.blocks.push(Block::default());
@@ -154,6 +156,7 @@ impl<'a> Drawing<'a> {
                         b"ENTITIES" => Section::Entities,
                         _ => Section::Other,
                     };
+                    last = b"";
                 }
                 (9, name) => variable = name,
                 (70, _) if section == Section::Header && variable == b"$INSUNITS" => {

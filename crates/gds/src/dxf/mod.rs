@@ -4,7 +4,7 @@
 //! | question | file |
 //! | --- | --- |
 //! | how the text is read | `pairs`, `drawing` |
-//! | what an entity draws | `shapes`, `curves` |
+//! | what an entity draws | `shapes`, `curves`, `hatch` |
 //! | which cells there are, and what they hold | `cells` |
 //! | open lines that close an outline together | `join` |
 //! | numbers of layers | `layers` |
@@ -14,6 +14,7 @@ mod affine;
 mod cells;
 mod curves;
 mod drawing;
+mod hatch;
 mod join;
 mod layers;
 mod pairs;

@@ -4,11 +4,13 @@ use super::Fault;
 use super::affine::Affine;
 use super::curves::{Arc, bulged};
 use super::drawing::{Entity, Kind};
+use super::hatch;
 use super::pairs::Pair;
 
 /// What an entity draws.
 pub(super) enum Drawn<'a> {
     Polygon(Vec<[f64; 2]>),
+    Polygons(Vec<Vec<[f64; 2]>>),
     /// A line without width.
     Open(Vec<[f64; 2]>),
     Path {
@@ -129,6 +131,10 @@ pub(super) fn drawn<'a>(entity: &Entity, fields: &Fields<'_, 'a>, unit: f64) -> 
                 text: parts.into_iter().flatten().collect::<Vec<_>>().concat(),
             }
         }
+        Kind::Hatch => match hatch::outlines(fields.pairs, unit)? {
+            Some(outlines) => Drawn::Polygons(outlines),
+            None => Drawn::Unread("hatches with holes, splines or lines"),
+        },
         Kind::Unread => Drawn::Unread("entities of other kinds"),
     })
 }

@@ -33,7 +33,7 @@ fn pairs(words: &str) -> String {
 /// A drawing of blocks and entities.
 fn drawing(units: &str, blocks: &str, entities: &str) -> String {
     pairs(&format!(
-        "0 SECTION 2 HEADER {units} 0 ENDSEC 0 SECTION 2 BLOCKS {blocks} 0 ENDSEC 0 SECTION 2 ENTITIES {entities} 0 ENDSEC 0 EOF"
+        "0 SECTION 2 HEADER 9 $UCSNAME 2 NONE {units} 0 ENDSEC 0 SECTION 2 BLOCKS {blocks} 0 ENDSEC 0 SECTION 2 ENTITIES {entities} 0 ENDSEC 0 SECTION 2 OBJECTS 0 LAYOUT 8 ODD 10 1e9 0 ENDSEC 0 EOF"
     ))
 }
 
@@ -93,6 +93,10 @@ fn entities_are_drawn() {
         of("0 LWPOLYLINE 8 1 70 0 43 0.1 10 0 20 0 10 1 20 0"),
         [[0, -50, 1000, 50]]
     );
+    // A filled square beside a half disc of an arc and a line.
+    let hatch = "0 HATCH 8 1 10 0 20 0 70 1 91 2 92 2 72 0 73 1 93 4 10 0 20 0 10 1 20 0 10 1 20 1 10 0 20 1 97 0 \
+        92 1 93 2 72 2 10 4 20 0 40 1 50 0 51 180 73 1 72 1 10 3 20 0 11 5 21 0 97 0 75 1";
+    assert_eq!(of(hatch), [[0, 0, 1000, 1000], [3000, 0, 5000, 1000]]);
     let old = "0 POLYLINE 8 1 66 1 70 1 0 VERTEX 8 1 10 0 20 0 0 VERTEX 8 1 10 1 20 0 0 VERTEX 8 1 10 0 20 1 0 SEQEND";
     assert_eq!(of(old), [[0, 0, 1000, 1000]]);
     // Lines and a half circle that meet.

@@ -7,7 +7,8 @@ use metalith_core::{Error, Result};
 use ndarray::{Array2, Axis};
 
 use super::SceneImage;
-use super::read::{LONGEST, array, png_values};
+use super::pictures::png_values;
+use super::read::{LONGEST, array};
 
 impl SceneImage {
     /// This scene with the distances of its pixels (um).

@@ -2,7 +2,7 @@
 //!
 //! | question | file |
 //! | --- | --- |
-//! | which files can be read | `read`, `exr` |
+//! | which files can be read | `read`, `pictures`, `exr` |
 //! | colour profiles | `colours` |
 //! | scenes that need no file | `chart` |
 //! | a spectral cube as a few planes | `cube` |
@@ -17,6 +17,7 @@ mod cube;
 mod depth;
 mod exr;
 mod folder;
+mod pictures;
 mod pixel_count;
 mod read;
 
