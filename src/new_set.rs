@@ -94,9 +94,7 @@ pub fn new_set(
 fn files_of(given: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let is_frame = |path: &PathBuf| {
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        ["npy", "png", "tif", "tiff"]
-            .iter()
-            .any(|known| ending.eq_ignore_ascii_case(known))
+        frame::ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known))
     };
     let mut all = Vec::new();
     for path in given {
@@ -113,7 +111,7 @@ fn files_of(given: &[PathBuf]) -> Result<Vec<PathBuf>> {
         return Err(Error::refused(
             "new-set/frames",
             format!("there are {} frames", all.len()),
-            format!("give 1 to {MOST_FRAMES} frames of NPY, PNG or TIFF, or their folder"),
+            format!("give 1 to {MOST_FRAMES} frames of NPY, PNG, TIFF or FITS, or their folder"),
         ));
     }
     Ok(all)

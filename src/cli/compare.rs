@@ -28,7 +28,7 @@ use super::{Outcome, Terminal, images, output, print_json, print_line};
     --design nano=designs/neural_nano_optics.toml::cameras/gt1930_relay.toml:28.9"
 )]
 pub(crate) struct CompareArgs {
-    /// Photographs, or folders of them: PNG, JPEG or NPY, all of one size.
+    /// Photographs, or folders of them: PNG, JPEG, TIFF, EXR or NPY, all of one size.
     #[arg(required = true)]
     photographs: Vec<PathBuf>,
 

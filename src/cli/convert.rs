@@ -11,11 +11,12 @@ use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
-/// Write a layout in GDSII or OASIS: the same cells, streamed from one file into the other.
+/// Write a layout in GDSII or OASIS: the same cells, streamed from one file into the other. Drawings in DXF are read too.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  metalith convert out/lens_pillars.gds out/lens_pillars.oas\n  \
-    metalith convert from_elsewhere.oas lens.gds"
+    metalith convert from_elsewhere.oas lens.gds\n  \
+    metalith convert drawing.dxf lens.gds"
 )]
 pub(crate) struct ConvertArgs {
     /// The layout to read, `-` for standard input; its first bytes show its format.

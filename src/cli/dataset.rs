@@ -22,7 +22,7 @@ use super::{Outcome, Terminal, print_line};
     after_help = "Example:\n  metalith dataset photographs --layout out/prototype_3x3/prototype_3x3_pillars.gds \\\n    --camera cameras/gt1930.toml --design designs/prototype_3x3.toml --out out/pairs"
 )]
 pub(crate) struct DatasetArgs {
-    /// Folder of PNG, JPEG or NPY images.
+    /// Folder of PNG, JPEG, TIFF, EXR or NPY images.
     images: PathBuf,
 
     /// The pillar layout; `-` for standard input.

@@ -20,7 +20,7 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[derive(Args)]
 #[command(after_help = "Example:\n  metalith denoise photograph.png --noise 25 --add --out clean.png")]
 pub(crate) struct DenoiseArgs {
-    /// The picture: PNG, JPEG or NPY.
+    /// The picture: PNG, JPEG, TIFF, EXR or NPY.
     picture: PathBuf,
 
     /// Standard deviation of the noise, in levels of a scale from 0 to 255.

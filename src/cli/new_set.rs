@@ -21,7 +21,7 @@ pub(crate) struct NewSetArgs {
     /// The layout that was fabricated.
     layout: PathBuf,
 
-    /// Frames (NPY, PNG, TIFF), or their folders.
+    /// Frames (NPY, PNG, TIFF, FITS), or their folders.
     #[arg(required = true)]
     frames: Vec<PathBuf>,
 

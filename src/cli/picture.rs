@@ -22,7 +22,7 @@ use super::{Outcome, Terminal, print_json, print_line};
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  metalith picture out/prototype_3x3/prototype_3x3_pillars.gds --camera cameras/gt1930.toml \\\n    --design designs/prototype_3x3.toml scene.png --out out/picture\n\n\
-    The scene is a PNG or JPEG in sRGB, an NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in \
+    The scene is a PNG, JPEG or TIFF in sRGB or with a colour profile, an EXR or NPY of linear light, an NPY cube with --wavelengths-nm, or one of the built-in \
     scenes chart, star and edge. Pixels of the scene that are finer than half a sensor pixel are averaged. Kernels are cached."
 )]
 pub(crate) struct PictureArgs {

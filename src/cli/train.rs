@@ -29,7 +29,7 @@ use super::{Outcome, Terminal, print_json, print_line};
     --pixels 512 --steps 1200 --out flatnet.safetensors"
 )]
 pub(crate) struct TrainArgs {
-    /// Folder of PNG, JPEG or NPY photographs.
+    /// Folder of PNG, JPEG, TIFF, EXR or NPY photographs.
     folder: PathBuf,
 
     /// File for the weights [default: out/denoiser.safetensors, or out/KIND.safetensors for a last stage].

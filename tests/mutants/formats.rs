@@ -16,7 +16,7 @@ use metalith::phase::{Interpolation, RadialPhase};
 use metalith::prior::NetworkDenoiser;
 use metalith::sensor::{Camera, Spectrum};
 use metalith::study::{Slurm, Tolerance};
-use metalith::{CalibratedModel, Design, Silent};
+use metalith::{CalibratedModel, Design, Layout, Silent};
 use metalith_testing::session::{PIXELS, small_set};
 use metalith_testing::{design, root};
 
@@ -325,10 +325,20 @@ fn pictures(folder: &Path) -> Vec<Format> {
                 images::png(24, 16, png::ColorType::Rgb, png::BitDepth::Sixteen),
                 images::png(24, 16, png::ColorType::Grayscale, png::BitDepth::Eight),
                 file("tests/mutants/small.jpg"),
+                images::coloured_png(),
+                images::tiff(20, 1),
+                images::exr(),
                 images::npy(&[16, 20, 3], images::FLOAT),
                 images::npy(&[16, 20], images::FLOAT),
             ],
             read_picture,
+        ),
+        Format::new(
+            "drawing",
+            folder.join("drawing.dxf"),
+            Kind::Text,
+            vec![images::DRAWING.into()],
+            Layout::open,
         ),
         Format::new("cube", folder.join("cube.npy"), Kind::Bytes, vec![cube], |path| {
             read_scene(&SceneFile {
@@ -402,6 +412,13 @@ fn measured(folder: &Path) -> Vec<Format> {
             Kind::Bytes,
             vec![images::tiff(PIXELS, 1), images::tiff(PIXELS, 3)],
             reads(with("tiff")),
+        ),
+        Format::new(
+            "capture_fits",
+            folder.join("frame.fits"),
+            Kind::Bytes,
+            vec![images::fits(PIXELS)],
+            reads(with("fits")),
         ),
     ]
 }

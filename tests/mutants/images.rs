@@ -50,3 +50,95 @@ pub(crate) fn tiff(size: usize, pages: usize) -> Vec<u8> {
     }
     bytes.into_inner()
 }
+
+/// A PNG with a colour profile and a rotation.
+pub(crate) fn coloured_png() -> Vec<u8> {
+    let mut info = png::Info::with_size(16, 20);
+    info.color_type = png::ColorType::Rgb;
+    info.bit_depth = png::BitDepth::Eight;
+    let mut profile = vec![0; 128];
+    profile[16..20].copy_from_slice(b"GRAY");
+    profile[36..40].copy_from_slice(b"acsp");
+    profile.extend([1u32.to_be_bytes(), *b"kTRC", 144u32.to_be_bytes(), 16u32.to_be_bytes()].concat());
+    profile.extend(b"curv\0\0\0\0\0\0\0\x02\0\0\xff\xff");
+    info.icc_profile = Some(profile.into());
+    info.exif_metadata = Some(b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"[..].into());
+    let mut bytes = Vec::new();
+    let mut writer = png::Encoder::with_info(&mut bytes, info)
+        .unwrap()
+        .write_header()
+        .unwrap();
+    writer.write_image_data(&[9; 3 * 16 * 20]).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+/// An EXR of one channel in half precision, not compressed.
+pub(crate) fn exr() -> Vec<u8> {
+    const SIDE: i32 = 16;
+    let mut out = b"\x76\x2f\x31\x01\x02\0\0\0".to_vec();
+    let mut attribute = |name: &str, kind: &str, value: &[u8]| {
+        out.extend([name.as_bytes(), b"\0", kind.as_bytes(), b"\0"].concat());
+        out.extend((value.len() as u32).to_le_bytes());
+        out.extend(value);
+    };
+    let channel = [
+        &b"Y\0"[..],
+        &1i32.to_le_bytes(),
+        &[0; 4],
+        &1i32.to_le_bytes(),
+        &1i32.to_le_bytes(),
+        b"\0",
+    ]
+    .concat();
+    let window: Vec<u8> = [0, 0, SIDE - 1, SIDE - 1]
+        .iter()
+        .flat_map(|v: &i32| v.to_le_bytes())
+        .collect();
+    attribute("channels", "chlist", &channel);
+    attribute("compression", "compression", &[0]);
+    attribute("dataWindow", "box2i", &window);
+    attribute("displayWindow", "box2i", &window);
+    attribute("lineOrder", "lineOrder", &[0]);
+    attribute("pixelAspectRatio", "float", &1f32.to_le_bytes());
+    attribute("screenWindowCenter", "v2f", &[0; 8]);
+    attribute("screenWindowWidth", "float", &1f32.to_le_bytes());
+    out.push(0);
+    let (table, line) = (8 * SIDE as usize, 8 + 2 * SIDE as usize);
+    let first = out.len() + table;
+    out.extend((0..SIDE as usize).flat_map(|y| ((first + y * line) as u64).to_le_bytes()));
+    for y in 0..SIDE {
+        out.extend([y, 2 * SIDE].iter().flat_map(|v| v.to_le_bytes()));
+        out.extend((0..SIDE as u16).flat_map(|x| (0x3000 + 64 * x).to_le_bytes()));
+    }
+    out
+}
+
+/// A FITS file of 16 bits.
+pub(crate) fn fits(size: usize) -> Vec<u8> {
+    let axes = ["NAXIS1", "NAXIS2"].map(|key| format!("{key:<8}= {size}"));
+    let cards = [
+        "SIMPLE  = T",
+        "BITPIX  = 16",
+        "NAXIS   = 2",
+        &axes[0],
+        &axes[1],
+        "BZERO   = 32768",
+        "END",
+    ];
+    let mut out: Vec<u8> = cards
+        .iter()
+        .flat_map(|card| format!("{card:<80}").into_bytes())
+        .collect();
+    out.resize(2880, b' ');
+    out.extend((0..size * size).flat_map(|i| ((i * 3 % 4000) as i16).to_be_bytes()));
+    out
+}
+
+/// A drawing in DXF with one of each kind.
+pub(crate) const DRAWING: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n13\n0\nENDSEC\n0\nSECTION\n2\nBLOCKS\n\
+    0\nBLOCK\n2\nP\n10\n0\n20\n0\n0\nCIRCLE\n8\n0\n10\n1\n20\n1\n40\n0.2\n0\nENDBLK\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n\
+    0\nLWPOLYLINE\n8\nA\n70\n1\n10\n0\n20\n0\n42\n0.5\n10\n1\n20\n0\n10\n1\n20\n1\n\
+    0\nINSERT\n8\n2\n2\nP\n10\n3\n20\n0\n41\n2\n42\n1\n50\n30\n70\n2\n71\n2\n44\n1\n45\n1\n\
+    0\nLINE\n8\n1\n10\n0\n20\n0\n11\n1\n21\n0\n0\nARC\n8\n1\n10\n0.5\n20\n0\n40\n0.5\n50\n0\n51\n180\n\
+    0\nTEXT\n8\n1\n10\n0\n20\n0\n1\nlens\n0\nENDSEC\n0\nEOF\n";

@@ -1,4 +1,4 @@
-//! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY.
+//! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY, TIFF and FITS.
 
 mod alignment_cross;
 mod csv;
@@ -7,6 +7,10 @@ pub mod document;
 mod error;
 pub mod expression;
 pub mod file;
+#[cfg(feature = "frames")]
+pub mod file_kind;
+#[cfg(feature = "frames")]
+pub mod fits;
 mod lagrange;
 mod layer;
 mod memo;
@@ -16,6 +20,8 @@ mod plane;
 mod progress;
 pub mod srgb;
 pub mod text;
+#[cfg(feature = "frames")]
+pub mod tiff;
 mod warning;
 mod wedge;
 mod zernike;

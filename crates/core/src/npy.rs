@@ -12,7 +12,7 @@ pub struct Array {
     /// Entries along each axis, slowest first.
     pub shape: Vec<u64>,
     pub values: Vec<f64>,
-    /// True if the file holds whole numbers, uint8 or uint16.
+    /// True if the file holds whole numbers.
     pub whole: bool,
 }
 
@@ -28,9 +28,9 @@ pub enum NpyError {
     Format(String),
     #[error("its header says that entries have several fields, or is nested")]
     Nested,
-    #[error("it holds an array of shape {shape:?}{}", if *columns_first { " in Fortran order" } else { "" })]
-    Shape { shape: Vec<u64>, columns_first: bool },
-    #[error("its entries are neither float32, float64, uint8 nor uint16")]
+    #[error("it holds an array of shape {shape:?}")]
+    Shape { shape: Vec<u64> },
+    #[error("its entries are neither float32, float64 nor whole numbers of 8 to 32 bits")]
     Type,
     #[error("its entries are neither float32, float64, complex64 nor complex128")]
     NoPhase,
@@ -46,8 +46,8 @@ const LONGEST_HEADER: usize = 1 << 12;
 /// Most entries of an array: no file that is read has as many.
 const MOST_ENTRIES: u64 = 1 << 40;
 
-/// Read an array of float32, float64, uint8 or uint16 in C order, if its shape is one that the caller takes: nothing is read or
-/// set aside for entries before that.
+/// Read an array of float32, float64 or whole numbers of 8 to 32 bits, in C or Fortran order, if its shape is one that the caller
+/// takes: nothing is read or set aside for entries before that.
 ///
 /// # Errors
 /// If the file cannot be read or holds something else.
@@ -58,8 +58,8 @@ pub fn read(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, Np
     read_from(BufReader::new(File::open(path)?), takes)
 }
 
-/// Variant of [`read`] for phases (rad), as other programs write them: in C or Fortran order, or as complex fields of which
-/// the phase is the angle.
+/// Variant of [`read`] for phases (rad), as other programs write them: real numbers, or complex fields of which the phase is the
+/// angle.
 ///
 /// # Errors
 /// As [`read`].
@@ -78,7 +78,7 @@ pub fn read_fields(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Ar
     if !std::fs::metadata(path)?.is_file() {
         return Err(NpyError::NotAFile);
     }
-    let (npy, shape, columns_first) = opened(BufReader::new(File::open(path)?), |shape, _| takes(shape))?;
+    let (npy, shape, columns_first) = opened(BufReader::new(File::open(path)?), takes)?;
     let fields: io::Result<Vec<Complex64>> = match npy.try_data::<Complex64>() {
         Ok(data) => data.collect(),
         Err(npy) => {
@@ -99,7 +99,7 @@ pub fn read_fields(path: &Path, takes: impl FnOnce(&[u64]) -> bool) -> Result<Ar
 }
 
 fn phases_from(from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
-    let (npy, shape, columns_first) = opened(from, |shape, _| takes(shape))?;
+    let (npy, shape, columns_first) = opened(from, takes)?;
     let npy = match npy.try_data::<Complex64>() {
         Ok(data) => return angles(shape, columns_first, data),
         Err(npy) => npy,
@@ -119,18 +119,15 @@ fn phases_from(from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Ar
 type Headed<R> = npyz::NpyFile<io::Chain<Cursor<Vec<u8>>, R>>;
 
 /// A plain array of a shape that is taken, and whether its columns come first, with that shape.
-fn opened<R: Read>(
-    mut from: R,
-    takes: impl FnOnce(&[u64], bool) -> bool,
-) -> Result<(Headed<R>, Vec<u64>, bool), NpyError> {
+fn opened<R: Read>(mut from: R, takes: impl FnOnce(&[u64]) -> bool) -> Result<(Headed<R>, Vec<u64>, bool), NpyError> {
     let header = plain_header(&mut from)?;
     let npy = npyz::NpyFile::new(Cursor::new(header).chain(from)).map_err(|e| NpyError::Format(e.to_string()))?;
     let shape = npy.shape().to_vec();
     let columns_first = npy.order() != npyz::Order::C;
-    if takes(&shape, columns_first) {
+    if takes(&shape) {
         Ok((npy, shape, columns_first))
     } else {
-        Err(NpyError::Shape { shape, columns_first })
+        Err(NpyError::Shape { shape })
     }
 }
 
@@ -153,16 +150,24 @@ fn angles(
     Ok(rows_first(shape, columns_first, values))
 }
 
-/// An array in C order; one of more than two axes stays as it is.
+/// An array in C order.
 fn rows_first(shape: Vec<u64>, columns_first: bool, values: Vec<f64>) -> Array {
-    let values = match shape[..] {
-        [rows, columns] if columns_first => {
-            let (rows, columns) = (rows as usize, columns as usize);
-            (0..rows * columns)
-                .map(|k| values[k % columns * rows + k / columns])
-                .collect()
+    let values = if columns_first && shape.len() > 1 {
+        let sides: Vec<usize> = shape.iter().map(|n| *n as usize).collect();
+        // Entries from one to the next along each axis, as they are stored.
+        let mut strides = vec![1; sides.len()];
+        for k in 1..sides.len() {
+            strides[k] = strides[k - 1] * sides[k - 1];
         }
-        _ => values,
+        let stored = |k: usize| {
+            let along = sides.iter().zip(&strides).rev();
+            along
+                .fold((k, 0), |(k, at), (side, stride)| (k / side, at + k % side * stride))
+                .1
+        };
+        (0..values.len()).map(|k| values[stored(k)]).collect()
+    } else {
+        values
     };
     Array {
         shape,
@@ -176,22 +181,29 @@ fn rows_first(shape: Vec<u64>, columns_first: bool, values: Vec<f64>) -> Array {
 /// # Errors
 /// As [`read`].
 pub fn read_from(from: impl Read, takes: impl FnOnce(&[u64]) -> bool) -> Result<Array, NpyError> {
-    let (npy, shape, _) = opened(from, |shape, columns_first| !columns_first && takes(shape))?;
+    let (npy, shape, columns_first) = opened(from, takes)?;
     let (values, whole) = match reals(npy) {
         Ok(values) => (values, false),
-        Err(npy) => match npy.try_data::<u16>() {
-            Ok(data) => (data.map(|v| v.map(f64::from)).collect(), true),
-            Err(npy) => {
-                let data = npy.try_data::<u8>().map_err(|_| NpyError::Type)?;
-                (data.map(|v| v.map(f64::from)).collect(), true)
-            }
-        },
+        Err(npy) => (whole_numbers(npy).ok_or(NpyError::Type)?, true),
     };
-    Ok(Array {
-        shape,
-        values: values.map_err(NpyError::Short)?,
-        whole,
-    })
+    let array = rows_first(shape, columns_first, values.map_err(NpyError::Short)?);
+    Ok(Array { whole, ..array })
+}
+
+/// Whole numbers of 8 to 32 bits; none if the file holds others.
+fn whole_numbers<R: Read>(npy: npyz::NpyFile<R>) -> Option<io::Result<Vec<f64>>> {
+    fn of<T: npyz::Deserialize + Into<f64>, R: Read>(
+        npy: npyz::NpyFile<R>,
+    ) -> Result<io::Result<Vec<f64>>, npyz::NpyFile<R>> {
+        Ok(npy.try_data::<T>()?.map(|v| v.map(Into::into)).collect())
+    }
+    of::<u8, R>(npy)
+        .or_else(of::<u16, R>)
+        .or_else(of::<u32, R>)
+        .or_else(of::<i8, R>)
+        .or_else(of::<i16, R>)
+        .or_else(of::<i32, R>)
+        .ok()
 }
 
 /// The bytes before the entries, if they describe a plain array. The parser behind takes twice the time for each
@@ -278,6 +290,29 @@ mod tests {
         assert!(matches!(outcome(&file(PLAIN, &[0; 15])), Err(NpyError::Short(_))));
     }
 
+    /// Entries of which the number is that of the place, along any number of axes in either order.
+    #[test]
+    fn fortran_order_is_put_into_rows() {
+        let read = |order: &str, shape: &str, values: &[u32]| {
+            let header = PLAIN
+                .replace("<f4", "<u4")
+                .replace("(2, 2)", shape)
+                .replace("False", order);
+            let data: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            read_from(&file(&header, &data)[..], |_| true).unwrap()
+        };
+        let rows: Vec<u32> = (0..24).collect();
+        let columns: Vec<u32> = (0..24).map(|k| k % 2 * 12 + k / 2 % 3 * 4 + k / 6).collect();
+        let found = read("True", "(2, 3, 4)", &columns);
+        assert_eq!(found, read("False", "(2, 3, 4)", &rows));
+        assert!(found.whole && found.values[23] == 23.0);
+        assert_eq!(
+            read("True", "(24,)", &rows).values,
+            read("False", "(24,)", &rows).values
+        );
+        assert_eq!(read("False", "(1,)", &[u32::MAX]).values, [4_294_967_295.0]);
+    }
+
     #[test]
     fn phases_are_read_as_other_programs_write_them() {
         let phases = |header: &str, numbers: &[f64]| {
@@ -303,14 +338,7 @@ mod tests {
     fn what_is_no_plain_array_is_named() {
         let with = |from: &str, to: &str| outcome(&file(&PLAIN.replace(from, to), &[0; 64]));
         assert!(matches!(with("(2, 2)", "(2, 3)"), Err(NpyError::Shape { .. })));
-        assert!(matches!(
-            with("False", "True"),
-            Err(NpyError::Shape {
-                columns_first: true,
-                ..
-            })
-        ));
-        assert!(matches!(with("<f4", "<i4"), Err(NpyError::Type)));
+        assert!(matches!(with("<f4", "<i8"), Err(NpyError::Type)));
         assert!(matches!(
             with("(2, 2)", "(99999999999, 99999999999)"),
             Err(NpyError::Format(_))

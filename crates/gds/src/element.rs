@@ -141,6 +141,14 @@ impl ElementContent {
             let record = input.next()?;
             match record.kind {
                 kind::ENDEL => break,
+                kind::XY if record.data == data::INT4 && input.body(record).is_empty() => {}
+                other if !self.points.is_empty() && (other == kind::ENDSTR || ElementKind::of(other).is_some()) => {
+                    let (kind, begin) = (other, self.offset);
+                    let cause = LayoutError::ElementNotEnded { kind, begin };
+                    input.odd(record.offset, cause, "the element was taken as ended")?;
+                    input.again(record);
+                    break;
+                }
                 kind::XY => self.extend_points(input, record, limits)?,
                 kind::LAYER => {
                     self.layer.layer = input.int2(record)? as u16;
@@ -169,8 +177,8 @@ impl ElementContent {
                     self.mirror = bits & 0x8000 != 0;
                     self.absolute = (bits & 6 != 0).then_some(record.offset);
                 }
-                kind::MAG => self.magnification = input.real8(record, 0)?,
-                kind::ANGLE => self.angle_deg = input.real8(record, 0)?,
+                kind::MAG => self.magnification = input.real8(record, 0, 1)?,
+                kind::ANGLE => self.angle_deg = input.real8(record, 0, 1)?,
                 kind::COLROW => {
                     let body = input.checked(record, data::INT2, 4)?;
                     self.columns = u16::from_be_bytes([body[0], body[1]]);
@@ -191,7 +199,7 @@ impl ElementContent {
         self.check(input, has_layer, has_datatype)
     }
 
-    fn extend_points(&mut self, input: &Input, record: Record, limits: &ReadLimits) -> Result<()> {
+    fn extend_points(&mut self, input: &mut Input, record: Record, limits: &ReadLimits) -> Result<()> {
         let body = input.checked(record, data::INT4, 8)?;
         let found = self.points.len() + body.len() / 8;
         if found > limits.vertices {
@@ -262,9 +270,15 @@ impl ElementContent {
             input.odd(self.offset, LayoutError::Points { element, points }, taken)?;
             self.points.truncate(most);
         }
-        if self.kind == ElementKind::Boundary && (1..3).contains(&points) {
+        let refers = matches!(self.kind, ElementKind::Reference | ElementKind::Array);
+        let fewest = if self.kind == ElementKind::Box {
+            2
+        } else {
+            *self.kind.points().start()
+        };
+        if !refers && points < fewest {
             input.odd(self.offset, LayoutError::Points { element, points }, "it was left out")?;
-            self.points.resize(3, self.points[0]);
+            self.points.resize(1, Point::default());
             self.kind = ElementKind::Node;
         }
         if self.kind == ElementKind::Box && points >= 2 && rectangle_of(&self.points).is_none() {

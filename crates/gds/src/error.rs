@@ -85,6 +85,9 @@ pub enum LayoutError {
     NotText { kind: u8, data: u8 },
     #[error("the file does not begin with HEADER")]
     NoHeader,
+    /// A drawing in DXF with something that is not read.
+    #[error("line {line} of the drawing: {what}")]
+    Drawing { line: u64, what: &'static str },
     #[error("this is {format}, which is not read as a layout")]
     OtherFormat { format: &'static str, remedy: &'static str },
     #[error("a file compressed by gzip that does not unpack: {0}")]
@@ -281,6 +284,11 @@ impl LayoutError {
             }
             Self::NoHeader => "is this a GDSII or OASIS file? Of compressed files those of gzip are read".into(),
             Self::OtherFormat { remedy, .. } => (*remedy).into(),
+            Self::Drawing { .. } => {
+                "closed polylines, circles, ellipses, solids, arcs, lines that meet, texts and blocks of DXF are read, each code and \
+                 value on a line of its own"
+                    .into()
+            }
             Self::Gzip(_) => CUT_SHORT.into(),
             Self::Unpacked { .. } => "is this the layout that was meant? Unpack it by gunzip, then read it".into(),
             Self::Oasis { fault, .. } => fault.remedy().into(),

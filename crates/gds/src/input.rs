@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::cells::FileFormat;
+use super::dxf;
 use super::gzip;
 use super::oasis::ReadSeek;
 use super::read_warnings::Tolerance;
@@ -30,8 +31,10 @@ pub(super) enum Source {
     File {
         path: PathBuf,
         bytes: u64,
-        /// The file that is read instead: what a compressed one holds.
+        /// The file that is read instead: what a compressed one holds, or what a drawing is.
         unpacked: Option<Arc<TempPath>>,
+        /// What was made of a drawing.
+        drawing: Option<Arc<dxf::Remarks>>,
     },
     Memory {
         name: PathBuf,
@@ -50,7 +53,11 @@ impl Source {
         if !meta.is_file() {
             return Err(Error::NotAFile { path: path.to_owned() });
         }
-        let unpacked = gzip::unpacked(path, meta.len())?.map(Arc::new);
+        let mut unpacked = gzip::unpacked(path, meta.len())?;
+        let mut drawing = None;
+        if let Some((file, remarks)) = dxf::unpacked(path, unpacked.as_deref().unwrap_or(path))? {
+            (unpacked, drawing) = (Some(file), Some(Arc::new(remarks)));
+        }
         let bytes = match &unpacked {
             Some(file) => std::fs::metadata(&**file).map_err(Error::io("read", path))?.len(),
             None => meta.len(),
@@ -58,7 +65,8 @@ impl Source {
         Ok(Self::File {
             path: path.to_owned(),
             bytes,
-            unpacked,
+            unpacked: unpacked.map(Arc::new),
+            drawing,
         })
     }
 
@@ -66,6 +74,14 @@ impl Source {
         match self {
             Self::File { path, .. } => path,
             Self::Memory { name, .. } => name,
+        }
+    }
+
+    /// What was made of a drawing, if it is one.
+    pub(crate) fn drawing(&self) -> Option<&dxf::Remarks> {
+        match self {
+            Self::File { drawing, .. } => drawing.as_deref(),
+            Self::Memory { .. } => None,
         }
     }
 
@@ -325,42 +341,52 @@ impl Input {
         &self.block.bytes[record.from..record.to]
     }
 
-    /// The body of a record that must have this data type and be a whole number of `unit` bytes long.
-    pub(crate) fn checked(&self, record: Record, data: u8, unit: usize) -> Result<&[u8]> {
-        let body = self.body(record);
-        if record.data != data || body.is_empty() || !body.len().is_multiple_of(unit) {
+    /// The body of a record that must have this data type and be a whole number of `unit` bytes long. Bytes behind are
+    /// read over.
+    pub(crate) fn checked(&mut self, record: Record, data: u8, unit: usize) -> Result<&[u8]> {
+        let bytes = self.body(record).len();
+        let whole = bytes - bytes % unit;
+        if record.data != data || whole != bytes || bytes == 0 {
             let cause = LayoutError::RecordBody {
                 kind: record.kind,
                 data: record.data,
-                bytes: body.len(),
+                bytes,
                 wanted: data,
                 unit,
             };
-            return Err(self.fault(record.offset, cause));
+            if record.data != data || whole == 0 {
+                return Err(self.fault(record.offset, cause));
+            }
+            self.odd(record.offset, cause, "the bytes behind were left out")?;
         }
-        Ok(body)
+        Ok(&self.block.bytes[record.from..record.from + whole])
+    }
+
+    /// Go back before a record that was read last.
+    pub(crate) fn again(&mut self, record: Record) {
+        self.from = record.from - 4;
     }
 
     /// The one two-byte integer of a record.
-    pub(crate) fn int2(&self, record: Record) -> Result<i16> {
+    pub(crate) fn int2(&mut self, record: Record) -> Result<i16> {
         let body = self.checked(record, record::data::INT2, 2)?;
         Ok(i16::from_be_bytes([body[0], body[1]]))
     }
 
     /// The one four-byte integer of a record.
-    pub(crate) fn int4(&self, record: Record) -> Result<i32> {
+    pub(crate) fn int4(&mut self, record: Record) -> Result<i32> {
         let body = self.checked(record, record::data::INT4, 4)?;
         Ok(i32::from_be_bytes([body[0], body[1], body[2], body[3]]))
     }
 
-    /// Real number `k` of a record that has at least `k + 1`.
-    pub(crate) fn real8(&self, record: Record, k: usize) -> Result<f64> {
-        let body = self.checked(record, record::data::REAL8, 8 * (k + 1))?;
+    /// Real number `k` of a record of `count`.
+    pub(crate) fn real8(&mut self, record: Record, k: usize, count: usize) -> Result<f64> {
+        let body = self.checked(record, record::data::REAL8, 8 * count)?;
         let bytes = body[8 * k..8 * k + 8].try_into().expect("eight bytes");
         Ok(super::real::decode(bytes))
     }
 
-    /// The text of a record without the zero that pads it to an even length.
+    /// The text of a record up to the zero that pads it to an even length, or that ends it before.
     pub(crate) fn text(&self, record: Record) -> Result<&[u8]> {
         let body = self.body(record);
         if record.data != record::data::ASCII {
@@ -370,7 +396,12 @@ impl Input {
             };
             return Err(self.fault(record.offset, cause));
         }
-        let end = body.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
+        // What begins with a zero is no text of C, and kept as it is.
+        let end = match body.iter().position(|&b| b == 0) {
+            Some(end @ 1..) => end,
+            Some(0) => body.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1),
+            None => body.len(),
+        };
         Ok(&body[..end])
     }
 }

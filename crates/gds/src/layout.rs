@@ -20,8 +20,8 @@ use metalith_core::{Progress, Silent};
 /// Cells at the top that a message names.
 const TOPS_NAMED: usize = 8;
 
-/// A GDSII or OASIS file of which every byte has been looked at once: cells in number, their tree, their faults.
-/// Shapes are not held; [`Layout::visit`] reads them again.
+/// A GDSII or OASIS file, or a drawing in DXF, of which every byte has been looked at once: cells in number, their tree, their
+/// faults. Shapes are not held; [`Layout::visit`] reads them again.
 pub struct Layout {
     source: Source,
     limits: ReadLimits,
@@ -37,6 +37,8 @@ pub struct Layout {
     details: FormatDetails,
     /// Number of the name of each cell.
     numbers: Vec<u32>,
+    /// True if cells that are not in the file count as empty.
+    missing_are_empty: bool,
     /// Places of the cells of notes, which are no layout.
     pub(super) notes: Vec<std::ops::Range<u64>>,
 }
@@ -61,15 +63,26 @@ impl Layout {
     /// # Errors
     /// If it cannot be read, is neither GDSII nor OASIS, or is beyond [`ReadLimits::default`].
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_with(path, ReadLimits::default(), &Silent)
+        Self::of(Source::file(path)?, ReadLimits::default(), &Silent)
     }
 
-    /// Read the file at `path` once, within `limits`.
+    /// Read the file at `path` once, within `limits`. Unless `progress` is strict, it is warned of cells that are referred to and
+    /// are not in the file, and they count as empty.
     ///
     /// # Errors
     /// As [`Layout::open`].
     pub fn open_with(path: &Path, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
-        Self::of(Source::file(path)?, limits, progress)
+        let mut layout = Self::of(Source::file(path)?, limits, progress)?;
+        if let Some(Faulty { cell, name, offset }) = layout.dangling().into_iter().next().filter(|_| !progress.strict())
+        {
+            let cause = LayoutError::Dangling { cell, name };
+            progress.warn(&format!(
+                "warning[layout/odd]: {}, byte {offset}: {cause}; such cells were taken as empty",
+                path.display()
+            ));
+            layout.missing_are_empty = true;
+        }
+        Ok(layout)
     }
 
     /// A layout from bytes in memory; `name` stands for the path in messages.
@@ -89,6 +102,19 @@ impl Layout {
     }
 
     fn scanned(source: Source, limits: ReadLimits, counter: Option<Counter>, progress: &dyn Progress) -> Result<Self> {
+        if let Some(drawing) = source.drawing() {
+            if let Some(cause) = drawing.fault().filter(|_| progress.strict()) {
+                return Err(Error::Layout {
+                    path: source.path().to_owned(),
+                    offset: 0,
+                    cause,
+                });
+            }
+            let name = source.path().display();
+            drawing
+                .texts()
+                .for_each(|text| progress.warn(&text.replacen(": ", &format!(": {name}: "), 1)));
+        }
         let scan = scan(&source, &limits, counter, progress)?;
         scan.warnings.report(source.path(), progress);
         Ok(Self::from_scan(source, limits, scan))
@@ -121,6 +147,7 @@ impl Layout {
             details: scan.details,
             numbers: scan.numbers,
             notes,
+            missing_are_empty: false,
         }
     }
 
@@ -296,7 +323,7 @@ impl Layout {
     pub fn roots(&self, selection: &Selection) -> Result<Vec<usize>> {
         if !selection.lenient {
             self.no_circles()?;
-            if !selection.without_missing {
+            if !(selection.without_missing || self.missing_are_empty) {
                 self.no_dangling()?;
             }
             self.no_doubled()?;

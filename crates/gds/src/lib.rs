@@ -3,7 +3,7 @@
 mod cell;
 mod cells;
 mod circle;
-
+mod dxf;
 mod element;
 mod error;
 pub mod extract;

@@ -92,6 +92,9 @@ pub(super) fn scan_with(input: &mut Input, bytes: u64, counter: Option<Counter>,
     let Some(units) = units else {
         return Err(input.fault(input.offset(), LayoutError::NoUnits));
     };
+    if let Some(offset) = tally.absolute.filter(|_| tally.magnified) {
+        input.odd(offset, LayoutError::AbsoluteWidth, "such widths were taken as relative")?;
+    }
     let trailing = bytes.saturating_sub(input.offset());
     let mut nonzero = false;
     loop {
@@ -130,8 +133,8 @@ fn stray(input: &Input, record: record::Record) -> Error {
 /// Smallest and largest database unit that is read (m).
 const UNIT_RANGE_M: std::ops::RangeInclusive<f64> = 1e-13..=1e-3;
 
-fn read_units(input: &Input, record: record::Record) -> Result<[f64; 2]> {
-    let units = [input.real8(record, 0)?, input.real8(record, 1)?];
+fn read_units(input: &mut Input, record: record::Record) -> Result<[f64; 2]> {
+    let units = [input.real8(record, 0, 2)?, input.real8(record, 1, 2)?];
     if !UNIT_RANGE_M.contains(&units[1]) || units[0].is_nan() || units[0] <= 0.0 {
         let cause = LayoutError::UnitSize {
             metres: units[1],
@@ -156,9 +159,9 @@ pub(super) struct Tally {
     touched: Vec<u32>,
     tallies: usize,
     path: Vec<Point>,
-    /// True if there is a path of absolute width. Together with a reference that magnifies (`magnified`) its meaning is
+    /// Place of the first path of absolute width. Together with a reference that magnifies (`magnified`) its meaning is
     /// not defined.
-    absolute: bool,
+    absolute: Option<u64>,
     magnified: bool,
     /// Counter for an inventory.
     counter: Option<Box<Counter>>,
@@ -178,7 +181,7 @@ impl Tally {
             touched: Vec::new(),
             tallies: 0,
             path: Vec::new(),
-            absolute: false,
+            absolute: None,
             magnified: false,
             counter: counter.map(Box::new),
         }
@@ -397,11 +400,10 @@ impl Tally {
     fn add(&mut self, element: &ElementContent, copies: u64, reach: [i64; 4]) -> Result<(), LayoutError> {
         self.cells.last_mut().expect("a cell was begun").with_properties += u64::from(element.properties > 0);
         let refers = matches!(element.kind, ElementKind::Reference | ElementKind::Array);
-        self.absolute |= element.kind == ElementKind::Path && element.width < 0;
-        self.magnified |= refers && element.magnification != 1.0;
-        if self.absolute && self.magnified {
-            return Err(LayoutError::AbsoluteWidth);
+        if element.kind == ElementKind::Path && element.width < 0 {
+            self.absolute.get_or_insert(element.offset);
         }
+        self.magnified |= refers && element.magnification != 1.0;
         if refers {
             let number = self.names.number(&element.name);
             self.reference(number, element.copies().saturating_mul(copies), element.offset)?;

@@ -109,6 +109,87 @@ fn areas() {
     );
 }
 
+/// Bytes behind the numbers of a record, an element without its end, a name with bytes behind its zero, and elements without
+/// points.
+#[test]
+fn records_that_are_too_long_and_elements_that_do_not_end() {
+    let square = |gds: &mut Gds, layer: &[u8], points: &[u8]| {
+        gds.empty(0x08).record(0x0D, 2, layer).int2(0x0E, &[0]);
+        gds.record(0x10, 3, points);
+    };
+    let corners: Vec<u8> = [0i32, 0, 8, 0, 8, 8, 0, 8, 0, 0]
+        .iter()
+        .flat_map(|v| v.to_be_bytes())
+        .collect();
+    let (at, bytes) = with(|gds| {
+        square(gds, &[0, 1], &[&corners[..], &[0; 6]].concat());
+        gds.empty(0x11).sref("SUB", 50, 0);
+    });
+    let (warning, found) = read(bytes);
+    assert_eq!(
+        (warning.offset, &found[..]),
+        (at + 16, &[[0, 0, 8, 8], [45, -5, 55, 5]][..])
+    );
+    let (_, bytes) = with(|gds| {
+        square(gds, &[0, 1], &corners);
+        gds.sref("SUB", 50, 0);
+    });
+    let (warning, found) = read(bytes);
+    assert!(matches!(warning.cause, LayoutError::ElementNotEnded { kind: 0x0A, .. }));
+    assert_eq!(found, [[0, 0, 8, 8], [45, -5, 55, 5]]);
+    let (_, bytes) = with(|gds| {
+        gds.empty(0x09)
+            .int2(0x0D, &[1])
+            .int2(0x0E, &[0])
+            .int4(0x10, &[])
+            .empty(0x11);
+        gds.sref("SUB", 0, 0);
+    });
+    assert_eq!(read(bytes).1, [[-5, -5, 5, 5]]);
+    // Programs in C end a name at its first zero; that is no departure.
+    let (_, bytes) = with(|gds| {
+        gds.empty(0x0A)
+            .record(0x12, 6, b"SUB\0\0\0\0\x01")
+            .int4(0x10, &[0, 0])
+            .empty(0x11);
+    });
+    assert_eq!(boxes(&layout(bytes)), [[-5, -5, 5, 5]]);
+}
+
+/// Cells that are not in the file are empty for who hears of them, and an error for who is strict or hears nothing.
+#[test]
+fn missing_cells_are_empty_with_a_warning() {
+    struct Hears(std::sync::Mutex<Vec<String>>);
+    impl Progress for Hears {
+        fn begin(&self, _: &str, _: u64) {}
+
+        fn advance(&self, _: u64) {}
+
+        fn warn(&self, text: &str) {
+            self.0.lock().unwrap().push(text.to_owned());
+        }
+    }
+    let (_, bytes) = with(|gds| {
+        gds.sref("SUB", 0, 0).sref("ELSEWHERE", 0, 0);
+    });
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), &bytes).unwrap();
+    let hears = Hears(std::sync::Mutex::default());
+    let heard = Layout::open_with(file.path(), ReadLimits::default(), &hears).unwrap();
+    assert_eq!(boxes(&heard), [[-5, -5, 5, 5]]);
+    let warnings = hears.0.into_inner().unwrap();
+    assert!(
+        warnings.len() == 1 && warnings[0].contains("TOP refers to ELSEWHERE"),
+        "{warnings:?}"
+    );
+    for silent in [
+        Layout::open(file.path()),
+        Layout::open_with(file.path(), ReadLimits::default(), &Strict),
+    ] {
+        assert!(silent.unwrap().roots(&Selection::default()).is_err());
+    }
+}
+
 struct Texts(Vec<(Vec<u8>, i64)>);
 
 impl Visitor for Texts {
@@ -253,6 +334,6 @@ fn compressed_files_are_read() {
     assert!(matches!(cause(open(&packed[..packed.len() / 2])), LayoutError::Gzip(_)));
     let bomb = pack(&vec![0; 80 << 20]);
     assert!(matches!(cause(open(&bomb)), LayoutError::Unpacked { .. }));
-    let dxf = open(b"999\r\nmade by hand\r\n  0\r\nSECTION\r\n  2\r\nHEADER\r\n");
-    assert!(matches!(cause(dxf), LayoutError::OtherFormat { format: "DXF", .. }));
+    let binary = open(b"AutoCAD Binary DXF\r\n\x1a\0");
+    assert!(matches!(cause(binary), LayoutError::OtherFormat { .. }));
 }

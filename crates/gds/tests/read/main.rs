@@ -1,6 +1,7 @@
 //! The reader and the extraction: hand-built bytes, files of other tools, random trees, damaged bytes.
 
 mod departures;
+mod dxf;
 mod folded;
 mod oasis;
 mod pillars;
@@ -97,7 +98,10 @@ fn absolute_widths_and_magnified_cells_do_not_go_together() {
     };
     assert_eq!(boxes(&layout(drawn(-200, 1.0))), [[-100, 0, 100, 1000]]);
     assert_eq!(boxes(&layout(drawn(200, 2.0))), [[-200, 0, 200, 2000]]);
-    assert_eq!(fault_of(drawn(-200, 2.0)).1, LayoutError::AbsoluteWidth);
+    // Other programs magnify it all the same.
+    let both = layout(drawn(-200, 2.0));
+    assert_eq!(both.warnings().listed[0].cause, LayoutError::AbsoluteWidth);
+    assert_eq!(boxes(&both), [[-200, 0, 200, 2000]]);
 }
 
 /// Optional records, unusual order, several XY records, padding: all legal, all read.

@@ -7,7 +7,8 @@ use metalith_core::{Error, Result};
 use ndarray::{Array2, Axis};
 
 use super::SceneImage;
-use super::read::{LONGEST, array, png_values};
+use super::pictures::png_values;
+use super::read::{LONGEST, array};
 
 impl SceneImage {
     /// This scene with the distances of its pixels (um).
@@ -53,11 +54,11 @@ pub fn read_depth(path: &Path) -> Result<Array2<f32>> {
     let mm = if bytes.starts_with(b"\x93NUMPY") {
         array(path, &bytes).map_err(told)?.0
     } else if bytes.starts_with(b"\x89PNG") {
-        let (values, deep) = png_values(path, &bytes).map_err(told)?;
-        if !deep {
+        let png = png_values(path, &bytes).map_err(told)?;
+        if !png.deep {
             return Err(fault("its values have fewer than 16 bits"));
         }
-        values * f64::from(u16::MAX)
+        png.values * f64::from(u16::MAX)
     } else {
         return Err(fault("it is neither NPY nor PNG"));
     };

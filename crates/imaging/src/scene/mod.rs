@@ -2,7 +2,8 @@
 //!
 //! | question | file |
 //! | --- | --- |
-//! | which files can be read | `read` |
+//! | which files can be read | `read`, `pictures`, `exr` |
+//! | colour profiles | `colours` |
 //! | scenes that need no file | `chart` |
 //! | a spectral cube as a few planes | `cube` |
 //! | how far each pixel is | `depth` |
@@ -11,9 +12,12 @@
 
 mod average;
 mod chart;
+mod colours;
 mod cube;
 mod depth;
+mod exr;
 mod folder;
+mod pictures;
 mod pixel_count;
 mod read;
 

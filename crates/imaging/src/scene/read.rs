@@ -5,12 +5,9 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::file::read_at_most;
 use metalith_core::{Error, Result, npy, srgb};
-use ndarray::{Array3, Axis};
-use zune_jpeg::JpegDecoder;
-use zune_jpeg::zune_core::bytestream::ZCursor;
-use zune_jpeg::zune_core::colorspace::ColorSpace;
-use zune_jpeg::zune_core::options::DecoderOptions;
+use ndarray::Array3;
 
+use super::pictures::{Stored, stored};
 use super::pixel_count::{SIDES, sides_words};
 use super::{SceneImage, cube};
 use crate::geometry::SceneView;
@@ -43,8 +40,9 @@ pub fn read_far_scene(path: &Path, field_deg: f64) -> Result<SceneImage> {
     })
 }
 
-/// Read a scene: PNG of 8 or 16 bits or JPEG in sRGB; NPY of linear light, `[row, column]` or `[row, column, colour]`;
-/// NPY `[row, column, band]` of reflectance with the wavelengths of its bands.
+/// Read a scene: PNG, JPEG or TIFF of 8 or 16 bits, in sRGB or with a colour profile; TIFF with a decimal point, EXR or NPY of
+/// linear light, `[row, column]` or `[row, column, colour]`; NPY `[row, column, band]` of reflectance with the wavelengths
+/// of its bands.
 ///
 /// # Errors
 /// If the file cannot be read or holds something else; the text says what is wrong and what to give.
@@ -89,7 +87,10 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
             let rgb = if is_npy {
                 grey_or_colour(path, light(path, &bytes)?)?
             } else {
-                values(path, &bytes)?.mapv(srgb::linear)
+                match stored(path, &bytes)? {
+                    Stored::Srgb(values) => values.mapv(srgb::linear),
+                    Stored::Light(light) => light,
+                }
             };
             Ok(SceneImage::of_rgb(&name, &rgb, file.field_deg, file.distance_um))
         }
@@ -105,37 +106,33 @@ pub fn read_picture(path: &Path) -> Result<Array3<f64>> {
     if is_npy(&bytes) {
         return Ok(grey_or_colour(path, light(path, &bytes)?)?.mapv(srgb::encoded));
     }
-    values(path, &bytes)
+    Ok(match stored(path, &bytes)? {
+        Stored::Srgb(values) => values,
+        Stored::Light(light) => light.mapv(srgb::encoded),
+    })
 }
 
 fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x93NUMPY")
 }
 
-/// Values of an image file as they are stored, full scale being one.
-fn values(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
-    if bytes.starts_with(b"\x89PNG") {
-        Ok(png_values(path, bytes)?.0)
-    } else if bytes.starts_with(&[0xff, 0xd8]) {
-        jpeg(path, bytes)
-    } else {
-        Err(fault(path, "it is neither PNG, JPEG nor NPY"))
-    }
-}
-
-fn fault(path: &Path, what: impl Into<String>) -> Error {
+pub(super) fn fault(path: &Path, what: impl Into<String>) -> Error {
     let hint = format!(
-        "give a PNG (8 or 16 bits, opaque) or JPEG in sRGB, an NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
+        "give a PNG or TIFF (8 or 16 bits, opaque) or a JPEG, in sRGB or with a colour profile, an EXR, TIFF or NPY of linear light of shape (rows, columns) or (rows, columns, 3), or an NPY cube with its wavelengths, {}",
         sides_words()
     );
     Error::table(path, None, what, hint)
 }
 
-fn check_sides(path: &Path, rows: usize, columns: usize) -> Result<()> {
+pub(super) fn check_sides(path: &Path, rows: usize, columns: usize) -> Result<()> {
+    sides(rows, columns).map_err(|what| fault(path, what))
+}
+
+pub(super) fn sides(rows: usize, columns: usize) -> Result<(), String> {
     if SIDES.contains(&rows) && SIDES.contains(&columns) {
         return Ok(());
     }
-    Err(fault(path, format!("it has {columns} x {rows} pixels")))
+    Err(format!("it has {columns} x {rows} pixels"))
 }
 
 /// An array of two or three axes, and whether it has whole numbers; one of two axes gets a third of one entry.
@@ -156,7 +153,7 @@ pub(super) fn array(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
 fn light(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
     let (array, whole) = array(path, bytes)?;
     if whole {
-        let what = "it has whole numbers (uint8 or uint16), and linear light of which white is 1 has fractions";
+        let what = "it has whole numbers, and linear light of which white is 1 has fractions";
         let hint = "divide it by its white and save it as float32 or float64: `numpy.save(file, values / white)`; of values in sRGB make a PNG";
         return Err(Error::table(path, None, what, hint));
     }
@@ -178,100 +175,11 @@ fn grey_or_colour(path: &Path, array: Array3<f64>) -> Result<Array3<f64>> {
     }
 }
 
-/// Red, green and blue of an opaque PNG as they are stored, full scale being one; and whether values have 16 bits.
-pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<(Array3<f64>, bool)> {
-    let wrong = |e: png::DecodingError| fault(path, e.to_string());
-    let mut decoder = png::Decoder::new(Cursor::new(bytes));
-    decoder.set_transformations(png::Transformations::EXPAND);
-    let mut reader = decoder.read_info().map_err(wrong)?;
-    let (columns, rows) = (reader.info().width as usize, reader.info().height as usize);
-    check_sides(path, rows, columns)?;
-    let size = reader
-        .output_buffer_size()
-        .ok_or_else(|| fault(path, "it is too large"))?;
-    let mut data = vec![0; size];
-    let info = reader.next_frame(&mut data).map_err(wrong)?;
-    let samples = info.color_type.samples();
-    let deep = info.bit_depth == png::BitDepth::Sixteen;
-    let value = |y: usize, x: usize, c: usize| {
-        let at = y * info.line_size + (x * samples + c) * if deep { 2 } else { 1 };
-        if deep {
-            f64::from(u16::from_be_bytes([data[at], data[at + 1]])) / 65535.0
-        } else {
-            f64::from(data[at]) / 255.0
-        }
-    };
-    if samples % 2 == 0 && (0..rows).any(|y| (0..columns).any(|x| value(y, x, samples - 1) < 1.0)) {
-        return Err(fault(path, "parts of it are transparent"));
-    }
-    let colours = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
-        value(y, x, if samples < 3 { 0 } else { c })
-    });
-    Ok((colours, deep))
-}
-
-fn jpeg(path: &Path, bytes: &[u8]) -> Result<Array3<f64>> {
-    let options = DecoderOptions::default()
-        .jpeg_set_out_colorspace(ColorSpace::RGB)
-        .set_max_width(*SIDES.end())
-        .set_max_height(*SIDES.end());
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    let data = decoder.decode().map_err(|e| fault(path, e.to_string()))?;
-    let (columns, rows) = decoder.dimensions().ok_or_else(|| fault(path, "it has no size"))?;
-    check_sides(path, rows, columns)?;
-    if data.len() != rows * columns * 3 {
-        return Err(fault(path, "its colours are not those of a picture"));
-    }
-    let stored = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
-        f64::from(data[(y * columns + x) * 3 + c]) / 255.0
-    });
-    Ok(upright(stored, decoder.exif().map_or(1, |exif| orientation(exif))))
-}
-
-/// Orientation in which a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if the file does not
-/// say.
-fn orientation(exif: &[u8]) -> u16 {
-    const TAG: u16 = 274;
-    /// Bytes of an entry, and those before its value.
-    const ENTRY: [usize; 2] = [12, 8];
-    let little = exif.starts_with(b"II");
-    let word = |at: usize| {
-        let bytes = exif.get(at..at.checked_add(2)?)?.try_into().ok()?;
-        Some(if little {
-            u16::from_le_bytes(bytes)
-        } else {
-            u16::from_be_bytes(bytes)
-        })
-    };
-    let said = || {
-        let halves = [word(4)?, word(6)?].map(usize::from);
-        let first = if little {
-            halves[0] | halves[1] << 16
-        } else {
-            halves[0] << 16 | halves[1]
-        };
-        let mut entries = (0..usize::from(word(first)?)).map(|k| first + 2 + k * ENTRY[0]);
-        word(entries.find(|at| word(*at) == Some(TAG))? + ENTRY[1])
-    };
-    said().filter(|o| (1..=8).contains(o)).unwrap_or(1)
-}
-
-/// A picture as it was seen by a camera that was held so.
-fn upright(mut stored: Array3<f64>, orientation: u16) -> Array3<f64> {
-    if orientation >= 5 {
-        stored.swap_axes(0, 1);
-    }
-    if matches!(orientation, 3 | 4 | 7 | 8) {
-        stored.invert_axis(Axis(0));
-    }
-    if matches!(orientation, 2 | 3 | 6 | 7) {
-        stored.invert_axis(Axis(1));
-    }
-    stored.as_standard_layout().into_owned()
-}
-
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::colours::Colours;
+    use super::super::colours::tests::{P3, curve_of_srgb, profile};
+    use super::super::pictures::orientation;
     use super::*;
 
     fn file(path: &Path, nm: Option<Vec<f64>>) -> SceneFile {
@@ -403,6 +311,128 @@ pub(super) mod tests {
         );
     }
 
+    /// A PNG of one colour, with chunks behind its head.
+    fn png_with(colour: [u8; 3], chunks: impl FnOnce(&mut png::Info<'_>)) -> Vec<u8> {
+        let mut info = png::Info::with_size(16, 20);
+        info.color_type = png::ColorType::Rgb;
+        info.bit_depth = png::BitDepth::Eight;
+        chunks(&mut info);
+        let mut bytes = Vec::new();
+        let encoder = png::Encoder::with_info(&mut bytes, info).unwrap();
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&colour.repeat(16 * 20)).unwrap();
+        writer.finish().unwrap();
+        bytes
+    }
+
+    /// Profiles, gamma and rotation of PNG, and profiles of JPEG and TIFF, are used.
+    #[test]
+    fn colours_are_those_that_a_file_states() {
+        /// Digits of a profile.
+        const TOLERANCE: f64 = 5e-4;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.bin");
+        let scene = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            read_scene(&file(&path, None)).unwrap()
+        };
+        let light = |bytes: &[u8]| {
+            let rgb = scene(bytes).rgb();
+            [0, 1, 2].map(|c| rgb[[0, 0, c]])
+        };
+        let near = |found: [f64; 3], want: [f64; 3]| {
+            let apart = (0..3).map(|c| (found[c] - want[c]).abs()).fold(0.0, f64::max);
+            assert!(apart < TOLERANCE, "{found:?} {want:?}");
+        };
+        let grey = 100.0 / 255.0;
+        near(
+            light(&png_with([100; 3], |info| {
+                info.source_gamma = Some(png::ScaledFloat::new(1.0))
+            })),
+            [grey; 3],
+        );
+        near(
+            light(&png_with([100; 3], |info| {
+                info.source_gamma = Some(png::ScaledFloat::new(0.45455))
+            })),
+            [srgb::linear(grey); 3],
+        );
+        let p3 = profile(P3, &curve_of_srgb());
+        let red = [1.22494, 0.0, 0.0];
+        near(
+            light(&png_with([255, 0, 0], |info| {
+                info.icc_profile = Some(p3.clone().into())
+            })),
+            red,
+        );
+        // A picture is cut to what sRGB has.
+        let values = read_picture(&path).unwrap();
+        assert!((values[[0, 0, 0]] - 1.0).abs() < 1e-6 && values[[0, 0, 1]] == 0.0);
+        let odd = png_with([255, 0, 0], |info| info.icc_profile = Some(b"no profile".into()));
+        std::fs::write(&path, odd).unwrap();
+        assert!(read_scene(&file(&path, None)).is_err());
+        let exif = [&b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0"[..], &[0; 4]].concat();
+        let turned = scene(&png_with([9; 3], |info| info.exif_metadata = Some(exif.into())));
+        assert_eq!((turned.view.rows, turned.view.columns), (16, 20));
+
+        let plain = std::fs::read("../../tests/mutants/small.jpg").unwrap();
+        let chunk = [&b"ICC_PROFILE\0\x01\x01"[..], &p3].concat();
+        let length = (chunk.len() as u16 + 2).to_be_bytes();
+        let marked = [&plain[..2], &[0xff, 0xe2], &length, &chunk, &plain[2..]].concat();
+        let (of_srgb, of_p3) = (scene(&plain).rgb(), scene(&marked).rgb());
+        let colours = Colours::of_profile(&p3).unwrap();
+        let wanted = colours.light(&of_srgb.mapv(srgb::encoded));
+        assert!(of_p3.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < TOLERANCE));
+        assert!(
+            of_p3
+                .iter()
+                .zip(&of_srgb)
+                .any(|(a, b)| (a - b).abs() > 10.0 * TOLERANCE)
+        );
+    }
+
+    #[test]
+    fn tiff_and_exr_are_read() {
+        use ::exr::prelude::{f16, write_rgb_file};
+        use ::tiff::encoder::{TiffEncoder, colortype};
+        /// Digits of half precision.
+        const HALF: f64 = 5e-4;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.bin");
+        let half = srgb::linear(188.0 / 255.0);
+        let check = |want: f64| {
+            let rgb = read_scene(&file(&path, None)).unwrap().rgb();
+            assert!(rgb.iter().all(|v| (v - want).abs() < HALF), "{} {want}", rgb[[0, 0, 0]]);
+        };
+        fn encoded<C: ::tiff::encoder::colortype::ColorType>(path: &Path, values: &[C::Inner])
+        where
+            [C::Inner]: ::tiff::encoder::TiffValue,
+        {
+            let mut encoder = TiffEncoder::new(std::fs::File::create(path).unwrap()).unwrap();
+            encoder.write_image::<C>(16, 16, values).unwrap();
+        }
+        encoded::<colortype::RGB8>(&path, &[188; 768]);
+        check(half);
+        encoded::<colortype::Gray16>(&path, &[48316; 256]);
+        check(half);
+        encoded::<colortype::RGB32Float>(&path, &[half as f32; 768]);
+        check(half);
+        encoded::<colortype::RGBA8>(&path, &[7; 1024]);
+        assert!(read_scene(&file(&path, None)).is_err());
+        let exr = folder.path().join("scene.exr");
+        let write = |value: f32| write_rgb_file(&exr, 16, 16, |_, _| [value; 3].map(f16::from_f32).into()).unwrap();
+        write(half as f32);
+        std::fs::copy(&exr, &path).unwrap();
+        check(half);
+        // White is 1, and light may be more.
+        write(7.5);
+        std::fs::copy(&exr, &path).unwrap();
+        check(7.5);
+        write(f32::NAN);
+        std::fs::copy(&exr, &path).unwrap();
+        assert!(read_scene(&file(&path, None)).is_err());
+    }
+
     #[test]
     fn odd_files_are_refused_with_a_reason() {
         let folder = tempfile::tempdir().unwrap();
@@ -412,7 +442,12 @@ pub(super) mod tests {
             let error = read_scene(&file(&path, nm)).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
         };
-        refused(b"GIF89a", None, "neither");
+        refused(b"unknown", None, "neither");
+        refused(b"GIF89a", None, "GIF");
+        refused(b"RIFF\0\0\0\0WEBPVP8 ", None, "dwebp");
+        refused(b"\0\0\0\x1cftypavif", None, "avifdec");
+        refused(b"II*\0\x08\0\0\0", None, "TIFF");
+        refused(&[0x76, 0x2f, 0x31, 0x01, 2, 0], None, "EXR");
         refused(&npy_bytes("(16, 16, 4)", &[0.1; 1024]), None, "bands");
         refused(
             &npy_bytes("(16, 16, 4)", &[0.1; 1024]),

@@ -4,10 +4,8 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use metalith_core::npy;
+use metalith_core::{npy, tiff};
 use ndarray::Array2;
-use tiff::ColorType;
-use tiff::decoder::{Decoder, DecodingResult, Limits};
 
 /// Most samples of a map along an axis, and fewest.
 const MOST: usize = 2048;
@@ -44,44 +42,22 @@ fn from_npy(path: &Path) -> Result<Array2<f32>, String> {
 }
 
 fn from_tiff(path: &Path) -> Result<Array2<f32>, String> {
-    let wrong = |e: tiff::TiffError| format!("it is no TIFF file that can be read: {e}");
     let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
-    let mut limits = Limits::default();
-    limits.decoding_buffer_size = 16 * MOST * MOST;
-    limits.intermediate_buffer_size = 16 * MOST * MOST;
-    let mut decoder = Decoder::new(BufReader::new(file)).map_err(wrong)?.with_limits(limits);
-    let (width, height) = decoder.dimensions().map_err(wrong)?;
-    let (rows, cols) = (height as usize, width as usize);
-    check_size(rows, cols)?;
-    let colour = decoder.colortype().map_err(wrong)?;
-    let channels = match colour {
-        ColorType::Gray(_) => 1,
-        ColorType::RGB(_) => 3,
-        _ => {
-            return Err(format!(
-                "its samples are {colour:?}, neither grey nor three equal channels"
-            ));
+    let read = tiff::read(BufReader::new(file), |page, [rows, cols, channels]| {
+        match (page, channels) {
+            (0, 1 | 3) => check_size(rows, cols),
+            (0, _) => Err("its samples are neither grey nor three equal channels".into()),
+            _ => Err("it has several pages, a map has one".into()),
         }
-    };
-    let values: Vec<f32> = match decoder.read_image().map_err(wrong)? {
-        DecodingResult::U8(v) => v.into_iter().map(f32::from).collect(),
-        DecodingResult::U16(v) => v.into_iter().map(f32::from).collect(),
-        DecodingResult::F32(v) => v,
-        _ => {
-            return Err(format!(
-                "its samples are {colour:?}; 8 or 16 bits are read, or 32 with a decimal point"
-            ));
-        }
-    };
-    if values.len() != rows * cols * channels {
-        return Err("its size is not that of its samples".into());
-    }
-    if values
-        .chunks_exact(channels)
+    })?;
+    let page = &read.pages[0];
+    if page
+        .values
+        .chunks_exact(page.channels)
         .any(|own| own.iter().any(|v| *v != own[0]))
     {
         return Err("its three channels differ: a map has one value for each sample".into());
     }
-    let values = values.into_iter().step_by(channels).collect();
-    Array2::from_shape_vec((rows, cols), values).map_err(|e| e.to_string())
+    let values = page.values.iter().step_by(page.channels).copied().collect();
+    Array2::from_shape_vec((page.rows, page.columns), values).map_err(|e| e.to_string())
 }

@@ -1,14 +1,12 @@
-//! Frames and maps from NPY, TIFF, PNG and CSV files.
+//! Frames and maps from NPY, TIFF, FITS, PNG and CSV files.
 
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use metalith_core::npy;
+use metalith_core::{fits, npy, tiff};
 use ndarray::Array2;
 use num_complex::Complex64;
-use tiff::ColorType;
-use tiff::decoder::{Decoder, DecodingResult, Limits};
 
 /// Most samples of a map or frame along an axis, and fewest.
 const MOST: usize = 8192;
@@ -22,6 +20,7 @@ pub(super) fn frames(path: &Path) -> Result<Vec<Array2<f32>>, String> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     let frames = match ending.to_ascii_lowercase().as_str() {
         "tif" | "tiff" => from_tiff(path)?,
+        "fits" | "fit" | "fts" => from_fits(path)?,
         "png" => vec![from_png(path)?],
         "csv" | "txt" => vec![from_csv(path)?],
         _ => from_npy(path)?,
@@ -148,43 +147,34 @@ fn from_csv(path: &Path) -> Result<Array2<f32>, String> {
 }
 
 fn from_tiff(path: &Path) -> Result<Vec<Array2<f32>>, String> {
-    let wrong = |e: tiff::TiffError| format!("it is no TIFF file that can be read: {e}");
-    let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
-    let mut limits = Limits::default();
-    limits.decoding_buffer_size = 1 << 30;
-    limits.intermediate_buffer_size = 1 << 30;
-    let mut decoder = Decoder::new(BufReader::new(file)).map_err(wrong)?.with_limits(limits);
-    let mut out = Vec::new();
-    loop {
-        let (width, height) = decoder.dimensions().map_err(wrong)?;
-        let (rows, cols) = (height as usize, width as usize);
+    let mut first = None;
+    let read = tiff::read(opened(path)?, |page, [rows, cols, channels]| {
         check_size(rows, cols)?;
-        let colour = decoder.colortype().map_err(wrong)?;
-        if !matches!(colour, ColorType::Gray(_)) {
-            return Err(format!("its samples are {colour:?}, not grey"));
+        let other_size = *first.get_or_insert((rows, cols)) != (rows, cols);
+        match (channels, (page + 1) * rows * cols) {
+            _ if other_size => Err(format!("page {} has another size than the first", page + 1)),
+            (1, 0..=MOST_SAMPLES) => Ok(()),
+            (1, _) => Err(format!("it has more than {page} pages")),
+            _ => Err(format!("its samples have {channels} channels, not grey")),
         }
-        let values: Vec<f32> = match decoder.read_image().map_err(wrong)? {
-            DecodingResult::U8(v) => v.into_iter().map(f32::from).collect(),
-            DecodingResult::U16(v) => v.into_iter().map(f32::from).collect(),
-            DecodingResult::U32(v) => v.into_iter().map(|v| v as f32).collect(),
-            DecodingResult::F32(v) => v,
-            DecodingResult::F64(v) => v.into_iter().map(|v| v as f32).collect(),
-            _ => {
-                return Err(format!(
-                    "its samples are {colour:?}; 8, 16 or 32 bits are read, or a decimal point"
-                ));
-            }
-        };
-        out.push(shaped(rows, cols, values)?);
-        if out[0].dim() != (rows, cols) {
-            return Err(format!("page {} has another size than the first", out.len()));
+    })?;
+    let pages = read.pages.into_iter();
+    pages.map(|page| shaped(page.rows, page.columns, page.values)).collect()
+}
+
+fn from_fits(path: &Path) -> Result<Vec<Array2<f32>>, String> {
+    let read = fits::read(opened(path)?, |[count, rows, cols]| {
+        check_size(rows, cols)?;
+        match count.checked_mul(rows * cols) {
+            Some(0..=MOST_SAMPLES) => Ok(()),
+            _ => Err(format!("it has {count} frames")),
         }
-        if !decoder.more_images() {
-            return Ok(out);
-        }
-        if (out.len() + 1) * rows * cols > MOST_SAMPLES {
-            return Err(format!("it has more than {} pages", out.len()));
-        }
-        decoder.next_image().map_err(wrong)?;
-    }
+    })?;
+    let frames = read.values.into_iter();
+    frames.map(|values| shaped(read.rows, read.columns, values)).collect()
+}
+
+fn opened(path: &Path) -> Result<BufReader<File>, String> {
+    let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
+    Ok(BufReader::new(file))
 }

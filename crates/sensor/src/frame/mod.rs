@@ -1,20 +1,20 @@
-//! Camera frames from NPY, PNG and TIFF files, what the sensor itself adds to them, and several exposures as one.
+//! Camera frames from NPY, PNG, TIFF and FITS files, what the sensor itself adds to them, and several exposures as one.
 
 mod expected;
+mod file;
 mod merge_exposures;
 mod orientation;
 mod png;
 mod sensor;
-mod tiff;
 
 pub use expected::expected;
+pub use file::{ENDINGS, size};
 pub use merge_exposures::{ExposedFrame, joined};
 pub use orientation::Orientation;
 pub use sensor::{DarkPixels, SensorFrame, SensorFrames, SensorPixels};
 
 use std::path::Path;
 
-use metalith_core::npy;
 use ndarray::Array2;
 
 use crate::relay::SATURATED;
@@ -73,25 +73,15 @@ const MOST_SHIFTED: f32 = 65_535.0;
 /// Variance of a number that is rounded to whole ones.
 const OF_ROUNDING: f64 = 1.0 / 12.0;
 
-/// Read frames of exactly `rows` x `cols` finite numbers, whose values are DN: NPY, grey PNG, or grey TIFF. NPY of three axes
-/// and TIFF of several pages are stacks: what comes back is their mean, and pixels that are saturated in any frame
+/// Read frames of exactly `rows` x `cols` finite numbers, whose values are DN: NPY, grey PNG, grey TIFF or FITS, recognised by their
+/// first bytes. NPY and FITS of three axes and TIFF of several pages are stacks: what comes back is their mean, and pixels that are saturated in any frame
 /// have `saturation_dn`, which a mean would hide. Files that end below `saturation_dn` must not be full. The first row of the file
 /// is row 0.
 ///
 /// # Errors
 /// What is wrong with the file, in words.
 pub fn read(path: &Path, rows: usize, cols: usize, saturation_dn: f64) -> Result<Recorded, String> {
-    let is = |endings: &[&str]| {
-        let ending = path.extension().and_then(|e| e.to_str());
-        ending.is_some_and(|e| endings.iter().any(|known| e.eq_ignore_ascii_case(known)))
-    };
-    let pages = if is(&["png"]) {
-        png::read(path, rows, cols)?
-    } else if is(&["tif", "tiff"]) {
-        tiff::read(path, rows, cols)?
-    } else {
-        from_npy(path, rows, cols)?
-    };
+    let pages = file::pages(path, rows, cols)?;
     let values = || pages.values.iter().flatten();
     if let Some(largest) = pages.largest.filter(|v| f64::from(*v) < SATURATED * saturation_dn) {
         let full = values().filter(|v| **v >= largest).count();
@@ -106,48 +96,6 @@ pub fn read(path: &Path, rows: usize, cols: usize, saturation_dn: f64) -> Result
         pages: pages.values.len() as u32,
         whole: pages.largest.is_some(),
         step_dn: step_of(&pages.values),
-    })
-}
-
-/// Rows and columns of the frames of a file.
-///
-/// # Errors
-/// What is wrong with the file, in words.
-pub fn size(path: &Path) -> Result<(usize, usize), String> {
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let file = || std::fs::File::open(path).map_err(|e| format!("it cannot be read: {e}"));
-    match ending.to_ascii_lowercase().as_str() {
-        "png" => png::size(file()?),
-        "tif" | "tiff" => tiff::size(file()?),
-        _ => {
-            let mut size = None;
-            // The shape is all that is wanted: no array is read.
-            let read = npy::read(path, |shape| {
-                size = match shape {
-                    [.., rows, cols] if shape.len() <= 3 => Some((*rows as usize, *cols as usize)),
-                    _ => None,
-                };
-                false
-            });
-            size.ok_or_else(|| read.err().map_or_else(String::new, |e| e.to_string()))
-        }
-    }
-}
-
-fn from_npy(path: &Path, rows: usize, cols: usize) -> Result<Pages, String> {
-    let one = [rows as u64, cols as u64];
-    let takes = |shape: &[u64]| {
-        shape == one
-            || (shape.len() == 3 && shape[1..] == one && shape[0] > 0 && shape[0] <= MOST_PIXELS / (one[0] * one[1]))
-    };
-    let array = npy::read(path, takes).map_err(|error| match error {
-        npy::NpyError::Shape { .. } => format!("{error}, the camera says [{rows}, {cols}]"),
-        other => other.to_string(),
-    })?;
-    let frames = array.values.chunks_exact(rows * cols);
-    Ok(Pages {
-        values: frames.map(|f| f.iter().map(|&v| v as f32).collect()).collect(),
-        largest: None,
     })
 }
 
@@ -261,5 +209,62 @@ mod tests {
         assert_eq!(read(&npy, 2, 3, 600.0).unwrap().dn, want);
         std::fs::write(&path, b"II*\0nothing").unwrap();
         assert!(read(&path, 2, 3, 600.0).unwrap_err().contains("no TIFF"));
+    }
+
+    /// Frames as other programs write them, whatever the file is called: FITS with BZERO, NPY by columns, TIFF of 32 bits.
+    #[test]
+    fn frames_of_other_programs_are_read() {
+        use ::tiff::encoder::{TiffEncoder, colortype};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frame.dat");
+        let want = ndarray::arr2(&[[1.0, 2.0, 3.0], [4.0, 5.0, 40_000.0]]);
+        let same = |path: &Path| {
+            assert_eq!(read(path, 2, 3, FULL).unwrap().dn, want);
+            assert_eq!(size(path), Ok((2, 3)));
+        };
+        let cards = [
+            "SIMPLE  = T",
+            "BITPIX  = 16",
+            "NAXIS   = 2",
+            "NAXIS1  = 3",
+            "NAXIS2  = 2",
+            "BZERO   = 32768",
+            "END",
+        ];
+        let mut fits: Vec<u8> = cards
+            .iter()
+            .flat_map(|card| format!("{card:<80}").into_bytes())
+            .collect();
+        fits.resize(2880, b' ');
+        fits.extend(want.iter().flat_map(|v| ((*v as i32 - 32768) as i16).to_be_bytes()));
+        std::fs::write(&path, &fits).unwrap();
+        same(&path);
+        assert!(read(&path, 3, 3, FULL).unwrap_err().contains("2 x 3"));
+
+        let header = "{'descr': '<u4', 'fortran_order': True, 'shape': (2, 3), }";
+        let head = [
+            &b"\x93NUMPY\x01\0"[..],
+            &(header.len() as u16).to_le_bytes(),
+            header.as_bytes(),
+        ]
+        .concat();
+        let columns = want
+            .t()
+            .iter()
+            .flat_map(|v| (*v as u32).to_le_bytes())
+            .collect::<Vec<_>>();
+        std::fs::write(&path, [head, columns].concat()).unwrap();
+        same(&path);
+
+        let wide: Vec<u32> = want.iter().map(|v| *v as u32).collect();
+        let mut encoder = TiffEncoder::new(File::create(&path).unwrap()).unwrap();
+        encoder.write_image::<colortype::Gray32>(3, 2, &wide).unwrap();
+        drop(encoder);
+        same(&path);
+        std::fs::rename(&path, folder.path().join("frame.DNG")).unwrap();
+        let raw = folder.path().join("frame.DNG");
+        assert_eq!(read(&raw, 2, 3, FULL).unwrap_err(), metalith_core::file_kind::RAW);
+        std::fs::write(&path, b"\xff\xd8\xff\xe0").unwrap();
+        assert!(read(&path, 2, 3, FULL).unwrap_err().contains("JPEG"));
     }
 }

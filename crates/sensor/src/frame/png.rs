@@ -7,8 +7,8 @@ use std::path::Path;
 use super::{Pages, other_size};
 
 /// Rows and columns of a PNG.
-pub(crate) fn size(file: File) -> Result<(usize, usize), String> {
-    let reader = png::Decoder::new(BufReader::new(file)).read_info();
+pub(crate) fn size(file: BufReader<File>) -> Result<(usize, usize), String> {
+    let reader = png::Decoder::new(file).read_info();
     let reader = reader.map_err(|e| format!("it is no PNG file that can be read: {e}"))?;
     Ok((reader.info().height as usize, reader.info().width as usize))
 }

@@ -1,0 +1,218 @@
+//! Pictures of PNG, JPEG and TIFF, and what they say of their colours and of the way that the camera was held.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use metalith_core::{Result, file_kind, tiff};
+use ndarray::{Array3, Axis};
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use super::colours::Colours;
+use super::exr;
+use super::pixel_count::SIDES;
+use super::read::{check_sides, fault, sides};
+
+/// Pixels of an image file.
+pub(super) enum Stored {
+    /// Values in sRGB, full scale being one.
+    Srgb(Array3<f64>),
+    /// Linear sRGB, white being one.
+    Light(Array3<f64>),
+}
+
+impl Stored {
+    fn of(values: Array3<f64>, colours: &Colours) -> Self {
+        if colours.is_srgb() {
+            Self::Srgb(values)
+        } else {
+            Self::Light(colours.light(&values))
+        }
+    }
+}
+
+pub(super) fn stored(path: &Path, bytes: &[u8]) -> Result<Stored> {
+    if bytes.starts_with(b"\x89PNG") {
+        let png = png_values(path, bytes)?;
+        let colours = png.colours.map_err(|what| fault(path, what))?;
+        Ok(Stored::of(upright(png.values, png.orientation), &colours))
+    } else if bytes.starts_with(&[0xff, 0xd8]) {
+        jpeg(path, bytes)
+    } else if [&b"II*\0"[..], b"MM\0*", b"II+\0", b"MM\0+"]
+        .iter()
+        .any(|m| bytes.starts_with(m))
+    {
+        tiff_values(path, bytes)
+    } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        let (light, colours) =
+            exr::light(bytes, |rows, columns| sides(rows, columns)).map_err(|what| fault(path, what))?;
+        finite(path, &light)?;
+        Ok(Stored::Light(colours.light(&light)))
+    } else {
+        let named = file_kind::words(bytes);
+        Err(fault(
+            path,
+            named.unwrap_or("it is neither PNG, JPEG, TIFF, EXR nor NPY"),
+        ))
+    }
+}
+
+fn finite(path: &Path, light: &Array3<f64>) -> Result<()> {
+    if light.iter().all(|v| v.is_finite()) {
+        Ok(())
+    } else {
+        Err(fault(path, "it holds light that is no number"))
+    }
+}
+
+/// Pixels of the first page of a TIFF: whole numbers are values in sRGB or of the profile, others are linear light.
+fn tiff_values(path: &Path, bytes: &[u8]) -> Result<Stored> {
+    let read = tiff::read(Cursor::new(bytes), |page, [rows, columns, _]| match page {
+        0 => sides(rows, columns),
+        _ => Err("it has several pages: write the one that is meant".into()),
+    });
+    let read = read.map_err(|what| fault(path, what))?;
+    let page = &read.pages[0];
+    let full = page.largest.map_or(1.0, f64::from);
+    let (own, colours) = (page.channels, if page.channels < 3 { 1 } else { 3 });
+    let value = |y: usize, x: usize, c: usize| f64::from(page.values[(y * page.columns + x) * own + c]) / full;
+    let (rows, columns) = (page.rows, page.columns);
+    if own > colours && (0..rows).any(|y| (0..columns).any(|x| value(y, x, colours) < 1.0)) {
+        return Err(fault(path, TRANSPARENT));
+    }
+    let values = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| value(y, x, c.min(colours - 1)));
+    finite(path, &values)?;
+    let colours = match (&read.profile, page.largest) {
+        (Some(profile), _) => Some(Colours::of_profile(profile).map_err(|what| fault(path, what))?),
+        (None, Some(_)) => None,
+        (None, None) => Some(Colours::linear(None)),
+    };
+    let values = upright(values, read.orientation);
+    Ok(match colours {
+        Some(colours) => Stored::of(values, &colours),
+        None => Stored::Srgb(values),
+    })
+}
+
+/// Word on a picture that is not opaque.
+const TRANSPARENT: &str = "parts of it are transparent";
+
+/// An opaque PNG.
+pub(super) struct Png {
+    /// Red, green and blue as they are stored, full scale being one.
+    pub values: Array3<f64>,
+    /// True if values have 16 bits.
+    pub deep: bool,
+    /// What the values are in light, or what is wrong with it.
+    colours: Result<Colours, String>,
+    /// As EXIF numbers it.
+    orientation: u16,
+}
+
+pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<Png> {
+    let wrong = |e: png::DecodingError| fault(path, e.to_string());
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(wrong)?;
+    let (columns, rows) = (reader.info().width as usize, reader.info().height as usize);
+    check_sides(path, rows, columns)?;
+    let size = reader
+        .output_buffer_size()
+        .ok_or_else(|| fault(path, "it is too large"))?;
+    let mut data = vec![0; size];
+    let info = reader.next_frame(&mut data).map_err(wrong)?;
+    let samples = info.color_type.samples();
+    let deep = info.bit_depth == png::BitDepth::Sixteen;
+    let value = |y: usize, x: usize, c: usize| {
+        let at = y * info.line_size + (x * samples + c) * if deep { 2 } else { 1 };
+        if deep {
+            f64::from(u16::from_be_bytes([data[at], data[at + 1]])) / 65535.0
+        } else {
+            f64::from(data[at]) / 255.0
+        }
+    };
+    if samples % 2 == 0 && (0..rows).any(|y| (0..columns).any(|x| value(y, x, samples - 1) < 1.0)) {
+        return Err(fault(path, TRANSPARENT));
+    }
+    let values = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
+        value(y, x, if samples < 3 { 0 } else { c })
+    });
+    // EXIF may stand behind the pixels; what is damaged there is no fault of them.
+    let _ = reader.finish();
+    let info = reader.info();
+    Ok(Png {
+        values,
+        deep,
+        colours: Colours::of_png(info),
+        orientation: info.exif_metadata.as_deref().map_or(1, orientation),
+    })
+}
+
+fn jpeg(path: &Path, bytes: &[u8]) -> Result<Stored> {
+    let options = DecoderOptions::default()
+        .jpeg_set_out_colorspace(ColorSpace::RGB)
+        .set_max_width(*SIDES.end())
+        .set_max_height(*SIDES.end());
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let data = decoder.decode().map_err(|e| fault(path, e.to_string()))?;
+    let (columns, rows) = decoder.dimensions().ok_or_else(|| fault(path, "it has no size"))?;
+    check_sides(path, rows, columns)?;
+    if data.len() != rows * columns * 3 {
+        return Err(fault(path, "its colours are not those of a picture"));
+    }
+    let stored = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
+        f64::from(data[(y * columns + x) * 3 + c]) / 255.0
+    });
+    let stored = upright(stored, decoder.exif().map_or(1, |exif| orientation(exif)));
+    Ok(match decoder.icc_profile() {
+        Some(profile) => Stored::of(
+            stored,
+            &Colours::of_profile(&profile).map_err(|what| fault(path, what))?,
+        ),
+        None => Stored::Srgb(stored),
+    })
+}
+
+/// Orientation in which a camera was held, as EXIF numbers it from 1 to 8 (tag 274); 1, upright, if the file does not
+/// say.
+pub(super) fn orientation(exif: &[u8]) -> u16 {
+    const TAG: u16 = 274;
+    /// Bytes of an entry, and those before its value.
+    const ENTRY: [usize; 2] = [12, 8];
+    let little = exif.starts_with(b"II");
+    let word = |at: usize| {
+        let bytes = exif.get(at..at.checked_add(2)?)?.try_into().ok()?;
+        Some(if little {
+            u16::from_le_bytes(bytes)
+        } else {
+            u16::from_be_bytes(bytes)
+        })
+    };
+    let said = || {
+        let halves = [word(4)?, word(6)?].map(usize::from);
+        let first = if little {
+            halves[0] | halves[1] << 16
+        } else {
+            halves[0] << 16 | halves[1]
+        };
+        let mut entries = (0..usize::from(word(first)?)).map(|k| first + 2 + k * ENTRY[0]);
+        word(entries.find(|at| word(*at) == Some(TAG))? + ENTRY[1])
+    };
+    said().filter(|o| (1..=8).contains(o)).unwrap_or(1)
+}
+
+/// A picture as it was seen by a camera that was held so.
+fn upright(mut stored: Array3<f64>, orientation: u16) -> Array3<f64> {
+    if orientation >= 5 {
+        stored.swap_axes(0, 1);
+    }
+    if matches!(orientation, 3 | 4 | 7 | 8) {
+        stored.invert_axis(Axis(0));
+    }
+    if matches!(orientation, 2 | 3 | 6 | 7) {
+        stored.invert_axis(Axis(1));
+    }
+    stored.as_standard_layout().into_owned()
+}
