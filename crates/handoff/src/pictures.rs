@@ -249,10 +249,15 @@ pub(super) fn dose_matrix(
     }
     plan.caption(format!(
         "Block n is on layer {}, datatype n, and has its number beside its lens. Each stands in the middle of a field of \
-         {} um, if a field is about the origin. Pads from the left: pillars of {}.",
+         {} um, if a field is about the origin.{}",
         spec.layer,
         process.writer.field_used_um,
-        pads.iter().map(PadPillar::words).collect::<Vec<_>>().join(", ")
+        if pads.is_empty() {
+            String::new()
+        } else {
+            let words: Vec<_> = pads.iter().map(PadPillar::words).collect();
+            format!(" Pads from the left: pillars of {}.", words.join(", "))
+        }
     ))
 }
 

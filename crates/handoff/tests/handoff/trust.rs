@@ -6,7 +6,7 @@ use std::path::Path;
 use metalith_core::{Error, FaultKind, Silent};
 use metalith_handoff::{HandoffOptions, handoff, verify_handoff};
 
-use crate::{DESIGN, PROCESS, copy_of_shared, options};
+use crate::{DESIGN, PROCESS, copy_of_shared, options, source};
 
 /// The design with words replaced, in a folder.
 fn altered(folder: &Path, changes: &[(&str, &str)]) -> HandoffOptions {
@@ -18,7 +18,7 @@ fn altered(folder: &Path, changes: &[(&str, &str)]) -> HandoffOptions {
     let path = folder.join("design.toml");
     fs::write(&path, text).unwrap();
     HandoffOptions {
-        design: path,
+        source: source(&path),
         ..options(&folder.join("out"))
     }
 }
