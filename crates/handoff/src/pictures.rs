@@ -203,17 +203,17 @@ fn complement(intervals: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
     gaps
 }
 
-/// The nine blocks with their doses, each with these pads.
+/// The nine blocks with their doses, each with a piece of this name and these pads.
 pub(super) fn dose_matrix(
     process: &Process,
-    pads: &[PadPillar],
+    (piece, pads): (&str, &[PadPillar]),
     blocks: &[DoseBlock],
     doses: &[super::dose::DoseRow],
 ) -> Figure {
     let spec = &process.dose_matrix;
     let mut plan = Plan::new("Dose matrix").width(560.0);
     let bounds = plan.outlines("block");
-    let lens = plan.layer("small lens");
+    let lens = plan.layer(piece);
     let pad = plan.layer("uniform pads");
     let field = plan.outlines("write field");
     for (block, dose) in blocks.iter().zip(doses) {

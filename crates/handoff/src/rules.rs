@@ -264,7 +264,12 @@ fn summary(name: &str, report: &DrcReport, deck: &Deck, process: &Process, pitch
         words.push_str(&format!(": {confirmed} {named_by}"));
     }
     if !assumed.is_empty() {
-        words = format!("assumed limits exceeded: {assumed} {named_by}; no lab has confirmed them, ask yours; {words}");
+        let exceeded = format!("assumed limits exceeded: {assumed} {named_by}; no lab has confirmed them, ask yours");
+        words = if confirmed.is_empty() {
+            format!("{exceeded}; {words}")
+        } else {
+            format!("{words}; {exceeded}")
+        };
     }
     HandoffCheck {
         name: format!("design rules, {}", name.replace('_', " ")),

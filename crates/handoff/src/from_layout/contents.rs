@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::central;
 use super::places::{Density, LayoutPiece, Places};
-use super::read::{OF_A_DESIGN, OF_PILLARS, Pattern};
+use super::read::Pattern;
 use crate::contents::{HandoffCheck, RuleReports};
 use crate::dose::{Beam, DoseRow, Exposure, WriteTime};
 use crate::dose_matrix::DoseBlock;
@@ -113,62 +113,54 @@ pub(super) struct LeftOut {
 }
 
 impl LeftOut {
-    pub(super) fn of(pattern: &Pattern) -> Vec<Self> {
-        let part = |part: &'static str, why: &str| Self {
-            part,
-            why: why.to_owned(),
-        };
+    /// Parts that are left out of a hand-off in which rules of the checks `waiting` are not in force.
+    pub(super) fn of(pattern: &Pattern, waiting: &[&str]) -> Vec<Self> {
         let mut parts = vec![
-            part("apertures", "openings of step 2 follow from the elements of a design"),
-            part(
+            ("apertures", "openings of step 2 follow from the elements of a design"),
+            (
                 "chip",
                 "size and edge of the chip are in a design: the page shows the bounding box of what is exposed",
             ),
-            part(
+            (
                 "film",
                 "material and thickness are in a design: the process is taken as it is, whether it fits or not",
             ),
-            part(
+            (
                 "test structures",
                 "pads, lines and verniers follow from the cell and the layers of a design",
             ),
-            part("reference lens", "it has the mapping of a design"),
-            part(
+            ("reference lens", "it has the mapping of a design"),
+            (
                 "alignment crosses",
                 "a layout does not say which shapes are marks: name their layer with --expose",
             ),
-            part(
+            (
                 "simulation",
                 "focal length, wavelength and limits are in a design: use `metalith psf`",
             ),
-            part("compensation and dose classes", "they need the elements of a design"),
+            ("compensation and dose classes", "they need the elements of a design"),
         ];
-        let rules = |checks: &[&str]| {
-            format!(
-                "rules {} state what a design holds and are not in force",
-                checks.join(", ")
-            )
-        };
-        parts.push(Self {
-            part: "rules of a design",
-            why: rules(&OF_A_DESIGN),
-        });
-        if let Pattern::Shapes(_) = pattern {
-            parts.push(Self {
-                part: "rules of pillars",
-                why: format!(
-                    "no pillars were found: rules {} are not in force",
-                    OF_PILLARS.join(", ")
-                ),
-            });
-            parts.push(part("pads of the dose matrix", "no pillars were found to make them of"));
-            parts.push(part("places to measure", "no pillars were found"));
-        } else {
-            parts.push(part(
+        parts.extend(match pattern {
+            Pattern::Pillars(_) => vec![(
                 "height of the pillars",
                 "rules about aspect ratios use the height that the rules file states",
-            ));
-        }
-        parts
+            )],
+            Pattern::Shapes(_) => vec![
+                ("pads of the dose matrix", "no pillars were found to make them of"),
+                ("places to measure", "no pillars were found"),
+            ],
+        });
+        let parts = parts.into_iter().map(|(part, why)| Self {
+            part,
+            why: why.to_owned(),
+        });
+        let rules = Self {
+            part: "rules",
+            why: format!(
+                "rules of checks {} state what a design or its pillars and marks hold and are not in force",
+                waiting.join(", ")
+            ),
+        };
+        parts.chain([rules]).collect()
     }
 }

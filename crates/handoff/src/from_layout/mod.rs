@@ -36,7 +36,7 @@ use metalith_gds::extract::{ExtractedElement, Extraction};
 use metalith_gds::{Layout, ReadLimits};
 use metalith_layout::PillarForm;
 use metalith_pillars::{DatabaseUnit, LatticeKind};
-use metalith_report::{Verdict, count, write_json};
+use metalith_report::{Verdict, count, counted, exact, write_json};
 
 /// Shares of the pillars below the widths that are measured on lenses, and of the pads of the dose matrix.
 const MEASURED: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
@@ -93,7 +93,7 @@ pub(crate) fn fill(
         doses: doses(process),
         sites: sites(&inputs.pattern, process),
         blocks,
-        left_out: LeftOut::of(&inputs.pattern),
+        left_out: LeftOut::of(&inputs.pattern, &inputs.waiting),
         checks: Vec::new(),
         rules: Vec::new(),
         files: Vec::new(),
@@ -359,12 +359,18 @@ fn check(
         verdict: Verdict::Pass,
         words: match &inputs.pattern {
             Pattern::Pillars(found) => format!(
-                "{} {} in {} elements were found; {} other shapes on layer {} are exposed and have no place to measure",
+                "{} {} in {} were found; {} on layer {}{}",
                 count(found.pillars),
                 found.shape.plural(),
-                found.elements.len(),
-                count(found.oddities.total()),
-                inputs.exposed[0]
+                counted(found.elements.len(), "element"),
+                counted(found.oddities.total() as usize, "other shape"),
+                inputs.exposed[0],
+                found.oddities.listed.first().map_or_else(String::new, |first| format!(
+                    " without a place to measure, such as one at ({}, {}) um: {}",
+                    exact(first.centre_nm[0] * 1e-3),
+                    exact(first.centre_nm[1] * 1e-3),
+                    first.why.words()
+                ))
             ),
             Pattern::Shapes(why) => {
                 format!(

@@ -8,7 +8,7 @@ use super::read::{LayoutInputs, Pattern};
 use crate::front_page::{self, chip, writing};
 use crate::kind_words::KindWords;
 use metalith_core::Result;
-use metalith_report::{Cell, Column, Figure, Page, Plan, Table, count, exact, fixed, sig};
+use metalith_report::{Cell, Column, Figure, Page, Plan, Table, count, counted, exact, fixed, sig};
 
 /// Write fields that the picture shows.
 const FIELDS: usize = 2500;
@@ -26,10 +26,7 @@ pub(super) fn write(folder: &Path, inputs: &LayoutInputs, c: &LayoutContents<'_>
     front_page::verdict(&mut page, &c.checks);
     let [x0, y0, x1, y1] = c.bounds_um;
     page.facts(&[
-        (
-            "Exposed area",
-            format!("{} x {} mm", sig((x1 - x0) * 1e-3, 3), sig((y1 - y0) * 1e-3, 3)),
-        ),
+        ("Exposed", format!("{} x {} um", sig(x1 - x0, 4), sig(y1 - y0, 4))),
         ("Tone of step 1", process.exposed_becomes().to_owned()),
         ("Base dose", format!("{} uC/cm2", process.resist.dose_uc_cm2)),
         (
@@ -44,9 +41,10 @@ pub(super) fn write(folder: &Path, inputs: &LayoutInputs, c: &LayoutContents<'_>
     layout(&mut page, inputs, c, folder)?;
     layers(&mut page, c);
     let pads = super::pads(&inputs.pattern);
+    let piece = "piece of the layout";
     let words = inputs.pattern.shape().map(KindWords::of);
     let measured = words.map_or("sizes", |words| words.measured);
-    writing::doses(&mut page, process, (&pads, measured), (&c.blocks, &c.doses));
+    writing::doses(&mut page, process, (piece, &pads, measured), (&c.blocks, &c.doses));
     page.paragraph(format!(
         "Each block holds the {} shapes of the layout in a square of {} um about ({}, {}) um{}.",
         count(c.piece.shapes as u64),
@@ -128,10 +126,10 @@ fn layout(page: &mut Page, inputs: &LayoutInputs, c: &LayoutContents<'_>, folder
         table.row([
             "Pillars".into(),
             format!(
-                "{} {} in {} elements; {} lattice, pitch {} nm",
+                "{} {} in {}; {} lattice, pitch {} nm",
                 count(found.pillars),
                 found.shape,
-                found.elements,
+                counted(found.elements, "element"),
                 found.lattice,
                 exact(found.pitch_nm)
             )

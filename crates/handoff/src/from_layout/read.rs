@@ -18,21 +18,39 @@ use metalith_drc::{Deck, LayoutLayers};
 use metalith_gds::extract::{Extraction, ExtractionPlan, extract};
 use metalith_gds::{FileFormat, Layout, ReadLimits};
 use metalith_pillars::{DatabaseUnit, PillarShape};
+use metalith_report::count;
 
 /// Layers of marks and labels in the dose matrix, as the shipped decks have them.
 pub(super) const DOSE_MARKS: LayerNumber = LayerNumber { layer: 3, datatype: 0 };
 pub(super) const DOSE_LABEL: LayerNumber = LayerNumber { layer: 11, datatype: 0 };
 
 /// Checks about what a design holds: cell, marks and layers.
-pub(super) const OF_A_DESIGN: [&str; 5] = [
+const OF_A_DESIGN: [&str; 5] = [
     "width_library",
     "on_lattice",
     "marks_complete",
     "layers_known",
     "active_area",
 ];
-/// Checks about pillars, which a layout without pillars cannot keep.
-pub(super) const OF_PILLARS: [&str; 5] = ["square", "circle", "rectangle", "aspect_max", "exposure_grid"];
+/// Checks about marks, for a layout whose marks are not named.
+const OF_MARKS: &str = "mark_keep_out";
+/// Checks about pillars and lenses, which a layout without pillars cannot keep.
+const OF_PILLARS: [&str; 14] = [
+    "square",
+    "circle",
+    "rectangle",
+    "manhattan",
+    "acute_angle",
+    "width_min",
+    "width_max",
+    "aspect_max",
+    "gap_aspect_max",
+    "exposure_grid",
+    "fill",
+    "fill_gradient",
+    "field_cut",
+    "field_in_lens",
+];
 
 const BLOCK: usize = 1 << 20;
 
@@ -49,6 +67,8 @@ pub(crate) struct LayoutInputs {
     /// Exposed layers, the pillars first.
     pub exposed: Vec<LayerNumber>,
     pub pattern: Pattern,
+    /// Checks of the decks that are not in force.
+    pub waiting: Vec<&'static str>,
     pub lab: Lab,
 }
 
@@ -70,8 +90,14 @@ impl Pattern {
 
     fn read(layout: &Layout, layer: LayerNumber, progress: &dyn Progress) -> Result<Self> {
         match extract(layout, &ExtractionPlan::discover(layer), progress) {
-            Ok(found) if found.pillars > 0 => Ok(Self::Pillars(Box::new(found))),
-            Ok(_) => Ok(Self::Shapes("no pillar stands on a lattice".into())),
+            // Pads and pitch from a few of the shapes would be of something else.
+            Ok(found) if found.pillars >= found.oddities.total().max(1) => Ok(Self::Pillars(Box::new(found))),
+            Ok(found) => Ok(Self::Shapes(format!(
+                "only {} of {} shapes on layer {layer} are {} on a lattice",
+                count(found.pillars),
+                count(found.pillars + found.oddities.total()),
+                found.shape.plural()
+            ))),
             Err(metalith_gds::Error::Extraction { cause, .. }) => Ok(Self::Shapes(format!("{cause} ({})", cause.id()))),
             Err(error) => Err(error.into()),
         }
@@ -120,10 +146,11 @@ impl LayoutInputs {
             pillars: exposed[0],
             marks: exposed.get(1).copied(),
         };
-        let waiting: Vec<&str> = match pattern {
-            Pattern::Pillars(_) => OF_A_DESIGN.to_vec(),
-            Pattern::Shapes(_) => OF_A_DESIGN.into_iter().chain(OF_PILLARS).collect(),
-        };
+        let mut waiting = OF_A_DESIGN.to_vec();
+        waiting.extend(layers.marks.is_none().then_some(OF_MARKS));
+        if let Pattern::Shapes(_) = pattern {
+            waiting.extend(OF_PILLARS);
+        }
         let first = process.checks.of_shape(shape).expect("it was checked").clone();
         let adapted =
             |rules: &Path, deck: Deck| deck.without_design(&waiting, (rules == first.pillar_rules).then_some(layers));
@@ -143,6 +170,7 @@ impl LayoutInputs {
             statistics,
             exposed,
             pattern,
+            waiting,
             lab,
         })
     }

@@ -7,12 +7,13 @@ pub(super) mod writing;
 use std::path::Path;
 
 use crate::contents::{Contents, HandoffCheck, RuleReports};
+use crate::cures::BrokenRule;
 use crate::job::JobPatterns;
 use crate::kind_words::KindWords;
 use crate::pad::dose_pads;
 use metalith_core::Result;
 use metalith_core::text::printable;
-use metalith_report::{Cell, Column, Page, Table, Verdict, count, sig};
+use metalith_report::{Cell, Column, Page, Table, Verdict, count, counted, sig};
 
 /// Rows of long tables that the page shows; all are in the CSV files.
 const SHOWN: usize = 40;
@@ -49,7 +50,7 @@ pub(super) fn write(folder: &Path, c: &Contents<'_>) -> Result<()> {
     writing::doses(
         &mut page,
         c.process,
-        (&pads, kind.measured),
+        ("small lens", &pads, kind.measured),
         (&c.blocks, &c.documents.doses),
     );
     writing::dose_classes(&mut page, c);
@@ -111,25 +112,21 @@ pub(super) fn broken_rules(page: &mut Page, checks: &[HandoffCheck]) {
     // What fails comes first.
     rows.sort_by_key(|(_, rule)| rule.assumed);
     page.section("What to change or to confirm");
-    let mut table = Table::new([
-        Column::text("Rule"),
-        Column::text("Limit"),
-        Column::text("What must hold"),
-        Column::text("Layout"),
-        Column::number("Violations", ""),
-        Column::text("Cure"),
-    ]);
-    for (check, rule) in rows {
-        table.row([
-            Cell::code(&rule.rule),
-            if rule.assumed { "assumed" } else { "in force" }.into(),
-            rule.requirement.as_str().into(),
-            check.name.trim_start_matches("design rules, ").into(),
-            rule.violations.into(),
-            rule.cure.as_str().into(),
-        ]);
-    }
-    page.table(table);
+    page.list(rows.into_iter().map(|(check, rule)| {
+        let BrokenRule {
+            rule: id,
+            requirement,
+            deck,
+            cure,
+            ..
+        } = rule;
+        format!(
+            "{}`{id}` of {deck}, {} in {}: {requirement}. Cure: {cure}.",
+            if rule.assumed { "Assumed limit: " } else { "" },
+            counted(rule.violations as usize, "violation"),
+            check.name.trim_start_matches("design rules, "),
+        )
+    }));
     if checks.iter().any(HandoffCheck::exceeds_assumed) {
         page.paragraph(
             "Assumed limits are guesses that no lab has confirmed: they fail nothing. Ask the lab for its limits before the first \

@@ -10,11 +10,11 @@ use crate::pictures;
 use crate::process::{JobSpec, Process};
 use metalith_report::{Cell, Column, Page, Table, fixed};
 
-/// The dose matrix: its pads, words for what is measured on them, its blocks and doses.
+/// The dose matrix: words for the piece above the pads, the pads, words for what is measured on them; blocks and doses.
 pub(crate) fn doses(
     page: &mut Page,
     process: &Process,
-    (pads, measured): (&[PadPillar], &str),
+    (piece, pads, measured): (&str, &[PadPillar], &str),
     (blocks, doses): (&[DoseBlock], &[DoseRow]),
 ) {
     page.section("Dose matrix");
@@ -28,7 +28,7 @@ pub(crate) fn doses(
         process.writer.acceleration_kv,
         if pads.is_empty() { "shapes" } else { "pads" }
     ));
-    page.figure(pictures::dose_matrix(process, pads, blocks, doses));
+    page.figure(pictures::dose_matrix(process, (piece, pads), blocks, doses));
     let mut table = Table::new([
         Column::number("Dose", ""),
         Column::number("Factor", ""),

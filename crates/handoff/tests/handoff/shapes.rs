@@ -14,7 +14,7 @@ use metalith_pillars::{DatabaseUnit, LatticeKind, PillarId, PillarRows, PillarSh
 use metalith_testing::{design, root};
 use metalith_wave::Accuracy;
 
-use super::{PILLARS, SUMMED, TABLE_S, options, rows_in};
+use super::{PILLARS, SUMMED, TABLE_S, options, rows_in, source};
 
 /// Largest distance of a polygon from its circle where a design says nothing (nm), and the rounding of its corners.
 const CHORD_NM: f64 = 0.5;
