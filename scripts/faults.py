@@ -44,12 +44,20 @@ class Case:
     name: str
     options: list[str]
     together: bool = False
+    command: str = ""
 
 
 CASES = [
     Case("layout", []),
     Case("run", ["--fast", "--fidelity", "published"]),
     Case("handoff", ["--fast", "--fidelity", "published"], together=True),
+    # Of a layout, which is no design.
+    Case(
+        "handoff-layout",
+        ["--process", str(ROOT / "processes/jbx6300_zep520a.toml"), "--layer", "1/0", "--expose", "3/0"],
+        together=True,
+        command="handoff",
+    ),
     Case("cells", ["--orders", "5", "--tolerance", "0.1"]),
     Case("optimize", ["--no-report"]),
     Case("calibrate", ["--effects", "defocus,pixel_blur"]),
@@ -102,10 +110,18 @@ class Bench:
         text = re.sub(r'(?m)^title = .*$', f'title = "version {n}"', small_design(), count=1)
         text = text.replace("width_max_nm = 300", f"width_max_nm = {300 + 10 * n}")
         path.write_text(text)
+        if self.case.name == "handoff-layout":
+            made = self.folder / f"layout-{n}"
+            command = [self.program, "layout", str(path), "--out", str(made), "-q"]
+            subprocess.run(command, env=self.environment(), check=True, capture_output=True)
+            # Both have one name, so that files of one hand-off replace those of the other.
+            path = made / "lens.gds"
+            next(made.glob("*_pillars.gds")).rename(path)
         return path
 
     def command(self, n: int) -> list[str]:
-        return [self.program, self.case.name, str(self.inputs[n]), "--out", str(self.out), "-q", *self.case.options]
+        command = self.case.command or self.case.name
+        return [self.program, command, str(self.inputs[n]), "--out", str(self.out), "-q", *self.case.options]
 
     def environment(self) -> dict[str, str]:
         return {**os.environ, "METALITH_CACHE": str(self.folder / "cache")}

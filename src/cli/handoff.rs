@@ -1,39 +1,66 @@
 //! `metalith handoff`: everything that a cleanroom needs, in one folder and one archive.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::compensate::compensated_name;
-use metalith::handoff::{Handoff, HandoffOptions, HandoffVerification, handoff, verify_handoff};
+use metalith::gds::LayerNumber;
+use metalith::handoff::{
+    DesignSource, Handoff, HandoffOptions, HandoffSource, HandoffVerification, LayoutSource, handoff, handoff_name,
+    verify_handoff,
+};
 use metalith::report::Verdict;
-use metalith::{Accuracy, Design, Result};
+use metalith::{Accuracy, Design, Error, Result};
 
 use super::compensated::judged_as_made;
 use super::layout::FormatArg;
 use super::out_folder::OutFolder;
+use super::psf::layer;
+use super::reading::ReadingArgs;
+use super::standard_input::InputFile;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
 
-/// Make the folder and the archive for the cleanroom, or check that a received folder is complete.
+/// Make the folder and the archive for the cleanroom, from a design or from a layout of any program, or check that a received
+/// folder is complete.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  metalith handoff designs/mini_3x3.toml --process processes/jbx6300_zep520a.toml\n  \
+                  metalith handoff lens.gds --process processes/jbx6300_tio2.toml --layer 10/0\n  \
                   metalith handoff --verify out/mini_3x3_handoff\n\n\
                   Exit codes: 0 fine; 1 a check failed, or the folder was altered; 2 bad input; \
                   3 a check could not run."
 )]
 pub(crate) struct HandoffArgs {
-    /// The design file.
-    #[arg(required_unless_present = "verify", conflicts_with = "verify")]
-    design: Option<PathBuf>,
+    /// The design file; or a layout in GDSII or OASIS, which is handed over as it is, `-` for standard input.
+    #[arg(
+        required_unless_present = "verify",
+        conflicts_with = "verify",
+        value_name = "DESIGN|LAYOUT"
+    )]
+    source: Option<PathBuf>,
 
-    /// Process file: writer, resist, doses, currents, overheads. If left out, a shipped one is used and stored in `inputs/`.
+    /// Process file: writer, resist, doses, currents, overheads. If left out, a shipped one is used and stored in `inputs/`; a
+    /// layout needs one.
     #[arg(long, value_name = "FILE")]
     process: Option<PathBuf>,
 
     /// Folder to make; `out/NAME_handoff` if left out. The archive has the same name.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
+
+    /// Of a layout: layer and datatype of the pillars. If left out, the only layer with shapes, else 1/0.
+    #[arg(long, value_parser = layer)]
+    layer: Option<LayerNumber>,
+
+    /// Of a layout: a further layer of the first step, such as marks; may be given several times.
+    #[arg(long, value_name = "LAYER", value_parser = layer)]
+    expose: Vec<LayerNumber>,
 
     /// Only check that this received folder is complete and unaltered.
     #[arg(long, value_name = "FOLDER")]
@@ -49,7 +76,7 @@ pub(crate) struct HandoffArgs {
     #[arg(long, value_name = "MODEL", conflicts_with = "compensate")]
     dose_classes: Option<PathBuf>,
 
-    /// Format of the layouts; GDSII if left out.
+    /// Format of the layouts that are made; GDSII if left out. A layout that is handed over stays as it is.
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
 
@@ -72,23 +99,110 @@ pub(crate) struct HandoffArgs {
 
 pub(crate) fn run(args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    match (&args.verify, &args.design) {
+    match (&args.verify, &args.source) {
         (Some(folder), _) => look(folder, args.json, terminal),
-        (None, Some(design)) => make(design, args, terminal),
+        (None, Some(path)) => {
+            let file = InputFile::of(path)?;
+            if is_layout(&file)? {
+                make_of_layout(path, &file, args, terminal)
+            } else {
+                make_of_design(path, args, terminal)
+            }
+        }
         (None, None) => unreachable!("one of both is required"),
     }
 }
 
-fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
+/// Endings of the names of layouts.
+const LAYOUT_ENDINGS: [&str; 7] = ["gds", "gds2", "gdsii", "oas", "oasis", "gz", "dxf"];
+
+/// True if a file is a layout by its name or its first bytes: a design is text.
+fn is_layout(path: &Path) -> Result<bool> {
+    let ending = path.extension().unwrap_or_default();
+    if LAYOUT_ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)) {
+        return Ok(true);
+    }
+    if !path.is_file() {
+        return Ok(false);
+    }
+    let mut head = Vec::new();
+    let file = File::open(path).map_err(Error::io("read", path))?;
+    file.take(64).read_to_end(&mut head).map_err(Error::io("read", path))?;
+    Ok(head.contains(&0) || head.starts_with(b"%SEMI-OASIS") || head.starts_with(&[0x1f, 0x8b]))
+}
+
+fn make_of_design(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
+    args.reading.apply(terminal);
+    let of_a_layout = [
+        ("--top", args.reading.top.is_some()),
+        ("--layer", args.layer.is_some()),
+        ("--expose", !args.expose.is_empty()),
+    ];
+    only("a layout", "a design names its cell and layers", &of_a_layout)?;
     judged_as_made("--compensate", args.compensate.as_deref(), args.fidelity)?;
     let default = match (&args.out, &args.compensate) {
         (Some(out), _) => out.clone(),
         (None, Some(_)) => handoff_of(&compensated_name(&Design::read_with(design, terminal)?.name)),
         (None, None) => handoff_of(&Design::read_with(design, terminal)?.name),
     };
-    let out = OutFolder::of(args.out.as_deref(), default, design)?;
+    let source = HandoffSource::Design(DesignSource {
+        path: design.to_owned(),
+        compensate: args.compensate.clone(),
+        dose_classes: args.dose_classes.clone(),
+        fidelity: args.fidelity.map(Into::into),
+        accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
+    });
+    make(
+        source,
+        OutFolder::of(args.out.as_deref(), default, design)?,
+        args,
+        terminal,
+    )
+}
+
+fn make_of_layout(path: &Path, file: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
+    args.reading.apply(terminal);
+    let of_a_design = [
+        ("--compensate", args.compensate.is_some()),
+        ("--dose-classes", args.dose_classes.is_some()),
+        ("--fidelity", args.fidelity.is_some()),
+        ("--fast", args.fast),
+    ];
+    only(
+        "a design",
+        "a layout is not simulated and has no elements of a design",
+        &of_a_design,
+    )?;
+    let default = handoff_of(&handoff_name(file));
+    let source = HandoffSource::Layout(LayoutSource {
+        path: file.to_owned(),
+        top: args.reading.top.clone(),
+        layer: args.layer,
+        exposed: args.expose.clone(),
+    });
+    make(
+        source,
+        OutFolder::of(args.out.as_deref(), default, path)?,
+        args,
+        terminal,
+    )
+}
+
+/// Refuse options, given or not, that are for another source.
+fn only(source: &str, why: &str, options: &[(&str, bool)]) -> Result<()> {
+    match options.iter().find(|(_, given)| *given) {
+        None => Ok(()),
+        Some((option, _)) => Err(Error::refused(
+            "option/of-another-source",
+            format!("{option} is for the hand-off of {source}: {why}"),
+            format!("leave {option} out"),
+        )),
+    }
+}
+
+fn make(source: HandoffSource, out: OutFolder, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
     let options = HandoffOptions {
-        design: design.to_owned(),
+        source,
         process: args.process.clone(),
         out: out.path.clone(),
         command: std::iter::once("metalith".to_owned())
@@ -96,11 +210,7 @@ fn make(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcom
             .collect::<Vec<_>>()
             .join(" "),
         waivers: args.waivers.clone(),
-        compensate: args.compensate.clone(),
-        dose_classes: args.dose_classes.clone(),
         format: args.format.map_or_else(Default::default, Into::into),
-        fidelity: args.fidelity.map(Into::into),
-        accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
     };
     let made = handoff(&options, terminal)?;
     out.note()?;
@@ -142,6 +252,10 @@ fn tell(made: &Handoff) {
     print_line!("{}  the same, packed", made.archive.display());
     for check in &made.checks {
         print_line!("{}: {}: {}", check.verdict.word(), check.name, check.words);
+        for broken in &check.broken {
+            let limit = if broken.assumed { "assumed: " } else { "" };
+            print_line!("  {limit}{}: {}: {}", broken.rule, broken.requirement, broken.cure);
+        }
     }
     print_line!("{} files, seal {}", made.manifest.files.len(), made.manifest.seal);
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use include_dir::{Dir, include_dir};
+use include_dir::{Dir, File, include_dir};
 
 use super::context::Context;
 use super::rule::{DeckRule, Rule, Severity};
@@ -125,14 +125,7 @@ impl Deck {
         if unit.is_nanometre() {
             return self;
         }
-        let step = format!("nm = {}", unit.nm());
-        let mut in_grid_rule = false;
-        let lines = self.text.split('\n').map(|line| {
-            in_grid_rule = line == "check = \"grid\"" || in_grid_rule && line != "[[rule]]";
-            if in_grid_rule && line == "nm = 1" { &step } else { line }
-        });
-        let text = lines.collect::<Vec<_>>().join("\n");
-        Self::parse(&self.path, text).expect("a number for a number")
+        Self::parse(&self.path, on_grid(&self.text, unit)).expect("a number for a number")
     }
 
     /// The deck with the height of the pillars of a design in its rules about proportions, in place of the height that the file
@@ -142,8 +135,26 @@ impl Deck {
     /// Never: the same text was read before.
     #[must_use]
     pub fn for_pillars_of(self, design: &Design) -> Self {
-        let height_nm = design.cell.pillar_height_nm;
-        Self::read_text(&self.path, self.text, Some(height_nm)).expect("it was read before")
+        let known = Known {
+            height_nm: Some(design.cell.pillar_height_nm),
+            ..Known::default()
+        };
+        Self::read_text(&self.path, self.text, &known).expect("it was read before")
+    }
+
+    /// The deck for a layout without a design: the rules of these checks, which state what a design holds, are not in force.
+    /// With `layers` pillars and marks are on these layers, and all other names of the deck on none.
+    ///
+    /// # Panics
+    /// Never: the same text was read before.
+    #[must_use]
+    pub fn without_design(self, of_a_design: &[&str], layers: Option<LayoutLayers>) -> Self {
+        let known = Known {
+            layers,
+            of_a_design,
+            ..Known::default()
+        };
+        Self::read_text(&self.path, self.text, &known).expect("it was read before")
     }
 
     /// The deck of the program whose file has the name at the end of `path`, if there is one.
@@ -154,17 +165,27 @@ impl Deck {
         Some(deck.expect("the decks of the program are sound"))
     }
 
+    /// True if it is one of the program, unaltered.
+    pub fn is_shipped(&self) -> bool {
+        let file = self.path.file_name().and_then(|name| SHIPPED.get_file(name));
+        file.and_then(File::contents_utf8).is_some_and(|text| {
+            // The step of its `grid` rules follows the database unit.
+            let shipped = DatabaseUnit::ALL.map(|unit| on_grid(text, unit));
+            shipped.contains(&self.text)
+        })
+    }
+
     /// Name and text of the file that it was read from.
     pub fn source(&self) -> (&Path, &str) {
         (&self.path, &self.text)
     }
 
     fn parse(path: &Path, text: String) -> Result<Self> {
-        Self::read_text(path, text, None)
+        Self::read_text(path, text, &Known::default())
     }
 
-    fn read_text(path: &Path, text: String, height_nm: Option<f64>) -> Result<Self> {
-        let contents = Document::read(path, &text, |root| read(root, height_nm))?;
+    fn read_text(path: &Path, text: String, known: &Known<'_>) -> Result<Self> {
+        let contents = Document::read(path, &text, |root| read(root, known))?;
         Ok(Self {
             name: contents.name,
             pillars: contents.pillars,
@@ -180,6 +201,41 @@ impl Deck {
     }
 }
 
+/// The text of a deck with this unit as the step of its `grid` rules where that is 1 nm.
+fn on_grid(text: &str, unit: DatabaseUnit) -> String {
+    let step = format!("nm = {}", unit.nm());
+    let mut in_grid_rule = false;
+    let lines = text.split('\n').map(|line| {
+        in_grid_rule = line == "check = \"grid\"" || in_grid_rule && line != "[[rule]]";
+        if in_grid_rule && line == "nm = 1" { &step } else { line }
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Layers of a layout that a deck is used for.
+#[derive(Clone, Copy, Debug)]
+pub struct LayoutLayers {
+    pub pillars: LayerNumber,
+    /// Layer of the marks of the first step, if it has some.
+    pub marks: Option<LayerNumber>,
+}
+
+/// Layer that no shape is on: layers of a deck that a layout does not have.
+const NO_LAYER: LayerNumber = LayerNumber {
+    layer: u16::MAX,
+    datatype: u16::MAX,
+};
+
+/// What is known of a layout better than by the file of the deck.
+#[derive(Default)]
+struct Known<'a> {
+    /// Height of the pillars.
+    height_nm: Option<f64>,
+    layers: Option<LayoutLayers>,
+    /// Checks whose rules wait for a design.
+    of_a_design: &'a [&'a str],
+}
+
 /// Content of a deck file.
 struct DeckContents {
     name: String,
@@ -187,8 +243,7 @@ struct DeckContents {
     rules: Vec<DeckRule>,
 }
 
-/// `height_nm`: height of the pillars that is known better than by the file.
-fn read(root: &Section<'_, '_>, height_nm: Option<f64>) -> DeckContents {
+fn read(root: &Section<'_, '_>, known: &Known<'_>) -> DeckContents {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     let name = root.text("name");
     let section = root.section("layers");
@@ -218,12 +273,18 @@ fn read(root: &Section<'_, '_>, height_nm: Option<f64>) -> DeckContents {
         pillars.extend(layers.get("pillars"));
     }
     section.finish();
+    if let Some(own) = known.layers {
+        layers.values_mut().for_each(|layer| *layer = NO_LAYER);
+        let marks = own.marks.unwrap_or(NO_LAYER);
+        layers.extend([("pillars".to_owned(), own.pillars), ("marks".to_owned(), marks)]);
+        pillars = vec![own.pillars];
+    }
     let stated_nm = root.float("pillar_height_nm", Limits::new(1.0..=100_000.0, "nm"));
     let sections = root.sections("rule");
     let mut context = Context {
         layers,
         pillars: pillars.first().copied().unwrap_or_default(),
-        height_nm: height_nm.unwrap_or(stated_nm),
+        height_nm: known.height_nm.unwrap_or(stated_nm),
         covered: Vec::new(),
     };
     context.covered = sections
@@ -240,7 +301,8 @@ fn read(root: &Section<'_, '_>, height_nm: Option<f64>) -> DeckContents {
     let mut ids = BTreeSet::new();
     let mut rules: Vec<DeckRule> = Vec::new();
     for s in sections.iter().take(MOST_RULES) {
-        if let Some(rule) = read_rule(s, &context, &mut ids) {
+        if let Some(mut rule) = read_rule(s, &context, &mut ids) {
+            rule.always &= !known.of_a_design.contains(&rule.check.as_str());
             rules.push(rule);
         }
         s.finish();

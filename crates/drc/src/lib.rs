@@ -40,7 +40,7 @@ mod winding;
 mod work;
 mod write_fields;
 
-pub use deck::Deck;
+pub use deck::{Deck, LayoutLayers};
 pub use export::{junit, lyrdb, sarif, text};
 pub use findings::Marker;
 pub use generic::check_generic;

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::cures::BrokenRule;
 use super::documents::Documents;
 use super::dose_classes::DoseClasses;
 use super::dose_matrix::DoseBlock;
@@ -34,6 +35,16 @@ pub struct HandoffCheck {
     pub words: String,
     /// Own report, in the folder.
     pub report: Option<String>,
+    /// Rules that are broken.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub broken: Vec<BrokenRule>,
+}
+
+impl HandoffCheck {
+    /// True if a limit is exceeded that no lab has confirmed.
+    pub fn exceeds_assumed(&self) -> bool {
+        self.broken.iter().any(|rule| rule.assumed)
+    }
 }
 
 fn as_word<S: serde::Serializer>(verdict: &Verdict, s: S) -> Result<S::Ok, S::Error> {
@@ -43,7 +54,7 @@ fn as_word<S: serde::Serializer>(verdict: &Verdict, s: S) -> Result<S::Ok, S::Er
 /// Results of the rules, by layout.
 pub(super) type RuleReports = Vec<(&'static str, DrcReport)>;
 
-/// Everything that the front page and `handoff.json` tell.
+/// Everything that the front page and `handoff.json` tell of a hand-off of a design.
 #[derive(Serialize)]
 pub(super) struct Contents<'a> {
     #[serde(skip)]

@@ -4,13 +4,14 @@ use serde::Serialize;
 
 use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
 use super::exposure::{exposures, snapping};
+use super::job::{self, JobPatterns};
 use super::kind_words::KindWords;
 use super::layout_statistics::LayoutStatistics;
 use super::layouts::Layouts;
 use super::listing::Listing;
 use super::metrology_sites::{Cross, MetrologySite, crosses, sites};
-use super::process::Process;
-use super::{job, tables};
+use super::process::{JobSpec, Process};
+use super::tables;
 use metalith_core::Result;
 use metalith_design::Design;
 
@@ -46,7 +47,8 @@ pub(super) fn write(
     };
     dose_tables(files, design, process, layouts, &documents)?;
     measuring_tables(files, design, process, layouts, &documents)?;
-    jobs(files, design, process, &documents)?;
+    let patterns = JobPatterns::of(design);
+    jobs(files, &patterns, process, &documents.crosses, &documents.snapping)?;
     Ok(documents)
 }
 
@@ -65,7 +67,7 @@ fn dose_tables(
         &documents.doses,
         &layouts.blocks,
         process.dose_matrix.layer,
-        design.cell.shape,
+        Some(design.cell.shape),
     )?;
     let times: Vec<_> = documents
         .exposures
@@ -117,19 +119,29 @@ fn measuring_tables(
     )
 }
 
-fn jobs(files: &mut Listing, design: &Design, process: &Process, documents: &Documents) -> Result<()> {
-    for (beam, _) in &documents.snapping {
-        let name = |kind: &str| format!("job/{}.{kind}", job::stem(design, beam));
+/// Write the drafts of a job for each current, where the process asks for them.
+pub(super) fn jobs(
+    files: &mut Listing,
+    patterns: &JobPatterns<'_>,
+    process: &Process,
+    crosses: &[Cross],
+    beams: &[(Beam, f64)],
+) -> Result<()> {
+    let JobSpec::Jeol(job) = &process.job else {
+        return Ok(());
+    };
+    for (beam, _) in beams {
+        let name = |kind: &str| format!("job/{}.{kind}", job::stem(patterns.name, beam));
         let drafts = [
             (
                 "jdf",
                 "DRAFT of the job deck, to be reviewed by staff",
-                job::job_deck(design, process, &documents.crosses, beam),
+                job::job_deck(patterns, process, job, crosses, beam),
             ),
             (
                 "sdf",
                 "DRAFT of the schedule, to be reviewed by staff",
-                job::schedule(design, process, beam),
+                job::schedule(patterns, process, job, beam),
             ),
         ];
         for (kind, purpose, text) in drafts {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::dose::doses;
 use super::drawing::{Drawing, LayerPair, RectNm, Sheet, nm, number};
-use super::pad::dose_pads;
+use super::pad::{PadPillar, dose_pads};
 use super::process::Process;
 use metalith_core::{Result, Silent};
 use metalith_design::Design;
@@ -119,35 +119,74 @@ pub(super) fn hyperbolic(design: &Design, wavelength_nm: f64) -> Design {
 /// # Errors
 /// If the file cannot be written.
 pub(super) fn write(path: &Path, design: &Design, process: &Process) -> Result<Vec<DoseBlock>> {
-    let spec = &process.dose_matrix;
-    let lens = small_lens(design, spec.lens_diameter_um, process.reference_wavelength_nm(design))?;
+    let diameter_um = process.dose_matrix.lens_diameter_um;
+    let lens = small_lens(design, diameter_um, process.reference_wavelength_nm(design))?;
     let pads = dose_pads(design, process);
-    let pitch = i64::from(pad_pitch(design));
-    let (label, marks) = (
-        number(&design.layout.layers.label),
-        number(&design.layout.layers.pillar_marks),
-    );
+    let content = BlockContent {
+        piece: Piece::Lens(&lens, PillarForm::of(design)),
+        pads: &pads,
+        lattice: design.cell.lattice,
+        pitch: i64::from(pad_pitch(design)),
+        marks: number(&design.layout.layers.pillar_marks),
+        label: number(&design.layout.layers.label),
+    };
+    draw(path, Drawing::of(design, "DOSE_MATRIX"), process, &content)
+}
+
+/// Content of each block.
+pub(super) struct BlockContent<'a> {
+    pub piece: Piece<'a>,
+    pub pads: &'a [PadPillar],
+    /// Lattice and pitch (nm) of the pads.
+    pub lattice: LatticeKind,
+    pub pitch: i64,
+    pub marks: LayerPair,
+    pub label: LayerPair,
+}
+
+/// Piece of what is exposed, above the pads of a block.
+pub(super) enum Piece<'a> {
+    /// A small lens.
+    Lens(&'a Class, PillarForm),
+    /// Outlines from the layout about the middle of the piece (database units).
+    Polygons(&'a [Vec<(i64, i64)>]),
+}
+
+/// Draw nine blocks into a file.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn draw(
+    path: &Path,
+    mut drawing: Drawing,
+    process: &Process,
+    content: &BlockContent<'_>,
+) -> Result<Vec<DoseBlock>> {
+    let spec = &process.dose_matrix;
+    let &BlockContent {
+        pads,
+        lattice,
+        pitch,
+        marks,
+        label,
+        ..
+    } = content;
     let blocks = blocks(process, pads.len());
-    let mut drawing = Drawing::new("DOSE_MATRIX", design);
     let mut top = Sheet::new("DOSE_MATRIX");
     for (block, dose) in blocks.iter().zip(doses(process)) {
         let layer: LayerPair = (spec.layer, block.number as i16);
         let lens_name = format!("D{}_LENS", block.number);
-        drawing.add_lens(&lens_name, layer, &lens, PillarForm::of(design));
+        match content.piece {
+            Piece::Lens(class, form) => drawing.add_lens(&lens_name, layer, class, form),
+            Piece::Polygons(polygons) => drawing.add_polygons(&lens_name, layer, polygons),
+        }
         top.place(&lens_name, block.lens, Symmetry::IDENTITY);
-        let span = (nm(spec.pad_um) + APART) * (pads.len() as i64 - 1);
+        let span = (nm(spec.pad_um) + APART) * (pads.len() as i64 - 1).max(0);
         for (k, pad) in pads.iter().enumerate() {
             let cell = format!("D{}_{}", block.number, pad.cell_name());
             drawing.add_pillar(&cell, layer, &pad.corners());
             let x = block.pads.0 - span / 2 + k as i64 * (nm(spec.pad_um) + APART);
-            top_pad(
-                &mut top,
-                &cell,
-                (x, block.pads.1),
-                nm(spec.pad_um),
-                design.cell.lattice,
-                pitch,
-            );
+            top_pad(&mut top, &cell, (x, block.pads.1), nm(spec.pad_um), lattice, pitch);
         }
         let left = block.lens.0 - nm(spec.lens_diameter_um) / 2 - APART - NUMERAL * 3 / 5;
         top.numerals(marks, (left, block.lens.1), NUMERAL, &block.number.to_string());

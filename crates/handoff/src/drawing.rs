@@ -195,18 +195,20 @@ pub(super) struct Drawing {
 
 impl Drawing {
     /// An empty drawing with the database unit and the date of a design, which was checked when the design was read.
-    pub(crate) fn new(name: &str, design: &Design) -> Self {
+    pub(crate) fn of(design: &Design, name: &str) -> Self {
         let date = design.layout.timestamp.parse::<NaiveDateTime>().unwrap_or_default();
+        Self::new(name, design.cell.database_unit, date)
+    }
+
+    /// An empty drawing with this database unit and date.
+    pub(crate) fn new(name: &str, unit: DatabaseUnit, date: NaiveDateTime) -> Self {
         let mut library = GdsLibrary::new(name);
-        library.units = gds_units(design.cell.database_unit);
+        library.units = gds_units(unit);
         library.dates = GdsDateTimes {
             modified: date,
             accessed: date,
         };
-        Self {
-            tree: library,
-            unit: design.cell.database_unit,
-        }
+        Self { tree: library, unit }
     }
 
     /// Add a cell in nanometres; cells come before those that refer to them.
@@ -238,6 +240,15 @@ impl Drawing {
     pub(crate) fn add_pillar(&mut self, name: &str, layer: LayerPair, corners: &[(i64, i64)]) {
         let mut sheet = Sheet::new(name);
         sheet.polygon(layer, (0, 0), corners);
+        self.add_drawn(sheet);
+    }
+
+    /// Add a cell of polygons with these corners (database units).
+    pub(crate) fn add_polygons(&mut self, name: &str, layer: LayerPair, polygons: &[Vec<(i64, i64)>]) {
+        let mut sheet = Sheet::new(name);
+        polygons
+            .iter()
+            .for_each(|corners| sheet.polygon(layer, (0, 0), corners));
         self.add_drawn(sheet);
     }
 

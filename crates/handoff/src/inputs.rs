@@ -1,16 +1,14 @@
-//! Inputs of a hand-off, each read once, with the bytes that were read.
+//! Inputs of a hand-off of a design, each read once, with the bytes that were read.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use super::listing::Listing;
-use super::options::HandoffOptions;
-use super::process::{Process, ShapeRules};
+use super::lab::{InputCopy, Lab};
+use super::options::{DesignSource, HandoffOptions};
+use super::process::Process;
 use metalith_core::file::read_at_most;
-use metalith_core::text::is_printable;
 use metalith_core::{Error, Progress, Result, document};
 use metalith_design::Design;
-use metalith_drc::{Deck, Waivers};
 use metalith_optics::CalibratedModel;
 use metalith_rcwa::Material;
 use metalith_sensor::Camera;
@@ -19,26 +17,14 @@ use metalith_verify::compensate::compensated_name;
 /// Longest input that is kept; tables of the phase of a 10 mm lens have 1 MB.
 const LONGEST: u64 = 256 << 20;
 
-/// The inputs of a hand-off.
+/// The inputs of a hand-off of a design.
 pub(super) struct Sources {
     pub design: Design,
-    pub process: Process,
-    /// The decks of the process, in its order.
-    decks: Vec<(PathBuf, Deck)>,
-    pub waivers: Option<Waivers>,
+    pub lab: Lab,
     /// Model that the layout is compensated for.
     pub model: Option<CalibratedModel>,
     /// Model whose biases are undone by dose classes.
     pub dose_model: Option<CalibratedModel>,
-    kept: Vec<InputCopy>,
-}
-
-/// One input as it was read.
-struct InputCopy {
-    /// File name with a prefix for its kind; not yet unique.
-    name: String,
-    purpose: &'static str,
-    bytes: Vec<u8>,
 }
 
 impl Sources {
@@ -46,127 +32,50 @@ impl Sources {
     ///
     /// # Errors
     /// Mistakes in one of them; a file that cannot be read, is no ordinary file, or changes while it is read.
-    pub(crate) fn read(options: &HandoffOptions, progress: &dyn Progress) -> Result<Self> {
-        let (design, mut kept) = read_design(&options.design, progress)?;
+    pub(crate) fn read(source: &DesignSource, options: &HandoffOptions, progress: &dyn Progress) -> Result<Self> {
+        let (mut design, kept) = read_design(&source.path, progress)?;
+        let cell = &design.cell;
         let process = match &options.process {
             Some(path) => Process::read(path)?,
-            None => Process::of_film(&design.cell.pillar_material, design.cell.pillar_height_nm),
+            None => Process::of_film(&cell.pillar_material, cell.pillar_height_nm),
         };
-        // The process and its decks may be those of the program, which are no files.
-        let (path, text) = process.source();
-        kept.push(InputCopy::new("process_", path, "the process values", text.as_bytes()));
-        let mut decks: Vec<(PathBuf, Deck)> = Vec::new();
-        for rules in process.checks.decks(design.cell.shape) {
-            if decks.iter().any(|(known, _)| known == rules) {
-                continue;
-            }
-            let deck = process.deck(rules, design.cell.database_unit)?.for_pillars_of(&design);
-            let (path, text) = deck.source();
-            kept.push(InputCopy::new(
-                "rules_",
-                path,
-                "rules that layouts were checked with",
-                text.as_bytes(),
-            ));
-            decks.push((rules.to_owned(), deck));
-        }
-        let waivers = options.waivers.as_deref().map(Waivers::read).transpose()?;
-        if let Some(waivers) = &waivers {
-            let purpose = "violations that were accepted";
-            kept.push(InputCopy::new(
-                "waivers_",
-                &waivers.path,
-                purpose,
-                waivers.text.as_bytes(),
-            ));
-        }
-        let mut design = design;
-        let model = match &options.compensate {
-            None => None,
-            Some(path) => {
+        let process = process.with_rules_for(cell.shape);
+        let checks = process.checks.clone();
+        let mut lab = Lab::read(
+            process,
+            (cell.shape, cell.database_unit),
+            &checks.decks(cell.shape),
+            |_, deck| deck.for_pillars_of(&design),
+            options.waivers.as_deref(),
+            kept,
+        )?;
+        let mut model =
+            |path: &Option<PathBuf>, kind: &str, purpose: &'static str| -> Result<Option<CalibratedModel>> {
+                let Some(path) = path else { return Ok(None) };
                 let text = document::load(path)?;
-                let purpose = "the calibrated model that the layout is compensated for";
-                kept.push(InputCopy::new("model_", path, purpose, text.as_bytes()));
-                design.name = compensated_name(&design.name);
-                Some(CalibratedModel::parse(path, &text)?)
-            }
-        };
-        let dose_model = match &options.dose_classes {
-            None => None,
-            Some(path) => {
-                let text = document::load(path)?;
-                let purpose = "the calibrated model that dose classes are made by";
-                kept.push(InputCopy::new("dose_model_", path, purpose, text.as_bytes()));
-                Some(CalibratedModel::parse(path, &text)?)
-            }
-        };
+                lab.keep_copy(InputCopy::new(kind, path, purpose, text.as_bytes()));
+                CalibratedModel::parse(path, &text).map(Some)
+            };
+        let compensated = model(
+            &source.compensate,
+            "model_",
+            "the calibrated model that the layout is compensated for",
+        )?;
+        if compensated.is_some() {
+            design.name = compensated_name(&design.name);
+        }
+        let dose_model = model(
+            &source.dose_classes,
+            "dose_model_",
+            "the calibrated model that dose classes are made by",
+        )?;
         Ok(Self {
             design,
-            process,
-            decks,
-            waivers,
-            model,
+            lab,
+            model: compensated,
             dose_model,
-            kept,
         })
     }
-
-    /// The decks of the first step for the pillars of the design.
-    pub(crate) fn first_step(&self) -> &ShapeRules {
-        let rules = self.process.checks.of_shape(self.design.cell.shape);
-        rules.expect("a process that has none is refused before")
-    }
-
-    /// A deck that the process names.
-    pub(crate) fn deck(&self, rules: &Path) -> &Deck {
-        let found = self.decks.iter().find(|(path, _)| path == rules);
-        &found.expect("all decks of the process are read").1
-    }
-
-    /// Write all inputs as they were read, each under a separate name.
-    ///
-    /// # Errors
-    /// If one cannot be written.
-    pub(crate) fn keep(&self, files: &mut Listing) -> Result<()> {
-        let mut taken = BTreeSet::new();
-        for input in &self.kept {
-            let name = unique(&taken, &input.name);
-            files.write(format!("inputs/{name}"), input.purpose, &input.bytes)?;
-            taken.insert(name.to_lowercase());
-        }
-        Ok(())
-    }
-}
-
-impl InputCopy {
-    fn new(kind: &str, path: &Path, purpose: &'static str, bytes: &[u8]) -> Self {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let legal = |c: char| {
-            if is_printable(c) && !r#"/\:*?"<>|"#.contains(c) {
-                c
-            } else {
-                '_'
-            }
-        };
-        Self {
-            name: format!("{kind}{name}").chars().map(legal).collect(),
-            purpose,
-            bytes: bytes.to_owned(),
-        }
-    }
-}
-
-/// The name, with a number before its extension if it is taken. Upper and lower case count as equal, because some file
-/// systems do not distinguish them.
-fn unique(taken: &BTreeSet<String>, name: &str) -> String {
-    let (stem, ending) = match name.rfind('.') {
-        Some(dot) if dot > 0 => name.split_at(dot),
-        _ => (name, ""),
-    };
-    std::iter::once(name.to_owned())
-        .chain((2u32..).map(|k| format!("{stem}_{k}{ending}")))
-        .find(|candidate| !taken.contains(&candidate.to_lowercase()))
-        .expect("there are more numbers than names")
 }
 
 /// Read the design and the files it names. What is kept is what was read: the files are read before and after the

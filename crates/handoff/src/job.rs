@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::dose::{Beam, doses};
 use super::metrology_sites::Cross;
-use super::process::Process;
+use super::process::{JeolJob, Process};
 use metalith_design::Design;
 
 const WARNING: &str = "\
@@ -16,9 +16,37 @@ const WARNING: &str = "\
 /// Longest name of a job or magazine that all versions take.
 const LONGEST_NAME: usize = 8;
 
+/// Patterns of a job, and what they were made from.
+pub(super) struct JobPatterns<'a> {
+    /// Name of the hand-off, which the names of its files begin with.
+    pub name: &'a str,
+    /// `design` or `layout`.
+    pub source: &'static str,
+    /// SHA-256 of the source.
+    pub digest: String,
+    /// Layouts of step 1 without their endings: the pillars first, then the dose matrix, then others.
+    pub files: Vec<String>,
+    /// Middle of the exposed layers (um), where that is not the origin of the layout.
+    pub middle_um: Option<[f64; 2]>,
+}
+
+impl<'a> JobPatterns<'a> {
+    /// The patterns of a design.
+    pub(crate) fn of(design: &'a Design) -> Self {
+        let files = ["pillars", "dose_matrix", "tests_pillars"];
+        Self {
+            name: &design.name,
+            source: "design",
+            digest: design.digest(),
+            files: files.map(|what| format!("{}_{what}", design.name)).into(),
+            middle_um: None,
+        }
+    }
+}
+
 /// Name of a job: capitals and digits, a letter first.
-fn job_name(design: &Design) -> String {
-    let name = design.name.chars().filter(char::is_ascii_alphanumeric);
+fn job_name(name: &str) -> String {
+    let name = name.chars().filter(char::is_ascii_alphanumeric);
     let name = name.map(|c| c.to_ascii_uppercase());
     let name = name
         .skip_while(char::is_ascii_digit)
@@ -28,12 +56,19 @@ fn job_name(design: &Design) -> String {
 }
 
 /// Name of the job deck and of the schedule for a beam, without its ending: one dot is enough for a file.
-pub(super) fn stem(design: &Design, beam: &Beam) -> String {
-    format!("{}_{}nA", design.name, beam.current_na).replace('.', "p")
+pub(super) fn stem(name: &str, beam: &Beam) -> String {
+    format!("{name}_{}nA", beam.current_na).replace('.', "p")
 }
 
 /// The job deck: marks, position of each pattern, doses.
-pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], beam: &Beam) -> String {
+pub(super) fn job_deck(
+    patterns: &JobPatterns<'_>,
+    process: &Process,
+    job: &JeolJob,
+    crosses: &[Cross],
+    beam: &Beam,
+) -> String {
+    let source = patterns.source;
     let mut text = String::from(WARNING);
     let place = |role: &str| {
         crosses
@@ -45,19 +80,20 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
     // Writing to a string does not fail.
     let _ = writeln!(
         text,
-        "; design {} sha256 {}\n; process {}: {}\n;\nJOB/W '{}',{}",
-        design.name,
-        design.digest(),
+        "; {source} {} sha256 {}\n; process {}: {}\n;\nJOB/W '{}',{}",
+        patterns.name,
+        patterns.digest,
         process.name,
         process.title,
-        job_name(design),
-        process.job.substrate_inch
+        job_name(patterns.name),
+        job.substrate_inch
     );
-    text.push_str(if crosses.is_empty() {
-        ";\n; The design has no crosses.\n"
+    text.push_str(&if crosses.is_empty() {
+        format!(";\n; The {source} has no crosses.\n")
     } else {
         ";\n; Global marks: cross centres on the substrate [um]. The first exposure makes them and does not\n\
          ; look for them; keep these lines for any exposure that has to find them again.\n"
+            .to_owned()
     });
     if let (Some(p), Some(q)) = (place("P"), place("Q")) {
         let _ = writeln!(text, "GLMPOS P={p},Q={q}");
@@ -69,12 +105,20 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
             mark.width_um, mark.length_um
         );
     }
-    let _ = writeln!(text, "PATH {}", process.job.path);
+    let _ = writeln!(text, "PATH {}", job.path);
     text.push_str(
         "; One chip in the middle of the substrate. Repeat it by count and pitch: (first,count,pitch)/(first,count,pitch),\n\
          ; x to the right, rows downwards. The origin of a chip is the middle of its pattern: convert the layout with a\n\
          ; chip size that has (0, 0) in its middle.\n",
     );
+    if let Some([x, y]) = patterns.middle_um {
+        let _ = writeln!(
+            text,
+            "; The middle of the exposed layers of this layout is ({},{}) um: make that the middle of the chip, or shift it.",
+            whole(x),
+            whole(y)
+        );
+    }
     text.push_str(" ARRAY (0,1,0)/(0,1,0)\n");
     let corners: Vec<_> = ["M1", "M2", "M3", "M4"]
         .iter()
@@ -84,18 +128,22 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
         let _ = writeln!(text, "  CHMPOS {}", corners.join(","));
     }
     text.push_str("  ASSIGN P(1) -> ((*,*),SHOT1)   ; pillars at the base dose\n AEND\n");
-    text.push_str(
-        "; Dose matrix and test structures, beside the chip: choose where, then take the semicolons away\n\
-                   ; ARRAY (X,1,0)/(Y,1,0)\n;  ASSIGN P(2) -> ((*,*),SHOT2)  ; dose matrix: its own ranks\n; AEND\n\
-                   ; ARRAY (X,1,0)/(Y,1,0)\n;  ASSIGN P(3) -> ((*,*),SHOT1)  ; test structures\n; AEND\nPEND\n",
+    let tests = patterns.files.len() > 2;
+    let _ = writeln!(
+        text,
+        "; Dose matrix{}, beside the chip: choose where, then take the semicolons away\n\
+         ; ARRAY (X,1,0)/(Y,1,0)\n;  ASSIGN P(2) -> ((*,*),SHOT2)  ; dose matrix: its own ranks\n; AEND",
+        if tests { " and test structures" } else { "" }
     );
-    let _ = writeln!(text, "LAYER {}", process.job.layer_step1);
-    for (k, what) in ["pillars", "dose_matrix", "tests_pillars"].iter().enumerate() {
+    if tests {
+        text.push_str("; ARRAY (X,1,0)/(Y,1,0)\n;  ASSIGN P(3) -> ((*,*),SHOT1)  ; test structures\n; AEND\n");
+    }
+    let _ = writeln!(text, "PEND\nLAYER {}", job.layer_step1);
+    for (k, file) in patterns.files.iter().enumerate() {
         let _ = writeln!(
             text,
-            " P({}) '{}_{what}.v30'   ; converted from the layout of that name",
-            k + 1,
-            design.name
+            " P({}) '{file}.v30'   ; converted from the layout of that name",
+            k + 1
         );
     }
     let _ = writeln!(text, " STDCUR {}                  ; beam current [nA]", beam.current_na);
@@ -113,8 +161,8 @@ pub(super) fn job_deck(design: &Design, process: &Process, crosses: &[Cross], be
 }
 
 /// The schedule: which deck, at which current, dose and step.
-pub(super) fn schedule(design: &Design, process: &Process, beam: &Beam) -> String {
-    let name = job_name(design);
+pub(super) fn schedule(patterns: &JobPatterns<'_>, process: &Process, job: &JeolJob, beam: &Beam) -> String {
+    let name = job_name(patterns.name);
     format!(
         "{WARNING}; base dose, current and shot step belong together: shot step {} nm at {:.3} MHz gives {} uC/cm2 at {} nA\nMAGAZIN '{name}'\n#1\n%{}\nJDF '{}',{}\nACC {}\n\
          ; CALPRM '...'               ; or EOS mode,'...': lens mode ({}) and condition file of {} nA, the lab's names\n\
@@ -123,9 +171,9 @@ pub(super) fn schedule(design: &Design, process: &Process, beam: &Beam) -> Strin
         beam.clock_mhz,
         process.resist.dose_uc_cm2,
         beam.current_na,
-        process.job.cassette_slot,
-        stem(design, beam),
-        process.job.layer_step1,
+        job.cassette_slot,
+        stem(patterns.name, beam),
+        job.layer_step1,
         process.writer.acceleration_kv,
         process.writer.mode,
         beam.current_na,

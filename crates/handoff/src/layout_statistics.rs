@@ -153,6 +153,14 @@ impl Visitor for Counter {
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> Result<()> {
         let tally = self.layers.entry(shape.layer).or_insert(LayerSum::NONE);
         tally.shapes += placements.len() as u64;
+        if !placements.iter().all(Transform::is_square) {
+            for placement in placements {
+                let points = shape.outline.placed(placement);
+                tally.twice_area += twice_area(points.iter().copied());
+                tally.bounds.unite(&Rect::around(&points));
+            }
+            return Ok(());
+        }
         let twice = match &shape.rect {
             Some(r) => 2 * i128::from(r.width()) * i128::from(r.height()),
             None => twice_area(shape.outline.points()),
@@ -170,7 +178,7 @@ impl Visitor for Counter {
 }
 
 /// Twice the area of a polygon, whichever way it turns.
-fn twice_area(points: impl Iterator<Item = metalith_gds::Point> + Clone) -> i128 {
+pub(super) fn twice_area(points: impl Iterator<Item = metalith_gds::Point> + Clone) -> i128 {
     let around = points.clone().zip(points.cycle().skip(1));
     let signed: i128 = around
         .map(|(a, b)| i128::from(a.x) * i128::from(b.y) - i128::from(b.x) * i128::from(a.y))

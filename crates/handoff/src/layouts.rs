@@ -89,7 +89,7 @@ pub(super) fn write(
     format: LayoutFormat,
     progress: &dyn Progress,
 ) -> Result<Layouts> {
-    let (design, process) = (&sources.design, &sources.process);
+    let (design, process) = (&sources.design, &sources.lab.process);
     let named = |folder: &str, rest: &str| format!("{folder}/{}_{rest}.{}", design.name, format.extension());
     let mut array = PillarArray::build(design, progress)?;
     if let Some(model) = &sources.model {

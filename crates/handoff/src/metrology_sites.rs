@@ -64,26 +64,13 @@ pub(super) fn sites(
     let mut chosen: Vec<_> = std::iter::once(array.central()).chain(furthest).collect();
     chosen.dedup_by_key(|p| p.element.index);
     for placed in chosen {
-        let map = array.widths(placed);
-        let (cx, cy) = placed.element.centre_nm;
-        let radius_um = design.lens_of(&placed.element).radius_um();
-        for best in best_sites(&map, array.shape, radius_um, &widths, zones) {
-            let (around_nm, around_deg, around_by_nm) = neighbours(array.shape, &best);
-            let (x, y) = (map.lattice.drawn_nm(0, best.ix), map.lattice.drawn_nm(1, best.iy));
-            sites.push(MetrologySite {
-                id: format!("L{:02}", sites.len() + 1),
-                file: "pillars",
-                place: format!("element {}", placed.element.label()),
-                x_um: (cx as f64 + x) * 1e-3,
-                y_um: (cy as f64 + y) * 1e-3,
-                element_x_um: Some(x * 1e-3),
-                element_y_um: Some(y * 1e-3),
-                drawn: DrawnSize::of(array.shape, best.number),
-                around_nm,
-                around_deg,
-                around_by_nm,
-            });
-        }
+        let lens = MeasuredLens {
+            file: "pillars",
+            place: format!("element {}", placed.element.label()),
+            centre_nm: placed.element.centre_nm,
+            radius_um: design.lens_of(&placed.element).radius_um(),
+        };
+        lens.add_sites(&array.widths(placed), array.shape, &widths, zones, &mut sites);
     }
     for structure in structures {
         let Some(drawn) = structure.drawn else { continue };
@@ -103,6 +90,47 @@ pub(super) fn sites(
         });
     }
     sites
+}
+
+/// A lens on which sites are looked for.
+pub(super) struct MeasuredLens {
+    /// File that it is in.
+    pub file: &'static str,
+    /// Words for the element.
+    pub place: String,
+    pub centre_nm: (i64, i64),
+    pub radius_um: f64,
+}
+
+impl MeasuredLens {
+    /// Add the best sites for each of these widths or numbers in each of so many rings.
+    pub(super) fn add_sites(
+        &self,
+        map: &PillarMap,
+        shape: PillarShape,
+        targets: &[u16],
+        zones: usize,
+        sites: &mut Vec<MetrologySite>,
+    ) {
+        let (cx, cy) = self.centre_nm;
+        for best in best_sites(map, shape, self.radius_um, targets, zones) {
+            let (around_nm, around_deg, around_by_nm) = neighbours(shape, &best);
+            let (x, y) = (map.lattice.drawn_nm(0, best.ix), map.lattice.drawn_nm(1, best.iy));
+            sites.push(MetrologySite {
+                id: format!("L{:02}", sites.len() + 1),
+                file: self.file,
+                place: self.place.clone(),
+                x_um: (cx as f64 + x) * 1e-3,
+                y_um: (cy as f64 + y) * 1e-3,
+                element_x_um: Some(x * 1e-3),
+                element_y_um: Some(y * 1e-3),
+                drawn: DrawnSize::of(shape, best.number),
+                around_nm,
+                around_deg,
+                around_by_nm,
+            });
+        }
+    }
 }
 
 /// Pillars to look for: widths in equal steps inside the range, not its ends, where few pillars are (nm); of

@@ -112,6 +112,20 @@ impl PadPillar {
         })
     }
 
+    /// A pillar that was found in a layout: a width (nm), which becomes an even one, or a number.
+    pub(crate) fn found(form: PillarForm, number: u16) -> Self {
+        let shape = form.shape();
+        Self {
+            form,
+            number: if shape.has_width() {
+                (number & !1).max(2)
+            } else {
+                number
+            },
+            by_size: !shape.has_width() && !shape.has_one_size(),
+        }
+    }
+
     /// Corners about its middle (nm), counter-clockwise.
     pub(crate) fn corners(&self) -> Vec<(i64, i64)> {
         self.form.corners(self.number)

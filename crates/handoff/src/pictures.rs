@@ -203,17 +203,17 @@ fn complement(intervals: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
     gaps
 }
 
-/// The nine blocks with their doses, each with these pads.
+/// The nine blocks with their doses, each with a piece of this name and these pads.
 pub(super) fn dose_matrix(
     process: &Process,
-    pads: &[PadPillar],
+    (piece, pads): (&str, &[PadPillar]),
     blocks: &[DoseBlock],
     doses: &[super::dose::DoseRow],
 ) -> Figure {
     let spec = &process.dose_matrix;
     let mut plan = Plan::new("Dose matrix").width(560.0);
     let bounds = plan.outlines("block");
-    let lens = plan.layer("small lens");
+    let lens = plan.layer(piece);
     let pad = plan.layer("uniform pads");
     let field = plan.outlines("write field");
     for (block, dose) in blocks.iter().zip(doses) {
@@ -249,10 +249,15 @@ pub(super) fn dose_matrix(
     }
     plan.caption(format!(
         "Block n is on layer {}, datatype n, and has its number beside its lens. Each stands in the middle of a field of \
-         {} um, if a field is about the origin. Pads from the left: pillars of {}.",
+         {} um, if a field is about the origin.{}",
         spec.layer,
         process.writer.field_used_um,
-        pads.iter().map(PadPillar::words).collect::<Vec<_>>().join(", ")
+        if pads.is_empty() {
+            String::new()
+        } else {
+            let words: Vec<_> = pads.iter().map(PadPillar::words).collect();
+            format!(" Pads from the left: pillars of {}.", words.join(", "))
+        }
     ))
 }
 

@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::contents::{HandoffCheck, RuleReports};
+use super::cures::BrokenRule;
 use super::inputs::Sources;
+use super::lab::Lab;
 use super::layouts::{Layouts, OfEach};
 use super::listing::Listing;
 use super::process::Process;
@@ -13,7 +15,7 @@ use super::structures::{Structure, middle_of_reference};
 use metalith_core::{AtomicFile, Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
-use metalith_drc::{CheckInput, Date, Deck, DrcReport, Severity, Waiver, Waivers};
+use metalith_drc::{CheckInput, Date, Deck, DrcReport, Waiver, Waivers};
 use metalith_gds::Layout;
 use metalith_report::{Verdict, write_json};
 
@@ -48,17 +50,10 @@ pub(super) struct Subject<'a> {
 
 /// The layouts of a hand-off with the rules of each.
 pub(super) fn subjects<'a>(sources: &'a Sources, layouts: &'a Layouts, opened: &'a OfEach<Layout>) -> [Subject<'a>; 7] {
-    let (decks, first) = (&sources.process.checks, sources.first_step());
+    let (decks, first) = (&sources.lab.process.checks, sources.lab.first_step());
     let design = Some((&sources.design, &layouts.array));
     let reference = Some((&layouts.reference, &layouts.reference_array));
-    let subject = |name, layout, rules: &std::path::Path| Subject {
-        name,
-        layout,
-        deck: sources.deck(rules),
-        with: None,
-        design: None,
-        structures: Cow::Borrowed(&[]),
-    };
+    let subject = |name, layout, rules: &std::path::Path| Subject::of(name, layout, sources.lab.deck(rules));
     [
         Subject {
             design,
@@ -104,10 +99,11 @@ pub(super) struct Checked {
 pub(super) fn check(
     files: &mut Listing,
     subjects: &[Subject<'_>],
-    process: &Process,
-    accepted: Option<&Waivers>,
+    lab: &Lab,
+    pitch_nm: Option<f64>,
     progress: &dyn Progress,
 ) -> Result<Checked> {
+    let accepted = lab.waivers.as_ref();
     let mut reports = Vec::new();
     for subject in subjects {
         reports.push((subject.name, subject.check(files, accepted, progress)?));
@@ -128,13 +124,25 @@ pub(super) fn check(
         checks: reports
             .iter()
             .zip(subjects)
-            .map(|((name, report), subject)| summary(name, report, subject.deck, process))
+            .map(|((name, report), subject)| summary(name, report, subject.deck, &lab.process, pitch_nm))
             .collect(),
         reports,
     })
 }
 
-impl Subject<'_> {
+impl<'a> Subject<'a> {
+    /// A layout with its rules, and nothing else.
+    pub(super) fn of(name: &'static str, layout: &'a Layout, deck: &'a Deck) -> Self {
+        Self {
+            name,
+            layout,
+            deck,
+            with: None,
+            design: None,
+            structures: Cow::Borrowed(&[]),
+        }
+    }
+
     /// Check one layout; what it breaks on purpose is waived, and the waivers are written.
     fn check(&self, files: &mut Listing, accepted: Option<&Waivers>, progress: &dyn Progress) -> Result<DrcReport> {
         let mut waivers = accepted.cloned();
@@ -230,7 +238,13 @@ fn warn_once(reports: &mut RuleReports) {
     }
 }
 
-fn summary(name: &str, report: &DrcReport, deck: &Deck, process: &Process) -> HandoffCheck {
+fn summary(name: &str, report: &DrcReport, deck: &Deck, process: &Process, pitch_nm: Option<f64>) -> HandoffCheck {
+    let (file, _) = deck.source();
+    let file = file.file_name().unwrap_or_default().to_string_lossy();
+    let rules = report.rules.iter();
+    let broken: Vec<BrokenRule> = rules
+        .filter_map(|rule| BrokenRule::of(rule, &file, process.assumes(deck), process, pitch_nm))
+        .collect();
     let waived: u64 = report.rules.iter().map(|r| r.waived).sum();
     let mut words = format!(
         "{} rules, {} violations, {waived} waived",
@@ -240,29 +254,31 @@ fn summary(name: &str, report: &DrcReport, deck: &Deck, process: &Process) -> Ha
     if report.not_run() > 0 {
         words.push_str(&format!(", {} rules did not run", report.not_run()));
     }
-    let broken = report
-        .rules
-        .iter()
-        .filter(|r| r.severity > Severity::Note && r.open() > 0);
-    let broken: Vec<&str> = broken.map(|r| r.id.as_str()).collect();
-    if !broken.is_empty() {
-        let (file, _) = deck.source();
-        words.push_str(&format!(
-            ": {} in {}, which [checks] of process {} names{}",
-            broken.join(", "),
-            file.file_name().unwrap_or_default().to_string_lossy(),
-            process.name,
-            process.origin()
-        ));
+    let named = |assumed: bool| {
+        let rules = broken.iter().filter(|rule| rule.assumed == assumed);
+        rules.map(|rule| rule.rule.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    let (assumed, confirmed) = (named(true), named(false));
+    let named_by = format!("in {file}, which [checks] of {} names", process.words());
+    if !confirmed.is_empty() {
+        words.push_str(&format!(": {confirmed} {named_by}"));
+    }
+    if !assumed.is_empty() {
+        let exceeded = format!("assumed limits exceeded: {assumed} {named_by}; no lab has confirmed them, ask yours");
+        words = if confirmed.is_empty() {
+            format!("{exceeded}; {words}")
+        } else {
+            format!("{words}; {exceeded}")
+        };
     }
     HandoffCheck {
         name: format!("design rules, {}", name.replace('_', " ")),
-        verdict: match report.exit_code() {
-            0 => Verdict::Pass,
-            1 => Verdict::Fail,
+        verdict: match report.not_run() {
+            0 => Verdict::of(broken.iter().all(|rule| rule.assumed)),
             _ => Verdict::NotRun,
         },
         words,
         report: Some(format!("checks/{name}.txt")),
+        broken,
     }
 }

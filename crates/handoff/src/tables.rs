@@ -52,13 +52,13 @@ fn um(x: f64) -> String {
     format!("{x:.3}")
 }
 
-/// The doses, with a column to fill in for each size that tells a pad: of rectangles two.
+/// The doses, with a column to fill in for each size that tells a pad: of rectangles two, of other shapes one.
 pub(super) fn write_doses(
     path: &Path,
     doses: &[DoseRow],
     blocks: &[DoseBlock],
     layer: i16,
-    shape: PillarShape,
+    shape: Option<PillarShape>,
 ) -> Result<()> {
     let mut head = vec![
         "number",
@@ -72,7 +72,10 @@ pub(super) fn write_doses(
         "pads_x_um",
         "pads_y_um",
     ];
-    head.extend(KindWords::of(shape).dose_columns);
+    match shape {
+        Some(shape) => head.extend(KindWords::of(shape).dose_columns),
+        None => head.push("measured_width_nm"),
+    }
     head.push("remarks");
     let mut csv = Csv::new(&head);
     for (dose, block) in doses.iter().zip(blocks) {

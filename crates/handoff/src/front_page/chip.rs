@@ -14,6 +14,12 @@ pub(super) fn chip(page: &mut Page, c: &Contents<'_>, folder: &Path) -> Result<(
     let figure = pictures::chip(c.design);
     figure.write_svg(&folder.join("chip.svg"))?;
     page.figure(figure);
+    bounds(page, &c.census);
+    Ok(())
+}
+
+/// Bounding boxes of all files.
+pub(crate) fn bounds(page: &mut Page, census: &[LayoutStatistics]) {
     let mut table = Table::new([
         Column::text("File"),
         Column::text("Top cell"),
@@ -24,7 +30,7 @@ pub(super) fn chip(page: &mut Page, c: &Contents<'_>, folder: &Path) -> Result<(
         Column::number("to", "um"),
     ])
     .caption("Bounding boxes, read from the files");
-    for file in &c.census {
+    for file in census {
         let bounds = file.layers.iter().filter_map(|l| l.bounds_um);
         let Some(b) = bounds.reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]) else {
             continue;
@@ -40,7 +46,6 @@ pub(super) fn chip(page: &mut Page, c: &Contents<'_>, folder: &Path) -> Result<(
         ]);
     }
     page.table(table);
-    Ok(())
 }
 
 pub(super) fn layers(page: &mut Page, c: &Contents<'_>, folder: &Path) -> Result<()> {
@@ -84,7 +89,8 @@ pub(super) fn layers(page: &mut Page, c: &Contents<'_>, folder: &Path) -> Result
     Ok(())
 }
 
-pub(super) fn cells(page: &mut Page, c: &Contents<'_>) {
+/// Shapes, areas and cells of all files.
+pub(crate) fn cells(page: &mut Page, census: &[LayoutStatistics]) {
     page.section("Cells, shapes, areas");
     let mut table = Table::new([
         Column::text("File"),
@@ -94,7 +100,7 @@ pub(super) fn cells(page: &mut Page, c: &Contents<'_>) {
         Column::number("Area drawn", "um2"),
     ])
     .caption("All references followed, read from the files");
-    for file in &c.census {
+    for file in census {
         for l in &file.layers {
             table.row([
                 Cell::code(&file.file),
@@ -110,7 +116,7 @@ pub(super) fn cells(page: &mut Page, c: &Contents<'_>) {
         }
     }
     page.table(table);
-    for file in &c.census {
+    for file in census {
         page.details(
             format!(
                 "Cell tree of `{}`: {}, {}",

@@ -1,30 +1,34 @@
 //! Doses, times and jobs of the writer.
 
 use crate::contents::Contents;
-use crate::dose::{DOSE_FORMULA, FORMULA, duration};
-use crate::kind_words::KindWords;
-use crate::pad::dose_pads;
-use crate::{job, pictures};
+use crate::dose::{Beam, DOSE_FORMULA, DoseRow, Exposure, FORMULA, WriteTime, duration};
+use crate::dose_matrix::DoseBlock;
+use crate::job::{self, JobPatterns};
+use crate::metrology_sites::Cross;
+use crate::pad::PadPillar;
+use crate::pictures;
+use crate::process::{JobSpec, Process};
 use metalith_report::{Cell, Column, Page, Table, fixed};
 
-pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
+/// The dose matrix: words for the piece above the pads, the pads, words for what is measured on them; blocks and doses.
+pub(crate) fn doses(
+    page: &mut Page,
+    process: &Process,
+    (piece, pads, measured): (&str, &[PadPillar], &str),
+    (blocks, doses): (&[DoseBlock], &[DoseRow]),
+) {
     page.section("Dose matrix");
-    let range = c.process.resist.dose_range_uc_cm2;
+    let range = process.resist.dose_range_uc_cm2;
     page.paragraph(format!(
-        "Labs differ: {} is written with {} to {} uC/cm2 at {} kV. Write the matrix first, choose the dose whose pads have \
-         the {} drawn, and change the base dose.",
-        c.process.resist.name,
+        "Labs differ: {} is written with {} to {} uC/cm2 at {} kV. Write the matrix first, choose the dose whose {} have \
+         the {measured} drawn, and change the base dose.",
+        process.resist.name,
         range[0],
         range[1],
-        c.process.writer.acceleration_kv,
-        KindWords::of(c.design.cell.shape).measured
+        process.writer.acceleration_kv,
+        if pads.is_empty() { "shapes" } else { "pads" }
     ));
-    page.figure(pictures::dose_matrix(
-        c.process,
-        &dose_pads(c.design, c.process),
-        &c.blocks,
-        &c.documents.doses,
-    ));
+    page.figure(pictures::dose_matrix(process, (piece, pads), blocks, doses));
     let mut table = Table::new([
         Column::number("Dose", ""),
         Column::number("Factor", ""),
@@ -32,13 +36,13 @@ pub(super) fn doses(page: &mut Page, c: &Contents<'_>) {
         Column::number("Modulation", "%"),
         Column::text("Layer"),
     ]);
-    for d in &c.documents.doses {
+    for d in doses {
         table.row([
             d.number.into(),
             Cell::fixed(d.factor, 2),
             Cell::fixed(d.dose_uc_cm2, 1),
             Cell::fixed(d.modulation_percent, 1),
-            Cell::code(format!("{}/{}", c.process.dose_matrix.layer, d.number)),
+            Cell::code(format!("{}/{}", process.dose_matrix.layer, d.number)),
         ]);
     }
     page.table(table);
@@ -73,10 +77,15 @@ pub(super) fn dose_classes(page: &mut Page, c: &Contents<'_>) {
     page.table(table);
 }
 
-pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
+/// Time of each file at each current; `snapped` are words for what the shots round.
+pub(crate) fn write_time(
+    page: &mut Page,
+    process: &Process,
+    snapped: &str,
+    exposures: &[(String, Exposure, Vec<WriteTime>)],
+) {
     page.section("Write time");
-    let w = &c.process.writer;
-    let KindWords { snapped, changed, .. } = KindWords::of(c.design.cell.shape);
+    let w = &process.writer;
     page.code(format!("{FORMULA}\n{DOSE_FORMULA}"));
     page.paragraph(format!(
         "{}, {}: fields of {} um, grid {} nm, at most {} MHz. Overheads: {} us a shape, {} s a field, {} s a job. The shot \
@@ -94,7 +103,7 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
         Column::number("Fields", "s"),
         Column::number("Total", "h, min"),
     ]);
-    for (file, exposure, times) in &c.documents.exposures {
+    for (file, exposure, times) in exposures {
         for t in times {
             table.row([
                 Cell::code(file),
@@ -110,19 +119,22 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
         }
     }
     page.table(table);
-    let cell = &c.design.cell;
-    let row_nm = cell.lattice.row_nm(cell.pitch_nm, cell.database_unit);
+}
+
+/// What the shots of each beam do to pillars on a lattice with these distances along x and y (nm); `changed` are words for what is
+/// rounded.
+pub(crate) fn snapping(page: &mut Page, changed: &'static str, steps_nm: [f64; 2], snapping: &[(Beam, f64)]) {
     let mut snap = Table::new([
         Column::number("Current", "nA"),
         Column::number("Shot step", "nm"),
         Column::number("Clock", "MHz"),
-        Column::number(*changed, "nm"),
+        Column::number(changed, "nm"),
         Column::text("Pitch"),
     ])
     .caption("What the shots of each beam do to the pillars of the array");
-    for (beam, rms) in &c.documents.snapping {
+    for (beam, rms) in snapping {
         let fits = |nm: f64| nm % beam.shot_step_nm == 0.0;
-        let pitch = if fits(cell.pitch_nm.nm()) && fits(row_nm) {
+        let pitch = if steps_nm.into_iter().all(fits) {
             "a multiple of the step".to_owned()
         } else {
             format!(
@@ -141,12 +153,31 @@ pub(super) fn write_time(page: &mut Page, c: &Contents<'_>) {
     page.table(snap);
 }
 
-pub(super) fn job_files(page: &mut Page, c: &Contents<'_>) {
+/// The files for the writer.
+pub(crate) fn job_files(
+    page: &mut Page,
+    patterns: &JobPatterns<'_>,
+    process: &Process,
+    crosses: &[Cross],
+    beams: &[(Beam, f64)],
+) {
     page.section("Job");
-    page.note(
-        "The job files are drafts. They are to be reviewed and completed by the staff of the writer before any use.",
-    );
-    if let Some((beam, _)) = c.documents.snapping.last() {
-        page.code(job::job_deck(c.design, c.process, &c.documents.crosses, beam));
+    match &process.job {
+        JobSpec::Jeol(job) => {
+            page.note(
+                "The job files are drafts. They are to be reviewed and completed by the staff of the writer before any use.",
+            );
+            if let Some((beam, _)) = beams.last() {
+                page.code(job::job_deck(patterns, process, job, crosses, beam));
+            }
+        }
+        JobSpec::Raith(_) => {
+            page.note(format!(
+                "The layouts in `job/` are for a writer of Raith: the datatype of each exposed shape is its dose factor times 1000, \
+                 so that 1000 is the base dose of {} uC/cm2, which is set at the writer. Position lists and working areas are \
+                 made there.",
+                process.resist.dose_uc_cm2
+            ));
+        }
     }
 }

@@ -11,7 +11,7 @@ use metalith_core::Result;
 use metalith_core::document::load;
 use metalith_design::Design;
 use metalith_drc::Deck;
-use metalith_pillars::{DatabaseUnit, OutlineForm, PillarShape};
+use metalith_pillars::{DatabaseUnit, OutlineForm, PillarShape, Rectangles, UprightRectangles};
 
 /// The processes that ship with the program.
 static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../processes");
@@ -204,6 +204,18 @@ pub struct CheckSpec {
     pub aperture_rules: PathBuf,
     #[serde(skip)]
     pub test_opening_rules: PathBuf,
+    /// Whether a lab has confirmed the limits of the decks; where it is left out, those that ship with the program are assumed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limits: Option<LimitOrigin>,
+}
+
+/// Origin of the limits of a process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LimitOrigin {
+    /// Guesses that no lab has confirmed: what exceeds them is reported and fails nothing.
+    Assumed,
+    Confirmed,
 }
 
 /// The decks of the first step for one shape of pillars.
@@ -214,9 +226,25 @@ pub struct ShapeRules {
     pub test_rules: PathBuf,
 }
 
+/// Files for the writer beside the layouts.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum JobSpec {
+    /// Drafts of job deck and schedule.
+    Jeol(JeolJob),
+    /// Layouts whose datatype is the dose factor.
+    Raith(RaithJob),
+}
+
+/// Marker of a writer that reads the dose factor from the datatype.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RaithJob {
+    pub format: &'static str,
+}
+
 /// Values of the draft job that the staff must confirm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct JobSpec {
+pub struct JeolJob {
     pub substrate_inch: f64,
     pub cassette_slot: String,
     pub path: String,
@@ -230,6 +258,23 @@ impl CheckSpec {
             OutlineForm::Square => self.squares.as_ref(),
             OutlineForm::Circle => self.circles.as_ref(),
             OutlineForm::Polygon => self.rectangles.as_ref(),
+        }
+    }
+
+    /// A shape that there are decks for.
+    pub(super) fn some_shape(&self) -> PillarShape {
+        match (&self.squares, &self.circles) {
+            (None, Some(_)) => PillarShape::Circle,
+            // Decks for rectangles do not depend on their size.
+            (None, None) => {
+                let smallest = UprightRectangles {
+                    shortest_nm: 2,
+                    step_nm: 2,
+                    lengths: 1,
+                };
+                PillarShape::Rectangle(Rectangles::Upright(smallest))
+            }
+            _ => PillarShape::Square,
         }
     }
 
@@ -272,6 +317,46 @@ impl Process {
         fitting.into_iter().next().unwrap_or_else(Self::standard)
     }
 
+    /// This process with rules for pillars of a shape: a process of the program that has none uses the decks of what holds of
+    /// every layout of such pillars. One of a lab stays as it is.
+    #[must_use]
+    pub(super) fn with_rules_for(mut self, shape: PillarShape) -> Self {
+        if self.standard && self.checks.of_shape(shape).is_none() {
+            let shapes = shape.plural();
+            let deck = |kind: &str| PathBuf::from(format!("../rules/{kind}{shapes}.toml"));
+            let rules = ShapeRules {
+                pillar_rules: deck(""),
+                dose_rules: deck("dose_"),
+                test_rules: deck("test_"),
+            };
+            match shape.outline() {
+                // Rules of the dose matrix and the tests of squares are of the paper's cell.
+                OutlineForm::Square => {}
+                OutlineForm::Circle => self.checks.circles = Some(rules),
+                OutlineForm::Polygon => self.checks.rectangles = Some(rules),
+            }
+        }
+        self
+    }
+
+    /// True if no lab has confirmed the limits of a deck.
+    pub(super) fn assumes(&self, deck: &Deck) -> bool {
+        match self.checks.limits {
+            Some(origin) => origin == LimitOrigin::Assumed,
+            None => deck.is_shipped(),
+        }
+    }
+
+    /// Words that name the process: its name, and where it is from.
+    pub(super) fn words(&self) -> String {
+        if self.standard {
+            format!("process {} (shipped)", self.name)
+        } else {
+            let file = self.path.file_name().unwrap_or_default();
+            format!("process {} in {}", self.name, file.to_string_lossy())
+        }
+    }
+
     fn shipped(file: &File<'_>) -> Self {
         let text = file.contents_utf8().expect("processes are text");
         let path = Path::new("processes").join(file.path());
@@ -307,13 +392,22 @@ impl Process {
         }
     }
 
-    /// Words about the limits of a process of the program, which no lab has confirmed; none for another.
-    pub(super) fn origin(&self) -> &'static str {
-        if self.standard {
-            " (shipped; its limits are assumed: confirm them with the lab, change copies of both files, use --process)"
-        } else {
-            ""
-        }
+    /// True if a shipped process etches a film.
+    pub(super) fn any_etches(film: &str) -> bool {
+        SHIPPED
+            .files()
+            .map(Self::shipped)
+            .any(|process| process.transfer.etches(film))
+    }
+
+    /// Names of all shipped process files.
+    pub(super) fn shipped_names() -> Vec<String> {
+        let mut names: Vec<_> = SHIPPED
+            .files()
+            .map(|file| format!("processes/{}", file.path().display()))
+            .collect();
+        names.sort();
+        names
     }
 
     /// The shipped process file to copy for a film that none is for: one with rules for pillars of this shape.

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    ApertureStep, CheckSpec, DOSES, DoseMatrixSpec, JobSpec, Method, MetrologySpec, PatternTransfer, Process,
-    Proximity, Resist, ShapeRules, TestSpec, Tone, Writer,
+    ApertureStep, CheckSpec, DOSES, DoseMatrixSpec, JeolJob, JobSpec, LimitOrigin, Method, MetrologySpec,
+    PatternTransfer, Process, Proximity, RaithJob, Resist, ShapeRules, TestSpec, Tone, Writer,
 };
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section};
@@ -226,14 +226,21 @@ fn checks(s: &Section<'_, '_>, standard: bool) -> CheckSpec {
         rectangles,
         aperture_rules: file(s, "aperture_rules"),
         test_opening_rules: file(s, "test_opening_rules"),
+        limits: s.has("limits").then(|| {
+            let origins = [("assumed", LimitOrigin::Assumed), ("confirmed", LimitOrigin::Confirmed)];
+            s.choice("limits", &origins, None)
+        }),
     }
 }
 
 fn job(s: &Section<'_, '_>) -> JobSpec {
-    JobSpec {
+    if s.choice("format", &[("jeol", false), ("raith", true)], Some(false)) {
+        return JobSpec::Raith(RaithJob { format: "raith" });
+    }
+    JobSpec::Jeol(JeolJob {
         substrate_inch: within(s, "substrate_inch", 0.1, 12.0, "inch"),
         cassette_slot: s.text("cassette_slot"),
         path: s.text("path"),
         layer_step1: s.integer("layer_step1", 1..=99, ""),
-    }
+    })
 }

@@ -144,14 +144,14 @@ impl Structures {
     /// # Errors
     /// If one cannot be written.
     pub(crate) fn write(self, design: &Design, pillars: &Path, step2: &Path) -> Result<Vec<Structure>> {
-        let mut drawing = Drawing::new("TESTS", design);
+        let mut drawing = Drawing::of(design, "TESTS");
         for pillar in &self.pillars {
             let layer = number(&design.layout.layers.pillars);
             drawing.add_pillar(&pillar.cell_name(), layer, &pillar.corners());
         }
         drawing.add(self.top);
         drawing.write(pillars)?;
-        let mut drawing = Drawing::new("TESTS_STEP2", design);
+        let mut drawing = Drawing::of(design, "TESTS_STEP2");
         drawing.add(self.step2);
         drawing.write(step2)?;
         Ok(self.list)

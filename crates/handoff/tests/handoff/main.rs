@@ -1,5 +1,6 @@
 //! The hand-off as the one who receives it meets it: read from its files, by the readers of the library.
 
+mod foreign;
 mod formats;
 mod job;
 mod publish;
@@ -16,7 +17,9 @@ use metalith_cell::Fidelity;
 use metalith_core::{Error, Progress, Result, Silent};
 use metalith_design::{Design, PillarArray};
 use metalith_gds::{LayerNumber, Layout, Selection, Shape, Transform, Visitor};
-use metalith_handoff::{HandoffOptions, LayoutStatistics, Manifest, handoff, verify_handoff};
+use metalith_handoff::{
+    DesignSource, HandoffOptions, HandoffSource, LayoutStatistics, Manifest, handoff, verify_handoff,
+};
 use metalith_layout::LayoutFormat;
 use metalith_wave::Accuracy;
 
@@ -35,18 +38,24 @@ const PROCESS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../processes/jbx6
 
 fn options(out: &Path) -> HandoffOptions {
     HandoffOptions {
-        dose_classes: None,
-        compensate: None,
-        design: DESIGN.into(),
+        source: source(DESIGN.as_ref()),
         process: Some(PROCESS.into()),
         out: out.to_owned(),
         command: "metalith handoff designs/mini_3x3.toml".into(),
         format: LayoutFormat::Gds,
-        // What is simulated is not the matter here.
-        fidelity: Some(Fidelity::Published),
-        accuracy: Accuracy::Fast,
         waivers: None,
     }
+}
+
+/// A design, simulated in the quickest way: what is simulated is not the matter here.
+fn source(design: &Path) -> HandoffSource {
+    HandoffSource::Design(DesignSource {
+        path: design.to_owned(),
+        fidelity: Some(Fidelity::Published),
+        accuracy: Accuracy::Fast,
+        compensate: None,
+        dose_classes: None,
+    })
 }
 
 /// One hand-off that tests may read, not change. It stays where tests keep their files and is replaced by the next.

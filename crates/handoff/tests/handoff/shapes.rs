@@ -9,11 +9,12 @@ use metalith_design::{Design, PillarArray};
 use metalith_gds::{
     LayerNumber, Layout, Point, Rect, Selection, Shape, Transform, Visitor, circle_of, tilted_rectangle_of,
 };
-use metalith_handoff::{HandoffOptions, LayoutStatistics, handoff, verify_handoff};
+use metalith_handoff::{DesignSource, HandoffOptions, HandoffSource, LayoutStatistics, handoff, verify_handoff};
 use metalith_pillars::{DatabaseUnit, LatticeKind, PillarId, PillarRows, PillarShape, Rectangles};
 use metalith_testing::{design, root};
+use metalith_wave::Accuracy;
 
-use super::{PILLARS, SUMMED, TABLE_S, options, rows_in};
+use super::{PILLARS, SUMMED, TABLE_S, options, rows_in, source};
 
 /// Largest distance of a polygon from its circle where a design says nothing (nm), and the rounding of its corners.
 const CHORD_NM: f64 = 0.5;
@@ -27,10 +28,15 @@ fn made(name: &str) -> PathBuf {
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}_shapes"));
     let _ = std::fs::remove_dir_all(&out);
     let options = HandoffOptions {
-        design: design(name),
+        source: HandoffSource::Design(DesignSource {
+            path: design(name),
+            fidelity: None,
+            accuracy: Accuracy::Fast,
+            compensate: None,
+            dose_classes: None,
+        }),
         process: None,
         command: format!("metalith handoff designs/{name}.toml"),
-        fidelity: None,
         ..options(&out)
     };
     let made = handoff(&options, &Silent).unwrap();
@@ -231,14 +237,14 @@ fn a_process_for_another_thickness_is_refused() {
     let process = root().join("processes/jbx6300_asi.toml");
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("thicker");
     let options = HandoffOptions {
-        design: design("hexagonal_1550"),
+        source: source(&design("hexagonal_1550")),
         process: Some(process),
         ..options(&out)
     };
     let error = handoff(&options, &Silent).unwrap_err();
     assert_eq!(error.id(), "handoff/film-thickness-differs");
     insta::assert_snapshot!(error, @"
-    the film of the design is 900 nm thick, but the etch and the rules of jbx6300_asi are for 400 to 700 nm
+    the film of the design is 900 nm thick; `film_nm` in [transfer] of process jbx6300_asi in jbx6300_asi.toml is 400 to 700 nm, for which its etch and its rules are
       help: use a process file for this thickness; if its etch and its rules are right for it, change `film_nm` in [transfer]
     ");
     assert!(!out.exists());
@@ -270,14 +276,14 @@ fn a_process_without_rules_for_a_shape_is_refused() {
     std::fs::write(&process, text).unwrap();
     let out = folder.path().join("out");
     let options = HandoffOptions {
-        design: design("asi_940"),
+        source: source(&design("asi_940")),
         process: Some(process),
         ..options(&out)
     };
     let error = handoff(&options, &Silent).unwrap_err();
     assert_eq!(error.id(), "handoff/no-rules-for-pillars");
     insta::assert_snapshot!(error, @r#"
-    the pillars of the design are circles, and the process has no decks of rules for them
+    the pillars are circles, and [checks] of process jbx6300_asi in process.toml has no decks of rules for them
       help: copy process.toml within its folder, add a section [checks.circles] with `pillar_rules = "../rules/circles.toml"`, `dose_rules = "../rules/dose_circles.toml"` and `test_rules = "../rules/test_circles.toml"`, and give the copy to --process
     "#);
     assert!(!out.exists());

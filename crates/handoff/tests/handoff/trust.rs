@@ -6,7 +6,7 @@ use std::path::Path;
 use metalith_core::{Error, FaultKind, Silent};
 use metalith_handoff::{HandoffOptions, handoff, verify_handoff};
 
-use crate::{DESIGN, PROCESS, copy_of_shared, options};
+use crate::{DESIGN, PROCESS, copy_of_shared, options, source};
 
 /// The design with words replaced, in a folder.
 fn altered(folder: &Path, changes: &[(&str, &str)]) -> HandoffOptions {
@@ -18,7 +18,7 @@ fn altered(folder: &Path, changes: &[(&str, &str)]) -> HandoffOptions {
     let path = folder.join("design.toml");
     fs::write(&path, text).unwrap();
     HandoffOptions {
-        design: path,
+        source: source(&path),
         ..options(&folder.join("out"))
     }
 }
@@ -85,8 +85,8 @@ fn film_and_process_must_agree() {
     let error = handoff(&options, &Silent).unwrap_err();
     assert_eq!(error.id(), "handoff/film-material-differs");
     insta::assert_snapshot!(error, @r#"
-    the film of the design is "alumina_malitson_dodge_1972", but the process etches sin_luke_2015, sin_philipp_1973: reactive ion etch of silicon nitride, stopped on fused silica
-      help: copy processes/jbx6300_zep520a.toml within its folder, set `films = ["alumina_malitson_dodge_1972"]` and `etch` in [transfer], confirm the limits of the rules that [checks] names, and give the copy to --process
+    the film of the design is "alumina_malitson_dodge_1972"; `films` in [transfer] of process jbx6300_zep520a in jbx6300_zep520a.toml has sin_luke_2015, sin_philipp_1973 (reactive ion etch of silicon nitride, stopped on fused silica), and no shipped process has it
+      help: copy processes/jbx6300_zep520a.toml within its folder, set `films = ["alumina_malitson_dodge_1972"]` and `etch` in [transfer] to what the lab does, and give the copy to --process: its limits count as assumed until the lab confirms them
     "#);
     assert!(!options.out.exists());
 }
