@@ -47,7 +47,7 @@ pub(super) fn gather<'a>(
         lenient: true,
         ..Selection::default()
     };
-    let (Discovered { sites, shape }, no_elements) = sites(layout, deck, input, allowance, &selection, progress)?;
+    let (Discovered { sites, shape, fits }, no_elements) = sites(layout, deck, input, allowance, &selection, progress)?;
     let unit_nm = layout.unit_nm();
     let (pillars, doses) = pillar_layers(deck);
     let rules: Vec<(&DeckRule, &mut Findings)> = deck
@@ -67,7 +67,7 @@ pub(super) fn gather<'a>(
         doses,
         unit_nm,
         passes: pass_table(pillars, unit_nm, &rules),
-        filler: Filler::new(sites, Scale::of(layout)?),
+        filler: Filler::new(sites, Scale::of(layout)?).fitted(&fits),
         loose: BTreeMap::new(),
         vertices: 0,
         rects: 0,

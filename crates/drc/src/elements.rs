@@ -27,6 +27,7 @@ pub(super) fn sites(
         let designed = Discovered {
             sites: design.sites(),
             shape: design.cell.shape,
+            fits: Vec::new(),
         };
         return Ok((designed, String::new()));
     }
@@ -49,6 +50,7 @@ pub(super) fn sites(
     let nothing = Discovered {
         sites: Vec::new(),
         shape: PillarShape::default(),
+        fits: Vec::new(),
     };
     Ok((nothing, why))
 }

@@ -45,7 +45,7 @@ pub use outline_memo::{BoxMemo, OutlineMemo};
 pub use pillar::{DrawnPillar, PillarFinder, drawn_corners, pillar_of};
 pub use read_warnings::{ReadWarning, ReadWarnings};
 pub use rectangle::{TiltedRectangle, tilted_rectangle_of};
-pub use shape::{Outline, Point, Rect, Shape, ShapeKind, Text};
+pub use shape::{CORNER_STEPS, Outline, Point, Rect, Shape, ShapeKind, Text};
 pub use shape::{rectangle_of, simplified};
 pub use transform::Transform;
 pub use visit::{Selection, Visitor};

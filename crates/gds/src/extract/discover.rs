@@ -2,7 +2,7 @@
 
 use super::failed;
 use super::lattices::{Cluster, FEWEST};
-use super::places::{Centre, Places};
+use super::places::{Centre, PlaceFit, Places};
 use super::sites::Scale;
 use super::sizes::Sizes;
 use super::tiles::{COARSE, FINE, MOST_TILES};
@@ -65,6 +65,8 @@ pub struct Discovered {
     pub sites: Vec<ElementSite>,
     /// Shape of most of its pillars.
     pub shape: PillarShape,
+    /// How the places of each element were found; none where they are exact.
+    pub fits: Vec<PlaceFit>,
 }
 
 /// Find the elements of a layout whose pillars are on these layers, each with the ends of its pillars: see
@@ -86,7 +88,7 @@ pub fn discover(
     let fail = failed(layout.path());
     let look = |how: Look| seen(layout, &selection, scale, how, progress);
     let close = look(CLOSE)?;
-    let Seen { mut sites, shape, .. } = if close.may_be_wider() {
+    let Seen { sites, shape, .. } = if close.may_be_wider() {
         match look(WIDE) {
             Ok(wide) if wide.holds_a_lens() => wide,
             // What a second look cannot tell is no fault of the layout.
@@ -107,16 +109,18 @@ pub fn discover(
             most: MOST_ELEMENTS,
         }));
     }
-    sites.sort_by_key(|s| (s.centre_nm[1], s.centre_nm[0]));
+    let mut sites = sites;
+    sites.sort_by_key(|(s, _)| (s.centre_nm[1], s.centre_nm[0]));
+    let (mut sites, fits): (Vec<ElementSite>, Vec<PlaceFit>) = sites.into_iter().unzip();
     for (k, site) in sites.iter_mut().enumerate() {
         site.name = format!("element {}", k + 1);
     }
-    Ok(Discovered { sites, shape })
+    Ok(Discovered { sites, shape, fits })
 }
 
 /// Findings of one search of a layout.
 struct Seen {
-    sites: Vec<ElementSite>,
+    sites: Vec<(ElementSite, PlaceFit)>,
     shape: PillarShape,
     /// Shapes that may be pillars by their outline, however wide.
     shapes: u64,
@@ -126,13 +130,13 @@ impl Seen {
     /// True if a search for wider pitches may find more: nothing was found, or no lattice that is closer than such
     /// pitches are.
     fn may_be_wider(&self) -> bool {
-        let is_wide = |site: &ElementSite| site.lattice.pitch_nm().at_least_nm() > CLOSE.widest_nm;
+        let is_wide = |(site, _): &(ElementSite, PlaceFit)| site.lattice.pitch_nm().at_least_nm() > CLOSE.widest_nm;
         self.shapes >= FEWEST && self.sites.iter().all(is_wide)
     }
 
     /// True if there are elements, none of a pitch that no design has.
     fn holds_a_lens(&self) -> bool {
-        let is_known = |site: &ElementSite| site.lattice.pitch_nm().at_least_nm() <= WIDE.widest_nm;
+        let is_known = |(site, _): &(ElementSite, PlaceFit)| site.lattice.pitch_nm().at_least_nm() <= WIDE.widest_nm;
         !self.sites.is_empty() && self.sites.iter().all(is_known)
     }
 }
@@ -183,6 +187,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     for members in tiles.clusters() {
         let cluster = Cluster {
             steps_per_nm: scale.steps_per_nm(),
+            unit_halves: 2.0 * scale.steps_per_nm() as f64 * scale.nm(1.0),
             tiles: &tiles,
             members: &members,
         };
@@ -207,8 +212,11 @@ impl Map {
     #[inline]
     fn square(r: &Rect, scale: Scale, widest_nm: i64) -> Option<Centre> {
         let centre = Centre::of(r, scale)?;
-        let width = scale.whole_nm(r.width())?;
-        (r.width() == r.height() && width <= widest_nm).then_some(centre)
+        let width_nm = match scale.whole_nm(r.width()) {
+            Some(nm) if r.width() == r.height() => nm,
+            _ => scale.rounded_width_nm(r)?,
+        };
+        (width_nm <= widest_nm).then_some(centre)
     }
 }
 

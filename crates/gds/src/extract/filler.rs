@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use copies::Images;
 
 use super::MOST_SITES;
+use super::places::PlaceFit;
 use super::plan::ExtractedElement;
 use super::sites::{Scale, SitePlace, Sites};
 use super::stored_pillars::StoredPillars;
@@ -36,6 +37,10 @@ pub struct Filler {
     most: u64,
     /// More is to be held than may be.
     refused: bool,
+    /// True if shapes count that are pillars to the rounding of their corners.
+    tolerant: bool,
+    /// Placements of shapes that were put to that.
+    rounded: u64,
 }
 
 /// Placements that symmetry takes into one another, eight or four.
@@ -63,7 +68,30 @@ impl Filler {
             held: 0,
             most: MOST_SITES,
             refused: false,
+            tolerant: false,
+            rounded: 0,
         }
+    }
+
+    /// This filler for elements whose places were found so.
+    #[must_use]
+    pub fn fitted(mut self, fits: &[PlaceFit]) -> Self {
+        let sites: Vec<ElementSite> = self.elements.iter().map(|e| e.site.clone()).collect();
+        self.sites = Sites::fitted(&sites, fits, self.scale);
+        self
+    }
+
+    /// This filler, which takes shapes for pillars that are such to the rounding of their corners: [`crate::CORNER_STEPS`]. Their
+    /// widths are whole nanometres.
+    #[must_use]
+    pub fn tolerant(mut self) -> Self {
+        self.tolerant = true;
+        self
+    }
+
+    /// Pillars whose width was rounded to a whole nanometre.
+    pub fn rounded(&self) -> u64 {
+        self.rounded
     }
 
     /// This filler, which may hold this many sites.
@@ -176,6 +204,7 @@ impl Filler {
         if !self.orbits.iter().all(|orbit| site(self, orbit).is_some()) {
             return false;
         }
+        let is_rounded = self.is_rounded(r);
         for k in 0..self.orbits.len() {
             let orbit = &self.orbits[k];
             if let Some((row, column, width_nm)) = site(self, orbit) {
@@ -183,6 +212,7 @@ impl Filler {
                 if let StoredPillars::Eighth(map) = &mut self.elements[element].widths {
                     *map.at(column, row) = width_nm;
                     self.pillars += copies;
+                    self.rounded += if is_rounded { copies } else { 0 };
                 }
             }
         }
@@ -221,15 +251,26 @@ impl Filler {
         if !self.scale.reaches(r) {
             return Err(Why::OutsideElements);
         }
-        if r.width() != r.height() {
-            return Err(Why::UnequalSides);
-        }
-        let width_nm = self.scale.whole_nm(r.width()).ok_or(Why::OddShape)?;
+        let width_nm = match self.scale.whole_nm(r.width()) {
+            Some(nm) if r.width() == r.height() => nm,
+            _ => self.unequal_width_nm(r)?,
+        };
         let (element, row, column) = self.site(r, width_nm, guess)?;
         if width_nm > i64::from(u16::MAX) {
             return Err(Why::TooWide);
         }
         Ok((element, row, column, width_nm as u16))
+    }
+
+    /// Width of a shape that is a square of whole nanometres to the rounding of its corners at most.
+    #[cold]
+    fn unequal_width_nm(&self, r: &Rect) -> Result<i64, Why> {
+        let nearest = self.scale.rounded_width_nm(r).filter(|_| self.tolerant);
+        nearest.ok_or(if r.width() == r.height() {
+            Why::OddShape
+        } else {
+            Why::UnequalSides
+        })
     }
 
     /// Element, row and column of a pillar that reaches so far (nm), by the box around it.
@@ -309,7 +350,15 @@ impl Filler {
         if !takes(r.width()) {
             return Ok(false);
         }
-        self.fill(element, row, column, width_nm)
+        let put = self.fill(element, row, column, width_nm);
+        self.rounded += u64::from(put.is_ok() && self.is_rounded(r));
+        put
+    }
+
+    /// True if a shape is no square of whole nanometres.
+    #[inline]
+    fn is_rounded(&self, r: &Rect) -> bool {
+        r.width() != r.height() || self.scale.whole_nm(r.width()).is_none()
     }
 
     /// The width at one site alone; none if its element cannot be held.

@@ -10,6 +10,7 @@ mod lattices;
 mod pillars;
 mod places;
 mod plan;
+mod rounded;
 mod sites;
 mod sizes;
 mod stored_pillars;
@@ -31,6 +32,7 @@ use pillars::PillarCollector;
 
 pub use discover::{Discovered, discover};
 pub use filler::Filler;
+pub use places::PlaceFit;
 pub use sites::Scale;
 pub use stored_pillars::StoredPillars;
 
@@ -173,6 +175,7 @@ fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> 
         Elements::Given(sites) => Discovered {
             sites: sites.clone(),
             shape: PillarShape::default(),
+            fits: Vec::new(),
         },
         Elements::Discover => {
             let scale = Scale::of(layout)?;
@@ -194,7 +197,7 @@ fn extract_from(
 ) -> Result<Extraction<StoredPillars>> {
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
-    let mut pillars = PillarCollector::new(plan, found.shape, found.sites, Scale::of(layout)?, most);
+    let mut pillars = PillarCollector::new(plan, found, Scale::of(layout)?, most);
     layout.visit(&selection, &mut pillars, progress)?;
     let name = layout.cells()[top].name.clone();
     pillars.finish(name).map_err(failed(layout.path()))

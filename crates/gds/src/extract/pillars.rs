@@ -1,5 +1,6 @@
 //! The visitor that fills the width maps.
 
+use super::discover::Discovered;
 use super::filler::Filler;
 use super::plan::{Extraction, ExtractionPlan};
 use super::sites::Scale;
@@ -7,7 +8,7 @@ use super::stored_pillars::StoredPillars;
 use super::survey::Surveyor;
 use super::unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
 use crate::{ExtractionError, LayerNumber, LayoutCell, PillarFinder, Rect, Shape, Text, Transform, Visitor, pillar_of};
-use metalith_pillars::{ElementSite, PillarShape};
+use metalith_pillars::PillarShape;
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
 pub(super) struct PillarCollector {
@@ -23,20 +24,15 @@ pub(super) struct PillarCollector {
 
 impl PillarCollector {
     /// Holds `most` sites.
-    pub(crate) fn new(
-        plan: &ExtractionPlan,
-        shape: PillarShape,
-        sites: Vec<ElementSite>,
-        scale: Scale,
-        most: u64,
-    ) -> Self {
+    pub(crate) fn new(plan: &ExtractionPlan, found: Discovered, scale: Scale, most: u64) -> Self {
+        let Discovered { sites, shape, fits } = found;
         Self {
             layer: plan.pillar_layer,
             shape,
             listed: plan.listed,
             scale,
             finder: PillarFinder::new(shape, scale.nm(1.0)),
-            filler: Filler::new(sites, scale).holding(most),
+            filler: Filler::new(sites, scale).fitted(&fits).holding(most).tolerant(),
             oddities: UnrecognisedShapes::default(),
             surveyor: Surveyor::default(),
         }
