@@ -40,9 +40,10 @@ impl PsfArgs {
         };
         Ok(CellStack {
             pitch_nm: f64::from(pitch_nm),
-            lattice: found.elements.first().map_or(CellLattice::Square, |e| {
-                CellLattice::drawn(e.site.lattice.kind(), pitch_nm, e.site.lattice.unit())
-            }),
+            lattice: found
+                .elements
+                .first()
+                .map_or(CellLattice::Square, |e| CellLattice::of(&e.site.lattice)),
             shape: found.shape,
             ..stated
         })

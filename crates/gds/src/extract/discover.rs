@@ -100,7 +100,10 @@ pub fn discover(
     };
     let layers = || layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     if sites.is_empty() {
-        return Err(fail(ExtractionError::NoElements { layers: layers() }));
+        return Err(fail(ExtractionError::NoElements {
+            layers: layers(),
+            contents: None,
+        }));
     }
     if sites.len() > MOST_ELEMENTS {
         return Err(fail(ExtractionError::Groups {

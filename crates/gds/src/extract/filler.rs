@@ -404,6 +404,17 @@ impl Filler {
         there
     }
 
+    /// True if a shape may be a pillar of an element: in its lattice, or no wider than two pitches of the first.
+    pub fn may_be_of_element(&self, r: &Rect) -> bool {
+        /// Pitches that a pillar, and what is drawn in the place of one, is no wider than.
+        const PITCHES: i64 = 2;
+        if !self.scale.reaches(r) || self.elements.is_empty() {
+            return false;
+        }
+        let width_nm = self.scale.at_least_nm(r.width().max(r.height()));
+        width_nm <= PITCHES * self.sites.pitch_nm(0) || self.sites.stand(r, &mut 0) != SitePlace::Outside
+    }
+
     /// Keeps the wider of a pillar and the one that is on its site already; returns the other, as a rectangle about the
     /// same site. Both have even widths.
     pub fn keep_wider(&mut self, r: &Rect, placement: usize) -> Rect {

@@ -7,6 +7,8 @@
 mod discover;
 mod filler;
 mod lattices;
+mod layer_contents;
+mod named_shapes;
 mod pillars;
 mod places;
 mod plan;
@@ -179,7 +181,18 @@ fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> 
         },
         Elements::Discover => {
             let scale = Scale::of(layout)?;
-            let mut found = discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress)?;
+            let found = discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress);
+            let mut found = match found {
+                Err(Error::Extraction {
+                    path,
+                    cause: ExtractionError::NoElements { layers, .. },
+                }) => {
+                    let contents = Some(layer_contents::words(layout, &plan.selection(), progress)?);
+                    let cause = ExtractionError::NoElements { layers, contents };
+                    return Err(Error::Extraction { path, cause });
+                }
+                other => other?,
+            };
             ElementSite::widen(&mut found.sites);
             found
         }

@@ -2,12 +2,16 @@
 
 use super::discover::Discovered;
 use super::filler::Filler;
+use super::named_shapes::name_of;
 use super::plan::{Extraction, ExtractionPlan};
 use super::sites::Scale;
 use super::stored_pillars::StoredPillars;
 use super::survey::Surveyor;
 use super::unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
-use crate::{ExtractionError, LayerNumber, LayoutCell, PillarFinder, Rect, Shape, Text, Transform, Visitor, pillar_of};
+use crate::{
+    ExtractionError, LayerNumber, LayoutCell, OutlineMemo, PillarFinder, Rect, Shape, Text, Transform, Visitor,
+    pillar_of,
+};
 use metalith_pillars::PillarShape;
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
@@ -19,6 +23,8 @@ pub(super) struct PillarCollector {
     finder: PillarFinder,
     filler: Filler,
     oddities: UnrecognisedShapes,
+    /// Memory of the names of outlines that are no pillars.
+    names: OutlineMemo<Why>,
     surveyor: Surveyor,
 }
 
@@ -34,6 +40,7 @@ impl PillarCollector {
             finder: PillarFinder::new(shape, scale.nm(1.0)),
             filler: Filler::new(sites, scale).fitted(&fits).holding(most).tolerant(),
             oddities: UnrecognisedShapes::default(),
+            names: OutlineMemo::default(),
             surveyor: Surveyor::default(),
         }
     }
@@ -66,7 +73,8 @@ impl PillarCollector {
             size_nm: [nm(r.width()), nm(r.height())],
             offset,
         };
-        self.oddities.add(oddity, self.listed);
+        let in_element = self.filler.may_be_of_element(r);
+        self.oddities.add(oddity, in_element, self.listed);
     }
 
     /// An outline that is no pillar by its box alone: it may be a rectangle with more vertices than it needs, become one where it
@@ -84,7 +92,12 @@ impl PillarCollector {
             let is_other = PillarShape::CHOICES
                 .iter()
                 .any(|(_, s)| pillar_of(&placed, *s, unit_nm).is_some());
-            let why = if is_other { Why::OtherShape } else { Why::OddShape };
+            let why = if is_other {
+                Why::OtherShape
+            } else {
+                self.names
+                    .placed(shape.outline, &Transform::IDENTITY, || name_of(&placed))
+            };
             self.odd(why, &Rect::around(&placed), shape.offset);
         }
     }

@@ -71,13 +71,15 @@ impl Scale {
         (scaled % self.den == 0).then_some(scaled / self.den)
     }
 
-    /// Width of a rectangle that is a square to the rounding of its corners, to a whole nanometre: of two the even one. None if its
-    /// edges differ by more than a step of the grid.
+    /// Width of a rectangle that is a square to the rounding of its corners, to a whole nanometre: of two the even one. None if an
+    /// edge differs from it by more than a step of the grid: the database unit, or a nanometre if both edges are whole ones.
     pub fn rounded_width_nm(self, r: &Rect) -> Option<i64> {
-        let step = grid_step(self.nm(1.0));
         let (width, height) = (r.width(), r.height());
+        let is_whole = [width, height].iter().all(|edge| self.whole_nm(*edge).is_some());
+        let step = if is_whole { grid_step(self.nm(1.0)) } else { 1.0 };
         let width_nm = self.nm((width + height) as f64 / 2.0).round_ties_even() as i64;
-        ((width - height).abs() as f64 <= 2.0 * CORNER_STEPS * step && width_nm > 0).then_some(width_nm)
+        // Two corners off by half a step to either side along each axis.
+        ((width - height).abs() as f64 <= 4.0 * CORNER_STEPS * step && width_nm > 0).then_some(width_nm)
     }
 
     /// True if a rectangle is near enough for arithmetic.
