@@ -47,7 +47,8 @@ pub(super) fn gather<'a>(
         lenient: true,
         ..Selection::default()
     };
-    let (Discovered { sites, shape, fits }, no_elements) = sites(layout, deck, input, allowance, &selection, progress)?;
+    let (Discovered { sites, shape, fits, .. }, no_elements) =
+        sites(layout, deck, input, allowance, &selection, progress)?;
     let unit_nm = layout.unit_nm();
     let (pillars, doses) = pillar_layers(deck);
     let rules: Vec<(&DeckRule, &mut Findings)> = deck

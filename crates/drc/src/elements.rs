@@ -28,6 +28,7 @@ pub(super) fn sites(
             sites: design.sites(),
             shape: design.cell.shape,
             fits: Vec::new(),
+            turn: None,
         };
         return Ok((designed, String::new()));
     }
@@ -51,6 +52,7 @@ pub(super) fn sites(
         sites: Vec::new(),
         shape: PillarShape::default(),
         fits: Vec::new(),
+        turn: None,
     };
     Ok((nothing, why))
 }

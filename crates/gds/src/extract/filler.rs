@@ -253,7 +253,7 @@ impl Filler {
         }
         let width_nm = match self.scale.whole_nm(r.width()) {
             Some(nm) if r.width() == r.height() => nm,
-            _ => self.unequal_width_nm(r)?,
+            _ => return self.standing_rounded(r, guess),
         };
         let (element, row, column) = self.site(r, width_nm, guess)?;
         if width_nm > i64::from(u16::MAX) {
@@ -262,15 +262,26 @@ impl Filler {
         Ok((element, row, column, width_nm as u16))
     }
 
-    /// Width of a shape that is a square of whole nanometres to the rounding of its corners at most.
+    /// Variant of [`Filler::standing`] for a shape that is a square of whole nanometres to the rounding of its corners at most.
     #[cold]
-    fn unequal_width_nm(&self, r: &Rect) -> Result<i64, Why> {
-        let nearest = self.scale.rounded_width_nm(r).filter(|_| self.tolerant);
-        nearest.ok_or(if r.width() == r.height() {
-            Why::OddShape
-        } else {
-            Why::UnequalSides
-        })
+    fn standing_rounded(&self, r: &Rect, guess: &mut u32) -> Result<(u32, usize, usize, u16), Why> {
+        let is_square = r.width() == r.height();
+        let other = if is_square { Why::OddShape } else { Why::UnequalSides };
+        let width_nm = self.scale.rounded_width_nm(r).filter(|_| self.tolerant).ok_or(other)?;
+        let place = self.site(r, width_nm, guess);
+        let unequal = |why: Why| if why == Why::OffLattice { other } else { why };
+        let (element, row, column) = place.map_err(|why| if is_square { why } else { unequal(why) })?;
+        let width = match is_square {
+            true => r.width() as f64,
+            false => (self.sites)
+                .width_about(r, [element as usize, row, column])
+                .ok_or(other)?,
+        };
+        let width_nm = self.scale.nm(width).round_ties_even();
+        let in_range = (1.0..=f64::from(u16::MAX)).contains(&width_nm);
+        in_range
+            .then_some((element, row, column, width_nm as u16))
+            .ok_or(Why::TooWide)
     }
 
     /// Element, row and column of a pillar that reaches so far (nm), by the box around it.

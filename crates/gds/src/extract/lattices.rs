@@ -28,10 +28,18 @@ pub(super) struct Cluster<'a> {
     pub members: &'a [usize],
 }
 
+/// An element as it was found.
+pub(super) struct FoundElement {
+    pub site: ElementSite,
+    pub fit: PlaceFit,
+    /// True if a good part of its centres are not on the lattice.
+    pub is_poor: bool,
+}
+
 impl Cluster<'_> {
     /// Lattice, and how far its pillars reach; none if it is too small to be an element. Where most places are on no lattice of
     /// whole steps, they may be places that were rounded one by one.
-    pub(crate) fn element(&self) -> Result<Option<(ElementSite, PlaceFit)>, ExtractionError> {
+    pub(crate) fn element(&self) -> Result<Option<FoundElement>, ExtractionError> {
         let pillars: u64 = self.members.iter().map(|&k| self.tiles.pillars(k)).sum();
         if pillars < FEWEST {
             return Ok(None);
@@ -43,14 +51,23 @@ impl Cluster<'_> {
             Ok(Some(site)) => self.count_on(site, &tiles),
             _ => 0,
         };
+        let exactly = |site: ElementSite| FoundElement {
+            is_poor: SHARE_OF_SITES as usize * on < (SHARE_OF_SITES as usize - 1) * all,
+            site,
+            fit: PlaceFit::default(),
+        };
         if few_are_off(on, all)
             && let Ok(Some(site)) = exact
         {
-            return Ok(Some((site, PlaceFit::default())));
+            return Ok(Some(exactly(site)));
         }
         match self.rounded(&tiles).filter(|(fit, _)| !few_are_off(on, fit.count)) {
-            Some((fit, grid)) => self.fitted_site(&fit, grid, pillars).map(Some),
-            None => Ok(exact?.map(|site| (site, PlaceFit::default()))),
+            Some((fit, grid)) => {
+                let (site, fit) = self.fitted_site(&fit, grid, pillars)?;
+                let is_poor = false;
+                Ok(Some(FoundElement { site, fit, is_poor }))
+            }
+            None => Ok(exact?.map(exactly)),
         }
     }
 

@@ -18,6 +18,7 @@ mod sizes;
 mod stored_pillars;
 mod survey;
 mod tiles;
+mod turned;
 mod unrecognised_shapes;
 
 pub use plan::{Elements, ExtractedElement, Extraction, ExtractionPlan};
@@ -31,7 +32,9 @@ use metalith_core::{LayerNumber, Progress};
 pub use metalith_pillars::ElementSite;
 use metalith_pillars::{EighthMap, PillarMap, PillarReader, PillarShape};
 use pillars::PillarCollector;
+use turned::visit_turned;
 
+use discover::discover_turned;
 pub use discover::{Discovered, discover};
 pub use filler::Filler;
 pub use places::PlaceFit;
@@ -148,6 +151,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
         elements: folded.elements.into_iter().map(whole).collect(),
         pillars: folded.pillars,
         oddities: folded.oddities,
+        turned_deg: folded.turned_deg,
         survey: folded.survey,
     })
 }
@@ -178,10 +182,11 @@ fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> 
             sites: sites.clone(),
             shape: PillarShape::default(),
             fits: Vec::new(),
+            turn: None,
         },
         Elements::Discover => {
             let scale = Scale::of(layout)?;
-            let found = discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress);
+            let found = discover_turned(layout, &plan.selection(), &[plan.pillar_layer], scale, progress);
             let mut found = match found {
                 Err(Error::Extraction {
                     path,
@@ -210,8 +215,9 @@ fn extract_from(
 ) -> Result<Extraction<StoredPillars>> {
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
+    let turn = found.turn;
     let mut pillars = PillarCollector::new(plan, found, Scale::of(layout)?, most);
-    layout.visit(&selection, &mut pillars, progress)?;
+    visit_turned(layout, &selection, turn, &mut pillars, progress)?;
     let name = layout.cells()[top].name.clone();
     pillars.finish(name).map_err(failed(layout.path()))
 }

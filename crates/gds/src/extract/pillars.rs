@@ -18,6 +18,7 @@ use metalith_pillars::PillarShape;
 pub(super) struct PillarCollector {
     layer: LayerNumber,
     shape: PillarShape,
+    turned_deg: Option<f64>,
     listed: usize,
     scale: Scale,
     finder: PillarFinder,
@@ -31,10 +32,16 @@ pub(super) struct PillarCollector {
 impl PillarCollector {
     /// Holds `most` sites.
     pub(crate) fn new(plan: &ExtractionPlan, found: Discovered, scale: Scale, most: u64) -> Self {
-        let Discovered { sites, shape, fits } = found;
+        let Discovered {
+            sites,
+            shape,
+            fits,
+            turn,
+        } = found;
         Self {
             layer: plan.pillar_layer,
             shape,
+            turned_deg: turn.map(f64::to_degrees),
             listed: plan.listed,
             scale,
             finder: PillarFinder::new(shape, scale.nm(1.0)),
@@ -51,6 +58,7 @@ impl PillarCollector {
             shape: self.shape,
             pillars: self.filler.pillars(),
             elements: self.filler.finish()?,
+            turned_deg: self.turned_deg,
             oddities: self.oddities,
             survey: self.surveyor.finish(self.scale),
         })

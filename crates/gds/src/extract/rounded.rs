@@ -3,6 +3,7 @@
 
 use super::lattices::{AXES, Cluster, SHARE_OF_SITES};
 use super::places::PlaceFit;
+use super::turned::typical_distance;
 use crate::{CORNER_STEPS, ExtractionError, Point};
 use metalith_pillars::{DatabaseUnit, ElementSite, Lattice, LatticeKind, Pitch};
 
@@ -14,6 +15,8 @@ const ONE_PLACE: f64 = 2.0;
 const NUMBERED: f64 = 0.25;
 /// Steps on either side of the middle that the first fit takes in.
 const FIRST_REACH: f64 = 12.0;
+/// Pitch over the distance of neighbouring pillars, at least: 0.71 where every other site has a pillar.
+const SHARE_OF_DISTANCE: f64 = 0.6;
 /// Half the root of three: the distance of rows of a hexagonal lattice over its pitch.
 const ROW: f64 = 0.866_025_403_784_438_6;
 
@@ -80,8 +83,11 @@ impl Cluster<'_> {
     pub(super) fn rounded(&self, tiles: &[Vec<Point>]) -> Option<(Fit, f64)> {
         let nanometre = 2.0 * self.steps_per_nm as f64;
         let coarser = (self.unit_halves < nanometre).then_some(nanometre);
+        // A lattice much closer than pillars are is one of their superlattices, turned.
+        let least = SHARE_OF_DISTANCE * typical_distance(tiles)?;
         [self.unit_halves].into_iter().chain(coarser).find_map(|grid| {
             let fits = self.fits(tiles, grid).into_iter();
+            let fits = fits.filter(|fit| fit.pitch.nm() * nanometre >= least);
             fits.reduce(|best, fit| if fit.count > best.count { fit } else { best })
                 .map(|fit| (fit, grid))
         })

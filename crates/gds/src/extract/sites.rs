@@ -71,12 +71,19 @@ impl Scale {
         (scaled % self.den == 0).then_some(scaled / self.den)
     }
 
-    /// Width of a rectangle that is a square to the rounding of its corners, to a whole nanometre: of two the even one. None if an
-    /// edge differs from it by more than a step of the grid: the database unit, or a nanometre if both edges are whole ones.
+    /// Step of the grid that a rectangle is drawn on (database units): the unit, or a nanometre if both edges are whole ones.
+    pub(super) fn step_of(self, r: &Rect) -> f64 {
+        let is_whole = [r.width(), r.height()]
+            .iter()
+            .all(|edge| self.whole_nm(*edge).is_some());
+        if is_whole { grid_step(self.nm(1.0)) } else { 1.0 }
+    }
+
+    /// Width of a rectangle that may be a square to the rounding of its corners, to a whole nanometre: of two the even one. None if
+    /// an edge differs from it by more than a step of the grid.
     pub fn rounded_width_nm(self, r: &Rect) -> Option<i64> {
         let (width, height) = (r.width(), r.height());
-        let is_whole = [width, height].iter().all(|edge| self.whole_nm(*edge).is_some());
-        let step = if is_whole { grid_step(self.nm(1.0)) } else { 1.0 };
+        let step = self.step_of(r);
         let width_nm = self.nm((width + height) as f64 / 2.0).round_ties_even() as i64;
         // Two corners off by half a step to either side along each axis.
         ((width - height).abs() as f64 <= 4.0 * CORNER_STEPS * step && width_nm > 0).then_some(width_nm)
@@ -203,6 +210,24 @@ impl Sites {
             tiles,
             tile,
         }
+    }
+
+    /// Width (database units) of the square about a site whose corners were rounded to those of a rectangle: the middle of what is
+    /// possible. None if a corner is farther from every such square than rounding moves it.
+    pub(crate) fn width_about(&self, pillar: &Rect, [element, row, column]: [usize; 3]) -> Option<f64> {
+        let grid = &self.grids[element];
+        let per_unit = (PLACES_PER_NM * self.scale.num) as f64;
+        let corner = CORNER_STEPS * self.scale.step_of(pillar) + grid.rounding / per_unit;
+        let (mut least, mut most) = (0.0f64, f64::INFINITY);
+        let edges = [(pillar.x0, pillar.x1, column), (pillar.y0, pillar.y1, row)];
+        for (axis, (from, to, site)) in edges.into_iter().enumerate() {
+            let place = grid.first[axis] as f64 + site as f64 * grid.step[axis];
+            let off = (from + to) as f64 / 2.0 - place / per_unit;
+            let either = 2.0 * (corner - off.abs());
+            least = least.max((to - from) as f64 - either);
+            most = most.min((to - from) as f64 + either);
+        }
+        (least <= most).then_some(0.5 * (least + most))
     }
 
     /// Pitch of an element (nm).
