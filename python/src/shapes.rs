@@ -21,7 +21,7 @@ pub fn told(shape: PillarShape) -> ToldShape {
     let [a, b, c] = match shape {
         PillarShape::Rectangle(Rectangles::Rotated(p)) => [p.width_nm, p.length_nm, p.steps],
         PillarShape::Rectangle(Rectangles::Upright(p)) => [p.shortest_nm, p.step_nm, p.lengths],
-        PillarShape::Square | PillarShape::Circle => [0; 3],
+        PillarShape::Square | PillarShape::Circle | PillarShape::Mixed => [0; 3],
     };
     (shape.design_name().into(), a, b, c)
 }

@@ -16,7 +16,9 @@ use metalith::verify::{
     single_psfs, single_white, write_single_psf_report,
 };
 use metalith::wave::psf::FOCUS_PLANES;
-use metalith::{AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, PolarisationBasis, Result, extract};
+use metalith::{
+    AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, PillarShape, PolarisationBasis, Result, extract,
+};
 
 use self::light::{PsfLight, USUAL_DISTANCE_UM};
 use super::reading::ReadingArgs;
@@ -276,9 +278,14 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
             ));
         }
     }
-    if args.model.is_none()
+    let fidelity = match args.model {
+        Some(_) => Fidelity::Calibrated,
+        None => args.fidelity.into(),
+    };
+    let is_judged = args.model.is_none() || found.shape == PillarShape::Mixed;
+    if is_judged
         && !args.extract_only
-        && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))
+        && let Some((what, hint)) = fidelity.refusal(found.shape, PsfArgs::lattice_kind(found))
     {
         return Err(Error::refused(
             "cell/fidelity-not-for-pillars",

@@ -230,7 +230,7 @@ impl Shape<'_> {
         match shape.outline() {
             OutlineForm::Square => self.rect.as_ref(),
             OutlineForm::Circle => self.circle.as_ref(),
-            OutlineForm::Polygon => None,
+            OutlineForm::Polygon | OutlineForm::Mixed => None,
         }
     }
 }

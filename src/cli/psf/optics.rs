@@ -1,7 +1,7 @@
 //! Cells, light and sensor by the options of `metalith psf`, and the assumptions beside them.
 
 use metalith::cell::{
-    CellStack, FittedCell, FocusedLight, FocusingStack, Handedness, Mapping, NeighbourCell, PointwiseCell,
+    CellStack, FittedCell, FocusedLight, FocusingStack, Handedness, Mapping, MixedCell, NeighbourCell, PointwiseCell,
     Polarisation, PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
 };
 use metalith::design::CellFile;
@@ -212,6 +212,9 @@ impl PsfArgs {
             .collect::<Vec<_>>();
         widths.sort_unstable();
         widths.dedup();
+        if found.shape == PillarShape::Mixed {
+            return Ok(Box::new(MixedCell::new(&stack, widths)));
+        }
         if matches!(self.fidelity, FidelityArg::Fitted) {
             let band_um = light.band_um(stack.range_um());
             let range = (

@@ -234,6 +234,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
         .filter(|found| mostly || found.with_squares);
     let shape = match &rectangles {
         Some(found) => found.shape,
+        None if how.at_angles && is_mixed([squares, circles]) => PillarShape::Mixed,
         None if circles > squares => PillarShape::Circle,
         None => PillarShape::Square,
     };
@@ -280,6 +281,14 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
         turn,
         cause: failed,
     })
+}
+
+/// True if both squares and circles are pillars: as few as these may be marks.
+fn is_mixed(shapes: [u64; 2]) -> bool {
+    /// One in so many at least.
+    const SHARE: u64 = 100;
+    let [few, all] = [shapes[0].min(shapes[1]), shapes[0] + shapes[1]];
+    few >= FEWEST && SHARE * few >= all
 }
 
 /// Tiles of one group in a search.
