@@ -115,6 +115,10 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(design) => deck.for_pillars_of(design),
         None => deck,
     };
+    let deck = match args.reading.layer {
+        Some(layer) => deck.with_pillars_on(layer),
+        None => deck,
+    };
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);

@@ -38,10 +38,6 @@ pub(crate) struct PsfArgs {
     /// The layout, of any program; `-` for standard input.
     layout: PathBuf,
 
-    /// Layer and datatype of the pillars.
-    #[arg(long, default_value = "1/0", value_parser = layer)]
-    layer: LayerNumber,
-
     #[command(flatten)]
     reading: ReadingArgs,
 
@@ -247,7 +243,7 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction, left_out: Option<&LeftOut>
             args.layout.display(),
             count(found.pillars),
             count(found.pillars + others),
-            args.layer,
+            args.reading.pillar_layer(),
             found.shape.plural()
         ),
         "name the layer of the pillars with --layer, or look at what else is there with --extract-only --json",
@@ -348,9 +344,9 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     args.say_guesses(terminal);
     terminal.stop_on_interrupt();
     let layout = args.reading.open(&InputFile::of(&args.layout)?, terminal)?;
-    let plan = ExtractionPlan::discover(args.layer);
+    let plan = ExtractionPlan::discover(args.reading.pillar_layer());
     let found = extract(&layout, &plan, terminal)?;
-    let left_out = LeftOut::of(&found, args.layer);
+    let left_out = LeftOut::of(&found, args.reading.pillar_layer());
     mostly_pillars(args, &found, left_out.as_ref())?;
     one_kind(args, &found)?;
     known_light(args, &found)?;
@@ -413,6 +409,7 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         });
         let json = serde_json::json!({
             "not_understood": left_out.as_ref().map(|left_out| &left_out.words),
+            "turned_deg": found.turned_deg,
             "pillars": found.pillars,
             "elements": elements.collect::<Vec<_>>(),
             "other_shapes": found.oddities,
@@ -443,7 +440,11 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             },
         );
     }
-    print_line!("{} other shapes on layer {}", count(found.oddities.total()), args.layer);
+    print_line!(
+        "{} other shapes on layer {}",
+        count(found.oddities.total()),
+        args.reading.pillar_layer()
+    );
     for (what, value) in &assumptions {
         print_line!("{what}: {value}");
     }

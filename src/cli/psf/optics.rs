@@ -98,6 +98,13 @@ impl PsfArgs {
                 ),
             ),
         ];
+        if let Some(deg) = found.turned_deg {
+            let words = format!(
+                "at an angle of {} deg; places and directions are along rows and columns of its lattice",
+                sig(deg, 6)
+            );
+            all.insert(1, ("the layout is placed", words));
+        }
         if let Some(light) = light {
             let edge = ("edge of a sensor pixel", format!("{} um", exact(self.pixel_um(light))));
             all.insert(2, edge);

@@ -27,7 +27,7 @@ pub use unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
 
 use std::path::Path;
 
-use crate::{Error, ExtractionError, Layout, Result};
+use crate::{Error, ExtractionError, Layout, ReadLimits, Result};
 use metalith_core::{LayerNumber, Progress};
 pub use metalith_pillars::ElementSite;
 use metalith_pillars::{EighthMap, PillarMap, PillarReader, PillarShape};
@@ -102,7 +102,52 @@ fn failed(path: &Path) -> impl Fn(ExtractionError) -> Error {
     }
 }
 
-/// Reads pillars out of GDSII files.
+/// Reads pillars out of layouts, on a layer and below a cell that may be others than those that are stated.
+#[derive(Clone, Debug, Default)]
+pub struct PillarsAt {
+    /// Layer in place of the stated one.
+    pub layer: Option<LayerNumber>,
+    /// Cell to start from; the top cell if there is one only.
+    pub top: Option<String>,
+}
+
+impl PillarsAt {
+    fn plan(&self, plan: ExtractionPlan) -> ExtractionPlan {
+        ExtractionPlan {
+            pillar_layer: self.layer.unwrap_or(plan.pillar_layer),
+            top: self.top.clone(),
+            ..plan
+        }
+    }
+}
+
+impl PillarReader for PillarsAt {
+    fn pillars(
+        &self,
+        layout: &Path,
+        layer: LayerNumber,
+        shape: PillarShape,
+        elements: &[ElementSite],
+        progress: &dyn Progress,
+    ) -> metalith_core::Result<Vec<PillarMap>> {
+        let file = Layout::open_with(layout, ReadLimits::default(), progress)?;
+        let plan = self.plan(ExtractionPlan::given(layer, elements.to_vec()).of_shape(shape));
+        let found = extract(&file, &plan, progress)?;
+        Ok(found.elements.into_iter().map(|e| e.widths).collect())
+    }
+
+    fn elements(
+        &self,
+        layout: &Path,
+        layer: LayerNumber,
+        progress: &dyn Progress,
+    ) -> metalith_core::Result<Vec<ElementSite>> {
+        let file = Layout::open_with(layout, ReadLimits::default(), progress)?;
+        Ok(sites_of(&file, &self.plan(ExtractionPlan::discover(layer)), progress)?.sites)
+    }
+}
+
+/// Reads pillars out of layouts where they are stated to be.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GdsPillars;
 
@@ -115,10 +160,7 @@ impl PillarReader for GdsPillars {
         elements: &[ElementSite],
         progress: &dyn Progress,
     ) -> metalith_core::Result<Vec<PillarMap>> {
-        let file = Layout::open(layout)?;
-        let plan = ExtractionPlan::given(layer, elements.to_vec()).of_shape(shape);
-        let found = extract(&file, &plan, progress)?;
-        Ok(found.elements.into_iter().map(|e| e.widths).collect())
+        PillarsAt::default().pillars(layout, layer, shape, elements, progress)
     }
 
     fn elements(
@@ -127,8 +169,7 @@ impl PillarReader for GdsPillars {
         layer: LayerNumber,
         progress: &dyn Progress,
     ) -> metalith_core::Result<Vec<ElementSite>> {
-        let file = Layout::open(layout)?;
-        Ok(sites_of(&file, &ExtractionPlan::discover(layer), progress)?.sites)
+        PillarsAt::default().elements(layout, layer, progress)
     }
 }
 
