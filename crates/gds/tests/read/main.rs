@@ -1,6 +1,7 @@
 //! The reader and the extraction: hand-built bytes, files of other tools, random trees, damaged bytes.
 
 mod departures;
+mod drawn;
 mod folded;
 mod oasis;
 mod pillars;
