@@ -12,6 +12,7 @@ pub type ToldShape = (String, u16, u16, u16);
 
 const ROTATED: &str = "rectangle";
 const UPRIGHT: &str = "upright_rectangle";
+const MIXED: &str = "mixed";
 
 /// Most rotations in half a turn.
 const MOST_STEPS: u16 = 3600;
@@ -34,6 +35,7 @@ pub fn shape_of((word, width_nm, length_nm, steps): ToldShape) -> Result<PillarS
     match word.as_str() {
         ROTATED => return Ok(rectangles(width_nm, length_nm, steps)?.into()),
         UPRIGHT => return Ok(upright(width_nm, length_nm, steps)?.into()),
+        MIXED => return Ok(PillarShape::Mixed),
         _ => {}
     }
     let known = PillarShape::CHOICES.iter().find(|(name, _)| *name == word);
