@@ -271,11 +271,11 @@ impl Filler {
         let place = self.site(r, width_nm, guess);
         let unequal = |why: Why| if why == Why::OffLattice { other } else { why };
         let (element, row, column) = place.map_err(|why| if is_square { why } else { unequal(why) })?;
-        let width = match is_square {
-            true => r.width() as f64,
-            false => (self.sites)
-                .width_about(r, [element as usize, row, column])
-                .ok_or(other)?,
+        let width = if is_square {
+            r.width() as f64
+        } else {
+            let about = self.sites.width_about(r, [element as usize, row, column]);
+            about.ok_or(other)?
         };
         let width_nm = self.scale.nm(width).round_ties_even();
         let in_range = (1.0..=f64::from(u16::MAX)).contains(&width_nm);

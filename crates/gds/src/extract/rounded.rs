@@ -97,7 +97,7 @@ impl Cluster<'_> {
     fn fits(&self, tiles: &[Vec<Point>], grid: f64) -> Vec<Fit> {
         let mut found = Vec::new();
         for axis in 0..2 {
-            let Some(step) = self.refined_step(tiles, axis, grid) else {
+            let Some(step) = refined_step(tiles, axis, grid) else {
                 continue;
             };
             let of_row = if axis == 0 { 1.0 } else { 1.0 / (2.0 * ROW) };
@@ -162,48 +162,6 @@ impl Cluster<'_> {
             parity,
             count,
         })
-    }
-
-    /// Distance of neighbouring places along an axis, fitted from the middle outwards: none where tiles have one place each.
-    fn refined_step(&self, tiles: &[Vec<Point>], axis: usize, grid: f64) -> Option<f64> {
-        let mut steps = Vec::new();
-        for tile in tiles {
-            let mut places: Vec<i64> = tile.iter().map(|p| AXES[axis](*p)).collect();
-            places.sort_unstable();
-            let mut means: Vec<(f64, f64, i64)> = Vec::new();
-            for v in places {
-                match means.last_mut() {
-                    Some((sum, count, last)) if (v - *last) as f64 <= ONE_PLACE * grid => {
-                        (*sum, *count, *last) = (*sum + v as f64, *count + 1.0, v);
-                    }
-                    _ => means.push((v as f64, 1.0, v)),
-                }
-            }
-            let mean = |m: &(f64, f64, i64)| m.0 / m.1;
-            steps.extend(means.windows(2).map(|pair| mean(&pair[1]) - mean(&pair[0])));
-        }
-        steps.sort_unstable_by(f64::total_cmp);
-        // The densest group of steps that rounding makes of one.
-        let within = |from: usize| steps[from..].partition_point(|s| *s <= steps[from] + ONE_PLACE * grid);
-        let (from, count) = (0..steps.len())
-            .map(|k| (k, within(k)))
-            .max_by_key(|(k, n)| (*n, std::cmp::Reverse(*k)))?;
-        let step = steps[from..from + count].iter().sum::<f64>() / count as f64;
-        let mut places: Vec<f64> = tiles.iter().flatten().map(|p| AXES[axis](*p) as f64).collect();
-        places.sort_unstable_by(f64::total_cmp);
-        let middle = places[places.len() / 2];
-        let mut comb = Comb { first: middle, step };
-        let last = (places[places.len() - 1] - middle).max(middle - places[0]);
-        let mut reach = FIRST_REACH * step;
-        loop {
-            let from = places.partition_point(|v| *v < middle - reach);
-            let to = places.partition_point(|v| *v <= middle + reach);
-            comb = least_squares(&places[from..to], comb)?;
-            if reach > last {
-                return Some(comb.step);
-            }
-            reach *= 2.0;
-        }
     }
 
     fn nm_of(&self, halves: f64) -> f64 {
@@ -282,6 +240,48 @@ impl Cluster<'_> {
             slack_nm: self.nm_of(slack),
         };
         Ok((site, fit))
+    }
+}
+
+/// Distance of neighbouring places along an axis, fitted from the middle outwards: none where tiles have one place each.
+fn refined_step(tiles: &[Vec<Point>], axis: usize, grid: f64) -> Option<f64> {
+    let mut steps = Vec::new();
+    for tile in tiles {
+        let mut places: Vec<i64> = tile.iter().map(|p| AXES[axis](*p)).collect();
+        places.sort_unstable();
+        let mut means: Vec<(f64, f64, i64)> = Vec::new();
+        for v in places {
+            match means.last_mut() {
+                Some((sum, count, last)) if (v - *last) as f64 <= ONE_PLACE * grid => {
+                    (*sum, *count, *last) = (*sum + v as f64, *count + 1.0, v);
+                }
+                _ => means.push((v as f64, 1.0, v)),
+            }
+        }
+        let mean = |m: &(f64, f64, i64)| m.0 / m.1;
+        steps.extend(means.windows(2).map(|pair| mean(&pair[1]) - mean(&pair[0])));
+    }
+    steps.sort_unstable_by(f64::total_cmp);
+    // The densest group of steps that rounding makes of one.
+    let within = |from: usize| steps[from..].partition_point(|s| *s <= steps[from] + ONE_PLACE * grid);
+    let (from, count) = (0..steps.len())
+        .map(|k| (k, within(k)))
+        .max_by_key(|(k, n)| (*n, std::cmp::Reverse(*k)))?;
+    let step = steps[from..from + count].iter().sum::<f64>() / count as f64;
+    let mut places: Vec<f64> = tiles.iter().flatten().map(|p| AXES[axis](*p) as f64).collect();
+    places.sort_unstable_by(f64::total_cmp);
+    let middle = places[places.len() / 2];
+    let mut comb = Comb { first: middle, step };
+    let last = (places[places.len() - 1] - middle).max(middle - places[0]);
+    let mut reach = FIRST_REACH * step;
+    loop {
+        let from = places.partition_point(|v| *v < middle - reach);
+        let to = places.partition_point(|v| *v <= middle + reach);
+        comb = least_squares(&places[from..to], comb)?;
+        if reach > last {
+            return Some(comb.step);
+        }
+        reach *= 2.0;
     }
 }
 

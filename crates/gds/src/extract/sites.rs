@@ -127,9 +127,10 @@ impl Grid {
         let lattice = site.lattice;
         let scaled = |nm: f64| (nm * PLACES_PER_NM as f64).round() as i64 * scale.den;
         let step = lattice.steps_nm();
-        let step = match lattice.has_exact_rows() {
-            true => step.map(|nm| nm * (PLACES_PER_NM * scale.den) as f64),
-            false => step.map(|nm| scaled(nm) as f64),
+        let step = if lattice.has_exact_rows() {
+            step.map(|nm| nm * (PLACES_PER_NM * scale.den) as f64)
+        } else {
+            step.map(|nm| scaled(nm) as f64)
         };
         let first = |axis: usize| {
             let from_centre = lattice.place_nm(axis, 0) + fit.offset_nm[axis];

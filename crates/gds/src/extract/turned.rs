@@ -79,9 +79,12 @@ impl<V: Visitor> Visitor for Turned<'_, V> {
                 (None, true) => None,
                 (_, false) => nearly_upright(&self.points, self.unit_nm),
             };
-            let circle = shape.circle.and_then(|circle| match placement.is_square() {
-                true => placement.apply_rect(&circle),
-                false => circle_of(&self.points, self.unit_nm),
+            let circle = shape.circle.and_then(|circle| {
+                if placement.is_square() {
+                    placement.apply_rect(&circle)
+                } else {
+                    circle_of(&self.points, self.unit_nm)
+                }
             });
             let turned = Shape {
                 outline: Outline::new(&self.points),
