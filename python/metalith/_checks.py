@@ -48,13 +48,17 @@ def check(
     with_layouts: Sequence[PathLike] = (),
     waivers: PathLike | None = None,
     markers: int = 100,
+    layer: tuple[int, int] | None = None,
+    top: str | None = None,
     progress: Progress | None = None,
 ) -> CheckReport:
     """Check a layout against design rules: those of the program for the shape of its pillars, or for the ``design``, if
-    ``rules`` is left out. ``design`` puts the rules in force that compare with it."""
+    ``rules`` is left out. ``design`` puts the rules in force that compare with it. ``layer`` (layer and datatype) is that
+    of the pillars, if it is not as the rules say; ``top`` the cell to start from, if the layout has several."""
     native = design._native if design is not None else None
     most = _arguments.whole("markers", markers, 0, _arguments.MOST_32)
-    text, clean = _native.check(layout, rules, native, list(with_layouts), waivers, most, progress)
+    on = None if layer is None else _arguments.layer(layer)
+    text, clean = _native.check(layout, rules, native, list(with_layouts), waivers, most, progress, on, top)
     found = json.loads(text)
     places = [Marker(rule["id"], m) for rule in found["rules"] for m in rule.get("markers", [])]
     return CheckReport(clean=clean, rules=found["rules"], markers=places, numbers=found)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from . import _native
+from . import _arguments, _native
 from ._types import Json, PathLike, Progress
 
 
@@ -127,11 +127,15 @@ def calibrate(
     out: PathLike,
     *,
     effects: Sequence[str] = (),
+    layer: tuple[int, int] | None = None,
+    top: str | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Find the effects by which a measured set differs from its model. Page, ``diagnosis.json`` and ``model.toml`` are written
-    into ``out``. ``effects`` are those that are tried, all if left out. It takes minutes."""
-    told: Json = json.loads(_native.calibrate(measured, out, list(effects), progress))
+    into ``out``. ``effects`` are those that are tried, all if left out. The pillars are on ``layer`` (layer and datatype) below
+    the cell ``top`` of the layout, if that is not as the set says. It takes minutes."""
+    on = None if layer is None else _arguments.layer(layer)
+    told: Json = json.loads(_native.calibrate(measured, out, list(effects), progress, on, top))
     before, after = told["error"]["before"], told["error"]["after"]
     folder = Path(out)
     model = folder / "model.toml"

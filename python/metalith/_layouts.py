@@ -68,7 +68,7 @@ class UprightRectangles:
         return x.reshape(values.shape), y.reshape(values.shape)
 
 
-Shape: TypeAlias = Union[Literal["square", "circle"], Rectangles, UprightRectangles]
+Shape: TypeAlias = Union[Literal["square", "circle", "mixed"], Rectangles, UprightRectangles]
 """What pillars are."""
 
 
@@ -126,6 +126,8 @@ def _shape(told: tuple[str, int, int, int]) -> Shape:
         return Rectangles(width, length, steps)
     if word == "upright_rectangle":
         return UprightRectangles(width, length, steps)
+    if word == "mixed":
+        return "mixed"
     return "circle" if word == "circle" else "square"
 
 
@@ -347,7 +349,8 @@ def read_layout(
 ) -> Layout:
     """Read the pillars of a GDSII or OASIS file, written by any program: at the elements of ``design`` or of ``array``, or
     wherever squares or circles stand on a lattice on ``layer`` (layer and datatype). Rectangles need one of the two. All
-    elements stand on lattices of one kind and pitch."""
+    elements stand on lattices of one kind and pitch. Of squares and circles in one lens (shape ``mixed``) the number of a
+    circle is 32768 more than its diameter (nm)."""
     natives = (design._native if design is not None else None, array._native if array is not None else None)
     names, centres, widths, pitch_nm, lattice, pillars, others, found, shape = _native.read_layout(
         path, _arguments.layer(layer), top, *natives, progress

@@ -162,6 +162,8 @@ def check(
     waivers: PathLike | None = None,
     markers: int = 100,
     progress: Progress | None = None,
+    layer: tuple[int, int] | None = None,
+    top: str | None = None,
 ) -> tuple[str, bool]: ...
 def verify(
     design: Design,
@@ -176,6 +178,8 @@ def calibrate(
     out: PathLike,
     effects: list[str] = ...,
     progress: Progress | None = None,
+    layer: tuple[int, int] | None = None,
+    top: str | None = None,
 ) -> str: ...
 def plan(
     design: Design,

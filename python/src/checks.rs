@@ -6,8 +6,8 @@ use metalith::bench_plan::BenchFile;
 use metalith::calibrate::Settings;
 use metalith::cell::cache_folder;
 use metalith::drc::{self, CheckInput, Date, Deck, Waivers};
-use metalith::extract::GdsPillars;
-use metalith::gds::ReadLimits;
+use metalith::extract::PillarsAt;
+use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::{
     Accuracy, AsBuiltChip, CalibratedModel, Layout, PillarArray, PillarRows as _, Result, SimulationCases, cell_models,
 };
@@ -23,7 +23,7 @@ pub fn json(value: &impl serde::Serialize) -> String {
 
 /// Design rules: the report as JSON, and whether it is clean.
 #[pyfunction]
-#[pyo3(signature = (layout, rules=None, design=None, with_layouts=vec![], waivers=None, markers=100, progress=None))]
+#[pyo3(signature = (layout, rules=None, design=None, with_layouts=vec![], waivers=None, markers=100, progress=None, layer=None, top=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn check(
     py: Python<'_>,
@@ -34,6 +34,8 @@ pub fn check(
     waivers: Option<PathBuf>,
     markers: usize,
     progress: Option<Py<PyAny>>,
+    layer: Option<(u16, u16)>,
+    top: Option<String>,
 ) -> PyResult<(String, bool)> {
     let design = design.map(|d| &d.design);
     work(py, progress, |p| {
@@ -42,9 +44,18 @@ pub fn check(
             (None, Some(design)) => Some(Deck::for_design(design)),
             (None, None) => None,
         };
+        let layer = layer.map(|(layer, datatype)| LayerNumber::new(layer, datatype));
+        let deck = match (deck, layer) {
+            (Some(deck), Some(layer)) => Some(deck.with_pillars_on(layer)),
+            (deck, _) => deck,
+        };
         let waivers = waivers.as_deref().map(Waivers::read).transpose()?;
         let open = |path: &PathBuf| Layout::open_with(path, ReadLimits::default(), p);
         let file = Layout::open_counted(&layout, ReadLimits::default(), p)?;
+        let file = match &top {
+            Some(top) => file.below(top)?,
+            None => file,
+        };
         let with = with_layouts.iter().map(open).collect::<Result<Vec<_>, _>>()?;
         let input = CheckInput {
             with: with.iter().collect(),
@@ -56,7 +67,7 @@ pub fn check(
         };
         let report = match &deck {
             Some(deck) => drc::check(&file, deck, &input, p)?,
-            None => drc::check_generic(&file, &input, p)?,
+            None => drc::check_generic(&file, layer, &input, p)?,
         };
         Ok((json(&report), report.exit_code() == 0))
     })
@@ -106,21 +117,25 @@ pub fn verify(
 
 /// The diagnosis of a measured set, as JSON; report and model are written into a folder.
 #[pyfunction]
-#[pyo3(signature = (set, out, effects=vec![], progress=None))]
+#[pyo3(signature = (set, out, effects=vec![], progress=None, layer=None, top=None))]
 pub fn calibrate(
     py: Python<'_>,
     set: PathBuf,
     out: PathBuf,
     effects: Vec<String>,
     progress: Option<Py<PyAny>>,
+    layer: Option<(u16, u16)>,
+    top: Option<String>,
 ) -> PyResult<String> {
     work(py, progress, |p| {
+        let layer = layer.map(|(layer, datatype)| LayerNumber::new(layer, datatype));
+        let reader = PillarsAt { layer, top };
         let settings = Settings {
             cache: cache_folder(),
             only: effects,
             ..Settings::default()
         };
-        let done = metalith::calibrate::calibrate(&[set], &[out], &settings, &GdsPillars, p)?;
+        let done = metalith::calibrate::calibrate(&[set], &[out], &settings, &reader, p)?;
         Ok(json(&done[0].diagnosis))
     })
 }

@@ -153,6 +153,7 @@ fn simulate_together(
         shape,
         pillars: elements.iter().map(|e| e.widths.pillars()).sum(),
         elements,
+        turned_deg: None,
         oddities: Default::default(),
         survey: Default::default(),
     };

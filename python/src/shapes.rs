@@ -12,6 +12,7 @@ pub type ToldShape = (String, u16, u16, u16);
 
 const ROTATED: &str = "rectangle";
 const UPRIGHT: &str = "upright_rectangle";
+const MIXED: &str = "mixed";
 
 /// Most rotations in half a turn.
 const MOST_STEPS: u16 = 3600;
@@ -21,7 +22,7 @@ pub fn told(shape: PillarShape) -> ToldShape {
     let [a, b, c] = match shape {
         PillarShape::Rectangle(Rectangles::Rotated(p)) => [p.width_nm, p.length_nm, p.steps],
         PillarShape::Rectangle(Rectangles::Upright(p)) => [p.shortest_nm, p.step_nm, p.lengths],
-        PillarShape::Square | PillarShape::Circle => [0; 3],
+        PillarShape::Square | PillarShape::Circle | PillarShape::Mixed => [0; 3],
     };
     (shape.design_name().into(), a, b, c)
 }
@@ -34,6 +35,7 @@ pub fn shape_of((word, width_nm, length_nm, steps): ToldShape) -> Result<PillarS
     match word.as_str() {
         ROTATED => return Ok(rectangles(width_nm, length_nm, steps)?.into()),
         UPRIGHT => return Ok(upright(width_nm, length_nm, steps)?.into()),
+        MIXED => return Ok(PillarShape::Mixed),
         _ => {}
     }
     let known = PillarShape::CHOICES.iter().find(|(name, _)| *name == word);

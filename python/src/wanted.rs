@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use metalith::cell::{
-    Analyser, CellStack, FittedCell, FocusedLight, Handedness, Mapping, NeighbourCell, PointwiseCell, Polarisation,
-    PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
+    Analyser, CellStack, FittedCell, FocusedLight, Handedness, Mapping, MixedCell, NeighbourCell, PointwiseCell,
+    Polarisation, PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
 };
 use metalith::design::band_about;
 use metalith::{
@@ -134,6 +134,7 @@ pub fn cell_of(
             let range = (*drawn.first().unwrap_or(&100), *drawn.last().unwrap_or(&300));
             Box::new(FittedCell::of_stack(&stack, band, range)?)
         }
+        _ if shape == PillarShape::Mixed => Box::new(MixedCell::new(&stack, drawn)),
         _ => Box::new(PointwiseCell::new(stack, drawn)),
     })
 }

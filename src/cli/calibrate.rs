@@ -9,11 +9,12 @@ use metalith::calibrate::{
     write_validation,
 };
 use metalith::cell::cache_folder;
-use metalith::extract::GdsPillars;
+use metalith::extract::PillarsAt;
 use metalith::metrology::{self, Answer, SetKind, kind_of};
 use metalith::{Error, Result};
 
 use super::out_folder::OutFolder;
+use super::reading::ReadingArgs;
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Find the effects by which a measured set differs from its prediction.
@@ -30,6 +31,9 @@ pub(crate) struct CalibrateArgs {
     /// and the set's name if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
 
     /// Try these effects only, separated by commas; all if left out. With `--validate` all are tried, and the synthetic
     /// sets have these effects.
@@ -141,8 +145,13 @@ fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -
         adopt: args.adopt,
         ..Settings::default()
     };
+    args.reading.file.apply(terminal);
+    let reader = PillarsAt {
+        layer: args.reading.layer,
+        top: args.reading.file.top.clone(),
+    };
     if args.validate {
-        let (set, out) = (MeasuredSet::read(&args.sets[0], &GdsPillars, terminal)?, &outs[0]);
+        let (set, out) = (MeasuredSet::read(&args.sets[0], &reader, terminal)?, &outs[0]);
         let base = if args.trial.is_empty() && args.random == 0 {
             ValidationPlan::default()
         } else {
@@ -169,7 +178,7 @@ fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -
         return Ok(Outcome::Fine);
     }
     let mut outcome = Outcome::Fine;
-    for done in calibrate(&args.sets, outs, &settings, &GdsPillars, terminal)? {
+    for done in calibrate(&args.sets, outs, &settings, &reader, terminal)? {
         terminal.clear();
         if args.json {
             print_json(&done.diagnosis);

@@ -122,6 +122,10 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         (None, Some(design)) => Some(Deck::for_design(design).for_pillars_of(design)),
         (None, None) => None,
     };
+    let deck = match (deck, args.reading.layer) {
+        (Some(deck), Some(layer)) => Some(deck.with_pillars_on(layer)),
+        (deck, _) => deck,
+    };
     let layout = match deck {
         Some(_) => args.reading.open(&file, terminal)?,
         None => args.reading.open_counted(&file, terminal)?,
@@ -144,7 +148,7 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let report = match &deck {
         Some(deck) => drc::check(&layout, deck, &input, terminal)?,
-        None => drc::check_generic(&layout, &input, terminal)?,
+        None => drc::check_generic(&layout, args.reading.layer, &input, terminal)?,
     };
     terminal.clear();
     let mut text: Form = if args.json { json } else { drc::text };

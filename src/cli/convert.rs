@@ -7,7 +7,7 @@ use metalith::Result;
 use metalith::layout::{LayoutFormat, convert};
 
 use super::layout::FormatArg;
-use super::reading::ReadingArgs;
+use super::reading::FileArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
@@ -30,7 +30,7 @@ pub(crate) struct ConvertArgs {
     format: Option<FormatArg>,
 
     #[command(flatten)]
-    reading: ReadingArgs,
+    reading: FileArgs,
 }
 
 pub(crate) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<Outcome> {

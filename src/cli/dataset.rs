@@ -9,6 +9,7 @@ use metalith::study::{PairsRequest, is_planned, plan_pairs};
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
+use super::reading::ReadingArgs;
 use super::standard_input::{self, InputFile};
 use super::{Outcome, Terminal, print_line};
 
@@ -28,6 +29,9 @@ pub(crate) struct DatasetArgs {
     /// The pillar layout; `-` for standard input.
     #[arg(long)]
     layout: PathBuf,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
 
     #[command(flatten)]
     with: CameraArgs,
@@ -77,7 +81,12 @@ fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result
 
 pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let CameraFiles { design, camera, model } = args.with.read(terminal)?;
+    let CameraFiles {
+        mut design,
+        camera,
+        model,
+    } = args.with.read(terminal)?;
+    args.reading.aim(&mut design);
     let images = images_in(&args.images)?;
     if args.plan {
         return plan(args, images, terminal);
@@ -91,7 +100,7 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     check_images(&images, terminal)?;
     let read = |path: &Path| read_far_scene(path, args.with.field_deg);
-    let layout = InputFile::of(&args.layout)?;
+    let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
     let origin = DatasetOrigin::of(&design, &layout, &camera, args.with.model.as_deref())?;
     let system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
     let operator = system.simulation();

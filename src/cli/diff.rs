@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::Result;
 use metalith::diff::{self, DiffPlan};
-use metalith::gds::LayerNumber;
 
-use super::psf::layer;
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
@@ -22,10 +20,6 @@ pub(crate) struct DiffArgs {
 
     /// The second layout.
     b: PathBuf,
-
-    /// Layer of the pillars.
-    #[arg(long, value_name = "LAYER/DATATYPE", default_value = "1/0", value_parser = layer)]
-    layer: LayerNumber,
 
     #[command(flatten)]
     reading: ReadingArgs,
@@ -50,7 +44,7 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     let files = [InputFile::of(&args.a)?, InputFile::of(&args.b)?];
     let open = |path: &Path| args.reading.open(path, terminal);
     let plan = DiffPlan {
-        pillar_layer: args.layer,
+        pillar_layer: args.reading.pillar_layer(),
         listed: args.listed,
     };
     let found = diff::diff(&open(&files[0])?, &open(&files[1])?, &plan, terminal)?;

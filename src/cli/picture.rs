@@ -15,6 +15,7 @@ use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
 use super::paths::{apart, name_of};
+use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -28,6 +29,9 @@ use super::{Outcome, Terminal, print_json, print_line};
 pub(crate) struct PictureArgs {
     /// The pillar layout; `-` for standard input.
     layout: PathBuf,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
 
     /// The scene: an image file, `-` for standard input, or `chart`, `star`, `edge`.
     scene: String,
@@ -153,14 +157,19 @@ impl PictureArgs {
 pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let methods = RestorationMethod::of_names(&args.method)?;
-    let CameraFiles { design, camera, model } = args.with.read(terminal)?;
+    let CameraFiles {
+        mut design,
+        camera,
+        model,
+    } = args.with.read(terminal)?;
+    args.reading.aim(&mut design);
     let scene = args.scene()?;
     let outputs = args.outputs(&methods);
     let inputs = [&args.layout, &args.with.design, &args.with.camera].map(PathBuf::as_path);
     let others = [Path::new(&args.scene)].into_iter().chain(args.depth.as_deref());
     let written: Vec<&Path> = outputs.iter().map(PathBuf::as_path).collect();
     apart(inputs.into_iter().chain(others), &written)?;
-    let layout = InputFile::of(&args.layout)?;
+    let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
     let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {

@@ -7,6 +7,8 @@ use metalith::bench_plan::{BenchFile, MeasurementPlan};
 use metalith::{Result, plan_session};
 
 use super::out_folder::OutFolder;
+use super::reading::ReadingArgs;
+use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Plan a bench session: the fewest measurements that find every effect at a wanted size and distinguish it from the
@@ -27,6 +29,9 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "FILE")]
     layout: Option<PathBuf>,
 
+    #[command(flatten)]
+    reading: ReadingArgs,
+
     /// Folder of the session, created if it does not exist; `out/NAME_session` of the design if left out.
     #[arg(long, short, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -42,12 +47,24 @@ pub(crate) struct PlanArgs {
 
 pub(crate) fn run(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let design = standard_input::design(&args.design, terminal)?;
+    let mut design = standard_input::design(&args.design, terminal)?;
+    args.reading.aim(&mut design);
     let bench = BenchFile::read(&args.bench)?;
     let default = Path::new("out").join(format!("{}_session", design.name));
     let out = OutFolder::of(args.out.as_deref(), default, &args.design)?;
-    let layout = args.layout.as_deref();
-    let planned = plan_session(&design, &bench, layout, &out.path, args.effects.clone(), terminal)?;
+    let layout = args
+        .layout
+        .as_deref()
+        .map(|path| InputFile::of(path)?.below(&args.reading.file, terminal));
+    let layout = layout.transpose()?;
+    let planned = plan_session(
+        &design,
+        &bench,
+        layout.as_deref(),
+        &out.path,
+        args.effects.clone(),
+        terminal,
+    )?;
     out.note()?;
     terminal.clear();
     if args.json {

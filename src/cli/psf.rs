@@ -12,11 +12,13 @@ use metalith::design::CellFile;
 use metalith::gds::LayerNumber;
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
-    STREHL_AGAINST, SimulationCase, SinglePsfReport, focal_length_words, focus_words, plane_words, single_psfs,
-    single_white, write_single_psf_report,
+    LeftOut, STREHL_AGAINST, SimulationCase, SinglePsfReport, focal_length_words, focus_words, plane_words,
+    single_psfs, single_white, write_single_psf_report,
 };
 use metalith::wave::psf::FOCUS_PLANES;
-use metalith::{AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, PolarisationBasis, Result, extract};
+use metalith::{
+    AsBuiltChip, CalibratedModel, Error, Extraction, ExtractionPlan, PillarShape, PolarisationBasis, Result, extract,
+};
 
 use self::light::{PsfLight, USUAL_DISTANCE_UM};
 use super::reading::ReadingArgs;
@@ -27,17 +29,14 @@ use super::{Outcome, Terminal, print_line};
 /// Find the elements of any layout in GDSII or OASIS, read their pillars, and simulate their PSFs.
 #[derive(Args, Clone)]
 #[command(
-    after_help = "Example:\n  metalith psf lens.gds --layer 1/0 --distance-um 2400 --wavelength-nm 530 --out out/lens\n\n\
+    after_help = "Exit codes: 0 fine, 1 if 0.1 % of the shapes or more were not understood, 2 bad input.\n\
+    Example:\n  metalith psf lens.gds --layer 1/0 --distance-um 2400 --wavelength-nm 530 --out out/lens\n\n\
     Without --angle-x-deg and --angle-y-deg, incidence is normal. Without --at-x-um and --at-y-um, the axis of the element \
     is in the middle of the window. A steered element sends light of normal incidence far from its axis."
 )]
 pub(crate) struct PsfArgs {
     /// The layout, of any program; `-` for standard input.
     layout: PathBuf,
-
-    /// Layer and datatype of the pillars.
-    #[arg(long, default_value = "1/0", value_parser = layer)]
-    layer: LayerNumber,
 
     #[command(flatten)]
     reading: ReadingArgs,
@@ -231,19 +230,20 @@ fn between(low: f64, high: f64) -> impl Fn(&str) -> std::result::Result<f64, Str
 }
 
 /// A figure of a layout of which most was left out would be a figure of something else.
-fn mostly_pillars(args: &PsfArgs, found: &Extraction) -> Result<()> {
+fn mostly_pillars(args: &PsfArgs, found: &Extraction, left_out: Option<&LeftOut>) -> Result<()> {
     let others = found.oddities.total();
     if args.extract_only || others <= found.pillars {
         return Ok(());
     }
+    let reasons = left_out.map_or_else(String::new, |left_out| format!("; {}", left_out.words));
     Err(Error::refused(
         "psf/mostly-other-shapes",
         format!(
-            "{}: only {} of {} shapes on layer {} are {} on a lattice",
+            "{}: only {} of {} shapes on layer {} are {} on a lattice{reasons}",
             args.layout.display(),
             count(found.pillars),
             count(found.pillars + others),
-            args.layer,
+            args.reading.pillar_layer(),
             found.shape.plural()
         ),
         "name the layer of the pillars with --layer, or look at what else is there with --extract-only --json",
@@ -274,9 +274,14 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
             ));
         }
     }
-    if args.model.is_none()
+    let fidelity = match args.model {
+        Some(_) => Fidelity::Calibrated,
+        None => args.fidelity.into(),
+    };
+    let is_judged = args.model.is_none() || found.shape == PillarShape::Mixed;
+    if is_judged
         && !args.extract_only
-        && let Some((what, hint)) = Fidelity::from(args.fidelity).refusal(found.shape, PsfArgs::lattice_kind(found))
+        && let Some((what, hint)) = fidelity.refusal(found.shape, PsfArgs::lattice_kind(found))
     {
         return Err(Error::refused(
             "cell/fidelity-not-for-pillars",
@@ -339,9 +344,10 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     args.say_guesses(terminal);
     terminal.stop_on_interrupt();
     let layout = args.reading.open(&InputFile::of(&args.layout)?, terminal)?;
-    let plan = ExtractionPlan::discover(args.layer);
+    let plan = ExtractionPlan::discover(args.reading.pillar_layer());
     let found = extract(&layout, &plan, terminal)?;
-    mostly_pillars(args, &found)?;
+    let left_out = LeftOut::of(&found, args.reading.pillar_layer());
+    mostly_pillars(args, &found, left_out.as_ref())?;
     one_kind(args, &found)?;
     known_light(args, &found)?;
     let light = if args.extract_only {
@@ -382,12 +388,14 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             found: &found,
             psfs: &psfs,
             assumptions: &assumptions,
+            left_out: left_out.as_ref(),
             model: model.as_ref(),
             white: white.as_ref(),
         };
         write_single_psf_report(&report, folder)?;
     }
     terminal.clear();
+    let outcome = Outcome::of(left_out.as_ref().is_none_or(|left_out| !left_out.is_much));
     if args.json {
         let elements = found.elements.iter().map(|e| {
             serde_json::json!({
@@ -400,6 +408,8 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             })
         });
         let json = serde_json::json!({
+            "not_understood": left_out.as_ref().map(|left_out| &left_out.words),
+            "turned_deg": found.turned_deg,
             "pillars": found.pillars,
             "elements": elements.collect::<Vec<_>>(),
             "other_shapes": found.oddities,
@@ -410,7 +420,10 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             "white": white.as_ref().map(|w| &w.1),
         });
         print_line!("{json:#}");
-        return Ok(Outcome::Fine);
+        return Ok(outcome);
+    }
+    if let Some(left_out) = &left_out {
+        print_line!("{}", left_out.words);
     }
     for element in &found.elements {
         let (site, lattice) = (&element.site, element.site.lattice);
@@ -427,7 +440,11 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             },
         );
     }
-    print_line!("{} other shapes on layer {}", count(found.oddities.total()), args.layer);
+    print_line!(
+        "{} other shapes on layer {}",
+        count(found.oddities.total()),
+        args.reading.pillar_layer()
+    );
     for (what, value) in &assumptions {
         print_line!("{what}: {value}");
     }
@@ -478,5 +495,5 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     if let Some(folder) = &args.out {
         print_line!("report: {}", folder.join("report.html").display());
     }
-    Ok(Outcome::Fine)
+    Ok(outcome)
 }

@@ -3,14 +3,57 @@
 use std::path::Path;
 
 use clap::Args;
-use metalith::gds::ReadLimits;
-use metalith::{Layout, Progress, Result};
+use metalith::gds::{LayerNumber, ReadLimits};
+use metalith::{Design, Layout, Progress, Result};
 
 use super::Terminal;
+use super::psf::layer;
+
+/// Options of every command that reads pillars out of a layout of any program.
+#[derive(Args, Clone)]
+pub(crate) struct ReadingArgs {
+    /// Layer and datatype of the pillars; if left out, those of the design, the rules or the set, else 1/0.
+    #[arg(long, value_name = "LAYER/DATATYPE", value_parser = layer)]
+    pub(crate) layer: Option<LayerNumber>,
+
+    #[command(flatten)]
+    pub(crate) file: FileArgs,
+}
+
+impl ReadingArgs {
+    /// Layer of the pillars, where no other file says it.
+    pub(crate) fn pillar_layer(&self) -> LayerNumber {
+        self.layer.unwrap_or(LayerNumber::new(1, 0))
+    }
+
+    /// Look for the pillars of a design on the layer that is asked for.
+    pub(crate) fn aim(&self, design: &mut Design) {
+        if let Some(layer) = self.layer {
+            let pillars = &mut design.layout.layers.pillars;
+            (pillars.layer, pillars.datatype) = (layer.layer as i16, layer.datatype as i16);
+        }
+    }
+
+    /// Open a layout, below the cell to start from.
+    ///
+    /// # Errors
+    /// As [`FileArgs::open`].
+    pub(crate) fn open(&self, path: &Path, terminal: &Terminal) -> Result<Layout> {
+        self.file.open(path, terminal)
+    }
+
+    /// Variant of [`Self::open`] for an inventory.
+    ///
+    /// # Errors
+    /// As [`FileArgs::open`].
+    pub(crate) fn open_counted(&self, path: &Path, terminal: &Terminal) -> Result<Layout> {
+        self.file.open_counted(path, terminal)
+    }
+}
 
 /// Options of every command that reads a layout of any program.
 #[derive(Args, Clone)]
-pub(crate) struct ReadingArgs {
+pub(crate) struct FileArgs {
     /// Cell to start from; the top cell if there is only one.
     #[arg(long, value_name = "CELL")]
     pub(crate) top: Option<String>,
@@ -24,7 +67,7 @@ pub(crate) struct ReadingArgs {
 /// A way to open a layout.
 type Open = fn(&Path, ReadLimits, &dyn Progress) -> metalith::gds::Result<Layout>;
 
-impl ReadingArgs {
+impl FileArgs {
     /// Read from here on as asked.
     pub(crate) fn apply(&self, terminal: &Terminal) {
         terminal.set_strict(self.strict);

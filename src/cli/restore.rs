@@ -14,6 +14,7 @@ use ndarray::Array3;
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
 use super::paths::{apart, name_of};
+use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -27,6 +28,9 @@ use super::{Outcome, Terminal, print_json, print_line};
 pub(crate) struct RestoreArgs {
     /// The pillar layout; `-` for standard input.
     layout: PathBuf,
+
+    #[command(flatten)]
+    reading: ReadingArgs,
 
     /// The frame: a grey PNG of 8 or 16 bits.
     frame: PathBuf,
@@ -76,7 +80,12 @@ pub(crate) struct RestoreArgs {
 pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let wanted = pictures(&args.method, args.separate)?;
-    let CameraFiles { design, camera, model } = args.with.read(terminal)?;
+    let CameraFiles {
+        mut design,
+        camera,
+        model,
+    } = args.with.read(terminal)?;
+    args.reading.aim(&mut design);
     let distance_um = distance_um(args.distance_mm)?;
     let side = usize::from(args.pixels);
     // Nothing is known of it but its size and its field.
@@ -100,7 +109,7 @@ pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
         white: args.white,
     };
     let signals = read_signals(&args.frame, &camera, numbers)?;
-    let layout = InputFile::of(&args.layout)?;
+    let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
     let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {

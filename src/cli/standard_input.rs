@@ -11,7 +11,7 @@ use metalith::{Design, Error, Result};
 use tempfile::TempDir;
 
 use super::Terminal;
-use super::reading::ReadingArgs;
+use super::reading::FileArgs;
 
 /// Name of standard input in messages.
 const NAME: &str = "standard input";
@@ -86,7 +86,7 @@ impl InputFile {
     ///
     /// # Errors
     /// If it cannot be read or has no such cell, or there is no room for the copy.
-    pub(crate) fn below(self, reading: &ReadingArgs, terminal: &Terminal) -> Result<Self> {
+    pub(crate) fn below(self, reading: &FileArgs, terminal: &Terminal) -> Result<Self> {
         if reading.top.is_none() {
             reading.apply(terminal);
             return Ok(self);

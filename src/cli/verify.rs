@@ -317,8 +317,9 @@ fn print_failed(found: &Verification) {
 
 pub(crate) fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design, terminal)?;
+    args.reading.aim(&mut design);
     terminal.warnings(&design.warnings()?);
-    let layout = InputFile::of(&args.layout)?.below(&args.reading, terminal)?;
+    let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
     judged_as_made(
         "--compensated",
         args.compensated.model.as_deref(),

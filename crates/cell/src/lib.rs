@@ -34,7 +34,8 @@ pub use fit::{
 pub use illumination::{Illumination, Incidence, Spectral};
 pub use library::{LibraryErrors, LibraryPillar, PillarLibrary};
 pub use local_periodic::{
-    BAND_ORDERS, CellTable, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, Origin, PointwiseCell, RigorousCell, TableSpec,
+    BAND_ORDERS, CellTable, MixedCell, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, Origin, PointwiseCell,
+    RigorousCell, TableSpec,
 };
 pub use mapped_cell::{MappedCell, MappedDifference, MappedValue};
 pub use mapping_table::{AVOIDED_BELOW, MappingTable, RampOrders, SolvedMapping, simplex};

@@ -45,7 +45,12 @@ impl Fidelity {
     pub fn refusal(self, shape: PillarShape, lattice: LatticeKind) -> Option<(String, &'static str)> {
         let square_lattices_alone = matches!(self, Self::Published | Self::Neighbours);
         let for_rectangles = matches!(self, Self::Rigorous | Self::Calibrated);
-        if shape.basis().is_some() && !for_rectangles {
+        if shape == PillarShape::Mixed && self != Self::Rigorous {
+            Some((
+                format!("squares and circles in one lens by the `{self}` cell"),
+                "ask for `rigorous`: no other is made for both in one lens",
+            ))
+        } else if shape.basis().is_some() && !for_rectangles {
             Some((
                 format!("rectangular pillars by the `{self}` cell"),
                 "ask for `rigorous`, as `fidelity` in [verify] of a design or with --fidelity: no other is made for rectangles",

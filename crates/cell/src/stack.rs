@@ -107,7 +107,10 @@ impl CellStack {
         if !self.shape.has_width() {
             return Err(Error::refused(
                 "cell/rectangles-unsupported",
-                "the pillars are rectangles, and a pillar with one width is needed here",
+                format!(
+                    "the pillars are {}, and a pillar with one width is needed here",
+                    self.shape.plural()
+                ),
                 "use squares or circles here: calibration knows no rectangles, `optimise` no upright ones; the other commands do",
             ));
         }
@@ -160,7 +163,7 @@ impl CellStack {
             _ if width_nm <= 0.0 => Outline::empty(),
             OutlineForm::Square => Outline::rounded(width_nm, self.corner_radius_nm),
             OutlineForm::Circle => Outline::circle(width_nm),
-            OutlineForm::Polygon => Outline::empty(),
+            OutlineForm::Polygon | OutlineForm::Mixed => Outline::empty(),
         }
     }
 

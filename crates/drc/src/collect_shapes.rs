@@ -47,7 +47,8 @@ pub(super) fn gather<'a>(
         lenient: true,
         ..Selection::default()
     };
-    let (Discovered { sites, shape }, no_elements) = sites(layout, deck, input, allowance, &selection, progress)?;
+    let (Discovered { sites, shape, fits, .. }, no_elements) =
+        sites(layout, deck, input, allowance, &selection, progress)?;
     let unit_nm = layout.unit_nm();
     let (pillars, doses) = pillar_layers(deck);
     let rules: Vec<(&DeckRule, &mut Findings)> = deck
@@ -64,10 +65,11 @@ pub(super) fn gather<'a>(
         sound_boxes: Default::default(),
         sound_rings: HashSet::default(),
         relative: Vec::new(),
+        pillars_on: deck.pillars_on,
         doses,
         unit_nm,
         passes: pass_table(pillars, unit_nm, &rules),
-        filler: Filler::new(sites, Scale::of(layout)?),
+        filler: Filler::new(sites, Scale::of(layout)?).fitted(&fits),
         loose: BTreeMap::new(),
         vertices: 0,
         rects: 0,
@@ -149,6 +151,8 @@ struct Gather<'r, 'p> {
     /// Sound outlines with more corners, from the middle of the box around them.
     sound_rings: HashSet<Box<[Point]>, RandomState>,
     relative: Vec<Point>,
+    /// Layer that counts as that one, and that one as it, if it is not as the deck says.
+    pillars_on: Option<LayerNumber>,
     /// Further layers whose shapes count as if they were on that one.
     doses: &'r [LayerNumber],
     unit_nm: f64,
@@ -174,6 +178,13 @@ impl Gather<'_, '_> {
     /// The layer that rules see for a shape.
     #[inline]
     fn known_as(&self, layer: LayerNumber) -> LayerNumber {
+        if let Some(on) = self.pillars_on {
+            return match layer {
+                _ if layer == on => self.pillars,
+                _ if layer == self.pillars => on,
+                other => other,
+            };
+        }
         if self.doses.contains(&layer) {
             self.pillars
         } else {

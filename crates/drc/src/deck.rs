@@ -34,6 +34,8 @@ pub struct Deck {
     pub name: String,
     /// Layers that the pillars are on: one, or several where the datatype is a dose. They count as one.
     pub pillars: Vec<LayerNumber>,
+    /// The layer of the layout that counts as the first of these, in place of them; none if they are as the deck says.
+    pub(super) pillars_on: Option<LayerNumber>,
     path: PathBuf,
     text: String,
     /// Rules in the order of the file; shared by all clones.
@@ -157,6 +159,15 @@ impl Deck {
         Self::read_text(&self.path, self.text, &known).expect("it was read before")
     }
 
+    /// This deck for a layout whose pillars are on another layer than it says.
+    #[must_use]
+    pub fn with_pillars_on(self, layer: LayerNumber) -> Self {
+        Self {
+            pillars_on: Some(layer),
+            ..self
+        }
+    }
+
     /// The deck of the program whose file has the name at the end of `path`, if there is one.
     pub fn shipped(path: &Path) -> Option<Self> {
         let file = SHIPPED.get_file(path.file_name()?)?;
@@ -189,6 +200,7 @@ impl Deck {
         Ok(Self {
             name: contents.name,
             pillars: contents.pillars,
+            pillars_on: None,
             path: path.to_owned(),
             text,
             rules: contents.rules.into(),

@@ -27,13 +27,17 @@ pub(super) fn sites(
         let designed = Discovered {
             sites: design.sites(),
             shape: design.cell.shape,
+            fits: Vec::new(),
+            turn: None,
         };
         return Ok((designed, String::new()));
     }
+    let asked = deck.pillars_on.map(|layer| vec![layer]);
+    let layers = asked.as_deref().unwrap_or(&deck.pillars);
     // The pillars may be in a companion, where the apertures are what is checked.
     let mut why = String::new();
     for file in std::iter::once(&layout).chain(&input.with) {
-        match discover(file, selection, &deck.pillars, Scale::of(file)?, progress).map_err(Error::from) {
+        match discover(file, selection, layers, Scale::of(file)?, progress).map_err(Error::from) {
             Ok(mut found) => {
                 ElementSite::widen(&mut found.sites);
                 let total: u64 = found.sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
@@ -49,6 +53,8 @@ pub(super) fn sites(
     let nothing = Discovered {
         sites: Vec::new(),
         shape: PillarShape::default(),
+        fits: Vec::new(),
+        turn: None,
     };
     Ok((nothing, why))
 }

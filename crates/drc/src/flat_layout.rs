@@ -101,10 +101,11 @@ impl FlatLayout<'_> {
     /// The pillar at a site, in database units.
     pub(crate) fn body(&self, element: usize, row: usize, column: usize) -> Body<'static> {
         let around = self.pillar(element, row, column);
-        match self.shape.outline() {
+        let number = self.elements[element].widths.number(column, row);
+        match self.shape.of_pillar(PillarId(number)).0.outline() {
             OutlineForm::Square => Body::Rect(around),
             OutlineForm::Circle => Body::Disc(around),
-            OutlineForm::Polygon => {
+            OutlineForm::Polygon | OutlineForm::Mixed => {
                 let (e, unit) = (&self.elements[element], |nm: f64| self.units(nm).round() as i64);
                 let x = e.site.centre_nm[0] as f64 + e.site.lattice.drawn_nm(0, column);
                 let y = e.site.centre_nm[1] as f64 + e.site.lattice.drawn_nm(1, row);

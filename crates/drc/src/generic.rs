@@ -30,18 +30,30 @@ fn deck_of(name: &str, layout: &Layout) -> Deck {
     }
 }
 
-/// Check a layout without a design against the deck of the shape of its pillars.
+/// Check a layout without a design against the deck of the shape of its pillars, on `layer` if the deck's is not meant.
 ///
 /// # Errors
 /// As [`super::check`].
-pub fn check_generic(layout: &Layout, input: &CheckInput<'_>, progress: &dyn Progress) -> Result<DrcReport> {
-    let name = plural(layout, Deck::named("squares").pillars[0]);
-    let deck = deck_of(name, layout);
+pub fn check_generic(
+    layout: &Layout,
+    layer: Option<LayerNumber>,
+    input: &CheckInput<'_>,
+    progress: &dyn Progress,
+) -> Result<DrcReport> {
+    let deck_of = |name: &str| {
+        let deck = deck_of(name, layout);
+        match layer {
+            Some(layer) => deck.with_pillars_on(layer),
+            None => deck,
+        }
+    };
+    let name = plural(layout, layer.unwrap_or(Deck::named("squares").pillars[0]));
+    let deck = deck_of(name);
     let report = super::check(layout, &deck, input, progress)?;
     // Pillars may be told apart from other shapes by their lattice alone.
     if report.elements == 0 || report.shape.plural() == name {
         return Ok(report);
     }
-    let deck = deck_of(report.shape.plural(), layout);
+    let deck = deck_of(report.shape.plural());
     super::check(layout, &deck, input, progress)
 }

@@ -236,8 +236,12 @@ impl Limit {
 pub enum ExtractionError {
     #[error("{elements} elements with {sites} lattice sites together")]
     Sites { elements: usize, sites: u64, most: u64 },
-    #[error("no element found on layer {layers}")]
-    NoElements { layers: String },
+    #[error("no element found on layer {layers}{}", contents.as_ref().map_or_else(String::new, |held| format!("; the layout holds {held}")))]
+    NoElements {
+        layers: String,
+        /// What other layers hold, if that was looked for.
+        contents: Option<String>,
+    },
     #[error("{groups} separate groups of shapes on layer {layers}")]
     Groups { groups: usize, layers: String, most: usize },
     #[error("small shapes are spread over more than {most} places of 8 um")]

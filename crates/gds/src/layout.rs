@@ -72,17 +72,20 @@ impl Layout {
     /// # Errors
     /// As [`Layout::open`].
     pub fn open_with(path: &Path, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
-        let mut layout = Self::of(Source::file(path)?, limits, progress)?;
-        if let Some(Faulty { cell, name, offset }) = layout.dangling().into_iter().next().filter(|_| !progress.strict())
-        {
+        Ok(Self::of(Source::file(path)?, limits, progress)?.without_missing_cells(path, progress))
+    }
+
+    /// This layout, in which cells that are not in the file count as empty, with a warning, unless `progress` is strict.
+    fn without_missing_cells(mut self, path: &Path, progress: &dyn Progress) -> Self {
+        if let Some(Faulty { cell, name, offset }) = self.dangling().into_iter().next().filter(|_| !progress.strict()) {
             let cause = LayoutError::Dangling { cell, name };
             progress.warn(&format!(
                 "warning[layout/odd]: {}, byte {offset}: {cause}; such cells were taken as empty",
                 path.display()
             ));
-            layout.missing_are_empty = true;
+            self.missing_are_empty = true;
         }
-        Ok(layout)
+        self
     }
 
     /// A layout from bytes in memory; `name` stands for the path in messages.
@@ -126,7 +129,8 @@ impl Layout {
     /// # Errors
     /// As [`Layout::open`].
     pub fn open_counted(path: &Path, limits: ReadLimits, progress: &dyn Progress) -> Result<Self> {
-        Self::scanned(Source::file(path)?, limits, Some(Counter::new()), progress)
+        let layout = Self::scanned(Source::file(path)?, limits, Some(Counter::new()), progress)?;
+        Ok(layout.without_missing_cells(path, progress))
     }
 
     pub(super) fn from_scan(source: Source, limits: ReadLimits, mut scan: Scan) -> Self {

@@ -48,7 +48,7 @@ pub use pillar::{DrawnPillar, PillarFinder, drawn_corners, pillar_of};
 pub use placements::MissingCell;
 pub use read_warnings::{ReadWarning, ReadWarnings};
 pub use rectangle::{TiltedRectangle, tilted_rectangle_of};
-pub use shape::{Outline, Point, Rect, Shape, ShapeKind, Text};
+pub use shape::{CORNER_STEPS, Outline, Point, Rect, Shape, ShapeKind, Text};
 pub use shape::{rectangle_of, simplified};
 pub use transform::Transform;
 pub use visit::{Selection, Visitor};

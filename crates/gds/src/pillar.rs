@@ -3,9 +3,12 @@
 use super::circle::circle_of;
 use super::outline_memo::{BoxMemo, OutlineMemo};
 use super::rectangle::tilted_rectangle_of;
-use super::shape::{Outline, Point, Rect, Shape, rectangle_of, simplified};
+use super::shape::{CORNER_STEPS, Outline, Point, Rect, Shape, grid_step, rectangle_of, simplified};
 use super::transform::Transform;
-use metalith_pillars::{OutlineForm, PillarId, PillarShape};
+use metalith_pillars::{OutlineForm, PillarId, PillarShape, SquaresAndCircles};
+
+/// Points of a closed outline of four corners.
+const CLOSED: usize = 5;
 
 /// An outline that may be a pillar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +32,11 @@ pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<D
     match shape.outline() {
         OutlineForm::Square => rectangle_of(&simplified(points)).map(of_width),
         OutlineForm::Circle => circle_of(points, unit_nm).map(of_width),
+        OutlineForm::Mixed => {
+            let square = rectangle_of(&simplified(points)).map(|around| (false, around));
+            let (is_circle, around) = square.or_else(|| Some((true, circle_of(points, unit_nm)?)))?;
+            either(around, is_circle, unit_nm)
+        }
         OutlineForm::Polygon => {
             let tilted = tilted_rectangle_of(points, unit_nm)?;
             let number = tilted.number(shape, unit_nm)?;
@@ -39,6 +47,21 @@ pub fn pillar_of(points: &[Point], shape: PillarShape, unit_nm: f64) -> Option<D
             })
         }
     }
+}
+
+/// The square or circle in a box, its width to a whole nanometre; a database unit is so long (nm).
+fn either(around: Rect, is_circle: bool, unit_nm: f64) -> Option<DrawnPillar> {
+    let [width_nm, height_nm] = [around.width(), around.height()].map(|edge| edge as f64 * unit_nm);
+    let step_nm = CORNER_STEPS * 2.0 * grid_step(unit_nm) * unit_nm;
+    let mean_nm = 0.5 * (width_nm + height_nm);
+    let is_alike = (width_nm - height_nm).abs() <= step_nm && mean_nm <= f64::from(u16::MAX);
+    let PillarId(number) =
+        is_alike.then(|| SquaresAndCircles::number(is_circle, mean_nm.round_ties_even() as u16))??;
+    Some(DrawnPillar {
+        around,
+        number: Some(number),
+        exact: false,
+    })
 }
 
 /// Corners of a pillar without curves about its middle, each on the nearest place of the grid, not closed; a database unit is so
@@ -92,6 +115,14 @@ impl PillarFinder {
                 let (shape, unit_nm) = (self.shape, self.unit_nm);
                 let told = self.boxes.of(&around, || pillar_of(&around.outline(), shape, unit_nm));
                 told.map(|pillar| DrawnPillar { around, ..pillar })
+            }
+            // What they are was seen when they were read.
+            _ if self.shape == PillarShape::Mixed && placement.is_square() && shape.outline.len() >= CLOSED => {
+                let is_circle = shape.circle.is_some();
+                match shape.circle.or(shape.rect) {
+                    Some(rect) => either(placement.apply_rect(&rect)?, is_circle, self.unit_nm),
+                    None => self.drawn(shape.outline, placement),
+                }
             }
             _ => self.drawn(shape.outline, placement),
         }

@@ -4,13 +4,23 @@ use super::transform::{Transform, turned};
 use metalith_core::LayerNumber;
 use metalith_pillars::{OutlineForm, PillarShape};
 
-/// Tolerance of the place of a corner of a circle or a rectangle, in database units or in nanometres, whichever is
-/// more: corners are rounded to one of these grids, twice where a cell is placed at an angle.
-const ROUNDED: f64 = 1.5;
+/// Tolerance of recognition: largest distance along an axis of a corner from where the outline that it stands for has it, in steps
+/// of the grid. Rounding to the grid moves a corner no farther. Two corners make an edge: one of a step more or less is the same.
+pub const CORNER_STEPS: f64 = 0.5;
+
+/// Tolerance of the place of a corner of a circle or a rectangle, in steps of the grid: [`CORNER_STEPS`] along both axes, twice
+/// where a cell is placed at an angle, and what the middle of all corners is moved by.
+const ROUNDED: f64 = 3.0 * CORNER_STEPS;
+
+/// Step of the grid that corners may be rounded to, in database units, of which one is so long (nm): the unit or a nanometre,
+/// whichever is more.
+pub(super) fn grid_step(unit_nm: f64) -> f64 {
+    (1.0 / unit_nm).max(1.0)
+}
 
 /// Tolerance of the place of a corner in database units, of which one is so long (nm).
 pub(super) fn rounding(unit_nm: f64) -> f64 {
-    ROUNDED * (1.0 / unit_nm).max(1.0)
+    ROUNDED * grid_step(unit_nm)
 }
 
 /// A place in database units.
@@ -220,7 +230,7 @@ impl Shape<'_> {
         match shape.outline() {
             OutlineForm::Square => self.rect.as_ref(),
             OutlineForm::Circle => self.circle.as_ref(),
-            OutlineForm::Polygon => None,
+            OutlineForm::Polygon | OutlineForm::Mixed => None,
         }
     }
 }

@@ -102,6 +102,16 @@ impl Transform {
         }
     }
 
+    /// Twice the place of a point of which twice the coordinates are given.
+    pub(super) fn twice(&self, p: Point) -> [i64; 2] {
+        let (m, dx, dy) = self.matrix();
+        let (x, y) = (p.x as f64, p.y as f64);
+        [
+            held(m[0] * x + m[1] * y + 2.0 * dx),
+            held(m[2] * x + m[3] * y + 2.0 * dy),
+        ]
+    }
+
     /// Place of a rectangle of the cell, if it is still an upright one whatever its size.
     #[inline]
     pub fn apply_rect(&self, r: &Rect) -> Option<Rect> {
@@ -180,11 +190,43 @@ impl Transform {
         matches!(self, Self::Square { .. })
     }
 
+    /// True if upright rectangles stay upright, whatever their size.
+    #[inline]
+    pub(super) fn keeps_upright(&self) -> bool {
+        match self {
+            Self::Square { .. } => true,
+            Self::General { matrix: m, .. } => m[0] == 0.0 || m[1] == 0.0,
+        }
+    }
+
     /// True if a counter-clockwise outline becomes a clockwise one.
     pub fn mirrors(&self) -> bool {
         match self {
             Self::Square { orientation, .. } => orientation & 4 != 0,
             Self::General { matrix: m, .. } => m[0] * m[3] - m[1] * m[2] < 0.0,
+        }
+    }
+
+    /// This transform as exact quarter turns and a shift by whole units, if its angle and magnification are nearly that.
+    pub(super) fn squared(self) -> Self {
+        /// Products of cosines are off by less.
+        const NEARLY: f64 = 1e-9;
+        let Self::General { matrix: m, dx, dy } = self else {
+            return self;
+        };
+        let is_near = |orientation: &u8| {
+            let (xx, xy) = turn(*orientation, 1, 0);
+            let (yx, yy) = turn(*orientation, 0, 1);
+            let exact = [xx, yx, xy, yy].map(|v| v as f64);
+            m.iter().zip(exact).all(|(a, b)| (a - b).abs() <= NEARLY)
+        };
+        match (0..8).find(is_near) {
+            Some(orientation) => Self::Square {
+                orientation,
+                dx: held(dx),
+                dy: held(dy),
+            },
+            None => self,
         }
     }
 

@@ -93,7 +93,7 @@ impl KindWords {
     /// Words and columns of pillars of this kind.
     pub(crate) fn of(shape: PillarShape) -> &'static Self {
         match shape {
-            PillarShape::Square => &SQUARES,
+            PillarShape::Square | PillarShape::Mixed => &SQUARES,
             PillarShape::Circle => &CIRCLES,
             PillarShape::Rectangle(Rectangles::Rotated(_)) => &ROTATED,
             PillarShape::Rectangle(Rectangles::Upright(_)) => &UPRIGHT,

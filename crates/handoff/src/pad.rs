@@ -196,7 +196,7 @@ pub(super) fn standing_for_all(design: &Design, rotations_deg: &[f64]) -> Option
             Some(rotations_deg.iter().map(number).collect())
         }
         PillarShape::Rectangle(Rectangles::Upright(pillars)) => Some(upright_sizes(design, pillars)),
-        PillarShape::Square | PillarShape::Circle => None,
+        PillarShape::Square | PillarShape::Circle | PillarShape::Mixed => None,
     }
 }
 

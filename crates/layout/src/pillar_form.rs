@@ -75,7 +75,7 @@ impl PillarForm {
                 let h = self.edge(number) / 2;
                 vec![(-h, -h), (h, -h), (h, h), (-h, h)]
             }
-            OutlineForm::Polygon => {
+            OutlineForm::Polygon | OutlineForm::Mixed => {
                 let corners = self.shape.corners(PillarId(number), self.chord_error_nm);
                 corners.into_iter().map(|(x, y)| (x * per_nm, y * per_nm)).collect()
             }
@@ -85,7 +85,7 @@ impl PillarForm {
     /// Reach of a pillar from its middle along x and y (database units).
     pub fn reach(&self, number: u16) -> (i64, i64) {
         match self.shape.outline() {
-            OutlineForm::Polygon => {
+            OutlineForm::Polygon | OutlineForm::Mixed => {
                 let (x, y) = self.shape.reach(PillarId(number));
                 (self.unit.units(x), self.unit.units(y))
             }

@@ -57,8 +57,7 @@ impl ElementSite {
                 ([self.lattice.place_nm(0, ix), self.lattice.place_nm(1, iy)], 1)
             }
         };
-        let unit = self.lattice.unit();
-        let covering = Lattice::covering_on_grid(self.lattice.kind(), diameter_nm, pitch, unit).ok()?;
+        let covering = self.lattice.covering_disc(diameter_nm).ok()?;
         // A lattice whose centre is beside that of the disc reaches a pitch farther.
         let beside = if centre == off { 0 } else { 2 };
         let sites = covering.sites() + (covering.sites() + sites) % 2 + beside;

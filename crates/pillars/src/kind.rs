@@ -31,6 +31,8 @@ pub enum OutlineForm {
     Circle,
     /// A polygon without curves, recognised by its corners where it is placed.
     Polygon,
+    /// A square or a circle, as the number of the pillar says.
+    Mixed,
 }
 
 /// Polarisations that pillars give a separate phase.

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::circle::Circle;
 use crate::kind::{OutlineForm, PillarId, PillarKind, PolarisationBasis, Quantity};
+use crate::mixed::SquaresAndCircles;
 use crate::rectangle::{Rectangles, RotatedRectangles, UprightRectangles};
 use crate::square::Square;
 
@@ -20,6 +21,8 @@ pub enum PillarShape {
     Circle,
     /// A rectangle; its number stands for its rotation or for its size: see [`Rectangles`].
     Rectangle(Rectangles),
+    /// Squares and circles in one lens: see [`SquaresAndCircles`]. No design has them.
+    Mixed,
 }
 
 /// Methods that ask the kind, each by one match, so that calls in loops can be inlined.
@@ -31,6 +34,7 @@ macro_rules! of_kind {
             match self {
                 Self::Square => Square.$name($($argument),*),
                 Self::Circle => Circle.$name($($argument),*),
+                Self::Mixed => SquaresAndCircles.$name($($argument),*),
                 Self::Rectangle(Rectangles::Rotated(kind)) => PillarKind::$name(&kind, $($argument),*),
                 Self::Rectangle(Rectangles::Upright(kind)) => PillarKind::$name(&kind, $($argument),*),
             }
@@ -80,6 +84,15 @@ impl PillarShape {
         *self == Self::Square
     }
 
+    /// The shape of one pillar and its number among pillars of that shape alone.
+    pub fn of_pillar(self, id: PillarId) -> (Self, PillarId) {
+        match (self, SquaresAndCircles::width(id)) {
+            (Self::Mixed, (true, width)) => (Self::Circle, width),
+            (Self::Mixed, (false, width)) => (Self::Square, width),
+            _ => (self, id),
+        }
+    }
+
     /// The rectangles, if they are those that differ by their rotation.
     pub fn rotated(self) -> Option<RotatedRectangles> {
         match self {
@@ -108,6 +121,7 @@ impl fmt::Display for PillarShape {
         f.write_str(match self {
             Self::Square => Square.name(),
             Self::Circle => Circle.name(),
+            Self::Mixed => SquaresAndCircles.name(),
             Self::Rectangle(Rectangles::Rotated(kind)) => kind.name(),
             Self::Rectangle(Rectangles::Upright(kind)) => kind.name(),
         })

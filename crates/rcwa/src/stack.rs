@@ -1,6 +1,6 @@
 //! Input of the solver: layers on a lattice, in optical constants.
 
-use metalith_pillars::{DatabaseUnit, LatticeKind, Pitch};
+use metalith_pillars::{DatabaseUnit, Lattice, LatticeKind, Pitch};
 use num_complex::Complex64;
 use serde::Serialize;
 
@@ -37,6 +37,16 @@ impl CellLattice {
             LatticeKind::Square => Self::Square,
             LatticeKind::Hexagonal => Self::Staggered {
                 row_nm: kind.row_nm(pitch, unit),
+            },
+        }
+    }
+
+    /// The lattice that pillars of a file stand on.
+    pub fn of(lattice: &Lattice) -> Self {
+        match lattice.kind() {
+            LatticeKind::Square => Self::Square,
+            LatticeKind::Hexagonal => Self::Staggered {
+                row_nm: lattice.row_nm(),
             },
         }
     }

@@ -64,16 +64,17 @@ impl PillarZoom {
     /// The outlines of all pillars as one path.
     fn outlines(&self) -> String {
         let outline = |([cx, cy], number): &([i64; 2], u16)| {
-            let width = i64::from(*number);
+            let (shape, PillarId(number)) = self.shape.of_pillar(PillarId(*number));
+            let width = i64::from(number);
             let (x, y) = (cx - width / 2, cy - width / 2);
-            match self.shape.outline() {
+            match shape.outline() {
                 OutlineForm::Square => format!("M{x} {y}h{width}v{width}h-{width}z"),
                 OutlineForm::Circle => {
                     let (radius, middle) = (width as f64 / 2.0, y as f64 + width as f64 / 2.0);
                     format!("M{x} {middle}a{radius} {radius} 0 1 0 {width} 0a{radius} {radius} 0 1 0 -{width} 0z")
                 }
-                OutlineForm::Polygon => {
-                    let corners = self.shape.corners(PillarId(*number), 0.0).into_iter();
+                OutlineForm::Polygon | OutlineForm::Mixed => {
+                    let corners = shape.corners(PillarId(number), 0.0).into_iter();
                     let corners = corners.map(|(x, y)| format!("{} {}", cx + x, cy - y));
                     format!("M{}z", corners.collect::<Vec<_>>().join("L"))
                 }

@@ -74,7 +74,7 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             match design.cell.shape.outline() {
                 _ if of_paper => "0.004 rms in |t|, 0.03 beside resonances".into(),
                 OutlineForm::Circle => "0.004 rms in t, 0.01 beside resonances".into(),
-                OutlineForm::Square | OutlineForm::Polygon => {
+                OutlineForm::Square | OutlineForm::Polygon | OutlineForm::Mixed => {
                     "not known for this cell; more where the index is higher".into()
                 }
             },

@@ -9,6 +9,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::left_out::LeftOut;
 use super::lens_figures::{focus_cells, focus_columns};
 use super::polychromatic::CameraStatement;
 use super::single_memory::FocusRequest;
@@ -89,8 +90,7 @@ pub fn single_psfs(
         }
     }
     light.check_held(&elements, &light.wavelengths_um, 1)?;
-    // Strehl is against the sites as drawn, whatever they transmit.
-    let open = all_open(&elements);
+    let apertures: Vec<PillarMap> = elements.iter().map(|(_, widths)| whole_aperture(widths)).collect();
     progress.begin(
         "simulating elements",
         (elements.len() * light.wavelengths_um.len()) as u64,
@@ -105,14 +105,13 @@ pub fn single_psfs(
         let fields = fields.collect::<Result<Vec<_>>>()?;
         let full = case.full_transmission(wavelength_um)?;
         let focus = [light.at_um[0], light.at_um[1], light.distance_um];
-        let psfs = fields
-            .par_iter()
-            .zip(&elements)
-            .map_init(Scratch::default, |scratch, (fields, (site, widths))| {
+        let psfs = fields.par_iter().zip(elements.par_iter().zip(&apertures)).map_init(
+            Scratch::default,
+            |scratch, (fields, ((site, widths), aperture))| {
                 progress.check_stopped()?;
                 let window = light.window(light.at_um, widths, wavelength_um);
                 let psf = fields.psf(window, light.accuracy, &light.reported_lp_mm(), scratch)?;
-                let matched = IdealPsf::of(&Pillars::new(*widths, &open)?, focus, wavelength_um, full);
+                let matched = IdealPsf::of(&Pillars::new(aperture, &OPEN)?, focus, wavelength_um, full);
                 let through = |request: &FocusRequest| -> Result<ThroughFocus> {
                     let planes = request.planes(wavelength_um, widths.circle_um(), light.distance_um);
                     let distances_um = planes.distances_um(light.distance_um);
@@ -132,7 +131,8 @@ pub fn single_psfs(
                     metrics: psf.metrics(&matched, light.pixel_um),
                     psf,
                 })
-            });
+            },
+        );
         all.extend(psfs.collect::<Result<Vec<_>>>()?);
     }
     Ok(all)
@@ -143,9 +143,27 @@ pub(super) fn kind_of(elements: &[(&ElementSite, &PillarMap)]) -> LatticeKind {
     elements.first().map_or(LatticeKind::Square, |(_, w)| w.lattice.kind())
 }
 
-/// Transmissions of 1 for all pillars of some elements.
-pub(super) fn all_open(elements: &[(&ElementSite, &PillarMap)]) -> Vec<Complex64> {
-    vec![Complex64::ONE; usize::from(largest_number(elements)) + 1]
+/// Transmissions of the sites of [`whole_aperture`].
+pub(super) const OPEN: [Complex64; 2] = [Complex64::ZERO, Complex64::ONE];
+
+/// Sites that an ideal lens in the place of an element fills (1): those with a pillar, whatever it transmits, and holes, which have
+/// pillars before and behind them in their row and in their column. A disc without holes is its own pillars.
+pub(super) fn whole_aperture(widths: &PillarMap) -> PillarMap {
+    let (lattice, n) = (widths.lattice, widths.lattice.sites());
+    let none = (n, 0);
+    let (mut rows, mut columns) = (vec![none; n], vec![none; n]);
+    let widen = |ends: &mut (usize, usize), k: usize| *ends = (ends.0.min(k), ends.1.max(k));
+    for ((iy, ix), _) in widths.number.indexed_iter().filter(|(_, number)| **number > 0) {
+        widen(&mut rows[iy], ix);
+        widen(&mut columns[ix], iy);
+    }
+    let within = |(first, last): (usize, usize), k: usize| (first..=last).contains(&k);
+    let mut whole = PillarMap::empty(lattice);
+    for ((iy, ix), number) in whole.number.indexed_iter_mut() {
+        let is_inside = within(rows[iy], ix) && within(columns[ix], iy) && lattice.has(ix, iy);
+        *number = u16::from(is_inside);
+    }
+    whole
 }
 
 pub(super) fn largest_number(elements: &[(&ElementSite, &PillarMap)]) -> u16 {
@@ -206,6 +224,8 @@ pub struct SinglePsfReport<'a> {
     /// Name of the layout file.
     pub file: &'a str,
     pub found: &'a Extraction,
+    /// Shapes of elements that are no pillars, if there are any.
+    pub left_out: Option<&'a LeftOut>,
     pub psfs: &'a [SinglePsf],
     /// Assumptions that no layout states, each with its value.
     pub assumptions: &'a [(&'static str, String)],
@@ -216,8 +236,8 @@ pub struct SinglePsfReport<'a> {
 }
 
 /// Reference of Strehl ratios of a layout without a design, in words for people.
-pub const STREHL_AGAINST: &str = "Strehl ratios are against the sites that hold a pillar; `run` and `verify` divide by the whole \
-     aperture, so that both differ where pillars are missing.";
+pub const STREHL_AGAINST: &str = "Strehl ratios are against an ideal lens that fills the outline of the pillars: a hole inside of it lowers \
+     them. `run` and `verify` divide by the aperture of the design.";
 
 /// Write `report.html`, `report.json` and each PSF as an NPY array (float64, rows along +y) into a folder.
 ///
@@ -227,6 +247,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     let SinglePsfReport {
         file,
         found,
+        left_out,
         psfs,
         assumptions,
         model,
@@ -237,6 +258,9 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         format!("PSFs of {file}"),
         "a layout without a design, computed from the bytes of its file",
     );
+    if let Some(left_out) = left_out {
+        page.paragraph(&left_out.words);
+    }
     page.facts(&[
         ("Pillars", format!("{} {}", count(found.pillars), found.shape.plural())),
         ("Elements", found.elements.len().to_string()),

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::polychromatic::{CameraStatement, step_nm};
 use super::polychromatic_channels::{Channels, Point, WhiteChannel, per_light};
-use super::single::{Lighting, all_open, distinct, kind_of, largest_number};
+use super::single::{Lighting, OPEN, distinct, kind_of, largest_number, whole_aperture};
 use metalith_core::{Progress, Result, Wedge};
 use metalith_gds::extract::Extraction;
 use metalith_optics::{IncoherentFields, SimulationCase};
@@ -55,7 +55,6 @@ pub fn single_white(
     let lp_mm = statement.frequencies().drawn();
     let elements = distinct(found);
     light.check_held(&elements, &[shortest_um], sampling.wavelengths_nm.len())?;
-    let ones = all_open(&elements);
     progress.begin(
         "simulating polychromatic light",
         (elements.len() * sampling.wavelengths_nm.len()) as u64,
@@ -69,6 +68,7 @@ pub fn single_white(
     let mut all = Vec::new();
     for (site, widths) in elements {
         let element = light.read(&optics, site, widths)?;
+        let aperture = whole_aperture(widths);
         let fields = |nm: &f64| {
             Ok((
                 nm * 1e-3,
@@ -85,7 +85,7 @@ pub fn single_white(
             // Sites as drawn, whatever they transmit.
             let focus = [landing[0], landing[1], light.distance_um];
             let full = case.full_transmission(*um)?;
-            let matched = IdealPsf::of(&Pillars::new(widths, &ones)?, focus, *um, full);
+            let matched = IdealPsf::of(&Pillars::new(&aperture, &OPEN)?, focus, *um, full);
             progress.advance(1);
             Ok(per_light(landing, psf, matched.power_um2))
         };

@@ -173,6 +173,7 @@ mod tests {
             shape,
             elements: Vec::new(),
             pillars: 0,
+            turned_deg: None,
             oddities: Default::default(),
             survey: Default::default(),
         }

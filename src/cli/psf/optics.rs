@@ -1,7 +1,7 @@
 //! Cells, light and sensor by the options of `metalith psf`, and the assumptions beside them.
 
 use metalith::cell::{
-    CellStack, FittedCell, FocusedLight, FocusingStack, Handedness, Mapping, NeighbourCell, PointwiseCell,
+    CellStack, FittedCell, FocusedLight, FocusingStack, Handedness, Mapping, MixedCell, NeighbourCell, PointwiseCell,
     Polarisation, PolarisationAxis, PolarisedLight, PublishedCell, cache_folder, polarising_cell,
 };
 use metalith::design::CellFile;
@@ -40,9 +40,10 @@ impl PsfArgs {
         };
         Ok(CellStack {
             pitch_nm: f64::from(pitch_nm),
-            lattice: found.elements.first().map_or(CellLattice::Square, |e| {
-                CellLattice::drawn(e.site.lattice.kind(), pitch_nm, e.site.lattice.unit())
-            }),
+            lattice: found
+                .elements
+                .first()
+                .map_or(CellLattice::Square, |e| CellLattice::of(&e.site.lattice)),
             shape: found.shape,
             ..stated
         })
@@ -97,6 +98,13 @@ impl PsfArgs {
                 ),
             ),
         ];
+        if let Some(deg) = found.turned_deg {
+            let words = format!(
+                "at an angle of {} deg; places and directions are along rows and columns of its lattice",
+                sig(deg, 6)
+            );
+            all.insert(1, ("the layout is placed", words));
+        }
         if let Some(light) = light {
             let edge = ("edge of a sensor pixel", format!("{} um", exact(self.pixel_um(light))));
             all.insert(2, edge);
@@ -211,6 +219,9 @@ impl PsfArgs {
             .collect::<Vec<_>>();
         widths.sort_unstable();
         widths.dedup();
+        if found.shape == PillarShape::Mixed {
+            return Ok(Box::new(MixedCell::new(&stack, widths)));
+        }
         if matches!(self.fidelity, FidelityArg::Fitted) {
             let band_um = light.band_um(stack.range_um());
             let range = (

@@ -6,12 +6,14 @@
 //! Rectangles have the same approximation by [`crate::RotatedCell`] and [`crate::UprightCell`]. The coupled model
 //! ([`crate::NeighbourCell`]) does without it.
 
+mod mixed;
 mod pointwise;
 mod table;
 mod table_file;
 mod tabulated;
 mod width_spectrum;
 
+pub use mixed::MixedCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, PointwiseCell};
 pub use table::{CellTable, Origin, TableSpec};
 pub use tabulated::RigorousCell;

@@ -21,7 +21,7 @@ use std::io::Read;
 use super::work::Allowance;
 use content::{Content, Strings, WantedPillars};
 use metalith_core::{Error, Progress, Result};
-use metalith_gds::extract::{Scale, discover};
+use metalith_gds::extract::{PlaceFit, Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 use metalith_pillars::{ElementSite, PillarShape, UprightRectangles};
 
@@ -62,7 +62,10 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
                     None => found.shape,
                     Some(first) => both(first, found.shape)?,
                 });
-                sites::unite(&mut sites, found.sites);
+                // What is not exactly on its site is compared as an outline: half a step of the grid counts here.
+                let exact = found.sites.into_iter().zip(&found.fits);
+                let exact = exact.filter(|(_, fit)| **fit == PlaceFit::default());
+                sites::unite(&mut sites, exact.map(|(site, _)| site).collect());
             }
             // Without elements, all shapes are compared as outlines.
             Err(Error::Invalid { .. }) => {}

@@ -2,13 +2,14 @@
 
 use super::failed;
 use super::lattices::{Cluster, FEWEST};
-use super::places::{Centre, Places};
+use super::places::{Centre, PlaceFit, Places};
 use super::sites::Scale;
 use super::sizes::Sizes;
-use super::tiles::{COARSE, FINE, MOST_TILES};
+use super::tiles::{COARSE, FINE, MOST_TILES, TileMap};
+use super::turned::visit_turned;
 use crate::{
-    Error, ExtractionError, LayerNumber, Layout, LayoutCell, PillarFinder, Rect, Result, Selection, Shape, Transform,
-    Visitor,
+    Error, ExtractionError, LayerNumber, Layout, LayoutCell, OutlineMemo, PillarFinder, Point, Rect, Result, Selection,
+    Shape, TiltedRectangle, Transform, Visitor, tilted_rectangle_of,
 };
 use metalith_core::Progress;
 use metalith_pillars::{ElementSite, PillarShape};
@@ -20,18 +21,26 @@ struct Look {
     bits: u32,
     /// Wider shapes are pads or marks (nm).
     widest_nm: i64,
+    /// True if an angle is looked for at which all stands.
+    at_angles: bool,
+    /// The angle by which the layout is turned back (rad).
+    turn: Option<f64>,
 }
 
 /// Settings that nearly all lenses need.
 const CLOSE: Look = Look {
     bits: FINE,
     widest_nm: 6000,
+    at_angles: false,
+    turn: None,
 };
 /// Settings for wider pitches, up to the widest of a design. Marks and pads are taken for pillars then too: a second
 /// look, where the first finds no closer lattice.
 const WIDE: Look = Look {
     bits: COARSE,
     widest_nm: 20_000,
+    at_angles: false,
+    turn: None,
 };
 /// Squares for one upright rectangle, at most, of a layout whose pillars are such.
 const FEWEST_AMONG: u64 = 4;
@@ -46,6 +55,11 @@ struct Map {
     pillars: Places,
     /// Rectangles at any angle, of whatever size.
     tilted: Places,
+    /// Squares and circles that stand at an angle, and their number.
+    turned: Places,
+    turned_shapes: u64,
+    tilted_squares: OutlineMemo<Option<Rect>>,
+    at_angles: bool,
     /// Numbers of squares and of circles.
     shapes: [u64; 2],
     /// Other sizes that may be pillars.
@@ -65,6 +79,10 @@ pub struct Discovered {
     pub sites: Vec<ElementSite>,
     /// Shape of most of its pillars.
     pub shape: PillarShape,
+    /// How the places of each element were found; none where they are exact.
+    pub fits: Vec<PlaceFit>,
+    /// Angle by which the layout was turned back before they were found (rad); none for most.
+    pub turn: Option<f64>,
 }
 
 /// Find the elements of a layout whose pillars are on these layers, each with the ends of its pillars: see
@@ -79,14 +97,48 @@ pub fn discover(
     scale: Scale,
     progress: &dyn Progress,
 ) -> Result<Discovered> {
+    search(layout, from, layers, scale, false, progress)
+}
+
+/// Variant of [`discover`] that finds elements placed at any angle as a whole, too.
+///
+/// # Errors
+/// As [`discover`].
+pub(super) fn discover_turned(
+    layout: &Layout,
+    from: &Selection,
+    layers: &[LayerNumber],
+    scale: Scale,
+    progress: &dyn Progress,
+) -> Result<Discovered> {
+    search(layout, from, layers, scale, true, progress)
+}
+
+fn search(
+    layout: &Layout,
+    from: &Selection,
+    layers: &[LayerNumber],
+    scale: Scale,
+    at_angles: bool,
+    progress: &dyn Progress,
+) -> Result<Discovered> {
     let selection = Selection {
         layers: Some(layers.to_vec()),
         ..from.clone()
     };
     let fail = failed(layout.path());
     let look = |how: Look| seen(layout, &selection, scale, how, progress);
-    let close = look(CLOSE)?;
-    let Seen { mut sites, shape, .. } = if close.may_be_wider() {
+    let close = look(Look { at_angles, ..CLOSE })?;
+    let turned = match close.turn {
+        None => None,
+        // What a turned look cannot tell is no fault of the layout.
+        turn => look(Look { turn, ..CLOSE }).ok().filter(Seen::holds_a_lens),
+    };
+    let Seen { sites, shape, turn, .. } = if let Some(turned) = turned {
+        turned
+    } else if let Some(cause) = close.cause {
+        return Err(fail(cause));
+    } else if close.may_be_wider() {
         match look(WIDE) {
             Ok(wide) if wide.holds_a_lens() => wide,
             // What a second look cannot tell is no fault of the layout.
@@ -98,7 +150,10 @@ pub fn discover(
     };
     let layers = || layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     if sites.is_empty() {
-        return Err(fail(ExtractionError::NoElements { layers: layers() }));
+        return Err(fail(ExtractionError::NoElements {
+            layers: layers(),
+            contents: None,
+        }));
     }
     if sites.len() > MOST_ELEMENTS {
         return Err(fail(ExtractionError::Groups {
@@ -107,32 +162,43 @@ pub fn discover(
             most: MOST_ELEMENTS,
         }));
     }
-    sites.sort_by_key(|s| (s.centre_nm[1], s.centre_nm[0]));
+    let mut sites = sites;
+    sites.sort_by_key(|(s, _)| (s.centre_nm[1], s.centre_nm[0]));
+    let (mut sites, fits): (Vec<ElementSite>, Vec<PlaceFit>) = sites.into_iter().unzip();
     for (k, site) in sites.iter_mut().enumerate() {
         site.name = format!("element {}", k + 1);
     }
-    Ok(Discovered { sites, shape })
+    Ok(Discovered {
+        sites,
+        shape,
+        fits,
+        turn,
+    })
 }
 
 /// Findings of one search of a layout.
 struct Seen {
-    sites: Vec<ElementSite>,
+    sites: Vec<(ElementSite, PlaceFit)>,
     shape: PillarShape,
     /// Shapes that may be pillars by their outline, however wide.
     shapes: u64,
+    /// Angle by which a layout is turned back in this search, or by which it should be in another one (rad).
+    turn: Option<f64>,
+    /// Reason why there is no element, where another angle may show one.
+    cause: Option<ExtractionError>,
 }
 
 impl Seen {
     /// True if a search for wider pitches may find more: nothing was found, or no lattice that is closer than such
     /// pitches are.
     fn may_be_wider(&self) -> bool {
-        let is_wide = |site: &ElementSite| site.lattice.pitch_nm().at_least_nm() > CLOSE.widest_nm;
+        let is_wide = |(site, _): &(ElementSite, PlaceFit)| site.lattice.pitch_nm().at_least_nm() > CLOSE.widest_nm;
         self.shapes >= FEWEST && self.sites.iter().all(is_wide)
     }
 
     /// True if there are elements, none of a pitch that no design has.
     fn holds_a_lens(&self) -> bool {
-        let is_known = |site: &ElementSite| site.lattice.pitch_nm().at_least_nm() <= WIDE.widest_nm;
+        let is_known = |(site, _): &(ElementSite, PlaceFit)| site.lattice.pitch_nm().at_least_nm() <= WIDE.widest_nm;
         !self.sites.is_empty() && self.sites.iter().all(is_known)
     }
 }
@@ -141,9 +207,24 @@ impl Seen {
 fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progress: &dyn Progress) -> Result<Seen> {
     let fail = failed(layout.path());
     let mut map = Map::new(scale, how);
-    layout.visit(selection, &mut map, progress)?;
+    visit_turned(layout, selection, how.turn, &mut map, progress)?;
     let [squares, circles] = map.shapes;
     let shapes = squares + circles + map.sizes.rectangles;
+    let mostly_turned = how.at_angles && map.turned_shapes > squares + circles;
+    if mostly_turned && map.turned_shapes >= FEWEST {
+        let Some(tiles) = map.turned.finish() else {
+            return Err(fail(ExtractionError::Scattered { most: MOST_TILES }));
+        };
+        let clusters = tiles.clusters();
+        let largest = clusters.iter().max_by_key(|members| members.len());
+        return Ok(Seen {
+            sites: Vec::new(),
+            shape: PillarShape::default(),
+            shapes,
+            turn: largest.and_then(|members| cluster_of(&tiles, members, scale, how).turn()),
+            cause: None,
+        });
+    }
     let mostly = map.sizes.rectangles > squares + circles;
     // Squares are upright rectangles too, where others of several sizes stand among them.
     let among = circles == 0 && FEWEST_AMONG * map.sizes.rectangles > squares;
@@ -153,6 +234,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
         .filter(|found| mostly || found.with_squares);
     let shape = match &rectangles {
         Some(found) => found.shape,
+        None if how.at_angles && is_mixed([squares, circles]) => PillarShape::Mixed,
         None if circles > squares => PillarShape::Circle,
         None => PillarShape::Square,
     };
@@ -172,23 +254,53 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
                 finder: PillarFinder::new(shape, scale.nm(1.0)),
                 pillars: Places::new(scale, how.bits),
             };
-            layout.visit(selection, &mut search, progress)?;
+            visit_turned(layout, selection, how.turn, &mut search, progress)?;
             search.pillars
         }
     };
     let Some(tiles) = places.finish() else {
         return Err(fail(ExtractionError::Scattered { most: MOST_TILES }));
     };
-    let mut sites = Vec::new();
+    let (mut sites, mut turn, mut failed) = (Vec::new(), how.turn, None);
     for members in tiles.clusters() {
-        let cluster = Cluster {
-            steps_per_nm: scale.steps_per_nm(),
-            tiles: &tiles,
-            members: &members,
-        };
-        sites.extend(cluster.element().map_err(&fail)?);
+        let cluster = cluster_of(&tiles, &members, scale, how);
+        let found = cluster.element();
+        if how.at_angles && turn.is_none() && found.as_ref().map_or(true, |f| f.as_ref().is_some_and(|f| f.is_poor)) {
+            turn = cluster.turn();
+        }
+        match found {
+            Ok(found) => sites.extend(found.map(|found| (found.site, found.fit))),
+            Err(cause) if turn.is_some() && how.turn.is_none() => failed = Some(cause),
+            Err(cause) => return Err(fail(cause)),
+        }
     }
-    Ok(Seen { sites, shape, shapes })
+    Ok(Seen {
+        sites,
+        shape,
+        shapes,
+        turn,
+        cause: failed,
+    })
+}
+
+/// True if both squares and circles are pillars: as few as these may be marks.
+fn is_mixed(shapes: [u64; 2]) -> bool {
+    /// One in so many at least.
+    const SHARE: u64 = 100;
+    let [few, all] = [shapes[0].min(shapes[1]), shapes[0] + shapes[1]];
+    few >= FEWEST && SHARE * few >= all
+}
+
+/// Tiles of one group in a search.
+fn cluster_of<'a>(tiles: &'a TileMap, members: &'a [usize], scale: Scale, how: Look) -> Cluster<'a> {
+    // Corners of what is turned back were rounded twice.
+    let rounded = if how.turn.is_some() { 2.0 } else { 1.0 };
+    Cluster {
+        steps_per_nm: scale.steps_per_nm(),
+        unit_halves: rounded * 2.0 * scale.steps_per_nm() as f64 * scale.nm(1.0),
+        tiles,
+        members,
+    }
 }
 
 impl Map {
@@ -198,17 +310,69 @@ impl Map {
             widest_nm: how.widest_nm,
             pillars: Places::new(scale, how.bits),
             tilted: Places::new(scale, how.bits),
+            turned: Places::new(scale, how.bits),
+            turned_shapes: 0,
+            tilted_squares: OutlineMemo::default(),
+            at_angles: how.at_angles,
             shapes: [0; 2],
             sizes: Sizes::default(),
         }
+    }
+
+    /// Count a square or a circle that stands at an angle; whether it does.
+    #[inline]
+    fn stands_at_angle(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> bool {
+        let is_placed_upright = placements.iter().all(Transform::keeps_upright);
+        if is_placed_upright && (shape.rect.is_some() || shape.circle.is_some() || shape.outline.len() != 5) {
+            return false;
+        }
+        self.counts_at_angle(shape, placements, is_placed_upright)
+    }
+
+    fn counts_at_angle(&mut self, shape: &Shape<'_>, placements: &[Transform], is_placed_upright: bool) -> bool {
+        let scale = self.scale;
+        let around = if is_placed_upright {
+            let points = shape.outline.points;
+            let ask = || {
+                let tilted = tilted_rectangle_of(points, scale.nm(1.0)).filter(TiltedRectangle::is_square)?;
+                Some(tilted.around.moved(Point::new(-points[0].x, -points[0].y)))
+            };
+            let from_first = self.tilted_squares.of(shape.outline, 0, ask);
+            from_first.and_then(|around| shape.outline.at.apply_rect(&around.moved(points[0])))
+        } else {
+            shape.rect.filter(|r| r.width() == r.height()).or(shape.circle)
+        };
+        let Some(around) = around else { return false };
+        self.turned_shapes += placements.len() as u64;
+        let twice = Point::new(around.x0 + around.x1, around.y0 + around.y1);
+        let centre = |placement: &Transform| {
+            let [x, y] = placement.twice(twice);
+            let place = Rect {
+                x0: x,
+                x1: 0,
+                y0: y,
+                y1: 0,
+            };
+            let half = |v: i64| scale.whole_steps(v);
+            scale.reaches(&place).then_some(())?;
+            Some(Centre {
+                at: Point::new(half(x)?, half(y)?),
+                even: true,
+            })
+        };
+        self.turned.add(placements, centre);
+        true
     }
 
     /// The middle of the box around a shape, if it may be a pillar by that.
     #[inline]
     fn square(r: &Rect, scale: Scale, widest_nm: i64) -> Option<Centre> {
         let centre = Centre::of(r, scale)?;
-        let width = scale.whole_nm(r.width())?;
-        (r.width() == r.height() && width <= widest_nm).then_some(centre)
+        let width_nm = match scale.whole_nm(r.width()) {
+            Some(nm) if r.width() == r.height() => nm,
+            _ => scale.rounded_width_nm(r)?,
+        };
+        (width_nm <= widest_nm).then_some(centre)
     }
 }
 
@@ -232,6 +396,7 @@ impl Visitor for Map {
     fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> metalith_core::Result<()> {
         self.pillars.begin(placements);
         self.tilted.begin(placements);
+        self.turned.begin(placements);
         Ok(())
     }
 
@@ -254,6 +419,9 @@ impl Visitor for Map {
                 }
             };
             self.tilted.add(placements, centre);
+            return Ok(());
+        }
+        if self.at_angles && self.stands_at_angle(shape, placements) {
             return Ok(());
         }
         let Some(rect) = shape.rect.as_ref().or(shape.circle.as_ref()) else {

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use copies::Images;
 
 use super::MOST_SITES;
+use super::places::PlaceFit;
 use super::plan::ExtractedElement;
 use super::sites::{Scale, SitePlace, Sites};
 use super::stored_pillars::StoredPillars;
@@ -36,6 +37,10 @@ pub struct Filler {
     most: u64,
     /// More is to be held than may be.
     refused: bool,
+    /// True if shapes count that are pillars to the rounding of their corners.
+    tolerant: bool,
+    /// Placements of shapes that were put to that.
+    rounded: u64,
 }
 
 /// Placements that symmetry takes into one another, eight or four.
@@ -63,7 +68,30 @@ impl Filler {
             held: 0,
             most: MOST_SITES,
             refused: false,
+            tolerant: false,
+            rounded: 0,
         }
+    }
+
+    /// This filler for elements whose places were found so.
+    #[must_use]
+    pub fn fitted(mut self, fits: &[PlaceFit]) -> Self {
+        let sites: Vec<ElementSite> = self.elements.iter().map(|e| e.site.clone()).collect();
+        self.sites = Sites::fitted(&sites, fits, self.scale);
+        self
+    }
+
+    /// This filler, which takes shapes for pillars that are such to the rounding of their corners: [`crate::CORNER_STEPS`]. Their
+    /// widths are whole nanometres.
+    #[must_use]
+    pub fn tolerant(mut self) -> Self {
+        self.tolerant = true;
+        self
+    }
+
+    /// Pillars whose width was rounded to a whole nanometre.
+    pub fn rounded(&self) -> u64 {
+        self.rounded
     }
 
     /// This filler, which may hold this many sites.
@@ -176,6 +204,7 @@ impl Filler {
         if !self.orbits.iter().all(|orbit| site(self, orbit).is_some()) {
             return false;
         }
+        let is_rounded = self.is_rounded(r);
         for k in 0..self.orbits.len() {
             let orbit = &self.orbits[k];
             if let Some((row, column, width_nm)) = site(self, orbit) {
@@ -183,6 +212,7 @@ impl Filler {
                 if let StoredPillars::Eighth(map) = &mut self.elements[element].widths {
                     *map.at(column, row) = width_nm;
                     self.pillars += copies;
+                    self.rounded += if is_rounded { copies } else { 0 };
                 }
             }
         }
@@ -221,15 +251,37 @@ impl Filler {
         if !self.scale.reaches(r) {
             return Err(Why::OutsideElements);
         }
-        if r.width() != r.height() {
-            return Err(Why::UnequalSides);
-        }
-        let width_nm = self.scale.whole_nm(r.width()).ok_or(Why::OddShape)?;
+        let width_nm = match self.scale.whole_nm(r.width()) {
+            Some(nm) if r.width() == r.height() => nm,
+            _ => return self.standing_rounded(r, guess),
+        };
         let (element, row, column) = self.site(r, width_nm, guess)?;
         if width_nm > i64::from(u16::MAX) {
             return Err(Why::TooWide);
         }
         Ok((element, row, column, width_nm as u16))
+    }
+
+    /// Variant of [`Filler::standing`] for a shape that is a square of whole nanometres to the rounding of its corners at most.
+    #[cold]
+    fn standing_rounded(&self, r: &Rect, guess: &mut u32) -> Result<(u32, usize, usize, u16), Why> {
+        let is_square = r.width() == r.height();
+        let other = if is_square { Why::OddShape } else { Why::UnequalSides };
+        let width_nm = self.scale.rounded_width_nm(r).filter(|_| self.tolerant).ok_or(other)?;
+        let place = self.site(r, width_nm, guess);
+        let unequal = |why: Why| if why == Why::OffLattice { other } else { why };
+        let (element, row, column) = place.map_err(|why| if is_square { why } else { unequal(why) })?;
+        let width = if is_square {
+            r.width() as f64
+        } else {
+            let about = self.sites.width_about(r, [element as usize, row, column]);
+            about.ok_or(other)?
+        };
+        let width_nm = self.scale.nm(width).round_ties_even();
+        let in_range = (1.0..=f64::from(u16::MAX)).contains(&width_nm);
+        in_range
+            .then_some((element, row, column, width_nm as u16))
+            .ok_or(Why::TooWide)
     }
 
     /// Element, row and column of a pillar that reaches so far (nm), by the box around it.
@@ -309,7 +361,15 @@ impl Filler {
         if !takes(r.width()) {
             return Ok(false);
         }
-        self.fill(element, row, column, width_nm)
+        let put = self.fill(element, row, column, width_nm);
+        self.rounded += u64::from(put.is_ok() && self.is_rounded(r));
+        put
+    }
+
+    /// True if a shape is no square of whole nanometres.
+    #[inline]
+    fn is_rounded(&self, r: &Rect) -> bool {
+        r.width() != r.height() || self.scale.whole_nm(r.width()).is_none()
     }
 
     /// The width at one site alone; none if its element cannot be held.
@@ -353,6 +413,17 @@ impl Filler {
             *place = number;
         }
         there
+    }
+
+    /// True if a shape may be a pillar of an element: in its lattice, or no wider than two pitches of the first.
+    pub fn may_be_of_element(&self, r: &Rect) -> bool {
+        /// Pitches that a pillar, and what is drawn in the place of one, is no wider than.
+        const PITCHES: i64 = 2;
+        if !self.scale.reaches(r) || self.elements.is_empty() {
+            return false;
+        }
+        let width_nm = self.scale.at_least_nm(r.width().max(r.height()));
+        width_nm <= PITCHES * self.sites.pitch_nm(0) || self.sites.stand(r, &mut 0) != SitePlace::Outside
     }
 
     /// Keeps the wider of a pillar and the one that is on its site already; returns the other, as a rectangle about the

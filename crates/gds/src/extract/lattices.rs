@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::places::PlaceFit;
 use super::tiles::TileMap;
-use crate::{ExtractionError, Point, Rect};
+use crate::{CORNER_STEPS, ExtractionError, Point, Rect};
 use metalith_pillars::{DatabaseUnit, ElementSite, Lattice, LatticeKind, Pitch};
 
 /// Fewer pillars together are no element.
@@ -11,8 +12,8 @@ pub(super) const FEWEST: u64 = 16;
 /// One in so many tiles at least shows a row between those of its samples, where two arrays make a hexagonal lattice: all do but
 /// those that pillars reach by their rims.
 const ROWS_BETWEEN: usize = 4;
-/// All centres but one in so many at most are sites of a hexagonal lattice.
-const SHARE_OF_SITES: u64 = 4;
+/// All centres but one in so many at most are sites of a lattice.
+pub(super) const SHARE_OF_SITES: u64 = 4;
 /// Lattice sites for each pillar found: a lens fills 0.79 of its lattice.
 const SITES_PER_PILLAR: u64 = 64;
 
@@ -20,18 +21,58 @@ const SITES_PER_PILLAR: u64 = 64;
 pub(super) struct Cluster<'a> {
     /// Steps of places in a nanometre.
     pub steps_per_nm: i64,
+    /// Database unit (half steps).
+    pub unit_halves: f64,
     pub tiles: &'a TileMap,
     /// Numbers of its tiles.
     pub members: &'a [usize],
 }
 
+/// An element as it was found.
+pub(super) struct FoundElement {
+    pub site: ElementSite,
+    pub fit: PlaceFit,
+    /// True if a good part of its centres are not on the lattice.
+    pub is_poor: bool,
+}
+
 impl Cluster<'_> {
-    /// Lattice, and how far its pillars reach; none if it is too small to be an element.
-    pub(crate) fn element(&self) -> Result<Option<ElementSite>, ExtractionError> {
+    /// Lattice, and how far its pillars reach; none if it is too small to be an element. Where most places are on no lattice of
+    /// whole steps, they may be places that were rounded one by one.
+    pub(crate) fn element(&self) -> Result<Option<FoundElement>, ExtractionError> {
         let pillars: u64 = self.members.iter().map(|&k| self.tiles.pillars(k)).sum();
         if pillars < FEWEST {
             return Ok(None);
         }
+        let exact = self.exact(pillars);
+        let tiles = self.sampled();
+        let all = tiles.iter().map(Vec::len).sum();
+        let on = match &exact {
+            Ok(Some(site)) => self.count_on(site, &tiles),
+            _ => 0,
+        };
+        let exactly = |site: ElementSite| FoundElement {
+            is_poor: SHARE_OF_SITES as usize * on < (SHARE_OF_SITES as usize - 1) * all,
+            site,
+            fit: PlaceFit::default(),
+        };
+        if few_are_off(on, all)
+            && let Ok(Some(site)) = exact
+        {
+            return Ok(Some(exactly(site)));
+        }
+        match self.rounded(&tiles).filter(|(fit, _)| !few_are_off(on, fit.count)) {
+            Some((fit, grid)) => {
+                let (site, fit) = self.fitted_site(&fit, grid, pillars)?;
+                let is_poor = false;
+                Ok(Some(FoundElement { site, fit, is_poor }))
+            }
+            None => Ok(exact?.map(exactly)),
+        }
+    }
+
+    /// The lattice of whole steps that most samples are on.
+    fn exact(&self, pillars: u64) -> Result<Option<ElementSite>, ExtractionError> {
         let mut steps = [BTreeMap::<i64, u64>::new(), BTreeMap::new()];
         for &k in self.members {
             for (axis, steps) in AXES.into_iter().zip(&mut steps) {
@@ -113,7 +154,7 @@ impl Cluster<'_> {
     }
 
     /// Box around all centres (half steps).
-    fn bounds(&self) -> Rect {
+    pub(super) fn bounds(&self) -> Rect {
         let mut bounds = Rect::EMPTY;
         self.members.iter().for_each(|&k| bounds.unite(&self.tiles.bounds(k)));
         bounds
@@ -126,7 +167,9 @@ impl Cluster<'_> {
             *phases.entry(AXES[axis](s).rem_euclid(step)).or_default() += 1;
         }
         let phase = most_common(phases).unwrap_or(0);
-        // Outermost places on the lattice: what is off it does not widen it.
+        // Outermost places on the lattice: what is off it does not widen it, but for pillars of odd width, by half a unit.
+        let odd = (CORNER_STEPS * self.unit_halves) as i64;
+        let (from, to) = (from - odd, to + odd);
         let first = from + (phase - from).rem_euclid(step);
         let last = to - (to - phase).rem_euclid(step);
         (first, (last - first).max(0) / step + 1)
@@ -211,7 +254,7 @@ impl Cluster<'_> {
     }
 
     /// Succeeds if so many pillars fill a lattice of so many places an axis well enough to be one.
-    fn dense_enough(
+    pub(super) fn dense_enough(
         &self,
         pillars: u64,
         sites: i64,
@@ -232,8 +275,15 @@ impl Cluster<'_> {
     }
 }
 
+/// True if nearly all of some places are on a lattice: a few may be faults.
+fn few_are_off(on: usize, all: usize) -> bool {
+    /// One in so many may be off.
+    const FEW: usize = 50;
+    FEW * on >= (FEW - 1) * all
+}
+
 /// Coordinates of a place along x and along y.
-const AXES: [fn(Point) -> i64; 2] = [|s| s.x, |s| s.y];
+pub(super) const AXES: [fn(Point) -> i64; 2] = [|s| s.x, |s| s.y];
 
 /// Count of the key counted most often.
 fn most_common_count(counts: &BTreeMap<i64, u64>) -> u64 {

@@ -7,14 +7,18 @@
 mod discover;
 mod filler;
 mod lattices;
+mod layer_contents;
+mod named_shapes;
 mod pillars;
 mod places;
 mod plan;
+mod rounded;
 mod sites;
 mod sizes;
 mod stored_pillars;
 mod survey;
 mod tiles;
+mod turned;
 mod unrecognised_shapes;
 
 pub use plan::{Elements, ExtractedElement, Extraction, ExtractionPlan};
@@ -23,14 +27,17 @@ pub use unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
 
 use std::path::Path;
 
-use crate::{Error, ExtractionError, Layout, Result};
+use crate::{Error, ExtractionError, Layout, ReadLimits, Result};
 use metalith_core::{LayerNumber, Progress};
 pub use metalith_pillars::ElementSite;
 use metalith_pillars::{EighthMap, PillarMap, PillarReader, PillarShape};
 use pillars::PillarCollector;
+use turned::visit_turned;
 
+use discover::discover_turned;
 pub use discover::{Discovered, discover};
 pub use filler::Filler;
+pub use places::PlaceFit;
 pub use sites::Scale;
 pub use stored_pillars::StoredPillars;
 
@@ -95,7 +102,52 @@ fn failed(path: &Path) -> impl Fn(ExtractionError) -> Error {
     }
 }
 
-/// Reads pillars out of GDSII files.
+/// Reads pillars out of layouts, on a layer and below a cell that may be others than those that are stated.
+#[derive(Clone, Debug, Default)]
+pub struct PillarsAt {
+    /// Layer in place of the stated one.
+    pub layer: Option<LayerNumber>,
+    /// Cell to start from; the top cell if there is one only.
+    pub top: Option<String>,
+}
+
+impl PillarsAt {
+    fn plan(&self, plan: ExtractionPlan) -> ExtractionPlan {
+        ExtractionPlan {
+            pillar_layer: self.layer.unwrap_or(plan.pillar_layer),
+            top: self.top.clone(),
+            ..plan
+        }
+    }
+}
+
+impl PillarReader for PillarsAt {
+    fn pillars(
+        &self,
+        layout: &Path,
+        layer: LayerNumber,
+        shape: PillarShape,
+        elements: &[ElementSite],
+        progress: &dyn Progress,
+    ) -> metalith_core::Result<Vec<PillarMap>> {
+        let file = Layout::open_with(layout, ReadLimits::default(), progress)?;
+        let plan = self.plan(ExtractionPlan::given(layer, elements.to_vec()).of_shape(shape));
+        let found = extract(&file, &plan, progress)?;
+        Ok(found.elements.into_iter().map(|e| e.widths).collect())
+    }
+
+    fn elements(
+        &self,
+        layout: &Path,
+        layer: LayerNumber,
+        progress: &dyn Progress,
+    ) -> metalith_core::Result<Vec<ElementSite>> {
+        let file = Layout::open_with(layout, ReadLimits::default(), progress)?;
+        Ok(sites_of(&file, &self.plan(ExtractionPlan::discover(layer)), progress)?.sites)
+    }
+}
+
+/// Reads pillars out of layouts where they are stated to be.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GdsPillars;
 
@@ -108,10 +160,7 @@ impl PillarReader for GdsPillars {
         elements: &[ElementSite],
         progress: &dyn Progress,
     ) -> metalith_core::Result<Vec<PillarMap>> {
-        let file = Layout::open(layout)?;
-        let plan = ExtractionPlan::given(layer, elements.to_vec()).of_shape(shape);
-        let found = extract(&file, &plan, progress)?;
-        Ok(found.elements.into_iter().map(|e| e.widths).collect())
+        PillarsAt::default().pillars(layout, layer, shape, elements, progress)
     }
 
     fn elements(
@@ -120,8 +169,7 @@ impl PillarReader for GdsPillars {
         layer: LayerNumber,
         progress: &dyn Progress,
     ) -> metalith_core::Result<Vec<ElementSite>> {
-        let file = Layout::open(layout)?;
-        Ok(sites_of(&file, &ExtractionPlan::discover(layer), progress)?.sites)
+        PillarsAt::default().elements(layout, layer, progress)
     }
 }
 
@@ -144,6 +192,7 @@ pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) 
         elements: folded.elements.into_iter().map(whole).collect(),
         pillars: folded.pillars,
         oddities: folded.oddities,
+        turned_deg: folded.turned_deg,
         survey: folded.survey,
     })
 }
@@ -173,10 +222,23 @@ fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> 
         Elements::Given(sites) => Discovered {
             sites: sites.clone(),
             shape: PillarShape::default(),
+            fits: Vec::new(),
+            turn: None,
         },
         Elements::Discover => {
             let scale = Scale::of(layout)?;
-            let mut found = discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress)?;
+            let found = discover_turned(layout, &plan.selection(), &[plan.pillar_layer], scale, progress);
+            let mut found = match found {
+                Err(Error::Extraction {
+                    path,
+                    cause: ExtractionError::NoElements { layers, .. },
+                }) => {
+                    let contents = Some(layer_contents::words(layout, &plan.selection(), progress)?);
+                    let cause = ExtractionError::NoElements { layers, contents };
+                    return Err(Error::Extraction { path, cause });
+                }
+                other => other?,
+            };
             ElementSite::widen(&mut found.sites);
             found
         }
@@ -194,8 +256,9 @@ fn extract_from(
 ) -> Result<Extraction<StoredPillars>> {
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
-    let mut pillars = PillarCollector::new(plan, found.shape, found.sites, Scale::of(layout)?, most);
-    layout.visit(&selection, &mut pillars, progress)?;
+    let turn = found.turn;
+    let mut pillars = PillarCollector::new(plan, found, Scale::of(layout)?, most);
+    visit_turned(layout, &selection, turn, &mut pillars, progress)?;
     let name = layout.cells()[top].name.clone();
     pillars.finish(name).map_err(failed(layout.path()))
 }

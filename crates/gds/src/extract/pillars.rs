@@ -1,43 +1,53 @@
 //! The visitor that fills the width maps.
 
+use super::discover::Discovered;
 use super::filler::Filler;
+use super::named_shapes::name_of;
 use super::plan::{Extraction, ExtractionPlan};
 use super::sites::Scale;
 use super::stored_pillars::StoredPillars;
 use super::survey::Surveyor;
 use super::unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
-use crate::{ExtractionError, LayerNumber, LayoutCell, PillarFinder, Rect, Shape, Text, Transform, Visitor, pillar_of};
-use metalith_pillars::{ElementSite, PillarShape};
+use crate::{
+    ExtractionError, LayerNumber, LayoutCell, OutlineMemo, PillarFinder, Rect, Shape, Text, Transform, Visitor,
+    pillar_of,
+};
+use metalith_pillars::PillarShape;
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
 pub(super) struct PillarCollector {
     layer: LayerNumber,
     shape: PillarShape,
+    turned_deg: Option<f64>,
     listed: usize,
     scale: Scale,
     finder: PillarFinder,
     filler: Filler,
     oddities: UnrecognisedShapes,
+    /// Memory of the names of outlines that are no pillars.
+    names: OutlineMemo<Why>,
     surveyor: Surveyor,
 }
 
 impl PillarCollector {
     /// Holds `most` sites.
-    pub(crate) fn new(
-        plan: &ExtractionPlan,
-        shape: PillarShape,
-        sites: Vec<ElementSite>,
-        scale: Scale,
-        most: u64,
-    ) -> Self {
+    pub(crate) fn new(plan: &ExtractionPlan, found: Discovered, scale: Scale, most: u64) -> Self {
+        let Discovered {
+            sites,
+            shape,
+            fits,
+            turn,
+        } = found;
         Self {
             layer: plan.pillar_layer,
             shape,
+            turned_deg: turn.map(f64::to_degrees),
             listed: plan.listed,
             scale,
             finder: PillarFinder::new(shape, scale.nm(1.0)),
-            filler: Filler::new(sites, scale).holding(most),
+            filler: Filler::new(sites, scale).fitted(&fits).holding(most).tolerant(),
             oddities: UnrecognisedShapes::default(),
+            names: OutlineMemo::default(),
             surveyor: Surveyor::default(),
         }
     }
@@ -48,6 +58,7 @@ impl PillarCollector {
             shape: self.shape,
             pillars: self.filler.pillars(),
             elements: self.filler.finish()?,
+            turned_deg: self.turned_deg,
             oddities: self.oddities,
             survey: self.surveyor.finish(self.scale),
         })
@@ -70,7 +81,8 @@ impl PillarCollector {
             size_nm: [nm(r.width()), nm(r.height())],
             offset,
         };
-        self.oddities.add(oddity, self.listed);
+        let in_element = self.filler.may_be_of_element(r);
+        self.oddities.add(oddity, in_element, self.listed);
     }
 
     /// An outline that is no pillar by its box alone: it may be a rectangle with more vertices than it needs, become one where it
@@ -88,7 +100,12 @@ impl PillarCollector {
             let is_other = PillarShape::CHOICES
                 .iter()
                 .any(|(_, s)| pillar_of(&placed, *s, unit_nm).is_some());
-            let why = if is_other { Why::OtherShape } else { Why::OddShape };
+            let why = if is_other {
+                Why::OtherShape
+            } else {
+                self.names
+                    .placed(shape.outline, &Transform::IDENTITY, || name_of(&placed))
+            };
             self.odd(why, &Rect::around(&placed), shape.offset);
         }
     }

@@ -24,6 +24,15 @@ impl Centre {
     }
 }
 
+/// Places of an element that were found from rounded corners.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlaceFit {
+    /// Middle of the lattice from the whole nanometre that is given as its centre, along x and y (nm).
+    pub offset_nm: [f64; 2],
+    /// Largest distance of a pillar from its site along an axis (nm); zero where places are exact.
+    pub slack_nm: f64,
+}
+
 /// Occupied places of a layout.
 pub(super) struct Places {
     scale: Scale,

@@ -89,6 +89,8 @@ pub struct Extraction<W = PillarMap> {
     pub shape: PillarShape,
     /// Pillars on a lattice, over all elements.
     pub pillars: u64,
+    /// Angle at which the layout is placed (degrees), if all of it was turned back by it before it was read.
+    pub turned_deg: Option<f64>,
     /// Everything on the pillar layer that is not a pillar on the lattice of an element.
     pub oddities: UnrecognisedShapes,
     /// All layers and texts.

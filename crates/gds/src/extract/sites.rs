@@ -2,7 +2,9 @@
 
 use std::collections::HashMap;
 
-use crate::{Layout, Rect, Result};
+use super::places::PlaceFit;
+use crate::shape::grid_step;
+use crate::{CORNER_STEPS, Layout, Rect, Result};
 use metalith_pillars::ElementSite;
 
 /// Database unit as `num / den` nanometres: lengths are compared as `database units * num` and `nm * den`.
@@ -69,6 +71,24 @@ impl Scale {
         (scaled % self.den == 0).then_some(scaled / self.den)
     }
 
+    /// Step of the grid that a rectangle is drawn on (database units): the unit, or a nanometre if both edges are whole ones.
+    pub(super) fn step_of(self, r: &Rect) -> f64 {
+        let is_whole = [r.width(), r.height()]
+            .iter()
+            .all(|edge| self.whole_nm(*edge).is_some());
+        if is_whole { grid_step(self.nm(1.0)) } else { 1.0 }
+    }
+
+    /// Width of a rectangle that may be a square to the rounding of its corners, to a whole nanometre: of two the even one. None if
+    /// an edge differs from it by more than a step of the grid.
+    pub fn rounded_width_nm(self, r: &Rect) -> Option<i64> {
+        let (width, height) = (r.width(), r.height());
+        let step = self.step_of(r);
+        let width_nm = self.nm((width + height) as f64 / 2.0).round_ties_even() as i64;
+        // Two corners off by half a step to either side along each axis.
+        ((width - height).abs() as f64 <= 4.0 * CORNER_STEPS * step && width_nm > 0).then_some(width_nm)
+    }
+
     /// True if a rectangle is near enough for arithmetic.
     #[inline]
     pub fn reaches(self, r: &Rect) -> bool {
@@ -86,13 +106,14 @@ pub(super) enum SitePlace {
     Outside,
 }
 
-/// One element in scaled units (nm * den), [`PLACES_PER_NM`] times as fine, so that its places are whole.
+/// One element in scaled units (nm * den), [`PLACES_PER_NM`] times as fine, so that its places are whole: but for rows of a
+/// hexagonal lattice that are not rounded.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     first: [i64; 2],
-    step: [i64; 2],
+    step: [f64; 2],
     /// Largest distance of a place that is rounded to the grid of the file.
-    rounding: i64,
+    rounding: f64,
     inverse: [f64; 2],
     /// Columns and rows that pillars may be in: the first, and the one after the last.
     reach: [[i64; 2]; 2],
@@ -102,16 +123,24 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(site: &ElementSite, scale: Scale) -> Self {
+    fn new(site: &ElementSite, fit: PlaceFit, scale: Scale) -> Self {
         let lattice = site.lattice;
         let scaled = |nm: f64| (nm * PLACES_PER_NM as f64).round() as i64 * scale.den;
-        let step = lattice.steps_nm().map(scaled);
-        let first = |axis: usize| PLACES_PER_NM * site.centre_nm[axis] * scale.den + scaled(lattice.place_nm(axis, 0));
+        let step = lattice.steps_nm();
+        let step = if lattice.has_exact_rows() {
+            step.map(|nm| nm * (PLACES_PER_NM * scale.den) as f64)
+        } else {
+            step.map(|nm| scaled(nm) as f64)
+        };
+        let first = |axis: usize| {
+            let from_centre = lattice.place_nm(axis, 0) + fit.offset_nm[axis];
+            PLACES_PER_NM * site.centre_nm[axis] * scale.den + scaled(from_centre)
+        };
         Self {
             first: [first(0), first(1)],
             step,
-            rounding: scaled(lattice.rounding_nm()),
-            inverse: step.map(|step| 1.0 / step as f64),
+            rounding: scaled(lattice.rounding_nm().max(fit.slack_nm)) as f64,
+            inverse: step.map(|step| 1.0 / step),
             reach: site.reach().map(|reach| [reach.start as i64, reach.end as i64]),
             staggered: !lattice.is_square(),
             pitch_nm: lattice.pitch_nm().at_least_nm(),
@@ -120,12 +149,12 @@ impl Grid {
 
     /// Nearest site along an axis and the distance from it.
     #[inline]
-    fn nearest(&self, axis: usize, place: i64) -> (i64, i64) {
-        let from_first = place - self.first[axis];
+    fn nearest(&self, axis: usize, place: i64) -> (i64, f64) {
+        let from_first = (place - self.first[axis]) as f64;
         // A conversion cuts off, and needs no call as rounding does: this is the innermost loop of reading.
-        let sites = from_first as f64 * self.inverse[axis];
+        let sites = from_first * self.inverse[axis];
         let site = (sites + 0.5f64.copysign(sites)) as i64;
-        (site, from_first - site * self.step[axis])
+        (site, from_first - site as f64 * self.step[axis])
     }
 
     #[inline]
@@ -138,7 +167,8 @@ impl Grid {
     fn extent(&self) -> [[i64; 2]; 2] {
         [0, 1].map(|axis| {
             let [from, to] = self.reach[axis];
-            [self.first[axis] + from * self.step[axis], (to - from) * self.step[axis]]
+            let along = |count: i64| (count as f64 * self.step[axis]).round() as i64;
+            [self.first[axis] + along(from), along(to - from)]
         })
     }
 }
@@ -153,14 +183,21 @@ pub(super) struct Sites {
 }
 
 impl Sites {
+    /// The sites of elements as designs have them.
     pub(crate) fn new(sites: &[ElementSite], scale: Scale) -> Self {
-        let grids: Vec<Grid> = sites.iter().map(|s| Grid::new(s, scale)).collect();
+        Self::fitted(sites, &[], scale)
+    }
+
+    /// The sites of elements that were found so; those beyond the last of `fits` are where they say.
+    pub(crate) fn fitted(sites: &[ElementSite], fits: &[PlaceFit], scale: Scale) -> Self {
+        let fit = |k: usize| fits.get(k).copied().unwrap_or_default();
+        let grids: Vec<Grid> = (sites.iter().enumerate().map(|(k, s)| Grid::new(s, fit(k), scale))).collect();
         let widths = grids.iter().flat_map(|g| g.extent().map(|[_, width]| width));
         let tile = widths.max().unwrap_or(1).max(1);
         let mut tiles: HashMap<(i64, i64), Vec<u32>> = HashMap::new();
         for (k, g) in grids.iter().enumerate() {
             let extent = g.extent();
-            let from = [0, 1].map(|axis| (extent[axis][0] - g.step[axis] / 2).div_euclid(tile));
+            let from = [0, 1].map(|axis| (extent[axis][0] - g.step[axis] as i64 / 2).div_euclid(tile));
             let to = extent.map(|[first, width]| (first + width).div_euclid(tile));
             for y in from[1]..=to[1] {
                 for x in from[0]..=to[0] {
@@ -176,6 +213,24 @@ impl Sites {
         }
     }
 
+    /// Width (database units) of the square about a site whose corners were rounded to those of a rectangle: the middle of what is
+    /// possible. None if a corner is farther from every such square than rounding moves it.
+    pub(crate) fn width_about(&self, pillar: &Rect, [element, row, column]: [usize; 3]) -> Option<f64> {
+        let grid = &self.grids[element];
+        let per_unit = (PLACES_PER_NM * self.scale.num) as f64;
+        let corner = CORNER_STEPS * self.scale.step_of(pillar) + grid.rounding / per_unit;
+        let (mut least, mut most) = (0.0f64, f64::INFINITY);
+        let edges = [(pillar.x0, pillar.x1, column), (pillar.y0, pillar.y1, row)];
+        for (axis, (from, to, site)) in edges.into_iter().enumerate() {
+            let place = grid.first[axis] as f64 + site as f64 * grid.step[axis];
+            let off = (from + to) as f64 / 2.0 - place / per_unit;
+            let either = 2.0 * (corner - off.abs());
+            least = least.max((to - from) as f64 - either);
+            most = most.min((to - from) as f64 + either);
+        }
+        (least <= most).then_some(0.5 * (least + most))
+    }
+
     /// Pitch of an element (nm).
     #[inline]
     pub(crate) fn pitch_nm(&self, element: u32) -> i64 {
@@ -189,7 +244,7 @@ impl Sites {
         let x = (pillar.x0 + pillar.x1) * half;
         let y = (pillar.y0 + pillar.y1) * half;
         // Half a database unit.
-        let slack = [pillar.x1 - pillar.x0, pillar.y1 - pillar.y0].map(|edge| edge % 2 * half);
+        let slack = [pillar.x1 - pillar.x0, pillar.y1 - pillar.y0].map(|edge| (edge % 2 * half) as f64);
         if let Some(standing) = self.try_element(*guess, x, y, slack) {
             return standing;
         }
@@ -204,7 +259,7 @@ impl Sites {
     }
 
     #[inline]
-    fn try_element(&self, element: u32, x: i64, y: i64, slack: [i64; 2]) -> Option<SitePlace> {
+    fn try_element(&self, element: u32, x: i64, y: i64, slack: [f64; 2]) -> Option<SitePlace> {
         let grid = self.grids.get(element as usize)?;
         let (column, dx) = grid.nearest(0, x);
         let (row, dy) = grid.nearest(1, y);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::sites::Scale;
 use crate::outline_memo::{BoxMemo, OutlineMemo};
-use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
+use crate::{Point, Rect, Shape, Transform, pillar_of, tilted_rectangle_of};
 use metalith_pillars::{PillarShape, RotatedRectangles, UprightRectangles};
 
 /// Sizes that are distinguished: a layout has one, and what its corners make of it.
@@ -16,6 +16,10 @@ const ALIKE_NM: i64 = 2;
 /// Rotations in half a turn by which pillars of a layout from anywhere are told: by a degree, beside which the rounding of
 /// corners is little.
 const STEPS: u16 = 180;
+
+/// Rotations in half a turn where those are not all: by a tenth of a degree, which moves no corner of a pillar of 600 nm by more than
+/// its rounding.
+const FINE_STEPS: u16 = 1800;
 
 /// Widths of squares that are counted: those beyond are no pillars (nm).
 const MOST_WIDTHS: usize = 1 << 15;
@@ -47,6 +51,8 @@ struct Size {
     count: u64,
     /// Sums of both edges (nm).
     sums: [f64; 2],
+    /// Number of those that are rotated by none of [`STEPS`].
+    between: u64,
 }
 
 /// A rectangle, wherever it stands.
@@ -58,6 +64,8 @@ struct SeenRectangle {
     size: Option<usize>,
     /// The box around it, from its first corner.
     around: Rect,
+    /// True if it is rotated by one of [`STEPS`], to the rounding of its corners.
+    by_steps: bool,
 }
 
 /// Rectangles that are pillars.
@@ -88,13 +96,21 @@ impl Sizes {
                 numbers.insert(key, counted.len());
                 counted.push(Size::default());
             }
+            let [width_nm, length_nm] = edges.map(|nm| nm.round() as u16);
+            let steps = STEPS;
+            let alike = RotatedRectangles {
+                width_nm,
+                length_nm,
+                steps,
+            };
             Some(SeenRectangle {
+                by_steps: tilted.number(alike.into(), scale.nm(1.0)).is_some(),
                 edges,
                 size: numbers.get(&key).copied(),
                 around: tilted.around.moved(Point::new(-points[0].x, -points[0].y)),
             })
         };
-        // Edges are as long wherever the outline stands.
+        // Edges are as long wherever the outline stands, and rotations of one that is turned by quarters in steps as before.
         let seen = match (magnification, &shape.rect) {
             (1.0, Some(rect)) => self.boxes.of(rect, see),
             (1.0, None) => self.known.of(shape.outline, 0, see),
@@ -106,6 +122,20 @@ impl Sizes {
         }
         if let Some(size) = seen.size.map(|k| &mut self.counted[k]) {
             size.count += copies;
+            let by_steps = if placed.is_square() {
+                seen.by_steps
+            } else {
+                let corners = shape.outline.placed(placed);
+                let [width_nm, length_nm] = seen.edges.map(|nm| nm.round() as u16);
+                let steps = STEPS;
+                let alike = RotatedRectangles {
+                    width_nm,
+                    length_nm,
+                    steps,
+                };
+                pillar_of(&corners, alike.into(), scale.nm(1.0)).is_some()
+            };
+            size.between += if by_steps { 0 } else { copies };
             (0..2).for_each(|k| size.sums[k] += seen.edges[k] * copies as f64);
         }
         match shape.rect {
@@ -187,14 +217,18 @@ impl Sizes {
         let sizes = || self.numbers.iter().map(|(key, k)| (*key, &self.counted[*k]));
         let ((w, l), _) = sizes().max_by_key(|(key, size)| (size.count, std::cmp::Reverse(*key)))?;
         let near = sizes().filter(|((a, b), _)| (a - w).abs() <= ALIKE_NM && (b - l).abs() <= ALIKE_NM);
-        let (count, sums) = near.fold((0, [0.0; 2]), |(n, [a, b]), (_, size)| {
-            (n + size.count, [a + size.sums[0], b + size.sums[1]])
+        let (count, between, sums) = near.fold((0, 0, [0.0; 2]), |(n, between, [a, b]), (_, size)| {
+            (
+                n + size.count,
+                between + size.between,
+                [a + size.sums[0], b + size.sums[1]],
+            )
         });
         let [width, length] = sums.map(|sum| (sum / count as f64).round() as i64);
         let pillars = RotatedRectangles {
             width_nm: u16::try_from(width).ok()?,
             length_nm: u16::try_from(length).ok()?,
-            steps: STEPS,
+            steps: if between == 0 { STEPS } else { FINE_STEPS },
         };
         (width < length && length <= longest_nm).then_some(FoundRectangles {
             shape: pillars.into(),

@@ -31,6 +31,9 @@ struct Tile {
     parts: u64,
     /// Number of its samples.
     sampled: u8,
+    /// Number of samples of shapes of odd width, which are off their places by half a step: from the last sample backwards, where there
+    /// is room.
+    odd: u8,
 }
 
 impl Tile {
@@ -40,6 +43,7 @@ impl Tile {
         high: (i32::MIN, i32::MIN),
         parts: 0,
         sampled: 0,
+        odd: 0,
     };
 
     #[inline]
@@ -136,6 +140,22 @@ impl TileMap {
             .map(move |&(x, y)| Point::new(corner.0 + i64::from(x), corner.1 + i64::from(y)))
     }
 
+    /// Centres remembered of a tile, those of odd shapes too (half steps).
+    pub(crate) fn all_samples(&self, tile: usize) -> impl Iterator<Item = Point> + '_ {
+        let last = self.last(tile);
+        self.samples(tile).chain(last).chain(self.odd_samples(tile))
+    }
+
+    /// Centres remembered of odd shapes of a tile (half steps).
+    fn odd_samples(&self, tile: usize) -> impl Iterator<Item = Point> + '_ {
+        let (key, Tile { sampled, odd, .. }) = &self.tiles[tile];
+        let corner = self.corner(*key);
+        let first = (SAMPLES - usize::from(*odd)).max(usize::from(*sampled));
+        self.samples[tile][first..]
+            .iter()
+            .map(move |&(x, y)| Point::new(corner.0 + i64::from(x), corner.1 + i64::from(y)))
+    }
+
     /// The last centre met in a tile that has samples (half steps).
     pub(crate) fn last(&self, tile: usize) -> Option<Point> {
         let (key, Tile { sampled, .. }) = &self.tiles[tile];
@@ -174,6 +194,15 @@ impl TileMap {
         self.last[tile] = (x as u16, y as u16);
     }
 
+    #[inline]
+    fn sample_odd(&mut self, tile: usize, x: i64, y: i64) {
+        let Tile { sampled, odd, .. } = &mut self.tiles[tile].1;
+        if usize::from(*sampled) + usize::from(*odd) < SAMPLES {
+            *odd += 1;
+            self.samples[tile][SAMPLES - usize::from(*odd)] = (x as u16, y as u16);
+        }
+    }
+
     /// Count a pillar by its centre; it serves as a sample of the lattice if it is an `even` number of nm wide.
     #[inline]
     pub(crate) fn add(&mut self, centre: Point, even: bool, guess: &mut u32) {
@@ -187,6 +216,8 @@ impl TileMap {
         tile.parts |= 1 << part;
         if even {
             self.sample(number, x, y);
+        } else {
+            self.sample_odd(number, x, y);
         }
     }
 
@@ -219,6 +250,12 @@ impl TileMap {
                 let tile = self.at(sample, &mut guess);
                 let (x, y) = self.within(sample);
                 self.sample(tile, x, y);
+            }
+            for sample in cell.odd_samples(number) {
+                let sample = placement.apply(sample);
+                let tile = self.at(sample, &mut guess);
+                let (x, y) = self.within(sample);
+                self.sample_odd(tile, x, y);
             }
             let from = self.corner(self.tiles[counted].0);
             let sum = &mut self.tiles[counted].1;
@@ -256,10 +293,15 @@ impl TileMap {
             } else {
                 self.last[own]
             };
-            sum.sampled = 0;
+            let odd: Vec<_> = (self.odd_samples(own).chain(other.odd_samples(number)))
+                .map(|place| self.within(place))
+                .collect();
+            let sum = &mut self.tiles[own].1;
+            (sum.sampled, sum.odd) = (0, 0);
             for (x, y) in in_turn.flatten() {
                 self.sample(own, i64::from(x), i64::from(y));
             }
+            odd.into_iter().for_each(|(x, y)| self.sample_odd(own, x, y));
             self.last[own] = last;
             if self.len() > MOST_TILES {
                 return false;

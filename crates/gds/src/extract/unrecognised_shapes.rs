@@ -21,11 +21,15 @@ pub enum Why {
     TooWide,
     /// A circle among squares, or a square among circles.
     OtherShape,
+    /// A cross: pillars of this shape are not simulated.
+    Cross,
+    /// An outline with a hole: pillars of this shape are not simulated.
+    Ring,
 }
 
 impl Why {
     /// All reasons, in the order of [`UnrecognisedShapes::by_why`].
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::OffLattice,
         Self::UnequalSides,
         Self::OddShape,
@@ -33,6 +37,8 @@ impl Why {
         Self::OutsideElements,
         Self::TooWide,
         Self::OtherShape,
+        Self::Cross,
+        Self::Ring,
     ];
 
     /// Words for the reason.
@@ -45,6 +51,8 @@ impl Why {
             Self::OutsideElements => "outside every element",
             Self::TooWide => "wider than the pitch",
             Self::OtherShape => "of another shape than the pillars",
+            Self::Cross => "a cross",
+            Self::Ring => "a ring",
         }
     }
 }
@@ -66,7 +74,13 @@ pub struct UnrecognisedShape {
 pub struct UnrecognisedShapes {
     pub listed: Vec<UnrecognisedShape>,
     /// Number for each of [`Why::ALL`].
-    pub by_why: [u64; 7],
+    pub by_why: [u64; 9],
+    /// Number of those that may be pillars of an element: on its lattice, or no wider than two pitches and not alone.
+    #[serde(skip)]
+    pub in_elements: u64,
+    /// The first of these.
+    #[serde(skip)]
+    pub first: Option<UnrecognisedShape>,
 }
 
 impl UnrecognisedShapes {
@@ -75,8 +89,12 @@ impl UnrecognisedShapes {
         self.by_why.iter().sum()
     }
 
-    pub(super) fn add(&mut self, oddity: UnrecognisedShape, most: usize) {
+    pub(super) fn add(&mut self, oddity: UnrecognisedShape, in_element: bool, most: usize) {
         self.by_why[oddity.why as usize] += 1;
+        if in_element {
+            self.in_elements += 1;
+            self.first.get_or_insert(oddity);
+        }
         if self.listed.len() < most {
             self.listed.push(oddity);
         }

@@ -2,6 +2,7 @@
 
 mod departures;
 mod dxf;
+mod drawn;
 mod folded;
 mod oasis;
 mod pillars;

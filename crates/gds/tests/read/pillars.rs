@@ -2,7 +2,7 @@
 
 use metalith_core::Silent;
 use metalith_gds::Layout;
-use metalith_gds::extract::{ElementSite, ExtractionPlan, Why, extract};
+use metalith_gds::extract::{ElementSite, Extraction, ExtractionPlan, Why, extract};
 use metalith_pillars::{Lattice, LatticeKind, PillarMap, PillarShape, RotatedRectangles};
 use metalith_testing::gds::Gds;
 
@@ -202,7 +202,9 @@ fn upright_rectangles_are_found_among_squares_and_marks() {
         &(|k: i32| [101 + 20 * (k % 7), 101]) as &dyn Fn(i32) -> [i32; 2],
         &|k: i32| [80 + 2 * (k % 100), 90],
     ] {
-        assert!(found(edges, false).is_err());
+        // The squares among them may be on a lattice of their own; the others are counted.
+        let few = |read: Extraction| read.oddities.total() > 5 * read.pillars;
+        assert!(found(edges, false).map_or(true, few));
     }
 }
 
@@ -241,7 +243,7 @@ fn everything_that_is_not_a_pillar_is_listed() {
         within_nm: None,
     };
     let read = extract(&layout(gds.end()), &ExtractionPlan::given(PILLARS, vec![site]), &Silent).unwrap();
-    assert_eq!(read.oddities.by_why, [1; 7]);
+    assert_eq!(read.oddities.by_why, [1, 1, 1, 1, 1, 1, 1, 0, 0]);
     let whys: Vec<_> = read.oddities.listed.iter().map(|o| o.why).collect();
     assert_eq!(
         whys,

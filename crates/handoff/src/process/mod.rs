@@ -258,6 +258,7 @@ impl CheckSpec {
             OutlineForm::Square => self.squares.as_ref(),
             OutlineForm::Circle => self.circles.as_ref(),
             OutlineForm::Polygon => self.rectangles.as_ref(),
+            OutlineForm::Mixed => None,
         }
     }
 

@@ -31,7 +31,18 @@ pub struct Lattice {
     kind: LatticeKind,
     pitch: Pitch,
     unit: DatabaseUnit,
+    rows: Rows,
     sites: usize,
+}
+
+/// Distance of the rows of a hexagonal lattice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+enum Rows {
+    /// A whole number of database units, as in designs.
+    #[default]
+    Whole,
+    /// Half the root of three of the pitch, each place rounded for itself: as loops of other programs draw it.
+    Exact,
 }
 
 impl Lattice {
@@ -56,8 +67,22 @@ impl Lattice {
     /// # Errors
     /// As [`Lattice::of_kind`]; also if the pitch of a hexagonal lattice is no multiple of the unit.
     pub fn on_grid(kind: LatticeKind, pitch: Pitch, unit: DatabaseUnit, sites: usize) -> Result<Self> {
+        Self::with_rows(kind, pitch, unit, Rows::Whole, sites)
+    }
+
+    /// A hexagonal lattice of any pitch in a grid of `sites` places an axis whose rows are half the root of three of the pitch
+    /// apart: places in a file of this database unit are rounded one by one.
+    ///
+    /// # Errors
+    /// As [`Lattice::of_kind`].
+    pub fn hexagonal_by_place(pitch: Pitch, unit: DatabaseUnit, sites: usize) -> Result<Self> {
+        Self::with_rows(LatticeKind::Hexagonal, pitch, unit, Rows::Exact, sites)
+    }
+
+    fn with_rows(kind: LatticeKind, pitch: Pitch, unit: DatabaseUnit, rows: Rows, sites: usize) -> Result<Self> {
         let is_hexagonal = kind == LatticeKind::Hexagonal;
-        if pitch == Pitch::whole(0) || (is_hexagonal && !unit.divides(pitch)) {
+        let is_off_grid = is_hexagonal && rows == Rows::Whole && !unit.divides(pitch);
+        if pitch == Pitch::whole(0) || is_off_grid {
             return Err(Error::refused(
                 "lattice/off-grid",
                 format!("a {kind} lattice with a pitch of {pitch} nm on a grid of {unit} nm"),
@@ -82,10 +107,11 @@ impl Lattice {
             kind,
             pitch,
             unit,
+            rows,
             sites,
         };
-        // Squares of distances are held in units of half the grid.
-        if is_hexagonal && lattice.half_index(0).unsigned_abs() * unit.of(pitch) as u64 > MOST_UNITS {
+        // Squares of distances are held in units of half the grid, or of the places.
+        if is_hexagonal && lattice.half_index(0).unsigned_abs() * lattice.units_of_pitch() as u64 / 2 > MOST_UNITS {
             return Err(Error::refused(
                 "lattice/sites",
                 format!("a hexagonal lattice of {sites} places an axis on a grid of {unit} nm"),
@@ -121,9 +147,7 @@ impl Lattice {
         if pitch == Pitch::whole(0) {
             return Self::on_grid(kind, pitch, unit, 1);
         }
-        let halves = 2 * pitch.half();
-        let across = (i64::from(diameter_nm) * Pitch::HALVES_PER_NM + halves - 1) / halves;
-        let across = across as usize;
+        let across = Self::across(diameter_nm, pitch);
         let sites = match kind {
             _ if across == 0 => 0,
             LatticeKind::Square if unit.divides(pitch) && !unit.divides_half(pitch) => across + (across + 1) % 2,
@@ -139,7 +163,30 @@ impl Lattice {
     /// # Errors
     /// As [`Lattice::on_grid`].
     pub fn with_sites(&self, sites: usize) -> Result<Self> {
-        Self::on_grid(self.kind, self.pitch, self.unit, sites)
+        Self::with_rows(self.kind, self.pitch, self.unit, self.rows, sites)
+    }
+
+    /// The smallest lattice like this one that covers a disc of this diameter: see [`Lattice::covering_on_grid`].
+    ///
+    /// # Errors
+    /// As [`Lattice::on_grid`].
+    pub fn covering_disc(&self, diameter_nm: u32) -> Result<Self> {
+        match self.rows {
+            Rows::Whole => Self::covering_on_grid(self.kind, diameter_nm, self.pitch, self.unit),
+            Rows::Exact => self.with_sites(2 * Self::across(diameter_nm, self.pitch) + 1),
+        }
+    }
+
+    /// Pitches in a length, rounded up.
+    fn across(diameter_nm: u32, pitch: Pitch) -> usize {
+        let halves = 2 * pitch.half();
+        ((i64::from(diameter_nm) * Pitch::HALVES_PER_NM + halves - 1) / halves) as usize
+    }
+
+    /// True if the rows of a hexagonal lattice are as far apart as six equal neighbours have them, not a whole number of
+    /// database units.
+    pub fn has_exact_rows(&self) -> bool {
+        self.rows == Rows::Exact
     }
 
     /// Arrangement of the sites.
@@ -169,7 +216,10 @@ impl Lattice {
 
     /// Distance of two rows (nm).
     pub fn row_nm(&self) -> f64 {
-        self.kind.row_nm(self.pitch, self.unit)
+        match self.rows {
+            Rows::Whole => self.kind.row_nm(self.pitch, self.unit),
+            Rows::Exact => 0.75f64.sqrt() * self.pitch.nm(),
+        }
     }
 
     /// Number of places of the grid along an axis; on a square lattice each is a site.

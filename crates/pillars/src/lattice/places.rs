@@ -1,6 +1,6 @@
 //! Places of a lattice: from the centre, on the grid of a file, and their distances as whole numbers.
 
-use super::{Lattice, LatticeKind};
+use super::{Lattice, LatticeKind, Rows};
 use crate::Pitch;
 
 impl Lattice {
@@ -11,6 +11,10 @@ impl Lattice {
             (LatticeKind::Square, _) => self.half_index(i) * self.pitch.half(),
             // An odd number of places: twice the place is even.
             (LatticeKind::Hexagonal, 0) => self.half_index(i) / 2 * self.pitch.half(),
+            (LatticeKind::Hexagonal, _) if self.rows == Rows::Exact => {
+                let rows = (self.half_index(i) / 2) as f64;
+                (rows * self.row_nm() * Pitch::HALVES_PER_NM as f64).round() as i64
+            }
             (LatticeKind::Hexagonal, _) => {
                 let row = LatticeKind::row_units(self.pitch, self.unit);
                 self.half_index(i) / 2 * row * (Pitch::HALVES_PER_NM / self.unit.per_nm())
@@ -49,6 +53,9 @@ impl Lattice {
 
     /// Largest distance along an axis of a place in a file from the place on the lattice (nm); zero where all are on the grid.
     pub fn rounding_nm(&self) -> f64 {
+        if self.rows == Rows::Exact {
+            return 0.5 * self.unit.nm();
+        }
         let off = |axis, i| (self.drawn_nm(axis, i) - self.place_nm(axis, i)).abs();
         // Remainders repeat after so many places at most.
         let places = self.sites.min(2 * Pitch::HALVES_PER_NM as usize);
@@ -73,6 +80,7 @@ impl Lattice {
     pub fn units2(&self, ix: usize, iy: usize) -> i64 {
         match self.kind {
             LatticeKind::Square => self.half_radius2(ix, iy),
+            LatticeKind::Hexagonal if self.rows == Rows::Exact => self.place(0, ix).pow(2) + self.place(1, iy).pow(2),
             LatticeKind::Hexagonal => {
                 let steps = [
                     self.unit.of(self.pitch),
@@ -92,7 +100,13 @@ impl Lattice {
                 let (d, p) = (d * i128::from(Pitch::HALVES_PER_NM), 2 * i128::from(self.pitch.half()));
                 (d * d / (p * p)) as i64
             }
-            LatticeKind::Hexagonal => (d * i128::from(self.unit.per_nm())).pow(2).min(i64::MAX.into()) as i64,
+            LatticeKind::Hexagonal => {
+                let per_radius = match self.rows {
+                    Rows::Whole => self.unit.per_nm(),
+                    Rows::Exact => Pitch::HALVES_PER_NM / 2,
+                };
+                (d * i128::from(per_radius)).pow(2).min(i64::MAX.into()) as i64
+            }
         }
     }
 
@@ -100,16 +114,18 @@ impl Lattice {
     pub fn units_of_pitch(&self) -> i64 {
         match self.kind {
             LatticeKind::Square => 2,
+            LatticeKind::Hexagonal if self.rows == Rows::Exact => 2 * self.pitch.half(),
             LatticeKind::Hexagonal => 2 * self.unit.of(self.pitch),
         }
     }
 
-    /// A length of which distances along both axes are whole numbers: half a pitch, or half a database unit on a hexagonal
-    /// lattice (nm).
+    /// A length of which distances along both axes are whole numbers: half a pitch, or on a hexagonal lattice half a database
+    /// unit, or a step of [`Pitch::HALVES_PER_NM`] where rows are no whole number of units (nm).
     #[inline]
     pub fn unit_nm(&self) -> f64 {
         match self.kind {
             LatticeKind::Square => 0.5 * self.pitch.nm(),
+            LatticeKind::Hexagonal if self.rows == Rows::Exact => 1.0 / Pitch::HALVES_PER_NM as f64,
             LatticeKind::Hexagonal => 0.5 * self.unit.nm(),
         }
     }

@@ -1,0 +1,223 @@
+//! Pillars as other programs draw them: corners and places rounded to the grid one by one.
+
+use metalith_core::Silent;
+use metalith_gds::Layout;
+use metalith_gds::extract::{Extraction, ExtractionPlan, Why, extract};
+use metalith_pillars::{LatticeKind, PillarShape, SquaresAndCircles};
+use metalith_testing::gds::Gds;
+
+use super::{PILLARS, layout};
+
+/// Places of a lens of so many rows on either side of the middle (nm): rows of a hexagonal lattice are shifted by half a pitch.
+fn places(rows: i32, pitch: f64, is_hexagonal: bool) -> Vec<[f64; 2]> {
+    let (row, shift) = if is_hexagonal {
+        (pitch * 0.75f64.sqrt(), pitch / 2.0)
+    } else {
+        (pitch, 0.0)
+    };
+    let all = (-rows..=rows).flat_map(|j| (-rows..=rows).map(move |i| (f64::from(i), j)));
+    let at = all.map(|(i, j)| [i * pitch + f64::from(j.rem_euclid(2)) * shift, f64::from(j) * row]);
+    let reach = f64::from(rows) * row + 1.0;
+    at.filter(|[x, y]| x.hypot(*y) < reach).collect()
+}
+
+/// Corners of a polygon of so many, about the middle.
+fn regular(corners: u32, radius: f64) -> Vec<[f64; 2]> {
+    let corner = |k: u32| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(corners)).sin_cos();
+        [radius * cos, radius * sin]
+    };
+    (0..corners).map(corner).collect()
+}
+
+fn rectangle(width: f64, height: f64, degrees: f64) -> Vec<[f64; 2]> {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let signs = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];
+    let corner = |[x, y]: [f64; 2]| [cos * x * width - sin * y * height, sin * x * width + cos * y * height];
+    signs.map(corner).into()
+}
+
+/// A closed outline at a place, each corner rounded to units of so many nanometres.
+fn put(gds: &mut Gds, corners: &[[f64; 2]], [x, y]: [f64; 2], unit_nm: f64) {
+    let rounded = |v: f64| (v / unit_nm).round() as i32;
+    let mut points: Vec<(i32, i32)> = corners.iter().map(|c| (rounded(x + c[0]), rounded(y + c[1]))).collect();
+    points.push(points[0]);
+    gds.polygon(1, &points);
+}
+
+fn drawn(unit_nm: f64, each: impl Fn(&mut Gds)) -> Extraction {
+    let mut gds = Gds::library_with_unit(unit_nm * 1e-9);
+    gds.cell("TOP");
+    each(&mut gds);
+    gds.end_cell();
+    read(&layout(gds.end()))
+}
+
+fn read(file: &Layout) -> Extraction {
+    extract(file, &ExtractionPlan::discover(PILLARS), &Silent).unwrap()
+}
+
+/// All are pillars, on a lattice of this pitch.
+fn assert_all(read: &Extraction, count: usize, pitch_nm: f64, kind: LatticeKind) {
+    assert_eq!((read.pillars, read.oddities.total()), (count as u64, 0), "{pitch_nm}");
+    let lattice = read.elements[0].site.lattice;
+    assert_eq!(
+        (read.elements.len(), lattice.pitch_nm().nm(), lattice.kind()),
+        (1, pitch_nm, kind)
+    );
+}
+
+/// Circles of any number of corners about places that a loop works out, on grids of 1 nm and of 0.1 nm, the middle beside the grid.
+#[test]
+fn hexagonal_lattices_by_a_loop_are_read() {
+    for (pitch, corners, unit_nm, off) in [
+        (400.0, 24, 1.0, 0.0),
+        (400.0, 64, 0.1, 0.0),
+        (433.3, 17, 1.0, 0.4),
+        (325.0, 8, 1.0, 123.46),
+        (443.0, 9, 0.5, 7.3),
+    ] {
+        let places = places(24, pitch, true);
+        let read = drawn(unit_nm, |gds| {
+            for [x, y] in &places {
+                put(gds, &regular(corners, 100.0), [x + off, y - 3.0 * off], unit_nm);
+            }
+        });
+        assert_all(&read, places.len(), pitch, LatticeKind::Hexagonal);
+        let row_nm = read.elements[0].site.lattice.row_nm();
+        assert!((row_nm - pitch * 0.75f64.sqrt()).abs() < 1e-9, "{row_nm}");
+    }
+}
+
+/// Squares of any width at pitches that are no multiples of the grid: each as wide as it was before rounding, to the rounding of
+/// two corners. What is more than that off is another shape.
+#[test]
+fn squares_are_read_to_half_a_step_a_corner() {
+    for (pitch, off) in [(333.3, 0.0), (351.0, 0.37), (350.0, 0.4567), (433.3, 0.0)] {
+        let places = places(12, pitch, false);
+        let width = |k: usize| 120.0 + 3.0 * (k % 30) as f64 + 0.3;
+        let read = drawn(1.0, |gds| {
+            for (k, [x, y]) in places.iter().enumerate() {
+                put(gds, &rectangle(width(k), width(k), 0.0), [x + off, y + off], 1.0);
+            }
+        });
+        assert_all(&read, places.len(), pitch, LatticeKind::Square);
+        let numbers = read.elements[0].widths.number.iter().filter(|n| **n > 0);
+        for (k, number) in numbers.enumerate() {
+            assert!(
+                (f64::from(*number) - width(k)).abs() <= 1.0,
+                "{number} for {}",
+                width(k)
+            );
+        }
+    }
+    // On the sites of an exact lattice: 150 x 151, 122 x 120 about the middle of 121 x 121, and more than that.
+    let places = places(6, 350.0, false);
+    for (width, height, want) in [(150, 151, Some(151)), (122, 120, Some(121)), (150, 153, None)] {
+        let read = drawn(1.0, |gds| {
+            for (k, [x, y]) in places.iter().enumerate() {
+                let (w, h) = if k == 60 { (width, height) } else { (140, 140) };
+                let (x, y) = (*x as i32 - w / 2, *y as i32 - h / 2);
+                gds.rect(1, x, y, x + w, y + h);
+            }
+        });
+        let unequal = read.oddities.by_why[Why::UnequalSides as usize];
+        assert_eq!(unequal, u64::from(want.is_none()), "{width} x {height}");
+        let other = read.elements[0].widths.number.iter().find(|n| ![0, 140].contains(*n));
+        assert_eq!(other.copied(), want, "{width} x {height}");
+    }
+}
+
+/// Rectangles of one size at any angle, to what their corners tell.
+#[test]
+fn rectangles_at_any_angle_are_read() {
+    let places = places(10, 400.0, false);
+    let degrees = |k: usize| 0.1125 * k as f64 * 3.0;
+    let read = drawn(1.0, |gds| {
+        for (k, place) in places.iter().enumerate() {
+            put(gds, &rectangle(100.0, 300.0, degrees(k)), *place, 1.0);
+        }
+    });
+    assert_all(&read, places.len(), 400.0, LatticeKind::Square);
+    let pillars = read.shape.rotated().unwrap();
+    let numbers = read.elements[0].widths.number.iter().filter(|n| **n > 0);
+    for (k, number) in numbers.enumerate() {
+        let off = pillars.rotation(*number).to_degrees() - degrees(k);
+        let off = off - 180.0 * (off / 180.0).round();
+        // Two corners that give way by half a step turn the longer edge by 0.19 degrees; a step of numbers is 0.1.
+        assert!(off.abs() < 0.3, "{k}: {off}");
+    }
+}
+
+/// A cell that is placed at an angle, and its shapes turned one by one: the lens in its own rows.
+#[test]
+fn lenses_at_an_angle_are_read() {
+    for (is_hexagonal, degrees, pitch) in [
+        (false, 30.0, 350.0),
+        (false, 45.0, 350.0),
+        (true, 17.0, 400.0),
+        (true, 30.0, 400.0),
+    ] {
+        let places = places(16, pitch, is_hexagonal);
+        let outline = if is_hexagonal {
+            regular(32, 90.0)
+        } else {
+            rectangle(160.0, 160.0, 0.0)
+        };
+        let mut gds = Gds::library();
+        gds.cell("LENS");
+        places.iter().for_each(|place| put(&mut gds, &outline, *place, 1.0));
+        gds.end_cell();
+        gds.cell("TOP")
+            .placed("LENS", 40_000, -70_000, false, 1.0, degrees)
+            .end_cell();
+        let (sin, cos) = f64::to_radians(degrees).sin_cos();
+        let turn = |[x, y]: [f64; 2]| [cos * x - sin * y, sin * x + cos * y];
+        let turned: Vec<[f64; 2]> = outline.iter().map(|c| turn(*c)).collect();
+        let flat = drawn(1.0, |gds| places.iter().for_each(|p| put(gds, &turned, turn(*p), 1.0)));
+        let kind = if is_hexagonal {
+            LatticeKind::Hexagonal
+        } else {
+            LatticeKind::Square
+        };
+        for read in [read(&layout(gds.end())), flat] {
+            assert_all(&read, places.len(), pitch, kind);
+            let turned = read.turned_deg.unwrap();
+            let fold = if is_hexagonal { 60.0 } else { 90.0 };
+            let off = turned - degrees - fold * ((turned - degrees) / fold).round();
+            assert!(off.abs() < 0.01, "{turned} for {degrees}");
+        }
+    }
+}
+
+/// Squares and circles in one lens, and crosses and rings among them, which are counted by their names.
+#[test]
+fn squares_and_circles_stand_in_one_lens() {
+    let places = places(10, 400.0, false);
+    let cross =
+        [(-20, -60), (20, -60), (20, -20), (60, -20), (60, 20), (20, 20)].map(|(x, y)| [f64::from(x), f64::from(y)]);
+    let cross: Vec<[f64; 2]> = cross.into_iter().chain(cross.map(|[x, y]| [-x, -y])).collect();
+    let outer = regular(24, 90.0);
+    let inner: Vec<[f64; 2]> = regular(24, 40.0).into_iter().rev().collect();
+    let ring: Vec<[f64; 2]> = (outer.iter().chain(&outer[..1]).chain(&inner[23..]).chain(&inner))
+        .copied()
+        .collect();
+    let read = drawn(1.0, |gds| {
+        for (k, place) in places.iter().enumerate() {
+            match k {
+                100..103 => put(gds, &cross, *place, 1.0),
+                200..202 => put(gds, &ring, *place, 1.0),
+                _ if k % 2 == 0 => put(gds, &regular(24, 75.0), *place, 1.0),
+                _ => put(gds, &rectangle(140.0, 140.0, 0.0), *place, 1.0),
+            }
+        }
+    });
+    assert_eq!(read.shape, PillarShape::Mixed);
+    assert_eq!(read.pillars, places.len() as u64 - 5);
+    assert_eq!(read.oddities.by_why[Why::Cross as usize], 3);
+    assert_eq!(read.oddities.by_why[Why::Ring as usize], 2);
+    assert_eq!(read.oddities.in_elements, 5);
+    let numbers = read.elements[0].widths.number.iter().filter(|n| **n > 0);
+    let circle = SquaresAndCircles::number(true, 150).unwrap().0;
+    assert!(numbers.copied().all(|n| n == 140 || n == circle));
+}
