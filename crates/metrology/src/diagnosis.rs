@@ -67,8 +67,11 @@ pub struct ErrorReport {
     pub measure: String,
     pub before: ErrorPair,
     pub after: ErrorPair,
-    /// Root mean square by which repeats differ; none where there are none.
+    /// Root mean square that noise makes alone: by repeats, or by neighbours within a measurement; none where neither states it.
     pub noise_floor: Option<f64>,
+    /// Root mean square by which the model errs; none where it is exact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model_error: Option<f64>,
 }
 
 /// The answer for a set.
@@ -102,7 +105,7 @@ pub struct NotInModel {
     pub why: String,
 }
 
-/// The residual is explained up to this multiple of the difference of repeats.
+/// The residual is explained up to this multiple of the noise.
 const EXPLAINED: f64 = 1.5;
 
 /// Most groups that a line names.
@@ -115,10 +118,43 @@ pub(crate) struct SetFacts<'a> {
     pub(crate) measure: &'a str,
     /// Names of the measurements.
     pub(crate) names: Vec<String>,
-    pub(crate) noise_floor: Option<f64>,
     /// True if many measurements tell of an effect that is far below the difference of repeats.
     pub(crate) averages: bool,
     pub(crate) remarks: &'a [String],
+}
+
+impl ErrorReport {
+    /// Verdict on a set without any effect, or with those that were found. Many measurements may show an effect that is far below
+    /// their noise (`averages`).
+    fn verdict(&self, nothing_found: bool, averages: bool) -> SetVerdict {
+        let noise = EXPLAINED * self.noise_floor.unwrap_or(0.0);
+        let noise_or_model = noise.hypot(self.model_error.unwrap_or(0.0));
+        if self.before.fit <= noise_or_model && (nothing_found || !averages) {
+            SetVerdict::NoResidual
+        } else if nothing_found {
+            SetVerdict::Unexplained
+        } else if self.after.held_out <= noise {
+            SetVerdict::Explained
+        } else if self.after.held_out <= noise_or_model {
+            SetVerdict::ExplainedButFor
+        } else {
+            SetVerdict::Partly
+        }
+    }
+
+    /// What the effects leave of measurements that were left out, without the noise: in the unit of the measure, or in per cent.
+    fn remainder(&self) -> String {
+        let (all, noise) = (self.after.held_out, self.noise_floor.unwrap_or(0.0));
+        let left = (all.powi(2) - noise.powi(2)).max(0.0).sqrt();
+        match self
+            .measure
+            .split_once(" (")
+            .map(|(_, unit)| unit.trim_end_matches(')'))
+        {
+            Some("rms") | None => format!("{} % (rms)", sig(100.0 * left, 3)),
+            Some(unit) => format!("{} {unit}", sig(left, 3)),
+        }
+    }
 }
 
 impl Diagnosis {
@@ -195,14 +231,14 @@ impl Diagnosis {
             fit: errors.fitted,
             held_out: errors.held_out.iter().flatten().copied().fold(0.0, f64::max),
         };
-        let verdict = match (found.chosen.is_empty(), facts.noise_floor) {
-            (none, Some(floor)) if first.fitted <= EXPLAINED * floor && (none || !facts.averages) => {
-                SetVerdict::NoResidual
-            }
-            (true, _) => SetVerdict::Unexplained,
-            (_, Some(floor)) if pair(last).held_out <= EXPLAINED * floor => SetVerdict::Explained,
-            _ => SetVerdict::Partly,
+        let error = ErrorReport {
+            measure: facts.measure.into(),
+            before: pair(first),
+            after: pair(last),
+            noise_floor: model.noise(&found.theta),
+            model_error: Some(model.model_error(&found.theta)).filter(|e| *e > 0.0),
         };
+        let verdict = error.verdict(found.chosen.is_empty(), facts.averages);
         let not_fitted = facts.names.iter().zip(&plan.fitted).filter(|(_, f)| !**f);
         let not_fitted: Vec<String> = not_fitted.map(|(n, _)| n.clone()).collect();
         let fitted = facts.names.len() - not_fitted.len();
@@ -237,18 +273,18 @@ impl Diagnosis {
             0 => "none was kept out of the fit: name some by `not_fitted`".into(),
             n => format!("{n} were never fitted; they refuse an effect that predicts them worse"),
         });
+        if error.noise_floor.is_none() {
+            validation.push(
+                "the noise is not known, because nothing was measured twice: a part that remains may be noise".into(),
+            );
+        }
         Self {
             set: facts.title.into(),
             kind: facts.kind.into(),
             verdict,
             remarks: facts.remarks.to_vec(),
             effects: found.chosen.iter().map(of_effect).collect(),
-            error: ErrorReport {
-                measure: facts.measure.into(),
-                before: pair(first),
-                after: pair(last),
-                noise_floor: facts.noise_floor,
-            },
+            error,
             ranking: found
                 .tried
                 .iter()
@@ -305,13 +341,7 @@ impl Diagnosis {
     /// One line for a person.
     pub fn sentence(&self) -> String {
         let list: Vec<String> = self.effects.iter().map(FoundEffect::sentence).collect();
-        let unit = self
-            .error
-            .measure
-            .split_once(" (")
-            .map_or("", |(_, unit)| unit.trim_end_matches(')'));
-        let remainder = format!("{} {unit}", sig(self.error.after.held_out, 3));
-        self.verdict.sentence(&list, &remainder)
+        self.verdict.sentence(&list, &self.error.remainder())
     }
 }
 
@@ -328,5 +358,36 @@ impl FoundEffect {
     /// Values with their unit and intervals.
     pub fn sentence(&self) -> String {
         effect_words(&self.name, &self.value, &self.unit, &self.interval)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(before: f64, after: f64, noise: Option<f64>, model: f64, found: bool) -> SetVerdict {
+        let pair = |error| ErrorPair {
+            fit: error,
+            held_out: error,
+        };
+        let report = ErrorReport {
+            measure: "height (nm rms)".into(),
+            before: pair(before),
+            after: pair(after),
+            noise_floor: noise,
+            model_error: Some(model),
+        };
+        report.verdict(!found, true)
+    }
+
+    #[test]
+    fn a_verdict_compares_what_is_left_with_noise_and_model() {
+        let noise = Some(1.0);
+        assert_eq!(verdict(1.4, 1.4, noise, 0.0, false), SetVerdict::NoResidual);
+        assert_eq!(verdict(31.0, 1.03, noise, 0.0, true), SetVerdict::Explained);
+        assert_eq!(verdict(31.0, 2.0, noise, 2.0, true), SetVerdict::ExplainedButFor);
+        assert_eq!(verdict(31.0, 4.0, noise, 2.0, true), SetVerdict::Partly);
+        assert_eq!(verdict(31.0, 4.0, None, 0.0, true), SetVerdict::Partly);
+        assert_eq!(verdict(31.0, 31.0, noise, 2.0, false), SetVerdict::Unexplained);
     }
 }

@@ -13,6 +13,7 @@
 //! | `declared` | effects of a file, by expressions | |
 //! | `heights` | drawn maps and measured maps: set, model, figures | `pattern`, `declared` |
 //! | `spectra` | reflectance of film stacks: set, model, figures | `pattern`, `declared` |
+//! | `noise` | white noise by second differences | |
 //! | `proposal` | patterns of what no effect explains | `declared`, `heights`, `spectra` |
 //! | `psf_stack` | stacks of point spread functions of reliefs and complex transmissions: set, light, sensor, model, figures | `pattern`, the transforms of `heights` |
 //! | `diagnosis`, `page` | the answer for programs and for people | |
@@ -21,6 +22,7 @@
 mod declared;
 mod diagnosis;
 mod heights;
+mod noise;
 mod page;
 mod pattern;
 mod proposal;

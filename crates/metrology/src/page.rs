@@ -14,7 +14,12 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         format!("Calibration: {}", diagnosis.set),
         format!("measured {}", diagnosis.kind),
     );
-    page.verdict(Verdict::of(diagnosis.verdict.is_explained()), diagnosis.sentence());
+    let verdict = diagnosis.verdict;
+    page.finding(
+        Verdict::of_explained(verdict.is_explained(), verdict.is_partial()),
+        verdict.label(),
+        diagnosis.sentence(),
+    );
     let error = &diagnosis.error;
     let with_unit = |v: f64| format!("{} {unit}", sig(v, 3)).trim().to_owned();
     page.facts(&[

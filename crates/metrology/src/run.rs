@@ -116,8 +116,7 @@ pub fn calibrate(
                 kind: "heights",
                 measure: "height (nm rms)",
                 names: set.fields.iter().map(|f| f.name.clone()).collect(),
-                noise_floor: None,
-                averages: false,
+                averages: true,
                 remarks: &[],
             };
             let plan = model.plan();
@@ -139,7 +138,6 @@ pub fn calibrate(
                     "reflectance (rms)"
                 },
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
-                noise_floor: set.repeat_rms(),
                 averages: false,
                 remarks: &[],
             };
@@ -157,7 +155,6 @@ pub fn calibrate(
                 kind: "widths",
                 measure: "width (nm rms)",
                 names: (1..=set.sites.len()).map(|n| format!("site {n}")).collect(),
-                noise_floor: set.repeat_rms(),
                 averages: true,
                 remarks: &[],
             };
@@ -174,14 +171,13 @@ pub fn calibrate(
             let mut set = StackSet::read(&path)?;
             progress.begin("orientation", 0);
             let prepared = psf_stack::prepare(&mut set)?;
-            let mut model = StackModel::new(&set, &prepared.sampling, prepared.focus_um);
+            let mut model = StackModel::new(&set, &prepared);
             model.keep(&tried(&model.own.effects, &[], only)?);
             let facts = SetFacts {
                 title: &set.title,
                 kind: "psf_stack",
                 measure: "residual over measured norm (rms)",
                 names: set.planes.iter().map(|p| p.name.clone()).collect(),
-                noise_floor: Some(prepared.noise),
                 averages: false,
                 remarks: &set.remarks,
             };

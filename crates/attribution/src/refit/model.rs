@@ -95,6 +95,16 @@ pub trait RefitModel: Sync {
         0.004
     }
 
+    /// Root mean square that noise makes alone; none where nothing states it.
+    fn noise(&self, _theta: &[f64]) -> Option<f64> {
+        None
+    }
+
+    /// Root mean square by which the model itself errs; zero if it is exact.
+    fn model_error(&self, _theta: &[f64]) -> f64 {
+        0.0
+    }
+
     /// Groups in which an effect has to hold.
     fn scope(&self, _effect: usize) -> RefitScope {
         RefitScope::Bench

@@ -53,6 +53,10 @@ impl RefitModel for StackModel<'_> {
         &self.own.effects
     }
 
+    fn noise(&self, _theta: &[f64]) -> Option<f64> {
+        Some(self.noise)
+    }
+
     fn count(&self) -> usize {
         self.set.planes.len()
     }

@@ -459,6 +459,24 @@ impl RefitModel for SpectrumModel<'_> {
         vec![rms(self.mean(spectrum)), rms(&self.set.spectra[spectrum].reflectance)]
     }
 
+    /// By repeats, which show the drift of the instrument too; else by neighbouring wavelengths.
+    fn noise(&self, theta: &[f64]) -> Option<f64> {
+        self.set.repeat_rms().or_else(|| {
+            let fitted = (0..self.count()).filter(|&s| self.set.spectra[s].fitted);
+            let of = |s: usize| {
+                let model = self.predicted(s, theta);
+                let residual: Vec<f64> = self.set.spectra[s]
+                    .reflectance
+                    .iter()
+                    .zip(&model)
+                    .map(|(m, p)| m - p)
+                    .collect();
+                crate::noise::of_line(&residual)
+            };
+            Some(crate::noise::root_mean_square(fitted.map(of))).filter(|noise| *noise > 0.0)
+        })
+    }
+
     fn group_name(&self, way: usize, group: usize) -> String {
         match way {
             0 => heights(self.set)[group].to_string(),
