@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan, RefitScope, SetVerdict};
+use metalith_attribution::{Belonging, RefitErrors, RefitFinding, RefitModel, RefitPlan, RefitScope, SetVerdict};
 use metalith_report::{effect_words, sig};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -19,10 +19,17 @@ pub struct FoundEffect {
     /// 95 % interval of each value.
     pub interval: Value,
     pub parameters: Vec<String>,
-    /// The whole bench, or the kind of group that has separate values.
+    /// The whole bench, the kind of group that has separate values or whose values differ, or one group.
     pub of: String,
-    /// Value in each group alone with all else as it was found: one list for each parameter; empty if each group has its own.
-    pub by_group: Vec<Vec<(String, f64)>>,
+    /// Words on whether the values of groups agree within their intervals; none where each group has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<String>,
+    /// Groups that are predicted worse, when they are left out, than without the effect.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub worse_for: Vec<String>,
+    /// Value in each group alone with all else as it was found, and its 95 % interval: one list for each parameter; empty if each
+    /// group has its own.
+    pub by_group: Vec<Vec<(String, f64, [f64; 2])>>,
 }
 
 /// An effect as it was tried last.
@@ -165,13 +172,24 @@ impl Diagnosis {
             Ok([one]) => one,
             Err(list) => Value::Array(list),
         };
-        let of_effect = |&e: &usize| {
+        let objects = model.objects();
+        let kind = plan.ways.get(objects).map_or("group", |way| way.name.as_str());
+        let group_name = |group: usize| model.group_name(objects, group);
+        let of_effect = |(place, &e): (usize, &usize)| {
             let own = &effects[e];
             let values = own.slots.iter().map(|&s| json!(shown(s, found.theta[s])));
             let intervals = own.slots.iter().map(|&s| match found.intervals[s] {
                 Some(ends) => json!(ends.map(|v| shown(s, v))),
                 None => Value::Null,
             });
+            let (of, agreement) = match (model.scope(e), own.across) {
+                (RefitScope::One { way, group }, _) => (model.group_name(way, group), None),
+                (_, Some(way)) => (plan.ways[way].name.clone(), None),
+                _ => {
+                    let (of, words) = belonging_words(&found.belongings[place], kind, group_name);
+                    (of, Some(words))
+                }
+            };
             FoundEffect {
                 name: own.name.clone(),
                 value: one_or_list(values.collect()),
@@ -183,14 +201,19 @@ impl Diagnosis {
                     .iter()
                     .filter_map(|slot| {
                         let (_, groups) = found.by_group.iter().find(|(s, _)| s == slot)?;
-                        let named = groups.iter().map(|(g, v)| (model.group_name(0, *g), shown(*slot, *v)));
+                        let named = groups.iter().map(|g| {
+                            (
+                                group_name(g.group),
+                                shown(*slot, g.value),
+                                g.interval.map(|v| shown(*slot, v)),
+                            )
+                        });
                         Some(named.collect())
                     })
                     .collect(),
-                of: match (model.scope(e), own.across) {
-                    (RefitScope::One { way, group }, _) => model.group_name(way, group),
-                    (_, across) => across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
-                },
+                worse_for: found.worse[place].iter().map(|g| group_name(*g)).collect(),
+                of,
+                agreement,
             }
         };
         let names = model.figure_names();
@@ -283,7 +306,7 @@ impl Diagnosis {
             kind: facts.kind.into(),
             verdict,
             remarks: facts.remarks.to_vec(),
-            effects: found.chosen.iter().map(of_effect).collect(),
+            effects: found.chosen.iter().enumerate().map(of_effect).collect(),
             error,
             ranking: found
                 .tried
@@ -310,6 +333,7 @@ impl Diagnosis {
 
     /// Errors before and after each effect, and why others were refused, line by line.
     pub fn ladder_lines(&self) -> Vec<String> {
+        let belongs = self.effects.iter().filter_map(FoundEffect::belongs);
         let line = |step: &LadderStep| {
             let name = step
                 .effect
@@ -335,13 +359,40 @@ impl Diagnosis {
             }
         };
         let proposed = self.proposals.iter().map(Proposal::sentence);
-        self.ladder.iter().map(line).chain(proposed).collect()
+        self.ladder.iter().map(line).chain(belongs).chain(proposed).collect()
     }
 
     /// One line for a person.
     pub fn sentence(&self) -> String {
         let list: Vec<String> = self.effects.iter().map(FoundEffect::sentence).collect();
         self.verdict.sentence(&list, &self.error.remainder())
+    }
+}
+
+/// What an effect belongs to, and how the values of the groups of a kind compare.
+fn belonging_words(belonging: &Belonging, kind: &str, name: impl Fn(usize) -> String) -> (String, String) {
+    match belonging {
+        Belonging::Bench => (
+            "bench".into(),
+            format!("the values of each {kind} agree within their intervals"),
+        ),
+        Belonging::Groups => (
+            kind.into(),
+            format!(
+                "the values of each {kind} differ by more than their intervals: an effect of each {kind}, or an error of the model"
+            ),
+        ),
+        Belonging::One(group) => {
+            let own = format!("{kind} {}", name(*group));
+            (own.clone(), format!("the intervals of all but {own} include no effect"))
+        }
+        Belonging::AllBut(group) => (
+            "bench".into(),
+            format!(
+                "the values of each {kind} but {} agree within their intervals",
+                name(*group)
+            ),
+        ),
     }
 }
 
@@ -355,6 +406,16 @@ fn unit(units: &[&str]) -> String {
 }
 
 impl FoundEffect {
+    /// One line on what it belongs to; none where that is in its name.
+    pub fn belongs(&self) -> Option<String> {
+        let agreement = self.agreement.as_ref()?;
+        let worse = match self.worse_for.as_slice() {
+            [] => String::new(),
+            worse => format!("; it predicts {} worse", worse.join(", ")),
+        };
+        Some(format!("{} is of the {}: {agreement}{worse}", self.name, self.of))
+    }
+
     /// Values with their unit and intervals.
     pub fn sentence(&self) -> String {
         effect_words(&self.name, &self.value, &self.unit, &self.interval)

@@ -31,6 +31,14 @@ pub(crate) fn of_map(residual: &Array2<f64>) -> f64 {
     of_differences(differences.collect(), 6.0)
 }
 
+/// Number of neighbouring points that err together: the sum of the autocorrelation up to its first zero.
+pub(crate) fn correlated_points(residual: &[f64]) -> f64 {
+    let product = |lag: usize| -> f64 { residual.iter().zip(&residual[lag..]).map(|(a, b)| a * b).sum() };
+    let all = product(0).max(f64::MIN_POSITIVE);
+    let lags = (1..residual.len()).map(|lag| product(lag) / all);
+    1.0 + 2.0 * lags.take_while(|share| *share > 0.0).sum::<f64>()
+}
+
 /// Root of the mean square.
 pub(crate) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0.0), |(sum, n), v| (sum + v * v, n + 1.0));

@@ -2,7 +2,7 @@
 
 use metalith_report::{Axis, Cell, Chart, Column, Page, Ranking, Table, Verdict, number_words, sig};
 
-use crate::diagnosis::Diagnosis;
+use crate::diagnosis::{Diagnosis, FoundEffect};
 use crate::proposal::Proposal;
 
 /// Most groups whose values a row shows.
@@ -46,7 +46,7 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
                 Cell::code(&e.name),
                 format!("{} {}", number_words(&e.value), e.unit).as_str().into(),
                 number_words(&e.interval).as_str().into(),
-                e.of.as_str().into(),
+                belongs_to(e).as_str().into(),
                 by_group(&e.by_group).as_str().into(),
             ]);
         }
@@ -79,14 +79,27 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
     page
 }
 
+/// What an effect belongs to, why, and which groups it makes worse.
+fn belongs_to(effect: &FoundEffect) -> String {
+    let mut out = effect.of.clone();
+    if let Some(agreement) = &effect.agreement {
+        out = format!("{out}: {agreement}");
+    }
+    if !effect.worse_for.is_empty() {
+        out = format!("{out}; worse with it: {}", effect.worse_for.join(", "));
+    }
+    out
+}
+
 /// Values in each group alone: of each parameter, groups with their values.
-fn by_group(parameters: &[Vec<(String, f64)>]) -> String {
-    let of_one = |own: &Vec<(String, f64)>| {
-        let each = own
-            .iter()
-            .take(MOST_GROUPS)
-            .map(|(name, v)| format!("{name}: {}", sig(*v, 3)));
-        each.collect::<Vec<_>>().join(", ")
+fn by_group(parameters: &[Vec<(String, f64, [f64; 2])>]) -> String {
+    let of_one = |own: &Vec<(String, f64, [f64; 2])>| {
+        let each = own.iter().take(MOST_GROUPS);
+        let each = each
+            .map(|(name, v, [low, high])| format!("{name}: {} ({} to {})", sig(*v, 3), sig(*low, 3), sig(*high, 3)));
+        let more = own.len().saturating_sub(MOST_GROUPS);
+        let more = (more > 0).then(|| format!("and {more} more"));
+        each.chain(more).collect::<Vec<_>>().join(", ")
     };
     parameters.iter().map(of_one).collect::<Vec<_>>().join("; ")
 }

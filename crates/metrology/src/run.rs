@@ -127,6 +127,7 @@ pub fn calibrate(
         SetKind::Spectra => {
             let set = SpectrumSet::read(&path)?;
             let mut model = SpectrumModel::new(&set);
+            model.check()?;
             model.declare(&declared_for(&OF_SPECTRA)?)?;
             model.effects = tried(&model.effects, &spectra::CONDITIONAL, only)?;
             let facts = SetFacts {

@@ -23,7 +23,7 @@ pub(crate) fn figures(page: &mut Page, set: &SpectrumSet, model: &SpectrumModel<
         let (mean, predicted) = (model.mean(first), model.predicted(first, theta));
         let along = |values: Vec<f64>| set.wavelengths_nm.iter().copied().zip(values).collect::<Vec<_>>();
         let (medium, _) = &set.media[spectrum.medium];
-        let title = format!("{} nm, {medium}", spectrum.height_nm);
+        let title = format!("{} nm, {medium}", spectrum.size_nm);
         let axis = || Axis::linear("wavelength", "nm");
         let mut spectra = Chart::new(title.clone(), axis(), Axis::linear(measured, "")).size(460.0, 300.0);
         spectra.line("measured, mean of repeats", along(mean.to_vec()));
