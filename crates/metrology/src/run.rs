@@ -128,6 +128,7 @@ pub fn calibrate(
             let set = SpectrumSet::read(&path)?;
             let mut model = SpectrumModel::new(&set);
             model.check()?;
+            let remarks = model.remarks();
             model.declare(&declared_for(&OF_SPECTRA)?)?;
             model.effects = tried(&model.effects, &spectra::CONDITIONAL, only)?;
             let facts = SetFacts {
@@ -140,7 +141,7 @@ pub fn calibrate(
                 },
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
                 averages: false,
-                remarks: &[],
+                remarks: &remarks,
             };
             let plan = model.plan();
             answer(model, &plan, &facts, ("", out), progress, |model, page, theta| {

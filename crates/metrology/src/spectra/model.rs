@@ -42,6 +42,9 @@ const LAYERS: usize = 8;
 /// Parameters of a layer. Pillars have a taper in place of an extinction, and a residual film after all layers.
 const OF_A_LAYER: usize = 4;
 
+/// Fewest wavelengths of a pad that are used.
+const FEWEST_USED: f64 = 8.0;
+
 /// Largest bias of the widths of pillars (nm).
 const MOST_BIAS_NM: f64 = 60.0;
 
@@ -66,6 +69,8 @@ pub struct SpectrumModel<'a> {
     steps: Vec<f64>,
     /// Mean of the repeats that each spectrum is one of.
     means: Vec<Vec<f64>>,
+    /// Wavelengths of each spectrum that are fitted and judged.
+    used: Vec<Vec<bool>>,
     /// Solutions of pads of pillars.
     bank: Option<(&'a StatedPads, PadBank<'a>)>,
     declared: DeclaredSlots,
@@ -242,6 +247,8 @@ impl<'a> SpectrumModel<'a> {
                 first[s] = own[0];
             });
         }
+        let bank = set.pads.as_ref().map(|pads| (pads, PadBank::new(set, pads, SCALED_BY)));
+        let used = wavelengths_used(set, bank.as_ref().map(|(_, bank)| bank), &first);
         let sizes = sizes(set);
         let group = |s: &Spectrum| sizes.iter().position(|h| *h == s.size_nm).unwrap_or(0);
         let groups = set.spectra.iter().map(group).collect();
@@ -251,7 +258,8 @@ impl<'a> SpectrumModel<'a> {
             effects,
             steps,
             means,
-            bank: set.pads.as_ref().map(|pads| (pads, PadBank::new(set, pads, SCALED_BY))),
+            used,
+            bank,
             declared: DeclaredSlots::default(),
             first,
             groups,
@@ -353,13 +361,54 @@ impl<'a> SpectrumModel<'a> {
     /// If they cannot.
     pub(crate) fn check(&self) -> metalith_core::Result<()> {
         let Some((_, bank)) = &self.bank else { return Ok(()) };
+        let (path, refused) = (self.set.path.display(), metalith_core::Error::refused);
         bank.can_be_solved().map_err(|error| {
-            metalith_core::Error::refused(
+            refused(
                 "calibrate/pads-unsolvable",
-                format!("{}: the pillars cannot be solved: {error}", self.set.path.display()),
+                format!("{path}: the pillars cannot be solved: {error}"),
                 "check `pitch_nm`, `height_nm` and the materials of the layer of pillars",
             )
+        })?;
+        let few = (0..self.used.len()).find(|&s| self.points(s) < FEWEST_USED);
+        few.map_or(Ok(()), |s| {
+            let width_nm = self.set.spectra[s].size_nm;
+            Err(refused(
+                "calibrate/pads-resonant",
+                format!(
+                    "{path}: pads of {width_nm} nm have fewer than {FEWEST_USED} wavelengths far from guided-mode resonances"
+                ),
+                "extend [range] to longer wavelengths, or leave these pads out",
+            ))
         })
+    }
+
+    /// Words on wavelengths that are not used.
+    pub(crate) fn remarks(&self) -> Vec<String> {
+        let all: usize = self.used.iter().map(Vec::len).sum();
+        let used = self.used.iter().flatten().filter(|used| **used).count();
+        let words = format!(
+            "{} of {all} points are not used: near guided-mode resonances the power of pads changes too much from one width to the next to be interpolated",
+            all - used
+        );
+        (used < all).then_some(words).into_iter().collect()
+    }
+
+    /// Wavelengths of a spectrum that are used.
+    pub(crate) fn used(&self, spectrum: usize) -> &[bool] {
+        &self.used[spectrum]
+    }
+
+    /// Values at the wavelengths that are used.
+    fn of_used(&self, spectrum: usize, values: &[f64]) -> Vec<f64> {
+        let all = values.iter().zip(&self.used[spectrum]);
+        all.filter(|(_, used)| **used).map(|(v, _)| *v).collect()
+    }
+
+    /// Measured values less the prediction of a spectrum, where they are used.
+    fn residual(&self, spectrum: usize, measured: &[f64], theta: &[f64]) -> Vec<f64> {
+        let model = self.predicted(spectrum, theta);
+        let off: Vec<f64> = measured.iter().zip(&model).map(|(m, p)| m - p).collect();
+        self.of_used(spectrum, &off)
     }
 
     fn stack(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
@@ -468,6 +517,20 @@ fn sizes(set: &SpectrumSet) -> Vec<f64> {
     sizes
 }
 
+/// Wavelengths of each spectrum that are used: of films, all; of pads, those far from resonances.
+fn wavelengths_used(set: &SpectrumSet, bank: Option<&PadBank<'_>>, first: &[usize]) -> Vec<Vec<bool>> {
+    let mut out: Vec<Vec<bool>> = Vec::new();
+    for (s, own) in set.spectra.iter().enumerate() {
+        let used = match bank {
+            None => vec![true; set.wavelengths_nm.len()],
+            Some(_) if first[s] < s => out[first[s]].clone(),
+            Some(bank) => bank.smooth(own.medium, own.size_nm),
+        };
+        out.push(used);
+    }
+    out
+}
+
 /// Widest range of a bias (nm) in which all pillars are wider than nothing and narrower than their distance.
 fn bias_range(set: &SpectrumSet, pads: &StatedPads) -> (f64, f64) {
     let sizes = sizes(set);
@@ -512,8 +575,8 @@ impl RefitModel for SpectrumModel<'_> {
         self.set.spectra.len()
     }
 
-    fn points(&self, _: usize) -> f64 {
-        self.set.wavelengths_nm.len() as f64
+    fn points(&self, spectrum: usize) -> f64 {
+        self.used[spectrum].iter().filter(|used| **used).count() as f64
     }
 
     fn equations(&self, spectrum: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
@@ -539,6 +602,7 @@ impl RefitModel for SpectrumModel<'_> {
             columns.push(changed.iter().zip(&base).map(|(c, b)| (c - b) / step).collect());
         }
         columns.push(measured.iter().zip(&base).map(|(m, b)| m - b).collect());
+        let columns: Vec<Vec<f64>> = columns.iter().map(|c| self.of_used(spectrum, c)).collect();
         let product = |i: usize, j: usize| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum();
         RefitEquations::alike(DMatrix::from_fn(columns.len(), columns.len(), product))
     }
@@ -552,18 +616,13 @@ impl RefitModel for SpectrumModel<'_> {
     }
 
     fn figures(&self, spectrum: usize, theta: &[f64]) -> Vec<f64> {
-        let base = self.predicted(spectrum, theta);
-        let rms = |to: &[f64]| {
-            let squares: f64 = to.iter().zip(&base).map(|(a, b)| (a - b).powi(2)).sum();
-            (squares / base.len() as f64).sqrt()
-        };
+        let rms = |to: &[f64]| crate::noise::root_mean_square(self.residual(spectrum, to, theta).into_iter());
         vec![rms(self.mean(spectrum)), rms(&self.set.spectra[spectrum].reflectance)]
     }
 
     /// A residual goes on over neighbouring wavelengths, and repeats of an object share it.
     fn correlated_points(&self, spectrum: usize, theta: &[f64]) -> f64 {
-        let model = self.predicted(spectrum, theta);
-        let residual: Vec<f64> = self.mean(spectrum).iter().zip(&model).map(|(m, p)| m - p).collect();
+        let residual = self.residual(spectrum, self.mean(spectrum), theta);
         let own = self.first[spectrum];
         let repeats = (0..self.count()).filter(|&s| self.first[s] == own && self.set.spectra[s].fitted);
         crate::noise::correlated_points(&residual) * repeats.count().max(1) as f64
@@ -572,9 +631,12 @@ impl RefitModel for SpectrumModel<'_> {
     fn model_error(&self, theta: &[f64]) -> f64 {
         let Some((pads, bank)) = &self.bank else { return 0.0 };
         let repeats = self.set.repeats();
-        let objects: Vec<_> = { repeats.iter() }
-            .map(|own| (self.set.spectra[own[0]].medium, self.pillar(pads, own[0], theta)))
-            .collect();
+        let object = |own: &Vec<usize>| {
+            let first = own[0];
+            let medium = self.set.spectra[first].medium;
+            (medium, self.pillar(pads, first, theta), self.used(first))
+        };
+        let objects: Vec<_> = repeats.iter().map(object).collect();
         bank.error(&objects, [1, 2].map(|k| theta[LAYERS + OF_A_LAYER * pads.layer + k]))
     }
 
@@ -582,16 +644,7 @@ impl RefitModel for SpectrumModel<'_> {
     fn noise(&self, theta: &[f64]) -> Option<f64> {
         self.set.repeat_rms().or_else(|| {
             let fitted = (0..self.count()).filter(|&s| self.set.spectra[s].fitted);
-            let of = |s: usize| {
-                let model = self.predicted(s, theta);
-                let residual: Vec<f64> = self.set.spectra[s]
-                    .reflectance
-                    .iter()
-                    .zip(&model)
-                    .map(|(m, p)| m - p)
-                    .collect();
-                crate::noise::of_line(&residual)
-            };
+            let of = |s: usize| crate::noise::of_line(&self.residual(s, &self.set.spectra[s].reflectance, theta));
             Some(crate::noise::root_mean_square(fitted.map(of))).filter(|noise| *noise > 0.0)
         })
     }

@@ -42,10 +42,13 @@ pub(crate) fn figures(page: &mut Page, set: &SpectrumSet, model: &SpectrumModel<
             });
             residual.band("repeats", band);
         }
-        residual.line(
-            "residual",
-            along(mean.iter().zip(&predicted).map(|(m, p)| m - p).collect()),
-        );
+        let off = along(mean.iter().zip(&predicted).map(|(m, p)| m - p).collect());
+        if model.used(first).iter().all(|used| *used) {
+            residual.line("residual", off);
+        } else {
+            let used = off.into_iter().zip(model.used(first)).filter(|(_, used)| **used);
+            residual.points("residual, where it is used", used.map(|(point, _)| point));
+        }
         let role = if spectrum.fitted { "Fitted" } else { "Not fitted" };
         page.row([
             spectra.caption(format!("{role}.")),
