@@ -38,5 +38,5 @@ pub use pattern::NamePattern;
 pub use proposal::Proposal;
 pub use psf_stack::{ApertureShape, StackBench, StackModel, StackObject, StackPlane, StackSet, ThinLens, Transmission};
 pub use run::{Answer, SetKind, calibrate, kind_of};
-pub use spectra::{Spectrum, SpectrumModel, SpectrumSet, StatedLayer, StatedPads};
+pub use spectra::{ForecastEffect, Spectrum, SpectrumForecast, SpectrumModel, SpectrumSet, StatedLayer, StatedPads};
 pub use widths::{WidthModel, WidthSet, WidthSite};

@@ -53,7 +53,7 @@ const SMOOTH_OVER: usize = 4;
 
 /// Largest difference of a power from its interpolation by two neighbours on either side. Between these the bank errs by a seventh of
 /// it.
-const SMOOTH: f64 = 0.02;
+const SMOOTH: f64 = 0.006;
 
 /// Sine of the oblique wave; powers change with the square of the sine, alike at each azimuth.
 const OBLIQUE_SINE: f64 = 0.15;
@@ -81,7 +81,7 @@ const fn changed(index: i8, taper: i8, residual: i8) -> Solution {
 /// Pillars of a pad, and the cone that they are seen in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pillar {
-    /// Width of the top (nm).
+    /// Width at half height (nm).
     pub(super) width_nm: f64,
     pub(super) height_nm: f64,
     /// Angle of the walls from upright (degrees), positive if the foot is wider.
@@ -152,10 +152,10 @@ impl<'a> PadBank<'a> {
             self.set.wavelengths_nm[0],
             self.set.wavelengths_nm[1] - self.set.wavelengths_nm[0],
         );
-        let slope = pillar.height_nm * pillar.taper_deg.to_radians().tan();
-        // The middle of the wall, and steps of the width from one third of it to the next.
-        let (middle, taper) = (pillar.width_nm + slope, THIRD_OF_WALL * 2.0 * slope / self.step_nm);
-        let widths = self.width_weights(middle);
+        // Steps of the width from one third of the wall to the next.
+        let lean = 2.0 * pillar.height_nm * pillar.taper_deg.to_radians().tan();
+        let taper = THIRD_OF_WALL * lean / self.step_nm;
+        let widths = self.width_weights(pillar.width_nm);
         let heights = lagrange(&self.heights_nm, pillar.height_nm);
         let residual = (pillar.residual_nm - self.pads.residual_nm) / RESIDUAL_STEP_NM;
         let at = |slot: usize| {
@@ -232,7 +232,7 @@ impl<'a> PadBank<'a> {
     pub(super) fn direct(&self, medium: usize, pillar: &Pillar, index: IndexChange, nm: f64, orders: usize) -> f64 {
         let slices = if pillar.taper_deg == 0.0 { 1 } else { MANY_SLICES };
         let slope = 2.0 * pillar.taper_deg.to_radians().tan() * pillar.height_nm;
-        let depth = |k: usize| 1.0 - (k as f64 + 0.5) / slices as f64;
+        let depth = |k: usize| 0.5 - (k as f64 + 0.5) / slices as f64;
         let widths: Vec<f64> = (0..slices).map(|k| pillar.width_nm + slope * depth(k)).collect();
         let dn = index[0] * self.index(nm).re + index[1];
         let stack = self.stack((nm, medium), (&widths, pillar.height_nm), pillar.residual_nm, dn);
