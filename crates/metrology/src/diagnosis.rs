@@ -264,43 +264,12 @@ impl Diagnosis {
         let verdict = error.verdict(found.chosen.is_empty(), facts.averages);
         let not_fitted = facts.names.iter().zip(&plan.fitted).filter(|(_, f)| !**f);
         let not_fitted: Vec<String> = not_fitted.map(|(n, _)| n.clone()).collect();
-        let fitted = facts.names.len() - not_fitted.len();
-        let mut validation = vec![format!("{fitted} measurements were fitted")];
-        // Groups of a way among measurements that were fitted, or that were not.
-        let groups = |way: usize, fitted: bool| {
-            let own = plan.ways[way].groups.iter().zip(&plan.fitted);
-            let own: BTreeSet<usize> = own.filter(|(_, f)| **f == fitted).map(|(g, _)| *g).collect();
-            own
-        };
-        let named = |way: usize, own: &BTreeSet<usize>| {
-            let names: Vec<String> = own.iter().take(MOST_NAMED).map(|g| model.group_name(way, *g)).collect();
-            let more = if own.len() > MOST_NAMED { ", ..." } else { "" };
-            format!("{}{more}", names.join(", "))
-        };
-        for (w, (way, error)) in plan.ways.iter().zip(&last.held_out).enumerate() {
-            let (own, others) = (groups(w, true), groups(w, false));
-            validation.push(match error {
-                Some(_) => format!("each {} was left out in turn: {}", way.name, named(w, &own)),
-                None => format!(
-                    "only one {} was fitted, so none was left out: {}",
-                    way.name,
-                    named(w, &own)
-                ),
-            });
-            let new: BTreeSet<usize> = others.difference(&own).copied().collect();
-            if !new.is_empty() {
-                validation.push(format!("never fitted, {}: {}", way.name, named(w, &new)));
-            }
-        }
-        validation.push(match not_fitted.len() {
-            0 => "none was kept out of the fit: name some by `not_fitted`".into(),
-            n => format!("{n} were never fitted; they refuse an effect that predicts them worse"),
-        });
-        if error.noise_floor.is_none() {
-            validation.push(
-                "the noise is not known, because nothing was measured twice: a part that remains may be noise".into(),
-            );
-        }
+        let validation = validation(
+            model,
+            plan,
+            (last, error.noise_floor),
+            [facts.names.len(), not_fitted.len()],
+        );
         Self {
             set: facts.title.into(),
             kind: facts.kind.into(),
@@ -367,6 +336,53 @@ impl Diagnosis {
         let list: Vec<String> = self.effects.iter().map(FoundEffect::sentence).collect();
         self.verdict.sentence(&list, &self.error.remainder())
     }
+}
+
+/// What was fitted, what was left out in turn, and what was never fitted: of so many measurements, so many.
+fn validation(
+    model: &dyn RefitModel,
+    plan: &RefitPlan,
+    (last, noise): (&RefitErrors, Option<f64>),
+    [all, not_fitted]: [usize; 2],
+) -> Vec<String> {
+    let fitted = all - not_fitted;
+    let mut validation = vec![format!("{fitted} measurements were fitted")];
+    // Groups of a way among measurements that were fitted, or that were not.
+    let groups = |way: usize, fitted: bool| {
+        let own = plan.ways[way].groups.iter().zip(&plan.fitted);
+        let own: BTreeSet<usize> = own.filter(|(_, f)| **f == fitted).map(|(g, _)| *g).collect();
+        own
+    };
+    let named = |way: usize, own: &BTreeSet<usize>| {
+        let names: Vec<String> = own.iter().take(MOST_NAMED).map(|g| model.group_name(way, *g)).collect();
+        let more = if own.len() > MOST_NAMED { ", ..." } else { "" };
+        format!("{}{more}", names.join(", "))
+    };
+    for (w, (way, error)) in plan.ways.iter().zip(&last.held_out).enumerate() {
+        let (own, others) = (groups(w, true), groups(w, false));
+        validation.push(match error {
+            Some(_) => format!("each {} was left out in turn: {}", way.name, named(w, &own)),
+            None => format!(
+                "only one {} was fitted, so none was left out: {}",
+                way.name,
+                named(w, &own)
+            ),
+        });
+        let new: BTreeSet<usize> = others.difference(&own).copied().collect();
+        if !new.is_empty() {
+            validation.push(format!("never fitted, {}: {}", way.name, named(w, &new)));
+        }
+    }
+    validation.push(match not_fitted {
+        0 => "none was kept out of the fit: name some by `not_fitted`".into(),
+        n => format!("{n} were never fitted; they refuse an effect that predicts them worse"),
+    });
+    if noise.is_none() {
+        validation.push(
+            "the noise is not known, because nothing was measured twice: a part that remains may be noise".into(),
+        );
+    }
+    validation
 }
 
 /// What an effect belongs to, and how the values of the groups of a kind compare.

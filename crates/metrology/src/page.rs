@@ -65,17 +65,21 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         ranking.bar(&tried.name, tried.score.max(0.0), None, remark, chosen);
     }
     page.figure(ranking.caption("Each effect as it was tried last, on top of those that were taken before."));
+    // The table of the ladder has the other reasons.
+    let in_ladder = |name: &String| diagnosis.ladder.iter().any(|step| step.effect.as_ref() == Some(name));
+    let others = diagnosis.ranking.iter().filter(|t| !in_ladder(&t.name));
+    let others: Vec<String> = { others }
+        .filter_map(|t| Some(format!("`{}`: {}", t.name, t.rejected.as_ref()?)))
+        .collect();
+    if !others.is_empty() {
+        page.subsection("Other effects that were refused");
+        page.list(others);
+    }
     if !diagnosis.proposals.is_empty() {
         page.section("Patterns of the residual");
         page.paragraph("No effect of the list explains these. `proposal.toml` declares them: give it to `--declare`.");
         page.list(diagnosis.proposals.iter().map(Proposal::sentence));
     }
-    page.list(
-        diagnosis
-            .ranking
-            .iter()
-            .filter_map(|t| Some(format!("`{}`: {}", t.name, t.rejected.as_ref()?))),
-    );
     page
 }
 

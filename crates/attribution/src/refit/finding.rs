@@ -44,7 +44,11 @@ impl RefitRejection {
                     .map_or(own.clone(), |group| format!("{own}: {way} {group} is predicted worse"))
             }
             Self::Worse { what, before, after } => {
-                format!("fits better and predicts worse: {what} {before:.4} before, {after:.4} with it")
+                // Four digits of the larger one.
+                let decimals = (3.0 - before.abs().max(after.abs()).log10().floor()).clamp(0.0, 9.0) as usize;
+                format!(
+                    "fits better and predicts worse: {what}, {before:.decimals$} before, {after:.decimals$} with it"
+                )
             }
             Self::Nothing => "the 95 % interval of its value includes no effect".into(),
             Self::Unphysical => "its fitted value is at the end of its physical range".into(),

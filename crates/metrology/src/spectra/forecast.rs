@@ -216,3 +216,58 @@ fn effects(names: &[(&'static str, &str, &'static str)], halves: &[f64]) -> Vec<
     })
     .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_core::Silent;
+    use metalith_rcwa::CellLattice;
+
+    fn forecast(sigma: f64) -> SpectrumForecast {
+        let constant = |n: f64| Material::constant(n, 0.0).unwrap();
+        SpectrumForecast {
+            film: constant(2.05),
+            substrate: constant(1.46),
+            under: Vec::new(),
+            ambient: constant(1.0),
+            pads: StatedPads {
+                layer: 0,
+                pitch_nm: 300.0,
+                lattice: CellLattice::Square,
+                is_round: false,
+                height_nm: 500.0,
+                residual_nm: 0.0,
+                taper_deg: 0.0,
+            },
+            wavelengths_nm: (0..10).map(|k| 640.0 + 20.0 * f64::from(k)).collect(),
+            sigma,
+        }
+    }
+
+    fn half(effects: &[ForecastEffect], name: &str) -> f64 {
+        effects.iter().find(|e| e.name == name).unwrap().half_interval
+    }
+
+    /// Intervals are proportional to the noise where the range of an effect does not bound them.
+    #[test]
+    fn intervals_of_a_film_follow_the_noise() {
+        let [low, high] = [1e-5, 2e-5].map(|sigma| half(&forecast(sigma).of_film(), "film_height"));
+        assert!(low > 0.0 && (high / low - 2.0).abs() < 1e-3, "{low} {high}");
+    }
+
+    /// One pad does not distinguish what two do, and a third is not asked for if two suffice.
+    #[test]
+    fn pads_are_added_until_the_wanted_sizes_are_reached() {
+        let of = |size: f64| {
+            let wanted = |name: &str| (name == "cd_bias").then_some(size);
+            forecast(1e-3).of_pads(&[90.0, 120.0, 150.0], &wanted, &Silent).unwrap()
+        };
+        let (few, loose) = of(1e3);
+        let (more, tight) = of(0.5);
+        assert_eq!(few.len(), 1);
+        assert!(
+            more.len() > 1 && half(&tight, "cd_bias") < half(&loose, "cd_bias"),
+            "{more:?}"
+        );
+    }
+}

@@ -21,8 +21,8 @@ const FEW_ORDERS: usize = 7;
 /// Orders along an axis that the bank is compared with.
 const MANY_ORDERS: usize = 15;
 
-/// Slices of a leaning wall that the bank is compared with.
-const MANY_SLICES: usize = 9;
+/// Steps of a leaning wall that the bank is compared with.
+const MANY_STEPS: usize = 12;
 
 /// Heights that are solved, at Chebyshev's nodes.
 const HEIGHTS: usize = 8;
@@ -36,15 +36,14 @@ const WIDTH_STEP_NM: f64 = 8.0;
 /// Widths that are interpolated over.
 const WIDTHS: usize = 4;
 
-/// Change of the width from one of three slices to the next over that from foot to top: three slices then have the first moment of
-/// the wall.
-const THIRD_OF_WALL: f64 = 0.375;
+/// Steps of a leaning wall at a node: its ends have their own widths, since they reflect most, and slices half as thick.
+const STEPS: usize = 4;
 
 /// Distance of two thicknesses of the residual film (nm), and of two indices.
 const RESIDUAL_STEP_NM: f64 = 20.0;
 const INDEX_STEP: f64 = 0.1;
 
-/// Nodes of the taper, in steps of the width from one third of the wall to the next, and of the index.
+/// Nodes of the taper, in steps of the width at each step of the wall, and of the index.
 const TAPERS: [i8; 4] = [-1, 0, 1, 2];
 const INDICES: [i8; 5] = [-2, -1, 0, 1, 2];
 
@@ -134,7 +133,7 @@ impl<'a> PadBank<'a> {
     /// Ranges in which the bank interpolates: height less the stated one (nm), taper (degrees), residual film (nm).
     pub(super) fn ranges(pads: &StatedPads) -> [(f64, f64); 3] {
         let reach = 0.95 * HEIGHT_REACH_NM.min(0.5 * pads.height_nm);
-        let step = WIDTH_STEP_NM / (2.0 * THIRD_OF_WALL * pads.height_nm);
+        let step = STEPS as f64 * WIDTH_STEP_NM / (2.0 * pads.height_nm);
         let taper = |u: f64| (u * step).atan().to_degrees();
         [
             (-reach, reach),
@@ -152,9 +151,8 @@ impl<'a> PadBank<'a> {
             self.set.wavelengths_nm[0],
             self.set.wavelengths_nm[1] - self.set.wavelengths_nm[0],
         );
-        // Steps of the width from one third of the wall to the next.
         let lean = 2.0 * pillar.height_nm * pillar.taper_deg.to_radians().tan();
-        let taper = THIRD_OF_WALL * lean / self.step_nm;
+        let taper = lean / (STEPS as f64 * self.step_nm);
         let widths = self.width_weights(pillar.width_nm);
         let heights = lagrange(&self.heights_nm, pillar.height_nm);
         let residual = (pillar.residual_nm - self.pads.residual_nm) / RESIDUAL_STEP_NM;
@@ -230,10 +228,13 @@ impl<'a> PadBank<'a> {
 
     /// Power of the zeroth order without any interpolation, at normal incidence.
     pub(super) fn direct(&self, medium: usize, pillar: &Pillar, index: IndexChange, nm: f64, orders: usize) -> f64 {
-        let slices = if pillar.taper_deg == 0.0 { 1 } else { MANY_SLICES };
-        let slope = 2.0 * pillar.taper_deg.to_radians().tan() * pillar.height_nm;
-        let depth = |k: usize| 0.5 - (k as f64 + 0.5) / slices as f64;
-        let widths: Vec<f64> = (0..slices).map(|k| pillar.width_nm + slope * depth(k)).collect();
+        let lean = 2.0 * pillar.taper_deg.to_radians().tan() * pillar.height_nm;
+        let steps = if lean == 0.0 { 0 } else { MANY_STEPS };
+        let share = |k: usize| 0.5 - k as f64 / steps.max(1) as f64;
+        let widths: Vec<f64> = match steps {
+            0 => vec![pillar.width_nm],
+            _ => (0..=steps).map(|k| pillar.width_nm + lean * share(k)).collect(),
+        };
         let dn = index[0] * self.index(nm).re + index[1];
         let stack = self.stack((nm, medium), (&widths, pillar.height_nm), pillar.residual_nm, dn);
         self.solved(&[stack], nm, 0.0, orders).map_or(0.0, |found| found[0])
@@ -392,9 +393,9 @@ impl<'a> PadBank<'a> {
             Solution::Changed { index, taper, residual } => (index, taper, residual),
             _ => (0, 0, 0),
         };
-        let at = |third: i8| (width as f64 + f64::from(third * taper)) * self.step_nm;
-        let widths = [at(1), at(0), at(-1)];
-        let widths = if taper == 0 { &widths[1..2] } else { &widths };
+        let at = |step: i8| (width as f64 + f64::from(step * taper)) * self.step_nm;
+        let widths = [at(2), at(1), at(0), at(-1), at(-2)];
+        let widths = if taper == 0 { &widths[2..3] } else { &widths };
         let residual_nm = self.pads.residual_nm + RESIDUAL_STEP_NM * f64::from(residual);
         self.stack(
             (nm, medium),
@@ -430,10 +431,13 @@ impl<'a> PadBank<'a> {
         if residual_nm > 0.0 {
             layers.push(Layer::uniform(residual_nm, film));
         }
-        layers.extend(widths.iter().map(|width| {
+        // The slices of both ends are half as thick.
+        let parts = |k: usize| if k == 0 || k + 1 == widths.len() { 0.5 } else { 1.0 };
+        let all: f64 = (0..widths.len()).map(parts).sum();
+        layers.extend(widths.iter().enumerate().map(|(k, width)| {
             let width = width.min(nearest);
             Layer {
-                height_nm: height_nm / widths.len() as f64,
+                height_nm: height_nm * parts(k) / all,
                 outline: match width {
                     _ if width <= 0.0 => Outline::empty(),
                     _ if self.pads.is_round => Outline::circle(width),
