@@ -39,18 +39,21 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
             Column::text("Value"),
             Column::text("95 % interval"),
             Column::text("Belongs to"),
-            Column::text("In each group alone"),
         ]);
         for e in &diagnosis.effects {
             table.row([
                 Cell::code(&e.name),
                 format!("{} {}", number_words(&e.value), e.unit).as_str().into(),
                 number_words(&e.interval).as_str().into(),
-                belongs_to(e).as_str().into(),
-                by_group(&e.by_group).as_str().into(),
+                e.of.as_str().into(),
             ]);
         }
         page.table(table);
+        let groups: Vec<String> = diagnosis.effects.iter().filter_map(in_groups).collect();
+        if !groups.is_empty() {
+            page.subsection("In each group alone");
+            page.list(groups);
+        }
     }
     ladder(&mut page, diagnosis, unit);
     let mut ranking = Ranking::new(
@@ -83,16 +86,15 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
     page
 }
 
-/// What an effect belongs to, why, and which groups it makes worse.
-fn belongs_to(effect: &FoundEffect) -> String {
-    let mut out = effect.of.clone();
-    if let Some(agreement) = &effect.agreement {
-        out = format!("{out}: {agreement}");
-    }
-    if !effect.worse_for.is_empty() {
-        out = format!("{out}; worse with it: {}", effect.worse_for.join(", "));
-    }
-    out
+/// Whether the values of groups agree, which they are, and which groups an effect makes worse; none where each has its own.
+fn in_groups(effect: &FoundEffect) -> Option<String> {
+    let agreement = effect.agreement.as_ref()?;
+    let worse = match effect.worse_for.as_slice() {
+        [] => String::new(),
+        worse => format!(" Worse with it: {}.", worse.join(", ")),
+    };
+    let values = by_group(&effect.by_group);
+    Some(format!("`{}`: {agreement}. {values}.{worse}", effect.name))
 }
 
 /// Values in each group alone: of each parameter, groups with their values.
