@@ -50,8 +50,8 @@ pub use linear_trend::LinearTrend;
 pub use measurements::{MeasurementEquations, Measurements, ReferenceValue, References, eliminate, own_step};
 pub use names::{ConditionalEffect, RENAMED, check_names};
 pub use refit::{
-    LeaveOut, RefitEffect, RefitEquations, RefitErrors, RefitFinding, RefitModel, RefitParameter, RefitPlan,
-    RefitRejection, RefitScope, RefitTried, select, try_beside,
+    Belonging, GroupValue, LeaveOut, RefitEffect, RefitEquations, RefitErrors, RefitFinding, RefitModel,
+    RefitParameter, RefitPlan, RefitRejection, RefitScope, RefitTried, select, try_beside,
 };
 pub use search::{
     Alternative, EXPLAINED, EndsSearch, Evidence, Finding, LEAST_GAIN, Pattern, REFERENCES_DECIDE, RandomNoise,

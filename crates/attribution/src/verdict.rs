@@ -36,24 +36,41 @@ impl SetVerdict {
         )
     }
 
+    /// True if effects explain a part of the residual and a part remains: neither a success nor a failure.
+    pub fn is_partial(self) -> bool {
+        self == Self::Partly
+    }
+
     /// True if the effects that were found make a model of the chip.
     pub fn has_a_model(self) -> bool {
         !matches!(self, Self::Unexplained | Self::DataUnfit)
     }
 
+    /// The words that [`SetVerdict::sentence`] begins with.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::NoResidual => "nothing to explain",
+            Self::Explained | Self::ExplainedButFor => "explained",
+            Self::OneOf => "one of these",
+            Self::Partly => "partly explained",
+            Self::Unexplained => "unexplained",
+            Self::DataUnfit => "data unfit",
+        }
+    }
+
     /// One line for a person, with the effects in words and the remainder in words.
     pub fn sentence(self, effects: &[String], remainder: &str) -> String {
-        let list = effects.join("; ");
+        let (label, list) = (self.label(), effects.join("; "));
         match self {
             Self::NoResidual => {
-                "nothing to explain: the measurements agree with what was stated, to within their noise".into()
+                format!("{label}: the measurements agree with what was stated, to within their noise")
             }
-            Self::Explained => format!("explained by {list}"),
-            Self::ExplainedButFor => format!("explained by {list} but for {remainder}, below the error of the model"),
-            Self::OneOf => format!("one of these, which this set cannot distinguish: {list}"),
-            Self::Partly => format!("partly explained by {list}; {remainder} remains"),
-            Self::Unexplained => "unexplained: there is a residual that no known effect explains".into(),
-            Self::DataUnfit => "data unfit: too few measurements can be used".into(),
+            Self::Explained => format!("{label} by {list}"),
+            Self::ExplainedButFor => format!("{label} by {list} but for {remainder}, below the error of the model"),
+            Self::OneOf => format!("{label}, which this set cannot distinguish: {list}"),
+            Self::Partly => format!("{label} by {list}; {remainder} remains"),
+            Self::Unexplained => format!("{label}: there is a residual that no known effect explains"),
+            Self::DataUnfit => format!("{label}: too few measurements can be used"),
         }
     }
 }

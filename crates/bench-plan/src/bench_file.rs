@@ -38,6 +38,8 @@ pub struct BenchFile {
     pub field_boundary_um: Option<[f64; 2]>,
     /// Widths by SEM that could be taken.
     pub sem: Option<SemOffer>,
+    /// Spectra of the film and of pads that could be measured.
+    pub spectrometer: Option<Spectrometer>,
     /// Sizes that are to be found, by the name of the effect, in its unit.
     pub wanted: BTreeMap<String, f64>,
 }
@@ -51,6 +53,23 @@ pub struct SemOffer {
     pub sigma_nm: f64,
     /// Standard deviation of the offset that all widths share (nm).
     pub offset_sigma_nm: f64,
+}
+
+/// A spectrometer, along the normal.
+#[derive(Clone, Copy, Debug)]
+pub struct Spectrometer {
+    pub from_nm: f64,
+    pub to_nm: f64,
+    pub step_nm: f64,
+    /// Standard deviation of a reflectance.
+    pub sigma: f64,
+}
+
+impl Spectrometer {
+    pub(crate) fn wavelengths_nm(&self) -> Vec<f64> {
+        let steps = ((self.to_nm - self.from_nm) / self.step_nm).floor().max(0.0) as usize;
+        (0..=steps).map(|k| self.from_nm + k as f64 * self.step_nm).collect()
+    }
 }
 
 /// Part of saturation that measurements are exposed to where the bench says nothing: 30 % of room for what is brighter than
@@ -141,6 +160,7 @@ fn sections(root: &Section<'_, '_>) -> BenchFile {
         most_measurements: most as usize,
         field_boundary_um: read::field_boundary(root),
         sem: root.optional_section("sem").map(|s| sem(&s)),
+        spectrometer: root.optional_section("spectrometer").map(|s| spectrometer(&s)),
         wanted: root
             .optional_section("wanted")
             .map_or_else(BTreeMap::new, |s| wanted(&s)),
@@ -155,6 +175,25 @@ fn sem(s: &Section<'_, '_>) -> SemOffer {
     };
     s.finish();
     offer
+}
+
+fn spectrometer(s: &Section<'_, '_>) -> Spectrometer {
+    let nm = || Limits::new(100.0..=20_000.0, "nm");
+    let out = Spectrometer {
+        from_nm: s.float("from_nm", nm()),
+        to_nm: s.float("to_nm", nm()),
+        step_nm: s.float("step_nm", Limits::new(0.5..=100.0, "nm")),
+        sigma: s.float("sigma", Limits::new(1e-5..=0.5, "")),
+    };
+    if !(8..=500).contains(&(out.wavelengths_nm().len() - 1)) {
+        s.fault(
+            "to_nm",
+            "the spectrum has fewer than 8 or more than 500 steps",
+            "check `from_nm`, `to_nm` and `step_nm`",
+        );
+    }
+    s.finish();
+    out
 }
 
 fn wanted(s: &Section<'_, '_>) -> BTreeMap<String, f64> {

@@ -13,11 +13,13 @@
 //! | `information` | normal equations of each, by the simulator and the noise |
 //! | `choice` | the fewest measurements |
 //! | `expected_performance` | what they find, and what they cannot distinguish |
+//! | `cheap` | spectra and widths that cost less, and the effects that they determine |
 //! | `filled_in_files` | a folder whose plan is not to be overwritten |
 //! | `files`, `page` | the set folder, and the check list |
 
 mod bench_file;
 mod candidates;
+mod cheap;
 mod choice;
 mod expected_performance;
 mod files;
@@ -35,7 +37,8 @@ use metalith_design::Design;
 use metalith_pillars::PillarReader;
 use serde::Serialize;
 
-pub use bench_file::{BenchFile, SemOffer};
+pub use bench_file::{BenchFile, SemOffer, Spectrometer};
+pub use cheap::{CheapEffect, CheapMeasurements};
 pub use expected_performance::{Confusion, PlannedEffect};
 pub use filled_in_files::check_not_begun;
 pub use limits::check_plannable;
@@ -72,6 +75,9 @@ pub struct MeasurementPlan {
     pub effects: Vec<PlannedEffect>,
     /// Pairs that the measurements cannot distinguish.
     pub confusions: Vec<Confusion>,
+    /// Spectra and widths that cost less than the session, if the bench has a spectrometer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cheap: Option<CheapMeasurements>,
     /// SHA-256 in hexadecimal of the files that a person fills in, as they were written.
     pub written: BTreeMap<String, String>,
 }
@@ -176,6 +182,8 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
         .collect();
     let effects = expected_performance::effects(&simulator, &surrogate, &shown, &detections, progress)?;
     let confusions = expected_performance::confusions(&simulator, &shown, &choice, &picked, &reachable);
+    let of_spectrometer = |s| cheap::cheap(&set, s, bench.sem, &effects, progress);
+    let cheap = bench.spectrometer.as_ref().map(of_spectrometer).transpose()?;
     files::write_set(request.folder, design, bench, &shown, &request.layout_in_set)?;
     let plan = MeasurementPlan {
         folder: request.folder.to_owned(),
@@ -184,6 +192,7 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
         measurements: shown.measurements.iter().map(|c| planned(c, &shown, bench)).collect(),
         effects,
         confusions,
+        cheap,
         written: filled_in_files::digests(request.folder)?,
     };
     page::write_page(&plan, &shown, candidates.unseen)?;

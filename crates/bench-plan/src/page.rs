@@ -1,9 +1,9 @@
 //! The check list of a planned session, to print.
 
 use metalith_core::Result;
-use metalith_report::{Cell, Column, ImageGrid, Page, Table, Verdict, count, exact, sig};
+use metalith_report::{Cell, Column, ImageGrid, Page, Table, Verdict, count, counted, exact, sig};
 
-use crate::MeasurementPlan;
+use crate::{CheapMeasurements, MeasurementPlan};
 use metalith_calibrate::MeasuredSet;
 
 /// Pictures of a row.
@@ -39,6 +39,9 @@ pub(crate) fn write_page(plan: &MeasurementPlan, set: &MeasuredSet, unseen: usiz
     measurements(&mut page, plan, set);
     effects(&mut page, plan);
     confusions(&mut page, plan);
+    if let Some(found) = &plan.cheap {
+        cheap(&mut page, found);
+    }
     pictures(&mut page, set);
     page.section("Method");
     page.paragraph(format!(
@@ -173,6 +176,45 @@ fn confusions(page: &mut Page, plan: &MeasurementPlan) {
             Cell::from(spaced(format!("{second}{}", c.looks_like)).as_str()),
             Cell::sig(c.gain, 2),
             Cell::from(c.remedy().as_str()),
+        ]);
+    }
+    page.table(table);
+}
+
+fn cheap(page: &mut Page, found: &CheapMeasurements) {
+    page.section("Cheaper measurements first");
+    let widths: Vec<String> = found.pad_widths_nm.iter().map(|w| exact(*w)).collect();
+    let sem = match found.sem_widths {
+        Some(widths) => format!("Measure {} by SEM.", counted(widths, "width")),
+        None => "No number of widths by SEM of this bench determines the bias.".into(),
+    };
+    page.list([
+        "Measure the reflectance of the film before it is etched, against a mirror.".to_owned(),
+        format!(
+            "Measure the reflectance of {}: {} nm.",
+            counted(widths.len(), "pad"),
+            widths.join(", ")
+        ),
+        sem,
+    ]);
+    let mut table = Table::new([
+        Column::text("Effect"),
+        Column::text("Wanted size"),
+        Column::text("Spectrum of the film"),
+        Column::text("Spectra of these pads"),
+        Column::text("Widths by SEM"),
+        Column::text("Determined by"),
+    ])
+    .caption("Half of the 95 % interval that noise alone makes, all effects of a column fitted together with the gain of the reference; computed from the sensitivities of the model that `calibrate` fits to spectra. An error of the model makes intervals wider.");
+    for e in &found.effects {
+        let with_unit = |v: &Option<f64>| v.map(|v| format!("{} {}", sig(v, 2), e.unit));
+        table.row([
+            Cell::code(&e.name),
+            with_unit(&e.wanted).as_deref().into(),
+            with_unit(&e.film).as_deref().into(),
+            with_unit(&e.pads).as_deref().into(),
+            with_unit(&e.sem).as_deref().into(),
+            e.determined_by.unwrap_or("none of these").into(),
         ]);
     }
     page.table(table);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use metalith_attribution::{RefitErrors, RefitFinding, RefitModel, RefitPlan, RefitScope, SetVerdict};
+use metalith_attribution::{Belonging, RefitErrors, RefitFinding, RefitModel, RefitPlan, RefitScope, SetVerdict};
 use metalith_report::{effect_words, sig};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -19,10 +19,17 @@ pub struct FoundEffect {
     /// 95 % interval of each value.
     pub interval: Value,
     pub parameters: Vec<String>,
-    /// The whole bench, or the kind of group that has separate values.
+    /// The whole bench, the kind of group that has separate values or whose values differ, or one group.
     pub of: String,
-    /// Value in each group alone with all else as it was found: one list for each parameter; empty if each group has its own.
-    pub by_group: Vec<Vec<(String, f64)>>,
+    /// Words on whether the values of groups agree within their intervals; none where each group has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<String>,
+    /// Groups that are predicted worse, when they are left out, than without the effect.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub worse_for: Vec<String>,
+    /// Value in each group alone with all else as it was found, and its 95 % interval: one list for each parameter; empty if each
+    /// group has its own.
+    pub by_group: Vec<Vec<(String, f64, [f64; 2])>>,
 }
 
 /// An effect as it was tried last.
@@ -67,8 +74,11 @@ pub struct ErrorReport {
     pub measure: String,
     pub before: ErrorPair,
     pub after: ErrorPair,
-    /// Root mean square by which repeats differ; none where there are none.
+    /// Root mean square that noise makes alone: by repeats, or by neighbours within a measurement; none where neither states it.
     pub noise_floor: Option<f64>,
+    /// Root mean square by which the model errs; none where it is exact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model_error: Option<f64>,
 }
 
 /// The answer for a set.
@@ -102,7 +112,7 @@ pub struct NotInModel {
     pub why: String,
 }
 
-/// The residual is explained up to this multiple of the difference of repeats.
+/// The residual is explained up to this multiple of the noise.
 const EXPLAINED: f64 = 1.5;
 
 /// Most groups that a line names.
@@ -115,10 +125,43 @@ pub(crate) struct SetFacts<'a> {
     pub(crate) measure: &'a str,
     /// Names of the measurements.
     pub(crate) names: Vec<String>,
-    pub(crate) noise_floor: Option<f64>,
     /// True if many measurements tell of an effect that is far below the difference of repeats.
     pub(crate) averages: bool,
     pub(crate) remarks: &'a [String],
+}
+
+impl ErrorReport {
+    /// Verdict on a set without any effect, or with those that were found. Many measurements may show an effect that is far below
+    /// their noise (`averages`).
+    fn verdict(&self, nothing_found: bool, averages: bool) -> SetVerdict {
+        let noise = EXPLAINED * self.noise_floor.unwrap_or(0.0);
+        let noise_or_model = noise.hypot(self.model_error.unwrap_or(0.0));
+        if self.before.fit <= noise_or_model && (nothing_found || !averages) {
+            SetVerdict::NoResidual
+        } else if nothing_found {
+            SetVerdict::Unexplained
+        } else if self.after.held_out <= noise {
+            SetVerdict::Explained
+        } else if self.after.held_out <= noise_or_model {
+            SetVerdict::ExplainedButFor
+        } else {
+            SetVerdict::Partly
+        }
+    }
+
+    /// What the effects leave of measurements that were left out, without the noise: in the unit of the measure, or in per cent.
+    fn remainder(&self) -> String {
+        let (all, noise) = (self.after.held_out, self.noise_floor.unwrap_or(0.0));
+        let left = (all.powi(2) - noise.powi(2)).max(0.0).sqrt();
+        match self
+            .measure
+            .split_once(" (")
+            .map(|(_, unit)| unit.trim_end_matches(')'))
+        {
+            Some("rms") | None => format!("{} % (rms)", sig(100.0 * left, 3)),
+            Some(unit) => format!("{} {unit}", sig(left, 3)),
+        }
+    }
 }
 
 impl Diagnosis {
@@ -129,13 +172,24 @@ impl Diagnosis {
             Ok([one]) => one,
             Err(list) => Value::Array(list),
         };
-        let of_effect = |&e: &usize| {
+        let objects = model.objects();
+        let kind = plan.ways.get(objects).map_or("group", |way| way.name.as_str());
+        let group_name = |group: usize| model.group_name(objects, group);
+        let of_effect = |(place, &e): (usize, &usize)| {
             let own = &effects[e];
             let values = own.slots.iter().map(|&s| json!(shown(s, found.theta[s])));
             let intervals = own.slots.iter().map(|&s| match found.intervals[s] {
                 Some(ends) => json!(ends.map(|v| shown(s, v))),
                 None => Value::Null,
             });
+            let (of, agreement) = match (model.scope(e), own.across) {
+                (RefitScope::One { way, group }, _) => (model.group_name(way, group), None),
+                (_, Some(way)) => (plan.ways[way].name.clone(), None),
+                _ => {
+                    let (of, words) = belonging_words(&found.belongings[place], kind, group_name);
+                    (of, Some(words))
+                }
+            };
             FoundEffect {
                 name: own.name.clone(),
                 value: one_or_list(values.collect()),
@@ -147,14 +201,19 @@ impl Diagnosis {
                     .iter()
                     .filter_map(|slot| {
                         let (_, groups) = found.by_group.iter().find(|(s, _)| s == slot)?;
-                        let named = groups.iter().map(|(g, v)| (model.group_name(0, *g), shown(*slot, *v)));
+                        let named = groups.iter().map(|g| {
+                            (
+                                group_name(g.group),
+                                shown(*slot, g.value),
+                                g.interval.map(|v| shown(*slot, v)),
+                            )
+                        });
                         Some(named.collect())
                     })
                     .collect(),
-                of: match (model.scope(e), own.across) {
-                    (RefitScope::One { way, group }, _) => model.group_name(way, group),
-                    (_, across) => across.map_or_else(|| "bench".into(), |w| plan.ways[w].name.clone()),
-                },
+                worse_for: found.worse[place].iter().map(|g| group_name(*g)).collect(),
+                of,
+                agreement,
             }
         };
         let names = model.figure_names();
@@ -195,60 +254,29 @@ impl Diagnosis {
             fit: errors.fitted,
             held_out: errors.held_out.iter().flatten().copied().fold(0.0, f64::max),
         };
-        let verdict = match (found.chosen.is_empty(), facts.noise_floor) {
-            (none, Some(floor)) if first.fitted <= EXPLAINED * floor && (none || !facts.averages) => {
-                SetVerdict::NoResidual
-            }
-            (true, _) => SetVerdict::Unexplained,
-            (_, Some(floor)) if pair(last).held_out <= EXPLAINED * floor => SetVerdict::Explained,
-            _ => SetVerdict::Partly,
+        let error = ErrorReport {
+            measure: facts.measure.into(),
+            before: pair(first),
+            after: pair(last),
+            noise_floor: model.noise(&found.theta),
+            model_error: Some(model.model_error(&found.theta)).filter(|e| *e > 0.0),
         };
+        let verdict = error.verdict(found.chosen.is_empty(), facts.averages);
         let not_fitted = facts.names.iter().zip(&plan.fitted).filter(|(_, f)| !**f);
         let not_fitted: Vec<String> = not_fitted.map(|(n, _)| n.clone()).collect();
-        let fitted = facts.names.len() - not_fitted.len();
-        let mut validation = vec![format!("{fitted} measurements were fitted")];
-        // Groups of a way among measurements that were fitted, or that were not.
-        let groups = |way: usize, fitted: bool| {
-            let own = plan.ways[way].groups.iter().zip(&plan.fitted);
-            let own: BTreeSet<usize> = own.filter(|(_, f)| **f == fitted).map(|(g, _)| *g).collect();
-            own
-        };
-        let named = |way: usize, own: &BTreeSet<usize>| {
-            let names: Vec<String> = own.iter().take(MOST_NAMED).map(|g| model.group_name(way, *g)).collect();
-            let more = if own.len() > MOST_NAMED { ", ..." } else { "" };
-            format!("{}{more}", names.join(", "))
-        };
-        for (w, (way, error)) in plan.ways.iter().zip(&last.held_out).enumerate() {
-            let (own, others) = (groups(w, true), groups(w, false));
-            validation.push(match error {
-                Some(_) => format!("each {} was left out in turn: {}", way.name, named(w, &own)),
-                None => format!(
-                    "only one {} was fitted, so none was left out: {}",
-                    way.name,
-                    named(w, &own)
-                ),
-            });
-            let new: BTreeSet<usize> = others.difference(&own).copied().collect();
-            if !new.is_empty() {
-                validation.push(format!("never fitted, {}: {}", way.name, named(w, &new)));
-            }
-        }
-        validation.push(match not_fitted.len() {
-            0 => "none was kept out of the fit: name some by `not_fitted`".into(),
-            n => format!("{n} were never fitted; they refuse an effect that predicts them worse"),
-        });
+        let validation = validation(
+            model,
+            plan,
+            (last, error.noise_floor),
+            [facts.names.len(), not_fitted.len()],
+        );
         Self {
             set: facts.title.into(),
             kind: facts.kind.into(),
             verdict,
             remarks: facts.remarks.to_vec(),
-            effects: found.chosen.iter().map(of_effect).collect(),
-            error: ErrorReport {
-                measure: facts.measure.into(),
-                before: pair(first),
-                after: pair(last),
-                noise_floor: facts.noise_floor,
-            },
+            effects: found.chosen.iter().enumerate().map(of_effect).collect(),
+            error,
             ranking: found
                 .tried
                 .iter()
@@ -274,6 +302,7 @@ impl Diagnosis {
 
     /// Errors before and after each effect, and why others were refused, line by line.
     pub fn ladder_lines(&self) -> Vec<String> {
+        let belongs = self.effects.iter().filter_map(FoundEffect::belongs);
         let line = |step: &LadderStep| {
             let name = step
                 .effect
@@ -299,19 +328,87 @@ impl Diagnosis {
             }
         };
         let proposed = self.proposals.iter().map(Proposal::sentence);
-        self.ladder.iter().map(line).chain(proposed).collect()
+        self.ladder.iter().map(line).chain(belongs).chain(proposed).collect()
     }
 
     /// One line for a person.
     pub fn sentence(&self) -> String {
         let list: Vec<String> = self.effects.iter().map(FoundEffect::sentence).collect();
-        let unit = self
-            .error
-            .measure
-            .split_once(" (")
-            .map_or("", |(_, unit)| unit.trim_end_matches(')'));
-        let remainder = format!("{} {unit}", sig(self.error.after.held_out, 3));
-        self.verdict.sentence(&list, &remainder)
+        self.verdict.sentence(&list, &self.error.remainder())
+    }
+}
+
+/// What was fitted, what was left out in turn, and what was never fitted: of so many measurements, so many.
+fn validation(
+    model: &dyn RefitModel,
+    plan: &RefitPlan,
+    (last, noise): (&RefitErrors, Option<f64>),
+    [all, not_fitted]: [usize; 2],
+) -> Vec<String> {
+    let fitted = all - not_fitted;
+    let mut validation = vec![format!("{fitted} measurements were fitted")];
+    // Groups of a way among measurements that were fitted, or that were not.
+    let groups = |way: usize, fitted: bool| {
+        let own = plan.ways[way].groups.iter().zip(&plan.fitted);
+        let own: BTreeSet<usize> = own.filter(|(_, f)| **f == fitted).map(|(g, _)| *g).collect();
+        own
+    };
+    let named = |way: usize, own: &BTreeSet<usize>| {
+        let names: Vec<String> = own.iter().take(MOST_NAMED).map(|g| model.group_name(way, *g)).collect();
+        let more = if own.len() > MOST_NAMED { ", ..." } else { "" };
+        format!("{}{more}", names.join(", "))
+    };
+    for (w, (way, error)) in plan.ways.iter().zip(&last.held_out).enumerate() {
+        let (own, others) = (groups(w, true), groups(w, false));
+        validation.push(match error {
+            Some(_) => format!("each {} was left out in turn: {}", way.name, named(w, &own)),
+            None => format!(
+                "only one {} was fitted, so none was left out: {}",
+                way.name,
+                named(w, &own)
+            ),
+        });
+        let new: BTreeSet<usize> = others.difference(&own).copied().collect();
+        if !new.is_empty() {
+            validation.push(format!("never fitted, {}: {}", way.name, named(w, &new)));
+        }
+    }
+    validation.push(match not_fitted {
+        0 => "none was kept out of the fit: name some by `not_fitted`".into(),
+        n => format!("{n} were never fitted; they refuse an effect that predicts them worse"),
+    });
+    if noise.is_none() {
+        validation.push(
+            "the noise is not known, because nothing was measured twice: a part that remains may be noise".into(),
+        );
+    }
+    validation
+}
+
+/// What an effect belongs to, and how the values of the groups of a kind compare.
+fn belonging_words(belonging: &Belonging, kind: &str, name: impl Fn(usize) -> String) -> (String, String) {
+    match belonging {
+        Belonging::Bench => (
+            "bench".into(),
+            format!("the values of each {kind} agree within their intervals"),
+        ),
+        Belonging::Groups => (
+            kind.into(),
+            format!(
+                "the values of each {kind} differ by more than their intervals: an effect of each {kind}, or an error of the model"
+            ),
+        ),
+        Belonging::One(group) => {
+            let own = format!("{kind} {}", name(*group));
+            (own.clone(), format!("the intervals of all but {own} include no effect"))
+        }
+        Belonging::AllBut(group) => (
+            "bench".into(),
+            format!(
+                "the values of each {kind} but {} agree within their intervals",
+                name(*group)
+            ),
+        ),
     }
 }
 
@@ -325,8 +422,49 @@ fn unit(units: &[&str]) -> String {
 }
 
 impl FoundEffect {
+    /// One line on what it belongs to; none where that is in its name.
+    pub fn belongs(&self) -> Option<String> {
+        let agreement = self.agreement.as_ref()?;
+        let worse = match self.worse_for.as_slice() {
+            [] => String::new(),
+            worse => format!("; it predicts {} worse", worse.join(", ")),
+        };
+        Some(format!("{} is of the {}: {agreement}{worse}", self.name, self.of))
+    }
+
     /// Values with their unit and intervals.
     pub fn sentence(&self) -> String {
         effect_words(&self.name, &self.value, &self.unit, &self.interval)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(before: f64, after: f64, noise: Option<f64>, model: f64, found: bool) -> SetVerdict {
+        let pair = |error| ErrorPair {
+            fit: error,
+            held_out: error,
+        };
+        let report = ErrorReport {
+            measure: "height (nm rms)".into(),
+            before: pair(before),
+            after: pair(after),
+            noise_floor: noise,
+            model_error: Some(model),
+        };
+        report.verdict(!found, true)
+    }
+
+    #[test]
+    fn a_verdict_compares_what_is_left_with_noise_and_model() {
+        let noise = Some(1.0);
+        assert_eq!(verdict(1.4, 1.4, noise, 0.0, false), SetVerdict::NoResidual);
+        assert_eq!(verdict(31.0, 1.03, noise, 0.0, true), SetVerdict::Explained);
+        assert_eq!(verdict(31.0, 2.0, noise, 2.0, true), SetVerdict::ExplainedButFor);
+        assert_eq!(verdict(31.0, 4.0, noise, 2.0, true), SetVerdict::Partly);
+        assert_eq!(verdict(31.0, 4.0, None, 0.0, true), SetVerdict::Partly);
+        assert_eq!(verdict(31.0, 31.0, noise, 2.0, false), SetVerdict::Unexplained);
     }
 }

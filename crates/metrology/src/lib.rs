@@ -12,7 +12,8 @@
 //! | `widths` | tables of widths: set, model, figures, `model.toml` | |
 //! | `declared` | effects of a file, by expressions | |
 //! | `heights` | drawn maps and measured maps: set, model, figures | `pattern`, `declared` |
-//! | `spectra` | reflectance of film stacks: set, model, figures | `pattern`, `declared` |
+//! | `spectra` | reflectance of film stacks and of pads of pillars: set, model, figures | `pattern`, `declared` |
+//! | `noise` | white noise by second differences | |
 //! | `proposal` | patterns of what no effect explains | `declared`, `heights`, `spectra` |
 //! | `psf_stack` | stacks of point spread functions of reliefs and complex transmissions: set, light, sensor, model, figures | `pattern`, the transforms of `heights` |
 //! | `diagnosis`, `page` | the answer for programs and for people | |
@@ -21,6 +22,7 @@
 mod declared;
 mod diagnosis;
 mod heights;
+mod noise;
 mod page;
 mod pattern;
 mod proposal;
@@ -36,5 +38,5 @@ pub use pattern::NamePattern;
 pub use proposal::Proposal;
 pub use psf_stack::{ApertureShape, StackBench, StackModel, StackObject, StackPlane, StackSet, ThinLens, Transmission};
 pub use run::{Answer, SetKind, calibrate, kind_of};
-pub use spectra::{Spectrum, SpectrumModel, SpectrumSet, StatedLayer};
+pub use spectra::{ForecastEffect, Spectrum, SpectrumForecast, SpectrumModel, SpectrumSet, StatedLayer, StatedPads};
 pub use widths::{WidthModel, WidthSet, WidthSite};

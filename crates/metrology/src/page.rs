@@ -2,7 +2,7 @@
 
 use metalith_report::{Axis, Cell, Chart, Column, Page, Ranking, Table, Verdict, number_words, sig};
 
-use crate::diagnosis::Diagnosis;
+use crate::diagnosis::{Diagnosis, FoundEffect};
 use crate::proposal::Proposal;
 
 /// Most groups whose values a row shows.
@@ -14,7 +14,12 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         format!("Calibration: {}", diagnosis.set),
         format!("measured {}", diagnosis.kind),
     );
-    page.verdict(Verdict::of(diagnosis.verdict.is_explained()), diagnosis.sentence());
+    let verdict = diagnosis.verdict;
+    page.finding(
+        Verdict::of_explained(verdict.is_explained(), verdict.is_partial()),
+        verdict.label(),
+        diagnosis.sentence(),
+    );
     let error = &diagnosis.error;
     let with_unit = |v: f64| format!("{} {unit}", sig(v, 3)).trim().to_owned();
     page.facts(&[
@@ -34,7 +39,6 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
             Column::text("Value"),
             Column::text("95 % interval"),
             Column::text("Belongs to"),
-            Column::text("In each group alone"),
         ]);
         for e in &diagnosis.effects {
             table.row([
@@ -42,10 +46,14 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
                 format!("{} {}", number_words(&e.value), e.unit).as_str().into(),
                 number_words(&e.interval).as_str().into(),
                 e.of.as_str().into(),
-                by_group(&e.by_group).as_str().into(),
             ]);
         }
         page.table(table);
+        let groups: Vec<String> = diagnosis.effects.iter().filter_map(in_groups).collect();
+        if !groups.is_empty() {
+            page.subsection("In each group alone");
+            page.list(groups);
+        }
     }
     ladder(&mut page, diagnosis, unit);
     let mut ranking = Ranking::new(
@@ -60,28 +68,44 @@ pub(crate) fn page(diagnosis: &Diagnosis, unit: &str) -> Page {
         ranking.bar(&tried.name, tried.score.max(0.0), None, remark, chosen);
     }
     page.figure(ranking.caption("Each effect as it was tried last, on top of those that were taken before."));
+    // The table of the ladder has the other reasons.
+    let in_ladder = |name: &String| diagnosis.ladder.iter().any(|step| step.effect.as_ref() == Some(name));
+    let others = diagnosis.ranking.iter().filter(|t| !in_ladder(&t.name));
+    let others: Vec<String> = { others }
+        .filter_map(|t| Some(format!("`{}`: {}", t.name, t.rejected.as_ref()?)))
+        .collect();
+    if !others.is_empty() {
+        page.subsection("Other effects that were refused");
+        page.list(others);
+    }
     if !diagnosis.proposals.is_empty() {
         page.section("Patterns of the residual");
         page.paragraph("No effect of the list explains these. `proposal.toml` declares them: give it to `--declare`.");
         page.list(diagnosis.proposals.iter().map(Proposal::sentence));
     }
-    page.list(
-        diagnosis
-            .ranking
-            .iter()
-            .filter_map(|t| Some(format!("`{}`: {}", t.name, t.rejected.as_ref()?))),
-    );
     page
 }
 
+/// Whether the values of groups agree, which they are, and which groups an effect makes worse; none where each has its own.
+fn in_groups(effect: &FoundEffect) -> Option<String> {
+    let agreement = effect.agreement.as_ref()?;
+    let worse = match effect.worse_for.as_slice() {
+        [] => String::new(),
+        worse => format!(" Worse with it: {}.", worse.join(", ")),
+    };
+    let values = by_group(&effect.by_group);
+    Some(format!("`{}`: {agreement}. {values}.{worse}", effect.name))
+}
+
 /// Values in each group alone: of each parameter, groups with their values.
-fn by_group(parameters: &[Vec<(String, f64)>]) -> String {
-    let of_one = |own: &Vec<(String, f64)>| {
-        let each = own
-            .iter()
-            .take(MOST_GROUPS)
-            .map(|(name, v)| format!("{name}: {}", sig(*v, 3)));
-        each.collect::<Vec<_>>().join(", ")
+fn by_group(parameters: &[Vec<(String, f64, [f64; 2])>]) -> String {
+    let of_one = |own: &Vec<(String, f64, [f64; 2])>| {
+        let each = own.iter().take(MOST_GROUPS);
+        let each = each
+            .map(|(name, v, [low, high])| format!("{name}: {} ({} to {})", sig(*v, 3), sig(*low, 3), sig(*high, 3)));
+        let more = own.len().saturating_sub(MOST_GROUPS);
+        let more = (more > 0).then(|| format!("and {more} more"));
+        each.chain(more).collect::<Vec<_>>().join(", ")
     };
     parameters.iter().map(of_one).collect::<Vec<_>>().join("; ")
 }

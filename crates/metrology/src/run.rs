@@ -116,8 +116,7 @@ pub fn calibrate(
                 kind: "heights",
                 measure: "height (nm rms)",
                 names: set.fields.iter().map(|f| f.name.clone()).collect(),
-                noise_floor: None,
-                averages: false,
+                averages: true,
                 remarks: &[],
             };
             let plan = model.plan();
@@ -128,6 +127,8 @@ pub fn calibrate(
         SetKind::Spectra => {
             let set = SpectrumSet::read(&path)?;
             let mut model = SpectrumModel::new(&set);
+            model.check()?;
+            let remarks = model.remarks();
             model.declare(&declared_for(&OF_SPECTRA)?)?;
             model.effects = tried(&model.effects, &spectra::CONDITIONAL, only)?;
             let facts = SetFacts {
@@ -139,9 +140,8 @@ pub fn calibrate(
                     "reflectance (rms)"
                 },
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
-                noise_floor: set.repeat_rms(),
                 averages: false,
-                remarks: &[],
+                remarks: &remarks,
             };
             let plan = model.plan();
             answer(model, &plan, &facts, ("", out), progress, |model, page, theta| {
@@ -157,7 +157,6 @@ pub fn calibrate(
                 kind: "widths",
                 measure: "width (nm rms)",
                 names: (1..=set.sites.len()).map(|n| format!("site {n}")).collect(),
-                noise_floor: set.repeat_rms(),
                 averages: true,
                 remarks: &[],
             };
@@ -174,14 +173,13 @@ pub fn calibrate(
             let mut set = StackSet::read(&path)?;
             progress.begin("orientation", 0);
             let prepared = psf_stack::prepare(&mut set)?;
-            let mut model = StackModel::new(&set, &prepared.sampling, prepared.focus_um);
+            let mut model = StackModel::new(&set, &prepared);
             model.keep(&tried(&model.own.effects, &[], only)?);
             let facts = SetFacts {
                 title: &set.title,
                 kind: "psf_stack",
                 measure: "residual over measured norm (rms)",
                 names: set.planes.iter().map(|p| p.name.clone()).collect(),
-                noise_floor: Some(prepared.noise),
                 averages: false,
                 remarks: &set.remarks,
             };

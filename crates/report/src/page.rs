@@ -38,15 +38,22 @@ impl Page {
 
     /// The banner: what came out, in one sentence. Belongs first.
     pub fn verdict(&mut self, verdict: Verdict, words: impl AsRef<str>) -> &mut Self {
-        let class = match verdict {
-            Verdict::Pass => "pass",
-            Verdict::Fail => "fail",
-            Verdict::NotRun => "notrun",
-        };
+        self.banner(verdict, verdict.word(), words.as_ref())
+    }
+
+    /// The banner of a question that is not answered by pass or fail: `label` in the colour of the verdict, then what came out, in
+    /// one sentence, without the label if it begins with it.
+    pub fn finding(&mut self, verdict: Verdict, label: &str, words: impl AsRef<str>) -> &mut Self {
+        let words = words.as_ref();
+        self.banner(verdict, label, words.strip_prefix(label).unwrap_or(words))
+    }
+
+    fn banner(&mut self, verdict: Verdict, label: &str, rest: &str) -> &mut Self {
         self.body.push_str(&format!(
-            "<p class=\"banner {class}\" role=\"status\">{} {}</p>\n",
-            verdict.html(),
-            inline(words.as_ref())
+            "<p class=\"banner {}\" role=\"status\">{} {}</p>\n",
+            verdict.class(),
+            verdict.labelled(label),
+            inline(rest.trim_start_matches([':', ',', ' ']))
         ));
         self
     }

@@ -27,15 +27,34 @@ impl Verdict {
         }
     }
 
+    /// Pass if all of a residual is explained, fail if nothing is; a part of it is neither.
+    pub fn of_explained(all: bool, part: bool) -> Self {
+        if part { Self::NotRun } else { Self::of(all) }
+    }
+
+    pub(super) fn class(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Fail => "fail",
+            Self::NotRun => "notrun",
+        }
+    }
+
     pub(super) fn html(self) -> String {
-        let (class, sign) = match self {
-            Self::Pass => ("pass", "✓"),
-            Self::Fail => ("fail", "✗"),
-            Self::NotRun => ("notrun", "–"),
+        self.labelled(self.word())
+    }
+
+    /// The sign and the colour of the verdict with other words.
+    pub(super) fn labelled(self, label: &str) -> String {
+        let sign = match self {
+            Self::Pass => "✓",
+            Self::Fail => "✗",
+            Self::NotRun => "–",
         };
         format!(
-            "<span class=\"verdict {class}\"><span aria-hidden=\"true\">{sign}</span> {}</span>",
-            self.word()
+            "<span class=\"verdict {}\"><span aria-hidden=\"true\">{sign}</span> {}</span>",
+            self.class(),
+            escape(label)
         )
     }
 }

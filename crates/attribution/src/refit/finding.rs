@@ -44,7 +44,11 @@ impl RefitRejection {
                     .map_or(own.clone(), |group| format!("{own}: {way} {group} is predicted worse"))
             }
             Self::Worse { what, before, after } => {
-                format!("fits better and predicts worse: {what} {before:.4} before, {after:.4} with it")
+                // Four digits of the larger one.
+                let decimals = (3.0 - before.abs().max(after.abs()).log10().floor()).clamp(0.0, 9.0) as usize;
+                format!(
+                    "fits better and predicts worse: {what}, {before:.decimals$} before, {after:.decimals$} with it"
+                )
             }
             Self::Nothing => "the 95 % interval of its value includes no effect".into(),
             Self::Unphysical => "its fitted value is at the end of its physical range".into(),
@@ -81,7 +85,31 @@ pub struct RefitFinding {
     pub theta: Vec<f64>,
     /// 95 % interval of each parameter; none of one that was not fitted.
     pub intervals: Vec<Option<[f64; 2]>>,
-    /// Value of each parameter that was fitted in each group of the first way alone, with all else as it was found: slot, and
-    /// groups with their values.
-    pub by_group: Vec<(usize, Vec<(usize, f64)>)>,
+    /// Value of each parameter that was fitted in each group of objects alone, with all else as it was found: slot, and groups.
+    pub by_group: Vec<(usize, Vec<GroupValue>)>,
+    /// What each chosen effect belongs to.
+    pub belongings: Vec<Belonging>,
+    /// Groups of objects that each chosen effect predicts worse, when they are left out, than without it.
+    pub worse: Vec<Vec<usize>>,
+}
+
+/// Value of a parameter in one group alone, with its 95 % interval.
+#[derive(Clone, Debug)]
+pub struct GroupValue {
+    pub group: usize,
+    pub value: f64,
+    pub interval: [f64; 2],
+}
+
+/// What an effect belongs to, by its values in groups of objects.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Belonging {
+    /// The values of all groups agree within their intervals.
+    Bench,
+    /// They differ.
+    Groups,
+    /// One group has a value, all others have none.
+    One(usize),
+    /// The values of all groups but one agree.
+    AllBut(usize),
 }

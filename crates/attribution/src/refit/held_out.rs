@@ -10,7 +10,7 @@ use crate::fit::normal_equations::hold;
 use crate::fit::{Gain, minimise};
 
 /// Information on a parameter, relative to that of all measurements, below which others do not predict it.
-const UNINFORMED: f64 = 1e-3;
+pub(super) const UNINFORMED: f64 = 1e-3;
 
 /// Groups up to which each is left out of a fit in full. One of more moves a fit so little that the linear model holds.
 const FEW_GROUPS: usize = 12;
@@ -120,26 +120,6 @@ impl Selection<'_> {
         }
     }
 
-    /// Value of each active parameter in each group of the first way alone, with all else as it was found.
-    pub(super) fn values_by_group(&self, now: &State) -> Vec<(usize, Vec<(usize, f64)>)> {
-        let Some(way) = self.plan.ways.first() else {
-            return Vec::new();
-        };
-        let last = now.active.len();
-        let of_slot = |(k, &slot): (usize, &usize)| {
-            let (low, high) = self.model.parameters()[slot].range;
-            let own = self.groups(way).into_iter().filter_map(|group| {
-                let members = (0..now.equations.len()).filter(|&m| self.plan.fitted[m] && way.groups[m] == group);
-                let sums = members.map(|m| [now.equations[m].fit[(k, k)], now.equations[m].fit[(k, last)]]);
-                let [information, slope] = sums.fold([0.0, 0.0], |[a, b], [x, y]| [a + x, b + y]);
-                let value = (now.theta[slot] + slope / information).clamp(low, high);
-                (information > UNINFORMED * now.total[(k, k)]).then_some((group, value))
-            });
-            (slot, own.collect())
-        };
-        now.active.iter().enumerate().map(of_slot).collect()
-    }
-
     /// Group of a way that an effect predicts worse than before, and most so; none if it predicts none worse.
     pub(super) fn worse_group(&self, way: usize, before: &RefitErrors, after: &RefitErrors) -> Option<String> {
         let groups = &self.plan.ways[way].groups;
@@ -209,7 +189,7 @@ pub(super) fn gain(before: &[Option<f64>], after: &[Option<f64>]) -> Gain {
 }
 
 /// Half of a 95 % interval in standard deviations that were estimated with some degrees of freedom (Student).
-fn student_95(degrees: usize) -> f64 {
+pub(super) fn student_95(degrees: usize) -> f64 {
     const FEW: [f64; 9] = [12.71, 12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31];
     FEW.get(degrees).copied().unwrap_or(1.96 + 2.6 / degrees as f64)
 }

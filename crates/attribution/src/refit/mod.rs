@@ -4,6 +4,7 @@
 //! objects in turn, and measurements that were never fitted. It is taken if it predicts them better in each way of leaving out.
 //! One that fits better and predicts worse is refused by name.
 
+mod belonging;
 mod finding;
 mod fit;
 mod held_out;
@@ -15,7 +16,7 @@ mod tests;
 
 use metalith_core::{Progress, Result};
 
-pub use finding::{RefitErrors, RefitFinding, RefitRejection, RefitTried};
+pub use finding::{Belonging, GroupValue, RefitErrors, RefitFinding, RefitRejection, RefitTried};
 pub use model::{LeaveOut, RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitPlan, RefitScope};
 
 /// Select the effects that explain measurements.

@@ -95,6 +95,26 @@ pub trait RefitModel: Sync {
         0.004
     }
 
+    /// Way of leaving out whose groups are the objects that an effect may belong to.
+    fn objects(&self) -> usize {
+        0
+    }
+
+    /// Number of points of a measurement, and of its repeats, whose residuals err together.
+    fn correlated_points(&self, _measurement: usize, _theta: &[f64]) -> f64 {
+        1.0
+    }
+
+    /// Root mean square that noise makes alone; none where nothing states it.
+    fn noise(&self, _theta: &[f64]) -> Option<f64> {
+        None
+    }
+
+    /// Root mean square by which the model itself errs; zero if it is exact.
+    fn model_error(&self, _theta: &[f64]) -> f64 {
+        0.0
+    }
+
     /// Groups in which an effect has to hold.
     fn scope(&self, _effect: usize) -> RefitScope {
         RefitScope::Bench

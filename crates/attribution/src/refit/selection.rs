@@ -9,7 +9,7 @@ use super::model::{RefitModel, RefitPlan, RefitScope};
 use crate::fit::Gain;
 
 /// A figure of measurements that were never fitted may grow by this share: rounding, and steps of a fit that end early.
-const MAY_GROW: f64 = 0.002;
+pub(super) const MAY_GROW: f64 = 0.002;
 
 /// Two effects are taken at once if they gain by this share more than the best one alone.
 const PAIR_SHARE: f64 = 0.1;
@@ -67,10 +67,15 @@ impl Selection<'_> {
         let mut intervals = self.drop_redundant(&mut course);
         let by_group = self.values_by_group(&course.now);
         self.add_values_of_groups(&mut course, &mut intervals);
-        Ok(RefitFinding {
+        let mut found = RefitFinding {
             by_group,
             ..self.finding(course, intervals)
-        })
+        };
+        found.belongings = self.belongings(&found);
+        found.worse = { found.ladder.windows(2) }
+            .map(|pair| self.worse_groups(&pair[0], &pair[1]))
+            .collect();
+        Ok(found)
     }
 
     /// Take the effect, or the two, that predict most of what was left out; false if none is taken.
@@ -342,6 +347,8 @@ impl Selection<'_> {
             theta: now.theta,
             intervals,
             by_group: Vec::new(),
+            belongings: Vec::new(),
+            worse: Vec::new(),
         }
     }
 

@@ -92,7 +92,7 @@ impl Diagnosis {
             patterns: patterns.iter().map(|p| FreePattern::new(simulator, p)).collect(),
             proposal: None,
             unexplained_share,
-            remainder: (verdict == SetVerdict::ExplainedButFor).then_some(remainder),
+            remainder: matches!(verdict, SetVerdict::ExplainedButFor | SetVerdict::Partly).then_some(remainder),
             missing_by_speckle: evidence.amount_by_noise,
             left_out: left_out(set, unusable),
             warnings: Vec::new(),

@@ -121,7 +121,7 @@ pub struct Diagnosis {
     pub proposal: Option<Proposal>,
     /// Share of the error above noise that is left.
     pub unexplained_share: f64,
-    /// The remainder that is below the error of the model; none with another verdict.
+    /// What the effects leave, if they explain the rest; none with another verdict.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remainder: Option<Remainder>,
     /// Share of missing pillars by their speckle, where the speckle counts as noise in the error after.

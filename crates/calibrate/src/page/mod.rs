@@ -14,7 +14,7 @@ use crate::interval_parts::WidthParts;
 use crate::session::{Session, Simulations};
 use crate::statistics::Evidence;
 use metalith_core::Result;
-use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, counted, fixed, sig};
+use metalith_report::{Axis, Cell, Column, ImageGrid, Page, Ranking, Table, Verdict, counted, sig};
 
 /// Write the report of a session.
 ///
@@ -35,9 +35,11 @@ pub(crate) fn write_page(
             session.set().path.display()
         ),
     );
-    page.verdict(
-        Verdict::of(diagnosis.verdict.is_explained()),
-        capitalised(&diagnosis.sentence()),
+    let verdict = diagnosis.verdict;
+    page.finding(
+        Verdict::of_explained(verdict.is_explained(), verdict.is_partial()),
+        verdict.label(),
+        diagnosis.sentence(),
     );
     let error = &diagnosis.error;
     page.facts(&[
@@ -47,7 +49,7 @@ pub(crate) fn write_page(
         ("Held out, null test", sig(error.null_test_held_out, 4)),
         (
             "Unexplained",
-            format!("{} %", fixed(100.0 * diagnosis.unexplained_share, 1)),
+            format!("{} %", sig(100.0 * diagnosis.unexplained_share, 2)),
         ),
     ]);
     page.paragraph(

@@ -14,6 +14,7 @@ use super::far_field::{FarFieldPlan, relative_error};
 use super::fft::{Fft2, frequency};
 use super::set::HeightSet;
 use crate::declared::{DeclaredEffect, DeclaredSlots, Stage};
+use crate::noise::root_mean_square;
 
 /// Samples that a drawn map goes on beyond its rim, as its outermost samples are: a blur of 2 um at 0.1 um a sample.
 const MARGIN: usize = 64;
@@ -461,6 +462,13 @@ impl RefitModel for HeightModel<'_> {
             out.push(relative_error(&found, &measured[field]));
         }
         out
+    }
+
+    fn noise(&self, theta: &[f64]) -> Option<f64> {
+        let fitted: Vec<usize> = (0..self.count()).filter(|&f| self.set.fields[f].fitted).collect();
+        let of = |&f: &usize| crate::noise::of_map(&(self.measured(f) - self.predicted(f, theta)));
+        let each: Vec<f64> = fitted.par_iter().map(of).collect();
+        Some(root_mean_square(each.into_iter())).filter(|noise| *noise > 0.0)
     }
 
     fn group_name(&self, way: usize, group: usize) -> String {

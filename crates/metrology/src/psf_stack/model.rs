@@ -9,9 +9,9 @@ use ndarray::Array2;
 use num_complex::Complex32;
 use rayon::prelude::*;
 
+use super::Prepared;
 use super::detector::{Detector, Images, Measured, eliminated};
 use super::light::{Light, Place};
-use super::sampling::Sampling;
 use super::set::StackSet;
 use super::setting::{self, Effects, Setting};
 
@@ -44,6 +44,8 @@ pub struct StackModel<'a> {
     middle_um: f64,
     kept: Vec<Mutex<Vec<Arc<Base>>>>,
     keep: usize,
+    /// Relative error that noise makes alone.
+    pub(super) noise: f64,
     /// Times that starts of each effect were compared.
     pub(super) scans: Vec<AtomicUsize>,
 }
@@ -61,8 +63,9 @@ pub(super) struct Base {
 }
 
 impl<'a> StackModel<'a> {
-    /// A model of a set whose frames have the orientation of the sensor; `focus_um` is where the stated model is registered.
-    pub(crate) fn new(set: &'a StackSet, sampling: &'a Sampling, focus_um: f64) -> Self {
+    /// A model of a set whose frames have the orientation of the sensor.
+    pub(crate) fn new(set: &'a StackSet, prepared: &'a Prepared) -> Self {
+        let (sampling, focus_um) = (&prepared.sampling, prepared.focus_um);
         let (rows, cols) = set.planes[0].frame.dim();
         let detector = Detector::new(rows, cols, sampling);
         let measured: Vec<Measured> = { set.planes.par_iter() }
@@ -81,6 +84,7 @@ impl<'a> StackModel<'a> {
             middle_um: 0.5 * (low + high),
             kept: set.planes.iter().map(|_| Mutex::default()).collect(),
             keep: keep.clamp(1, 5),
+            noise: prepared.noise,
             scans: Vec::new(),
         };
         out.scans = out.own.effects.iter().map(|_| AtomicUsize::new(0)).collect();

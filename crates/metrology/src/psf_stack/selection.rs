@@ -53,6 +53,15 @@ impl RefitModel for StackModel<'_> {
         &self.own.effects
     }
 
+    /// Objects are the second way of leaving out, after planes.
+    fn objects(&self) -> usize {
+        1
+    }
+
+    fn noise(&self, _theta: &[f64]) -> Option<f64> {
+        Some(self.noise)
+    }
+
     fn count(&self) -> usize {
         self.set.planes.len()
     }

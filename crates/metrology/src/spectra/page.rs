@@ -23,7 +23,7 @@ pub(crate) fn figures(page: &mut Page, set: &SpectrumSet, model: &SpectrumModel<
         let (mean, predicted) = (model.mean(first), model.predicted(first, theta));
         let along = |values: Vec<f64>| set.wavelengths_nm.iter().copied().zip(values).collect::<Vec<_>>();
         let (medium, _) = &set.media[spectrum.medium];
-        let title = format!("{} nm, {medium}", spectrum.height_nm);
+        let title = format!("{} nm, {medium}", spectrum.size_nm);
         let axis = || Axis::linear("wavelength", "nm");
         let mut spectra = Chart::new(title.clone(), axis(), Axis::linear(measured, "")).size(460.0, 300.0);
         spectra.line("measured, mean of repeats", along(mean.to_vec()));
@@ -42,10 +42,13 @@ pub(crate) fn figures(page: &mut Page, set: &SpectrumSet, model: &SpectrumModel<
             });
             residual.band("repeats", band);
         }
-        residual.line(
-            "residual",
-            along(mean.iter().zip(&predicted).map(|(m, p)| m - p).collect()),
-        );
+        let off = along(mean.iter().zip(&predicted).map(|(m, p)| m - p).collect());
+        if model.used(first).iter().all(|used| *used) {
+            residual.line("residual", off);
+        } else {
+            let used = off.into_iter().zip(model.used(first)).filter(|(_, used)| **used);
+            residual.points("residual, where it is used", used.map(|(point, _)| point));
+        }
         let role = if spectrum.fitted { "Fitted" } else { "Not fitted" };
         page.row([
             spectra.caption(format!("{role}.")),

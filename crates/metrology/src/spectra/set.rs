@@ -6,18 +6,35 @@ use std::path::{Path, PathBuf};
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::text::{quoted, without_mark};
-use metalith_rcwa::Material;
+use metalith_rcwa::{CellLattice, Material};
 
+use super::pads::{LARGEST_APERTURE, PadBank};
 use crate::pattern::NamePattern;
 
 /// A layer as it was stated.
 #[derive(Clone, Debug)]
 pub struct StatedLayer {
     pub name: String,
-    /// None of the object, whose medium differs by measurement.
+    /// None of an object that its medium fills; of pillars, their material.
     pub material: Option<Material>,
-    /// Thickness (nm); none of the object, whose height differs by measurement.
+    /// Thickness (nm); none of the object, which differs by measurement.
     pub thickness_nm: Option<f64>,
+}
+
+/// Pillars of all pads as they were stated; their widths differ by measurement.
+#[derive(Clone, Debug)]
+pub struct StatedPads {
+    /// Number of their layer.
+    pub layer: usize,
+    pub pitch_nm: f64,
+    pub lattice: CellLattice,
+    /// True if they are circles.
+    pub is_round: bool,
+    pub height_nm: f64,
+    /// Film under the pillars (nm).
+    pub residual_nm: f64,
+    /// Angle of the walls from upright (degrees), positive if the foot is wider.
+    pub taper_deg: f64,
 }
 
 /// One measured spectrum.
@@ -25,9 +42,9 @@ pub struct StatedLayer {
 pub struct Spectrum {
     /// Name of the file without its ending.
     pub name: String,
-    /// Height of the object (nm).
-    pub height_nm: f64,
-    /// Number of the medium in the object.
+    /// Height of the object, or width of the pillars as drawn (nm).
+    pub size_nm: f64,
+    /// Number of the medium in the object, or between the pillars.
     pub medium: usize,
     /// Reflectance, or transmission, at each wavelength of the set.
     pub reflectance: Vec<f64>,
@@ -46,6 +63,8 @@ pub struct SpectrumSet {
     pub ambient_index: f64,
     /// Layers from the light inwards; one is the object.
     pub layers: Vec<StatedLayer>,
+    /// The object, if it is pads of pillars.
+    pub pads: Option<StatedPads>,
     pub substrate: Option<Material>,
     /// Stated numerical aperture of the objective; zero for normal incidence.
     pub numerical_aperture: f64,
@@ -87,7 +106,7 @@ impl SpectrumSet {
         for (k, s) in self.spectra.iter().enumerate() {
             let same = |own: &&mut Vec<usize>| {
                 let first = &self.spectra[own[0]];
-                first.height_nm == s.height_nm && first.medium == s.medium
+                first.size_nm == s.size_nm && first.medium == s.medium
             };
             match out.iter_mut().find(same) {
                 Some(own) => own.push(k),
@@ -130,11 +149,16 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> SpectrumSet {
         .optional_float("numerical_aperture", Limits::new(0.0..=0.98, ""))
         .unwrap_or(0.0);
     stack.finish();
-    let layers = layers(root, &folder, &wavelengths_nm);
+    let (layers, pads) = layers(root, &folder, &wavelengths_nm);
+    let largest = pads.as_ref().map_or(0.98, |_| LARGEST_APERTURE);
+    if numerical_aperture > largest {
+        let what = format!("the numerical aperture of pads of pillars is at most {largest}");
+        root.fault("stack", what, "measure pads through an objective of a lower aperture");
+    }
     let reference = root.section("reference");
     let mirror = table(&reference, "file", &folder.join(reference.text("file")), 0);
     reference.finish();
-    let (media, spectra) = captures(root, &folder, &wavelengths_nm, &mirror);
+    let (media, spectra) = captures(root, (&folder, pads.as_ref()), &wavelengths_nm, &mirror);
     SpectrumSet {
         path: path.to_owned(),
         title,
@@ -142,6 +166,7 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> SpectrumSet {
         is_transmission,
         ambient_index,
         layers,
+        pads,
         substrate,
         numerical_aperture,
         media,
@@ -181,17 +206,29 @@ fn material(s: &Section<'_, '_>, key: &str, folder: &Path, wavelengths_nm: &[f64
     Some(found)
 }
 
-fn layers(root: &Section<'_, '_>, folder: &Path, wavelengths_nm: &[f64]) -> Vec<StatedLayer> {
-    let mut out = Vec::new();
+/// What a layer is.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Film,
+    Object,
+    Pillars,
+}
+
+fn layers(root: &Section<'_, '_>, folder: &Path, wavelengths_nm: &[f64]) -> (Vec<StatedLayer>, Option<StatedPads>) {
+    let (mut out, mut pads) = (Vec::new(), None);
+    let kinds = [("yes", Kind::Object), ("no", Kind::Film), ("pillars", Kind::Pillars)];
     for s in root.sections("layer") {
         let name = s.text("name");
-        let is_object = s.choice("object", &[("yes", true), ("no", false)], Some(false));
+        let kind = s.choice("object", &kinds, Some(Kind::Film));
+        if kind == Kind::Pillars {
+            pads = Some(pillars(&s, out.len()));
+        }
         out.push(StatedLayer {
             name,
-            material: (!is_object)
+            material: (kind != Kind::Object)
                 .then(|| material(&s, "material", folder, wavelengths_nm))
                 .flatten(),
-            thickness_nm: (!is_object).then(|| s.float("thickness_nm", Limits::new(0.0..=100_000.0, "nm"))),
+            thickness_nm: (kind == Kind::Film).then(|| s.float("thickness_nm", Limits::new(0.0..=100_000.0, "nm"))),
         });
         s.finish();
     }
@@ -199,15 +236,54 @@ fn layers(root: &Section<'_, '_>, folder: &Path, wavelengths_nm: &[f64]) -> Vec<
         root.fault(
             "layer",
             "not one layer is the object",
-            "give [[layer]] sections from the light inwards, one with `object = \"yes\"`",
+            "give [[layer]] sections from the light inwards, one with `object = \"yes\"` or `object = \"pillars\"`",
         );
     }
-    out
+    (out, pads)
+}
+
+fn pillars(s: &Section<'_, '_>, layer: usize) -> StatedPads {
+    let pitch_nm = s.float("pitch_nm", Limits::new(50.0..=20_000.0, "nm"));
+    let is_round = s.choice("shape", &[("square", false), ("circle", true)], Some(false));
+    let is_hexagonal = s.choice("lattice", &[("square", false), ("hexagonal", true)], Some(false));
+    if is_hexagonal && !is_round {
+        s.fault(
+            "lattice",
+            "pillars of a hexagonal lattice are circles",
+            "write shape = \"circle\"",
+        );
+    }
+    let pads = StatedPads {
+        layer,
+        pitch_nm,
+        lattice: if is_hexagonal {
+            CellLattice::hexagonal(pitch_nm)
+        } else {
+            CellLattice::Square
+        },
+        is_round,
+        height_nm: s.float("height_nm", Limits::new(10.0..=50_000.0, "nm")),
+        residual_nm: s
+            .optional_float("residual_nm", Limits::new(0.0..=50_000.0, "nm"))
+            .unwrap_or(0.0),
+        taper_deg: s
+            .optional_float("taper_deg", Limits::new(-10.0..=10.0, "degrees"))
+            .unwrap_or(0.0),
+    };
+    let [_, (low, high), _] = PadBank::ranges(&pads);
+    if !(low..=high).contains(&pads.taper_deg) {
+        s.fault(
+            "taper_deg",
+            format!("walls of this height lean by {low:.2} to {high:.2} degrees at most"),
+            "state a taper in this range: pads are solved for no other",
+        );
+    }
+    pads
 }
 
 fn captures(
     root: &Section<'_, '_>,
-    folder: &Path,
+    (folder, pads): (&Path, Option<&StatedPads>),
     wavelengths_nm: &[f64],
     mirror: &[[f64; 2]],
 ) -> (Vec<(String, Material)>, Vec<Spectrum>) {
@@ -221,11 +297,15 @@ fn captures(
         let all_fitted = s.choice("fitted", &[("yes", true), ("no", false)], Some(true));
         let not_fitted = s.texts("not_fitted");
         s.finish();
-        let hint = "write the height in nm and the repeat in braces: captures/{height_nm}_{repeat}.csv";
+        let (what, key, most) = match pads {
+            None => ("height", "height_nm", 100_000.0),
+            Some(pads) => ("width", "width_nm", pads.nearest_nm()),
+        };
+        let hint = format!("write the {what} in nm and the repeat in braces: captures/{{{key}}}_{{repeat}}.csv");
         let pattern = match NamePattern::parse(&text, folder) {
-            Ok(pattern) if pattern.names().contains(&"height_nm") => pattern,
+            Ok(pattern) if pattern.names().contains(&key) => pattern,
             Ok(_) => {
-                s.fault("files", "the names of files have no {height_nm}", hint);
+                s.fault("files", format!("the names of files have no {{{key}}}"), hint);
                 continue;
             }
             Err(what) => {
@@ -245,11 +325,11 @@ fn captures(
         media.push((name, medium));
         let mut known = BTreeSet::new();
         for (path, named) in files {
-            let height = &named["height_nm"];
-            known.insert(height.clone());
-            let Some(height_nm) = height.parse::<f64>().ok().filter(|h| (0.0..=100_000.0).contains(h)) else {
-                let what = format!("{}: `{height}` is no height in nm", path.display());
-                s.fault("files", what, hint);
+            let size = &named[key];
+            known.insert(size.clone());
+            let Some(size_nm) = size.parse::<f64>().ok().filter(|v| (0.0..=most).contains(v)) else {
+                let what = format!("{}: `{size}` is no {what} from 0 to {most} nm", path.display());
+                s.fault("files", what, &hint);
                 continue;
             };
             let capture = table(&s, "files", &path, header);
@@ -268,17 +348,17 @@ fn captures(
                 name: path
                     .file_stem()
                     .map_or_else(String::new, |n| n.to_string_lossy().into()),
-                height_nm,
+                size_nm,
                 medium: number,
                 reflectance,
-                fitted: all_fitted && !not_fitted.contains(height),
+                fitted: all_fitted && !not_fitted.contains(size),
             });
         }
-        for height in not_fitted.iter().filter(|h| !known.contains(*h)) {
+        for size in not_fitted.iter().filter(|h| !known.contains(*h)) {
             s.fault(
                 "not_fitted",
-                format!("no file has the height `{}`", quoted(height)),
-                "write heights as the names of files have them",
+                format!("no file has the {what} `{}`", quoted(size)),
+                format!("write each {what} as the names of files have it"),
             );
         }
     }

@@ -88,6 +88,10 @@ impl RefitModel for WidthModel<'_> {
         &self.effects
     }
 
+    fn noise(&self, _theta: &[f64]) -> Option<f64> {
+        self.set.repeat_rms()
+    }
+
     fn count(&self) -> usize {
         self.set.sites.len()
     }
