@@ -236,8 +236,8 @@ pub struct SinglePsfReport<'a> {
 }
 
 /// Reference of Strehl ratios of a layout without a design, in words for people.
-pub const STREHL_AGAINST: &str = "Strehl ratios are against an ideal lens that fills the outline of the pillars: a hole inside of it lowers \
-     them. `run` and `verify` divide by the aperture of the design.";
+pub const STREHL_AGAINST: &str = "Strehl ratios are against the sites that hold a pillar and the holes among them: a hole lowers the \
+     Strehl ratio. `run` and `verify` divide by the aperture of the design.";
 
 /// Write `report.html`, `report.json` and each PSF as an NPY array (float64, rows along +y) into a folder.
 ///
