@@ -236,8 +236,8 @@ pub struct SinglePsfReport<'a> {
 }
 
 /// Reference of Strehl ratios of a layout without a design, in words for people.
-pub const STREHL_AGAINST: &str = "Strehl ratios are against an ideal lens that fills the outline of the pillars: a hole inside of it lowers \
-     them. `run` and `verify` divide by the aperture of the design.";
+pub const STREHL_AGAINST: &str = "Strehl ratios are against the sites that hold a pillar and the holes among them: a hole lowers the \
+     Strehl ratio. `run` and `verify` divide by the aperture of the design.";
 
 /// Write `report.html`, `report.json` and each PSF as an NPY array (float64, rows along +y) into a folder.
 ///
@@ -392,4 +392,36 @@ fn write_npy(path: &Path, values: &Array2<f64>) -> Result<()> {
     };
     fill(&mut bytes).map_err(Error::io("encode", path))?;
     AtomicFile::write(path, &bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metalith_pillars::Lattice;
+
+    /// A disc is its own aperture on both lattices, and holes of any size inside of it are part of it.
+    #[test]
+    fn holes_are_part_of_the_aperture() {
+        for kind in [LatticeKind::Square, LatticeKind::Hexagonal] {
+            let lattice = Lattice::of_kind(kind, 400, 61).unwrap();
+            let sites = (0..61 * 61)
+                .map(|k| (k % 61, k / 61))
+                .filter(|(x, y)| lattice.has(*x, *y));
+            let mut disc = PillarMap::empty(lattice);
+            for (ix, iy) in sites.filter(|(x, y)| lattice.radius2_nm2(*x, *y) < 5_000.0f64.powi(2)) {
+                disc.number[[iy, ix]] = 120;
+            }
+            let filled = disc.number.mapv(|number| u16::from(number > 0));
+            assert_eq!(whole_aperture(&disc).number, filled);
+            let mut holed = disc.clone();
+            let middle = lattice.sites() / 2;
+            for (_, number) in holed.number.indexed_iter_mut().filter(|((iy, ix), _)| {
+                ix.abs_diff(middle) < 6 && iy.abs_diff(middle) < 4 || (ix + 3 * iy) % 7 == 0 && ix.abs_diff(middle) < 9
+            }) {
+                *number = 0;
+            }
+            assert!(holed.pillars() < disc.pillars());
+            assert_eq!(whole_aperture(&holed).number, filled);
+        }
+    }
 }

@@ -132,3 +132,24 @@ fn places_are_the_nearest_of_the_grid_and_mirror_images() {
     let odd = Pitch::of_nm(433.3).unwrap();
     assert!(Lattice::covering_on_grid(LatticeKind::Hexagonal, 10_000, odd, Nanometre).is_err());
 }
+
+/// Rows that are not rounded: places, distances and what covers a disc agree, and each place in a file is the nearest.
+#[test]
+fn rows_of_places_that_are_rounded_one_by_one() {
+    let pitch = Pitch::of_nm(433.3).unwrap();
+    let lattice = Lattice::hexagonal_by_place(pitch, DatabaseUnit::Nanometre, 41).unwrap();
+    assert!(lattice.has_exact_rows());
+    let row_nm = 433.3 * 0.75f64.sqrt();
+    assert!((lattice.row_nm() - row_nm).abs() < 1e-9);
+    for i in 0..41 {
+        let exact_nm = (i as f64 - 20.0) * row_nm;
+        assert!((lattice.place_nm(1, i) - exact_nm).abs() <= 1.0 / 80.0, "{i}");
+        assert!((lattice.drawn_nm(1, i) - exact_nm).abs() <= 0.5 + 1.0 / 80.0, "{i}");
+        let radius2 = lattice.units2(i, 20 - i % 2) as f64 * lattice.unit_nm().powi(2);
+        assert!((radius2 - lattice.radius2_nm2(i, 20 - i % 2)).abs() < 1e-6, "{i}");
+        assert_eq!(lattice.units2(i, 3), lattice.units2(40 - i, 37), "{i}");
+    }
+    let covering = lattice.covering_disc(10_000).unwrap();
+    assert!(covering.has_exact_rows() && covering.most_units2(10_000) > covering.units2(0, covering.sites() / 2) / 4);
+    assert!(Lattice::on_grid(LatticeKind::Hexagonal, pitch, DatabaseUnit::Nanometre, 41).is_err());
+}
