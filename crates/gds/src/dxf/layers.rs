@@ -39,10 +39,10 @@ impl Layers {
         let taken: BTreeSet<u16> = layers.values().map(|l| l.layer).collect();
         let mut free = (1..u16::MAX).filter(|n| !taken.contains(n));
         for name in names {
-            if !layers.contains_key(&name) {
-                // Past the last number all have one.
-                layers.insert(name, LayerNumber::new(free.next().unwrap_or(u16::MAX), 0));
-            }
+            // Past the last number all have one.
+            layers
+                .entry(name)
+                .or_insert_with(|| LayerNumber::new(free.next().unwrap_or(u16::MAX), 0));
         }
         Self(layers)
     }

@@ -46,8 +46,7 @@ pub(super) fn stored(path: &Path, bytes: &[u8]) -> Result<Stored> {
     {
         tiff_values(path, bytes)
     } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-        let (light, colours) =
-            exr::light(bytes, |rows, columns| sides(rows, columns)).map_err(|what| fault(path, what))?;
+        let (light, colours) = exr::light(bytes, sides).map_err(|what| fault(path, what))?;
         finite(path, &light)?;
         Ok(Stored::Light(colours.light(&light)))
     } else {

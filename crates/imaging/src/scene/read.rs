@@ -347,13 +347,13 @@ pub(super) mod tests {
         let grey = 100.0 / 255.0;
         near(
             light(&png_with([100; 3], |info| {
-                info.source_gamma = Some(png::ScaledFloat::new(1.0))
+                info.source_gamma = Some(png::ScaledFloat::new(1.0));
             })),
             [grey; 3],
         );
         near(
             light(&png_with([100; 3], |info| {
-                info.source_gamma = Some(png::ScaledFloat::new(0.45455))
+                info.source_gamma = Some(png::ScaledFloat::new(0.45455));
             })),
             [srgb::linear(grey); 3],
         );
@@ -361,7 +361,7 @@ pub(super) mod tests {
         let red = [1.22494, 0.0, 0.0];
         near(
             light(&png_with([255, 0, 0], |info| {
-                info.icc_profile = Some(p3.clone().into())
+                info.icc_profile = Some(p3.clone().into());
             })),
             red,
         );
