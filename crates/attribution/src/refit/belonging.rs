@@ -3,7 +3,7 @@
 use super::finding::{Belonging, GroupValue, RefitErrors, RefitFinding};
 use super::fit::State;
 use super::held_out::{UNINFORMED, student_95};
-use super::selection::{MAY_GROW, Selection};
+use super::selection::{Course, MAY_GROW, Selection, TRIAL_STEPS};
 
 /// Half of a 95 % interval in standard deviations.
 const HALF_95: f64 = 1.96;
@@ -76,8 +76,21 @@ impl Selection<'_> {
         found.chosen.iter().map(of).collect()
     }
 
-    /// Groups that an effect predicts worse than without it, when they are left out.
-    pub(super) fn worse_groups(&self, before: &RefitErrors, after: &RefitErrors) -> Vec<usize> {
+    /// Groups that each effect predicts worse, when they are left out, than all other effects without it; none where a fit is costly.
+    pub(super) fn worse_with_each(&self, course: &Course) -> Vec<Vec<usize>> {
+        let after = self.errors(&course.now);
+        let of = |&effect: &usize| {
+            if self.model.is_costly() {
+                return Vec::new();
+            }
+            let without = self.fit(self.dropped(&course.now, effect), TRIAL_STEPS);
+            self.worse_groups(&self.errors(&without), &after)
+        };
+        course.chosen.iter().map(of).collect()
+    }
+
+    /// Groups whose errors grow from one fit to another, when they are left out.
+    fn worse_groups(&self, before: &RefitErrors, after: &RefitErrors) -> Vec<usize> {
         let objects = self.model.objects();
         let (Some(way), true) = (
             self.plan.ways.get(objects),

@@ -89,7 +89,7 @@ pub struct RefitFinding {
     pub by_group: Vec<(usize, Vec<GroupValue>)>,
     /// What each chosen effect belongs to.
     pub belongings: Vec<Belonging>,
-    /// Groups of objects that each chosen effect predicts worse, when they are left out, than without it.
+    /// Groups of objects that each chosen effect predicts worse, when they are left out, than all others without it.
     pub worse: Vec<Vec<usize>>,
 }
 

@@ -66,15 +66,16 @@ impl Selection<'_> {
         }
         let mut intervals = self.drop_redundant(&mut course);
         let by_group = self.values_by_group(&course.now);
+        let mut worse = self.worse_with_each(&course);
         self.add_values_of_groups(&mut course, &mut intervals);
         let mut found = RefitFinding {
             by_group,
             ..self.finding(course, intervals)
         };
         found.belongings = self.belongings(&found);
-        found.worse = { found.ladder.windows(2) }
-            .map(|pair| self.worse_groups(&pair[0], &pair[1]))
-            .collect();
+        // Effects with a value for each group make none worse.
+        worse.resize(found.chosen.len(), Vec::new());
+        found.worse = worse;
         Ok(found)
     }
 
