@@ -18,7 +18,7 @@ use super::compensated::judged_as_made;
 use super::layout::FormatArg;
 use super::out_folder::OutFolder;
 use super::psf::layer;
-use super::reading::ReadingArgs;
+use super::reading::FileArgs;
 use super::standard_input::InputFile;
 use super::verify::FidelityArg;
 use super::{Outcome, Terminal, print_line};
@@ -52,7 +52,7 @@ pub(crate) struct HandoffArgs {
     out: Option<PathBuf>,
 
     #[command(flatten)]
-    reading: ReadingArgs,
+    reading: FileArgs,
 
     /// Of a layout: layer and datatype of the pillars. If left out, the only layer with shapes, else 1/0.
     #[arg(long, value_parser = layer)]

@@ -9,7 +9,7 @@ use metalith::gds::inventory::{FormatInventory, Inventory, LayerInventory};
 use metalith::report::{count, counted, exact};
 use metalith::text::printable;
 
-use super::reading::ReadingArgs;
+use super::reading::FileArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line};
 
@@ -34,7 +34,7 @@ pub(crate) struct InfoArgs {
     layout: PathBuf,
 
     #[command(flatten)]
-    reading: ReadingArgs,
+    reading: FileArgs,
 
     /// Print everything as JSON.
     #[arg(long)]

@@ -97,6 +97,7 @@ impl Deck {
             pillars,
             path: PathBuf::from(name),
             text: String::new(),
+            pillars_on: None,
             rules: Arc::new([rule]),
         }
     }
