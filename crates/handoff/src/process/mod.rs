@@ -331,8 +331,8 @@ impl Process {
                 test_rules: deck("test_"),
             };
             match shape.outline() {
-                // Rules of the dose matrix and the tests of squares are of the paper's cell.
-                OutlineForm::Square => {}
+                // Rules of the dose matrix and the tests of squares are of the paper's cell, and no deck is of mixed shapes.
+                OutlineForm::Square | OutlineForm::Mixed => {}
                 OutlineForm::Circle => self.checks.circles = Some(rules),
                 OutlineForm::Polygon => self.checks.rectangles = Some(rules),
             }
