@@ -1,8 +1,8 @@
 //! The reader and the extraction: hand-built bytes, files of other tools, random trees, damaged bytes.
 
 mod departures;
-mod dxf;
 mod drawn;
+mod dxf;
 mod folded;
 mod oasis;
 mod pillars;
