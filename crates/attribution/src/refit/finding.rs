@@ -36,6 +36,7 @@ impl RefitRejection {
     /// One clause for a person.
     pub fn sentence(&self) -> String {
         match self {
+            Self::Little(share) if *share <= 0.0 => "does not lower the fitted mean square".into(),
             Self::Little(share) => format!("lowers the fitted mean square by {:.1} % only", 100.0 * share),
             Self::Unsure { way, worse } => {
                 let own = format!("the 95 % interval of its gain includes zero where each {way} is left out");

@@ -361,9 +361,9 @@ impl<'a> SpectrumModel<'a> {
     /// If they cannot.
     pub(crate) fn check(&self) -> metalith_core::Result<()> {
         let Some((_, bank)) = &self.bank else { return Ok(()) };
-        let (path, refused) = (self.set.path.display(), metalith_core::Error::refused);
+        let path = self.set.path.display();
         bank.can_be_solved().map_err(|error| {
-            refused(
+            metalith_core::Error::refused(
                 "calibrate/pads-unsolvable",
                 format!("{path}: the pillars cannot be solved: {error}"),
                 "check `pitch_nm`, `height_nm` and the materials of the layer of pillars",
@@ -372,7 +372,7 @@ impl<'a> SpectrumModel<'a> {
         let few = (0..self.used.len()).find(|&s| self.points(s) < FEWEST_USED);
         few.map_or(Ok(()), |s| {
             let width_nm = self.set.spectra[s].size_nm;
-            Err(refused(
+            Err(metalith_core::Error::refused(
                 "calibrate/pads-resonant",
                 format!(
                     "{path}: pads of {width_nm} nm have fewer than {FEWEST_USED} wavelengths far from guided-mode resonances"
