@@ -176,6 +176,15 @@ pub fn calibrate(
             let prepared = psf_stack::prepare(&mut set)?;
             let mut model = StackModel::new(&set, &prepared.sampling, prepared.focus_um);
             model.keep(&tried(&model.own.effects, &[], only)?);
+            let plan = model.plan();
+            let mut found = select(&model, &plan, progress)?;
+            let mut remarks = set.remarks.clone();
+            remarks.extend(psf_stack::allow_for_samples(
+                &set,
+                &prepared.sampling,
+                (&model, &plan),
+                &mut found,
+            ));
             let facts = SetFacts {
                 title: &set.title,
                 kind: "psf_stack",
@@ -183,10 +192,9 @@ pub fn calibrate(
                 names: set.planes.iter().map(|p| p.name.clone()).collect(),
                 noise_floor: Some(prepared.noise),
                 averages: false,
-                remarks: &set.remarks,
+                remarks: &remarks,
             };
-            let plan = model.plan();
-            let (found, diagnosis) = found(&model, &plan, &facts, progress)?;
+            let diagnosis = Diagnosis::new(&facts, &model, &plan, &found);
             write(diagnosis, (None, None), ("", out), progress, |page| {
                 psf_stack::figures(page, &set, &model, &found.theta);
             })

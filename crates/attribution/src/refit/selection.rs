@@ -15,7 +15,10 @@ const MAY_GROW: f64 = 0.002;
 const PAIR_SHARE: f64 = 0.1;
 
 /// Candidates that are fitted in each step where a fit is costly and one of them is taken.
-const MOST_TRIED: usize = 6;
+const MOST_TRIED: usize = 4;
+
+/// Share of the least gain that the linear model promises of a candidate that is fitted where a fit is costly.
+const HOPELESS: f64 = 0.5;
 
 /// Steps of the fit of a candidate.
 pub(super) const TRIAL_STEPS: usize = 5;
@@ -99,6 +102,11 @@ impl Selection<'_> {
                 progress.check_stopped()?;
                 progress.note(&effects[effect].name);
                 let start = start.unwrap_or_else(|| self.with(&course.now, effect));
+                if let Some(tried) = self.hopeless(effect, &start, &course.now, &before) {
+                    course.last[effect] = Some(tried);
+                    progress.advance(1);
+                    continue;
+                }
                 let state = self.fit(start, TRIAL_STEPS);
                 let tried = self.try_last(effect, &state, &before);
                 progress.advance(1);
@@ -169,6 +177,20 @@ impl Selection<'_> {
             .into_iter()
             .map(|(_, effect, start)| (effect, Some(start)))
             .collect())
+    }
+
+    /// An effect of which the linear model promises so little that a fit, where it is costly, is not needed to refuse it.
+    fn hopeless(&self, effect: usize, start: &State, now: &State, before: &RefitErrors) -> Option<RefitTried> {
+        let share = 1.0 - start.promised() / now.promised().max(f64::MIN_POSITIVE);
+        let is_little = self.model.is_costly() && share < HOPELESS * self.model.least_share();
+        is_little.then(|| RefitTried {
+            effect,
+            score: share.max(0.0),
+            gain: NO_GAIN,
+            values: self.values(effect, &start.theta),
+            errors: before.clone(),
+            rejected: Some(RefitRejection::Little(share.max(0.0))),
+        })
     }
 
     /// The two effects that predict most together what was left out, with their fit; none that gain less than `least` by so much

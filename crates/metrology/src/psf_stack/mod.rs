@@ -1,6 +1,8 @@
 //! Point spread functions of known objects, a relief or a complex transmission, in stacks through focus.
 
+mod allowance;
 mod bench;
+mod chirp;
 mod detector;
 mod files;
 mod frames;
@@ -8,6 +10,7 @@ mod light;
 mod model;
 mod orientation;
 mod page;
+mod recent;
 mod sampling;
 mod selection;
 mod set;
@@ -17,6 +20,7 @@ mod tests;
 
 use metalith_core::Result;
 
+pub(crate) use allowance::allow_for_samples;
 pub use bench::{ApertureShape, StackBench, ThinLens};
 pub use model::StackModel;
 pub(crate) use page::figures;

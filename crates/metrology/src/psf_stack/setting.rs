@@ -22,7 +22,9 @@ const ZERNIKE: usize = 8;
 const BLUR: usize = ZERNIKE + ZERNIKES;
 const UNMODULATED: usize = BLUR + 3;
 const APERTURE: usize = UNMODULATED + 1;
-const BENCH: usize = APERTURE + 1;
+const FALLOFF: usize = APERTURE + 1;
+const MASK_BLUR: usize = FALLOFF + 3;
+const BENCH: usize = MASK_BLUR + 1;
 
 /// Slots of an object, after those of the bench.
 const OWN_FOCUS: usize = 0;
@@ -31,6 +33,9 @@ const OWN_SHIFT: usize = 2;
 const OWN_ROTATION: usize = 4;
 const OWN_ZERNIKE: usize = 5;
 const OWN: usize = OWN_ZERNIKE + ZERNIKES;
+
+/// Largest variance of the blur of a mask, over the square of its pitch.
+const MOST_MASK_BLUR: f64 = 25.0;
 
 /// Number of the way of leaving objects out, after planes.
 pub(super) const BY_OBJECT: usize = 1;
@@ -55,6 +60,10 @@ pub(super) struct PupilSetting {
     pub zernike_nm: [f64; ZERNIKES],
     pub unmodulated: f64,
     pub aperture: f64,
+    /// Logarithm of the amplitude of the illumination: a fall to the rim, and rises along x and y.
+    pub falloff: [f64; 3],
+    /// Variance of the blur of the phase of a mask.
+    pub mask_blur_um2: f64,
 }
 
 impl Setting {
@@ -74,6 +83,8 @@ impl Setting {
                 zernike_nm: std::array::from_fn(|k| theta[ZERNIKE + k] + own[OWN_ZERNIKE + k]),
                 unmodulated: theta[UNMODULATED],
                 aperture: theta[APERTURE],
+                falloff: [0, 1, 2].map(|k| theta[FALLOFF + k]),
+                mask_blur_um2: theta[MASK_BLUR],
             },
         }
     }
@@ -194,7 +205,22 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
     }
     b.parameter("unmodulated_light".into(), "", 0.002, 0.9);
     b.parameter("aperture_scale".into(), "", 0.005, 0.07);
+    if let Some(p) = b.out.parameters.last_mut() {
+        // A smaller opening needs no more samples.
+        p.range.0 = -0.4;
+    }
+    b.parameter("illumination_falloff".into(), "", 0.02, 4.0);
+    for axis in ["x", "y"] {
+        b.parameter(format!("illumination_decentre {axis}"), "", 0.02, 4.0);
+    }
     let masks = || set.objects.iter().filter_map(|o| o.transmission.as_ref());
+    let pitch_um = masks().map(|t| t.sample_um).fold(0.0, f64::max);
+    let variance = pitch_um * pitch_um;
+    b.parameter("mask_blur".into(), "um", 0.02 * variance, MOST_MASK_BLUR * variance);
+    if let Some(p) = b.out.parameters.last_mut() {
+        (p.range.0, p.start) = (0.0, 0.1 * variance);
+        p.shown = f64::sqrt;
+    }
     let (any_mask, any_depth) = (masks().next().is_some(), masks().any(|t| t.has_depth));
     let several = set.planes.iter().any(|p| p.number != set.planes[0].number);
     let every = RefitScope::Every { way: BY_OBJECT };
@@ -225,6 +251,12 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
         b.effect(name.into(), vec![BLUR + k], RefitScope::Bench, None);
     }
     b.effect("aperture_scale".into(), vec![APERTURE], RefitScope::Bench, None);
+    b.effect("illumination_falloff".into(), vec![FALLOFF], RefitScope::Bench, None);
+    let sides = vec![FALLOFF + 1, FALLOFF + 2];
+    b.effect("illumination_decentre".into(), sides, RefitScope::Bench, None);
+    if any_depth {
+        b.effect("mask_blur".into(), vec![MASK_BLUR], RefitScope::Bench, None);
+    }
     for (group, object) in set.objects.iter().enumerate() {
         let end = end_of(&object.name);
         let first = BENCH + OWN * group;

@@ -1,0 +1,43 @@
+//! Allowance for the samples of the light in the intervals of what was found.
+
+use metalith_attribution::{RefitFinding, RefitModel, RefitPlan};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::model::StackModel;
+use super::sampling::Sampling;
+use super::set::StackSet;
+
+/// Widen the intervals of a finding by what the fitted values change where the light has more samples; what was done, in words.
+pub(crate) fn allow_for_samples(
+    set: &StackSet,
+    sampling: &Sampling,
+    (model, plan): (&StackModel<'_>, &RefitPlan),
+    found: &mut RefitFinding,
+) -> Option<String> {
+    let effects = model.effects();
+    let active: Vec<usize> = found.chosen.iter().flat_map(|&e| effects[e].slots.clone()).collect();
+    let finer = sampling.finer().filter(|_| !active.is_empty())?;
+    let other = StackModel::new(set, &finer, found.theta[super::setting::FOCUS]);
+    let step = |model: &StackModel<'_>| -> Option<DVector<f64>> {
+        let size = active.len() + 1;
+        let fitted = (0..model.count()).into_par_iter().filter(|&m| plan.fitted[m]);
+        let forms: Vec<DMatrix<f64>> = fitted.map(|m| model.form(m, &active, &found.theta)).collect();
+        let sum = forms.into_iter().fold(DMatrix::zeros(size, size), |a, b| a + b);
+        let normal = sum.view((0, 0), (size - 1, size - 1)).into_owned();
+        let right = sum.view((0, size - 1), (size - 1, 1)).column(0).into_owned();
+        Some(normal.cholesky()?.solve(&right))
+    };
+    let change = step(&other)? - step(model)?;
+    for (&slot, change) in active.iter().zip(change.iter()) {
+        let range = model.parameters()[slot].range;
+        if let Some([low, high]) = &mut found.intervals[slot] {
+            (*low, *high) = (*low - change.abs(), *high + change.abs());
+            [low, high].into_iter().for_each(|v| *v = v.clamp(range.0, range.1));
+        }
+    }
+    Some(format!(
+        "intervals: each is wider on either side by the change of its value with {} samples of {:.3} um across the light",
+        finer.n, finer.dx_um
+    ))
+}
