@@ -191,9 +191,15 @@ impl Diagnosis {
             (t.score > 0.0).then(|| step(Some(t.effect), &t.errors, Some(rejected.sentence())))
         }));
         let (first, last) = (&found.ladder[0], &found.ladder[found.ladder.len() - 1]);
+        // No group predicts an effect of another.
+        let of_a_group = |w: usize| {
+            let own = |&e: &usize| matches!(model.scope(e), RefitScope::One { way, .. } if way == w);
+            found.chosen.iter().any(own)
+        };
+        let judging: Vec<usize> = (0..plan.ways.len()).filter(|&w| !of_a_group(w)).collect();
         let pair = |errors: &RefitErrors| ErrorPair {
             fit: errors.fitted,
-            held_out: errors.held_out.iter().flatten().copied().fold(0.0, f64::max),
+            held_out: { judging.iter().filter_map(|&w| errors.held_out[w]) }.fold(0.0, f64::max),
         };
         let verdict = match (found.chosen.is_empty(), facts.noise_floor) {
             (none, Some(floor)) if first.fitted <= EXPLAINED * floor && (none || !facts.averages) => {

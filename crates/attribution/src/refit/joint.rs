@@ -100,7 +100,7 @@ impl Selection<'_> {
     }
 
     /// A state with the parameters of an effect at their neutral values.
-    fn dropped(&self, state: &State, effect: usize) -> State {
+    pub(super) fn dropped(&self, state: &State, effect: usize) -> State {
         let slots = &self.model.effects()[effect].slots;
         let mut theta = state.theta.clone();
         slots

@@ -5,10 +5,14 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::model::StackModel;
-use super::sampling::Sampling;
+use super::sampling::{FINER, Sampling};
 use super::set::StackSet;
 
-/// Widen the intervals of a finding by what the fitted values change where the light has more samples; what was done, in words.
+/// Error of a value over its change on the finer grid: means over samples err by the square of their distance.
+const WHOLE: f64 = 1.0 / (1.0 - 1.0 / (FINER * FINER));
+
+/// Widen the intervals of a finding by the error of the samples of the light, from the change of the values on a finer grid; what was
+/// done, in words.
 pub(crate) fn allow_for_samples(
     set: &StackSet,
     sampling: &Sampling,
@@ -30,14 +34,15 @@ pub(crate) fn allow_for_samples(
     };
     let change = step(&other)? - step(model)?;
     for (&slot, change) in active.iter().zip(change.iter()) {
+        let error = WHOLE * change.abs();
         let range = model.parameters()[slot].range;
         if let Some([low, high]) = &mut found.intervals[slot] {
-            (*low, *high) = (*low - change.abs(), *high + change.abs());
+            (*low, *high) = (*low - error, *high + error);
             [low, high].into_iter().for_each(|v| *v = v.clamp(range.0, range.1));
         }
     }
     Some(format!(
-        "intervals: each is wider on either side by the change of its value with {} samples of {:.3} um across the light",
+        "intervals: each is wider on either side by {WHOLE:.1} times the change of its value with {} samples of {:.3} um across the light",
         finer.n, finer.dx_um
     ))
 }

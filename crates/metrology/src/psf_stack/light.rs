@@ -45,6 +45,8 @@ pub(super) struct Light<'a> {
 pub(super) struct Place {
     /// From the lens, or from the object without one (um).
     pub distance_um: f64,
+    /// From the object to a lens that is stated in its plane (um).
+    pub mask_um: f64,
     /// Edge of a pixel (um).
     pub pixel_um: f64,
     /// Whole pixels by which the pattern is displaced, along x and y.
@@ -253,7 +255,11 @@ impl<'a> Light<'a> {
         let z = at.distance_um;
         match s.method {
             Method::FourierSum => {
-                let bend = PI * (1.0 / z + self.curvature()) / wavelength_um;
+                // A lens at a distance changes the curvature and the scale of the sum as if the sensor stood elsewhere.
+                let through = 1.0 - z * self.set.bench.lens.map_or(0.0, |l| 1.0 / l.focal_um);
+                let moved = at.mask_um * through;
+                let bend = PI * (through / (z + moved) - through / z + 1.0 / z + self.curvature()) / wavelength_um;
+                let z = z + moved;
                 let scale = s.dx_um / (wavelength_um * z).sqrt();
                 self.sums[axis].chirp([place(0, n, 1.0), first], -s.dx_um * fine / (wavelength_um * z), |k| {
                     Complex64::from_polar(scale, bend * (k * s.dx_um).powi(2))

@@ -135,10 +135,13 @@ impl<'a> StackModel<'a> {
 
     fn setting(&self, theta: &[f64], object: usize) -> Setting {
         let mut out = Setting::of(theta, object);
-        if self.set.objects[object].transmission.is_none() {
-            let p = &mut out.pupil;
-            (p.depth, p.shift_um, p.rotation_deg, p.mask_scale, p.unmodulated) = (0.0, [0.0; 2], 0.0, 0.0, 0.0);
-            p.mask_blur_um2 = 0.0;
+        let transmission = self.set.objects[object].transmission.as_ref();
+        let p = &mut out.pupil;
+        if !transmission.is_some_and(|t| t.has_depth) {
+            (p.depth, p.mask_blur_um2) = (0.0, 0.0);
+        }
+        if transmission.is_none() {
+            (p.shift_um, p.rotation_deg, p.mask_scale, p.unmodulated) = ([0.0; 2], 0.0, 0.0, 0.0);
         }
         out
     }
@@ -152,6 +155,7 @@ impl<'a> StackModel<'a> {
         let pixel_um = bench.pixel_um * (1.0 + setting.pixel);
         let place = Place {
             distance_um,
+            mask_um: setting.mask_distance_um.clamp(-0.5 * distance_um, 4.0 * distance_um),
             pixel_um,
             origin_px: self.origins[m].map(|v| -v),
         };

@@ -24,7 +24,7 @@ const LARGEST_ANGLE: f64 = 0.3;
 const GROWTH: f64 = 1.08;
 
 /// Samples of a finer grid, over those of a grid.
-const FINER: f64 = 1.4;
+pub(super) const FINER: f64 = 1.4;
 
 /// Pixels around the window, so that a displaced pattern is there.
 const MARGIN: usize = 6;

@@ -3,7 +3,7 @@
 use metalith_attribution::{RefitEffect, RefitParameter, RefitScope};
 use metalith_core::Zernike;
 
-use super::sampling::Sampling;
+use super::sampling::{Method, Sampling};
 use super::set::StackSet;
 
 /// First Zernike polynomial (Noll), and their number: astigmatism, coma, trefoil, spherical aberration.
@@ -24,7 +24,8 @@ const UNMODULATED: usize = BLUR + 3;
 const APERTURE: usize = UNMODULATED + 1;
 const FALLOFF: usize = APERTURE + 1;
 const MASK_BLUR: usize = FALLOFF + 3;
-const BENCH: usize = MASK_BLUR + 1;
+const MASK_DISTANCE: usize = MASK_BLUR + 1;
+const BENCH: usize = MASK_DISTANCE + 1;
 
 /// Slots of an object, after those of the bench.
 const OWN_FOCUS: usize = 0;
@@ -47,6 +48,8 @@ pub(super) struct Setting {
     pub spacing: f64,
     pub pixel: f64,
     pub blur_um2: [f64; 2],
+    /// From the objects to the lens, where both are stated in one plane.
+    pub mask_distance_um: f64,
     pub pupil: PupilSetting,
 }
 
@@ -75,6 +78,7 @@ impl Setting {
             spacing: theta[SPACING],
             pixel: theta[PIXEL],
             blur_um2: [theta[BLUR] + theta[BLUR + 1], theta[BLUR] + theta[BLUR + 2]],
+            mask_distance_um: theta[MASK_DISTANCE],
             pupil: PupilSetting {
                 depth: theta[DEPTH] + own[OWN_DEPTH],
                 shift_um: [0, 1].map(|k| theta[SHIFT + k] + own[OWN_SHIFT + k]),
@@ -221,6 +225,9 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
         (p.range.0, p.start) = (0.0, 0.1 * variance);
         p.shown = f64::sqrt;
     }
+    let at_lens = set.bench.lens.filter(|l| l.distance_um == 0.0);
+    let focal_um = at_lens.map_or(1.0, |l| l.focal_um);
+    b.parameter("mask_distance".into(), "um", 0.02 * focal_um, 2.0 * focal_um);
     let (any_mask, any_depth) = (masks().next().is_some(), masks().any(|t| t.has_depth));
     let several = set.planes.iter().any(|p| p.number != set.planes[0].number);
     let every = RefitScope::Every { way: BY_OBJECT };
@@ -234,6 +241,10 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
             RefitScope::Bench,
             Some((0.05, 6)),
         );
+    }
+    if at_lens.is_some() && sampling.method == Method::FourierSum {
+        let scan = Some((0.25 * focal_um, 4));
+        b.effect("mask_distance".into(), vec![MASK_DISTANCE], RefitScope::Bench, scan);
     }
     b.effect("pixel_scale".into(), vec![PIXEL], RefitScope::Bench, Some((0.03, 4)));
     if any_depth {
