@@ -185,6 +185,7 @@ pub fn calibrate(
                 (&model, &plan),
                 &mut found,
             ));
+            remarks.extend(psf_stack::equal_scales(&model, &found));
             let facts = SetFacts {
                 title: &set.title,
                 kind: "psf_stack",

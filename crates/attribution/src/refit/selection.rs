@@ -204,7 +204,8 @@ impl Selection<'_> {
         let is_little = self.model.is_costly() && share < HOPELESS * self.model.least_share();
         is_little.then(|| RefitTried {
             effect,
-            score: share.max(0.0),
+            // It was not fitted.
+            score: 0.0,
             gain: NO_GAIN,
             values: self.values(effect, &start.theta),
             errors: before.clone(),

@@ -1,4 +1,4 @@
-//! Allowance for the samples of the light in the intervals of what was found.
+//! What a set cannot know: the error of the samples of the light, and scales that look alike.
 
 use metalith_attribution::{RefitFinding, RefitModel, RefitPlan};
 use nalgebra::{DMatrix, DVector};
@@ -45,4 +45,15 @@ pub(crate) fn allow_for_samples(
         "intervals: each is wider on either side by {WHOLE:.1} times the change of its value with {} samples of {:.3} um across the light",
         finer.n, finer.dx_um
     ))
+}
+
+/// Effects whose values look alike together: what is larger in the plane of the light has a smaller image.
+const SCALES: [&str; 4] = ["aperture_scale", "mask_scale", "pixel_scale", "plane_spacing"];
+
+/// A remark where scales were found that others explain as well.
+pub(crate) fn equal_scales(model: &StackModel<'_>, found: &RefitFinding) -> Option<String> {
+    let is_scale = |&&e: &&usize| SCALES.contains(&model.effects()[e].name.as_str());
+    (found.chosen.iter().filter(is_scale).count() > 1).then(|| {
+        "scales: aperture_scale and mask_scale larger by a factor, pixel_scale smaller by it and plane_spacing smaller by its square look alike; state what you know of them, and the others follow".into()
+    })
 }

@@ -20,7 +20,7 @@ mod tests;
 
 use metalith_core::Result;
 
-pub(crate) use allowance::allow_for_samples;
+pub(crate) use allowance::{allow_for_samples, equal_scales};
 pub use bench::{ApertureShape, StackBench, ThinLens};
 pub use model::StackModel;
 pub(crate) use page::figures;

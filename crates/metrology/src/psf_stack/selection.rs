@@ -147,7 +147,8 @@ impl RefitModel for StackModel<'_> {
     fn group_name(&self, way: usize, group: usize) -> String {
         match self.set.objects.get(group).filter(|_| way == BY_OBJECT) {
             Some(object) => object.name.clone(),
-            None => (group + 1).to_string(),
+            // As `not_fitted` counts them.
+            None => group.to_string(),
         }
     }
 
