@@ -7,6 +7,7 @@ mod detector;
 mod files;
 mod frames;
 mod light;
+mod mask;
 mod model;
 mod orientation;
 mod page;

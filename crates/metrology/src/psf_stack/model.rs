@@ -63,6 +63,13 @@ pub(super) struct Base {
     columns: Mutex<BTreeMap<usize, Arc<Change>>>,
 }
 
+impl Base {
+    /// Square of the relative error of a plane.
+    pub(super) fn error(&self) -> f64 {
+        self.residual.iter().map(|r| f64::from(*r).powi(2)).sum()
+    }
+}
+
 impl<'a> StackModel<'a> {
     /// A model of a set whose frames have the orientation of the sensor; `focus_um` is where the stated model is registered.
     pub(crate) fn new(set: &'a StackSet, sampling: &'a Sampling, focus_um: f64) -> Self {
@@ -283,13 +290,8 @@ impl<'a> StackModel<'a> {
             *products.entry([low, high]).or_insert_with(|| dot(a, b))
         };
         let mut form = eliminate(k, k + last + 1, &mut product);
-        form[(last, last)] = self.error(&base);
+        form[(last, last)] = base.error();
         form
-    }
-
-    /// Square of the relative error of a plane.
-    pub(super) fn error(&self, base: &Base) -> f64 {
-        base.residual.iter().map(|r| f64::from(*r).powi(2)).sum()
     }
 
     /// Change of the prediction with a parameter; none if there is no change.

@@ -49,6 +49,8 @@ pub(crate) struct Sampling {
     pub fine: usize,
     /// Pixels along each axis, with their margin.
     pub padded: [usize; 2],
+    /// True if masks pass evenly from sample to sample, and not in steps.
+    pub smooth_masks: bool,
     pub aperture_um: f64,
     pub middle_um: f64,
     /// Defocus whose path differs by an eighth of a wave at the rim (um).
@@ -168,6 +170,7 @@ impl Sampling {
             dx_um,
             fine,
             padded,
+            smooth_masks: false,
             aperture_um: b.aperture_um,
             middle_um,
             depth_of_focus_um: middle_um * (middle / light_um).powi(2),

@@ -104,7 +104,7 @@ impl RefitModel for StackModel<'_> {
             mean(&|v, i| v * i) - v * i,
         ];
         let correlation = vi / (vv * ii).sqrt().max(f64::MIN_POSITIVE);
-        vec![self.error(&base).sqrt(), at_peak.sqrt(), 1.0 - correlation]
+        vec![base.error().sqrt(), at_peak.sqrt(), 1.0 - correlation]
     }
 
     fn decides(&self, figure: usize) -> bool {
