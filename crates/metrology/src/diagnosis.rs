@@ -250,9 +250,10 @@ impl Diagnosis {
             (t.score > 0.0).then(|| step(Some(t.effect), &t.errors, Some(rejected.sentence())))
         }));
         let (first, last) = (&found.ladder[0], &found.ladder[found.ladder.len() - 1]);
+        let judging = judging(model, plan, found);
         let pair = |errors: &RefitErrors| ErrorPair {
             fit: errors.fitted,
-            held_out: errors.held_out.iter().flatten().copied().fold(0.0, f64::max),
+            held_out: { judging.iter().filter_map(|&w| errors.held_out[w]) }.fold(0.0, f64::max),
         };
         let error = ErrorReport {
             measure: facts.measure.into(),
@@ -410,6 +411,15 @@ fn belonging_words(belonging: &Belonging, kind: &str, name: impl Fn(usize) -> St
             ),
         ),
     }
+}
+
+/// Ways of leaving out that judge what was found: no group predicts an effect of another group.
+fn judging(model: &dyn RefitModel, plan: &RefitPlan, found: &RefitFinding) -> Vec<usize> {
+    let of_a_group = |w: usize| {
+        let own = |&e: &usize| matches!(model.scope(e), RefitScope::One { way, .. } if way == w);
+        found.chosen.iter().any(own)
+    };
+    (0..plan.ways.len()).filter(|&w| !of_a_group(w)).collect()
 }
 
 /// Unit of the values of an effect: one of each where they differ, 1 for a number.

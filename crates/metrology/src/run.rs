@@ -175,16 +175,25 @@ pub fn calibrate(
             let prepared = psf_stack::prepare(&mut set)?;
             let mut model = StackModel::new(&set, &prepared);
             model.keep(&tried(&model.own.effects, &[], only)?);
+            let plan = model.plan();
+            let mut found = select(&model, &plan, progress)?;
+            let mut remarks = set.remarks.clone();
+            remarks.extend(psf_stack::allow_for_samples(
+                &set,
+                &prepared.sampling,
+                (&model, &plan),
+                &mut found,
+            ));
+            remarks.extend(psf_stack::equal_scales(&model, &found));
             let facts = SetFacts {
                 title: &set.title,
                 kind: "psf_stack",
                 measure: "residual over measured norm (rms)",
                 names: set.planes.iter().map(|p| p.name.clone()).collect(),
                 averages: false,
-                remarks: &set.remarks,
+                remarks: &remarks,
             };
-            let plan = model.plan();
-            let (found, diagnosis) = found(&model, &plan, &facts, progress)?;
+            let diagnosis = Diagnosis::new(&facts, &model, &plan, &found);
             write(diagnosis, (None, None), ("", out), progress, |page| {
                 psf_stack::figures(page, &set, &model, &found.theta);
             })

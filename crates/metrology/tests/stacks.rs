@@ -49,9 +49,10 @@ const OBJECTS: [(&str, Phase); 3] = [
 /// What was done to the bench.
 #[derive(Clone, Copy)]
 struct Truth {
-    /// Astigmatism of the lens (nm rms, Noll 6), and of the object `cubic` alone.
+    /// Astigmatism of the lens (nm rms, Noll 6), and of the objects `cubic` and `lobes` alone.
     lens_nm: f64,
     cubic_nm: f64,
+    lobes_nm: f64,
     /// Displacement of all masks along x (um).
     shift_um: f64,
     spacing: f64,
@@ -61,6 +62,7 @@ struct Truth {
 const NONE: Truth = Truth {
     lens_nm: 0.0,
     cubic_nm: 0.0,
+    lobes_nm: 0.0,
     shift_um: 0.0,
     spacing: 1.0,
     turned: false,
@@ -84,32 +86,30 @@ fn plane(object: usize, z_um: f64, truth: &Truth, moved_px: [f64; 2]) -> Vec<f64
         }
         let shift = truth.shift_um / radius;
         let phase = OBJECTS[object].1(x - shift, y);
-        let own = if OBJECTS[object].0 == "cubic" {
-            truth.cubic_nm
-        } else {
-            0.0
-        };
+        let own = [0.0, truth.cubic_nm, truth.lobes_nm][object];
         let astigmatism = 6f64.sqrt() * (x * x - y * y);
         let path = (truth.lens_nm + own) * 1e-3 * astigmatism;
         let defocus = 0.5 * (1.0 / z_um - 1.0 / FOCAL_UM) * (x * x + y * y) * radius * radius;
         Complex64::cis(phase + TAU * (path + defocus) / WAVELENGTH_UM)
     };
-    let kernel = |k: usize, point: usize, moved: f64| {
-        Complex64::cis(-TAU * fine_at(k, moved) * at(point) / (WAVELENGTH_UM * z_um))
-    };
     let fine = SIDE * FINE;
+    let [by_x, by_y] = moved_px.map(|moved| -> Vec<Vec<Complex64>> {
+        let factor = |k, point| Complex64::cis(-TAU * fine_at(k, moved) * at(point) / (WAVELENGTH_UM * z_um));
+        (0..fine)
+            .map(|k| (0..POINTS).map(|point| factor(k, point)).collect())
+            .collect()
+    });
     let mut rows = vec![Complex64::ZERO; POINTS * fine];
     for y in 0..POINTS {
         let line: Vec<Complex64> = (0..POINTS).map(|x| wave(x, y)).collect();
         for k in 0..fine {
-            rows[y * fine + k] = (0..POINTS).map(|x| line[x] * kernel(k, x, moved_px[0])).sum();
+            rows[y * fine + k] = (0..POINTS).map(|x| line[x] * by_x[k][x]).sum();
         }
     }
     let mut out = vec![0.0; SIDE * SIDE];
     for j in 0..fine {
-        let factors: Vec<Complex64> = (0..POINTS).map(|y| kernel(j, y, moved_px[1])).collect();
         for k in 0..fine {
-            let sum: Complex64 = (0..POINTS).map(|y| rows[y * fine + k] * factors[y]).sum();
+            let sum: Complex64 = (0..POINTS).map(|y| rows[y * fine + k] * by_y[j][y]).sum();
             out[j / FINE * SIDE + k / FINE] += sum.norm_sqr();
         }
     }
@@ -195,15 +195,15 @@ fn effect<'a>(answer: &'a Diagnosis, name: &str) -> &'a FoundEffect {
     found.unwrap_or_else(|| panic!("{name} is not among {:?}", names(answer)))
 }
 
-/// True if a value lies in the 95 % interval of a parameter, or by a share beside it: what samples of the opening err by.
+/// True if a value lies in the 95 % interval of a parameter, or by a share beside it: what the direct sums err by at the rim.
 fn holds(effect: &FoundEffect, parameter: usize, value: f64) -> bool {
-    const SAMPLED: f64 = 0.02;
+    const RIM: f64 = 0.005;
     let ends = match &effect.interval[parameter] {
         own if own.is_array() => own,
         _ => &effect.interval,
     };
     let [low, high]: [f64; 2] = serde_json::from_value(ends.clone()).unwrap();
-    let more = SAMPLED * value.abs();
+    let more = RIM * value.abs();
     (low - more..=high + more).contains(&value)
 }
 
@@ -246,4 +246,84 @@ fn a_wavefront_of_one_object_is_not_of_the_lens() {
     assert_eq!(own.of, "cubic");
     assert!(holds(own, 1, truth.cubic_nm), "{own:?}");
     assert!(!names(&answer).contains(&"lens_astigmatism"), "{:?}", names(&answer));
+}
+
+#[test]
+fn a_wavefront_of_all_masks_that_the_open_aperture_denies_is_refused_by_name() {
+    let truth = Truth {
+        cubic_nm: 70.0,
+        lobes_nm: 70.0,
+        ..NONE
+    };
+    let answer = stacks(truth, 4);
+    assert!(!names(&answer).contains(&"lens_astigmatism"), "{:?}", names(&answer));
+    let tried = answer.ranking.iter().find(|r| r.name == "lens_astigmatism").unwrap();
+    let reason = tried.rejected.as_deref().unwrap();
+    assert!(reason.contains("predicts worse") && reason.contains("open"), "{reason}");
+    assert!(answer.error.after.held_out < 0.05, "{:?}", answer.error);
+}
+
+#[test]
+fn effects_of_a_file_are_refused_for_stacks() {
+    let nowhere = Path::new("no_set");
+    let declared = (&[][..], Some(Path::new("effects.toml")));
+    let outcome = calibrate(nowhere, SetKind::PsfStack, nowhere, declared, &Silent);
+    assert_eq!(outcome.unwrap_err().id(), "calibrate/kind-has-none");
+}
+
+/// A mask of complex values before a lens that stands apart, in the light of a table, with a file for each plane.
+#[test]
+fn complex_masks_a_lens_at_a_distance_and_a_spectrum_are_read() {
+    const EDGE: usize = 24;
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let values: Vec<npyz::num_complex::Complex<f64>> = (0..EDGE * EDGE)
+        .map(|k| npyz::num_complex::Complex::from_polar(1.0, 0.1 * (k % EDGE) as f64))
+        .collect();
+    let file = std::fs::File::create(at("mask.npy")).unwrap();
+    let options = npyz::WriteOptions::new().default_dtype().shape(&[EDGE as u64; 2]);
+    let mut writer = options.writer(file).begin_nd().unwrap();
+    writer.extend(values).unwrap();
+    writer.finish().unwrap();
+    for z in [-500, 0, 500] {
+        let spot = |k: usize| {
+            let [x, y] = [k % EDGE, k / EDGE].map(|v| v as f64 - 0.5 * EDGE as f64);
+            100.0 + 1000.0 * (-(x * x + y * y) / 8.0).exp()
+        };
+        let frame: Vec<f64> = (0..EDGE * EDGE).map(spot).collect();
+        write_array(&at(&format!("mask_{z}.npy")), &[EDGE as u64; 2], &frame);
+    }
+    std::fs::write(at("led.csv"), "wavelength_nm,weight\n620,1\n633,2\n646,1\n").unwrap();
+    let text = r#"
+schema = 1
+kind = "psf_stack"
+title = "read"
+[source]
+spectrum = "led.csv"
+[aperture]
+diameter_mm = 1.0
+[lens]
+focal_length_mm = 100.0
+distance_mm = 50.0
+diameter_mm = 2.0
+[sensor]
+distance_mm = 100.0
+pixel_um = 20.0
+files = "{object}_{z_um}.npy"
+[[object]]
+name = "mask"
+kind = "complex"
+file = "mask.npy"
+sample_um = 40.0
+"#;
+    std::fs::write(at("measurement.toml"), text).unwrap();
+    let only = ["focus_offset".to_owned()];
+    let answer = calibrate(folder.path(), SetKind::PsfStack, &at("out"), (&only, None), &Silent);
+    let answer = answer.unwrap().diagnosis;
+    assert!(
+        answer.remarks.iter().any(|r| r.starts_with("propagation")),
+        "{:?}",
+        answer.remarks
+    );
+    assert!(answer.ranking.iter().all(|r| r.name == "focus_offset"));
 }

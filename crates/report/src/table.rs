@@ -226,7 +226,8 @@ impl Table {
         for row in &self.rows {
             html.push_str("<tr>");
             for (cell, column) in row.iter().zip(&self.columns) {
-                let class = match (column.number, cell.0.chars().count() <= KEPT_WHOLE) {
+                let shown = cell.0.trim_start_matches("<code>").trim_end_matches("</code>");
+                let class = match (column.number, shown.chars().count() <= KEPT_WHOLE) {
                     (true, _) => " class=\"number\"",
                     (false, true) => " class=\"short\"",
                     (false, false) => "",

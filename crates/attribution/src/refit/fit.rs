@@ -4,11 +4,14 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::model::RefitEquations;
-use super::selection::Selection;
+use super::selection::{Selection, TRIAL_STEPS};
 use crate::fit::minimise;
 
 /// A fit ends when a step lowers the mean square by less than this share.
 const CONVERGED: f64 = 1e-5;
+
+/// As [`CONVERGED`], of candidates where a fit is costly: they are compared by much more.
+const COMPARED: f64 = 1e-3;
 
 /// A fit: values, and the equations of all fitted measurements about them.
 pub(super) struct State {
@@ -73,6 +76,8 @@ impl Selection<'_> {
     pub(super) fn fit(&self, mut now: State, steps: usize) -> State {
         let size = now.active.len();
         let free: Vec<usize> = (0..size).collect();
+        let is_trial = self.model.is_costly() && steps <= TRIAL_STEPS;
+        let enough = if is_trial { COMPARED } else { CONVERGED };
         let mut damping = 1e-6;
         for _ in 0..steps {
             let mut form = now.total.clone();
@@ -88,7 +93,7 @@ impl Selection<'_> {
             let next = self.at(now.active.clone(), theta);
             let gain = now.sum_of_squares() - next.sum_of_squares();
             if gain > 0.0 {
-                let small = gain < CONVERGED * now.sum_of_squares();
+                let small = gain < enough * now.sum_of_squares();
                 now = next;
                 damping = (damping * 0.1).max(1e-9);
                 if small {

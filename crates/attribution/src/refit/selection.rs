@@ -15,7 +15,10 @@ pub(super) const MAY_GROW: f64 = 0.002;
 const PAIR_SHARE: f64 = 0.1;
 
 /// Candidates that are fitted in each step where a fit is costly and one of them is taken.
-const MOST_TRIED: usize = 6;
+const MOST_TRIED: usize = 4;
+
+/// Share of the least gain that the linear model promises of a candidate that is fitted where a fit is costly.
+const HOPELESS: f64 = 0.5;
 
 /// Steps of the fit of a candidate.
 pub(super) const TRIAL_STEPS: usize = 5;
@@ -38,6 +41,8 @@ pub(super) struct Course {
     pub(super) ladder: Vec<RefitErrors>,
     /// Each effect as it was tried last.
     pub(super) last: Vec<Option<RefitTried>>,
+    /// True if several effects together were tried and did not help.
+    pub(super) is_alone: bool,
 }
 
 /// Errors of a fit, and the 95 % interval of each parameter.
@@ -59,11 +64,13 @@ impl Selection<'_> {
             now,
             chosen: Vec::new(),
             last: vec![None; self.model.effects().len()],
+            is_alone: false,
         };
         while self.step(&mut course, progress)? {}
         if self.take_for_groups(&mut course, progress)? {
             while self.step(&mut course, progress)? {}
         }
+        self.drop_denied(&mut course, progress)?;
         let mut intervals = self.drop_redundant(&mut course);
         let by_group = self.values_by_group(&course.now);
         let mut worse = self.worse_with_each(&course);
@@ -95,8 +102,12 @@ impl Selection<'_> {
             if !good.is_empty() {
                 break;
             }
-            if pass == 1 && self.model.is_costly() && self.take_together(course, &common, progress)? {
-                return Ok(true);
+            if pass == 1 && self.model.is_costly() && !course.is_alone {
+                if self.take_together(course, &common, progress)? {
+                    return Ok(true);
+                }
+                // Effects of one group come between; what did not help together will not with those.
+                course.is_alone = true;
             }
             for (k, (effect, start)) in { self.promising(&course.now, open, progress)?.into_iter() }.enumerate() {
                 if self.model.is_costly() && k >= MOST_TRIED && !good.is_empty() {
@@ -105,13 +116,18 @@ impl Selection<'_> {
                 progress.check_stopped()?;
                 progress.note(&effects[effect].name);
                 let start = start.unwrap_or_else(|| self.with(&course.now, effect));
+                if let Some(tried) = self.hopeless(effect, &start, &course.now, &before) {
+                    self.note(course, tried);
+                    progress.advance(1);
+                    continue;
+                }
                 let state = self.fit(start, TRIAL_STEPS);
                 let tried = self.try_last(effect, &state, &before);
                 progress.advance(1);
                 if tried.rejected.is_none() {
                     good.push((state, tried.clone()));
                 }
-                course.last[effect] = Some(tried);
+                self.note(course, tried);
             }
         }
         good.sort_by(|(_, a), (_, b)| b.gain.value.total_cmp(&a.gain.value));
@@ -177,6 +193,32 @@ impl Selection<'_> {
             .collect())
     }
 
+    /// Keep how an effect was tried last. Where effects of one group come later, those explain what the effect would: it is then
+    /// still the groups that it predicts worse which refuse it.
+    fn note(&self, course: &mut Course, tried: RefitTried) {
+        let kept = &mut course.last[tried.effect];
+        let was_worse = { kept.as_ref() }.is_some_and(|k| matches!(k.rejected, Some(RefitRejection::Worse { .. })));
+        let is_little = matches!(tried.rejected, Some(RefitRejection::Little(_)));
+        if !(self.model.is_costly() && was_worse && is_little) {
+            *kept = Some(tried);
+        }
+    }
+
+    /// An effect of which the linear model promises so little that a fit, where it is costly, is not needed to refuse it.
+    fn hopeless(&self, effect: usize, start: &State, now: &State, before: &RefitErrors) -> Option<RefitTried> {
+        let share = 1.0 - start.promised() / now.promised().max(f64::MIN_POSITIVE);
+        let is_little = self.model.is_costly() && share < HOPELESS * self.model.least_share();
+        is_little.then(|| RefitTried {
+            effect,
+            // It was not fitted.
+            score: 0.0,
+            gain: NO_GAIN,
+            values: self.values(effect, &start.theta),
+            errors: before.clone(),
+            rejected: Some(RefitRejection::Little(share.max(0.0))),
+        })
+    }
+
     /// The two effects that predict most together what was left out, with their fit; none that gain less than `least` by so much
     /// that one of them suffices, or that are refused.
     fn pair(
@@ -213,6 +255,35 @@ impl Selection<'_> {
             }
         }
         Ok(best.map(|(_, pair, state)| (pair, state)))
+    }
+
+    /// Drop effects that a group in which they have to hold denies now that others were taken, one after the other, where a fit is
+    /// costly: few were tried in the order in which they would be best.
+    fn drop_denied(&self, course: &mut Course, progress: &dyn Progress) -> Result<()> {
+        if !self.model.is_costly() || course.chosen.len() < 2 {
+            return Ok(());
+        }
+        let every = |e: usize| matches!(self.model.scope(e), RefitScope::Every { .. });
+        let mut place = 0;
+        progress.begin("effects again", course.chosen.len() as u64);
+        while let Some(&effect) = course.chosen.get(place) {
+            progress.check_stopped()?;
+            progress.advance(1);
+            if every(effect) {
+                let without = self.fit(self.dropped(&course.now, effect), TRIAL_STEPS);
+                let tried = self.try_last(effect, &course.now, &self.errors(&without));
+                if tried.rejected.is_some() {
+                    course.chosen.remove(place);
+                    course.ladder.remove(place + 1);
+                    course.now = self.fit(without, TAKEN_STEPS);
+                    *course.ladder.last_mut().expect("the errors without effects") = self.errors(&course.now);
+                    course.last[effect] = Some(tried);
+                    continue;
+                }
+            }
+            place += 1;
+        }
+        Ok(())
     }
 
     /// Drop effects that others made needless, one after the other; intervals of the parameters of the others.
@@ -326,6 +397,7 @@ impl Selection<'_> {
             chosen,
             ladder,
             mut last,
+            ..
         } = course;
         let before = ladder.last().expect("the errors without effects");
         let mut order = chosen.clone();

@@ -38,7 +38,7 @@ impl FrameEquations {
         let more: Vec<_> = more.iter().map(|m| reading.pixels(m)).collect();
         let residual = now.whitened(data, c, &lines[0]);
         let led = data.beam[c].led;
-        let scale = data.scale[c] as f32;
+        let scale = (data.scale[c] * now.scale[c]) as f32;
         let scaled = scale * now.flux[led] as f32;
         let weight = &data.weight[c];
         let column =

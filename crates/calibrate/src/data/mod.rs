@@ -277,13 +277,13 @@ mod tests {
         PixelGrid::new(&samples, STEP_UM, &optic, PIXELS, PIXELS)
     }
 
-    /// Two measurements in each of two colours: windows that are off, lamps that are brighter, and a black level.
-    #[test]
-    fn nuisances_are_fitted_as_they_were() {
-        /// Relative to the noise: priors hold flux and black level back a little.
-        const TOLERANCE: f64 = 2e-3;
-        let shifts = [[0.3, -0.2], [2.2, 1.1], [-1.4, 0.6], [0.0, -3.1]];
-        let (flux, black_dn): (PerLed<f64>, f64) = (vec![1.004, 0.993].into(), 0.2);
+    /// Two measurements in each of two colours, whose windows are off: with lamps of a flux over what is stated, a black level, and
+    /// a scale of each over what is stated, which is one DN where scales are free.
+    fn measured(
+        shifts: [[f64; 2]; 4],
+        (flux, black_dn): (&PerLed<f64>, f64),
+        scales: Option<[f64; 4]>,
+    ) -> (Data, PerMeasurement<PixelGrid>) {
         let beam = (0..4).map(|c| MeasurementSetup {
             element: ElementIndex::from(c / 2),
             led: LedIndex::from(c % 2),
@@ -295,20 +295,21 @@ mod tests {
         let signal: PerMeasurement<Array2<f32>> = beam
             .iter()
             .zip(shifts)
-            .map(|(b, shift)| {
+            .zip(scales.unwrap_or([SCALE_DN; 4]))
+            .map(|((b, shift), scale)| {
                 image
                     .pixels(shift)
-                    .mapv(|v| (f64::from(v) * SCALE_DN * flux[b.led] + black_dn) as f32)
+                    .mapv(|v| (f64::from(v) * scale * flux[b.led] + black_dn) as f32)
             })
             .collect();
         let data = Data {
             weight: signal.iter().map(|s| s.mapv(|_| (1.0 / SIGMA_DN) as f32)).collect(),
-            scale: vec![SCALE_DN; signal.len()].into(),
+            scale: vec![scales.map_or(SCALE_DN, |_| 1.0); signal.len()].into(),
             leds: flux.len(),
             pixel_um: PIXEL_UM,
             registration_um: 2.0,
             flux_sigma: 0.01,
-            free_scale: false,
+            free_scale: scales.is_some(),
             references: References {
                 values: Vec::new(),
                 offset_sigma: 1.0,
@@ -316,15 +317,29 @@ mod tests {
             beam,
             signal,
         };
-        assert_eq!(data.folds()[2].raw, [0; 4]);
-        assert_eq!(data.clusters().raw, [0, 1, 2, 3]);
-        let images: PerMeasurement<PixelGrid> = vec![image; 4].into();
-        let found = data.fitted_nuisances(&images, &vec![true; 4].into());
-        for (found, shift) in found.shift_um.iter().zip(shifts) {
+        (data, vec![image; 4].into())
+    }
+
+    const SHIFTS: [[f64; 2]; 4] = [[0.3, -0.2], [2.2, 1.1], [-1.4, 0.6], [0.0, -3.1]];
+
+    fn are_near(found: &PerMeasurement<[f64; 2]>, tolerance: f64) {
+        for (found, shift) in found.iter().zip(SHIFTS) {
             for axis in [0, 1] {
-                assert!((found[axis] - shift[axis]).abs() < TOLERANCE, "{found:?} {shift:?}");
+                assert!((found[axis] - shift[axis]).abs() < tolerance, "{found:?} {shift:?}");
             }
         }
+    }
+
+    #[test]
+    fn nuisances_are_fitted_as_they_were() {
+        /// Relative to the noise: priors hold flux and black level back a little.
+        const TOLERANCE: f64 = 2e-3;
+        let (flux, black_dn): (PerLed<f64>, f64) = (vec![1.004, 0.993].into(), 0.2);
+        let (data, images) = measured(SHIFTS, (&flux, black_dn), None);
+        assert_eq!(data.folds()[2].raw, [0; 4]);
+        assert_eq!(data.clusters().raw, [0, 1, 2, 3]);
+        let found = data.fitted_nuisances(&images, &vec![true; 4].into());
+        are_near(&found.shift_um, TOLERANCE);
         for (found, flux) in found.flux.iter().zip(&flux) {
             assert!((found - flux).abs() < TOLERANCE, "{found} {flux}");
         }
@@ -333,5 +348,17 @@ mod tests {
             "{}",
             found.black_dn
         );
+    }
+
+    #[test]
+    fn free_scales_are_fitted_wherever_they_are() {
+        const TOLERANCE: f64 = 2e-3;
+        let (flux, scales) = (vec![1.0; 2].into(), [400.0, 1700.0, 30.0, 52_000.0]);
+        let (data, images) = measured(SHIFTS, (&flux, 0.2), Some(scales));
+        let found = data.fitted_nuisances(&images, &vec![true; 4].into());
+        are_near(&found.shift_um, TOLERANCE);
+        for (found, scale) in found.scale.iter().zip(scales) {
+            assert!((found / scale - 1.0).abs() < TOLERANCE, "{found} {scale}");
+        }
     }
 }

@@ -15,7 +15,7 @@ use crate::heights::fft::{Fft2, frequency};
 const FOUND_PX: f64 = 0.003;
 
 /// Steps towards a displacement.
-const STEPS: usize = 4;
+pub(super) const STEPS: usize = 4;
 
 /// A frame without its level, of norm one.
 pub(super) struct Measured {
@@ -205,83 +205,115 @@ impl Detector {
         (shift, peak / (norm * of_measured.sqrt()).max(f64::MIN_POSITIVE))
     }
 
-    /// Displacement of a prediction to where the frame is, as least squares have it, with the images there.
-    pub(super) fn register(&self, spectrum: &[Complex32], measured: &Measured, from: [f64; 2]) -> ([f64; 2], Images) {
-        let mut shift = from;
+    /// Displacement of a prediction to where the frame is, as least squares have it, with the images there; and whether steps were
+    /// short.
+    pub(super) fn register(
+        &self,
+        spectrum: &[Complex32],
+        measured: &Measured,
+        from: [f64; 2],
+        steps: usize,
+    ) -> (([f64; 2], Images), bool) {
+        let (mut shift, mut is_near) = (from, true);
         let mut images = self.images(spectrum, shift);
-        for _ in 0..STEPS {
-            let columns = [&images.value, &images.along[0], &images.along[1]];
-            let (values, used) = (&measured.values, &measured.used);
-            let ones: Vec<f32> = vec![1.0; values.len()];
+        for _ in 0..steps {
+            let all = [
+                &images.value,
+                &measured.used,
+                &images.along[0],
+                &images.along[1],
+                &measured.values,
+            ];
             let mut form = DMatrix::<f64>::zeros(5, 5);
-            let all = [columns[0], &ones, columns[1], columns[2], values];
             for i in 0..5 {
                 for j in 0..=i {
-                    form[(i, j)] = dot_used(all[i], all[j], used);
+                    form[(i, j)] = dot_used(all[i], all[j], &measured.used);
                     form[(j, i)] = form[(i, j)];
                 }
             }
             let normal = form.view((0, 0), (4, 4)).into_owned();
             let right = form.view((0, 4), (4, 1)).into_owned();
-            let Some(found) = normal.cholesky().map(|c| c.solve(&right)) else {
+            let found = normal.cholesky().map(|c| c.solve(&right));
+            let Some(found) = found.filter(|found| found[0] > 0.0) else {
+                is_near = false;
                 break;
             };
-            if found[0] <= 0.0 {
-                break;
-            }
-            let step = [2, 3].map(|k| (-found[k] / found[0]).clamp(-1.0, 1.0));
+            let step = [2, 3].map(|k| -found[k] / found[0]);
+            is_near &= step.iter().all(|v| v.abs() < 1.0);
+            let step = step.map(|v| v.clamp(-1.0, 1.0));
             let next = [0, 1].map(|k| (shift[k] + step[k]).clamp(from[k] - 3.0, from[k] + 3.0));
-            let moved = step[0].hypot(step[1]);
-            if moved < FOUND_PX {
+            if step[0].hypot(step[1]) < FOUND_PX {
                 break;
             }
             shift = next;
             images = self.images(spectrum, shift);
         }
-        (shift, images)
+        ((shift, images), is_near)
     }
 }
 
 fn dot_used(a: &[f32], b: &[f32], used: &[f32]) -> f64 {
-    let mut sums = [0.0_f64; 8];
-    let mut chunks = a.chunks_exact(8).zip(b.chunks_exact(8)).zip(used.chunks_exact(8));
-    for ((a, b), u) in &mut chunks {
-        for k in 0..8 {
-            sums[k] += f64::from(a[k] * u[k]) * f64::from(b[k]);
+    let lanes = |k: usize| a[k] * used[k] * b[k];
+    summed(a.len(), lanes)
+}
+
+/// Sum of products.
+pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
+    summed(a.len().min(b.len()), |k| a[k] * b[k])
+}
+
+/// Sum of values, in single precision over few of them only.
+fn summed(n: usize, value: impl Fn(usize) -> f32) -> f64 {
+    const LANES: usize = 8;
+    const BLOCK: usize = 4 * LANES;
+    let mut sums = [0.0_f64; LANES];
+    for first in (0..n / BLOCK * BLOCK).step_by(BLOCK) {
+        let mut own = [0.0_f32; LANES];
+        for at in (first..first + BLOCK).step_by(LANES) {
+            for (k, v) in own.iter_mut().enumerate() {
+                *v += value(at + k);
+            }
+        }
+        for (sum, v) in sums.iter_mut().zip(own) {
+            *sum += f64::from(v);
         }
     }
-    let first = a.len() / 8 * 8;
-    let rest: f64 = (first..a.len())
-        .map(|k| f64::from(a[k] * used[k]) * f64::from(b[k]))
-        .sum();
+    let rest: f64 = (n / BLOCK * BLOCK..n).map(|k| f64::from(value(k))).sum();
     sums.iter().sum::<f64>() + rest
 }
 
-/// Sums of products of columns over the pixels in use, with other columns eliminated.
-pub(super) fn eliminated(columns: &[&[f32]], own: &[&[f32]], used: &[f32]) -> DMatrix<f64> {
-    let (n, k) = (columns.len(), own.len());
+/// Sums of products of columns, with other columns eliminated.
+pub(super) fn eliminated(columns: &[&[f32]], own: &[&[f32]]) -> DMatrix<f64> {
+    let k = own.len();
     let all = |i: usize| if i < k { own[i] } else { columns[i - k] };
-    let mut form = DMatrix::<f64>::zeros(n + k, n + k);
-    for i in 0..n + k {
+    eliminate(k, k + columns.len(), &mut |i, j| dot(all(i), all(j)))
+}
+
+/// Products of columns, of which the first `k` are eliminated.
+pub(super) fn eliminate(k: usize, all: usize, product: &mut dyn FnMut(usize, usize) -> f64) -> DMatrix<f64> {
+    let mut form = DMatrix::<f64>::zeros(all, all);
+    for i in 0..all {
         for j in 0..=i {
-            form[(i, j)] = dot_used(all(i), all(j), used);
+            form[(i, j)] = product(i, j);
             form[(j, i)] = form[(i, j)];
         }
     }
-    for p in 0..k {
+    let squares: Vec<f64> = (0..k).map(|p| form[(p, p)]).collect();
+    for (p, square) in squares.into_iter().enumerate() {
         let pivot = form[(p, p)];
         // One that others hold already is rounding.
-        if pivot <= 1e-9 * dot_used(own[p], own[p], used) {
+        if pivot <= 1e-7 * square {
             continue;
         }
-        let row: Vec<f64> = (0..n + k).map(|j| form[(p, j)] / pivot).collect();
-        for i in p + 1..n + k {
+        let row: Vec<f64> = (0..all).map(|j| form[(p, j)] / pivot).collect();
+        for i in p + 1..all {
             let factor = form[(i, p)];
             for (j, v) in row.iter().enumerate().skip(p + 1) {
                 form[(i, j)] -= factor * v;
             }
         }
     }
+    let n = all - k;
     let mut out = form.view((k, k), (n, n)).into_owned();
     for i in 0..n {
         out[(i, i)] = out[(i, i)].max(0.0);

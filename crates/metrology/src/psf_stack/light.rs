@@ -1,30 +1,43 @@
 //! Light of an object: from its transmission to the intensity on the sensor.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use metalith_core::Zernike;
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 
 use super::bench::ApertureShape;
+use super::chirp::{Chirp, ChirpSum};
+use super::mask::{Mask, boxed};
+use super::recent::Recent;
 use super::sampling::{Method, Sampling};
-use super::set::{StackSet, Transmission};
+use super::set::StackSet;
 use super::setting::{FIRST_ZERNIKE, PupilSetting, ZERNIKES};
 use crate::heights::fft::{Fft2, frequency};
 
 /// Light behind opening, object and lens at each wavelength, or its spectrum.
 type Pupil = Arc<Vec<Array2<Complex32>>>;
 
-/// Pupils of an object that are kept.
-const KEPT: usize = 12;
+/// Pupils of an object that are kept: one for each parameter that is fitted, as far as memory (bytes) has them.
+const KEPT: usize = 48;
+const KEPT_BYTES: usize = 300_000_000;
+
+/// Light behind openings and masks, and masks of one depth, that are kept.
+const KEPT_PASSED: usize = 16;
+const KEPT_MASKS: usize = 4;
 
 /// Light of all objects of a set.
 pub(super) struct Light<'a> {
     set: &'a StackSet,
     sampling: &'a Sampling,
     zernikes: Vec<Array2<f32>>,
-    kept: Vec<Mutex<Vec<(PupilSetting, Pupil)>>>,
+    pupils: Vec<Recent<PupilSetting, Pupil>>,
+    /// Without the path of the lens.
+    passed: Vec<Recent<PupilSetting, Pupil>>,
+    masks: Vec<Recent<[f64; 2], Arc<Mask>>>,
+    /// Sums over samples of the light, to points along x and along y.
+    sums: [ChirpSum; 2],
     transforms: Option<[Fft2<f32>; 2]>,
 }
 
@@ -33,6 +46,8 @@ pub(super) struct Light<'a> {
 pub(super) struct Place {
     /// From the lens, or from the object without one (um).
     pub distance_um: f64,
+    /// From the object to a lens that is stated in its plane (um).
+    pub mask_um: f64,
     /// Edge of a pixel (um).
     pub pixel_um: f64,
     /// Whole pixels by which the pattern is displaced, along x and y.
@@ -59,51 +74,84 @@ impl<'a> Light<'a> {
                 })
             })
             .collect();
+        let waves = set.bench.wavelengths.len();
+        let keep = (KEPT_BYTES / (8 * n * n * waves * set.objects.len())).clamp(4, KEPT);
         let needs = sampling.method == Method::AngularSpectrum || at_lens.is_some();
         Self {
             set,
             sampling,
             zernikes,
-            kept: set.objects.iter().map(|_| Mutex::new(Vec::new())).collect(),
+            pupils: set.objects.iter().map(|_| Recent::new(keep)).collect(),
+            passed: set.objects.iter().map(|_| Recent::new(keep.min(KEPT_PASSED))).collect(),
+            masks: set.objects.iter().map(|_| Recent::new(KEPT_MASKS.max(waves))).collect(),
+            sums: [1, 0].map(|axis| ChirpSum::new(n, sampling.padded[axis] * sampling.fine)),
             transforms: needs.then(|| [Fft2::new(n, n, false), Fft2::new(n, n, true)]),
         }
     }
 
     /// Light behind the lens of an object.
     pub(super) fn pupil(&self, object: usize, setting: &PupilSetting) -> Pupil {
-        let mut kept = self.kept[object].lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(at) = kept.iter().position(|(s, _)| s == setting) {
-            let found = kept.remove(at);
-            let pupil = found.1.clone();
-            kept.push(found);
-            return pupil;
-        }
-        let waves = 0..self.set.bench.wavelengths.len();
-        let pupil: Pupil = Arc::new(waves.map(|w| self.behind(object, setting, w)).collect());
-        if kept.len() >= KEPT {
-            kept.remove(0);
-        }
-        kept.push((*setting, pupil.clone()));
-        pupil
+        self.pupils[object].get(*setting, || {
+            let waves = 0..self.set.bench.wavelengths.len();
+            Arc::new(waves.map(|w| self.behind(object, setting, w)).collect())
+        })
     }
 
-    fn behind(&self, object: usize, setting: &PupilSetting, wavelength: usize) -> Array2<Complex32> {
-        let (n, dx, bench) = (self.sampling.n, self.sampling.dx_um, &self.set.bench);
-        let wavelength_um = bench.wavelengths[wavelength][0];
-        let mask = { self.set.objects[object].transmission.as_ref() }
-            .map(|t| Mask::new(t, t.factors[wavelength] * (1.0 + setting.depth), dx));
+    /// Light behind opening and object at each wavelength.
+    fn passed(&self, object: usize, setting: &PupilSetting) -> Pupil {
+        let flat = PupilSetting {
+            zernike_nm: [0.0; ZERNIKES],
+            falloff: [0.0; 3],
+            ..*setting
+        };
+        self.passed[object].get(flat, || {
+            let waves = 0..self.set.bench.wavelengths.len();
+            Arc::new(waves.map(|w| self.pass(object, setting, w)).collect())
+        })
+    }
+
+    fn pass(&self, object: usize, setting: &PupilSetting, wavelength: usize) -> Array2<Complex32> {
+        let (n, dx) = (self.sampling.n, self.sampling.dx_um);
+        let mask = self.set.objects[object].transmission.as_ref().map(|t| {
+            let factor = t.factors[wavelength] * (1.0 + setting.depth);
+            self.masks[object].get([factor, setting.mask_blur_um2], || {
+                Arc::new(Mask::new(t, factor, setting.mask_blur_um2, dx))
+            })
+        });
         let turned = Complex64::cis(-setting.rotation_deg.to_radians()) / (1.0 + setting.mask_scale);
         let share = setting.unmodulated as f32;
-        let mut field = Array2::from_shape_fn((n, n), |(y, x)| {
+        let step = mask
+            .as_ref()
+            .filter(|_| self.sampling.smooth_masks)
+            .map_or(0.0, |m| m.sample_um);
+        let width = dx.hypot(step);
+        Array2::from_shape_fn((n, n), |(y, x)| {
             let (x, y) = (place(x, n, dx), place(y, n, dx));
             let open = self.opening(x, y, setting.aperture);
             let Some(mask) = mask.as_ref().filter(|_| open > 0.0) else {
                 return Complex32::from(open);
             };
             let at = Complex64::new(x - setting.shift_um[0], y - setting.shift_um[1]) * turned;
-            let passed = mask.at(at.re, at.im, dx);
+            let passed = mask.at(at.re, at.im, width);
             (passed * (1.0 - share) + share) * open
-        });
+        })
+    }
+
+    fn behind(&self, object: usize, setting: &PupilSetting, wavelength: usize) -> Array2<Complex32> {
+        let (n, dx, bench) = (self.sampling.n, self.sampling.dx_um, &self.set.bench);
+        let wavelength_um = bench.wavelengths[wavelength][0];
+        let mut field = self.passed(object, setting)[wavelength].clone();
+        if setting.falloff.iter().any(|v| *v != 0.0) {
+            let radius = 0.5 * bench.aperture_um;
+            let [fall, by_x, by_y] = setting.falloff;
+            let line = |rise: f64| -> Vec<f32> {
+                let at = |k: usize| place(k, n, dx) / radius;
+                let value = |k: usize| (rise * at(k) - fall * at(k) * at(k)).clamp(-20.0, 20.0).exp() as f32;
+                (0..n).map(value).collect()
+            };
+            let (xs, ys) = (line(by_x), line(by_y));
+            field.indexed_iter_mut().for_each(|((y, x), v)| *v *= xs[x] * ys[y]);
+        }
         let lens = bench.lens.filter(|l| l.distance_um > 0.0);
         if let (Some(lens), Some([forward, inverse])) = (lens, &self.transforms) {
             let curvature = bench.source_um.map_or(0.0, |s| 1.0 / s);
@@ -138,7 +186,10 @@ impl<'a> Light<'a> {
             (Method::AngularSpectrum, Some([forward, _])) => {
                 self.bend(&mut field, self.curvature() / wavelength_um);
                 let spectrum = forward.transposed(field.into_raw_vec_and_offset().0);
-                Array2::from_shape_vec((n, n), spectrum).expect("as many as samples")
+                let spectrum = Array2::from_shape_vec((n, n), spectrum).expect("as many as samples");
+                // From the lowest frequency to the highest; a transform is transposed.
+                let from = |k: usize| (k + n / 2 + 1) % n;
+                Array2::from_shape_fn((n, n), |(y, x)| spectrum[(from(x), from(y))])
             }
             _ => field,
         }
@@ -189,42 +240,43 @@ impl<'a> Light<'a> {
     pub(super) fn intensity(&self, pupil: &Pupil, place_of: Place) -> Array2<f32> {
         let (s, b) = (self.sampling, &self.set.bench);
         let [rows, cols] = s.padded.map(|n| n * s.fine);
-        let mut out = Array2::<f32>::zeros((rows, cols));
+        let mut out = vec![0.0_f32; rows * cols];
         for (field, [wavelength_um, weight]) in pupil.iter().zip(&b.wavelengths) {
-            let [ey, ex] = [(rows, 1), (cols, 0)].map(|(m, axis)| self.kernel(m, place_of, axis, *wavelength_um));
-            let light = match s.method {
-                Method::FourierSum => ey.dot(field).dot(&ex.t()),
-                Method::AngularSpectrum => ey.dot(&field.t()).dot(&ex.t()),
-            };
+            let [by_x, by_y] = [0, 1].map(|axis| self.chirp(place_of, axis, *wavelength_um));
+            let light = self.sums[1].sum(&self.sums[0].sum(field, &by_x), &by_y);
             let weight = *weight as f32;
-            out.zip_mut_with(&light, |sum, v| *sum += weight * v.norm_sqr());
+            out.iter_mut()
+                .zip(&light)
+                .for_each(|(sum, v)| *sum += weight * v.norm_sqr());
         }
-        out
+        Array2::from_shape_vec((rows, cols), out).expect("as many as points")
     }
 
-    /// Factors of a sum over samples of the light along an axis, for each fine point.
-    fn kernel(&self, m: usize, at: Place, axis: usize, wavelength_um: f64) -> Array2<Complex32> {
+    /// Factors of a sum over samples of the light along an axis.
+    fn chirp(&self, at: Place, axis: usize, wavelength_um: f64) -> Chirp {
         let (s, n) = (self.sampling, self.sampling.n);
         let fine = at.pixel_um / s.fine as f64;
-        let points = (0..m).map(|j| place(j, m, fine) + at.origin_px[axis] * at.pixel_um);
-        let points: Vec<f64> = points.collect();
+        // Of the window along the other axis there are as many rows.
+        let first = place(0, s.padded[1 - axis] * s.fine, 1.0) + at.origin_px[axis] * s.fine as f64;
         let z = at.distance_um;
         match s.method {
             Method::FourierSum => {
-                let bend = PI * (1.0 / z + self.curvature()) / wavelength_um;
-                let xs: Vec<f64> = (0..n).map(|k| place(k, n, s.dx_um)).collect();
+                // A lens at a distance changes the curvature and the scale of the sum as if the sensor stood elsewhere.
+                let through = 1.0 - z * self.set.bench.lens.map_or(0.0, |l| 1.0 / l.focal_um);
+                let moved = at.mask_um * through;
+                let bend = PI * (through / (z + moved) - through / z + 1.0 / z + self.curvature()) / wavelength_um;
+                let z = z + moved;
                 let scale = s.dx_um / (wavelength_um * z).sqrt();
-                let bent: Vec<Complex64> = xs.iter().map(|x| Complex64::cis(bend * x * x) * scale).collect();
-                Array2::from_shape_fn((m, n), |(j, k)| {
-                    single(bent[k] * Complex64::cis(-TAU * points[j] * xs[k] / (wavelength_um * z)))
+                self.sums[axis].chirp([place(0, n, 1.0), first], -s.dx_um * fine / (wavelength_um * z), |k| {
+                    Complex64::from_polar(scale, bend * (k * s.dx_um).powi(2))
                 })
             }
             Method::AngularSpectrum => {
-                let first = 0.5 * (n as f64 - 1.0) * s.dx_um;
-                Array2::from_shape_fn((m, n), |(j, k)| {
-                    let f = frequency(k, n) / s.dx_um;
-                    let phase = -PI * wavelength_um * z * f * f + TAU * f * (points[j] + first);
-                    single(Complex64::cis(phase) / n as f64)
+                let middle = 0.5 * (n as f64 - 1.0);
+                self.sums[axis].chirp([1.0 - (n / 2) as f64, first], fine / (n as f64 * s.dx_um), |k| {
+                    let f = k / (n as f64 * s.dx_um);
+                    let phase = -PI * wavelength_um * z * f * f + TAU * k * middle / n as f64;
+                    Complex64::from_polar(1.0 / n as f64, phase)
                 })
             }
         }
@@ -236,65 +288,6 @@ fn place(k: usize, n: usize, step: f64) -> f64 {
     (k as f64 - 0.5 * (n as f64 - 1.0)) * step
 }
 
-fn single(v: Complex64) -> Complex32 {
+pub(super) fn single(v: Complex64) -> Complex32 {
     Complex32::new(v.re as f32, v.im as f32)
-}
-
-/// Complex transmission on blocks of samples.
-struct Mask {
-    values: Array2<Complex32>,
-    sample_um: f64,
-}
-
-impl Mask {
-    /// Means over blocks of at most half a sample of the light.
-    fn new(t: &Transmission, factor: f64, dx_um: f64) -> Self {
-        let block = ((0.5 * dx_um / t.sample_um) as usize).max(1);
-        let (rows, cols) = t.phase.dim();
-        let [m, n] = [rows, cols].map(|n| n.div_ceil(block));
-        let mut values = Array2::<Complex32>::zeros((m, n));
-        let mut counts = Array2::<f32>::zeros((m, n));
-        for ((y, x), phase) in t.phase.indexed_iter() {
-            let amplitude = t.amplitude.as_ref().map_or(1.0, |a| a[(y, x)]);
-            let at = (y / block, x / block);
-            values[at] += Complex32::from_polar(amplitude, (f64::from(*phase) * factor).rem_euclid(TAU) as f32);
-            counts[at] += 1.0;
-        }
-        values.zip_mut_with(&counts, |v, n| *v /= *n);
-        Self {
-            values,
-            sample_um: t.sample_um * block as f64,
-        }
-    }
-
-    /// Mean over a sample of the light about a place (um) from the middle of the object; its outermost samples go on.
-    fn at(&self, x: f64, y: f64, dx_um: f64) -> Complex32 {
-        let (rows, cols) = self.values.dim();
-        let [x, y] = [(x, cols), (y, rows)].map(|(v, n)| v / self.sample_um + 0.5 * n as f64);
-        boxed(self.values.view(), x, y, 0.5 * dx_um / self.sample_um)
-    }
-}
-
-/// Mean of samples, each a square of edge 1, over a square about a place.
-fn boxed<T>(values: ArrayView2<'_, T>, x: f64, y: f64, half: f64) -> T
-where
-    T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T> + Default,
-{
-    let (rows, cols) = values.dim();
-    let range = |v: f64, n: usize| {
-        // Beyond the rim its samples go on.
-        let v = v.clamp(-1.0, n as f64 + 1.0);
-        let (low, high) = (v - half, v + half);
-        (low.floor() as isize..=high.floor() as isize).filter_map(move |k| {
-            let weight = (high.min(k as f64 + 1.0) - low.max(k as f64)) / (2.0 * half);
-            (weight > 0.0).then(|| (k.clamp(0, n as isize - 1) as usize, weight as f32))
-        })
-    };
-    let mut sum = T::default();
-    for (row, by_row) in range(y, rows) {
-        for (col, by_col) in range(x, cols) {
-            sum = sum + values[(row, col)] * (by_row * by_col);
-        }
-    }
-    sum
 }

@@ -1,13 +1,17 @@
 //! Point spread functions of known objects, a relief or a complex transmission, in stacks through focus.
 
+mod allowance;
 mod bench;
+mod chirp;
 mod detector;
 mod files;
 mod frames;
 mod light;
+mod mask;
 mod model;
 mod orientation;
 mod page;
+mod recent;
 mod sampling;
 mod selection;
 mod set;
@@ -17,6 +21,7 @@ mod tests;
 
 use metalith_core::Result;
 
+pub(crate) use allowance::{allow_for_samples, equal_scales};
 pub use bench::{ApertureShape, StackBench, ThinLens};
 pub use model::StackModel;
 pub(crate) use page::figures;

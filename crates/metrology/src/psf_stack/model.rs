@@ -1,16 +1,17 @@
 //! Forward model of stacks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use metalith_attribution::{LeaveOut, RefitEffect, RefitPlan};
+use nalgebra::DMatrix;
 use ndarray::Array2;
 use num_complex::Complex32;
 use rayon::prelude::*;
 
 use super::Prepared;
-use super::detector::{Detector, Images, Measured, eliminated};
+use super::detector::{Detector, Images, Measured, STEPS, dot, eliminate, eliminated};
 use super::light::{Light, Place};
 use super::set::StackSet;
 use super::setting::{self, Effects, Setting};
@@ -59,7 +60,16 @@ pub(super) struct Base {
     pub(super) images: Images,
     gain: f32,
     pub(super) residual: Vec<f32>,
+    /// Sums of products of columns that were asked for.
+    products: Mutex<HashMap<[usize; 2], f64>>,
     columns: Mutex<BTreeMap<usize, Arc<Change>>>,
+}
+
+impl Base {
+    /// Square of the relative error of a plane.
+    pub(super) fn error(&self) -> f64 {
+        self.residual.iter().map(|r| f64::from(*r).powi(2)).sum()
+    }
 }
 
 impl<'a> StackModel<'a> {
@@ -136,9 +146,13 @@ impl<'a> StackModel<'a> {
 
     fn setting(&self, theta: &[f64], object: usize) -> Setting {
         let mut out = Setting::of(theta, object);
-        if self.set.objects[object].transmission.is_none() {
-            let p = &mut out.pupil;
-            (p.depth, p.shift_um, p.rotation_deg, p.mask_scale, p.unmodulated) = (0.0, [0.0; 2], 0.0, 0.0, 0.0);
+        let transmission = self.set.objects[object].transmission.as_ref();
+        let p = &mut out.pupil;
+        if !transmission.is_some_and(|t| t.has_depth) {
+            (p.depth, p.mask_blur_um2) = (0.0, 0.0);
+        }
+        if transmission.is_none() {
+            (p.shift_um, p.rotation_deg, p.mask_scale, p.unmodulated) = ([0.0; 2], 0.0, 0.0, 0.0);
         }
         out
     }
@@ -152,6 +166,7 @@ impl<'a> StackModel<'a> {
         let pixel_um = bench.pixel_um * (1.0 + setting.pixel);
         let place = Place {
             distance_um,
+            mask_um: setting.mask_distance_um.clamp(-0.5 * distance_um, 4.0 * distance_um),
             pixel_um,
             origin_px: self.origins[m].map(|v| -v),
         };
@@ -159,20 +174,32 @@ impl<'a> StackModel<'a> {
         self.detector.spectrum(intensity, pixel_um, setting.blur_um2)
     }
 
-    /// Prediction of a plane, registered to its frame.
-    pub(super) fn predict(&self, m: usize, theta: &[f64]) -> Base {
+    /// Prediction of a plane, registered to its frame; from where the last one was, if that is near.
+    fn predict(&self, m: usize, theta: &[f64], last: Option<[f64; 2]>) -> Base {
         let setting = &self.setting(theta, self.set.planes[m].object);
         let spectrum = self.spectrum(m, setting);
         let measured = &self.measured[m];
-        let (shift, images) = if self.set.bench.shift {
+        let correlated = || {
             let (from, _) = self.detector.correlate(&spectrum, measured, [WANDERS; 2]);
-            self.detector.register(&spectrum, measured, from)
+            self.detector.register(&spectrum, measured, from, STEPS).0
+        };
+        let (shift, mut images) = if self.set.bench.shift {
+            let at_last = last.map(|from| self.detector.register(&spectrum, measured, from, STEPS));
+            let at_last = at_last.filter(|(_, found)| *found).map(|(at, _)| at);
+            at_last.unwrap_or_else(correlated)
         } else {
             ([0.0; 2], self.detector.images(&spectrum, [0.0; 2]))
         };
-        let ones = vec![1.0_f32; measured.values.len()];
-        let own: &[&[f32]] = if self.set.bench.background { &[&ones] } else { &[] };
-        let form = eliminated(&[&images.value, &measured.values], own, &measured.used);
+        // Pixels that are not used have no part in any sum.
+        for own in [&mut images.value].into_iter().chain(&mut images.along) {
+            own.iter_mut().zip(&measured.used).for_each(|(v, u)| *v *= u);
+        }
+        let own: &[&[f32]] = if self.set.bench.background {
+            &[&measured.used]
+        } else {
+            &[]
+        };
+        let form = eliminated(&[&images.value, &measured.values], own);
         let gain = (form[(0, 1)] / form[(0, 0)].max(f64::MIN_POSITIVE)).max(0.0);
         let gain = if gain.is_finite() { gain as f32 } else { 0.0 };
         let mut residual: Vec<f32> = { measured.values.iter().zip(&images.value) }
@@ -180,8 +207,11 @@ impl<'a> StackModel<'a> {
             .collect();
         if self.set.bench.background {
             let count: f32 = measured.used.iter().sum();
-            let level = residual.iter().zip(&measured.used).map(|(r, u)| r * u).sum::<f32>() / count.max(1.0);
-            residual.iter_mut().for_each(|r| *r -= level);
+            let level = residual.iter().sum::<f32>() / count.max(1.0);
+            residual
+                .iter_mut()
+                .zip(&measured.used)
+                .for_each(|(r, u)| *r -= level * u);
         }
         Base {
             setting: *setting,
@@ -190,6 +220,7 @@ impl<'a> StackModel<'a> {
             images,
             gain,
             residual,
+            products: Mutex::default(),
             columns: Mutex::default(),
         }
     }
@@ -199,7 +230,7 @@ impl<'a> StackModel<'a> {
         let mut kept = self.kept[m].lock().unwrap_or_else(PoisonError::into_inner);
         let base = match kept.iter().position(|b| b.setting == *setting) {
             Some(at) => kept.remove(at),
-            None => Arc::new(self.predict(m, theta)),
+            None => Arc::new(self.predict(m, theta, kept.last().map(|b| b.shift))),
         };
         if kept.len() >= self.keep {
             kept.remove(0);
@@ -208,14 +239,63 @@ impl<'a> StackModel<'a> {
         base
     }
 
-    /// Square of the relative error of a plane.
-    pub(super) fn error(&self, m: usize, base: &Base) -> f64 {
-        let used = &self.measured[m].used;
-        base.residual
-            .iter()
-            .zip(used)
-            .map(|(r, u)| f64::from(r * u).powi(2))
-            .sum()
+    /// Square of the relative error of a plane after one step towards its displacement, to compare starts.
+    pub(super) fn rough_error(&self, m: usize, theta: &[f64]) -> f64 {
+        let spectrum = self.spectrum(m, &self.setting(theta, self.set.planes[m].object));
+        let measured = &self.measured[m];
+        let from = if self.set.bench.shift {
+            self.detector.correlate(&spectrum, measured, [WANDERS; 2]).0
+        } else {
+            [0.0; 2]
+        };
+        let mut images = self.detector.images(&spectrum, from);
+        for own in [&mut images.value].into_iter().chain(&mut images.along) {
+            own.iter_mut().zip(&measured.used).for_each(|(v, u)| *v *= u);
+        }
+        eliminated(&[&measured.values], &self.nuisances(m, &images))[(0, 0)]
+    }
+
+    /// Columns of what is free in each plane.
+    pub(super) fn nuisances<'b>(&'b self, m: usize, images: &'b Images) -> Vec<&'b [f32]> {
+        let mut own: Vec<&[f32]> = vec![&images.value];
+        if self.set.bench.background {
+            own.push(&self.measured[m].used);
+        }
+        if self.set.bench.shift {
+            own.extend(images.along.iter().map(|v| &v[..]));
+        }
+        own
+    }
+
+    /// Normal equations of a plane over the changes with some parameters and the residual.
+    pub(super) fn form(&self, m: usize, active: &[usize], theta: &[f64]) -> DMatrix<f64> {
+        let base = self.base(m, theta);
+        let columns: Vec<_> = active.iter().map(|&slot| self.column(m, &base, slot, theta)).collect();
+        let own = self.nuisances(m, &base.images);
+        let k = own.len();
+        let mut products = base.products.lock().unwrap_or_else(PoisonError::into_inner);
+        let last = active.len();
+        let mut product = |i: usize, j: usize| {
+            let values = |i: usize| match i.checked_sub(k) {
+                None => Some(own[i]),
+                Some(c) if c == last => Some(&base.residual[..]),
+                Some(c) => columns[c].as_ref().map(|c| &c.values[..]),
+            };
+            // Names of columns: what is free, the residual, parameters.
+            let name = |i: usize| match i.checked_sub(k) {
+                None => i,
+                Some(c) if c == last => k,
+                Some(c) => k + 1 + active[c],
+            };
+            let (Some(a), Some(b)) = (values(i), values(j)) else {
+                return 0.0;
+            };
+            let (low, high) = (name(i).min(name(j)), name(i).max(name(j)));
+            *products.entry([low, high]).or_insert_with(|| dot(a, b))
+        };
+        let mut form = eliminate(k, k + last + 1, &mut product);
+        form[(last, last)] = base.error();
+        form
     }
 
     /// Change of the prediction with a parameter; none if there is no change.
@@ -236,7 +316,8 @@ impl<'a> StackModel<'a> {
             }
             let there = self.detector.image(&self.spectrum(m, &setting), base.shift);
             let factor = base.gain / step as f32;
-            let change = { there.iter().zip(&base.images.value) }.map(|(a, b)| (a - b) * factor);
+            let used = &self.measured[m].used;
+            let change = { there.iter().zip(&base.images.value).zip(used) }.map(|((a, b), u)| (a * u - b) * factor);
             Arc::new(Change {
                 theta: theta.to_vec(),
                 values: change.collect(),

@@ -108,6 +108,7 @@ fn best(set: &StackSet, sampling: &Sampling) -> (usize, bool, f64) {
                 let place = Place {
                     distance_um: distance_um.max(0.05 * set.bench.sensor_um),
                     pixel_um: set.bench.pixel_um,
+                    mask_um: 0.0,
                     origin_px: [0.0; 2],
                 };
                 let intensity = light.intensity(&light.pupil(plane.object, &still.pupil), place);

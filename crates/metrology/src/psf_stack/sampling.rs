@@ -23,6 +23,9 @@ const LARGEST_ANGLE: f64 = 0.3;
 /// Share by which the opening may grow beyond its stated size.
 const GROWTH: f64 = 1.08;
 
+/// Samples of a finer grid, over those of a grid.
+pub(super) const FINER: f64 = 1.4;
+
 /// Pixels around the window, so that a displaced pattern is there.
 const MARGIN: usize = 6;
 
@@ -46,6 +49,8 @@ pub(crate) struct Sampling {
     pub fine: usize,
     /// Pixels along each axis, with their margin.
     pub padded: [usize; 2],
+    /// True if masks pass evenly from sample to sample, and not in steps.
+    pub smooth_masks: bool,
     pub aperture_um: f64,
     pub middle_um: f64,
     /// Defocus whose path differs by an eighth of a wave at the rim (um).
@@ -57,7 +62,7 @@ pub(crate) struct Sampling {
 }
 
 /// Smallest size not below `n` of the same parity that Fourier transforms like.
-fn fft_size(n: usize) -> usize {
+pub(super) fn fft_size(n: usize) -> usize {
     let smooth = |mut k: usize| {
         for p in [2, 3, 5] {
             while k.is_multiple_of(p) {
@@ -165,6 +170,7 @@ impl Sampling {
             dx_um,
             fine,
             padded,
+            smooth_masks: false,
             aperture_um: b.aperture_um,
             middle_um,
             depth_of_focus_um: middle_um * (middle / light_um).powi(2),
@@ -174,6 +180,18 @@ impl Sampling {
         let steepest = distances.iter().map(|&z| curvature(z).abs()).fold(0.0, f64::max);
         out.reason = out.words(light_um, steepest);
         Ok(out)
+    }
+
+    /// A finer grid of the same light; none if it is larger than what is simulated.
+    pub(super) fn finer(&self) -> Option<Self> {
+        let n = fft_size(((self.n as f64 * FINER) as usize).next_multiple_of(2));
+        let finer = Self {
+            n,
+            dx_um: self.dx_um * self.n as f64 / n as f64,
+            ..self.clone()
+        };
+        // The angular spectrum would come round.
+        (n <= MOST_SAMPLES && self.method == Method::FourierSum).then_some(finer)
     }
 
     fn words(&self, light_um: f64, steepest: f64) -> String {

@@ -5,7 +5,6 @@ use std::sync::atomic::Ordering;
 use metalith_attribution::{RefitEffect, RefitEquations, RefitModel, RefitParameter, RefitScope};
 use rayon::prelude::*;
 
-use super::detector::eliminated;
 use super::model::StackModel;
 use super::setting::{self, BY_OBJECT};
 
@@ -72,26 +71,7 @@ impl RefitModel for StackModel<'_> {
     }
 
     fn equations(&self, m: usize, active: &[usize], theta: &[f64]) -> RefitEquations {
-        let base = self.base(m, theta);
-        let none = vec![0.0_f32; base.residual.len()];
-        let columns: Vec<_> = active.iter().map(|&slot| self.column(m, &base, slot, theta)).collect();
-        let mut all: Vec<&[f32]> = columns
-            .iter()
-            .map(|c| c.as_ref().map_or(&none[..], |c| &c.values[..]))
-            .collect();
-        all.push(&base.residual);
-        let ones = vec![1.0_f32; none.len()];
-        let mut own: Vec<&[f32]> = vec![&base.images.value];
-        if self.set.bench.background {
-            own.push(&ones);
-        }
-        if self.set.bench.shift {
-            own.extend(base.images.along.iter().map(|v| &v[..]));
-        }
-        let mut form = eliminated(&all, &own, &self.measured[m].used);
-        let last = active.len();
-        form[(last, last)] = self.error(m, &base);
-        RefitEquations::alike(form)
+        RefitEquations::alike(self.form(m, active, theta))
     }
 
     fn figure_names(&self) -> Vec<(&'static str, &'static str)> {
@@ -133,7 +113,7 @@ impl RefitModel for StackModel<'_> {
             mean(&|v, i| v * i) - v * i,
         ];
         let correlation = vi / (vv * ii).sqrt().max(f64::MIN_POSITIVE);
-        vec![self.error(m, &base).sqrt(), at_peak.sqrt(), 1.0 - correlation]
+        vec![base.error().sqrt(), at_peak.sqrt(), 1.0 - correlation]
     }
 
     fn decides(&self, figure: usize) -> bool {
@@ -176,7 +156,8 @@ impl RefitModel for StackModel<'_> {
     fn group_name(&self, way: usize, group: usize) -> String {
         match self.set.objects.get(group).filter(|_| way == BY_OBJECT) {
             Some(object) => object.name.clone(),
-            None => (group + 1).to_string(),
+            // As `not_fitted` counts them.
+            None => group.to_string(),
         }
     }
 
@@ -202,7 +183,7 @@ impl RefitModel for StackModel<'_> {
             .map(|values| {
                 let mut theta = theta.to_vec();
                 slots.iter().zip(values).for_each(|(&s, v)| theta[s] += v);
-                planes.iter().map(|&m| self.error(m, &self.predict(m, &theta))).sum()
+                planes.iter().map(|&m| self.rough_error(m, &theta)).sum()
             })
             .collect();
         let middle = errors[errors.len() / 2];

@@ -3,7 +3,7 @@
 use metalith_attribution::{RefitEffect, RefitParameter, RefitScope};
 use metalith_core::Zernike;
 
-use super::sampling::Sampling;
+use super::sampling::{Method, Sampling};
 use super::set::StackSet;
 
 /// First Zernike polynomial (Noll), and their number: astigmatism, coma, trefoil, spherical aberration.
@@ -22,7 +22,10 @@ const ZERNIKE: usize = 8;
 const BLUR: usize = ZERNIKE + ZERNIKES;
 const UNMODULATED: usize = BLUR + 3;
 const APERTURE: usize = UNMODULATED + 1;
-const BENCH: usize = APERTURE + 1;
+const FALLOFF: usize = APERTURE + 1;
+const MASK_BLUR: usize = FALLOFF + 3;
+const MASK_DISTANCE: usize = MASK_BLUR + 1;
+const BENCH: usize = MASK_DISTANCE + 1;
 
 /// Slots of an object, after those of the bench.
 const OWN_FOCUS: usize = 0;
@@ -31,6 +34,9 @@ const OWN_SHIFT: usize = 2;
 const OWN_ROTATION: usize = 4;
 const OWN_ZERNIKE: usize = 5;
 const OWN: usize = OWN_ZERNIKE + ZERNIKES;
+
+/// Largest variance of the blur of a mask, over the square of its pitch.
+const MOST_MASK_BLUR: f64 = 25.0;
 
 /// Number of the way of leaving objects out, after planes.
 pub(super) const BY_OBJECT: usize = 1;
@@ -42,6 +48,8 @@ pub(super) struct Setting {
     pub spacing: f64,
     pub pixel: f64,
     pub blur_um2: [f64; 2],
+    /// From the objects to the lens, where both are stated in one plane.
+    pub mask_distance_um: f64,
     pub pupil: PupilSetting,
 }
 
@@ -55,6 +63,10 @@ pub(super) struct PupilSetting {
     pub zernike_nm: [f64; ZERNIKES],
     pub unmodulated: f64,
     pub aperture: f64,
+    /// Logarithm of the amplitude of the illumination: a fall to the rim, and rises along x and y.
+    pub falloff: [f64; 3],
+    /// Variance of the blur of the phase of a mask.
+    pub mask_blur_um2: f64,
 }
 
 impl Setting {
@@ -66,6 +78,7 @@ impl Setting {
             spacing: theta[SPACING],
             pixel: theta[PIXEL],
             blur_um2: [theta[BLUR] + theta[BLUR + 1], theta[BLUR] + theta[BLUR + 2]],
+            mask_distance_um: theta[MASK_DISTANCE],
             pupil: PupilSetting {
                 depth: theta[DEPTH] + own[OWN_DEPTH],
                 shift_um: [0, 1].map(|k| theta[SHIFT + k] + own[OWN_SHIFT + k]),
@@ -74,6 +87,8 @@ impl Setting {
                 zernike_nm: std::array::from_fn(|k| theta[ZERNIKE + k] + own[OWN_ZERNIKE + k]),
                 unmodulated: theta[UNMODULATED],
                 aperture: theta[APERTURE],
+                falloff: [0, 1, 2].map(|k| theta[FALLOFF + k]),
+                mask_blur_um2: theta[MASK_BLUR],
             },
         }
     }
@@ -194,7 +209,25 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
     }
     b.parameter("unmodulated_light".into(), "", 0.002, 0.9);
     b.parameter("aperture_scale".into(), "", 0.005, 0.07);
+    if let Some(p) = b.out.parameters.last_mut() {
+        // A smaller opening needs no more samples.
+        p.range.0 = -0.4;
+    }
+    b.parameter("illumination_falloff".into(), "", 0.02, 4.0);
+    for axis in ["x", "y"] {
+        b.parameter(format!("illumination_decentre {axis}"), "", 0.02, 4.0);
+    }
     let masks = || set.objects.iter().filter_map(|o| o.transmission.as_ref());
+    let pitch_um = masks().map(|t| t.sample_um).fold(0.0, f64::max);
+    let variance = pitch_um * pitch_um;
+    b.parameter("mask_blur".into(), "um", 0.02 * variance, MOST_MASK_BLUR * variance);
+    if let Some(p) = b.out.parameters.last_mut() {
+        (p.range.0, p.start) = (0.0, 0.1 * variance);
+        p.shown = f64::sqrt;
+    }
+    let at_lens = set.bench.lens.filter(|l| l.distance_um == 0.0);
+    let focal_um = at_lens.map_or(1.0, |l| l.focal_um);
+    b.parameter("mask_distance".into(), "um", 0.02 * focal_um, 2.0 * focal_um);
     let (any_mask, any_depth) = (masks().next().is_some(), masks().any(|t| t.has_depth));
     let several = set.planes.iter().any(|p| p.number != set.planes[0].number);
     let every = RefitScope::Every { way: BY_OBJECT };
@@ -208,6 +241,10 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
             RefitScope::Bench,
             Some((0.05, 6)),
         );
+    }
+    if at_lens.is_some() && sampling.method == Method::FourierSum {
+        let scan = Some((0.25 * focal_um, 4));
+        b.effect("mask_distance".into(), vec![MASK_DISTANCE], RefitScope::Bench, scan);
     }
     b.effect("pixel_scale".into(), vec![PIXEL], RefitScope::Bench, Some((0.03, 4)));
     if any_depth {
@@ -225,6 +262,12 @@ pub(super) fn effects(set: &StackSet, sampling: &Sampling) -> Effects {
         b.effect(name.into(), vec![BLUR + k], RefitScope::Bench, None);
     }
     b.effect("aperture_scale".into(), vec![APERTURE], RefitScope::Bench, None);
+    b.effect("illumination_falloff".into(), vec![FALLOFF], RefitScope::Bench, None);
+    let sides = vec![FALLOFF + 1, FALLOFF + 2];
+    b.effect("illumination_decentre".into(), sides, RefitScope::Bench, None);
+    if any_depth {
+        b.effect("mask_blur".into(), vec![MASK_BLUR], RefitScope::Bench, None);
+    }
     for (group, object) in set.objects.iter().enumerate() {
         let end = end_of(&object.name);
         let first = BENCH + OWN * group;

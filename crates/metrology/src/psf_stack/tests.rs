@@ -56,6 +56,7 @@ fn middle_row(set: &StackSet, sampling: &Sampling) -> Vec<(f64, f64)> {
     let place = Place {
         distance_um: set.bench.sensor_um,
         pixel_um: set.bench.pixel_um,
+        mask_um: 0.0,
         origin_px: [0.0; 2],
     };
     let found = light.intensity(&light.pupil(0, &setting.pupil), place);
