@@ -118,7 +118,7 @@ pub fn calibrate(
                 names: set.fields.iter().map(|f| f.name.clone()).collect(),
                 noise_floor: None,
                 averages: false,
-                remarks: &[],
+                remarks: &set.remarks,
             };
             let plan = model.plan();
             answer(model, &plan, &facts, ("nm", out), progress, |model, page, theta| {
@@ -141,7 +141,7 @@ pub fn calibrate(
                 names: set.spectra.iter().map(|s| s.name.clone()).collect(),
                 noise_floor: set.repeat_rms(),
                 averages: false,
-                remarks: &[],
+                remarks: &set.remarks,
             };
             let plan = model.plan();
             answer(model, &plan, &facts, ("", out), progress, |model, page, theta| {
@@ -159,7 +159,7 @@ pub fn calibrate(
                 names: (1..=set.sites.len()).map(|n| format!("site {n}")).collect(),
                 noise_floor: set.repeat_rms(),
                 averages: true,
-                remarks: &[],
+                remarks: &set.remarks,
             };
             let plan = model.plan();
             let (found, mut diagnosis) = found(&model, &plan, &facts, progress)?;

@@ -3,6 +3,7 @@
 mod film_reflectance;
 mod model;
 mod page;
+mod screening;
 mod set;
 
 pub(crate) use model::CONDITIONAL;
