@@ -67,10 +67,30 @@ fn tokens(stem: &str) -> Vec<Token> {
     out
 }
 
+/// Units that may stand apart from their number.
+const UNITS: [&str; 6] = ["nm", "um", "mm", "ms", "us", "deg"];
+
+/// A name in which units follow their numbers at once, and a micrometre is `um`.
+fn with_units_joined(stem: &str) -> String {
+    let mut out = stem.replace(['\u{b5}', '\u{3bc}'], "u");
+    for (unit, gap) in UNITS.iter().flat_map(|unit| [' ', '_', '-'].map(|gap| (unit, gap))) {
+        let apart = format!("{gap}{unit}");
+        let mut from = 0;
+        while let Some(at) = out[from..].find(&apart).map(|at| from + at) {
+            let ends = !out[at + apart.len()..].starts_with(char::is_alphanumeric);
+            if ends && out[..at].ends_with(|c: char| c.is_ascii_digit()) {
+                out.remove(at);
+            }
+            from = at + unit.len();
+        }
+    }
+    out
+}
+
 /// Conditions that the name of a file without its ending states.
 pub(crate) fn conditions(stem: &str) -> NamedConditions {
     let mut found = NamedConditions::default();
-    let tokens = tokens(stem);
+    let tokens = tokens(&with_units_joined(stem));
     let mut k = 0;
     while k < tokens.len() {
         let token = &tokens[k];
@@ -83,12 +103,18 @@ pub(crate) fn conditions(stem: &str) -> NamedConditions {
             Some(word) if token.before.is_empty() => format!("{}{}", word.before, word.after),
             _ => token.before.clone(),
         };
+        // A `-` behind no word separates; a length behind a word that is negative is no distance.
+        let length = if before.is_empty() { number.abs() } else { number };
+        let distance = |um: f64| Some(um).filter(|um| *um > 0.0);
         match (before.as_str(), token.after.as_str()) {
             (_, "ms") => found.exposure_ms = Some(number),
             (_, "us") => found.exposure_ms = Some(number * 1e-3),
             ("exp" | "t", "s") | (_, "s" | "sec") => found.exposure_ms = Some(number * 1e3),
-            (_, "nm") => found.led_nm = Some(number),
-            (_, "mm") => found.distance_um = Some(number * 1e3),
+            (_, "nm") => found.led_nm = Some(length),
+            (_, "mm") => found.distance_um = distance(length * 1e3),
+            ("" | "led" | "l" | "w" | "wl" | "lambda", "um") if WAVELENGTHS_NM.contains(&(length * 1e3)) => {
+                found.led_nm = Some((length * 1e6).round() * 1e-3);
+            }
             ("a" | "aoi" | "angle", _) | (_, "deg") => {
                 // A second angle follows at once: `a-15+00`.
                 let second = tokens
@@ -100,7 +126,7 @@ pub(crate) fn conditions(stem: &str) -> NamedConditions {
             }
             ("z" | "d" | "dist" | "distance", "" | "um") | (_, "um") => {
                 if token.after == "um" || number >= LEAST_DISTANCE_UM {
-                    found.distance_um = Some(number);
+                    found.distance_um = distance(length);
                 } else {
                     found.plane = Some(number as u32);
                 }
@@ -168,6 +194,8 @@ mod tests {
                 "E0_530nm_d336p5um_exp0.5s",
                 of(Some([0, 0]), nm, Some(336.5), None, None, Some(500.0)),
             ),
+            ("el1.0-530 nm-336.0um", of(Some([1, 0]), nm, um, None, None, None)),
+            ("e00_0.530um_z336_um", of(Some([0, 0]), nm, um, None, None, None)),
             ("green", NamedConditions::default()),
         ] {
             assert_eq!(conditions(name), expected, "{name}");

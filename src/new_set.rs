@@ -364,8 +364,13 @@ fn captures(
         lines.known("element", element.map(|e| format!("{e:?}")), "[0, 0]", &meaning);
         let led = own.led_nm.or_else(|| <[f64; 1]>::try_from(leds).ok().map(|[one]| one));
         lines.known("led_nm", led.map(|nm| nm.to_string()), "530", "centre of its LED (nm)");
-        let angle = own.aoi_deg.unwrap_or_default();
-        lines.key("aoi_deg", format!("{angle:?}"));
+        match own.aoi_deg {
+            Some(angle) => lines.key("aoi_deg", format!("{angle:?}")),
+            None => lines.key(
+                "aoi_deg",
+                "[0.0, 0.0]  # correct it for light that is not along the axis",
+            ),
+        }
         let plane = own.plane.map_or_else(String::new, |p| format!(" of plane {p}"));
         lines.known(
             "distance_um",
@@ -426,12 +431,22 @@ impl RecognisedFrame {
 impl NewSet {
     /// Names of the columns of a table of frames.
     pub const COLUMNS: [&str; 6] = ["element", "colour", "distance", "angle", "exposure", "pixels"];
+
+    /// Keys with values that neither layout nor names state.
+    pub const ASSUMED: [&str; 4] = [
+        "substrate, ambient_index of [stack]: pillars on fused silica in air",
+        "registration_sigma_px, flux_sigma of [camera]: 0.5 pixels, 1 %",
+        "aoi_deg of [[capture]]: along the axis, where no name has an angle",
+        "window_centre_um of [[capture]]: window about the axis of the element",
+    ];
 }
 
 fn write_page(path: &Path, frames: &[RecognisedFrame], open: &[String]) -> Result<()> {
     let mut page = Page::new("Frames of a new set", metalith_report::counted(frames.len(), "frame"));
     page.section("State these in measurement.toml");
     page.list(open);
+    page.section("Correct these where they are assumed");
+    page.list(NewSet::ASSUMED);
     page.section("Recognised by the names of the files");
     let mut table = Table::new(["frame"].into_iter().chain(NewSet::COLUMNS).map(Column::text));
     for frame in frames {

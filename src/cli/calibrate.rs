@@ -250,10 +250,19 @@ fn describe_metrology(done: &Answer) {
     }
 }
 
+/// Most measurements that are left out and named.
+const MOST_LEFT_OUT: usize = 8;
+
 fn describe(done: &Calibration) {
     let error = &done.diagnosis.error;
     for warning in &done.diagnosis.warnings {
         print_line!("warning: {warning}");
+    }
+    for left in done.diagnosis.left_out.iter().take(MOST_LEFT_OUT) {
+        print_line!("left out: `{}`: {}", left.measurement, left.reason);
+    }
+    if let Some(more) = done.diagnosis.left_out.len().checked_sub(MOST_LEFT_OUT + 1) {
+        print_line!("left out: {} more, see {}", more + 1, done.report.display());
     }
     print_line!("{}: {}", done.diagnosis.set, done.diagnosis.sentence());
     print_line!(

@@ -61,5 +61,9 @@ fn describe(begun: &NewSet) {
     for key in &begun.open {
         print_line!("  {key}");
     }
+    print_line!("correct these where they are assumed:");
+    for key in NewSet::ASSUMED {
+        print_line!("  {key}");
+    }
     print_line!("{}", begun.page.display());
 }

@@ -9,6 +9,7 @@
 //! | folder or file | holds | may use |
 //! | --- | --- | --- |
 //! | `pattern` | names of files by patterns | |
+//! | `number_rows` | rows of numbers with any separator | |
 //! | `widths` | tables of widths: set, model, figures, `model.toml` | |
 //! | `declared` | effects of a file, by expressions | |
 //! | `heights` | drawn maps and measured maps: set, model, figures | `pattern`, `declared` |
@@ -23,6 +24,7 @@ mod declared;
 mod diagnosis;
 mod heights;
 mod noise;
+mod number_rows;
 mod page;
 mod pattern;
 mod proposal;

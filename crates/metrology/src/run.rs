@@ -117,7 +117,7 @@ pub fn calibrate(
                 measure: "height (nm rms)",
                 names: set.fields.iter().map(|f| f.name.clone()).collect(),
                 averages: true,
-                remarks: &[],
+                remarks: &set.remarks,
             };
             let plan = model.plan();
             answer(model, &plan, &facts, ("nm", out), progress, |model, page, theta| {
@@ -128,7 +128,7 @@ pub fn calibrate(
             let set = SpectrumSet::read(&path)?;
             let mut model = SpectrumModel::new(&set);
             model.check()?;
-            let remarks = model.remarks();
+            let remarks = [set.remarks.clone(), model.remarks()].concat();
             model.declare(&declared_for(&OF_SPECTRA)?)?;
             model.effects = tried(&model.effects, &spectra::CONDITIONAL, only)?;
             let facts = SetFacts {
@@ -158,7 +158,7 @@ pub fn calibrate(
                 measure: "width (nm rms)",
                 names: (1..=set.sites.len()).map(|n| format!("site {n}")).collect(),
                 averages: true,
-                remarks: &[],
+                remarks: &set.remarks,
             };
             let plan = model.plan();
             let (found, mut diagnosis) = found(&model, &plan, &facts, progress)?;

@@ -154,3 +154,36 @@ pub(super) fn other_colours(set: &MeasuredSet, problem: &FitProblem<'_>) -> Vec<
     found.retain(|f| f.is_common || f.chi2[0] > FAR_WORSE * usual);
     found
 }
+
+/// Pairs of measurements, in both orders, whose frames fit the image of the other far better. They differ in the element with its
+/// angle, in the colour, or in the distance. An effect of the chip or bench makes one frame of a pair fit better, not both.
+pub(super) fn exchanged(problem: &FitProblem<'_>) -> Vec<(MeasurementIndex, MeasurementIndex)> {
+    let data = problem.data;
+    let image = |c| problem.prediction(&problem.surrogate.about, c);
+    let misfit = |c, of| misfits(data, &[(c, &image(of))], Orientation::Upright)[0];
+    let own: PerMeasurement<f64> = data.indices().map(|c| misfit(c, c)).collect();
+    let odd: Vec<MeasurementIndex> = data
+        .indices()
+        .filter(|&c| problem.used[c] && own[c] > FITS / OF_CHI2_BY_COLOUR)
+        .collect();
+    let mut found: Vec<(MeasurementIndex, MeasurementIndex)> = Vec::new();
+    for (k, &a) in odd.iter().enumerate() {
+        let alike = |&b: &MeasurementIndex| {
+            let (one, other) = (&data.beam[a], &data.beam[b]);
+            let same = [
+                one.element == other.element && one.aoi_rad == other.aoi_rad,
+                one.led == other.led,
+                one.distance_um == other.distance_um,
+            ];
+            same.iter().filter(|same| !**same).count() == 1
+        };
+        let fits = |b: &MeasurementIndex| {
+            misfit(a, *b) < OF_CHI2_BY_COLOUR * own[a] && misfit(*b, a) < OF_CHI2_BY_COLOUR * own[*b]
+        };
+        let free = |b: &MeasurementIndex| !found.iter().any(|(own, _)| own == b || *own == a);
+        if let Some(b) = odd[k + 1..].iter().copied().filter(alike).filter(free).find(fits) {
+            found.extend([(a, b), (b, a)]);
+        }
+    }
+    found
+}

@@ -10,7 +10,7 @@ use crate::data::{BLACK_SIGMA_DN, Data, Nuisances};
 use crate::set::{MeasuredSet, MeasurementIndex};
 use crate::statistics::{FitProblem, Measurements};
 use metalith_core::{Error, Result};
-use mistaken_frames::{OtherColour, orientations, other_colours};
+use mistaken_frames::{OtherColour, exchanged, orientations, other_colours};
 use window_offsets::window_offsets;
 
 /// Share of pixels that are saturated or beside such past which a measurement is left out; fewer are masked. What surrounds a
@@ -47,6 +47,8 @@ pub(crate) struct Recognised {
     pub data: Option<Data>,
     pub warnings: Vec<String>,
     colours: Vec<OtherColour>,
+    /// Measurements whose frame is the frame of another, and the other.
+    exchanged: Vec<(MeasurementIndex, MeasurementIndex)>,
 }
 
 /// Recognise hot, dead and saturated pixels, frames of another colour, and frames that are mirrored or turned.
@@ -97,6 +99,7 @@ pub(crate) fn recognise(set: &MeasuredSet, problem: &FitProblem<'_>) -> Result<R
             ),
         ));
     }
+    found.exchanged = exchanged(&masked);
     found.colours = other_colours(set, &masked);
     let mut common: Vec<String> = Vec::new();
     for own in found.colours.iter().filter(|o| o.is_common) {
@@ -156,7 +159,12 @@ pub(crate) fn unusable_measurements(
         let seen = counted(&problem.data.signal[c]);
         let dark = below_dark(&problem.data.signal[c], &problem.data.weight[c]);
         let other = recognised.colours.iter().find(|o| o.measurement == c && !o.is_common);
-        let reason = if let Some(other) = other {
+        let reason = if let Some((_, other)) = recognised.exchanged.iter().find(|(own, _)| *own == c) {
+            format!(
+                "its frame and the one of `{}` were exchanged: each fits the image of the other far better",
+                set.measurements[*other].name
+            )
+        } else if let Some(other) = other {
             format!(
                 "the image of {} nm fits it far better than that of its `led_nm`: reduced chi-square {:.3} and {:.3}",
                 set.leds[other.led].name(),
@@ -171,10 +179,14 @@ pub(crate) fn unusable_measurements(
         } else if lost as f64 > MOST_SATURATED * pixels as f64 {
             format!("{lost} of its {pixels} pixels are saturated or beside one that is")
         } else if seen < LEAST_LIGHT * expected {
-            format!("it holds {:.1} % of the expected light", 100.0 * seen / expected)
+            format!(
+                "it holds {:.1} % of the expected light: correct its `scale_dn`, or `aoi_deg` and `window_centre_um`",
+                100.0 * seen / expected
+            )
         } else if seen > MOST_LIGHT * expected {
             format!(
-                "it holds {:.1} times the expected light: correct its `scale_dn`, or the bits of its values",
+                "it holds {:.1} times the expected light: correct its `scale_dn`, the bits of its values, or `aoi_deg` and \
+                 `window_centre_um`, if the spot is elsewhere than expected",
                 seen / expected
             )
         } else if beyond > MOST_SIGMAS * registration {

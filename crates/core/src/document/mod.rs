@@ -132,7 +132,8 @@ impl<'t> Document<'t> {
             kind,
             key,
             span,
-            what: what.into(),
+            // An error of another file has its own remedy, in a line of its own.
+            what: what.into().replace("\n  help: ", "; "),
             hint: hint.into(),
         }));
         Some(faults.len() - 1)

@@ -1,26 +1,57 @@
-//! Maps of numbers from TIFF and NPY files.
+//! Maps of numbers from TIFF, NPY and text files.
 
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
+use metalith_core::file::read_at_most;
+use metalith_core::text::table_rows;
 use metalith_core::{npy, tiff};
 use ndarray::Array2;
+
+use crate::number_rows::numbers;
 
 /// Most samples of a map along an axis, and fewest.
 const MOST: usize = 2048;
 const FEWEST: usize = 16;
 
-/// Read a map: TIFF of one grey channel or of three equal ones, or NPY. What is wrong comes back in words.
+/// Longest text of a map (bytes): 24 for each sample.
+const LONGEST: u64 = 24 * (MOST * MOST) as u64;
+
+/// Read a map: TIFF of one grey channel or of three equal ones, NPY, or rows of numbers as CSV. Samples may be no finite number. What
+/// is wrong comes back in words.
 pub(super) fn read(path: &Path) -> Result<Array2<f32>, String> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     let is_tiff = ["tif", "tiff"].iter().any(|known| ending.eq_ignore_ascii_case(known));
-    let map = if is_tiff { from_tiff(path)? } else { from_npy(path)? };
-    let wrong = map.iter().filter(|v| !v.is_finite()).count();
-    match wrong {
-        0 => Ok(map),
-        _ => Err(format!("{wrong} of its {} samples are not finite numbers", map.len())),
+    if is_tiff {
+        from_tiff(path)
+    } else if ["csv", "txt"].iter().any(|known| ending.eq_ignore_ascii_case(known)) {
+        from_text(path)
+    } else {
+        from_npy(path)
     }
+}
+
+fn from_text(path: &Path) -> Result<Array2<f32>, String> {
+    let bytes = read_at_most(path, LONGEST, "a map of numbers").map_err(|e| e.to_string())?;
+    let text = String::from_utf8_lossy(&bytes);
+    let (mut values, mut cols) = (Vec::new(), None);
+    for (line, row) in table_rows(&text) {
+        let row =
+            numbers(row).ok_or_else(|| format!("line {line}: a field is no number; lines of a head begin with #"))?;
+        let wanted = *cols.get_or_insert(row.len());
+        if row.len() != wanted {
+            return Err(format!(
+                "line {line} has {} numbers, the first row has {wanted}",
+                row.len()
+            ));
+        }
+        values.extend(row.into_iter().map(|v| v as f32));
+    }
+    let cols = cols.unwrap_or(0);
+    let rows = values.len() / cols.max(1);
+    check_size(rows, cols)?;
+    Array2::from_shape_vec((rows, cols), values).map_err(|e| e.to_string())
 }
 
 fn check_size(rows: usize, cols: usize) -> Result<(), String> {
@@ -54,7 +85,7 @@ fn from_tiff(path: &Path) -> Result<Array2<f32>, String> {
     if page
         .values
         .chunks_exact(page.channels)
-        .any(|own| own.iter().any(|v| *v != own[0]))
+        .any(|own| own.iter().any(|v| v.to_bits() != own[0].to_bits()))
     {
         return Err("its three channels differ: a map has one value for each sample".into());
     }

@@ -5,6 +5,7 @@ pub(crate) mod fft;
 mod map;
 mod model;
 mod page;
+mod screening;
 mod set;
 
 pub(crate) use model::CONDITIONAL;

@@ -9,7 +9,7 @@ use metalith_core::{Result, csv_rows};
 use ndarray::Array2;
 
 use super::far_field::FarField;
-use super::map;
+use super::{map, screening};
 use crate::pattern::{NamePattern, Named};
 
 /// Nuisances of each field.
@@ -54,6 +54,8 @@ pub struct HeightSet {
     pub groups: Vec<String>,
     pub fields: Vec<HeightField>,
     pub far_field: Option<FarField>,
+    /// What was found in the maps before any fit.
+    pub remarks: Vec<String>,
 }
 
 /// Most samples of all fields: a map of drawn heights takes 20 bytes for each.
@@ -86,7 +88,13 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> HeightSet {
     let groups = root.section("groups");
     let group_name = groups.text("by");
     let not_fitted = groups.texts("not_fitted");
-    let (fields, names) = fields(root, &folder, &group_name, &not_fitted, rim, &groups);
+    let mut remarks = Vec::new();
+    let (fields, names) = fields(root, &folder, &group_name, &not_fitted, rim, (&groups, &mut remarks));
+    if root.sound(&["measured.files", "drawn.files"])
+        && let Some((what, hint)) = screening::wrong_maps(&fields, rim, nuisances)
+    {
+        root.section("measured").fault("files", what, hint);
+    }
     for name in &not_fitted {
         if !names.is_empty() && !names.contains(name) {
             let known = names.join(", ");
@@ -127,6 +135,7 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> HeightSet {
         groups: names,
         fields,
         far_field,
+        remarks,
     }
 }
 
@@ -164,7 +173,7 @@ fn fields(
     group_name: &str,
     not_fitted: &[String],
     rim: usize,
-    groups: &Section<'_, '_>,
+    (groups, remarks): (&Section<'_, '_>, &mut Vec<String>),
 ) -> (Vec<HeightField>, Vec<String>) {
     let nm = Limits::new(1e-6..=1e6, "nm");
     let drawn = root.section("drawn");
@@ -213,8 +222,24 @@ fn fields(
     names.dedup();
     let mut out: Vec<HeightField> = Vec::new();
     let mut samples = 0;
+    let used: Vec<PathBuf> = files.iter().map(|(_, named)| drawn_files.path(named)).collect();
+    let drawn_only = drawn_files
+        .files()
+        .unwrap_or_default()
+        .into_iter()
+        .map(|(path, _)| path);
+    let drawn_only: Vec<String> = drawn_only
+        .filter(|path| !used.contains(path))
+        .map(|path| stem(&path))
+        .collect();
+    if !drawn_only.is_empty() {
+        remarks.push(format!(
+            "No measured map belongs to these drawn ones: {}",
+            drawn_only.join(", ")
+        ));
+    }
     for (path, named) in files {
-        match field(&path, &named, &drawn_files, drawn_nm, &scale) {
+        match field(&path, &named, &drawn_files, drawn_nm, &scale, remarks) {
             Ok(mut field) => {
                 let group = named.get(group_name).cloned().unwrap_or_default();
                 field.group = names.iter().position(|n| *n == group).unwrap_or(0);
@@ -264,21 +289,41 @@ fn field(
     drawn_files: &NamePattern,
     drawn_nm: f64,
     scale: &Scale,
+    remarks: &mut Vec<String>,
 ) -> std::result::Result<HeightField, (bool, String)> {
-    let name = path
-        .file_stem()
-        .map_or_else(String::new, |n| n.to_string_lossy().into());
+    let name = stem(path);
     let drawn_path = drawn_files.path(named);
     let read = |path: &Path| map::read(path).map_err(|what| format!("{}: {what}", path.display()));
     let drawn = read(&drawn_path).map_err(|what| (true, what))?;
-    let measured = read(path).map_err(|what| (false, what))?;
+    let mut measured = read(path).map_err(|what| (false, what))?;
     if drawn.dim() != measured.dim() {
         let [d, m] = [drawn.dim(), measured.dim()];
         let what = format!(
-            "{name} was drawn on {} x {} samples and measured on {} x {}",
+            "{name} was drawn on {} x {} samples and measured on {} x {}: resample one of them on the grid of the other",
             d.0, d.1, m.0, m.1
         );
         return Err((false, what));
+    }
+    if screening::is_cut(&measured) {
+        remarks.push(format!(
+            "{name} has many samples of the largest number of its format: heights above it were cut"
+        ));
+    }
+    let wrong = drawn.iter().filter(|v| !v.is_finite()).count();
+    if wrong > 0 {
+        let all = drawn.len();
+        let what = format!(
+            "{}: {wrong} of its {all} samples are not finite numbers",
+            drawn_path.display()
+        );
+        return Err((true, what));
+    }
+    match screening::mend(&drawn, &mut measured) {
+        Ok(0) => {}
+        Ok(n) => remarks.push(format!(
+            "{name} has {n} dead samples; the median of their neighbours stands for them"
+        )),
+        Err(what) => return Err((false, format!("{}: {what}", path.display()))),
     }
     let nm = match scale {
         Scale::Each(nm) => *nm,
@@ -300,6 +345,11 @@ fn field(
         group: 0,
         fitted: true,
     })
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .map_or_else(String::new, |n| n.to_string_lossy().into())
 }
 
 fn pattern(s: &Section<'_, '_>, folder: &Path) -> Option<NamePattern> {

@@ -5,6 +5,7 @@ mod forecast;
 mod model;
 mod pads;
 mod page;
+mod screening;
 mod set;
 
 pub use forecast::{ForecastEffect, SpectrumForecast};

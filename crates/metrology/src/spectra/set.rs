@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::text::{quoted, without_mark};
 use metalith_rcwa::{CellLattice, Material};
 
 use super::pads::{LARGEST_APERTURE, PadBank};
+use super::screening;
+use crate::number_rows::numbers;
 use crate::pattern::NamePattern;
 
 /// A layer as it was stated.
@@ -71,6 +72,8 @@ pub struct SpectrumSet {
     /// Media of the object, each with its name.
     pub media: Vec<(String, Material)>,
     pub spectra: Vec<Spectrum>,
+    /// What was found in the spectra before any fit.
+    pub remarks: Vec<String>,
 }
 
 /// Longest table of a spectrum (rows).
@@ -81,7 +84,7 @@ impl SpectrumSet {
     ///
     /// # Errors
     /// All mistakes of the text and of the files that it names, each at its line.
-    pub fn read(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path) -> metalith_core::Result<Self> {
         let text = load(path)?;
         Document::read(path, &text, |root| sections(path, root))
     }
@@ -156,10 +159,11 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> SpectrumSet {
         root.fault("stack", what, "measure pads through an objective of a lower aperture");
     }
     let reference = root.section("reference");
-    let mirror = table(&reference, "file", &folder.join(reference.text("file")), 0);
+    let of_mirror = unit(&reference);
+    let mirror = table(&reference, "file", &folder.join(reference.text("file")), 0, of_mirror);
     reference.finish();
     let (media, spectra) = captures(root, (&folder, pads.as_ref()), &wavelengths_nm, &mirror);
-    SpectrumSet {
+    let mut set = SpectrumSet {
         path: path.to_owned(),
         title,
         wavelengths_nm,
@@ -171,7 +175,13 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> SpectrumSet {
         numerical_aperture,
         media,
         spectra,
+        remarks: Vec::new(),
+    };
+    if let Some((what, hint)) = screening::wrong_as_a_whole(&set) {
+        root.fault("captures", what, hint);
     }
+    set.remarks = screening::leave_out_far_repeats(&mut set);
+    set
 }
 
 /// A share of the range by which wavelengths may be scaled, which materials must cover too.
@@ -296,6 +306,7 @@ fn captures(
         let medium = material(&s, "medium", folder, wavelengths_nm);
         let all_fitted = s.choice("fitted", &[("yes", true), ("no", false)], Some(true));
         let not_fitted = s.texts("not_fitted");
+        let unit = unit(&s);
         s.finish();
         let (what, key, most) = match pads {
             None => ("height", "height_nm", 100_000.0),
@@ -332,15 +343,21 @@ fn captures(
                 s.fault("files", what, &hint);
                 continue;
             };
-            let capture = table(&s, "files", &path, header);
+            let capture = table(&s, "files", &path, header, unit);
             let values: Option<Vec<f64>> = wavelengths_nm
                 .iter()
-                .map(|&nm| Some(at(&capture, nm)? / 100.0 * at(mirror, nm)? / 100.0))
+                .map(|&nm| Some(at(&capture, nm)? * at(mirror, nm)?))
                 .collect();
             let Some(reflectance) = values else {
                 if !capture.is_empty() && !mirror.is_empty() {
-                    let what = format!("{} or the reference does not cover [range]", path.display());
-                    s.fault("files", what, "shorten [range]");
+                    let covers = |rows: &[[f64; 2]]| format!("{} to {} nm", rows[0][0], rows[rows.len() - 1][0]);
+                    let what = format!(
+                        "{} has {}, the reference has {}: [range] is not covered",
+                        path.display(),
+                        covers(&capture),
+                        covers(mirror)
+                    );
+                    s.fault("files", what, "give wavelengths in nm, or shorten [range]");
                 }
                 continue;
             };
@@ -375,47 +392,90 @@ fn captures(
 /// Largest value of a table (per cent).
 const LARGEST: f64 = 1e6;
 
-/// Rows of two numbers, wavelengths (nm) rising, after some header lines; a fault at the key if there are none.
-fn table(s: &Section<'_, '_>, key: &str, path: &Path, header: usize) -> Vec<[f64; 2]> {
-    let mut out: Vec<[f64; 2]> = Vec::new();
-    let hint = "give rows of a wavelength (nm) and a per cent, with a comma between";
-    let text = match metalith_core::document::load(path) {
-        Ok(text) => text,
-        Err(error) => {
-            s.fault(key, error.to_string(), hint);
-            return out;
+/// Largest share of the rows of a table that may lack a value: neighbours stand for them.
+const MOST_MISSING: f64 = 0.1;
+
+/// Values that are all below this are fractions, unless their unit is stated (per cent).
+const FRACTIONS: f64 = 1.5;
+
+/// Rows of a wavelength (nm), rising, and a fraction, after some header lines; a fault at the key if there are none. Values are per
+/// cent, or fractions if `unit` says so.
+fn table(s: &Section<'_, '_>, key: &str, path: &Path, header: usize, unit: Option<f64>) -> Vec<[f64; 2]> {
+    let hint = "give rows of a wavelength (nm) and a per cent";
+    let rows = load(path)
+        .map_err(|e| e.to_string())
+        .and_then(|text| rows(&text, header));
+    let rows = rows.map_err(|what| format!("{}: {what}", path.display())).and_then(|rows| {
+        let largest = rows.iter().map(|row| row[1].abs()).fold(0.0, f64::max);
+        if unit.is_none() && largest <= FRACTIONS {
+            return Err(format!(
+                "{}: no value is above {FRACTIONS} per cent; if these are fractions, state `unit = \"fraction\"`, else `unit = \"percent\"`",
+                path.display()
+            ));
         }
-    };
-    for (k, line) in without_mark(&text).lines().enumerate().skip(header) {
+        Ok(rows)
+    });
+    match rows {
+        Ok(rows) => rows
+            .into_iter()
+            .map(|[nm, value]| [nm, value * unit.unwrap_or(0.01)])
+            .collect(),
+        Err(what) => {
+            s.fault(key, what, hint);
+            Vec::new()
+        }
+    }
+}
+
+/// The unit of the values of a section: its fraction of one; none if it is not stated.
+fn unit(s: &Section<'_, '_>) -> Option<f64> {
+    s.choice("unit", &[("percent", Some(0.01)), ("fraction", Some(1.0))], Some(None))
+}
+
+/// Rows of a text in the order of wavelengths, without those that lack a value; in words what is wrong.
+fn rows(text: &str, header: usize) -> Result<Vec<[f64; 2]>, String> {
+    let mut out: Vec<[f64; 2]> = Vec::new();
+    let mut missing = 0;
+    let mut falls = false;
+    for (k, line) in without_mark(text).lines().enumerate().skip(header) {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
-        let row = line
-            .split_once(',')
-            .and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
-        let wrong = match row {
-            Some(row @ [nm, value]) if f64::is_finite(nm) && f64::abs(value) <= LARGEST => {
-                let rises = out.last().is_none_or(|last| last[0] < nm);
-                out.push(row);
-                (!rises).then_some("its wavelength does not rise")
-            }
-            _ => Some("it is not two numbers, or one is too large"),
+        let wrong = |why: &str| format!("line {}: `{}`: {why}", k + 1, quoted(line));
+        let Some([nm, value]) = numbers(line).and_then(|row| <[f64; 2]>::try_from(row).ok()) else {
+            return Err(wrong(
+                "it is not two numbers; `header_lines` counts the lines before the first row",
+            ));
         };
-        if let Some(why) = wrong.or_else(|| (out.len() > MOST_ROWS).then_some("the table is too long")) {
-            s.fault(
-                key,
-                format!("{}, line {}: `{}`: {why}", path.display(), k + 1, quoted(line)),
-                hint,
-            );
-            return Vec::new();
+        if !nm.is_finite() || value.abs() > LARGEST {
+            return Err(wrong("one of its numbers is too large"));
+        }
+        if value.is_nan() {
+            missing += 1;
+            continue;
+        }
+        if let Some(last) = out.last() {
+            falls = if out.len() == 1 { nm < last[0] } else { falls };
+            if nm == last[0] || (nm < last[0]) != falls {
+                return Err(wrong("wavelengths must rise, or fall, from row to row"));
+            }
+        }
+        out.push([nm, value]);
+        if out.len() > MOST_ROWS {
+            return Err(wrong("the table is too long"));
         }
     }
-    if out.len() < 2 {
-        s.fault(key, format!("{} has less than two rows", path.display()), hint);
-        out.clear();
+    if falls {
+        out.reverse();
     }
-    out
+    if out.len() < 2 {
+        return Err("it has less than two rows".into());
+    }
+    if f64::from(missing) > MOST_MISSING * out.len() as f64 {
+        return Err(format!("{missing} rows have no value"));
+    }
+    Ok(out)
 }
 
 /// Linear interpolation; none beyond the rows.

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | `set` | keys of `measurement.toml` |
 //! | `table`, `rows` | a CSV table; its rows as sites with repeats |
+//! | `screening` | mistakes of a table that no fit shows |
 //! | `regions`, `fill` | rectangles or a layout; the area fraction around a place |
 //! | `terms`, `model` | effects with their parameters; the forward model |
 //! | `calibrated` | what was found as `model.toml` |
@@ -14,6 +15,7 @@ mod model;
 mod page;
 mod regions;
 mod rows;
+mod screening;
 mod set;
 mod table;
 mod terms;

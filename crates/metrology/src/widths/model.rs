@@ -135,4 +135,9 @@ impl RefitModel for WidthModel<'_> {
     fn decides(&self, _: usize) -> bool {
         true
     }
+
+    /// A bias hides a proximity of the opposite sign: over all places they may cancel.
+    fn tries_pairs(&self) -> bool {
+        true
+    }
 }

@@ -1,11 +1,12 @@
 //! Rows of a table as sites, with their repeats.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use metalith_core::document::Section;
 use metalith_core::text::quoted;
 
 use super::fill::{FilledRegion, Surroundings, own_fill};
+use super::screening::Screening;
 use super::set::{WidthSet, WidthSite};
 use super::table::{Table, report};
 
@@ -16,7 +17,7 @@ pub(super) struct Columns {
     pub(super) measured: Vec<(usize, Option<f64>)>,
     at: Option<[usize; 2]>,
     pad: Option<usize>,
-    dose: Option<usize>,
+    pub(super) dose: Option<usize>,
     orientation: Option<usize>,
     pub(super) fill: Option<usize>,
     open_area: Option<usize>,
@@ -70,6 +71,18 @@ const WIDTHS_NM: [f64; 2] = [1.0, 1e6];
 const PLACES_UM: [f64; 2] = [-1e6, 1e6];
 const DOSES: [f64; 2] = [1e-6, 1e9];
 
+/// Most names that a message lists.
+const MOST_SHOWN: usize = 8;
+
+/// Largest ratio of a measured to a drawn width, and of a drawn to a measured one, of a row that is believed.
+const ROW_RATIO: f64 = 5.0;
+
+fn far_from_drawn(line: usize, drawn_nm: f64, measured_nm: f64) -> Option<String> {
+    let ratio = measured_nm / drawn_nm;
+    let believed = (1.0 / ROW_RATIO..=ROW_RATIO).contains(&ratio);
+    (!believed).then(|| format!("line {line}: {measured_nm} nm were measured of a drawn width of {drawn_nm} nm"))
+}
+
 /// A row as it was read, by which its repeats are found.
 struct Row {
     key: String,
@@ -93,6 +106,11 @@ impl RowReader<'_> {
     /// Read the sites of a set, repeats joined; all faults of the rows at once.
     pub(super) fn read(&self, s: &Section<'_, '_>, set: &mut WidthSet, nominal: Option<f64>) {
         let (table, columns) = (self.table, self.columns);
+        let screening = Screening::new(table, self.drawn, &columns.measured);
+        if let Some((what, hint)) = screening.wrong_columns() {
+            s.fault("file", what, hint);
+            return;
+        }
         let (mut faults, mut found, mut places) = (Vec::new(), Vec::new(), BTreeMap::new());
         for row in 0..table.rows.len() {
             match self.row(row) {
@@ -105,10 +123,11 @@ impl RowReader<'_> {
                 faults,
                 s,
                 "file",
-                "correct these rows, or leave the measured width empty",
+                "correct these rows, or leave the measured width empty; widths are in nm, places in um, fills from 0 to 1",
             );
             return;
         }
+        self.check_places(s, &found);
         let mut doses: Vec<f64> = found.iter().filter_map(|r| r.dose).collect();
         doses.sort_by(f64::total_cmp);
         let nominal = nominal.or_else(|| doses.get(doses.len() / 2).copied()).unwrap_or(1.0);
@@ -141,6 +160,38 @@ impl RowReader<'_> {
         set.groups = self.by.map(|(name, _)| (name.clone(), names));
     }
 
+    /// Record pads without a region, or places that all lie outside the regions: the fill around them is then not known.
+    fn check_places(&self, s: &Section<'_, '_>, found: &[Row]) {
+        if self.regions.is_empty() {
+            return;
+        }
+        let hint = "complete the table of regions, or correct the places (um)";
+        if self.columns.at.is_some() {
+            if !found.is_empty() && found.iter().all(|r| r.site.loading.is_none_or(|fill| fill == 0.0)) {
+                s.fault("file", "no place lies in a region of [fill]", hint);
+            }
+            return;
+        }
+        let Some(pad) = self.columns.pad else { return };
+        let fields = (0..self.table.rows.len()).map(|row| &self.table.rows[row].1[pad]);
+        let unknown: BTreeSet<&String> = fields
+            .filter(|name| !self.regions.iter().any(|r| r.name == **name))
+            .collect();
+        if !unknown.is_empty() {
+            let shown: Vec<String> = unknown
+                .iter()
+                .take(MOST_SHOWN)
+                .map(|name| quoted(name).to_string())
+                .collect();
+            let more = if unknown.len() > MOST_SHOWN { ", ..." } else { "" };
+            let what = format!(
+                "no region of [fill] has the name of these pads: {}{more}",
+                shown.join(", ")
+            );
+            s.fault("file", what, hint);
+        }
+    }
+
     /// The sites of a row, one for each measured width; all that is wrong with it.
     fn row(&self, row: usize) -> Result<Vec<Row>, Vec<String>> {
         let Self {
@@ -157,7 +208,10 @@ impl RowReader<'_> {
                 range[0]
             })
         };
-        let measured = columns.measured.iter().filter(|(c, _)| !fields[*c].is_empty());
+        let measured = columns
+            .measured
+            .iter()
+            .filter(|(c, _)| !table.field(row, *c).is_empty());
         let measured: Vec<(f64, Option<f64>)> = measured.map(|(c, along)| (number(*c, WIDTHS_NM), *along)).collect();
         if measured.is_empty() {
             return Ok(Vec::new());
@@ -176,6 +230,10 @@ impl RowReader<'_> {
             "y" => -1.0,
             _ => (2.0 * number(c, [-360.0, 360.0]).to_radians()).cos(),
         });
+        if faults.is_empty() {
+            let widths = measured.iter().map(|(nm, _)| *nm);
+            faults.extend(widths.filter_map(|nm| far_from_drawn(table.rows[row].0, drawn_nm, nm)));
+        }
         if !faults.is_empty() {
             return Err(faults);
         }

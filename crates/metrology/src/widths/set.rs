@@ -9,6 +9,7 @@ use metalith_core::{Progress, Result};
 use super::fill::Surroundings;
 use super::regions::{Regions, fill, layout_fill};
 use super::rows::{Columns, RowReader};
+use super::screening;
 use super::table::Table;
 
 /// A pillar or line that was measured once or several times, at one dose.
@@ -52,6 +53,8 @@ pub struct WidthSet {
     pub groups: Option<(String, Vec<String>)>,
     /// Range over which the column of the fill was averaged (um), where it is stated.
     pub stated_range_um: Option<f64>,
+    /// What was found in the table before any fit.
+    pub remarks: Vec<String>,
 }
 
 impl WidthSet {
@@ -100,6 +103,7 @@ fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> Wid
         field: None,
         groups: None,
         stated_range_um: None,
+        remarks: Vec::new(),
     };
     let folder = crate::run::folder_of(path, root);
     set.field = root.optional_section("field").map(|s| {
@@ -149,6 +153,8 @@ fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> Wid
             regions: regions.rectangles(),
         };
         reader.read(&s, &mut set, nominal_dose);
+        check_dose(&nominal, nominal_dose, &table, columns.dose);
+        set.remarks = screening::remarks(&mut set.sites);
     }
     let group = root.section_or_none("groups");
     if let Some((name, known)) = &set.groups {
@@ -179,6 +185,19 @@ fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> Wid
         layout_fill(&layout, layer, &mut set, root, progress);
     }
     set
+}
+
+/// Record a nominal dose that is far from all doses of the table: a bias at this dose would be an extrapolation.
+fn check_dose(s: &Section<'_, '_>, nominal: Option<f64>, table: &Table, column: Option<usize>) {
+    let doses = column.map_or_else(Vec::new, |c| table.numbers(c));
+    let (low, high) = doses.iter().fold((f64::MAX, 0f64), |(a, b), d| (a.min(*d), b.max(*d)));
+    if let Some(dose) = nominal.filter(|dose| !doses.is_empty() && !(low / 2.0..=2.0 * high).contains(dose)) {
+        s.fault(
+            "nominal",
+            format!("it is {dose}, and the doses of the table are from {low} to {high}"),
+            "give it in the unit of the column `dose`, or leave it out",
+        );
+    }
 }
 
 /// Fewest sites that are fitted: an interval of fewer says nothing.

@@ -6,6 +6,8 @@ use metalith_core::document::{Section, load};
 use metalith_core::text::quoted;
 use metalith_core::{CsvRow, csv_columns, csv_rows};
 
+use crate::number_rows::{is_missing, with_commas};
+
 /// Most faults of one table that are listed.
 const MOST_LISTED: usize = 40;
 
@@ -28,7 +30,7 @@ impl Table {
             .map_or_else(String::new, |n| n.to_string_lossy().into());
         let hint = "give a CSV table whose first line names the columns";
         let text = match load(path) {
-            Ok(text) => text,
+            Ok(text) => with_commas(&text),
             Err(error) => {
                 s.fault(key, error.to_string(), hint);
                 return None;
@@ -73,6 +75,18 @@ impl Table {
     /// Place of a column.
     pub(super) fn column(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|n| n == name)
+    }
+
+    /// Field of a row; empty where a word stands for a missing value.
+    pub(super) fn field(&self, row: usize, column: usize) -> &str {
+        let field = self.rows[row].1[column].as_str();
+        if is_missing(field) { "" } else { field }
+    }
+
+    /// Numbers of a column, of the rows that have one.
+    pub(super) fn numbers(&self, column: usize) -> Vec<f64> {
+        let fields = (0..self.rows.len()).map(|row| self.field(row, column));
+        fields.filter_map(|f| f.parse().ok()).collect()
     }
 
     /// Finite number within a range in a row and column, or what is wrong with it.

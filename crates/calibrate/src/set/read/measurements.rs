@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 
-use super::{DISTANCE_UM, WINDOW_CENTRE_UM, holds_its_pages, recorded, sensor_frame, whole};
+use super::{DISTANCE_UM, WINDOW_CENTRE_UM, holds_its_pages, is_varied, recorded, sensor_frame, whole};
 use crate::set::{BenchLed, ElementIndex, LedIndex, MeasuredElement, Measurement, PerElement, PerLed, SemSite, sem};
 use metalith_core::document::{Limits, Section};
 use metalith_sensor::RelayCamera;
@@ -55,8 +55,16 @@ pub(super) fn measurements(
         let window_centre_um = [0, 1].map(|axis| window_centre_um[axis] + axis_um[axis]);
         let filter = camera.filter.pixels_of(leds.get(led).and_then(|l| l.channel));
         let (path, exposures) = exposures(&s, led, &mut darks);
-        s.finish();
         let joined = frame::joined(exposures, sensor.as_ref(), camera, filter);
+        let is_same = |other: &&Measurement| is_varied(&joined.dn) && other.dn == joined.dn;
+        if let Some(other) = measurements.iter().find(is_same) {
+            s.fault(
+                if s.has("file") { "file" } else { "exposure" },
+                format!("it has the same values as the frame of `{}`", other.name),
+                "give each measurement its own frame",
+            );
+        }
+        s.finish();
         measurements.push(Measurement {
             name: path
                 .file_stem()

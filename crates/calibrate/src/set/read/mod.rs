@@ -54,7 +54,8 @@ impl MeasuredSet {
 fn sections(path: &Path, root: &Section<'_, '_>, layouts: &dyn PillarReader, progress: &dyn Progress) -> MeasuredSet {
     root.integer("schema", SCHEMA..=SCHEMA, "");
     // Other kinds have other readers.
-    root.choice("kind", &[("psf", ()), ("heights", ()), ("spectra", ())], Some(()));
+    let kinds = ["psf", "heights", "spectra", "widths", "psf_stack"].map(|kind| (kind, ()));
+    root.choice("kind", &kinds, Some(()));
     let title = root.text("title");
     let layers = root.section("layout_layers");
     let layer = |key| {
