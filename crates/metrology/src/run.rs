@@ -180,7 +180,7 @@ pub fn calibrate(
             let mut remarks = set.remarks.clone();
             remarks.extend(psf_stack::allow_for_samples(
                 &set,
-                &prepared.sampling,
+                &prepared,
                 (&model, &plan),
                 &mut found,
             ));

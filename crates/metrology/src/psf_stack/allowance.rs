@@ -4,6 +4,7 @@ use metalith_attribution::{RefitFinding, RefitModel, RefitPlan};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::Prepared;
 use super::model::StackModel;
 use super::sampling::{FINER, Sampling};
 use super::set::StackSet;
@@ -15,7 +16,7 @@ const WHOLE: f64 = 1.0 / (1.0 - 1.0 / (FINER * FINER));
 /// are finer; what was done, in words.
 pub(crate) fn allow_for_samples(
     set: &StackSet,
-    sampling: &Sampling,
+    prepared: &Prepared,
     (model, plan): (&StackModel<'_>, &RefitPlan),
     found: &mut RefitFinding,
 ) -> Option<String> {
@@ -23,14 +24,19 @@ pub(crate) fn allow_for_samples(
     let active: Vec<usize> = found.chosen.iter().flat_map(|&e| effects[e].slots.clone()).collect();
     let smooth = Sampling {
         smooth_masks: true,
-        ..sampling.clone()
+        ..prepared.sampling.clone()
     };
-    let finer = sampling.finer();
+    let finer = prepared.sampling.finer();
     let here = step(set, (model, plan), &active, found)?;
     let mut errors = vec![0.0; active.len()];
     for (other, factor) in [(Some(&smooth), 1.0), (finer.as_ref(), WHOLE)] {
         let Some(other) = other else { continue };
-        let other = StackModel::new(set, other, found.theta[super::setting::FOCUS]);
+        let prepared = Prepared {
+            sampling: other.clone(),
+            focus_um: found.theta[super::setting::FOCUS],
+            noise: prepared.noise,
+        };
+        let other = StackModel::new(set, &prepared);
         let there = step(set, (&other, plan), &active, found)?;
         for ((error, here), there) in errors.iter_mut().zip(here.iter()).zip(there.iter()) {
             *error += factor * (there - here).abs();

@@ -172,6 +172,7 @@ impl SpectrumForecast {
             numerical_aperture: 0.0,
             media: vec![("ambient".into(), self.ambient.clone())],
             spectra: sizes_nm.iter().map(spectrum).collect(),
+            remarks: Vec::new(),
         }
     }
 

@@ -24,16 +24,16 @@ pub(super) fn wrong_as_a_whole(set: &SpectrumSet) -> Option<(String, &'static st
             "give per cent of the reference with the dark level subtracted, or state `unit`",
         ));
     }
-    let highest = spectra.iter().map(|s| s.height_nm).fold(0.0, f64::max);
-    if highest > 0.0 && highest < LEAST_HEIGHT_NM {
+    let highest = spectra.iter().map(|s| s.size_nm).fold(0.0, f64::max);
+    if highest > 0.0 && highest < LEAST_SIZE_NM {
         return Some((
-            format!("the largest height is {highest} nm"),
-            "write heights in nm in the names of files",
+            format!("the largest size is {highest} nm"),
+            "write heights or widths in nm in the names of files",
         ));
     }
     for (k, one) in spectra.iter().enumerate() {
         let is_same = |other: &&Spectrum| {
-            (other.height_nm, other.medium) != (one.height_nm, one.medium) && other.reflectance == one.reflectance
+            (other.size_nm, other.medium) != (one.size_nm, one.medium) && other.reflectance == one.reflectance
         };
         if let Some(other) = spectra[..k].iter().find(is_same) {
             return Some((
@@ -45,8 +45,8 @@ pub(super) fn wrong_as_a_whole(set: &SpectrumSet) -> Option<(String, &'static st
     None
 }
 
-/// Heights of objects are at least this, unless their unit is not nm.
-const LEAST_HEIGHT_NM: f64 = 1.0;
+/// Heights and widths of objects are at least this, unless their unit is not nm.
+const LEAST_SIZE_NM: f64 = 1.0;
 
 /// Leave out repeats that are far from the median of the three or more of their object; what was found, in words.
 pub(super) fn leave_out_far_repeats(set: &mut SpectrumSet) -> Vec<String> {
