@@ -1,5 +1,6 @@
 //! Mistakes of height maps that no fit shows: other units, maps that are turned, upside down, exchanged or cut, and dead samples.
 
+use metalith_report::sig;
 use ndarray::{Array2, Axis};
 
 use super::set::{FieldNuisances, HeightField};
@@ -152,7 +153,7 @@ pub(super) fn wrong_maps(
                 .collect(),
         );
         if !(1.0 / RATIO..=RATIO).contains(&ratio) {
-            let what = format!("measured heights are {ratio:.2e} of the drawn ones");
+            let what = format!("measured heights are {} times the drawn ones", sig(ratio, 3));
             return Some((
                 what,
                 "check `nm_per_level` of [drawn] and [measured], and the unit of the files",
@@ -254,7 +255,7 @@ mod tests {
     #[test]
     fn mistakes_of_maps_are_told() {
         assert_eq!(told(|d| d.mapv(|v| 0.8 * v + 40.0)), "");
-        assert!(told(|d| d.mapv(|v| 0.001 * v)).contains("of the drawn ones"));
+        assert!(told(|d| d.mapv(|v| 0.001 * v)).contains("times the drawn ones"));
         assert!(told(|d| d.mapv(|v| -v)).contains("fall"));
         assert!(told(|d| Array2::from_shape_fn(d.dim(), |(y, x)| d[(y, 47 - x)])).contains("columns reversed"));
         assert!(told(|d| Array2::from_elem(d.dim(), 5.0)).contains("flat"));

@@ -77,10 +77,10 @@ const MOST_SHOWN: usize = 8;
 /// Largest ratio of a measured to a drawn width, and of a drawn to a measured one, of a row that is believed.
 const ROW_RATIO: f64 = 5.0;
 
-fn far_from_drawn(line: usize, drawn_nm: f64, measured_nm: f64) -> Option<String> {
+fn far_from_drawn(place: &str, drawn_nm: f64, measured_nm: f64) -> Option<String> {
     let ratio = measured_nm / drawn_nm;
     let believed = (1.0 / ROW_RATIO..=ROW_RATIO).contains(&ratio);
-    (!believed).then(|| format!("line {line}: {measured_nm} nm were measured of a drawn width of {drawn_nm} nm"))
+    (!believed).then(|| format!("{place}: {measured_nm} nm were measured of a drawn width of {drawn_nm} nm"))
 }
 
 /// A row as it was read, by which its repeats are found.
@@ -232,7 +232,7 @@ impl RowReader<'_> {
         });
         if faults.is_empty() {
             let widths = measured.iter().map(|(nm, _)| *nm);
-            faults.extend(widths.filter_map(|nm| far_from_drawn(table.rows[row].0, drawn_nm, nm)));
+            faults.extend(widths.filter_map(|nm| far_from_drawn(&table.at_line(row), drawn_nm, nm)));
         }
         if !faults.is_empty() {
             return Err(faults);

@@ -74,7 +74,7 @@ pub(super) fn remarks(sites: &mut [WidthSite]) -> Vec<String> {
         site.measured_nm.retain(|nm| {
             let is_near = (nm - middle).abs() <= limit;
             if !is_near {
-                left_out.push(format!("{nm} nm beside {middle} nm (drawn: {drawn} nm)"));
+                left_out.push(format!("{nm:.1} nm beside {middle:.1} nm (drawn: {drawn} nm)"));
             }
             is_near
         });

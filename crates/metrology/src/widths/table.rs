@@ -77,6 +77,11 @@ impl Table {
         self.names.iter().position(|n| n == name)
     }
 
+    /// File and line of a row.
+    pub(super) fn at_line(&self, row: usize) -> String {
+        format!("{}, line {}", self.file, self.rows[row].0)
+    }
+
     /// Field of a row; empty where a word stands for a missing value.
     pub(super) fn field(&self, row: usize, column: usize) -> &str {
         let field = self.rows[row].1[column].as_str();
@@ -91,12 +96,8 @@ impl Table {
 
     /// Finite number within a range in a row and column, or what is wrong with it.
     pub(super) fn number(&self, row: usize, column: usize, range: [f64; 2]) -> Result<f64, String> {
-        let (line, fields) = &self.rows[row];
-        let (field, name) = (&fields[column], quoted(&self.names[column]));
-        let wrong = |what: &str| {
-            let file = &self.file;
-            format!("{file}, line {line}, column `{name}`: `{}` {what}", quoted(field))
-        };
+        let (field, name) = (&self.rows[row].1[column], quoted(&self.names[column]));
+        let wrong = |what: &str| format!("{}, column `{name}`: `{}` {what}", self.at_line(row), quoted(field));
         let value: f64 = field.parse().map_err(|_| wrong("is no number"))?;
         let [low, high] = range;
         if (low..=high).contains(&value) {
