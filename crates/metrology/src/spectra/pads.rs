@@ -521,6 +521,7 @@ mod tests {
             thickness_nm,
         };
         SpectrumSet {
+            remarks: Vec::new(),
             path: "set".into(),
             title: String::new(),
             wavelengths_nm: (0..=30).map(|k| 480.0 + 10.0 * f64::from(k)).collect(),
