@@ -178,11 +178,7 @@ impl RowReader<'_> {
             .filter(|name| !self.regions.iter().any(|r| r.name == **name))
             .collect();
         if !unknown.is_empty() {
-            let shown: Vec<String> = unknown
-                .iter()
-                .take(MOST_SHOWN)
-                .map(|name| quoted(name).to_string())
-                .collect();
+            let shown: Vec<String> = unknown.iter().take(MOST_SHOWN).map(|name| quoted(name)).collect();
             let more = if unknown.len() > MOST_SHOWN { ", ..." } else { "" };
             let what = format!(
                 "no region of [fill] has the name of these pads: {}{more}",
