@@ -12,7 +12,7 @@ use metalith::design::CellFile;
 use metalith::gds::LayerNumber;
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
-    LeftOut, STREHL_AGAINST, SimulationCase, SinglePsfReport, focal_length_words, focus_words, plane_words,
+    LeftOut, STREHL_AGAINST, SimulationCase, SinglePsf, SinglePsfReport, focal_length_words, focus_words, plane_words,
     single_psfs, single_white, write_single_psf_report,
 };
 use metalith::wave::psf::FOCUS_PLANES;
@@ -338,6 +338,34 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     Ok(())
 }
 
+/// Print the figures of each point spread function, with its focal length where planes through focus were simulated.
+fn print_psfs(psfs: &[SinglePsf], pixel_um: &str) {
+    for psf in psfs {
+        print_line!(
+            "{}, {} nm: Strehl {}{}, {} % in a pixel of {pixel_um} um, peak at ({}, {}) um",
+            psf.element,
+            sig(psf.wavelength_um * 1e3, 4),
+            sig(psf.metrics.strehl, 3),
+            focus_words(&psf.metrics).map_or_else(String::new, |words| format!(", {words}")),
+            sig(psf.metrics.energy_1_pixel * 100.0, 3),
+            sig(psf.metrics.peak_um[0], 5),
+            sig(psf.metrics.peak_um[1], 5),
+        );
+        if let Some(series) = &psf.through_focus {
+            print_line!(
+                "{}, {} nm, through focus: {}; the sensor is at {} um",
+                psf.element,
+                sig(psf.wavelength_um * 1e3, 4),
+                focal_length_words(series),
+                exact(series.sensor_um)
+            );
+            for plane in &series.planes {
+                print_line!("  z {} um: {}", sig(plane.distance_um, 6), plane_words(&plane.focus));
+            }
+        }
+    }
+}
+
 pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let stated = args.cell.as_deref().map(CellFile::read).transpose()?;
     let args = &args.clone().with_design(stated);
@@ -454,30 +482,7 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let pixel_um = light
         .as_ref()
         .map_or_else(String::new, |light| exact(args.pixel_um(light)));
-    for psf in &psfs {
-        print_line!(
-            "{}, {} nm: Strehl {}{}, {} % in a pixel of {pixel_um} um, peak at ({}, {}) um",
-            psf.element,
-            sig(psf.wavelength_um * 1e3, 4),
-            sig(psf.metrics.strehl, 3),
-            focus_words(&psf.metrics).map_or_else(String::new, |words| format!(", {words}")),
-            sig(psf.metrics.energy_1_pixel * 100.0, 3),
-            sig(psf.metrics.peak_um[0], 5),
-            sig(psf.metrics.peak_um[1], 5),
-        );
-        if let Some(series) = &psf.through_focus {
-            print_line!(
-                "{}, {} nm, through focus: {}; the sensor is at {} um",
-                psf.element,
-                sig(psf.wavelength_um * 1e3, 4),
-                focal_length_words(series),
-                exact(series.sensor_um)
-            );
-            for plane in &series.planes {
-                print_line!("  z {} um: {}", sig(plane.distance_um, 6), plane_words(&plane.focus));
-            }
-        }
-    }
+    print_psfs(&psfs, &pixel_um);
     if !psfs.is_empty() {
         print_line!("{STREHL_AGAINST}");
     }
