@@ -195,15 +195,16 @@ fn effect<'a>(answer: &'a Diagnosis, name: &str) -> &'a FoundEffect {
     found.unwrap_or_else(|| panic!("{name} is not among {:?}", names(answer)))
 }
 
-/// True if a value lies in the 95 % interval of a parameter, or by a share beside it: what the direct sums err by at the rim.
+/// True if a value lies in the 95 % interval of a parameter, or by a share beside it: masks have steps of 40 um in their files, and
+/// the direct sums take them smooth.
 fn holds(effect: &FoundEffect, parameter: usize, value: f64) -> bool {
-    const RIM: f64 = 0.005;
+    const STEPS: f64 = 0.005;
     let ends = match &effect.interval[parameter] {
         own if own.is_array() => own,
         _ => &effect.interval,
     };
     let [low, high]: [f64; 2] = serde_json::from_value(ends.clone()).unwrap();
-    let more = RIM * value.abs();
+    let more = STEPS * value.abs();
     (low - more..=high + more).contains(&value)
 }
 
