@@ -100,7 +100,7 @@ fn mistakes_of_frames_are_named_before_anything_is_fitted() {
     let d = diagnosed(&set).unwrap();
     let reasons: Vec<&str> = d.left_out.iter().map(|l| l.reason.as_str()).collect();
     assert!(
-        reasons.len() == 2 && reasons[0].contains("the image of 560 nm"),
+        reasons.len() == 2 && reasons[0].contains("the one of `e0_560_z0`"),
         "{reasons:?}"
     );
     is_the_bias(&d, &sound);

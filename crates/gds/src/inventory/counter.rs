@@ -255,6 +255,8 @@ impl Counter {
             }
         }
         self.turned.clear();
+        // Long names are read another way, which adds their reaches first.
+        self.now.reaches.sort_by_key(|reach| reach.number);
         self.reaches += self.now.reaches.len();
         std::mem::take(&mut self.now)
     }

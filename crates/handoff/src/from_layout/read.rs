@@ -90,6 +90,12 @@ impl Pattern {
 
     fn read(layout: &Layout, layer: LayerNumber, progress: &dyn Progress) -> Result<Self> {
         match extract(layout, &ExtractionPlan::discover(layer), progress) {
+            // No deck has rules for both.
+            Ok(found) if found.shape == PillarShape::Mixed => Ok(Self::Shapes(format!(
+                "the {} pillars on layer {layer} are {}, and rules are for one of them",
+                count(found.pillars),
+                found.shape.plural()
+            ))),
             // Pads and pitch from a few of the shapes would be of something else.
             Ok(found) if found.pillars >= found.oddities.total().max(1) => Ok(Self::Pillars(Box::new(found))),
             Ok(found) => Ok(Self::Shapes(format!(
