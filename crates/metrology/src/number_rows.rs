@@ -99,7 +99,7 @@ mod tests {
         let expected = "pad,drawn_nm\nA left,120.5";
         for text in [
             "\"pad\";drawn_nm\nA,left;120,5",
-            "pad\tdrawn_nm\nA, left\t120.5",
+            "pad\tdrawn_nm\nA,left\t120.5",
             "pad,drawn_nm\nA left,120.5",
         ] {
             assert_eq!(with_commas(text), expected);
