@@ -416,7 +416,8 @@ mod tests {
             let mut holed = disc.clone();
             let middle = lattice.sites() / 2;
             for (_, number) in holed.number.indexed_iter_mut().filter(|((iy, ix), _)| {
-                ix.abs_diff(middle) < 6 && iy.abs_diff(middle) < 4 || (ix + 3 * iy) % 7 == 0 && ix.abs_diff(middle) < 9
+                let apart = [ix.abs_diff(middle), iy.abs_diff(middle)];
+                apart[0] < 6 && apart[1] < 4 || (ix + 3 * iy) % 7 == 0 && apart[0] < 8 && apart[1] < 8
             }) {
                 *number = 0;
             }
