@@ -120,7 +120,7 @@ impl Lattice {
     }
 
     /// A length of which distances along both axes are whole numbers: half a pitch, or on a hexagonal lattice half a database
-    /// unit, or a step of [`Pitch::HALVES_PER_NM`] where rows are no whole number of units (nm).
+    /// unit, or half a step of pitches (0.025 nm) where rows are no whole number of units (nm).
     #[inline]
     pub fn unit_nm(&self) -> f64 {
         match self.kind {
