@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
-use metalith::gds::ReadLimits;
+use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::{AtomicFile, Error, Layout, Result};
 
 use super::compensated::CompensatedFor;
@@ -130,8 +130,11 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(_) => args.reading.open(&file, terminal)?,
         None => args.reading.open_counted(&file, terminal)?,
     };
+    if let Some(layer) = args.reading.layer {
+        has_shapes(&layout, layer)?;
+    }
     if let Some(path) = &args.new_rules {
-        return write_rules(&layout, path, terminal);
+        return write_rules(&layout, args.reading.layer, path, terminal);
     }
     let with = args.with.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
     let array = match &mut design {
@@ -168,8 +171,22 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
 }
 
 /// Write the rules that a layout keeps.
-fn write_rules(layout: &Layout, path: &Path, terminal: &Terminal) -> Result<Outcome> {
-    let rules = drc::new_rules(layout, None, terminal)?;
+/// Rules of an empty layer hold, and say nothing.
+fn has_shapes(layout: &Layout, layer: LayerNumber) -> Result<()> {
+    let used = layout.used_layers();
+    if used.contains(&layer) {
+        return Ok(());
+    }
+    let words: Vec<String> = used.iter().map(LayerNumber::to_string).collect();
+    Err(Error::refused(
+        "check/layer-empty",
+        format!("{} has no shapes on layer {layer}", layout.path().display()),
+        format!("name a layer that has shapes: {}", words.join(", ")),
+    ))
+}
+
+fn write_rules(layout: &Layout, layer: Option<LayerNumber>, path: &Path, terminal: &Terminal) -> Result<Outcome> {
+    let rules = drc::new_rules(layout, layer, terminal)?;
     AtomicFile::write(path, rules.text.as_bytes())?;
     terminal.clear();
     let left_out = match rules.left_out {

@@ -92,6 +92,9 @@ impl FileArgs {
     fn below_top(&self, open: Open, path: &Path, terminal: &Terminal) -> Result<Layout> {
         self.apply(terminal);
         let layout = open(path, ReadLimits::default(), terminal)?;
+        if self.strict {
+            layout.no_dangling()?;
+        }
         Ok(match &self.top {
             Some(top) => layout.below(top)?,
             None => layout,

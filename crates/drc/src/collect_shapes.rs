@@ -113,6 +113,7 @@ pub(super) fn gather<'a>(
         pillars,
         shape,
         elements,
+        slack_nm: fits.iter().map(|fit| fit.slack_nm).fold(0.0, f64::max),
         no_elements,
         loose: visit.loose,
         off_lattice: visit.off_lattice,

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use metalith_core::text::{is_printable, printable};
-use metalith_report::{counted, exact};
+use metalith_report::{counted, exact, sig};
 use serde_json::json;
 
 use super::report::{DrcReport, RuleReport};
@@ -22,6 +22,14 @@ pub fn text(report: &DrcReport) -> String {
         report.pillars_on_lattices,
         report.deck
     );
+    if report.slack_nm > 0.0 {
+        let _ = writeln!(
+            out,
+            "warning: places were rounded one by one, by up to {} nm: distances between pillars are those of their sites, and err by up to {} nm\n",
+            sig(report.slack_nm, 2),
+            sig(2.0 * report.slack_nm, 2)
+        );
+    }
     let mut reason = "";
     for r in &report.rules {
         let state = match &r.status {

@@ -75,6 +75,8 @@ pub(super) struct FlatLayout<'a> {
     pub shape: PillarShape,
     /// Elements with the pillars on their lattices.
     pub elements: Vec<ExtractedElement<StoredPillars>>,
+    /// Largest distance of a pillar from its site along an axis (nm); zero where places are exact.
+    pub slack_nm: f64,
     /// Reason why there are no elements, if there are none.
     pub no_elements: String,
     pub loose: BTreeMap<LayerNumber, LooseShapes>,

@@ -2,6 +2,7 @@
 
 use super::deck::Deck;
 use super::input::CheckInput;
+use super::new_rules::most_pillars;
 use super::report::DrcReport;
 use metalith_core::{Progress, Result};
 use metalith_gds::{LayerNumber, Layout};
@@ -30,7 +31,8 @@ fn deck_of(name: &str, layout: &Layout) -> Deck {
     }
 }
 
-/// Check a layout without a design against the deck of the shape of its pillars, on `layer` if the deck's is not meant.
+/// Check a layout without a design against the deck of the shape of its pillars. They are on `layer`; if it is left out, on the layer
+/// of the deck, or if this has no shapes, on the one with most shapes that may be pillars.
 ///
 /// # Errors
 /// As [`super::check`].
@@ -40,6 +42,12 @@ pub fn check_generic(
     input: &CheckInput<'_>,
     progress: &dyn Progress,
 ) -> Result<DrcReport> {
+    let usual = Deck::named("squares").pillars[0];
+    let layer = layer.or_else(|| {
+        most_pillars(layout)
+            .ok()
+            .filter(|_| !layout.used_layers().contains(&usual))
+    });
     let deck_of = |name: &str| {
         let deck = deck_of(name, layout);
         match layer {
@@ -47,7 +55,7 @@ pub fn check_generic(
             None => deck,
         }
     };
-    let name = plural(layout, layer.unwrap_or(Deck::named("squares").pillars[0]));
+    let name = plural(layout, layer.unwrap_or(usual));
     let deck = deck_of(name);
     let report = super::check(layout, &deck, input, progress)?;
     // Pillars may be told apart from other shapes by their lattice alone.

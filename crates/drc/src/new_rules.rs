@@ -117,7 +117,7 @@ pub fn new_rules(layout: &Layout, layer: Option<LayerNumber>, progress: &dyn Pro
 }
 
 /// The layer with most shapes that may be pillars.
-fn most_pillars(layout: &Layout) -> Result<LayerNumber> {
+pub(super) fn most_pillars(layout: &Layout) -> Result<LayerNumber> {
     let layers = layout.used_layers();
     let most = layers.iter().max_by_key(|&&layer| {
         let kinds = layout.kinds_on(layer);

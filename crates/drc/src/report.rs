@@ -53,6 +53,10 @@ pub struct DrcReport {
     #[serde(skip)]
     pub shape: PillarShape,
     pub pillars_on_lattices: u64,
+    /// Largest distance of a pillar from its site along an axis (nm), where places were rounded one by one. Distances between pillars
+    /// are those of their sites, and err by up to twice as much.
+    #[serde(skip_serializing_if = "is_exact")]
+    pub slack_nm: f64,
     /// Every rule of the deck, in its order.
     pub rules: Vec<RuleReport>,
     /// Warnings about the check itself: waivers that cover nothing or have expired.
@@ -86,6 +90,10 @@ impl DrcReport {
             _ => 3,
         }
     }
+}
+
+fn is_exact(slack_nm: &f64) -> bool {
+    *slack_nm == 0.0
 }
 
 pub(super) fn assemble(
@@ -129,6 +137,7 @@ pub(super) fn assemble(
         elements: flat.elements.len(),
         shape: flat.shape,
         pillars_on_lattices: flat.pillars_on_lattices(),
+        slack_nm: flat.slack_nm,
         rules,
         warnings,
         warned,

@@ -185,6 +185,11 @@ impl Layout {
         self.source.is_gzip()
     }
 
+    /// True if the file is a drawing in DXF, which is read as if it were GDSII.
+    pub fn is_drawing(&self) -> bool {
+        self.source.drawing().is_some()
+    }
+
     /// Format that it is in.
     pub fn format(&self) -> FileFormat {
         self.format
@@ -354,7 +359,10 @@ impl Layout {
     }
 
     /// Checks that every reference leads to a cell.
-    fn no_dangling(&self) -> Result<()> {
+    ///
+    /// # Errors
+    /// The first reference to a cell that is not in the file.
+    pub fn no_dangling(&self) -> Result<()> {
         match self.dangling().into_iter().next() {
             Some(Faulty { cell, name, offset }) => Err(self.fault(offset, LayoutError::Dangling { cell, name })),
             None => Ok(()),

@@ -135,6 +135,13 @@ impl LayoutInputs {
             Some(top) => layout.below(top)?,
             None => layout,
         };
+        if layout.is_drawing() {
+            return Err(Error::refused(
+                "handoff/drawing",
+                format!("{} is a drawing in DXF, which writers do not take", path.display()),
+                "bring it into GDSII first: metalith convert DRAWING.dxf LAYOUT.gds",
+            ));
+        }
         let statistics = LayoutStatistics::of(&layout, progress)?;
         let exposed = exposed_layers(source, &statistics)?;
         let pattern = Pattern::read(&layout, exposed[0], progress)?;
