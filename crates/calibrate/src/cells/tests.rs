@@ -45,6 +45,7 @@ fn tables_that_are_corrected_by_others_are_kept_apart() {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn a_change_solved_with_few_orders_is_that_with_many() {
     let cells = RigorousCells::new(made_up(), vec![460.0, 531.0, 660.0], (100.0, 240.0), None);
     let stated = CellChange::default();
