@@ -1,4 +1,4 @@
-//! What the pillars of a layout measure: pitches, and the smallest gap between shapes.
+//! Measures of the pillars of a layout: pitches, and the smallest gap between shapes.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,7 +10,6 @@ use super::input::CheckInput;
 use super::pairs::near;
 use super::rule::{NotRun, Rule, RuleOutcome};
 use super::spacing::neighbours;
-use super::waiver::Date;
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::{LayerNumber, Layout};
 use metalith_pillars::{PillarId, PillarRows, PillarShape};
@@ -106,14 +105,7 @@ fn least_on_lattices(flat: &FlatLayout<'_>) -> Option<f64> {
 pub(super) fn measure(layout: &Layout, pillars: LayerNumber, progress: &dyn Progress) -> Result<Measures> {
     let found = Arc::new(Mutex::new(Measures::default()));
     let deck = Deck::of_rule("measure", vec![pillars], Box::new(Measure(found.clone())));
-    let input = CheckInput {
-        with: Vec::new(),
-        design: None,
-        array: None,
-        waivers: None,
-        today: Date::today(),
-        markers: 0,
-    };
+    let input = CheckInput::default();
     let report = super::check(layout, &deck, &input, progress)?;
     if let Some(why) = report.rules.iter().find_map(|rule| rule.status.reason()) {
         return Err(Error::refused(

@@ -7,7 +7,6 @@ use super::deck::Deck;
 use super::input::CheckInput;
 use super::measure::{Measures, measure};
 use super::rule::Status;
-use super::waiver::Date;
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::{LayerNumber, Layout};
 use metalith_report::{counted, exact};
@@ -78,14 +77,7 @@ pub fn new_rules(layout: &Layout, layer: Option<LayerNumber>, progress: &dyn Pro
     for _ in 0..TRIES {
         let text = written(layout, pillars, &found, &rules);
         let deck = Deck::of_text(path, text.clone())?;
-        let input = CheckInput {
-            with: Vec::new(),
-            design: None,
-            array: None,
-            waivers: None,
-            today: Date::today(),
-            markers: 0,
-        };
+        let input = CheckInput::default();
         let report = super::check(layout, &deck, &input, progress)?;
         let mut changed = false;
         for judged in &report.rules {

@@ -290,7 +290,7 @@ impl LayoutError {
             Self::OtherFormat { remedy, .. } => (*remedy).into(),
             Self::Drawing { .. } => {
                 "closed polylines, circles, ellipses, solids, arcs, lines that meet, texts and blocks of DXF are read, each code and \
-                 value on a line of its own"
+                 value on separate lines"
                     .into()
             }
             Self::Gzip(_) => CUT_SHORT.into(),

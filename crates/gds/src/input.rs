@@ -33,7 +33,7 @@ pub(super) enum Source {
         bytes: u64,
         /// The file that is read instead: what a compressed one holds, or what a drawing is.
         unpacked: Option<Arc<TempPath>>,
-        /// What was made of a drawing.
+        /// Result of reading a drawing.
         drawing: Option<Arc<dxf::Remarks>>,
     },
     Memory {

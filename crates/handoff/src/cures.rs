@@ -33,7 +33,7 @@ pub struct BrokenRule {
     pub deck: String,
     /// True if its limit is a guess that no lab has confirmed: it fails nothing.
     pub assumed: bool,
-    /// What to change.
+    /// Remedy.
     pub cure: String,
 }
 

@@ -386,7 +386,7 @@ fn validation(
     validation
 }
 
-/// What an effect belongs to, and how the values of the groups of a kind compare.
+/// Scope of an effect, and how the values of the groups of a kind compare.
 fn belonging_words(belonging: &Belonging, kind: &str, name: impl Fn(usize) -> String) -> (String, String) {
     match belonging {
         Belonging::Bench => (

@@ -1,4 +1,4 @@
-//! Whether an effect is of the bench, of a kind of group or of one group: the value of each group alone, with its interval.
+//! Scope of an effect: the bench, a kind of group or one group. The value of each group alone, with its interval.
 
 use super::finding::{Belonging, GroupValue, RefitErrors, RefitFinding};
 use super::fit::State;
@@ -54,7 +54,7 @@ impl Selection<'_> {
         now.active.iter().enumerate().map(of_slot).collect()
     }
 
-    /// What each effect of a finding belongs to.
+    /// Scope of each effect of a finding.
     pub(super) fn belongings(&self, found: &RefitFinding) -> Vec<Belonging> {
         let parameters = self.model.parameters();
         let of = |&effect: &usize| {
@@ -128,7 +128,7 @@ fn jackknife(each: &[[f64; 2]], [information, slope]: [f64; 2]) -> f64 {
     student_95(each.len() - 1) * ((n - 1.0) / n * squares).sqrt()
 }
 
-/// What a parameter belongs to, by its values in groups.
+/// Scope of a parameter, by its values in groups.
 fn belonging(values: &[GroupValue], neutral: f64) -> Belonging {
     let all: Vec<&GroupValue> = values.iter().collect();
     if agree(&all) {

@@ -88,7 +88,7 @@ pub struct RefitFinding {
     pub intervals: Vec<Option<[f64; 2]>>,
     /// Value of each parameter that was fitted in each group of objects alone, with all else as it was found: slot, and groups.
     pub by_group: Vec<(usize, Vec<GroupValue>)>,
-    /// What each chosen effect belongs to.
+    /// Scope of each chosen effect.
     pub belongings: Vec<Belonging>,
     /// Groups of objects that each chosen effect predicts worse, when they are left out, than all others without it.
     pub worse: Vec<Vec<usize>>,
@@ -102,7 +102,7 @@ pub struct GroupValue {
     pub interval: [f64; 2],
 }
 
-/// What an effect belongs to, by its values in groups of objects.
+/// Scope of an effect, by its values in groups of objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Belonging {
     /// The values of all groups agree within their intervals.

@@ -10,7 +10,7 @@ use crate::fit::minimise;
 /// A fit ends when a step lowers the mean square by less than this share.
 const CONVERGED: f64 = 1e-5;
 
-/// As [`CONVERGED`], of candidates where a fit is costly: they are compared by much more.
+/// Variant of [`CONVERGED`] for candidates where a fit is costly: they differ by much more.
 const COMPARED: f64 = 1e-3;
 
 /// A fit: values, and the equations of all fitted measurements about them.

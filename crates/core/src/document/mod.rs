@@ -132,7 +132,7 @@ impl<'t> Document<'t> {
             kind,
             key,
             span,
-            // An error of another file has its own remedy, in a line of its own.
+            // An error of another file has its own remedy, in a separate line.
             what: what.into().replace("\n  help: ", "; "),
             hint: hint.into(),
         }));

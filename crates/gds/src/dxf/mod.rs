@@ -71,7 +71,7 @@ impl From<std::io::Error> for Failure {
     }
 }
 
-/// What was made of a drawing.
+/// Result of reading a drawing.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Remarks {
     /// Unit and layers, in words.

@@ -1,4 +1,4 @@
-//! The pairs of a code and a value that a drawing in DXF consists of, each on a line of its own.
+//! Pairs of a code and a value, of which a drawing in DXF consists: two lines each.
 
 use super::Fault;
 

@@ -7,7 +7,7 @@ use super::drawing::{Entity, Kind};
 use super::hatch;
 use super::pairs::Pair;
 
-/// What an entity draws.
+/// Shapes of an entity.
 pub(super) enum Drawn<'a> {
     Polygon(Vec<[f64; 2]>),
     Polygons(Vec<Vec<[f64; 2]>>),
@@ -80,7 +80,7 @@ struct Vertex {
     control: bool,
 }
 
-/// What an entity draws. A unit of the drawing is `unit` database units.
+/// Shapes of an entity. A unit of the drawing is `unit` database units.
 pub(super) fn drawn<'a>(entity: &Entity, fields: &Fields<'_, 'a>, unit: f64) -> Result<Drawn<'a>, Fault> {
     Ok(match entity.kind {
         Kind::LightPolyline | Kind::Polyline => polyline(fields, entity.kind == Kind::LightPolyline, unit)?,

@@ -202,7 +202,7 @@ fn upright_rectangles_are_found_among_squares_and_marks() {
         &(|k: i32| [101 + 20 * (k % 7), 101]) as &dyn Fn(i32) -> [i32; 2],
         &|k: i32| [80 + 2 * (k % 100), 90],
     ] {
-        // The squares among them may be on a lattice of their own; the others are counted.
+        // The squares among them may be on a separate lattice; the others are counted.
         let few = |read: Extraction| read.oddities.total() > 5 * read.pillars;
         assert!(found(edges, false).map_or(true, few));
     }

@@ -72,7 +72,7 @@ pub(crate) struct LayoutInputs {
     pub lab: Lab,
 }
 
-/// What was found on the layer of the pillars.
+/// Content of the layer of the pillars.
 pub(crate) enum Pattern {
     Pillars(Box<Extraction>),
     /// Shapes that are no pillars, with the reason in words.

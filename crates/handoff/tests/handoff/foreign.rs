@@ -63,7 +63,7 @@ fn drawn(folder: &Path, name: &str, cells: Vec<GdsStruct>) -> PathBuf {
     path
 }
 
-/// Two lenses as references, far from the origin, a mark and a label on layers of their own.
+/// Two lenses as references, far from the origin, a mark and a label on separate layers.
 fn two_lenses(folder: &Path) -> PathBuf {
     let mut top = GdsStruct::new("TOP");
     for (x, y) in LENSES {

@@ -216,7 +216,7 @@ fn material(s: &Section<'_, '_>, key: &str, folder: &Path, wavelengths_nm: &[f64
     Some(found)
 }
 
-/// What a layer is.
+/// Kind of a layer.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Film,
