@@ -401,8 +401,10 @@ impl Visitor for Gather<'_, '_> {
                 return Ok(());
             }
             for (k, placement) in placements.iter().enumerate() {
-                let placed = placement.apply_rect(rect).unwrap_or(*rect);
-                self.pillar(&placed, k);
+                match placement.apply_rect(rect) {
+                    Some(placed) => self.pillar(&placed, k),
+                    None => self.pillar(rect, k),
+                }
             }
             return Ok(());
         }

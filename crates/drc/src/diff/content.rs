@@ -290,9 +290,11 @@ impl Visitor for ContentReader<'_> {
                     return Ok(());
                 }
                 for (k, placement) in placements.iter().enumerate() {
-                    let placed = placement.apply_rect(rect).unwrap_or(*rect);
                     let corners = || shape.outline.placed(placement);
-                    self.pillar(&placed, k, corners)?;
+                    match placement.apply_rect(rect) {
+                        Some(placed) => self.pillar(&placed, k, corners)?,
+                        None => self.pillar(rect, k, corners)?,
+                    }
                 }
             }
             _ => {

@@ -27,6 +27,8 @@ pub struct Filler {
     guesses: Vec<u32>,
     /// Placements of the current cell about the middles of elements, if all of them are.
     orbits: Vec<Orbit>,
+    /// Site (row, column) and width (nm) of the present pillar in each of these.
+    orbit_sites: Vec<(usize, usize, u16)>,
     /// Images of the first placement that the placements of the current cell are, if they are.
     images: Option<Images>,
     /// The first placement that these were found with.
@@ -62,6 +64,7 @@ impl Filler {
             elements: sites.into_iter().map(empty).collect(),
             guesses: Vec::new(),
             orbits: Vec::new(),
+            orbit_sites: Vec::new(),
             images: None,
             first: Transform::IDENTITY,
             pillars: 0,
@@ -200,23 +203,24 @@ impl Filler {
         if self.orbits.is_empty() || placements.first() != Some(&self.first) || !takes(r.width()) {
             return false;
         }
-        let site = |filler: &Self, orbit: &Orbit| filler.site_of(orbit, r, placements);
-        if !self.orbits.iter().all(|orbit| site(self, orbit).is_some()) {
-            return false;
-        }
-        let is_rounded = self.is_rounded(r);
-        for k in 0..self.orbits.len() {
-            let orbit = &self.orbits[k];
-            if let Some((row, column, width_nm)) = site(self, orbit) {
-                let (element, copies) = (orbit.element as usize, orbit.placements.len() as u64);
-                if let StoredPillars::Eighth(map) = &mut self.elements[element].widths {
+        // All of them are looked up before one is put. A vector that is kept, because this is the innermost loop of reading.
+        let mut sites = std::mem::take(&mut self.orbit_sites);
+        sites.clear();
+        sites.extend(self.orbits.iter().map_while(|orbit| self.site_of(orbit, r, placements)));
+        let is_whole = sites.len() == self.orbits.len();
+        if is_whole {
+            let is_rounded = self.is_rounded(r);
+            for (orbit, &(row, column, width_nm)) in self.orbits.iter().zip(&sites) {
+                let copies = orbit.placements.len() as u64;
+                if let StoredPillars::Eighth(map) = &mut self.elements[orbit.element as usize].widths {
                     *map.at(column, row) = width_nm;
                     self.pillars += copies;
                     self.rounded += if is_rounded { copies } else { 0 };
                 }
             }
         }
-        true
+        self.orbit_sites = sites;
+        is_whole
     }
 
     /// Site (row, column) and width (nm) of a pillar in the first placement of an orbit, if the others put it on all

@@ -130,8 +130,11 @@ impl Visitor for PillarCollector {
                     return Ok(());
                 }
                 for (k, placement) in placements.iter().enumerate() {
-                    let placed = placement.apply_rect(rect).unwrap_or(*rect);
-                    self.candidate(&placed, k, shape.offset);
+                    // Not copied: this is the innermost loop of reading.
+                    match placement.apply_rect(rect) {
+                        Some(placed) => self.candidate(&placed, k, shape.offset),
+                        None => self.candidate(rect, k, shape.offset),
+                    }
                 }
             }
             _ => self.polygon(shape, placements),

@@ -243,8 +243,8 @@ impl Sites {
         let half = PITCHES_PER_NM * self.scale.num;
         let x = (pillar.x0 + pillar.x1) * half;
         let y = (pillar.y0 + pillar.y1) * half;
-        // Half a database unit.
-        let slack = [pillar.x1 - pillar.x0, pillar.y1 - pillar.y0].map(|edge| (edge % 2 * half) as f64);
+        // Half a database unit. Asked for only where a pillar is off its site: this is the innermost loop of reading.
+        let slack = || [pillar.x1 - pillar.x0, pillar.y1 - pillar.y0].map(|edge| (edge % 2 * half) as f64);
         if let Some(standing) = self.try_element(*guess, x, y, slack) {
             return standing;
         }
@@ -259,7 +259,7 @@ impl Sites {
     }
 
     #[inline]
-    fn try_element(&self, element: u32, x: i64, y: i64, slack: [f64; 2]) -> Option<SitePlace> {
+    fn try_element(&self, element: u32, x: i64, y: i64, slack: impl Fn() -> [f64; 2]) -> Option<SitePlace> {
         let grid = self.grids.get(element as usize)?;
         let (column, dx) = grid.nearest(0, x);
         let (row, dy) = grid.nearest(1, y);
@@ -267,8 +267,8 @@ impl Sites {
             return None;
         }
         let is_site = !grid.staggered || (column + row) % 2 == 0;
-        let slack = slack.map(|slack| slack + grid.rounding);
-        Some(if dx.abs() <= slack[0] && dy.abs() <= slack[1] && is_site {
+        let is_near = |slack: [f64; 2]| dx.abs() <= slack[0] + grid.rounding && dy.abs() <= slack[1] + grid.rounding;
+        Some(if is_site && (is_near([0.0; 2]) || is_near(slack())) {
             SitePlace::Site(element, row as usize, column as usize)
         } else {
             SitePlace::Between(element)
