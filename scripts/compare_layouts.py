@@ -9,6 +9,8 @@ none. Sizes and CPU seconds of OASIS are printed beside those of KLayout's write
 first difference.
 """
 
+import concurrent.futures
+import os
 import pathlib
 import subprocess
 import sys
@@ -72,13 +74,23 @@ def pillars(path):
 
 
 def compare(name, files):
-    # Layouts stay referenced: a region does not outlive its layout.
+    """Compare with the flat layout, each other one in a process: an XOR uses one core."""
+    # The layout stays referenced: a region does not outlive it.
     flat_layout, flat = pillars(files["flat"])
     expect(f"{name} flat: pillars", flat.count(), COUNTS[name])
-    for hierarchy in [h for h in files if h != "flat"]:
-        layout, region = pillars(files[hierarchy])
-        expect(f"{name} {hierarchy}: pillars", region.count(), COUNTS[name])
-        expect(f"{name} {hierarchy}: polygons of the XOR with flat", (flat ^ region).count(), 0)
+    others = [h for h in files if h != "flat"]
+    with concurrent.futures.ProcessPoolExecutor(os.cpu_count()) as pool:
+        found = pool.map(difference, [files["flat"]] * len(others), [files[h] for h in others])
+        for hierarchy, (count, polygons) in zip(others, found):
+            expect(f"{name} {hierarchy}: pillars", count, COUNTS[name])
+            expect(f"{name} {hierarchy}: polygons of the XOR with flat", polygons, 0)
+
+
+def difference(flat_path, path):
+    """Pillars of a layout, and polygons by which it differs from the flat one."""
+    flat_layout, flat = pillars(flat_path)
+    layout, region = pillars(path)
+    return region.count(), (flat ^ region).count()
 
 
 def count_with_gdstk(name, files):
