@@ -17,6 +17,7 @@ mod memo;
 #[cfg(feature = "npy")]
 pub mod npy;
 mod plane;
+mod processor;
 mod progress;
 pub mod srgb;
 pub mod text;
@@ -36,6 +37,7 @@ pub use lagrange::lagrange_weight;
 pub use layer::LayerNumber;
 pub use memo::Memo;
 pub use plane::part;
+pub use processor::vector_instructions;
 pub use progress::{Progress, Quiet, Silent};
 pub use warning::Warning;
 pub use wedge::{Wedge, numerical_aperture, turned_sine};
