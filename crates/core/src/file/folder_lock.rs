@@ -57,7 +57,7 @@ impl FolderLock {
     }
 
     /// True if others are kept out: false where there are no locks.
-    pub(super) fn is_held(&self) -> bool {
+    pub fn is_held(&self) -> bool {
         self.locked.is_some()
     }
 
