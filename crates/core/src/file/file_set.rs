@@ -40,15 +40,29 @@ impl FolderLock {
     /// # Errors
     /// What `write` returns; if the disk refuses; if another process without a lock wrote the same files meanwhile.
     pub fn publish<T>(&self, set: &str, stale: &[&str], write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+        self.put(set, stale, true, write)
+    }
+
+    /// Variant of [`FolderLock::publish`] for files whose names or whose folder a person chose: no list stays beside them, and no
+    /// file goes but those that are written anew or named in `stale`.
+    ///
+    /// # Errors
+    /// As [`FolderLock::publish`].
+    pub fn replace<T>(&self, set: &str, stale: &[&str], write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+        self.put(set, stale, false, write)
+    }
+
+    fn put<T>(&self, set: &str, stale: &[&str], is_listed: bool, write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
         let set = FileSet::of(self.folder(), set)?;
         let mut unfinished = Unfinished::new(&set)?;
         let written = write(&unfinished.0)
             .and_then(|value| {
-                set.complete(&unfinished.0, stale)?;
+                set.complete(&unfinished.0, stale, is_listed)?;
                 Ok(value)
             })
             .map_err(|error| set.in_its_place(error, &unfinished.0))?;
-        let own = set.identities(&unfinished.0)?;
+        let mut own = set.identities(&unfinished.0)?;
+        own.retain(|(path, _)| is_listed || *path != set.manifest);
         finish_decided(self)?;
         rename(&unfinished.0, &set.decided).map_err(|error| set.not_decided(error))?;
         // From here on the new ones stand: nothing is thrown away.
@@ -241,7 +255,7 @@ impl FileSet {
     }
 
     /// List the written files in their folder, when all are there and can take their places.
-    fn complete(&self, unfinished: &Path, stale: &[&str]) -> Result<()> {
+    fn complete(&self, unfinished: &Path, stale: &[&str], is_listed: bool) -> Result<()> {
         let mut names = Vec::new();
         for name in entries(unfinished).map_err(Error::io("read", unfinished))? {
             let target = self.folder.join(&name);
@@ -256,7 +270,7 @@ impl FileSet {
             }
         }
         names.sort();
-        let manifest = SetManifest::of(unfinished, &names, stale)?;
+        let manifest = SetManifest::of(unfinished, &names, stale, is_listed)?;
         let list = unfinished.join(self.manifest.file_name().expect("it has a name"));
         AtomicFile::write(&list, manifest.text().as_bytes())
     }
@@ -328,7 +342,10 @@ impl FileSet {
                 Vec::new()
             });
         };
-        let old = SetManifest::read(&self.manifest)?.unwrap_or_default();
+        let old = match new.is_listed {
+            true => SetManifest::read(&self.manifest)?.unwrap_or_default(),
+            false => SetManifest::default(),
+        };
         let mut coming = Vec::new();
         for name in new.names() {
             let from = self.decided.join(name);
@@ -346,9 +363,14 @@ impl FileSet {
                 steps.push(step);
             }
         }
-        steps.push(Step::Remove(self.manifest.clone()));
+        let last = if new.is_listed {
+            steps.push(Step::Remove(self.manifest.clone()));
+            Step::Rename(list, self.manifest.clone())
+        } else {
+            Step::Remove(list)
+        };
         steps.extend(coming.into_iter().map(|(from, to)| Step::Rename(from, to)));
-        steps.push(Step::Rename(list, self.manifest.clone()));
+        steps.push(last);
         steps.push(clear);
         Ok(steps)
     }

@@ -20,6 +20,7 @@ const LARGEST_DIGESTED: u64 = 1 << 26;
 /// Beginnings of lines that `sha256sum -c` takes for comments.
 const UNDIGESTED: &str = "# without digest: ";
 const STALE: &str = "# removed: ";
+const UNLISTED: &str = "# no list stays";
 
 /// Digest of a file, as a list has it.
 pub(super) struct Wanted<'a>(&'a str);
@@ -35,20 +36,25 @@ impl Wanted<'_> {
 pub(super) struct SetManifest {
     files: Vec<(String, Option<String>)>,
     stale: Vec<String>,
+    /// False if the list goes when the files are in their places.
+    pub(super) is_listed: bool,
 }
 
 impl SetManifest {
     /// List of the files with these names in a folder.
-    pub(super) fn of(folder: &Path, names: &[String], stale: &[&str]) -> Result<Self> {
+    pub(super) fn of(folder: &Path, names: &[String], stale: &[&str], is_listed: bool) -> Result<Self> {
         let listed = |name: &String| {
             let path = folder.join(name);
             let bytes = fs::metadata(&path).map_err(Error::io("read", &path))?.len();
-            let digest = (bytes <= LARGEST_DIGESTED).then(|| file_digest(&path)).transpose()?;
+            let digest = (is_listed && bytes <= LARGEST_DIGESTED)
+                .then(|| file_digest(&path))
+                .transpose()?;
             Ok((name.clone(), digest.map(|d| hex(&d))))
         };
         Ok(Self {
             files: names.iter().map(listed).collect::<Result<_>>()?,
             stale: stale.iter().map(|&name| name.to_owned()).collect(),
+            is_listed,
         })
     }
 
@@ -65,9 +71,14 @@ impl SetManifest {
             Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             found => found?,
         };
-        let mut list = Self::default();
+        let mut list = Self {
+            is_listed: true,
+            ..Self::default()
+        };
         for line in String::from_utf8_lossy(&bytes).lines() {
-            if let Some(name) = line.strip_prefix(UNDIGESTED).filter(|name| is_plain(name)) {
+            if line == UNLISTED {
+                list.is_listed = false;
+            } else if let Some(name) = line.strip_prefix(UNDIGESTED).filter(|name| is_plain(name)) {
                 list.files.push((name.to_owned(), None));
             } else if let Some(name) = line.strip_prefix(STALE).filter(|name| is_plain(name)) {
                 list.stale.push(name.to_owned());
@@ -85,6 +96,10 @@ impl SetManifest {
                 Some(digest) => writeln!(text, "{digest}  {name}"),
                 None => writeln!(text, "{UNDIGESTED}{name}"),
             };
+        }
+        if !self.is_listed {
+            text += UNLISTED;
+            text.push('\n');
         }
         self.stale.iter().for_each(|name| text += &format!("{STALE}{name}\n"));
         text

@@ -47,6 +47,33 @@ fn begun() -> (tempfile::TempDir, FolderLock) {
     (place, turn)
 }
 
+#[test]
+fn without_a_list_nothing_else_goes() {
+    let (place, turn) = begun();
+    fs::write(place.path().join("old.lyrdb"), "old").unwrap();
+    let replace = |names: &[&str]| {
+        turn.replace("set", &[STALE], |folder| {
+            names
+                .iter()
+                .try_for_each(|name| AtomicFile::write(&folder.join(name), b"new"))
+        })
+        .unwrap();
+    };
+    replace(&["a.lyrdb", "a.xml"]);
+    replace(&["a.lyrdb"]);
+    let there = [
+        ".set.sha256",
+        "a.lyrdb",
+        "a.png",
+        "a.xml",
+        "b.json",
+        FOREIGN,
+        "old.lyrdb",
+        "old.png",
+    ];
+    assert_eq!(names(place.path()), there);
+}
+
 /// Leave the second result as a run does that is killed after its decision.
 fn decide(folder: &Path) -> FileSet {
     let set = FileSet::of(folder, "set").unwrap();
@@ -55,7 +82,7 @@ fn decide(folder: &Path) -> FileSet {
     for name in NAMES[1] {
         fs::write(unfinished.join(name), format!("1 {name}")).unwrap();
     }
-    set.complete(&unfinished, &[STALE]).unwrap();
+    set.complete(&unfinished, &[STALE], true).unwrap();
     fs::rename(&unfinished, &set.decided).unwrap();
     set
 }
