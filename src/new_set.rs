@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use metalith_core::{AtomicFile, Error, LayerNumber, Progress, Result};
+use metalith_core::{AtomicFile, Error, FolderLock, LayerNumber, Progress, Result};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractedElement, ExtractionPlan, extract};
 use metalith_pillars::PillarShape;
@@ -80,8 +80,12 @@ pub fn new_set(
         &mut open,
     );
     let page = out.with_extension("html");
-    write_page(&page, &frames, &open)?;
-    AtomicFile::write(out, text.as_bytes())?;
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_owned();
+    let set = name(out).to_string_lossy().into_owned();
+    FolderLock::wait(folder, progress, || ())?.replace(&set, &[], |folder| {
+        write_page(&folder.join(name(&page)), &frames, &open)?;
+        AtomicFile::write(&folder.join(name(out)), text.as_bytes())
+    })?;
     Ok(NewSet {
         frames,
         open,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use metalith_bench_plan::{BenchFile, MeasurementPlan, PlanRequest, check_not_begun, check_plannable, plan};
 use metalith_cell::cache_folder;
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, FolderLock, Progress, Result};
 use metalith_design::{Design, PillarArray};
 use metalith_gds::extract::GdsPillars;
 use metalith_layout::write_pillars;
@@ -28,25 +28,35 @@ pub fn plan_session(
     progress: &dyn Progress,
 ) -> Result<MeasurementPlan> {
     check_plannable(design, bench)?;
+    let turn = FolderLock::wait(folder, progress, || {
+        progress.warn("another run writes into this folder: waiting for it");
+    })?;
     check_not_begun(folder)?;
-    let (layout, layout_in_set) = if let Some(file) = layout {
-        let whole = std::fs::canonicalize(file).map_err(Error::io("find", file))?;
-        let name = whole.display().to_string();
-        (whole, name)
-    } else {
-        let file = folder.join(LAYOUT);
-        let array = PillarArray::build(design, progress)?;
-        write_pillars(design, &array, design.layout.hierarchy, &file, progress)?;
-        (file, LAYOUT.to_owned())
-    };
-    let request = PlanRequest {
-        design,
-        bench,
-        layout: &layout,
-        layout_in_set,
-        folder,
-        only,
-        cache: cache_folder(),
-    };
-    plan(&request, &GdsPillars, progress)
+    // Not listed: a person fills some of these files in.
+    let planned = turn.replace("plan", &[], |into| {
+        let (layout, layout_in_set) = if let Some(file) = layout {
+            let whole = std::fs::canonicalize(file).map_err(Error::io("find", file))?;
+            let name = whole.display().to_string();
+            (whole, name)
+        } else {
+            let file = into.join(LAYOUT);
+            let array = PillarArray::build(design, progress)?;
+            write_pillars(design, &array, design.layout.hierarchy, &file, progress)?;
+            (file, LAYOUT.to_owned())
+        };
+        let request = PlanRequest {
+            design,
+            bench,
+            layout: &layout,
+            layout_in_set,
+            folder,
+            into,
+            only,
+            cache: cache_folder(),
+        };
+        plan(&request, &GdsPillars, progress)
+    })?;
+    let frames = folder.join("captures");
+    std::fs::create_dir_all(&frames).map_err(Error::io("make", &frames))?;
+    Ok(planned)
 }

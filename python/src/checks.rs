@@ -109,7 +109,10 @@ pub fn verify(
         let cases = cases.with_through_focus();
         let found = metalith::verify(design, &array, &layout, &cases, accuracy, p)?;
         if let Some(folder) = out {
-            metalith::write_report(design, &array, &found, None, &folder)?;
+            let turn = metalith::FolderLock::wait(&folder, p, || ())?;
+            turn.publish("report", &[], |folder| {
+                metalith::write_report(design, &array, &found, None, folder)
+            })?;
         }
         Ok((json(&found), found.passed()))
     })

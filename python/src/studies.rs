@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use metalith::FolderLock;
 use metalith::study::{self, Plan, PlanSettings, Work};
 use pyo3::prelude::*;
 
@@ -49,7 +50,8 @@ pub fn study_merge(
     work(py, progress, |p| {
         let result = study::merge(&Plan::open(&folder)?, psfs, p)?;
         if let Some(out) = out {
-            study::write_page(&result, &out)?;
+            let turn = FolderLock::wait(&out, p, || ())?;
+            turn.publish("report", &[], |folder| study::write_page(&result, folder))?;
         }
         Ok(serde_json::json!({ "study": result, "draws": result.draws }).to_string())
     })

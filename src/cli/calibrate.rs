@@ -167,7 +167,9 @@ fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -
             ..base
         };
         let validation = validate(&set, &settings, &plan, terminal)?;
-        write_validation(out, &validation)?;
+        terminal
+            .turn_at(out)?
+            .publish("validation", &[], |folder| write_validation(folder, &validation))?;
         terminal.clear();
         if args.json {
             print_json(&validation);

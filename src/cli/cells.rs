@@ -12,6 +12,7 @@ use metalith::report::{counted, fixed, sig};
 use metalith::{AtomicFile, Design, Error, PolarisationBasis, Progress, Result};
 
 use super::out_folder::OutFolder;
+use super::paths::name_of;
 use super::section_text::with_keys;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
@@ -98,9 +99,10 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         study.steered = study_steered(&design, cache.as_deref(), terminal)?;
         terminal.clear();
     }
-    let _turn = out.turn(terminal)?;
+    let turn = out.turn(terminal)?;
+    turn.publish("cells", &[], |folder| write_cell_report(&study, folder))?;
+    drop(turn);
     let folder = out.path;
-    write_cell_report(&study, &folder)?;
     if args.json {
         print_json(&study);
         return Ok(Outcome::Fine);
@@ -151,7 +153,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
             fixed(best.phase.rms_rad, 3)
         );
         if args.write {
-            write_mapping(&args.design, &design, best)?;
+            write_mapping(&args.design, &design, best, terminal)?;
         }
     }
     for study in &study.steered {
@@ -177,7 +179,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
 }
 
 /// Put a mapping into a design file, and the table that it may need beside that.
-fn write_mapping(path: &Path, design: &Design, best: &MappingStudy) -> Result<()> {
+fn write_mapping(path: &Path, design: &Design, best: &MappingStudy, terminal: &Terminal) -> Result<()> {
     if best.name == "design" {
         print_line!("design: {} has the best of these mappings", path.display());
         return Ok(());
@@ -185,16 +187,8 @@ fn write_mapping(path: &Path, design: &Design, best: &MappingStudy) -> Result<()
     let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
     let wavelength = ((design.mapping.wavelength_um * 1e6).round() / 1e3).to_string();
     let table = format!("{}_mapping.csv", design.name);
-    let quoted = format!("\"{table}\"");
     let coefficients = best.coefficients.as_ref().map(|list| format!("{list:?}"));
     let is_table = coefficients.is_none();
-    let keys = [
-        ("source", None),
-        ("table", is_table.then_some(quoted.as_str())),
-        ("basis", (!is_table).then_some("\"all_powers\"")),
-        ("coefficients", coefficients.as_deref()),
-        ("wavelength_nm", Some(wavelength.as_str())),
-    ];
     let cell = design.cell.mapped(design.mapping.wavelength_um);
     let stated = cell.to_toml();
     let stated: Vec<(&str, Option<&str>)> = stated
@@ -202,16 +196,32 @@ fn write_mapping(path: &Path, design: &Design, best: &MappingStudy) -> Result<()
         .filter_map(|line| line.split_once(" = "))
         .map(|(key, value)| (key, Some(value)))
         .collect();
-    let changed = with_keys(&text, "[mapping]", 0, &keys);
-    let changed = with_keys(&changed, "[mapping.cell]", 0, &stated);
+    let naming = |table: &str| {
+        let quoted = format!("\"{table}\"");
+        let keys = [
+            ("source", None),
+            ("table", is_table.then_some(quoted.as_str())),
+            ("basis", (!is_table).then_some("\"all_powers\"")),
+            ("coefficients", coefficients.as_deref()),
+            ("wavelength_nm", Some(wavelength.as_str())),
+        ];
+        let changed = with_keys(&text, "[mapping]", 0, &keys);
+        with_keys(&changed, "[mapping.cell]", 0, &stated)
+    };
+    // Tables that the design names stand beside it.
+    let beside = path.parent().unwrap_or(Path::new(""));
+    terminal.turn_at(beside)?.replace(&name_of(path), &[], |folder| {
+        if is_table {
+            let rows = cell.to_comments() + &best.table.to_csv();
+            AtomicFile::write(&folder.join(&table), rows.as_bytes())?;
+        }
+        // What cannot be read does not replace what can.
+        Design::parse(path, &naming(&format!("{}/{table}", name_of(folder))))?;
+        AtomicFile::write(&folder.join(name_of(path)), naming(&table).as_bytes())
+    })?;
     if is_table {
-        let file = path.with_file_name(&table);
-        AtomicFile::write(&file, (cell.to_comments() + &best.table.to_csv()).as_bytes())?;
-        print_line!("mapping: {}", file.display());
+        print_line!("mapping: {}", path.with_file_name(&table).display());
     }
-    // What cannot be read does not replace what can.
-    Design::parse(path, &changed)?;
-    AtomicFile::write(path, changed.as_bytes())?;
     print_line!("design: {} has this mapping now", path.display());
     Ok(())
 }
@@ -220,9 +230,9 @@ fn write_mapping(path: &Path, design: &Design, best: &MappingStudy) -> Result<()
 fn rotations(args: &CellsArgs, design: &Design, out: &OutFolder, terminal: &Terminal) -> Result<Outcome> {
     let study = RotationStudy::new(design, terminal)?;
     terminal.clear();
-    let _turn = out.turn(terminal)?;
-    let folder = &out.path;
-    write_rotation_report(&study, folder)?;
+    let turn = out.turn(terminal)?;
+    let folder = turn.folder();
+    turn.publish("cells", &[], |folder| write_rotation_report(&study, folder))?;
     if args.json {
         print_json(&study);
         return Ok(Outcome::Fine);
@@ -258,9 +268,9 @@ fn library(args: &CellsArgs, design: &Design, out: &OutFolder, terminal: &Termin
     let cache = args.cache.clone().or_else(cache_folder);
     let study = LibraryStudy::new(design, cache.as_deref(), terminal)?;
     terminal.clear();
-    let _turn = out.turn(terminal)?;
-    let folder = &out.path;
-    write_library_report(&study, folder)?;
+    let turn = out.turn(terminal)?;
+    let folder = turn.folder();
+    turn.publish("cells", &[], |folder| write_library_report(&study, folder))?;
     if args.json {
         print_json(&study);
         return Ok(Outcome::Fine);

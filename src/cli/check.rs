@@ -9,6 +9,7 @@ use metalith::{AtomicFile, Error, Layout, Result};
 
 use super::compensated::CompensatedFor;
 use super::output::is_standard_output;
+use super::paths::name_of;
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_line, standard_input};
@@ -155,13 +156,15 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     terminal.clear();
     let mut text: Form = if args.json { json } else { drc::text };
+    let mut files = Vec::new();
     for (path, form) in args.outputs() {
         if is_standard_output(path) {
             text = form;
         } else {
-            AtomicFile::write(path, form(&report).as_bytes())?;
+            files.push((path, form(&report)));
         }
     }
+    write_together(&files, terminal)?;
     print_line!("{}", text(&report).trim_end());
     Ok(match report.exit_code() {
         0 => Outcome::Fine,
@@ -170,7 +173,31 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     })
 }
 
-/// Write the rules that a layout keeps.
+/// Write the forms of one result: those of a folder together.
+fn write_together(files: &[(&Path, String)], terminal: &Terminal) -> Result<()> {
+    let folder_of = |path: &Path| path.parent().unwrap_or(Path::new("")).to_owned();
+    for (k, (first, _)) in files.iter().enumerate() {
+        let of_one: Vec<_> = files
+            .iter()
+            .filter(|(path, _)| folder_of(path) == folder_of(first))
+            .collect();
+        if files[..k].iter().any(|(path, _)| folder_of(path) == folder_of(first)) {
+            continue;
+        }
+        if let [(path, text)] = of_one[..] {
+            AtomicFile::write(path, text.as_bytes())?;
+            continue;
+        }
+        terminal
+            .turn_at(&folder_of(first))?
+            .replace(&name_of(first), &[], |folder| {
+                let mut each = of_one.iter();
+                each.try_for_each(|(path, text)| AtomicFile::write(&folder.join(name_of(path)), text.as_bytes()))
+            })?;
+    }
+    Ok(())
+}
+
 /// Rules of an empty layer hold, and say nothing.
 fn has_shapes(layout: &Layout, layer: LayerNumber) -> Result<()> {
     let used = layout.used_layers();
@@ -185,6 +212,7 @@ fn has_shapes(layout: &Layout, layer: LayerNumber) -> Result<()> {
     ))
 }
 
+/// Write the rules that a layout keeps.
 fn write_rules(layout: &Layout, layer: Option<LayerNumber>, path: &Path, terminal: &Terminal) -> Result<Outcome> {
     let rules = drc::new_rules(layout, layer, terminal)?;
     AtomicFile::write(path, rules.text.as_bytes())?;

@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use metalith::baselines::{
-    Comparison, ComparisonResult, DiffuserSpec, Lensless, ListedDesign, MaskSpec, write_comparison,
-};
+use metalith::baselines::{Comparison, DiffuserSpec, Lensless, ListedDesign, MaskSpec, write_comparison};
 use metalith::imaging::KernelCache;
 use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
@@ -85,6 +83,10 @@ pub(crate) struct CompareArgs {
     /// Folder for `compare.html` and `compare.json`.
     #[arg(long, short, default_value = "out/compare", value_name = "FOLDER")]
     out: PathBuf,
+
+    /// Also state CPU seconds in `compare.html` and `compare.json`. Without it, two runs write the same bytes.
+    #[arg(long, conflicts_with = "plan")]
+    timings: bool,
 
     /// Print `compare.json` instead of the table, without its first two fields, `report` and `metalith`.
     #[arg(long)]
@@ -276,19 +278,19 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     let take = |k| open.take(k, &cache, terminal);
     let comparison = open.comparison((0..comparison.count()).map(take).collect::<Result<_>>()?);
     terminal.clear();
+    let table = comparison.markdown();
+    let stated = if args.timings { comparison } else { comparison.untimed() };
+    write_comparison(&stated, &terminal.turn_at(&args.out)?)?;
     if args.json {
-        write_comparison(&comparison, &args.out)?;
-        print_json(&comparison);
-        Ok(Outcome::Fine)
+        print_json(&stated);
     } else {
-        tell(&comparison, &args.out)
+        tell(&table, &args.out);
     }
+    Ok(Outcome::Fine)
 }
 
-/// Write the page and the numbers of a comparison, and print its table.
-pub(crate) fn tell(comparison: &ComparisonResult, folder: &Path) -> Result<Outcome> {
-    write_comparison(comparison, folder)?;
-    output::line(format_args!("{}", comparison.markdown()));
+/// Print the table of a comparison and where its page is.
+pub(crate) fn tell(table: &str, folder: &Path) {
+    output::line(format_args!("{table}"));
     output::line(format_args!("page: {}", folder.join("compare.html").display()));
-    Ok(Outcome::Fine)
 }

@@ -105,7 +105,8 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
     let operator = system.simulation();
     let head = DatasetManifest::of(&system, origin, args.seed);
-    let manifest = write_dataset(&system, &operator, &images, &read, head, &args.out, terminal)?;
+    let turn = terminal.turn_at(&args.out)?;
+    let manifest = write_dataset(&system, &operator, &images, &read, head, &turn, terminal)?;
     terminal.clear();
     print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());
     Ok(Outcome::Fine)

@@ -7,7 +7,7 @@ use metalith::CalibratedModel;
 use metalith::compensate::{compensate, compensated_name, write_compensation_report};
 use metalith::layout::{LayoutFormat, OasisEncoding, Written, write_apertures_as, write_pillars_as};
 use metalith::report::{count, counted, sig};
-use metalith::{Design, Hierarchy, PillarArray, Result, write_layer_properties};
+use metalith::{Design, FolderLock, Hierarchy, PillarArray, Result, write_layer_properties};
 
 use super::out_folder::OutFolder;
 use super::{Outcome, Terminal, print_line, standard_input};
@@ -119,6 +119,19 @@ pub(crate) struct Files {
     pub properties: PathBuf,
 }
 
+impl Files {
+    fn moved_to(mut self, folder: &Path) -> Self {
+        let layouts = [&mut self.pillars, &mut self.apertures];
+        let of_layouts = layouts
+            .into_iter()
+            .flat_map(|written| std::iter::once(&mut written.path).chain(&mut written.beside));
+        for path in of_layouts.chain([&mut self.properties]) {
+            *path = folder.join(path.file_name().expect("it is a file"));
+        }
+        self
+    }
+}
+
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum HierarchyArg {
     /// Each unique part once; its symmetric copies as rotated and mirrored references.
@@ -138,14 +151,32 @@ impl Target {
         OutFolder::of(self.out.as_deref(), Path::new("out").join(name), path)
     }
 
-    /// Write all files of a design into a folder.
-    pub(crate) fn write(
+    /// Write all files of a design into the folder of a turn, with others that `also` writes beside them and of them. Files named in
+    /// `stale` go.
+    pub(crate) fn publish(
         &self,
         design: &Design,
         array: &PillarArray,
-        folder: &Path,
+        turn: &FolderLock,
+        stale: &[&str],
+        also: impl FnOnce(&Files, &Path) -> Result<()>,
         terminal: &Terminal,
     ) -> Result<Files> {
+        // Layouts of several formats may lie side by side.
+        let set = format!(
+            "{}_{}",
+            design.name,
+            self.format.asked()?.unwrap_or_default().extension()
+        );
+        let files = turn.publish(&set, stale, |folder| {
+            let files = self.write(design, array, folder, terminal)?;
+            also(&files, folder)?;
+            Ok(files)
+        })?;
+        Ok(files.moved_to(turn.folder()))
+    }
+
+    fn write(&self, design: &Design, array: &PillarArray, folder: &Path, terminal: &Terminal) -> Result<Files> {
         let file = |suffix: &str| folder.join(format!("{}{suffix}", design.name));
         let properties = file(".lyp");
         let format = self.format.asked()?.unwrap_or_default();
@@ -194,13 +225,15 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         let intended = std::mem::replace(&mut array, compensated.array.clone());
         compensation = Some((model, intended, compensated));
     }
-    let _turn = out.turn(terminal)?;
-    let written = args.target.write(&design, &array, &out.path, terminal)?;
-    if let Some((model, intended, compensated)) = &compensation {
-        let folder = &out.path;
-        let pillars = &written.pillars.path;
-        write_compensation_report(&design, intended, compensated, model, pillars, folder, terminal)?;
-    }
+    let turn = out.turn(terminal)?;
+    let report = |files: &Files, folder: &Path| match &compensation {
+        Some((model, intended, compensated)) => {
+            let pillars = &files.pillars.path;
+            write_compensation_report(&design, intended, compensated, model, pillars, folder, terminal)
+        }
+        None => Ok(()),
+    };
+    let written = args.target.publish(&design, &array, &turn, &[], report, terminal)?;
     terminal.clear();
     if args.json {
         let json = serde_json::json!({

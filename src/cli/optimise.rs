@@ -59,6 +59,9 @@ pub(crate) struct OptimiseArgs {
     starts_per_shard: u64,
 }
 
+/// Files that speak of a phase, and their list.
+const STALE: [&str; 4] = ["report.html", "report.json", "lens.gds", ".report.sha256"];
+
 pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.plan.is_some() {
         standard_input::named([args.design.as_path()])?;
@@ -88,7 +91,7 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     apart([args.design.as_path()], &[&phase, &kept])?;
     let task = OptimiseTask::of(&design)?;
     let cells = TaskCells::of(&design, !args.no_report, cache_folder().as_deref(), terminal)?;
-    let _turn = terminal.turn_at(&folder)?;
+    let turn = terminal.turn_at(&folder)?;
     out.note()?;
     let checkpoint = if args.fresh {
         Checkpoint::begin(&design)
@@ -100,7 +103,11 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let found = task.solve(&cells.all(), checkpoint, terminal)?;
     terminal.clear();
-    write_phase_table(&phase, &task.lens.rings, &found.waves, &remarks(args, &design))?;
+    // A report of an earlier phase must not stand beside this one.
+    turn.replace("phase", &STALE, |folder| {
+        let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
+        write_phase_table(&phase, &task.lens.rings, &found.waves, &remarks(args, &design))
+    })?;
     if let Some(checkpoint) = &found.interrupted {
         checkpoint.save(&kept)?;
         terminal.say(&format!("interrupted; the best so far is in {}", phase.display()));
@@ -115,9 +122,12 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.no_report {
         return Ok(Outcome::Fine);
     }
-    let findings = findings(args, &design, &task, &cells, &found, &phase, &folder, terminal)?;
+    let findings = turn.publish("report", &[], |folder| {
+        let findings = findings(args, &design, &task, &cells, &found, &phase, folder, terminal)?;
+        findings.write(folder)?;
+        Ok(findings)
+    })?;
     terminal.clear();
-    findings.write(&folder)?;
     if args.json {
         print_json(&findings);
     } else {

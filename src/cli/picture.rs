@@ -247,7 +247,7 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         camera: &camera,
         uncertainty: uncertainty.as_ref(),
     };
-    write_pages(&pages, &args.out)?;
+    write_pages(&pages, &terminal.turn_at(&args.out)?)?;
     terminal.clear();
     if args.json {
         print_json(&report);

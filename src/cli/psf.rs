@@ -420,7 +420,9 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             model: model.as_ref(),
             white: white.as_ref(),
         };
-        write_single_psf_report(&report, folder)?;
+        terminal
+            .turn_at(folder)?
+            .publish("report", &[], |folder| write_single_psf_report(&report, folder))?;
     }
     terminal.clear();
     let outcome = Outcome::of(left_out.as_ref().is_none_or(|left_out| !left_out.is_much));

@@ -138,7 +138,7 @@ pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
         of_frame,
         pictures: wanted.into_iter().map(|(picture, _)| picture).collect(),
     };
-    report.write(&frame, &restored, &camera, &args.out)?;
+    report.write(&frame, &restored, &camera, &terminal.turn_at(&args.out)?)?;
     terminal.clear();
     if args.json {
         print_json(&report);

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::{AtomicFile, Error, PillarArray, Result};
+use metalith::{Error, PillarArray, Result};
 
 use super::layout::Target;
-use super::verify::Judging;
+use super::verify::{Judging, REPORT_FILES};
 use super::{Outcome, Terminal, standard_input};
 
 /// Write the layouts of a design, read them back, simulate them, and write the report.
@@ -36,14 +36,14 @@ pub(crate) fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     args.judging.check_drawn(&design, &array)?;
-    let _turn = out.turn(terminal)?;
+    let turn = out.turn(terminal)?;
     // A report speaks of the layout beside it: the old one must not stand beside a new layout, whatever happens.
-    AtomicFile::discard(&folder.join("report.html"))?;
-    AtomicFile::discard(&folder.join("report.json"))?;
-    let written = args.target.write(&design, &array, folder, terminal)?;
+    let written = args
+        .target
+        .publish(&design, &array, &turn, &REPORT_FILES, |_, _| Ok(()), terminal)?;
     let judged = args
         .judging
-        .judge(&design, &array, &written.pillars.path, folder, terminal);
+        .judge(&design, &array, &written.pillars.path, &turn, terminal);
     if let Err(Error::Interrupted) = &judged {
         terminal.clear();
         terminal.say(&format!(

@@ -6,8 +6,9 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use metalith::file::settled;
 use metalith::layout::{LayoutFormat, convert};
-use metalith::{Design, Error, Result};
+use metalith::{Design, Error, Result, Silent};
 use tempfile::TempDir;
 
 use super::Terminal;
@@ -63,9 +64,11 @@ impl InputFile {
     /// The file at `path`; waits for the end of standard input where that is meant.
     ///
     /// # Errors
-    /// If there is no room for the copy in the folder of temporary files.
+    /// If there is no room for the copy in the folder of temporary files, or what a killed run left beside the file cannot be
+    /// finished.
     pub(crate) fn of(path: &Path) -> Result<Self> {
         if !is_standard_input(path) {
+            settled(path, &Silent)?;
             return Ok(Self {
                 path: path.to_owned(),
                 _copy: None,

@@ -11,7 +11,7 @@ use metalith::study::{
 };
 use metalith::{Error, Progress, Result};
 
-use super::paths::apart;
+use super::paths::{apart, name_of};
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Simulate many chips with the tolerances of a process and a bench: the yield, and the effects that limit it.
@@ -289,8 +289,11 @@ fn merge_pairs(plan: &PairsPlan, args: &MergeArgs, terminal: &Terminal) -> Resul
 fn merge_comparison(plan: &metalith::study::ComparisonPlan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     without_table(args)?;
     let comparison = plan.merge(terminal)?;
+    let table = comparison.markdown();
+    metalith::baselines::write_comparison(&comparison.untimed(), &terminal.turn_at(&args.study)?)?;
     terminal.clear();
-    super::compare::tell(&comparison, &args.study)
+    super::compare::tell(&table, &args.study);
+    Ok(Outcome::Fine)
 }
 
 fn merge_starts(plan: &StartsPlan, args: &MergeArgs) -> Result<Outcome> {
@@ -314,8 +317,10 @@ fn merge_study(plan: &Plan, args: &MergeArgs, terminal: &Terminal) -> Result<Out
     apart([args.study.join(MANIFEST).as_path()], &[&out, &page, &numbers])?;
     TableFormat::of(&out)?;
     let result = merge(plan, args.psfs, terminal)?;
-    result.write(&out)?;
-    write_page(&result, &folder)?;
+    terminal.turn_at(&folder)?.publish(&name_of(&out), &[], |folder| {
+        result.write(&folder.join(name_of(&out)))?;
+        write_page(&result, folder)
+    })?;
     terminal.clear();
     for y in &result.yields {
         print_line!(

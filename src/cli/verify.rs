@@ -9,8 +9,8 @@ use metalith::imaging::thumbnail;
 use metalith::report::{Figure, count, counted, sig};
 use metalith::sensor::Camera;
 use metalith::{
-    Accuracy, AsBuiltChip, CalibratedModel, Design, Error, Fidelity, PillarArray, PillarRows, Result, SimulationCases,
-    Verification, cell_models, verify,
+    Accuracy, AsBuiltChip, CalibratedModel, Design, Error, Fidelity, FolderLock, PillarArray, PillarRows, Result,
+    SimulationCases, Verification, cell_models, verify,
     verify::{Simulation, lens_figures, verdict_words, verify_in_parts, verify_pillars},
     write_report,
 };
@@ -19,6 +19,12 @@ use super::compensated::{CompensatedFor, judged_as_made};
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
+
+/// Name of the set of the files of the report.
+const REPORT: &str = "report";
+
+/// Names of its files, and of their list.
+pub(crate) const REPORT_FILES: [&str; 3] = ["report.html", "report.json", ".report.sha256"];
 
 /// Read a layout back, compare every pillar with its design, simulate it, and write the report.
 #[derive(Args)]
@@ -165,13 +171,13 @@ impl Judging {
         if self.fast { Accuracy::Fast } else { Accuracy::Accurate }
     }
 
-    /// Read back, simulate, write the report into `folder`, and say what came out.
+    /// Read back, simulate, write the report into the folder of a turn, and say what came out.
     pub(crate) fn judge(
         &self,
         design: &Design,
         array: &PillarArray,
         layout: &Path,
-        folder: &Path,
+        turn: &FolderLock,
         terminal: &Terminal,
     ) -> Result<Outcome> {
         let mut design = design.clone();
@@ -197,11 +203,11 @@ impl Judging {
                 let cases = SimulationCases::of_cells(&models)?;
                 let accuracy = self.accuracy();
                 let found = verify_in_parts(design, array, layout, &cases, accuracy, part_bytes, terminal)?;
-                return self.report(design, array, &found, None, folder, terminal);
+                return self.report(design, array, &found, None, turn, terminal);
             }
             Simulation::Not(why) => {
                 let found = verify_pillars(design, array, layout, judge, why, terminal)?;
-                return self.report(design, array, &found, None, folder, terminal);
+                return self.report(design, array, &found, None, turn, terminal);
             }
         }
         let model = self.model()?;
@@ -238,7 +244,7 @@ impl Judging {
             },
             None => None,
         };
-        self.report(design, array, &found, picture, folder, terminal)
+        self.report(design, array, &found, picture, turn, terminal)
     }
 
     /// The cell of the pillars as drawn that judges a layout of this design.
@@ -252,17 +258,19 @@ impl Judging {
         array: &PillarArray,
         found: &Verification,
         picture: Option<Figure>,
-        folder: &Path,
+        turn: &FolderLock,
         terminal: &Terminal,
     ) -> Result<Outcome> {
-        write_report(design, array, found, picture, folder)?;
+        turn.publish(REPORT, &[], |folder| {
+            write_report(design, array, found, picture, folder)
+        })?;
         terminal.clear();
         if self.json {
             print_json(found);
         } else if terminal.is_quiet() {
             print_failed(found);
         } else {
-            summary(design, array, found, folder);
+            summary(design, array, found, turn.folder());
         }
         Ok(Outcome::of(found.passed()))
     }
@@ -338,6 +346,6 @@ pub(crate) fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
         ..args.judging.clone()
     };
     judging.check_drawn(&design, &array)?;
-    let _turn = terminal.turn_at(&folder)?;
-    judging.judge(&design, &array, &layout, &folder, terminal)
+    let turn = terminal.turn_at(&folder)?;
+    judging.judge(&design, &array, &layout, &turn, terminal)
 }

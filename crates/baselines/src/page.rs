@@ -1,20 +1,20 @@
 //! The page of a comparison.
 
-use std::path::Path;
-
-use metalith_core::{Result, srgb};
+use metalith_core::{FolderLock, Result, srgb};
 use metalith_imaging::{Zone, shown};
 use metalith_report::{Cell, Column, Page, PhotoRow, Table, write_json};
 
 use crate::compare::{ComparedCamera, ComparisonResult};
 
-/// Write `compare.html` and `compare.json` into a folder.
+/// Write `compare.html` and `compare.json` into the folder of a turn.
 ///
 /// # Errors
 /// If they cannot be written.
-pub fn write_comparison(comparison: &ComparisonResult, folder: &Path) -> Result<()> {
-    write_json(&folder.join("compare.json"), "comparison", comparison)?;
-    page(comparison).write(&folder.join("compare.html"))
+pub fn write_comparison(comparison: &ComparisonResult, turn: &FolderLock) -> Result<()> {
+    turn.publish("compare", &[], |folder| {
+        write_json(&folder.join("compare.json"), "comparison", comparison)?;
+        page(comparison).write(&folder.join("compare.html"))
+    })
 }
 
 fn page(comparison: &ComparisonResult) -> Page {
@@ -48,9 +48,14 @@ fn page(comparison: &ComparisonResult) -> Page {
     table(&mut page, comparison, "PSNR of linear light", "dB", 2, |s| {
         s.psnr_linear_db
     });
-    page.paragraph(
-        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values unless stated otherwise. CPU seconds are for one picture. Frames of cameras without a lens are not pictures and have no scores. LPIPS needs its weights (`--lpips`); without them the column is empty.",
-    );
+    let timed = if comparison.is_timed() {
+        "CPU seconds are for one picture. "
+    } else {
+        ""
+    };
+    page.paragraph(format!(
+        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values unless stated otherwise. {timed}Frames of cameras without a lens are not pictures and have no scores. LPIPS needs its weights (`--lpips`); without them the column is empty."
+    ));
     for camera in &comparison.cameras {
         one(&mut page, camera);
     }
@@ -82,6 +87,9 @@ fn table(
     let scored = what == "SSIM";
     if scored {
         columns.push(Column::number("1 - LPIPS", ""));
+    }
+    let timed = scored && comparison.is_timed();
+    if timed {
         columns.push(Column::number("CPU time", "s"));
     }
     let mut table = Table::new(columns);
@@ -92,7 +100,9 @@ fn table(
             if scored {
                 let optional = |v: Option<f64>, digits| v.map_or_else(Cell::none, |v| Cell::fixed(v, digits));
                 row.push(optional(way.one_less_lpips, 3));
-                row.push(optional(way.cpu_s, 0));
+                if timed {
+                    row.push(optional(way.cpu_s, 0));
+                }
             }
             table.row(row);
         }
@@ -147,7 +157,7 @@ mod tests {
         };
         let folder = tempfile::tempdir().unwrap();
         let written = |camera: ComparedCamera| {
-            write_comparison(&comparison(camera), folder.path()).unwrap();
+            write_comparison(&comparison(camera), &FolderLock::of(folder.path()).unwrap()).unwrap();
             ["compare.html", "compare.json"].map(|name| std::fs::read_to_string(folder.path().join(name)).unwrap())
         };
         const NOTE: &str = "the restoration is limited by its operator";

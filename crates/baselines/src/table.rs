@@ -32,6 +32,21 @@ impl ComparisonResult {
         })
     }
 
+    /// True if CPU seconds are stated.
+    pub(crate) fn is_timed(&self) -> bool {
+        self.cameras.iter().any(|c| c.ways.iter().any(|w| w.cpu_s.is_some()))
+    }
+
+    /// This comparison without CPU seconds, which no two runs agree about.
+    #[must_use]
+    pub fn untimed(mut self) -> Self {
+        for camera in &mut self.cameras {
+            camera.frame_cpu_s = None;
+            camera.ways.iter_mut().for_each(|way| way.cpu_s = None);
+        }
+        self
+    }
+
     /// The table in Markdown: a row for each camera and way; zones are separated by slashes.
     pub fn markdown(&self) -> String {
         let zones = Zone::ALL.map(Zone::name).join(" / ");

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use metalith_cell::Material;
-use metalith_core::{AtomicFile, Error, Result};
+use metalith_core::{AtomicFile, Result};
 use metalith_design::Design;
 use metalith_pillars::PillarShape;
 
@@ -52,8 +52,6 @@ pub(crate) fn write_set(
     if !set.sem.is_empty() {
         AtomicFile::write(&folder.join("cd_sem.csv"), sem_table(set).as_bytes())?;
     }
-    let frames = folder.join("captures");
-    std::fs::create_dir_all(&frames).map_err(Error::io("make", &frames))?;
     let text = text(design, bench, set, layout, &substrate, spacer);
     AtomicFile::write(&folder.join("measurement.toml"), text.as_bytes())
 }

@@ -107,6 +107,8 @@ pub struct PlanRequest<'a> {
     pub layout_in_set: String,
     /// Folder of the set.
     pub folder: &'a Path,
+    /// Folder that the files are written into before they take their places there; the same one if nothing stands there.
+    pub into: &'a Path,
     /// Plan for these effects alone; for all if empty.
     pub only: Vec<String>,
     /// Folder of cached tables of cells.
@@ -184,7 +186,7 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
     let confusions = expected_performance::confusions(&simulator, &shown, &choice, &picked, &reachable);
     let of_spectrometer = |s| cheap::cheap(&set, s, bench.sem, &effects, progress);
     let cheap = bench.spectrometer.as_ref().map(of_spectrometer).transpose()?;
-    files::write_set(request.folder, design, bench, &shown, &request.layout_in_set)?;
+    files::write_set(request.into, design, bench, &shown, &request.layout_in_set)?;
     let plan = MeasurementPlan {
         folder: request.folder.to_owned(),
         page: request.folder.join("plan.html"),
@@ -193,10 +195,10 @@ pub fn plan(request: &PlanRequest<'_>, reader: &dyn PillarReader, progress: &dyn
         effects,
         confusions,
         cheap,
-        written: filled_in_files::digests(request.folder)?,
+        written: filled_in_files::digests(request.into)?,
     };
-    page::write_page(&plan, &shown, candidates.unseen)?;
-    metalith_report::write_json(&request.folder.join("plan.json"), "plan", &plan)?;
+    page::write_page(&request.into.join("plan.html"), &plan, &shown, candidates.unseen)?;
+    metalith_report::write_json(&request.into.join("plan.json"), "plan", &plan)?;
     Ok(plan)
 }
 

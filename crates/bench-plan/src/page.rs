@@ -1,5 +1,7 @@
 //! The check list of a planned session, to print.
 
+use std::path::Path;
+
 use metalith_core::Result;
 use metalith_report::{Cell, Column, ImageGrid, Page, Table, Verdict, count, counted, exact, sig};
 
@@ -19,7 +21,7 @@ const SAME: f64 = 1e-6;
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(crate) fn write_page(plan: &MeasurementPlan, set: &MeasuredSet, unseen: usize) -> Result<()> {
+pub(crate) fn write_page(path: &Path, plan: &MeasurementPlan, set: &MeasuredSet, unseen: usize) -> Result<()> {
     let mut page = Page::new(
         format!("Check list: {}", set.title),
         "Measurements to take, and the effects that they will find",
@@ -50,7 +52,7 @@ pub(crate) fn write_page(plan: &MeasurementPlan, set: &MeasuredSet, unseen: usiz
         if unseen > 0 { format!(" ({unseen} more were left out: their light leaves the element too steeply, or lands too far from its axis)") } else { String::new() }
     ));
     page.paragraph("The plan is based on a simulation of the design as drawn, with single effects and pairs of effects. A chip that differs by much more than the wanted sizes may need other measurements.");
-    page.write(&plan.page)
+    page.write(path)
 }
 
 fn instructions(page: &mut Page, plan: &MeasurementPlan, set: &MeasuredSet) {

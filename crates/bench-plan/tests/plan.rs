@@ -50,6 +50,7 @@ fn planned(folder: &Path, design: &Design, bench: &str, only: &[&str]) -> Measur
         layout: &layout,
         layout_in_set: "layout.gds".into(),
         folder,
+        into: folder,
         only: only.iter().map(|n| (*n).into()).collect(),
         cache: None,
     };
@@ -62,6 +63,7 @@ fn mini() -> Design {
 
 /// Fill the folder with frames; dark ones where none are given.
 fn fill(folder: &Path, plan: &MeasurementPlan, set: Option<&MeasuredSet>) {
+    std::fs::create_dir_all(folder.join("captures")).unwrap();
     for (k, measurement) in plan.measurements.iter().enumerate() {
         let dark = Array2::from_elem((PIXELS, PIXELS), 40.0);
         let frame = set.map_or(dark, |set| set.measurements.raw[k].dn.clone());

@@ -15,6 +15,10 @@ use metalith_core::{AtomicFile, FolderLock, Progress, Result};
 use metalith_optics::CalibratedModel;
 use metalith_pillars::PillarReader;
 
+/// The files of the answer and of its page, in the folder of the answers.
+const ANSWER: &str = "diagnosis.json";
+const REPORT: &str = "report.html";
+
 /// The file of the calibrated model, in the folder of the answers.
 const MODEL: &str = "model.toml";
 
@@ -91,13 +95,6 @@ fn conclude(
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Calibration> {
-    let _turn = FolderLock::wait(out, progress, || {
-        progress.warn("another run writes into this folder: waiting for it");
-    })?;
-    // This run may find none, and those of another must not stand beside its answer.
-    AtomicFile::discard(&out.join(MODEL))?;
-    let file = out.join(PROPOSAL);
-    AtomicFile::discard(&file)?;
     let mut proposed: Vec<Proposed> = Vec::new();
     let mut adopted: Option<(Session<'_>, Simulations)> = None;
     let without = diagnosis.error.after.held_out;
@@ -125,47 +122,52 @@ fn conclude(
         (diagnosis, evidence) = found;
         adopted = Some((wider, wider_simulations));
     }
+    let mut proposal = None;
     if !proposed.is_empty() {
         let effects: Vec<DeclaredEffect> = proposed.iter().map(|p| p.effect.clone()).collect();
-        AtomicFile::write(&file, DeclaredEffect::text(&effects).as_bytes())?;
+        proposal = Some(DeclaredEffect::text(&effects));
         let reason = |p: &Proposed| format!("`{}`: {}", p.effect.name, p.reason);
         diagnosis.proposal = Some(Proposal {
-            file: file.display().to_string(),
+            file: out.join(PROPOSAL).display().to_string(),
             effects: effects.into_iter().map(|e| e.name).collect(),
             reasons: proposed.iter().map(reason).collect(),
             held_out_without: adopted.is_some().then_some(without),
         });
     }
     let (session, simulations) = adopted.as_ref().map_or((session, simulations), |(a, b)| (a, b));
-    write(session, simulations, diagnosis, evidence, out)
+    let turn = FolderLock::wait(out, progress, || {
+        progress.warn("another run writes into this folder: waiting for it");
+    })?;
+    write(session, simulations, diagnosis, (evidence, proposal), &turn)
 }
 
-/// Write diagnosis, report and model.
+/// Write diagnosis, report, model and proposal. There may be no model or no proposal, and those of an earlier run must not stand beside
+/// the answer.
 fn write(
     session: &Session<'_>,
     simulations: &Simulations,
     diagnosis: Diagnosis,
-    evidence: Option<Evidence>,
-    out: &Path,
+    (evidence, proposal): (Option<Evidence>, Option<String>),
+    turn: &FolderLock,
 ) -> Result<Calibration> {
-    let answer = out.join("diagnosis.json");
-    let report = out.join("report.html");
-    diagnosis.write(&answer)?;
-    write_page(&report, session, simulations, &diagnosis, evidence.as_ref())?;
-    let has_a_model = diagnosis.verdict.has_a_model();
-    let model = match evidence.filter(|_| has_a_model) {
-        None => None,
-        Some(evidence) => {
-            let perturbation = session.simulator.perturbation(&evidence.finding.after.theta);
-            let path = out.join(MODEL);
-            CalibratedModel::new(diagnosis.set.clone(), diagnosis.sentence(), perturbation).write(&path)?;
-            Some(path)
+    let evidence = evidence.as_ref();
+    let model = evidence.filter(|_| diagnosis.verdict.has_a_model()).map(|evidence| {
+        let perturbation = session.simulator.perturbation(&evidence.finding.after.theta);
+        CalibratedModel::new(diagnosis.set.clone(), diagnosis.sentence(), perturbation)
+    });
+    turn.publish("calibration", &[MODEL, PROPOSAL], |folder| {
+        diagnosis.write(&folder.join(ANSWER))?;
+        write_page(&folder.join(REPORT), session, simulations, &diagnosis, evidence)?;
+        if let Some(text) = &proposal {
+            AtomicFile::write(&folder.join(PROPOSAL), text.as_bytes())?;
         }
-    };
+        model.as_ref().map_or(Ok(()), |model| model.write(&folder.join(MODEL)))
+    })?;
+    let out = turn.folder();
     Ok(Calibration {
         diagnosis,
-        answer,
-        report,
-        model,
+        answer: out.join(ANSWER),
+        report: out.join(REPORT),
+        model: model.map(|_| out.join(MODEL)),
     })
 }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::file::{file_digest, read_at_most};
 use metalith_core::text::hex;
-use metalith_core::{AtomicFile, Error, Progress, Result, srgb};
+use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result, srgb};
 use metalith_design::Design;
 use metalith_sensor::Camera;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,8 @@ use crate::operator::FrameOperator;
 use crate::png16;
 use crate::scene::SceneImage;
 
+/// Name of the file that lists the pairs.
+const MANIFEST: &str = "manifest.json";
 /// Images of one shard: a folder named by the range of their numbers.
 const SHARD: usize = 1000;
 /// Format of the files of a set, in words that change with it: files of an older format are made anew.
@@ -130,30 +132,48 @@ impl DatasetManifest {
     }
 }
 
-/// Write one pair for each image into a folder, and the manifest when all are there: `manifest` with these pairs. `read` gives the
-/// scene of an image. Ask [`check_images`](crate::check_images) first: here an image that cannot be used stops the work.
+/// Write one pair for each image into the folder of a turn, and the manifest when all are there: `manifest` with these pairs. `read`
+/// gives the scene of an image. Ask [`check_images`](crate::check_images) first: here an image that cannot be used stops the work.
 ///
 /// # Errors
 /// If an image cannot be read or is not of the size that the imaging system was opened for, a file cannot be written, or the user
-/// stopped it; what is complete is kept.
+/// stopped it; what is complete is kept. If another process without a lock wrote other pairs meanwhile.
 pub fn write_dataset(
     system: &ImagingSystem,
     operator: &FrameOperator<'_>,
     images: &[PathBuf],
     read: &dyn Fn(&Path) -> Result<SceneImage>,
     mut manifest: DatasetManifest,
-    folder: &Path,
+    turn: &FolderLock,
     progress: &dyn Progress,
 ) -> Result<DatasetManifest> {
     progress.begin("recording frames", images.len() as u64);
-    let writer = PairWriter::new(system, operator, manifest.seed, folder);
+    let writer = PairWriter::new(system, operator, manifest.seed, turn.folder());
     for (i, image) in images.iter().enumerate() {
         progress.check_stopped()?;
         manifest.pairs.push(writer.write(image, i, read)?);
         progress.advance(1);
     }
-    write_dataset_manifest(folder, &manifest)?;
+    write_dataset_manifest(turn.folder(), &manifest)?;
+    if !turn.is_held() {
+        check_own(turn.folder(), &manifest)?;
+    }
     Ok(manifest)
+}
+
+/// Succeeds if the pairs that are there are those of a manifest; else the manifest is removed.
+fn check_own(folder: &Path, manifest: &DatasetManifest) -> Result<()> {
+    let is = |name: &str, digest: &str| file_digest(&folder.join(name)).is_ok_and(|found| hex(&found) == digest);
+    let is_own = |p: &DatasetPair| is(&p.frame, &p.frame_sha256) && is(&p.truth, &p.truth_sha256);
+    if manifest.pairs.iter().all(is_own) {
+        return Ok(());
+    }
+    AtomicFile::discard(&folder.join(MANIFEST))?;
+    Err(Error::refused(
+        "file/changed-meanwhile",
+        format!("another process wrote pairs into {} at the same time", folder.display()),
+        "let one program at a time write into this folder, and try again",
+    ))
 }
 
 /// Write `manifest.json` of a set.
@@ -161,7 +181,7 @@ pub fn write_dataset(
 /// # Errors
 /// If the file cannot be written.
 pub fn write_dataset_manifest(folder: &Path, manifest: &DatasetManifest) -> Result<()> {
-    metalith_report::write_json(&folder.join("manifest.json"), "dataset", manifest)
+    metalith_report::write_json(&folder.join(MANIFEST), "dataset", manifest)
 }
 
 /// Writer of the pairs of a set.
@@ -220,6 +240,8 @@ impl<'a> PairWriter<'a> {
             let ideal = self.system.truth(&scene).mapv(srgb::encoded);
             let frame = png16::grey(&recorded.planes, self.black, &of_frame);
             let truth = png16::colour(&ideal, Some(&of_truth));
+            // It speaks of other pairs from now on.
+            AtomicFile::discard(&self.folder.join(MANIFEST))?;
             AtomicFile::write(&frame_file, &frame)?;
             AtomicFile::write(&truth_file, &truth)?;
             [frame, truth]

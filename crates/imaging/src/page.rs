@@ -1,8 +1,6 @@
 //! The page of a picture.
 
-use std::path::Path;
-
-use metalith_core::{Result, part, srgb};
+use metalith_core::{FolderLock, Result, part, srgb};
 use metalith_report::{Axis, Cell, Chart, Column, HeatMap, Page, PhotoRow, Table, fixed, write_json};
 use metalith_sensor::{Camera, ColourFilter};
 use ndarray::{Array2, Array3};
@@ -32,17 +30,19 @@ pub struct PicturePages<'a> {
 /// Edge of a zoom (pixels of the scene).
 const ZOOM: usize = 96;
 
-/// Write `picture.html` and `picture.json` into a folder, and the frame and all pictures beside them.
+/// Write `picture.html` and `picture.json` into the folder of a turn, and the frame and all pictures beside them.
 ///
 /// # Errors
 /// If they cannot be written.
-pub fn write_pages(pages: &PicturePages<'_>, folder: &Path) -> Result<()> {
-    pages.report.frame.write(pages.frame, folder)?;
-    for (restoration, picture) in pages.report.restorations.iter().zip(pages.restored) {
-        write_restored(&folder.join(&restoration.picture), picture)?;
-    }
-    write_json(&folder.join("picture.json"), "picture", pages.report)?;
-    page(pages).write(&folder.join("picture.html"))
+pub fn write_pages(pages: &PicturePages<'_>, turn: &FolderLock) -> Result<()> {
+    turn.publish("picture", &[], |folder| {
+        pages.report.frame.write(pages.frame, folder)?;
+        for (restoration, picture) in pages.report.restorations.iter().zip(pages.restored) {
+            write_restored(&folder.join(&restoration.picture), picture)?;
+        }
+        write_json(&folder.join("picture.json"), "picture", pages.report)?;
+        page(pages).write(&folder.join("picture.html"))
+    })
 }
 
 /// Scene and picture in linear sRGB, and the frame between them.

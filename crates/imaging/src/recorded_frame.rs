@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use metalith_core::file::read_at_most;
+use metalith_core::file::{check_unaltered, read_at_most};
 use metalith_core::{Error, Result};
 use metalith_sensor::Camera;
 use ndarray::Array2;
@@ -34,8 +34,9 @@ struct Grey {
 /// channel below one another, as `metalith picture` writes it.
 ///
 /// # Errors
-/// If it cannot be read, is of another camera, or neither it nor `numbers` says what its numbers are.
+/// If it cannot be read, is of another run than the files beside it, is of another camera, or neither it nor `numbers` says what its numbers are.
 pub fn read_signals(path: &Path, camera: &Camera, numbers: FrameNumbers) -> Result<Vec<Array2<f32>>> {
+    check_unaltered(path)?;
     let (rows, columns) = (camera.sensor.rows as usize, camera.sensor.columns as usize);
     let grey = read_grey(path, [rows * planes_of(camera), columns])?;
     let signal = signals(camera, path, &grey, numbers)?;

@@ -1,8 +1,6 @@
 //! The page of pictures that were restored from a recorded frame: nobody knows the scene.
 
-use std::path::Path;
-
-use metalith_core::{Result, srgb};
+use metalith_core::{FolderLock, Result, srgb};
 use metalith_report::{Page, PhotoRow, fixed, write_json};
 use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
@@ -49,16 +47,18 @@ impl RestoredReport {
     /// Name of its page.
     pub const PAGE: &str = "restored.html";
 
-    /// Write the page, its numbers and all pictures, linear sRGB in the order of the report, into a folder.
+    /// Write the page, its numbers and all pictures, linear sRGB in the order of the report, into the folder of a turn.
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn write(&self, frame: &Frame, pictures: &[Array3<f64>], camera: &Camera, folder: &Path) -> Result<()> {
-        for (restored, picture) in self.pictures.iter().zip(pictures) {
-            write_restored(&folder.join(&restored.picture), picture)?;
-        }
-        write_json(&folder.join("restored.json"), "restored", self)?;
-        self.page(frame, pictures, camera).write(&folder.join(Self::PAGE))
+    pub fn write(&self, frame: &Frame, pictures: &[Array3<f64>], camera: &Camera, turn: &FolderLock) -> Result<()> {
+        turn.publish("restored", &[], |folder| {
+            for (restored, picture) in self.pictures.iter().zip(pictures) {
+                write_restored(&folder.join(&restored.picture), picture)?;
+            }
+            write_json(&folder.join("restored.json"), "restored", self)?;
+            self.page(frame, pictures, camera).write(&folder.join(Self::PAGE))
+        })
     }
 
     fn page(&self, frame: &Frame, pictures: &[Array3<f64>], camera: &Camera) -> Page {

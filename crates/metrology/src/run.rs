@@ -261,28 +261,26 @@ fn write(
     progress: &dyn Progress,
     figures: impl FnOnce(&mut Page),
 ) -> Result<Answer> {
-    let _turn = FolderLock::wait(out, progress, || {
+    let turn = FolderLock::wait(out, progress, || {
         progress.warn("another run writes into this folder: waiting for it");
     })?;
-    let [answer, report] = ["diagnosis.json", "report.html"].map(|name| out.join(name));
-    let [proposed, model] = ["proposal.toml", "model.toml"].map(|name| out.join(name));
-    for earlier in [&proposed, &model] {
-        AtomicFile::discard(earlier)?;
-    }
-    if let Some(text) = proposal {
-        AtomicFile::write(&proposed, text.as_bytes())?;
-    }
-    metalith_report::write_plain_json(&answer, &diagnosis)?;
+    let [answer, report, proposed, model] = ["diagnosis.json", "report.html", "proposal.toml", "model.toml"];
     let mut page = page(&diagnosis, unit);
     figures(&mut page);
-    page.write(&report)?;
-    if let Some(calibrated) = &calibrated {
-        calibrated.write(&model)?;
-    }
+    turn.publish("calibration", &[proposed, model], |folder| {
+        if let Some(text) = &proposal {
+            AtomicFile::write(&folder.join(proposed), text.as_bytes())?;
+        }
+        metalith_report::write_plain_json(&folder.join(answer), &diagnosis)?;
+        page.write(&folder.join(report))?;
+        calibrated
+            .as_ref()
+            .map_or(Ok(()), |found| found.write(&folder.join(model)))
+    })?;
     Ok(Answer {
         diagnosis,
-        answer,
-        report,
-        model: calibrated.map(|_| model),
+        answer: out.join(answer),
+        report: out.join(report),
+        model: calibrated.map(|_| out.join(model)),
     })
 }

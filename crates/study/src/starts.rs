@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{AtomicFile, Error, Progress, Quiet, Result};
+use metalith_core::{AtomicFile, Error, FolderLock, Progress, Quiet, Result};
 use metalith_design::Design;
 use metalith_optimise::{Checkpoint, OptimiseTask, TaskCells, write_phase_table};
 use serde::{Deserialize, Serialize};
@@ -147,12 +147,14 @@ impl StartsPlan {
                 found.merit
             ),
         ];
-        write_phase_table(&phase, &task.lens.rings, &found.waves, &remarks)?;
         let mut table = String::from("start,seed,from,merit\n");
         for s in &starts {
             table.push_str(&format!("{},{},{},{}\n", s.start, s.seed, s.from, s.merit));
         }
-        AtomicFile::write(&self.folder.join("starts.csv"), table.as_bytes())?;
+        FolderLock::of(&self.folder)?.publish("starts", &[], |folder| {
+            write_phase_table(&folder.join("phase.csv"), &task.lens.rings, &found.waves, &remarks)?;
+            AtomicFile::write(&folder.join("starts.csv"), table.as_bytes())
+        })?;
         Ok(StartsResult { starts, best, phase })
     }
 }

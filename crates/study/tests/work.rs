@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use common::{SMALL_CAMERA, tolerance};
 use metalith_baselines::{Comparison, ComparisonResult, Lensless, ListedDesign, MaskSpec};
-use metalith_core::Silent;
+use metalith_core::{FolderLock, Silent};
 use metalith_design::Design;
 use metalith_imaging::scene::read_far_scene;
 use metalith_imaging::{DatasetManifest, DatasetOrigin, ImagingSystem, write_dataset};
@@ -124,7 +124,7 @@ fn pairs_of_shards_are_those_of_one_run() {
             &images,
             &scene,
             head,
-            &at("alone"),
+            &FolderLock::of(&at("alone")).unwrap(),
             &Silent,
         )
         .unwrap()
@@ -262,7 +262,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     ];
     assert_eq!(names, expected);
     assert!(merged.cameras.iter().all(|c| c.shown.is_some()));
-    metalith_baselines::write_comparison(&merged, &at("page")).unwrap();
+    metalith_baselines::write_comparison(&merged, &FolderLock::of(&at("page")).unwrap()).unwrap();
     let page = fs::read_to_string(at("page/compare.html")).unwrap();
     for part in ["Pictures of small", "Pictures of FlatCam, ours"] {
         assert!(page.contains(part), "{part}");

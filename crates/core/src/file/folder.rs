@@ -5,6 +5,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use super::file_set::wait_for_other;
 use super::part;
 use crate::error::{Error, Result};
 
@@ -86,13 +87,19 @@ impl AtomicFolder {
         let parent = part::folder_of(target);
         fs::create_dir_all(parent).map_err(Error::io("create the folder", parent))?;
         let lock = part::open(&places.lock, target)?;
+        let is_locked = lock.is_some();
         let mut this = Self {
             part: PathBuf::new(),
             places,
-            lock: Some(lock),
+            lock,
         };
+        if !is_locked {
+            wait_for_other(&this.places.ready)?;
+        }
         this.places.finish()?;
-        this.places.remove_unfinished()?;
+        if is_locked {
+            this.places.remove_unfinished()?;
+        }
         this.part = this.places.new_part()?;
         Ok(this)
     }
@@ -113,10 +120,22 @@ impl AtomicFolder {
     /// If the archive is missing or the disk refuses. The old ones are then as they were, or the next run finishes
     /// what this one began.
     pub fn publish(mut self) -> Result<()> {
+        let there = |path: &Path| fs::symlink_metadata(path).map_err(Error::io("publish", path));
+        let own = [there(&self.folder())?, there(&self.archive())?];
         self.places.decide(&self.part)?;
         // From here on the new ones stand: nothing is thrown away.
         self.part = PathBuf::new();
-        self.places.finish()
+        self.places.finish()?;
+        let is_own = |path: &Path, own| there(path).is_ok_and(|found| part::same(&found, own));
+        if is_own(&self.places.folder, &own[0]) && is_own(&self.places.archive, &own[1]) {
+            return Ok(());
+        }
+        // Where there are no locks.
+        Err(Error::refused(
+            "file/changed-meanwhile",
+            format!("{} was replaced while it was written", self.places.folder.display()),
+            "let one program at a time write into this folder, and try again",
+        ))
     }
 }
 
@@ -133,7 +152,7 @@ impl Drop for AtomicFolder {
 }
 
 /// True if something is at the path; links are not followed.
-fn is_there(path: &Path) -> Result<bool> {
+pub(super) fn is_there(path: &Path) -> Result<bool> {
     match fs::symlink_metadata(path) {
         Ok(_) => Ok(true),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(false),
@@ -141,11 +160,11 @@ fn is_there(path: &Path) -> Result<bool> {
     }
 }
 
-fn rename(from: &Path, to: &Path) -> Result<()> {
+pub(super) fn rename(from: &Path, to: &Path) -> Result<()> {
     fs::rename(from, to).map_err(Error::io("rename to", to))
 }
 
-fn remove_tree(path: &Path) -> Result<()> {
+pub(super) fn remove_tree(path: &Path) -> Result<()> {
     match fs::remove_dir_all(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", path)(error)),
         _ => Ok(()),
@@ -221,7 +240,6 @@ impl Places {
     fn decide(&self, part: &Path) -> Result<()> {
         for made in [part.join(FOLDER), part.join(ARCHIVE)] {
             part::flush_folder_of(&made).map_err(Error::io("flush the folder of", &made))?;
-            fs::metadata(&made).map_err(Error::io("publish", &made))?;
         }
         rename(part, &self.ready)?;
         part::flush_folder_of(&self.ready).map_err(Error::io("flush the folder of", &self.ready))

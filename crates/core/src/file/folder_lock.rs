@@ -1,29 +1,67 @@
 //! One run at a time writes the files of a folder.
 
 use std::fs::{self, File, TryLockError};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use super::file_set;
 use crate::error::{Error, Result};
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 
 /// Time that a run waits before it asks again.
-const PAUSE: Duration = Duration::from_millis(50);
+pub(super) const PAUSE: Duration = Duration::from_millis(50);
 
 /// The turn of a run to write the files of a folder, which belong together: two runs at once would leave some of the one and
 /// some of the other. It ends when it is dropped, or with the process.
 #[derive(Debug)]
 pub struct FolderLock {
+    folder: PathBuf,
     /// The folder itself, locked; none where folders or their file system have no locks.
-    _locked: Option<File>,
+    locked: Option<File>,
 }
 
 impl FolderLock {
-    /// Wait for the turn at `folder`, which is made if need be. `wait` is called once if another process has it.
+    /// Wait for the turn at `folder`, which is made if need be. `wait` is called once if another process has it. What a
+    /// killed run has left there is finished or removed.
     ///
     /// # Errors
-    /// If the folder cannot be made, or the user stops the run while it waits.
+    /// If the folder cannot be made, the disk refuses, or the user stops the run while it waits.
     pub fn wait(folder: &Path, progress: &dyn Progress, wait: impl FnOnce()) -> Result<Self> {
+        let turn = Self {
+            folder: folder.to_owned(),
+            locked: Self::locked(folder, progress, wait)?,
+        };
+        file_set::settle(&turn)?;
+        Ok(turn)
+    }
+
+    /// Variant of [`FolderLock::wait`] that waits without a word.
+    ///
+    /// # Errors
+    /// As [`FolderLock::wait`].
+    pub fn of(folder: &Path) -> Result<Self> {
+        Self::wait(folder, &Silent, || ())
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    #[cfg(test)]
+    pub(super) fn without_locks(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            locked: None,
+        }
+    }
+
+    /// True if others are kept out: false where there are no locks.
+    pub fn is_held(&self) -> bool {
+        self.locked.is_some()
+    }
+
+    fn locked(folder: &Path, progress: &dyn Progress, wait: impl FnOnce()) -> Result<Option<File>> {
         let folder = if folder.as_os_str().is_empty() {
             Path::new(".")
         } else {
@@ -32,24 +70,27 @@ impl FolderLock {
         fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
         // A folder may be written and not read; and elsewhere it cannot be opened.
         let Ok(opened) = File::open(folder) else {
-            return Ok(Self { _locked: None });
+            return Ok(None);
         };
         let mut wait = Some(wait);
-        while let Err(TryLockError::WouldBlock) = opened.try_lock() {
+        loop {
+            match opened.try_lock() {
+                Ok(()) => return Ok(Some(opened)),
+                Err(TryLockError::Error(_)) => return Ok(None),
+                Err(TryLockError::WouldBlock) => {}
+            }
             progress.check_stopped()?;
             if let Some(wait) = wait.take() {
                 wait();
             }
             std::thread::sleep(PAUSE);
         }
-        Ok(Self { _locked: Some(opened) })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::progress::Silent;
 
     /// A person who stops the run as soon as it has to wait.
     struct Impatient;

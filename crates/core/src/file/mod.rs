@@ -2,9 +2,11 @@
 
 mod digest;
 mod direct_io;
+mod file_set;
 mod folder;
 mod folder_lock;
 mod part;
+mod set_manifest;
 
 use std::fs;
 use std::io::{self, Read, Write};
@@ -12,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 pub use digest::file_digest;
 pub use direct_io::{Ahead, Block};
+pub use file_set::{check_unaltered, settled};
 pub use folder::AtomicFolder;
 pub use folder_lock::FolderLock;
 
@@ -50,10 +53,12 @@ pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
 /// Until [`AtomicFile::commit`] the old file, if any, is untouched; dropped or killed before, nothing
 /// replaces it. The unfinished file has a fixed name (`.name.part`), so that the next run overwrites
 /// what a killed one left. It is locked, so that two runs do not write into one another, and it is written only
-/// if it is an ordinary file with no other name: links and pipes that lie there are refused.
+/// if it is an ordinary file with no other name: links and pipes that lie there are refused. Where there are no locks, the name
+/// holds host and process, and the run that ends well is the one whose file is there.
 pub struct AtomicFile {
     target: PathBuf,
     part: PathBuf,
+    is_locked: bool,
     out: Option<direct_io::Output>,
 }
 
@@ -94,9 +99,15 @@ impl AtomicFile {
             ));
         }
         let part = target.with_file_name(format!(".{}.part", name.to_string_lossy()));
-        let file = part::open(&part, target)?;
+        let locked = part::open(&part, target)?;
+        let is_locked = locked.is_some();
+        let (part, file) = match locked {
+            Some(file) => (part, file),
+            None => part::new_of_run(&part.with_extension(""), ".part", part::create_new)?,
+        };
         Ok(Self {
             target: target.to_owned(),
+            is_locked,
             out: Some(direct_io::Output::new(file, &part)),
             part,
         })
@@ -120,14 +131,11 @@ impl AtomicFile {
         let out = self.out.as_mut().expect("a file is committed once");
         let file = out.finish().map_err(Error::io("write", &self.target))?;
         file.sync_all().map_err(Error::io("write", &self.target))?;
-        if !part::is_at(file, &self.part).map_err(Error::io("read", &self.part))? {
-            return Err(Error::refused(
-                "file/changed-meanwhile",
-                format!("{} was replaced while it was written", self.part.display()),
-                "let one program at a time write into this folder, and try again",
-            ));
-        }
+        part::check_at(file, &self.part)?;
         fs::rename(&self.part, &self.target).map_err(Error::io("rename to", &self.target))?;
+        if !self.is_locked {
+            part::check_at(file, &self.target)?;
+        }
         // What is at the path of the unfinished file from now on belongs to another run.
         self.out = None;
         part::flush_folder_of(&self.target).map_err(Error::io("flush the folder of", &self.target))

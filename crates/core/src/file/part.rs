@@ -2,7 +2,8 @@
 
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use crate::error::{Error, Result};
 
@@ -10,17 +11,25 @@ use crate::error::{Error, Result};
 /// error.
 const MOST_TRIES: u32 = 100;
 
-/// Open the unfinished file `part` of `target`, empty and locked, and make it if it is not there.
+/// Open the unfinished file `part` of `target`, empty and locked, and make it if it is not there. None where there are no
+/// locks: nothing tells then who writes it.
 ///
 /// # Errors
 /// If it cannot be made, something else than an ordinary file with this one name lies there, or another process
 /// writes it.
-pub(super) fn open(part: &Path, target: &Path) -> Result<File> {
+pub(super) fn open(part: &Path, target: &Path) -> Result<Option<File>> {
     for _ in 0..MOST_TRIES {
         let file = reach(part)?;
         if claim(&file, part, target)? {
+            // Asked again, a lock that is held is granted.
+            if let Err(TryLockError::Error(_)) = file.try_lock() {
+                if file.metadata().is_ok_and(|found| found.len() == 0) {
+                    remove_own(&file, part);
+                }
+                return Ok(None);
+            }
             file.set_len(0).map_err(Error::io("empty", part))?;
-            return Ok(file);
+            return Ok(Some(file));
         }
     }
     Err(busy(target))
@@ -72,6 +81,45 @@ pub(super) fn claim(file: &File, part: &Path, target: &Path) -> Result<bool> {
     is_at(file, part).map_err(Error::io("read", part))
 }
 
+/// Make something at `BEFORE.HOST-PROCESS-NUMBER` and an ending: a path that is of this run alone. `make` must fail if
+/// there is something already.
+pub(super) fn new_of_run<T>(
+    before: &Path,
+    ending: &str,
+    make: impl Fn(&Path) -> io::Result<T>,
+) -> Result<(PathBuf, T)> {
+    for number in 0.. {
+        let mut path = before.as_os_str().to_owned();
+        path.push(format!(".{}-{}-{number}{ending}", host(), std::process::id()));
+        let path = PathBuf::from(path);
+        match make(&path) {
+            Ok(made) => return Ok((path, made)),
+            // Of another thread, or of a killed process of this number.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(refused(&path, error)),
+        }
+    }
+    unreachable!("numbers do not end")
+}
+
+/// Make a file, and fail if there is one.
+pub(super) fn create_new(path: &Path) -> io::Result<File> {
+    File::options().write(true).create_new(true).open(path)
+}
+
+/// Name of this machine, as far as it can stand in the name of a file; empty if it is not known.
+fn host() -> &'static str {
+    static HOST: OnceLock<String> = OnceLock::new();
+    HOST.get_or_init(|| {
+        let name = fs::read_to_string("/proc/sys/kernel/hostname")
+            .or_else(|_| std::env::var("HOSTNAME"))
+            .or_else(|_| std::env::var("COMPUTERNAME"))
+            .unwrap_or_default();
+        let plain = name.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-');
+        plain.take(32).collect()
+    })
+}
+
 fn busy(target: &Path) -> Error {
     Error::refused(
         "file/busy",
@@ -97,6 +145,21 @@ pub(super) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
+/// Succeeds if the open file is the one at `path`.
+///
+/// # Errors
+/// If another process has put a file there.
+pub(super) fn check_at(file: &File, path: &Path) -> Result<()> {
+    if is_at(file, path).map_err(Error::io("read", path))? {
+        return Ok(());
+    }
+    Err(Error::refused(
+        "file/changed-meanwhile",
+        format!("{} was replaced while it was written", path.display()),
+        "let one program at a time write into this folder, and try again",
+    ))
+}
+
 /// Remove the open file at `path`, if it is still that: after it was lost, what lies there is the file of another run. Removed
 /// while it is locked, or another run could hold the file whose name is taken away here, and a third one a new file of this
 /// name. What cannot be removed is left to the next run.
@@ -112,14 +175,14 @@ pub(super) fn is_same(a: &File, b: &File) -> io::Result<bool> {
 }
 
 #[cfg(unix)]
-fn same(a: &Metadata, b: &Metadata) -> bool {
+pub(super) fn same(a: &Metadata, b: &Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
     (a.dev(), a.ino()) == (b.dev(), b.ino())
 }
 
 /// Elsewhere files have no numbers that can be compared; an open file cannot be renamed there either.
 #[cfg(not(unix))]
-fn same(_: &Metadata, _: &Metadata) -> bool {
+pub(super) fn same(_: &Metadata, _: &Metadata) -> bool {
     true
 }
 
