@@ -19,13 +19,34 @@ pub(crate) fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&
         } else {
             continue;
         };
-        return Err(Error::refused(
-            "option/same-file",
-            format!("{} {what}", output.display()),
-            "name another file to write to",
-        ));
+        return Err(same_file(output, what));
     }
     Ok(())
+}
+
+/// Refuse to write into a folder whose files are inputs, however many they are: asked before any work.
+///
+/// # Errors
+/// With the name of the first such output.
+pub(crate) fn outside(folder: &Path, outputs: &[&Path]) -> Result<()> {
+    let Ok(folder) = folder.canonicalize() else {
+        return Ok(());
+    };
+    match outputs
+        .iter()
+        .find(|output| Identity::of(output).path.starts_with(&folder))
+    {
+        None => Ok(()),
+        Some(output) => Err(same_file(output, "is in a folder of inputs, and could overwrite one")),
+    }
+}
+
+fn same_file(output: &Path, what: &str) -> Error {
+    Error::refused(
+        "option/same-file",
+        format!("{} {what}", output.display()),
+        "name another file to write to",
+    )
 }
 
 /// The name of a file without its folders.
