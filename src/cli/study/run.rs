@@ -15,6 +15,9 @@ use crate::cli::{Outcome, Terminal, print_line, program};
 /// Time after which a run looks again at its processes.
 const PAUSE: Duration = Duration::from_millis(50);
 
+/// Most damaged shards that are named before they are made again.
+const MOST_NAMED: usize = 20;
+
 #[derive(Args)]
 pub(super) struct RunArgs {
     /// Folder of the study.
@@ -49,7 +52,7 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let found = work.cut().status()?;
     found.check_usable()?;
-    for (path, why) in &found.damaged {
+    for (path, why) in found.damaged.iter().take(MOST_NAMED) {
         terminal.say(&format!("{} {why}: it is made again", path.display()));
     }
     match args.jobs {

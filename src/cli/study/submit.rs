@@ -98,7 +98,7 @@ pub(super) fn run(args: &SubmitArgs, terminal: &Terminal) -> Result<Outcome> {
     if !queued.is_empty() {
         terminal.say(&queue.words(queued.len()));
     }
-    if missing.is_empty() && queued.is_empty() {
+    if missing.is_empty() && queued.is_empty() && !args.merge {
         print_line!("nothing is missing");
         return Ok(Outcome::Fine);
     }
@@ -192,19 +192,13 @@ impl Queue {
         }
     }
 
-    /// Submit one job, unless one of this name is queued: its number. In a dry run the line of shell is printed that gives
+    /// Submit one job, unless it is a plan that is queued: its number. In a dry run the line of shell is printed that gives
     /// `variable` this number.
     fn submit(&self, job: &Job, variable: &str, after: &[String], args: &SubmitArgs) -> Result<String> {
-        let is_array = !job.shards.is_empty();
-        if let Some((_, number)) = self
-            .numbers
-            .iter()
-            .find(|(name, _)| *name == job.name && self.is_asked && !is_array)
-        {
-            // A merge that is queued waits for other arrays: another one follows them.
-            if variable == "plan" {
-                return Ok(number.clone());
-            }
+        // One plan is enough. A merge that is queued waits for the arrays before: another one follows those of now.
+        let same = self.numbers.iter().find(|(name, _)| *name == job.name);
+        if let Some((_, number)) = same.filter(|_| self.is_asked && variable == "plan") {
+            return Ok(number.clone());
         }
         let what = match job.shards.len() {
             0 => variable.to_owned(),
