@@ -14,6 +14,7 @@ use metalith::metrology::{self, Answer, SetKind, kind_of};
 use metalith::{Error, Result};
 
 use super::out_folder::OutFolder;
+use super::paths::apart;
 use super::reading::ReadingArgs;
 use super::{Outcome, Terminal, print_json, print_line};
 
@@ -119,6 +120,10 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
 
 /// Calibrate or validate the sets, each into its folder.
 fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -> Result<Outcome> {
+    // Those of an earlier run are removed, and an effect may be declared by one.
+    for out in outs {
+        apart(args.declare.as_deref(), &[&out.join("proposal.toml")])?;
+    }
     let kinds: Vec<_> = args.sets.iter().map(|set| kind_of(set)).collect();
     if kinds.iter().any(Option::is_some) {
         return run_metrology(args, &kinds, outs, terminal);

@@ -201,6 +201,16 @@ fn only(source: &str, why: &str, options: &[(&str, bool)]) -> Result<()> {
 }
 
 fn make(source: HandoffSource, out: OutFolder, args: &HandoffArgs, terminal: &Terminal) -> Result<Outcome> {
+    // The folder is replaced as a whole.
+    let inputs = [
+        &args.source,
+        &args.process,
+        &args.compensate,
+        &args.dose_classes,
+        &args.waivers,
+    ];
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+    super::paths::outside(&out.path, &inputs)?;
     let options = HandoffOptions {
         source,
         process: args.process.clone(),

@@ -19,13 +19,35 @@ pub(crate) fn apart<'p>(inputs: impl IntoIterator<Item = &'p Path>, outputs: &[&
         } else {
             continue;
         };
-        return Err(Error::refused(
-            "option/same-file",
-            format!("{} {what}", output.display()),
-            "name another file to write to",
-        ));
+        return Err(same_file(output, what));
     }
     Ok(())
+}
+
+/// Refuse outputs in a folder whose files are all inputs, or inputs in a folder that is replaced as a whole: asked before any
+/// work.
+///
+/// # Errors
+/// With the name of the first such file.
+pub(crate) fn outside(folder: &Path, files: &[&Path]) -> Result<()> {
+    let Ok(folder) = folder.canonicalize() else {
+        return Ok(());
+    };
+    match files.iter().find(|file| Identity::of(file).path.starts_with(&folder)) {
+        None => Ok(()),
+        Some(file) => Err(same_file(
+            file,
+            &format!("is in {}, where an input would be overwritten", folder.display()),
+        )),
+    }
+}
+
+fn same_file(output: &Path, what: &str) -> Error {
+    Error::refused(
+        "option/same-file",
+        format!("{} {what}", output.display()),
+        "name another file or folder to write to",
+    )
 }
 
 /// The name of a file without its folders.
@@ -80,5 +102,31 @@ impl Identity {
             return true;
         }
         self.path == other.path
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn an_input_is_known_by_any_of_its_names() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        fs::create_dir(at("shards")).unwrap();
+        fs::write(at("shards/0"), "draws").unwrap();
+        std::os::unix::fs::symlink(at("shards/0"), at("link")).unwrap();
+        fs::hard_link(at("shards/0"), at("other")).unwrap();
+        for output in ["shards/0", "shards/../shards/0", "link", "other"] {
+            let refused = apart([at("shards/0").as_path()], &[&at(output)]).unwrap_err();
+            assert_eq!(refused.id(), "option/same-file", "{output}");
+        }
+        for output in ["shards/0", "shards/new", "link"] {
+            assert!(outside(&at("shards"), &[&at(output)]).is_err(), "{output}");
+        }
+        assert!(apart([at("shards/0").as_path()], &[&at("shards/1"), &at("new")]).is_ok());
+        assert!(outside(&at("shards"), &[&at("shards.csv")]).is_ok());
+        assert!(outside(&at("none"), &[&at("none/new")]).is_ok());
     }
 }

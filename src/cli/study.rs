@@ -1,17 +1,16 @@
 //! `metalith study`: a chip made many times, in shards for any number of machines.
 
+mod run;
+mod submit;
+
 use std::path::PathBuf;
-use std::process::{Child, Command};
 
 use clap::{Args, Subcommand};
 use metalith::report::sig;
-use metalith::study::{
-    MANIFEST, PairsPlan, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan, submissions,
-    write_page,
-};
-use metalith::{Error, Progress, Result};
+use metalith::study::{PairsPlan, Plan, PlanSettings, REPORT, StartsPlan, TableFormat, Work, merge, plan, write_page};
+use metalith::{Error, Result};
 
-use super::paths::{apart, name_of};
+use super::paths::{apart, name_of, outside};
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Simulate many chips with the tolerances of a process and a bench: the yield, and the effects that limit it.
@@ -29,11 +28,11 @@ enum Step {
     /// Plan a study: write the layout, solve the tables of cells, time the first draw, and cut the work into shards.
     Plan(PlanArgs),
     /// Make one shard, or all missing ones. Existing shards are kept.
-    Run(RunArgs),
+    Run(run::RunArgs),
     /// List existing and missing shards.
     Status(StatusArgs),
-    /// Submit missing shards to Slurm as job arrays.
-    Submit(SubmitArgs),
+    /// Submit missing shards to Slurm as job arrays, or print a command for each.
+    Submit(submit::SubmitArgs),
     /// Merge all shards into a table of the draws and a page.
     Merge(MergeArgs),
 }
@@ -53,24 +52,6 @@ struct PlanArgs {
 }
 
 #[derive(Args)]
-struct RunArgs {
-    /// Folder of the study.
-    study: PathBuf,
-
-    /// Number of the shard.
-    #[arg(long, value_name = "N", required_unless_present = "missing")]
-    shard: Option<u64>,
-
-    /// Make all missing shards.
-    #[arg(long, conflicts_with = "shard")]
-    missing: bool,
-
-    /// Number of processes; if left out, one shard after the other with all threads.
-    #[arg(long, value_name = "N", requires = "missing", value_parser = clap::value_parser!(u16).range(1..=512))]
-    jobs: Option<u16>,
-}
-
-#[derive(Args)]
 struct StatusArgs {
     /// Folder of the study.
     study: PathBuf,
@@ -78,20 +59,6 @@ struct StatusArgs {
     /// Print the list as JSON.
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Args)]
-struct SubmitArgs {
-    /// Folder of the study.
-    study: PathBuf,
-
-    /// File with the settings of the jobs: partition, time, memory, size of arrays.
-    #[arg(long, value_name = "FILE")]
-    slurm: PathBuf,
-
-    /// Write the job scripts and submit nothing.
-    #[arg(long)]
-    dry_run: bool,
 }
 
 #[derive(Args)]
@@ -113,9 +80,9 @@ pub(crate) fn run(args: &StudyArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     match &args.step {
         Step::Plan(args) => plan_study(args, terminal),
-        Step::Run(args) => run_shards(args, terminal),
+        Step::Run(args) => run::run(args, terminal),
         Step::Status(args) => tell_status(args),
-        Step::Submit(args) => submit(args),
+        Step::Submit(args) => submit::run(args, terminal),
         Step::Merge(args) => merge_shards(args, terminal),
     }
 }
@@ -137,120 +104,15 @@ fn plan_study(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     Ok(Outcome::Fine)
 }
 
-fn run_shards(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
-    let work = Work::open(&args.study)?;
-    if let Some(number) = args.shard {
-        work.run(&[number], terminal)?;
-        terminal.clear();
-        return Ok(Outcome::Fine);
-    }
-    let found = work.cut().status()?;
-    if let Some((path, why)) = found.unusable.first() {
-        return Err(Error::refused(
-            "study/shard-unusable",
-            format!("{} cannot be used: {why}", path.display()),
-            "remove it, then run again",
-        ));
-    }
-    match args.jobs {
-        Some(jobs) if jobs > 1 => by_processes(args, &found.missing, jobs.into(), terminal)?,
-        _ => work.run(&found.missing, terminal)?,
-    }
-    terminal.clear();
-    tell(&work)
-}
-
-/// Each shard by a separate process, so many at a time.
-fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Terminal) -> Result<()> {
-    let program = super::program()?;
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let threads = (cores / jobs).max(1).to_string();
-    terminal.begin("running shards", missing.len() as u64);
-    let mut running: Vec<(u64, Child)> = Vec::new();
-    let mut failed = Vec::new();
-    let mut waiting = missing.iter();
-    loop {
-        while running.len() < jobs && !terminal.stopped() {
-            let Some(number) = waiting.next() else { break };
-            let child = Command::new(&program)
-                .args(["study", "run"])
-                .arg(&args.study)
-                .args(["--shard", &number.to_string(), "--threads", &threads, "--quiet"])
-                .spawn()
-                .map_err(Error::io("start", &program))?;
-            running.push((*number, child));
-        }
-        if running.is_empty() {
-            break;
-        }
-        let (number, mut child) = running.remove(0);
-        let done = child.wait().map_err(Error::io("wait for", &program))?;
-        terminal.advance(1);
-        if !done.success() {
-            failed.push(number);
-        }
-    }
-    terminal.check_stopped()?;
-    if failed.is_empty() {
-        return Ok(());
-    }
-    Err(Error::refused(
-        "study/shards-not-made",
-        format!("{} shards failed, the first is {}", failed.len(), failed[0]),
-        "their messages are above; run again with --missing",
-    ))
-}
-
-/// One line on how far the work is.
-fn tell(work: &Work) -> Result<Outcome> {
-    let found = work.cut().status()?;
-    print_line!("{} of {} shards are there", found.finished, found.shards);
-    Ok(Outcome::Fine)
-}
-
 fn tell_status(args: &StatusArgs) -> Result<Outcome> {
     let found = Work::open(&args.study)?.cut().status()?;
     if args.json {
         print_json(&found);
     } else {
         print_line!("{} of {} shards are there", found.finished, found.shards);
-        for (path, why) in &found.unusable {
-            print_line!("{}: {why}", path.display());
+        for (path, why) in found.damaged.iter().chain(&found.unusable) {
+            print_line!("{} {why}", path.display());
         }
-    }
-    Ok(Outcome::Fine)
-}
-
-fn submit(args: &SubmitArgs) -> Result<Outcome> {
-    let cut = Work::open(&args.study)?.cut();
-    let slurm = Slurm::read(&args.slurm)?;
-    let missing = cut.status()?.missing;
-    if missing.is_empty() {
-        print_line!("nothing is missing");
-        return Ok(Outcome::Fine);
-    }
-    for submission in submissions(&cut, &slurm, &missing)? {
-        let shards = submission.shards.len();
-        if args.dry_run {
-            print_line!("{} shards: sbatch {}", shards, submission.script.display());
-            continue;
-        }
-        let answer = Command::new("sbatch")
-            .arg(&submission.script)
-            .output()
-            .map_err(Error::io("start sbatch for", &submission.script))?;
-        if !answer.status.success() {
-            return Err(Error::refused(
-                "study/sbatch-failed",
-                format!(
-                    "sbatch refused {}: {}",
-                    submission.script.display(),
-                    String::from_utf8_lossy(&answer.stderr).trim()
-                ),
-                "correct the file that --slurm names; --dry-run writes the scripts alone",
-            ));
-        }
-        print_line!("{} shards: {}", shards, String::from_utf8_lossy(&answer.stdout).trim());
     }
     Ok(Outcome::Fine)
 }
@@ -314,7 +176,10 @@ fn merge_study(plan: &Plan, args: &MergeArgs, terminal: &Terminal) -> Result<Out
     let out = args.out.clone().unwrap_or_else(|| args.study.join("result.csv"));
     let folder = out.parent().map_or_else(PathBuf::new, std::path::Path::to_owned);
     let [page, numbers] = REPORT.map(|name| folder.join(name));
-    apart([args.study.join(MANIFEST).as_path()], &[&out, &page, &numbers])?;
+    let inputs = plan.inputs()?;
+    let outputs = [out.as_path(), &page, &numbers];
+    apart(inputs.iter().map(PathBuf::as_path), &outputs)?;
+    outside(&plan.cut().shards_folder(), &outputs)?;
     TableFormat::of(&out)?;
     let result = merge(plan, args.psfs, terminal)?;
     terminal.turn_at(&folder)?.publish(&name_of(&out), &[], |folder| {

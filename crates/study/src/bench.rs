@@ -21,6 +21,9 @@ use crate::plan::{Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::study_file::Tolerance;
 
+/// Relative difference of amounts that are the same: machines may round logarithms and exponentials otherwise.
+const SAME_AMOUNT: f64 = 1e-12;
+
 /// Everything that judges a draw.
 pub(crate) struct StudyBench {
     pub tolerance: Tolerance,
@@ -109,7 +112,30 @@ impl StudyBench {
         let Some(key) = known.filter(|key| hex(key) == plan.key) else {
             return Err(another_plan(&plan.folder));
         };
-        Self::new(tolerance, key, files)
+        let cells = files.cells.len() as u64;
+        let bench = Self::new(tolerance, key, files)?;
+        let drawer = &bench.drawer;
+        // Amounts, draws and tables are found by their numbers.
+        if (drawer.count(), drawer.names()) != (plan.draws, plan.quantities.clone())
+            || cells != bench.tolerance.designs()
+        {
+            return Err(another_plan(&plan.folder));
+        }
+        Ok(bench)
+    }
+
+    /// True if a record has the amounts, the values of keys and the verdict of its draw.
+    pub(crate) fn is_drawn(&self, record: &DrawRecord, limits: &[LimitStatement]) -> Result<bool> {
+        let amounts = self.drawer.draw(self.key, record.draw)?.amounts;
+        let is_same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME_AMOUNT * a.abs();
+        let setting = self.tolerance.setting(self.drawer.design_of(record.draw));
+        let holds = limits.iter().zip(&record.reached).all(|(l, r)| l.holds(*r));
+        Ok(amounts.iter().zip(&record.amounts).all(is_same)
+            && record.passed == holds
+            && setting.len() == record.design.len()
+            && setting
+                .iter()
+                .all(|(key, value)| record.design.get(*key) == Some(value)))
     }
 
     /// A design with the tables in its file.

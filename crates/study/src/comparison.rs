@@ -60,7 +60,7 @@ impl ComparisonPlan {
         let open = self.comparison.open(progress)?;
         let cache = KernelCache::only(&self.folder);
         let camera = |k: u64| open.take(k as usize, &cache, progress);
-        shards.iter().try_for_each(|n| self.cut().make(*n, &camera, progress))
+        self.cut().make_all(shards, &camera, progress)
     }
 
     /// The table of all cameras. The first photograph is taken again, for the page.

@@ -21,11 +21,12 @@
 //! | `record` | what is kept of one draw |
 //! | `plan`, `shard` | the folder of a study |
 //! | `pairs`, `comparison`, `starts` | pairs for learning, cameras side by side, starts of the optimiser, in shards |
-//! | `cut`, `manifest`, `work` | shards of whatever work |
+//! | `sharding`, `manifest`, `work` | shards of whatever work |
+//! | `shard_file`, `status` | one shard as a file with its digest, and the state of all |
 //! | `merge`, `yields`, `response`, `grid_points` | all draws, and what they say |
 //! | `columns`, `parquet_file` | the draws as a table |
 //! | `page`, `grid_page` | what a person reads |
-//! | `slurm` | job arrays |
+//! | `slurm`, `shell` | job arrays, and paths as words of a shell |
 
 mod bench;
 mod bias;
@@ -47,9 +48,12 @@ mod plan;
 mod record;
 mod response;
 mod shard;
+mod shard_file;
 mod sharding;
+mod shell;
 mod slurm;
 mod starts;
+mod status;
 mod study_file;
 mod work;
 mod yields;
@@ -65,13 +69,14 @@ pub use merge::{StudyResult, TableFormat, merge};
 pub use page::{REPORT, write_page};
 pub use pairs::{PairsPlan, PairsRequest, plan_pairs};
 pub use picture::{KnownKernels, PictureSpec, SceneChoice, TakenPicture};
-pub use plan::{Layout, Plan, PlanSettings, plan};
+pub use plan::{Layout, Plan, PlanSettings, plan, planned_later};
 pub use record::{DrawRecord, LimitStatement};
 pub use response::{Response, Tightening};
 pub use shard::Run;
-pub use sharding::{Shard, Sharding, Status};
-pub use slurm::{Slurm, Submission, submissions};
+pub use sharding::{Shard, Sharding};
+pub use slurm::{JOB_NAME, Job, Queued, Slurm, queued_shards, submitted};
 pub use starts::{StartRecord, StartsPlan, StartsResult, plan_starts};
+pub use status::Status;
 pub use study_file::{Distribution, FigureLimit, Grid, Tolerance, Varied};
 pub use work::Work;
 pub use yields::{Yield, wilson};

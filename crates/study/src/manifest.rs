@@ -4,14 +4,25 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use metalith_core::file::read_at_most;
-use metalith_core::{Error, Result};
+use metalith_core::text::hex;
+use metalith_core::{AtomicFile, Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use sha2::{Digest, Sha256};
+
+use crate::shard_file::split;
+use crate::sharding::Sharding;
 
 /// Name of the manifest within the folder.
 pub const MANIFEST: &str = "plan.json";
 /// Longest manifest.
 const LONGEST: u64 = 64 << 20;
+
+/// End of a manifest around its last field: SHA-256 of all that precedes this end.
+const BEFORE: &str = ",\n  \"sha256\": \"";
+const AFTER: &str = "\"\n}\n";
+/// End of the text of all other fields.
+const END: &str = "\n}";
 
 /// Manifest of one kind of work.
 pub(crate) trait Manifest: Serialize + DeserializeOwned {
@@ -23,6 +34,9 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
 
     /// Remember where it was read.
     fn place(&mut self, folder: &Path);
+
+    /// Division of the work into shards.
+    fn sharding(&self) -> Sharding;
 
     /// Manifest of a folder.
     ///
@@ -41,6 +55,7 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
             ));
         }
         found.place(folder);
+        found.sharding().check()?;
         Ok(found)
     }
 
@@ -66,7 +81,13 @@ pub(crate) trait Manifest: Serialize + DeserializeOwned {
     /// # Errors
     /// If the file cannot be written.
     fn write_in(&self, folder: &Path) -> Result<()> {
-        metalith_report::write_plain_json(&folder.join(MANIFEST), self)
+        let text = serde_json::to_string_pretty(self).expect("plain data serialises");
+        let fields = text.strip_suffix(END).expect("a manifest has fields");
+        let digest = hex(&Sha256::digest(fields));
+        AtomicFile::write(
+            &folder.join(MANIFEST),
+            format!("{fields}{BEFORE}{digest}{AFTER}").as_bytes(),
+        )
     }
 }
 
@@ -86,6 +107,10 @@ macro_rules! manifest {
             fn place(&mut self, folder: &std::path::Path) {
                 self.folder = folder.to_owned();
             }
+
+            fn sharding(&self) -> crate::sharding::Sharding {
+                self.cut()
+            }
         }
 
         impl $plan {
@@ -102,7 +127,7 @@ macro_rules! manifest {
 pub(crate) use manifest;
 
 const PLAN_AGAIN: &str =
-    "plan it again: `metalith study plan`, or `--plan` of `metalith dataset`, `compare`, `optimise`";
+    "remove this file and plan again: `metalith study plan`, or `--plan` of `metalith dataset`, `compare`, `optimise`";
 
 /// True if a folder holds a plan, of whatever work.
 pub fn is_planned(folder: &Path) -> bool {
@@ -114,8 +139,24 @@ pub fn is_planned(folder: &Path) -> bool {
 /// # Errors
 /// If there is none, or it is no manifest.
 pub(crate) fn read<T: DeserializeOwned>(folder: &Path) -> Result<T> {
-    let bytes = read_at_most(&folder.join(MANIFEST), LONGEST, "the manifest of a plan")?;
-    serde_json::from_slice(&bytes).map_err(|e| fault(folder, e.to_string()))
+    let path = folder.join(MANIFEST);
+    let mut bytes = read_at_most(&path, LONGEST, "the manifest of a plan")?;
+    let refused = |id, why| {
+        let what = format!("{} {why}", path.display());
+        Err(Error::refused(id, what, PLAN_AGAIN))
+    };
+    match split(&bytes, BEFORE, AFTER) {
+        None => refused(
+            "study/version-differs",
+            "has no digest: it was changed, or another version of the program wrote it",
+        ),
+        Some((_, false)) => refused("study/plan-damaged", "is damaged: its digest differs"),
+        Some((length, true)) => {
+            bytes.truncate(length);
+            bytes.extend_from_slice(END.as_bytes());
+            serde_json::from_slice(&bytes).map_err(|e| fault(folder, e.to_string()))
+        }
+    }
 }
 
 fn fault(folder: &Path, what: String) -> Error {

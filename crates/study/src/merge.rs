@@ -45,11 +45,13 @@ pub struct StudyResult {
 /// Put the shards of a study together; `show` of its worst draws are simulated again for their PSFs.
 ///
 /// # Errors
-/// If draws are missing or there twice, all named; if a shard is of another plan; as [`Run::open`].
+/// If shards are missing, damaged or of another plan, all named; if amounts are not those that the plan draws; as
+/// [`Run::open`].
 pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyResult> {
     let draws = plan.cut().whole(&|d: &DrawRecord| Some(d.draw))?;
     check_counts(plan, &draws)?;
     let run = Run::open(plan, progress)?;
+    run.check(&draws)?;
     let drawer = run.drawer();
     let count = plan.quantities.len();
     let names = plan.quantities.iter().map(|q| q.0.clone()).collect();

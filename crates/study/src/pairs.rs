@@ -109,7 +109,7 @@ impl PairsPlan {
             }
             writer.write(image, k, &|p| self.request.scene(p))
         };
-        shards.iter().try_for_each(|n| self.cut().make(*n, &pair, progress))
+        self.cut().make_all(shards, &pair, progress)
     }
 
     /// Write the manifest of the set when all pairs are there.

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::bench::{Files, StudyBench};
-use crate::manifest::{Manifest, absolute, another_plan, is_planned, manifest};
+use crate::manifest::{MANIFEST, Manifest, absolute, another_plan, is_planned, manifest};
 use crate::picture::SceneChoice;
 use crate::record::LimitStatement;
 use crate::sharding::{Sharding, parts_per_shard};
@@ -82,6 +82,24 @@ impl Plan {
             per_shard: self.draws_per_shard,
             folder: self.folder.clone(),
         }
+    }
+
+    /// Files that results are made from beside the shards: manifest, tolerance, design, layouts, tables, model, camera, scene.
+    ///
+    /// # Errors
+    /// If the tolerance cannot be read.
+    pub fn inputs(&self) -> Result<Vec<PathBuf>> {
+        let tolerance = Tolerance::read(&self.tolerance)?;
+        let files = self.files();
+        let mut all = vec![self.folder.join(MANIFEST), self.tolerance.clone(), tolerance.design];
+        all.extend(files.layouts.into_iter().chain(files.cells).chain(tolerance.model));
+        if let Some(picture) = tolerance.picture {
+            all.push(picture.camera);
+            if let SceneChoice::File(path) = picture.scene {
+                all.push(path);
+            }
+        }
+        Ok(all)
     }
 
     /// Paths of the layouts and the tables.
@@ -279,6 +297,19 @@ pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf], progress: &dyn Pro
         add("file", &file_digest(&path)?);
     }
     Ok(hash.finalize().into())
+}
+
+/// Division of a study that is still to be planned into a folder.
+pub fn planned_later(tolerance: &Tolerance, draws_per_shard: u64, folder: &Path) -> Sharding {
+    let values = tolerance.grids.iter().map(|grid| grid.values.len() as u64);
+    let draws = tolerance.draws * tolerance.designs() * values.product::<u64>();
+    Sharding {
+        key: String::new(),
+        part: "draw",
+        parts: draws,
+        per_shard: draws_per_shard.clamp(1, draws),
+        folder: folder.to_owned(),
+    }
 }
 
 /// A plan of nothing, for tests of what is done with plans.

@@ -1,9 +1,11 @@
 //! Shards of a study: its draws, judged one after the other.
 
-use metalith_core::{Progress, Quiet, Result};
+use metalith_core::{Error, Progress, Quiet, Result};
 
 use crate::bench::{JudgedDraw, StudyBench};
 use crate::plan::Plan;
+use crate::record::DrawRecord;
+use crate::sharding::ranges;
 
 /// Judges the draws of shards, one after the other.
 pub struct Run<'p> {
@@ -23,13 +25,44 @@ impl<'p> Run<'p> {
         })
     }
 
-    /// Make one shard, if it is not there.
+    /// Make shards, if they are not there whole; those that another run makes come last.
     ///
     /// # Errors
     /// If tables of cells cannot be used (none are made here), a draw cannot be simulated, the file cannot be written or is of another plan, or the user stopped it.
-    pub fn shard(&self, number: u64, progress: &dyn Progress) -> Result<()> {
+    pub fn shards(&self, numbers: &[u64], progress: &dyn Progress) -> Result<()> {
         let draw = |k| Ok(self.bench.draw(k, &Quiet(progress))?.record);
-        self.plan.cut().make(number, &draw, progress)
+        self.plan.cut().make_all(numbers, &draw, progress)
+    }
+
+    /// Check that draws of shards are the draws of the plan.
+    ///
+    /// # Errors
+    /// If some are not, with the shards that hold them.
+    pub(crate) fn check(&self, draws: &[DrawRecord]) -> Result<()> {
+        let mut others = Vec::new();
+        for draw in draws {
+            if !self.bench.is_drawn(draw, &self.plan.limits)? {
+                others.push(draw.draw);
+            }
+        }
+        if others.is_empty() {
+            return Ok(());
+        }
+        let mut shards: Vec<u64> = others.iter().map(|k| k / self.plan.draws_per_shard).collect();
+        shards.dedup();
+        Err(Error::refused(
+            "study/draws-differ",
+            format!(
+                "{} draws have other amounts, values or verdicts than the plan gives: {}",
+                others.len(),
+                ranges(&others)
+            ),
+            format!(
+                "remove the files of their shards ({}) from {}, and make them again by `metalith study run FOLDER --missing`",
+                ranges(&shards),
+                self.plan.cut().shards_folder().display()
+            ),
+        ))
     }
 
     /// Full result of a draw.

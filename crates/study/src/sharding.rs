@@ -1,15 +1,23 @@
 //! Work that is cut into shards: files with a line for each part, whole or not there.
 
-use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use metalith_core::{AtomicFile, Error, Progress, Result};
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+
+use crate::manifest::MANIFEST;
+use crate::shard_file::{Header, ShardState, digest_line};
 
 /// Folder of the shards within that of the plan.
 const FOLDER: &str = "shards";
+
+/// Most parts of any work: as many as a study may have draws. Lists of all of them fit into memory.
+pub(crate) const MOST_PARTS: u64 = 10_000_000;
+
+/// Time after which a run looks again at the shards that other runs make.
+const PAUSE: Duration = Duration::from_millis(200);
 
 /// Time that a shard shall take (s): long enough for a queue to be worth it, short enough to lose one.
 const SHARD_SECONDS: f64 = 600.0;
@@ -34,29 +42,6 @@ pub struct Shard {
     /// Parts: from the first up to the one before `end`.
     pub first: u64,
     pub end: u64,
-}
-
-/// First line of a shard.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Header {
-    plan: String,
-    shard: u64,
-    first: u64,
-    end: u64,
-}
-
-/// Progress of the work.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Status {
-    pub shards: u64,
-    /// Draws of a study, pairs of a set for learning.
-    pub parts: u64,
-    pub finished: u64,
-    /// Numbers of the shards that are not there.
-    pub missing: Vec<u64>,
-    /// Files that cannot be used, with the reason.
-    pub unusable: Vec<(PathBuf, String)>,
 }
 
 /// Parts of a shard that takes ten minutes if one takes so many seconds, unless somebody has asked for another number.
@@ -91,12 +76,17 @@ impl Sharding {
         })
     }
 
-    /// Path where a shard is, or will be.
-    pub fn path(&self, number: u64) -> PathBuf {
-        self.folder.join(FOLDER).join(format!("{number:06}.jsonl"))
+    /// Folder of the shards.
+    pub fn shards_folder(&self) -> PathBuf {
+        self.folder.join(FOLDER)
     }
 
-    fn header(&self, shard: Shard) -> Header {
+    /// Path where a shard is, or will be.
+    pub fn path(&self, number: u64) -> PathBuf {
+        self.shards_folder().join(format!("{number:06}.jsonl"))
+    }
+
+    pub(crate) fn header(&self, shard: Shard) -> Header {
         Header {
             plan: self.key.clone(),
             shard: shard.number,
@@ -105,22 +95,81 @@ impl Sharding {
         }
     }
 
-    /// Make one shard, if it is not there: a line for each of its parts.
+    /// Check that the numbers of a plan are such as plans have.
     ///
     /// # Errors
-    /// Those of `part`; if the file cannot be written or is of another plan.
-    pub fn make<T: Serialize>(
+    /// If it has no parts or too many, or a shard has none.
+    pub(crate) fn check(&self) -> Result<()> {
+        if (1..=MOST_PARTS).contains(&self.parts) && self.per_shard > 0 {
+            return Ok(());
+        }
+        Err(Error::refused(
+            "study/plan-out-of-range",
+            format!(
+                "{} says {} {}s, {} in a shard",
+                self.folder.join(MANIFEST).display(),
+                self.parts,
+                self.part,
+                self.per_shard
+            ),
+            format!("plan it again: a plan has 1 to {MOST_PARTS} {}s", self.part),
+        ))
+    }
+
+    /// Make shards, those first that no other run makes at the same time; then wait for those, and make what they leave.
+    ///
+    /// # Errors
+    /// As [`Self::make`].
+    pub(crate) fn make_all<T: Serialize>(
+        &self,
+        shards: &[u64],
+        part: &dyn Fn(u64) -> Result<T>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let mut missing = shards.to_vec();
+        let mut is_told = false;
+        loop {
+            let mut held = Vec::new();
+            for number in missing {
+                if !self.make(number, part, progress)? {
+                    held.push(number);
+                }
+            }
+            if held.is_empty() {
+                return Ok(());
+            }
+            if !is_told {
+                progress.begin("waiting for shards that other runs make", held.len() as u64);
+                is_told = true;
+            }
+            progress.check_stopped()?;
+            std::thread::sleep(PAUSE);
+            missing = held;
+        }
+    }
+
+    /// Make one shard, if it is not there whole: a line for each of its parts. False if another run makes it.
+    ///
+    /// # Errors
+    /// Those of `part`; if the file cannot be written, or another file is in its place.
+    fn make<T: Serialize>(
         &self,
         number: u64,
         part: &dyn Fn(u64) -> Result<T>,
         progress: &dyn Progress,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let shard = self.shard(number)?;
         if self.finished(number)? {
-            return Ok(());
+            return Ok(true);
         }
         let path = self.path(number);
-        let mut file = AtomicFile::create(&path)?;
+        let Some(mut file) = claimed(&path)? else {
+            return Ok(false);
+        };
+        // Another run may have finished it between the look and the claim.
+        if self.finished(number)? {
+            return Ok(true);
+        }
         let mut text = line(&self.header(shard));
         progress.begin(&format!("shard {number}"), shard.end - shard.first);
         for k in shard.first..shard.end {
@@ -128,170 +177,53 @@ impl Sharding {
             text.push_str(&line(&part(k)?));
             progress.advance(1);
         }
+        text.push_str(&digest_line(&text));
         file.write_all(text.as_bytes()).map_err(Error::io("write", &path))?;
-        file.commit()
+        match file.commit() {
+            // On a file system without locks: the other run writes the same bytes.
+            Err(error) if error.id() == "file/changed-meanwhile" => {
+                if !self.finished(number)? {
+                    AtomicFile::write(&path, text.as_bytes())?;
+                }
+                Ok(true)
+            }
+            other => other.map(|()| true),
+        }
     }
 
-    /// True if a shard is there; no more than its first line is read.
+    /// True if another run makes a shard at this moment. Without locks of the file system nobody knows.
+    ///
+    /// # Errors
+    /// If its folder cannot be written to.
+    pub fn is_held(&self, number: u64) -> Result<bool> {
+        Ok(claimed(&self.path(number))?.is_none())
+    }
+
+    /// True if a shard is there whole; one that is truncated or damaged counts as missing.
     ///
     /// # Errors
     /// If what is there belongs to another plan, or is no shard.
     pub fn finished(&self, number: u64) -> Result<bool> {
         let shard = self.shard(number)?;
         let path = self.path(number);
-        let file = match fs::File::open(&path) {
-            Ok(file) => file,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(false),
-            Err(error) => return Err(Error::io("read", &path)(error)),
-        };
-        let mut first = String::new();
-        BufReader::new(file)
-            .read_line(&mut first)
-            .map_err(Error::io("read", &path))?;
-        match self.refusal(shard, &first) {
-            None => Ok(true),
-            Some((id, why)) => Err(refused(id, &path, &why)),
-        }
-    }
-
-    /// The header in the first line of a shard of this plan, or why it is none, with the identity of the refusal.
-    fn own_header(&self, first_line: &str) -> std::result::Result<Header, (&'static str, &'static str)> {
-        match serde_json::from_str::<Header>(first_line) {
-            Err(_) => Err(("study/not-a-shard", "is no shard of a plan")),
-            Ok(header) if header.plan != self.key => Err(("study/shard-of-another-plan", "is a part of another plan")),
-            Ok(header) => Ok(header),
-        }
-    }
-
-    /// Identity and text of the refusal of a file with this first line as that shard.
-    fn refusal(&self, shard: Shard, first_line: &str) -> Option<(&'static str, String)> {
-        match self.own_header(first_line) {
-            Err((id, why)) => Some((id, why.into())),
-            Ok(header) if header != self.header(shard) => Some((
-                "study/shard-range-differs",
-                format!(
-                    "holds {}s {} to {} as shard {}, of a plan that was cut otherwise",
-                    self.part,
-                    header.first,
-                    header.end.saturating_sub(1),
-                    header.shard
-                ),
+        match ShardState::of(self, &path, Some(shard))? {
+            ShardState::Whole(_) => Ok(true),
+            ShardState::Absent | ShardState::Truncated | ShardState::Damaged => Ok(false),
+            ShardState::Foreign(id, why) => Err(Error::refused(
+                id,
+                format!("{} {why}", path.display()),
+                "remove the file if it came here by mistake; its shard is then made again",
             )),
-            Ok(_) => None,
         }
     }
+}
 
-    /// Progress of the work.
-    ///
-    /// # Errors
-    /// If its folder cannot be read.
-    pub fn status(&self) -> Result<Status> {
-        let mut status = Status {
-            shards: self.shards(),
-            parts: self.parts,
-            finished: 0,
-            missing: Vec::new(),
-            unusable: Vec::new(),
-        };
-        for number in 0..self.shards() {
-            match self.finished(number) {
-                Ok(true) => status.finished += 1,
-                Ok(false) => status.missing.push(number),
-                Err(error) => {
-                    status.missing.push(number);
-                    status.unusable.push((self.path(number), error.to_string()));
-                }
-            }
-        }
-        Ok(status)
-    }
-
-    /// All parts, each once, in the order of their numbers; `number` is what a part says of itself, if it does.
-    ///
-    /// # Errors
-    /// If parts are missing or there twice, all named; if a shard is of another plan.
-    pub fn whole<T: DeserializeOwned>(&self, number: &dyn Fn(&T) -> Option<u64>) -> Result<Vec<T>> {
-        let folder = self.folder.join(FOLDER);
-        let files = files(&folder)?;
-        let mut found: Vec<Option<(T, usize)>> = Vec::new();
-        found.resize_with(self.parts as usize, || None);
-        let mut twice = Vec::new();
-        for (file, path) in files.iter().enumerate() {
-            for (k, part) in self.read(path, number)? {
-                let Some(place) = found.get_mut(k as usize) else {
-                    return Err(Error::refused(
-                        "study/unknown-draw",
-                        format!(
-                            "{} holds {} {k}, and the plan has {}",
-                            path.display(),
-                            self.part,
-                            self.parts
-                        ),
-                        "remove the file",
-                    ));
-                };
-                match place {
-                    Some((_, other)) => twice.push((k, *other, file)),
-                    None => *place = Some((part, file)),
-                }
-            }
-        }
-        if let Some((k, a, b)) = twice.first() {
-            return Err(Error::refused(
-                "study/draws-twice",
-                format!(
-                    "{} {}s exist twice, the first is {k}: in {} and in {}",
-                    twice.len(),
-                    self.part,
-                    files[*a].display(),
-                    files[*b].display()
-                ),
-                "remove one of the two files",
-            ));
-        }
-        let missing: Vec<u64> = (0..self.parts).filter(|k| found[*k as usize].is_none()).collect();
-        if !missing.is_empty() {
-            return Err(Error::refused(
-                "study/draws-missing",
-                format!(
-                    "{} of {} {}s are missing in {}: {}",
-                    missing.len(),
-                    self.parts,
-                    self.part,
-                    folder.display(),
-                    ranges(&missing)
-                ),
-                "make them with `metalith study run FOLDER --missing`",
-            ));
-        }
-        Ok(found.into_iter().flatten().map(|(part, _)| part).collect())
-    }
-
-    /// The parts of one file, whatever its name, with their numbers.
-    fn read<T: DeserializeOwned>(&self, path: &Path, number: &dyn Fn(&T) -> Option<u64>) -> Result<Vec<(u64, T)>> {
-        let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
-        let mut lines = text.lines();
-        let first_line = lines.next().unwrap_or_default();
-        let header = self
-            .own_header(first_line)
-            .map_err(|(id, why)| refused(id, path, why))?;
-        let mut parts = Vec::new();
-        for (k, line) in lines.enumerate() {
-            let part: T = serde_json::from_str(line).map_err(|e| {
-                let what = format!("this is no {}: {e}", self.part);
-                Error::table(path, Some(k + 2), what, "remove the file; its shard is then made again")
-            })?;
-            parts.push((header.first + k as u64, part));
-        }
-        let told = parts.iter().all(|(k, part)| number(part).is_none_or(|own| own == *k));
-        if !told || parts.len() as u64 != header.end.saturating_sub(header.first) {
-            return Err(refused(
-                "study/shard-incomplete",
-                path,
-                &format!("does not hold the {}s that its first line names", self.part),
-            ));
-        }
-        Ok(parts)
+/// The unfinished file of a shard, locked; none while another run has it.
+fn claimed(path: &Path) -> Result<Option<AtomicFile>> {
+    match AtomicFile::create(path) {
+        Ok(file) => Ok(Some(file)),
+        Err(error) if error.id() == "file/busy" => Ok(None),
+        Err(error) => Err(error),
     }
 }
 
@@ -299,37 +231,6 @@ fn line(value: &impl Serialize) -> String {
     let mut text = serde_json::to_string(value).expect("plain data serialises");
     text.push('\n');
     text
-}
-
-fn refused(id: &'static str, path: &Path, why: &str) -> Error {
-    Error::refused(
-        id,
-        format!("{} {why}", path.display()),
-        "remove the file if it came here by mistake; its shard is then made again",
-    )
-}
-
-/// Files of shards, by name.
-fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = match fs::read_dir(folder) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(Error::io("read", folder)(error)),
-    };
-    let mut files = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(Error::io("read", folder))?.path();
-        let name = path
-            .file_name()
-            .map(|n| n.to_string_lossy().into_owned())
-            .unwrap_or_default();
-        // Hidden ones are being written, or were left by a run that was killed.
-        if name.ends_with(".jsonl") && !name.starts_with('.') {
-            files.push(path);
-        }
-    }
-    files.sort();
-    Ok(files)
 }
 
 /// Rising numbers as `0-3, 7, 9-12`, the first twenty ranges.

@@ -114,7 +114,7 @@ impl StartsPlan {
                 }),
             }
         };
-        shards.iter().try_for_each(|n| self.cut().make(*n, &start, progress))
+        self.cut().make_all(shards, &start, progress)
     }
 
     /// The best of all starts: its phase in `phase.csv`, all merits in `starts.csv`.

@@ -62,8 +62,8 @@ impl Work {
         }
     }
 
-    /// Make some shards, one after the other; those that are there are left as they are, and nothing is read but the
-    /// manifest if all are.
+    /// Make some shards, one after the other; those that are there whole are left as they are, and nothing else is read
+    /// if all are. Shards that another run makes are passed over, and waited for at the end.
     ///
     /// # Errors
     /// If a file of the plan has changed, a part cannot be made, a file cannot be written or is of another plan, or the user
@@ -82,7 +82,7 @@ impl Work {
         match self {
             Self::Study(plan) => {
                 let run = Run::open(plan, progress)?;
-                missing.into_iter().try_for_each(|n| run.shard(n, progress))
+                run.shards(&missing, progress)
             }
             Self::Pairs(plan) => plan.run(&missing, progress),
             #[cfg(feature = "baselines")]

@@ -13,6 +13,7 @@ use metalith_imaging::{ForecastScene, ImagingSystem, scores};
 use metalith_optics::{CalibratedModel, Perturbation};
 use metalith_restoration::RestorationMethod;
 use metalith_study::{Plan, PlanSettings, Run, Work, merge, plan, write_page};
+use sha2::Digest as _;
 
 fn run_shard(plan: &Plan, number: u64) -> metalith_core::Result<()> {
     Work::Study(plan.clone()).run(&[number], &Silent)
@@ -37,9 +38,7 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     single.install(|| run_shard(&one, 0)).unwrap();
     let run = Run::open(&many, &Silent).unwrap();
-    for shard in [2, 0, 1] {
-        run.shard(shard, &Silent).unwrap();
-    }
+    run.shards(&[2, 0, 1], &Silent).unwrap();
     let (a, b) = (merge(&one, 0, &Silent).unwrap(), merge(&many, 1, &Silent).unwrap());
     assert_eq!(a.draws, b.draws);
     assert_eq!(a.yields, b.yields);
@@ -146,9 +145,7 @@ fn designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables() {
     assert_ne!(one.cells[1], one.cells[2]);
     run_shard(&one, 0).unwrap();
     let run = Run::open(&many, &Silent).unwrap();
-    for shard in [4, 1, 0, 3, 2] {
-        run.shard(shard, &Silent).unwrap();
-    }
+    run.shards(&[4, 1, 0, 3, 2], &Silent).unwrap();
     let (a, b) = (merge(&one, 0, &Silent).unwrap(), merge(&many, 0, &Silent).unwrap());
     assert_eq!(a.draws, b.draws);
     // Values are recorded with the draw.
@@ -178,6 +175,32 @@ fn designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables() {
         "{csv}"
     );
     assert!(csv.contains("\n23,0.2,40,640,"), "{csv}");
+}
+
+/// A text with the digest of what it says in the place of its last line.
+fn sealed(text: &str) -> String {
+    let body = &text[..=text.trim_end().rfind('\n').unwrap()];
+    let digest = metalith_core::text::hex(&sha2::Sha256::digest(body));
+    format!("{body}{{\"sha256\":\"{digest}\"}}\n")
+}
+
+/// Numbers that no plan has are refused at once, with a right digest as well.
+fn manifests_are_held_to_their_digests(study: &Path) {
+    let path = study.join("plan.json");
+    let own = fs::read_to_string(&path).unwrap();
+    let refused = |text: &str| {
+        fs::write(&path, text).unwrap();
+        Work::open(study).err().unwrap().id()
+    };
+    let many = own.replace("\"draws\": 4", "\"draws\": 18446744073709551615");
+    assert_ne!(many, own);
+    assert_eq!(refused(&many), "study/plan-damaged");
+    let (fields, _) = many.split_once(",\n  \"sha256\"").unwrap();
+    let digest = metalith_core::text::hex(&sha2::Sha256::digest(fields));
+    let sealed = format!("{fields},\n  \"sha256\": \"{digest}\"\n}}\n");
+    assert_eq!(refused(&sealed), "study/plan-out-of-range");
+    assert_eq!(refused(&format!("{fields}\n}}\n")), "study/version-differs");
+    fs::write(&path, own).unwrap();
 }
 
 #[test]
@@ -219,27 +242,54 @@ fn shards_are_whole_are_of_one_plan_and_are_counted() {
     let twice = made.cut().path(7);
     fs::copy(made.cut().path(0), &twice).unwrap();
     let double = refusal(merge(&made, 0, &Silent).map(|_| ()));
-    assert_eq!(double.id(), "study/draws-twice");
-    insta::assert_snapshot!(metalith_testing::without_folder(double, folder.path()), @r"
-    2 draws exist twice, the first is 0: in study/shards/000000.jsonl and in study/shards/000007.jsonl
-      help: remove one of the two files
-    ");
+    assert_eq!(double.id(), "study/shard-range-differs");
+    assert!(
+        double
+            .to_string()
+            .contains("000007.jsonl holds draws 0 to 1 as shard 0"),
+        "{double}"
+    );
     fs::remove_file(&twice).unwrap();
     // A part of another plan.
     let own = fs::read_to_string(made.cut().path(1)).unwrap();
-    fs::write(made.cut().path(1), own.replace(&made.key, &"0".repeat(64))).unwrap();
+    fs::write(made.cut().path(1), sealed(&own.replace(&made.key, &"0".repeat(64)))).unwrap();
     let foreign = refusal(run_shard(&made, 1));
     assert_eq!(foreign.id(), "study/shard-of-another-plan");
     assert!(merge(&made, 0, &Silent).is_err());
     assert_eq!(made.cut().status().unwrap().unusable.len(), 1);
-    // A draw that lost its figures.
+    // Draws that somebody changed, with the digest of what is there now.
+    let number = |from: &str| {
+        let at = own.find(from).unwrap() + from.len();
+        let end = at + own[at..].find([',', ']']).unwrap();
+        own[..at].to_owned() + "0.5" + &own[end..]
+    };
     let (before, after) = own.split_once("\"reached\":[").unwrap();
     let cut = format!("{before}\"reached\":[{}", &after[after.find(']').unwrap()..]);
-    fs::write(made.cut().path(1), cut).unwrap();
-    let short = refusal(merge(&made, 0, &Silent).map(|_| ()));
-    assert_eq!(short.id(), "study/damaged-draw");
-    fs::write(made.cut().path(1), own).unwrap();
+    let verdict = own.replacen("\"passed\":true", "\"passed\":false", 1);
+    assert_ne!(verdict, own);
+    for (text, id) in [
+        (&cut, "study/damaged-draw"),
+        (&number("\"amounts\":["), "study/draws-differ"),
+        (&verdict, "study/draws-differ"),
+    ] {
+        fs::write(made.cut().path(1), sealed(text)).unwrap();
+        assert_eq!(refusal(merge(&made, 0, &Silent).map(|_| ())).id(), id);
+    }
+    // One that is damaged and one that was cut are named, and made again to the byte.
+    fs::write(made.cut().path(1), own.replacen("\"reached\":[", "\"reached\":[1", 1)).unwrap();
+    let first = fs::read_to_string(made.cut().path(0)).unwrap();
+    fs::write(made.cut().path(0), &first[..first.len() - 200]).unwrap();
+    let damaged = refusal(merge(&made, 0, &Silent).map(|_| ()));
+    assert_eq!(damaged.id(), "study/shards-damaged");
+    let words = damaged.to_string();
+    for part in ["000000.jsonl ends before its digest", "000001.jsonl is damaged"] {
+        assert!(words.contains(part), "{words}");
+    }
+    assert_eq!(made.cut().status().unwrap().missing, [0, 1]);
+    Work::Study(made.clone()).run(&[0, 1], &Silent).unwrap();
+    assert_eq!(fs::read_to_string(made.cut().path(1)).unwrap(), own);
     merge(&made, 0, &Silent).unwrap();
+    manifests_are_held_to_their_digests(&study);
     // A design that has changed since.
     let design = folder.path().join("design.toml");
     let text = fs::read_to_string(&design).unwrap();
