@@ -42,6 +42,9 @@ const WIDE: Look = Look {
     at_angles: false,
     turn: None,
 };
+/// Rounding of places that are turned back, in roundings along one axis: that of both axes of the file, along a diagonal, and that of
+/// the place where it is turned to.
+const TURNED: f64 = 1.0 + std::f64::consts::SQRT_2;
 /// Squares for one upright rectangle, at most, of a layout whose pillars are such.
 const FEWEST_AMONG: u64 = 4;
 /// Elements found at most.
@@ -207,7 +210,7 @@ impl Seen {
 fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progress: &dyn Progress) -> Result<Seen> {
     let fail = failed(layout.path());
     let mut map = Map::new(scale, how);
-    visit_turned(layout, selection, how.turn, &mut map, progress)?;
+    let is_rounded = visit_turned(layout, selection, how.turn, &mut map, progress)?;
     let [squares, circles] = map.shapes;
     let shapes = squares + circles + map.sizes.rectangles;
     let mostly_turned = how.at_angles && map.turned_shapes > squares + circles;
@@ -221,7 +224,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
             sites: Vec::new(),
             shape: PillarShape::default(),
             shapes,
-            turn: largest.and_then(|members| cluster_of(&tiles, members, scale, how).turn()),
+            turn: largest.and_then(|members| cluster_of(&tiles, members, scale, false).turn()),
             cause: None,
         });
     }
@@ -263,7 +266,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     };
     let (mut sites, mut turn, mut failed) = (Vec::new(), how.turn, None);
     for members in tiles.clusters() {
-        let cluster = cluster_of(&tiles, &members, scale, how);
+        let cluster = cluster_of(&tiles, &members, scale, is_rounded);
         let found = cluster.element();
         if how.at_angles && turn.is_none() && found.as_ref().map_or(true, |f| f.as_ref().is_some_and(|f| f.is_poor)) {
             turn = cluster.turn();
@@ -291,13 +294,13 @@ fn is_mixed(shapes: [u64; 2]) -> bool {
     few >= FEWEST && SHARE * few >= all
 }
 
-/// Tiles of one group in a search.
-fn cluster_of<'a>(tiles: &'a TileMap, members: &'a [usize], scale: Scale, how: Look) -> Cluster<'a> {
-    // Corners of what is turned back were rounded twice.
-    let rounded = if how.turn.is_some() { 2.0 } else { 1.0 };
+/// Tiles of one group in a search; `is_turned` if places were turned back and rounded.
+fn cluster_of<'a>(tiles: &'a TileMap, members: &'a [usize], scale: Scale, is_turned: bool) -> Cluster<'a> {
+    let unit_halves = 2.0 * scale.steps_per_nm() as f64 * scale.nm(1.0);
     Cluster {
         steps_per_nm: scale.steps_per_nm(),
-        unit_halves: rounded * 2.0 * scale.steps_per_nm() as f64 * scale.nm(1.0),
+        unit_halves,
+        rounding_halves: if is_turned { TURNED } else { 1.0 } * unit_halves,
         tiles,
         members,
     }

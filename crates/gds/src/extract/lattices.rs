@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::places::PlaceFit;
+use super::rounded::place_slack;
 use super::tiles::TileMap;
 use crate::{CORNER_STEPS, ExtractionError, Point, Rect};
 use metalith_pillars::{DatabaseUnit, ElementSite, Lattice, LatticeKind, Pitch};
@@ -23,6 +24,8 @@ pub(super) struct Cluster<'a> {
     pub steps_per_nm: i64,
     /// Database unit (half steps).
     pub unit_halves: f64,
+    /// Step of a grid on which rounding moves places as far as they were moved (half steps): the unit, but where they were turned.
+    pub rounding_halves: f64,
     pub tiles: &'a TileMap,
     /// Numbers of its tiles.
     pub members: &'a [usize],
@@ -54,7 +57,10 @@ impl Cluster<'_> {
         let exactly = |site: ElementSite| FoundElement {
             is_poor: SHARE_OF_SITES as usize * on < (SHARE_OF_SITES as usize - 1) * all,
             site,
-            fit: PlaceFit::default(),
+            fit: PlaceFit {
+                slack_nm: if self.is_turned() { self.nm_of(place_slack(self.rounding_halves)) } else { 0.0 },
+                ..PlaceFit::default()
+            },
         };
         if few_are_off(on, all)
             && let Ok(Some(site)) = exact
@@ -69,6 +75,11 @@ impl Cluster<'_> {
             }
             None => Ok(exact?.map(exactly)),
         }
+    }
+
+    /// True if places were turned back and rounded.
+    fn is_turned(&self) -> bool {
+        self.rounding_halves > self.unit_halves
     }
 
     /// The lattice of whole steps that most samples are on.
