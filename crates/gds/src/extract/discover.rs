@@ -1,5 +1,7 @@
 //! Discovery of the elements of any layout, and of the lattice on which they stand.
 
+use std::f64::consts::FRAC_PI_3;
+
 use super::failed;
 use super::lattices::{Cluster, FEWEST};
 use super::places::{Centre, PlaceFit, Places};
@@ -45,6 +47,8 @@ const WIDE: Look = Look {
 /// Rounding of places that are turned back, in roundings along one axis: that of both axes of the file, along a diagonal, and that of
 /// the place where it is turned to.
 const TURNED: f64 = 1.0 + std::f64::consts::SQRT_2;
+/// Turns that leave a hexagonal lattice as it is, but not the squares on it (rad).
+const SIXTHS: [f64; 3] = [0.0, FRAC_PI_3, -FRAC_PI_3];
 /// Squares for one upright rectangle, at most, of a layout whose pillars are such.
 const FEWEST_AMONG: u64 = 4;
 /// Elements found at most.
@@ -135,7 +139,10 @@ fn search(
     let turned = match close.turn {
         None => None,
         // What a turned look cannot tell is no fault of the layout.
-        turn => look(Look { turn, ..CLOSE }).ok().filter(Seen::holds_a_lens),
+        Some(angle) => SIXTHS.into_iter().find_map(|more| {
+            let turn = Some(angle + more);
+            look(Look { turn, ..CLOSE }).ok().filter(Seen::holds_a_lens)
+        }),
     };
     let Seen { sites, shape, turn, .. } = if let Some(turned) = turned {
         turned

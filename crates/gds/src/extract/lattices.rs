@@ -35,7 +35,7 @@ pub(super) struct Cluster<'a> {
 pub(super) struct FoundElement {
     pub site: ElementSite,
     pub fit: PlaceFit,
-    /// True if a good part of its centres are not on the lattice.
+    /// True if a good part of its centres are not on the lattice, or half of its sites have none.
     pub is_poor: bool,
 }
 
@@ -58,7 +58,11 @@ impl Cluster<'_> {
             is_poor: SHARE_OF_SITES as usize * on < (SHARE_OF_SITES as usize - 1) * all,
             site,
             fit: PlaceFit {
-                slack_nm: if self.is_turned() { self.nm_of(place_slack(self.rounding_halves)) } else { 0.0 },
+                slack_nm: if self.is_turned() {
+                    self.nm_of(place_slack(self.rounding_halves))
+                } else {
+                    0.0
+                },
                 ..PlaceFit::default()
             },
         };
@@ -69,8 +73,8 @@ impl Cluster<'_> {
         }
         match self.rounded(&tiles).filter(|(fit, _)| !few_are_off(on, fit.count)) {
             Some((fit, grid)) => {
+                let is_poor = fit.is_half_empty;
                 let (site, fit) = self.fitted_site(&fit, grid, pillars)?;
-                let is_poor = false;
                 Ok(Some(FoundElement { site, fit, is_poor }))
             }
             None => Ok(exact?.map(exactly)),
@@ -287,7 +291,7 @@ impl Cluster<'_> {
 }
 
 /// True if nearly all of some places are on a lattice: a few may be faults.
-fn few_are_off(on: usize, all: usize) -> bool {
+pub(super) fn few_are_off(on: usize, all: usize) -> bool {
     /// One in so many may be off.
     const FEW: usize = 50;
     FEW * on >= (FEW - 1) * all

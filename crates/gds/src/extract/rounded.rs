@@ -1,7 +1,7 @@
 //! Lattices whose places were rounded to the grid one by one, as loops of other programs draw them: any pitch, rows of hexagonal
 //! lattices half the root of three of the pitch apart, a centre anywhere.
 
-use super::lattices::{AXES, Cluster, SHARE_OF_SITES};
+use super::lattices::{AXES, Cluster, SHARE_OF_SITES, few_are_off};
 use super::places::PlaceFit;
 use super::turned::typical_distance;
 use crate::{CORNER_STEPS, ExtractionError, Point};
@@ -49,6 +49,9 @@ pub(super) struct Fit {
     parity: i64,
     /// Samples on sites.
     pub count: usize,
+    /// True if nearly all of them are on every other site of a square lattice, as those of a wider one are that is turned by 45
+    /// degrees.
+    pub is_half_empty: bool,
 }
 
 impl Cluster<'_> {
@@ -165,6 +168,7 @@ impl Cluster<'_> {
             combs,
             parity,
             count,
+            is_half_empty: kind.is_square() && few_are_off(counts[0].max(counts[1]), count),
         })
     }
 

@@ -134,7 +134,9 @@ impl<V> Turned<'_, V> {
         tilted_rectangle_of(&self.placed, self.unit_nm)?;
         let (simple, points) = (simplified(&self.placed), &self.placed);
         let points = if points.len() == CLOSED { points } else { &simple };
-        let &[a, b, c, d, _] = points.as_slice() else { return None };
+        let &[a, b, c, d, _] = points.as_slice() else {
+            return None;
+        };
         let corners = [a, b, c, d].map(|p| self.turned([p.x as f64, p.y as f64]));
         let [cos, sin] = self.direction.map(f64::abs);
         let rounding = CORNER_STEPS * grid_step(self.unit_nm);
@@ -293,12 +295,12 @@ impl Cluster<'_> {
     }
 }
 
-/// Distance of neighbouring places, in the middle of all (half steps).
+/// Distance of neighbouring places (half steps): of those one in ten from the nearest pair, since samples need not be neighbours.
 pub(super) fn typical_distance(tiles: &[Vec<Point>]) -> Option<f64> {
     let pairs = tiles.iter().flat_map(|tile| nearest_pairs(tile));
     let mut lengths: Vec<f64> = pairs.map(|[x, y]| x.hypot(y)).collect();
-    let middle = lengths.len() / 2;
-    (middle < lengths.len()).then(|| *lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let near = lengths.len() / 10;
+    (near < lengths.len()).then(|| *lengths.select_nth_unstable_by(near, f64::total_cmp).1)
 }
 
 /// Ways from each place to the nearest other one.
