@@ -258,7 +258,7 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
     )?;
     if let (Some(stated), Some(element)) = (&args.stated, found.elements.first()) {
         let (own, lattice) = (&stated.cell, element.site.lattice);
-        if (own.pitch_nm, own.lattice) != (lattice.pitch_nm(), lattice.kind()) {
+        if own.lattice != lattice.kind() || !own.pitch_nm.is_near(lattice.pitch_nm()) {
             return Err(Error::refused(
                 "psf/lattices-differ",
                 format!(

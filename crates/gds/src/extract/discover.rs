@@ -239,7 +239,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     // Squares are upright rectangles too, where others of several sizes stand among them.
     let among = circles == 0 && FEWEST_AMONG * map.sizes.rectangles > squares;
     let rectangles = (mostly || among)
-        .then(|| map.sizes.pillars(how.widest_nm))
+        .then(|| map.sizes.pillars(how.widest_nm, is_rounded))
         .flatten()
         .filter(|found| mostly || found.with_squares);
     let shape = match &rectangles {

@@ -41,7 +41,7 @@ impl PillarCollector {
         Self {
             layer: plan.pillar_layer,
             shape,
-            turned_deg: turn.map(f64::to_degrees),
+            turned_deg: turn.map(|turn| (turn.to_degrees() * 1e9).round() / 1e9),
             listed: plan.listed,
             scale,
             finder: PillarFinder::new(shape, scale.nm(1.0)),

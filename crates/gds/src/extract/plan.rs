@@ -103,8 +103,8 @@ impl<W> Extraction<W> {
     /// # Errors
     /// With the first element that stands on another one.
     pub fn check_one_lattice(&self, file: &Path, hint: &str) -> Result<()> {
-        let of = |e: &ExtractedElement<W>| (e.site.lattice.kind(), e.site.lattice.pitch_nm());
-        let Some(other) = self.elements.iter().find(|e| of(e) != of(&self.elements[0])) else {
+        let is_other = |e: &&ExtractedElement<W>| !e.site.lattice.is_like(&self.elements[0].site.lattice);
+        let Some(other) = self.elements.iter().find(is_other) else {
             return Ok(());
         };
         Err(Error::refused(

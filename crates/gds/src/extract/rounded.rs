@@ -19,9 +19,9 @@ const FIRST_REACH: f64 = 12.0;
 const SHARE_OF_DISTANCE: f64 = 0.6;
 /// Steps in a nanometre of pitches that people choose, the coarsest first.
 const DECIMALS: [f64; 7] = [1.0, 2.0, 10.0, 20.0, 100.0, 1e3, 1e4];
-/// Steps of the grid by which a rounder pitch may move the outermost places of a lattice: half of what their tolerance leaves beside
+/// Steps of the grid by which a rounder pitch or angle may move the outermost places of a lattice: half of what their tolerance leaves beside
 /// the rounding of corners.
-const ROOM: f64 = 0.5 * CORNER_STEPS;
+pub(super) const ROOM: f64 = 0.5 * CORNER_STEPS;
 /// Half the root of three: the distance of rows of a hexagonal lattice over its pitch.
 const ROW: f64 = 0.866_025_403_784_438_6;
 

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::lattices::{Cluster, SHARE_OF_SITES};
+use super::rounded::ROOM;
 use crate::circle::circle_of;
 use crate::shape::grid_step;
 use crate::{
@@ -291,8 +292,18 @@ impl Cluster<'_> {
         };
         let kinds = [LatticeKind::Square, LatticeKind::Hexagonal];
         let (_, angle) = kinds.into_iter().filter_map(of_kind).max_by_key(|(on, _)| *on)?;
-        (angle.abs() * reach > 2.0 * self.unit_halves).then_some(angle)
+        (angle.abs() * reach > 2.0 * self.unit_halves).then(|| roundest(angle, ROOM * self.unit_halves / reach))
     }
+}
+
+/// The roundest angle in degrees within some room about an angle: a lens that is placed at it is turned back without rounding (rad).
+fn roundest(angle: f64, room: f64) -> f64 {
+    let rounded = |per_degree: &f64| ((angle.to_degrees() * per_degree).round() / per_degree).to_radians();
+    let nearest = [1.0, 2.0, 10.0, 100.0, 1e3].iter().map(rounded);
+    nearest
+        .into_iter()
+        .find(|round| (round - angle).abs() <= room)
+        .unwrap_or(angle)
 }
 
 /// Distance of neighbouring places (half steps): of those one in ten from the nearest pair, since samples need not be neighbours.
