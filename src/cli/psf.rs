@@ -9,11 +9,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use metalith::cell::{Analyser, Fidelity, Handedness, Polarisation};
 use metalith::design::CellFile;
+use metalith::extract::LeftOut;
 use metalith::gds::LayerNumber;
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
-    LeftOut, STREHL_AGAINST, SimulationCase, SinglePsf, SinglePsfReport, focal_length_words, focus_words, plane_words,
-    single_psfs, single_white, write_single_psf_report,
+    STREHL_AGAINST, SimulationCase, SinglePsf, SinglePsfReport, focal_length_words, focus_words, outline_warnings,
+    plane_words, single_psfs, single_white, write_single_psf_report,
 };
 use metalith::wave::psf::FOCUS_PLANES;
 use metalith::{
@@ -423,6 +424,7 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         write_single_psf_report(&report, folder)?;
     }
     terminal.clear();
+    let warnings = outline_warnings(&found);
     let outcome = Outcome::of(left_out.as_ref().is_none_or(|left_out| !left_out.is_much));
     if args.json {
         let elements = found.elements.iter().map(|e| {
@@ -437,6 +439,7 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         });
         let json = serde_json::json!({
             "not_understood": left_out.as_ref().map(|left_out| &left_out.words),
+            "warnings": warnings,
             "turned_deg": found.turned_deg,
             "pillars": found.pillars,
             "elements": elements.collect::<Vec<_>>(),
@@ -452,6 +455,9 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     if let Some(left_out) = &left_out {
         print_line!("{}", left_out.words);
+    }
+    for warning in &warnings {
+        print_line!("{warning}");
     }
     for element in &found.elements {
         let (site, lattice) = (&element.site, element.site.lattice);

@@ -33,7 +33,7 @@ struct Look {
 const CLOSE: Look = Look {
     bits: FINE,
     widest_nm: 6000,
-    at_angles: false,
+    at_angles: true,
     turn: None,
 };
 /// Settings for wider pitches, up to the widest of a design. Marks and pads are taken for pillars then too: a second
@@ -84,16 +84,25 @@ struct Search {
 #[derive(Clone, Debug)]
 pub struct Discovered {
     pub sites: Vec<ElementSite>,
-    /// Shape of most of its pillars.
+    /// Shape of its pillars: squares and circles together where there are both.
     pub shape: PillarShape,
+    /// Shape of most of its pillars.
+    pub majority: PillarShape,
     /// How the places of each element were found; none where they are exact.
     pub fits: Vec<PlaceFit>,
     /// Angle by which the layout was turned back before they were found (rad); none for most.
     pub turn: Option<f64>,
 }
 
+impl Discovered {
+    /// Angle by which the layout was turned back (degrees), to a billionth.
+    pub fn turned_deg(&self) -> Option<f64> {
+        self.turn.map(|turn| (turn.to_degrees() * 1e9).round() / 1e9)
+    }
+}
+
 /// Find the elements of a layout whose pillars are on these layers, each with the ends of its pillars: see
-/// [`ElementSite::widen`].
+/// [`ElementSite::widen`]. Where all of it stands at an angle, elements are those of the layout turned back by it.
 ///
 /// # Errors
 /// If there is no element on these layers or there are too many, or if the layout cannot be read.
@@ -104,47 +113,34 @@ pub fn discover(
     scale: Scale,
     progress: &dyn Progress,
 ) -> Result<Discovered> {
-    search(layout, from, layers, scale, false, progress)
-}
-
-/// Variant of [`discover`] that finds elements placed at any angle as a whole, too.
-///
-/// # Errors
-/// As [`discover`].
-pub(super) fn discover_turned(
-    layout: &Layout,
-    from: &Selection,
-    layers: &[LayerNumber],
-    scale: Scale,
-    progress: &dyn Progress,
-) -> Result<Discovered> {
-    search(layout, from, layers, scale, true, progress)
-}
-
-fn search(
-    layout: &Layout,
-    from: &Selection,
-    layers: &[LayerNumber],
-    scale: Scale,
-    at_angles: bool,
-    progress: &dyn Progress,
-) -> Result<Discovered> {
     let selection = Selection {
         layers: Some(layers.to_vec()),
         ..from.clone()
     };
     let fail = failed(layout.path());
     let look = |how: Look| seen(layout, &selection, scale, how, progress);
-    let close = look(Look { at_angles, ..CLOSE })?;
+    let close = look(CLOSE)?;
     let turned = match close.turn {
         None => None,
         // What a turned look cannot tell is no fault of the layout.
         Some(angle) => SIXTHS.into_iter().find_map(|more| {
             let turn = Some(angle + more);
-            look(Look { turn, ..CLOSE }).ok().filter(Seen::holds_a_lens)
+            look(Look {
+                turn,
+                at_angles: false,
+                ..CLOSE
+            })
+            .ok()
+            .filter(Seen::holds_a_lens)
         }),
     };
-    let Seen { sites, shape, turn, .. } = if let Some(turned) = turned {
+    let Seen {
+        sites,
+        shape,
+        majority,
+        turn,
+        ..
+    } = if let Some(turned) = turned {
         turned
     } else if let Some(cause) = close.cause {
         return Err(fail(cause));
@@ -181,6 +177,7 @@ fn search(
     Ok(Discovered {
         sites,
         shape,
+        majority,
         fits,
         turn,
     })
@@ -190,6 +187,8 @@ fn search(
 struct Seen {
     sites: Vec<(ElementSite, PlaceFit)>,
     shape: PillarShape,
+    /// The same, but squares or circles where there are both.
+    majority: PillarShape,
     /// Shapes that may be pillars by their outline, however wide.
     shapes: u64,
     /// Angle by which a layout is turned back in this search, or by which it should be in another one (rad).
@@ -230,6 +229,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
         return Ok(Seen {
             sites: Vec::new(),
             shape: PillarShape::default(),
+            majority: PillarShape::default(),
             shapes,
             turn: largest.and_then(|members| cluster_of(&tiles, members, scale, false).turn()),
             cause: None,
@@ -242,11 +242,15 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
         .then(|| map.sizes.pillars(how.widest_nm, is_rounded))
         .flatten()
         .filter(|found| mostly || found.with_squares);
+    let square_or_circle = if circles > squares {
+        PillarShape::Circle
+    } else {
+        PillarShape::Square
+    };
     let shape = match &rectangles {
         Some(found) => found.shape,
-        None if how.at_angles && is_mixed([squares, circles]) => PillarShape::Mixed,
-        None if circles > squares => PillarShape::Circle,
-        None => PillarShape::Square,
+        None if is_mixed([squares, circles]) => PillarShape::Mixed,
+        None => square_or_circle,
     };
     let places = match rectangles {
         None => map.pillars,
@@ -287,6 +291,11 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     Ok(Seen {
         sites,
         shape,
+        majority: if shape == PillarShape::Mixed {
+            square_or_circle
+        } else {
+            shape
+        },
         shapes,
         turn,
         cause: failed,
