@@ -9,7 +9,7 @@ use metalith::calibrate::{BenchSampling, MeasuredSet, Session, Settings, Synthes
 fn calibration(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
     metalith_testing::session::small_set(folder.path());
-    let like = MeasuredSet::read(folder.path(), &metalith::extract::GdsPillars, &Silent).expect("a set");
+    let like = MeasuredSet::read(folder.path(), &metalith::extract::PillarsAt::STATED, &Silent).expect("a set");
     let settings = Settings {
         sampling: BenchSampling {
             spectrum: 0.34,

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use metalith::calibrate::{BenchSampling, DeclaredEffect, MeasuredSet, Settings, Synthesizer};
-use metalith::extract::GdsPillars;
+use metalith::extract::PillarsAt;
 use metalith::layout::{LayoutFormat, convert};
 use metalith::{Layout, Silent};
 use metalith_testing::session::{full_size_set, small_set, write_npy};
@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     convert(&Layout::open(&written)?, LayoutFormat::of_name(&kept), &kept, &Silent)?;
     let text = std::fs::read_to_string(&description)?;
     std::fs::write(&description, text.replace("\"layout.gds\"", "\"layout.oas\""))?;
-    let mut like = MeasuredSet::read(folder, &GdsPillars, &Silent)?;
+    let mut like = MeasuredSet::read(folder, &PillarsAt::STATED, &Silent)?;
     if let Some(place) = boundary {
         like.field_boundary_um = Some(place.try_into().map_err(|_| "a boundary is X,Y")?);
     }

@@ -128,6 +128,12 @@ def main():
     }
     pairs = {name: (name, written[name][0], shapes, None) for name, shapes in drawn.items()}
     pairs["turned"] = ("square", written["square"][0], drawn["square"], 30)
+    # Every corner of a lens at an angle rounded for itself, and places of a pitch that is no round number.
+    turned = [square(*box).rotate(math.radians(12)).translate(12.3456, -7.8901) for box in boxes(polygons["square"])]
+    pairs["flattened"] = ("square", written["square"][0], turned, None)
+    scaled = 1000 / 3 / 333.3
+    stretched = [square(x * scaled, y * scaled, w) for x, y, w in boxes(polygons["odd_pitch"])]
+    pairs["any_pitch"] = ("odd_pitch", written["odd_pitch"][0], stretched, None)
     # Half of each: the lens on the left is of squares, that on the right of circles.
     left = [p for p in polygons["square"] if p.bounding_box()[0][0] < 0]
     right = [p for p in polygons["round"] if p.bounding_box()[0][0] >= 0]

@@ -533,7 +533,7 @@ mod tests {
             })
             .collect();
         std::fs::write(&out, stated).unwrap();
-        let read = metalith_calibrate::MeasuredSet::read(&out, &metalith_gds::extract::GdsPillars, &Silent);
+        let read = metalith_calibrate::MeasuredSet::read(&out, &metalith_gds::extract::PillarsAt::STATED, &Silent);
         assert_eq!(read.unwrap().measurements.len(), 8);
         let again = new_set(
             &layout,

@@ -6,7 +6,7 @@ use metalith_bench_plan::{BenchFile, MeasurementPlan, PlanRequest, check_not_beg
 use metalith_cell::cache_folder;
 use metalith_core::{Error, FolderLock, Progress, Result};
 use metalith_design::{Design, PillarArray};
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 use metalith_layout::write_pillars;
 
 /// Name of the layout in the folder of the session.
@@ -54,7 +54,7 @@ pub fn plan_session(
             only,
             cache: cache_folder(),
         };
-        plan(&request, &GdsPillars, progress)
+        plan(&request, &PillarsAt::STATED, progress)
     })?;
     let frames = folder.join("captures");
     std::fs::create_dir_all(&frames).map_err(Error::io("make", &frames))?;

@@ -151,7 +151,18 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         markers: args.markers,
     };
     let report = match &deck {
-        Some(deck) => drc::check(&layout, deck, &input, terminal)?,
+        Some(deck) => {
+            let mut report = drc::check(&layout, deck, &input, terminal)?;
+            // Several layers of pillars are doses of one.
+            if let Some(layer) =
+                args.reading
+                    .layer
+                    .or(deck.pillars.first().copied().filter(|_| deck.pillars.len() == 1))
+            {
+                drc::add_recognition(&mut report, &layout, layer, &input, terminal)?;
+            }
+            report
+        }
         None => drc::check_generic(&layout, args.reading.layer, &input, terminal)?,
     };
     terminal.clear();

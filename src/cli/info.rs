@@ -61,6 +61,9 @@ pub(crate) fn run(args: &InfoArgs, terminal: &Terminal) -> Result<Outcome> {
 /// The summary.
 fn text(found: &Inventory) -> String {
     let mut out = String::new();
+    for left_out in found.lattices.iter().filter_map(|lattices| lattices.left_out.as_ref()) {
+        let _ = writeln!(out, "{}", left_out.words);
+    }
     head(found, &mut out);
     layers(found, &mut out);
     lattices(found, &mut out);
@@ -223,10 +226,16 @@ fn lattices(found: &Inventory, out: &mut String) {
         };
         let _ = writeln!(
             out,
-            "\n{} of {} on {}{under}",
+            "\n{} of {}{} on {}{under}{}",
             counted(lattice.element_count, "element"),
+            lattice
+                .pillar_count
+                .map_or_else(String::new, |n| format!("{} ", count(n))),
             lattice.pillars,
-            lattice.layer
+            lattice.layer,
+            lattice
+                .turned_deg
+                .map_or_else(String::new, |deg| format!(", at an angle of {} deg", exact(deg))),
         );
         for element in lattice.elements.iter().take(SHOWN) {
             let _ = writeln!(

@@ -9,11 +9,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use metalith::cell::{Analyser, Fidelity, Handedness, Polarisation};
 use metalith::design::CellFile;
+use metalith::extract::LeftOut;
 use metalith::gds::LayerNumber;
 use metalith::report::{count, exact, sig};
 use metalith::verify::{
-    LeftOut, STREHL_AGAINST, SimulationCase, SinglePsf, SinglePsfReport, focal_length_words, focus_words, plane_words,
-    single_psfs, single_white, write_single_psf_report,
+    STREHL_AGAINST, SimulationCase, SinglePsf, SinglePsfReport, focal_length_words, focus_words, outline_warnings,
+    plane_words, single_psfs, single_white, write_single_psf_report,
 };
 use metalith::wave::psf::FOCUS_PLANES;
 use metalith::{
@@ -258,7 +259,7 @@ fn one_kind(args: &PsfArgs, found: &Extraction) -> Result<()> {
     )?;
     if let (Some(stated), Some(element)) = (&args.stated, found.elements.first()) {
         let (own, lattice) = (&stated.cell, element.site.lattice);
-        if (own.pitch_nm, own.lattice) != (lattice.pitch_nm(), lattice.kind()) {
+        if own.lattice != lattice.kind() || !own.pitch_nm.is_near(lattice.pitch_nm()) {
             return Err(Error::refused(
                 "psf/lattices-differ",
                 format!(
@@ -425,6 +426,7 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             .publish("report", &[], |folder| write_single_psf_report(&report, folder))?;
     }
     terminal.clear();
+    let warnings = outline_warnings(&found);
     let outcome = Outcome::of(left_out.as_ref().is_none_or(|left_out| !left_out.is_much));
     if args.json {
         let elements = found.elements.iter().map(|e| {
@@ -439,6 +441,7 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
         });
         let json = serde_json::json!({
             "not_understood": left_out.as_ref().map(|left_out| &left_out.words),
+            "warnings": warnings,
             "turned_deg": found.turned_deg,
             "pillars": found.pillars,
             "elements": elements.collect::<Vec<_>>(),
@@ -454,6 +457,9 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     if let Some(left_out) = &left_out {
         print_line!("{}", left_out.words);
+    }
+    for warning in &warnings {
+        print_line!("{warning}");
     }
     for element in &found.elements {
         let (site, lattice) = (&element.site, element.site.lattice);

@@ -7,7 +7,7 @@ use metalith::bench_plan::BenchFile;
 use metalith::calibrate::{DeclaredEffect, MeasuredSet};
 use metalith::cell::{MappingTable, Material, PillarLibrary, UnitCellTable};
 use metalith::drc::{Deck, Waivers};
-use metalith::gds::extract::GdsPillars;
+use metalith::gds::extract::PillarsAt;
 use metalith::handoff::{Manifest, ManifestEntry, Process, verify_handoff};
 use metalith::imaging::scene::{SceneFile, read_depth, read_picture, read_scene};
 use metalith::optics::Perturbation;
@@ -377,7 +377,7 @@ fn measured(folder: &Path) -> Vec<Format> {
         fs::write(&own, text.replacen(&first, &format!("frame.{ending}"), 1)).unwrap();
         own
     };
-    let reads = |set: PathBuf| move |_: &Path| MeasuredSet::read(&set, &GdsPillars, &Silent);
+    let reads = |set: PathBuf| move |_: &Path| MeasuredSet::read(&set, &PillarsAt::STATED, &Silent);
     let size = PIXELS as u32;
     vec![
         Format::new(
@@ -385,7 +385,7 @@ fn measured(folder: &Path) -> Vec<Format> {
             folder.join("mutant.toml"),
             Kind::Text,
             vec![text.clone().into()],
-            |path| MeasuredSet::read(path, &GdsPillars, &Silent),
+            |path| MeasuredSet::read(path, &PillarsAt::STATED, &Silent),
         ),
         Format::new(
             "capture_npy",

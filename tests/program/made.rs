@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use metalith::calibrate::{Bench, BenchSampling, MeasuredSet, Stage, all_effects};
 use metalith::compensate::{compensate, compensation_cases};
 use metalith::design::CellIncidence;
-use metalith::extract::GdsPillars;
+use metalith::extract::PillarsAt;
 use metalith::optics::{AsBuiltChip, CalibratedModel, Perturbation};
 use metalith::verify::{Lighting, SimulationCase, single_psfs};
 use metalith::wave::{Scratch, Window};
@@ -61,7 +61,7 @@ impl Files {
         let layout = folder.join("few.gds");
         write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
         small_set(folder);
-        let mut set = MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap();
+        let mut set = MeasuredSet::read(folder, &PillarsAt::STATED, &Silent).unwrap();
         // The same chip on a bench: pillars of this layout, openings as the design has them.
         let found = metalith::layout::read_pillars(&design, &layout, &Silent).unwrap();
         for element in &mut set.elements {

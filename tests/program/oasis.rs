@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use metalith::Silent;
-use metalith::extract::GdsPillars;
+use metalith::extract::PillarsAt;
 use metalith::layout::{LayoutFormat, convert};
 use metalith_testing::{design, session::small_set};
 use serde_json::Value;
@@ -92,7 +92,7 @@ fn commands_read_oasis_as_gdsii() {
 fn a_measured_set_takes_oasis() {
     let folder = tempfile::tempdir().unwrap();
     let path = small_set(folder.path());
-    let read = || metalith::calibrate::MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+    let read = || metalith::calibrate::MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
     let from_gds = read();
     let text = fs::read_to_string(&path).unwrap();
     let line = text.lines().find(|line| line.starts_with("layout = ")).unwrap();

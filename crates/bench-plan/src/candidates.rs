@@ -270,7 +270,7 @@ mod tests {
     use crate::bench_file::tests::small_bench;
     use metalith_core::Silent;
     use metalith_design::PillarArray;
-    use metalith_gds::extract::GdsPillars;
+    use metalith_gds::extract::PillarsAt;
     use metalith_layout::write_pillars;
 
     #[test]
@@ -311,7 +311,7 @@ mod tests {
         let array = PillarArray::build(&design, &Silent).unwrap();
         write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
         let bench = small_bench("elements = [1, 0, 3, 0]\n");
-        let found = candidates(&design, &bench, &layout, &GdsPillars, &Silent).unwrap();
+        let found = candidates(&design, &bench, &layout, &PillarsAt::STATED, &Silent).unwrap();
         let set = &found.set;
         assert_eq!(set.stack.lens_diameter_um, 80.0);
         for (e, element) in set.elements.iter_enumerated() {

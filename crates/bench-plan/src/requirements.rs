@@ -111,13 +111,13 @@ mod tests {
     use super::*;
     use crate::bench_file::tests::small_bench;
     use metalith_core::Silent;
-    use metalith_gds::extract::GdsPillars;
+    use metalith_gds::extract::PillarsAt;
 
     #[test]
     fn sizes_that_cannot_be_are_refused_with_what_they_are_counted_from() {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
-        let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        let set = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
         let checked = |wanted: &str| check_wanted(&set, &small_bench(&format!("[wanted]\n{wanted}\n")));
         for sound in [
             "film_height = 10",

@@ -8,7 +8,7 @@ use metalith_bench_plan::{BenchFile, MeasurementPlan, PlanRequest, plan};
 use metalith_calibrate::{BenchSampling, MeasuredSet, Session, Settings, Synthesizer};
 use metalith_core::Silent;
 use metalith_design::{Design, PillarArray};
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 use metalith_layout::write_pillars;
 use metalith_testing::session::{self, PIXELS, write_npy};
 use ndarray::Array2;
@@ -54,7 +54,7 @@ fn planned(folder: &Path, design: &Design, bench: &str, only: &[&str]) -> Measur
         only: only.iter().map(|n| (*n).into()).collect(),
         cache: None,
     };
-    plan(&request, &GdsPillars, &Silent).unwrap()
+    plan(&request, &PillarsAt::STATED, &Silent).unwrap()
 }
 
 fn mini() -> Design {
@@ -72,7 +72,7 @@ fn fill(folder: &Path, plan: &MeasurementPlan, set: Option<&MeasuredSet>) {
 }
 
 fn read(folder: &Path) -> MeasuredSet {
-    MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap()
+    MeasuredSet::read(folder, &PillarsAt::STATED, &Silent).unwrap()
 }
 
 fn settings(cache: PathBuf, only: &[&str]) -> Settings {
@@ -195,7 +195,7 @@ fn a_session_of_a_hexagonal_lens_is_planned_and_diagnosed() {
     ] {
         let other = said.replace("shape = \"circle\"\nlattice = \"hexagonal\"", wrong);
         fs::write(folder.path().join("measurement.toml"), other).unwrap();
-        let error = MeasuredSet::read(folder.path(), &GdsPillars, &Silent)
+        let error = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent)
             .unwrap_err()
             .to_string();
         assert!(error.contains("lattice"), "{error}");

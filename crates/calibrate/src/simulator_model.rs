@@ -186,12 +186,12 @@ mod tests {
     use crate::statistics::check_calibration_fits;
     use metalith_cell::PublishedCell;
     use metalith_core::Silent;
-    use metalith_gds::extract::GdsPillars;
+    use metalith_gds::extract::PillarsAt;
 
     fn small_set() -> MeasuredSet {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
-        let mut set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        let mut set = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
         // One wavelength.
         set.leds.iter_mut().for_each(|led| led.fwhm_nm = 1e-6);
         set

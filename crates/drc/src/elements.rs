@@ -7,6 +7,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Discovered, Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 use metalith_pillars::{ElementSite, PillarShape};
+use metalith_report::exact;
 
 /// The layer that pillars are known by, and further layers whose shapes count as if they were on it.
 pub(super) fn pillar_layers(deck: &Deck) -> (LayerNumber, &[LayerNumber]) {
@@ -27,6 +28,7 @@ pub(super) fn sites(
         let designed = Discovered {
             sites: design.sites(),
             shape: design.cell.shape,
+            majority: design.cell.shape,
             fits: Vec::new(),
             turn: None,
         };
@@ -38,7 +40,16 @@ pub(super) fn sites(
     let mut why = String::new();
     for file in std::iter::once(&layout).chain(&input.with) {
         match discover(file, selection, layers, Scale::of(file)?, progress).map_err(Error::from) {
+            // Rules look at shapes as they stand.
+            Ok(found) if found.turned_deg().is_some() => {
+                let deg = found.turned_deg().unwrap_or_default();
+                why = format!(
+                    "the pillars stand at an angle of {} deg, and this rule is for upright lattices",
+                    exact(deg)
+                );
+            }
             Ok(mut found) => {
+                found.shape = found.majority;
                 ElementSite::widen(&mut found.sites);
                 let total: u64 = found.sites.iter().map(|s| (s.lattice.sites() as u64).pow(2)).sum();
                 if total <= allowance.sites {
@@ -53,6 +64,7 @@ pub(super) fn sites(
     let nothing = Discovered {
         sites: Vec::new(),
         shape: PillarShape::default(),
+        majority: PillarShape::default(),
         fits: Vec::new(),
         turn: None,
     };

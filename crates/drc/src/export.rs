@@ -13,13 +13,17 @@ use super::rule::{Severity, Status};
 pub fn text(report: &DrcReport) -> String {
     const SHOWN: usize = 5;
     let mut out = String::new();
+    if let Some(words) = &report.not_understood {
+        let _ = writeln!(out, "{words}");
+    }
     let _ = writeln!(
         out,
-        "{}: {} shapes, {}, {} pillars on their lattices\ndeck: {}\n",
+        "{}: {} shapes, {}, {} pillars on their lattices{}\ndeck: {}\n",
         printable(&report.layout),
         report.shapes,
         counted(report.elements, "element"),
         report.pillars_on_lattices,
+        (report.turned_deg).map_or_else(String::new, |deg| format!(", at an angle of {} deg", exact(deg))),
         report.deck
     );
     if report.slack_nm > 0.0 {

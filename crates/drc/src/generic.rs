@@ -3,6 +3,7 @@
 use super::deck::Deck;
 use super::input::CheckInput;
 use super::new_rules::most_pillars;
+use super::recognition::add_recognition;
 use super::report::DrcReport;
 use metalith_core::{Progress, Result};
 use metalith_gds::{LayerNumber, Layout};
@@ -57,11 +58,12 @@ pub fn check_generic(
     };
     let name = plural(layout, layer.unwrap_or(usual));
     let deck = deck_of(name);
-    let report = super::check(layout, &deck, input, progress)?;
+    let mut report = super::check(layout, &deck, input, progress)?;
     // Pillars may be told apart from other shapes by their lattice alone.
-    if report.elements == 0 || report.shape.plural() == name {
-        return Ok(report);
+    if report.elements > 0 && report.shape.plural() != name {
+        let deck = deck_of(report.shape.plural());
+        report = super::check(layout, &deck, input, progress)?;
     }
-    let deck = deck_of(report.shape.plural());
-    super::check(layout, &deck, input, progress)
+    add_recognition(&mut report, layout, layer.unwrap_or(usual), input, progress)?;
+    Ok(report)
 }

@@ -57,6 +57,12 @@ pub struct DrcReport {
     /// are those of their sites, and err by up to twice as much.
     #[serde(skip_serializing_if = "is_exact")]
     pub slack_nm: f64,
+    /// Shapes of elements that are no pillars, in words, where no design says what should be there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_understood: Option<String>,
+    /// Angle at which all pillars stand (degrees), if they are not upright.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turned_deg: Option<f64>,
     /// Every rule of the deck, in its order.
     pub rules: Vec<RuleReport>,
     /// Warnings about the check itself: waivers that cover nothing or have expired.
@@ -138,6 +144,8 @@ pub(super) fn assemble(
         shape: flat.shape,
         pillars_on_lattices: flat.pillars_on_lattices(),
         slack_nm: flat.slack_nm,
+        not_understood: None,
+        turned_deg: None,
         rules,
         warnings,
         warned,

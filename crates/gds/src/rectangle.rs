@@ -38,11 +38,13 @@ pub fn tilted_rectangle_of(points: &[Point], unit_nm: f64) -> Option<TiltedRecta
     let corners = [a, b, c, d].map(|p| [p.x as f64 - middle[0], p.y as f64 - middle[1]]);
     let [first, second] = [0, 1].map(|k| [corners[k + 1][0] - corners[k][0], corners[k + 1][1] - corners[k][1]]);
     let [long, other] = [first, second].map(|e| e[0].hypot(e[1]));
-    // A parallelogram has its corners opposite one another about its middle; one with right angles equal diagonals.
-    let opposite = |k: usize| (corners[k][0] + corners[k + 2][0]).hypot(corners[k][1] + corners[k + 2][1]) / 2.0;
-    let reach = |k: usize| corners[k][0].hypot(corners[k][1]);
+    // Diagonals of a parallelogram have one middle; those of one with right angles are equal. Rounding moves both by less than the
+    // tolerance of a corner.
+    let halves = |sign: f64, k: usize| [0, 1].map(|axis| (corners[k][axis] + sign * corners[k + 2][axis]) / 2.0);
+    let [p, q] = [0, 1].map(|k| halves(1.0, k));
+    let [r, s] = [0, 1].map(|k| halves(-1.0, k)).map(|[x, y]| x.hypot(y));
     let slack = rounding(unit_nm);
-    let is_rectangle = opposite(0).max(opposite(1)) <= slack && (reach(0) - reach(1)).abs() <= slack;
+    let is_rectangle = (p[0] - q[0]).hypot(p[1] - q[1]) <= slack && (r - s).abs() <= slack;
     let edges = [long.min(other), long.max(other)];
     (is_rectangle && edges[0] > 2.0 * slack).then_some(TiltedRectangle {
         around,

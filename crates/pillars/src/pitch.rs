@@ -4,48 +4,70 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-/// Steps of a pitch in a nanometre.
-const STEPS_PER_NM: u32 = 20;
+/// Steps of a pitch in a nanometre: half a step too much moves no place of 2^20 sites by more than 0.27 nm.
+const STEPS_PER_NM: u64 = 1_000_000;
+/// Steps of the pitch of a design: 0.05 nm.
+const STEPS_OF_DESIGNS: u64 = STEPS_PER_NM / 20;
 
-/// Distance of neighbouring pillars: a multiple of 0.05 nm, so that 325, 351 and 433.3 nm are exact, and half of each is.
+/// Distance of neighbouring pillars, in steps of 1e-6 nm: a multiple of 0.05 nm in designs, so that 325, 351 and 433.3 nm are
+/// exact, and half of each is; any that a layout from elsewhere has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Pitch(u32);
+pub struct Pitch(u64);
 
 impl Pitch {
     /// A pitch of whole nanometres.
     pub const fn whole(nm: u32) -> Self {
-        Self(nm.saturating_mul(STEPS_PER_NM))
+        Self(nm as u64 * STEPS_PER_NM)
+    }
+
+    /// The pitch nearest to so many nanometres; `None` if it is no length.
+    pub fn nearest(nm: f64) -> Option<Self> {
+        let steps = (nm * STEPS_PER_NM as f64).round();
+        (0.0..=f64::from(u32::MAX) * STEPS_PER_NM as f64)
+            .contains(&steps)
+            .then(|| Self(steps as u64))
     }
 
     /// The pitch of so many nanometres; `None` if it is no multiple of 0.05 nm.
     pub fn of_nm(nm: f64) -> Option<Self> {
         // Decimal fractions are not exact in binary.
         const ROUNDING: f64 = 1e-6;
-        let steps = nm * f64::from(STEPS_PER_NM);
-        let fits = (0.0..=f64::from(u32::MAX)).contains(&steps) && (steps - steps.round()).abs() < ROUNDING;
-        fits.then(|| Self(steps.round() as u32))
+        let steps = nm * (STEPS_PER_NM / STEPS_OF_DESIGNS) as f64;
+        let fits = (steps - steps.round()).abs() < ROUNDING;
+        fits.then(|| Self::nearest(nm)).flatten()
+    }
+
+    /// True if it is a multiple of 0.05 nm, as pitches of designs are.
+    pub fn is_of_designs(self) -> bool {
+        self.0.is_multiple_of(STEPS_OF_DESIGNS)
+    }
+
+    /// True if it differs from another by less than pitches of designs do.
+    pub fn is_near(self, other: Self) -> bool {
+        self.0.abs_diff(other.0) < STEPS_OF_DESIGNS
     }
 
     /// Pitch (nm).
     #[inline]
     pub fn nm(self) -> f64 {
-        f64::from(self.0) / f64::from(STEPS_PER_NM)
+        self.0 as f64 / STEPS_PER_NM as f64
     }
 
     /// Pitch (nm), if it is whole.
     pub fn whole_nm(self) -> Option<u32> {
-        self.0.is_multiple_of(STEPS_PER_NM).then_some(self.0 / STEPS_PER_NM)
+        let nm = u32::try_from(self.0 / STEPS_PER_NM).ok()?;
+        self.0.is_multiple_of(STEPS_PER_NM).then_some(nm)
     }
 
     /// Pitch as whole nanometres, rounded up.
     pub fn at_least_nm(self) -> i64 {
-        i64::from(self.0.div_ceil(STEPS_PER_NM))
+        self.0.div_ceil(STEPS_PER_NM) as i64
     }
 
     /// Half of the pitch in [`Pitch::HALVES_PER_NM`]: exact.
     #[inline]
     pub(crate) fn half(self) -> i64 {
-        i64::from(self.0)
+        self.0 as i64
     }
 
     /// Steps of half a pitch in a nanometre.
@@ -193,9 +215,14 @@ mod tests {
             assert_eq!(unit.divides_half(pitch), half, "{nm}");
         }
         assert_eq!(Pitch::of_nm(433.33), None);
+        let any = Pitch::nearest(1000.0 / 3.0).unwrap();
+        assert_eq!((any.nm(), any.is_of_designs()), (333.333_333, false));
+        assert!(any.is_near(Pitch::of_nm(333.35).unwrap()) && !any.is_near(Pitch::of_nm(333.25).unwrap()));
+        assert_eq!([-1.0, f64::NAN, f64::INFINITY].map(Pitch::nearest), [None; 3]);
         assert_eq!(Pitch::of_nm(-1.0), None);
         assert_eq!(Pitch::of_nm(f64::NAN), None);
-        let rounded: Vec<i64> = [-60, -59, -20, 20, 59, 60]
+        let half = Pitch::HALVES_PER_NM / 2;
+        let rounded: Vec<i64> = [-3 * half, 1 - 3 * half, -half, half, 3 * half - 1, 3 * half]
             .map(|n| DatabaseUnit::Nanometre.rounded(n))
             .into();
         assert_eq!(rounded, [-2, -1, -1, 1, 1, 2]);

@@ -9,14 +9,15 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::left_out::LeftOut;
 use super::lens_figures::{focus_cells, focus_columns};
+use super::lens_outline::outline_warnings;
 use super::polychromatic::CameraStatement;
 use super::single_memory::FocusRequest;
 use super::single_white::SingleWhite;
 use super::{model_page, polychromatic_page, through_focus};
 use metalith_cell::{Fidelity, Illumination, PolarisedLight};
 use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_gds::extract::LeftOut;
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_optics::{CaseOptics, ElementOptics, ModelStatement, Placement, SimulationCase};
 use metalith_pillars::{LatticeKind, PillarMap};
@@ -260,6 +261,9 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     );
     if let Some(left_out) = left_out {
         page.paragraph(&left_out.words);
+    }
+    for warning in outline_warnings(found) {
+        page.paragraph(&warning);
     }
     page.facts(&[
         ("Pillars", format!("{} {}", count(found.pillars), found.shape.plural())),

@@ -223,7 +223,7 @@ fn scattered_to(group: &FocusSeries, lattice: Lattice, distance_um: f64, wavelen
 mod tests {
     use metalith_core::Silent;
     use metalith_design::{Design, PillarArray};
-    use metalith_gds::extract::GdsPillars;
+    use metalith_gds::extract::PillarsAt;
     use metalith_layout::write_pillars;
     use metalith_optics::Stitching;
     use metalith_pillars::PillarReader;
@@ -249,12 +249,12 @@ mod tests {
         write_pillars(&design, &array, design.layout.hierarchy, &layout, &Silent).unwrap();
         let sites = design.sites_of(&design.elements());
         let layer = design.layout.layers.pillars.number();
-        let maps = GdsPillars
+        let maps = PillarsAt::STATED
             .pillars(&layout, layer, design.cell.shape, &sites, &Silent)
             .unwrap();
         let mut set = MeasuredSet::read(
             &metalith_testing::session::small_set(folder.path()),
-            &GdsPillars,
+            &PillarsAt::STATED,
             &Silent,
         )
         .unwrap();

@@ -314,7 +314,7 @@ fn window_mean(intensity: &[f32], n: usize, samples_per_pixel: f64, camera: &Rel
 mod tests {
     use super::*;
     use metalith_core::Silent;
-    use metalith_gds::extract::GdsPillars;
+    use metalith_gds::extract::PillarsAt;
 
     /// Windows of a relay are as they were; those of large pixels, and large ones, have room to be moved in.
     #[test]
@@ -323,7 +323,7 @@ mod tests {
         const ROUNDING_UM: f64 = 0.6;
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
-        let mut set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        let mut set = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
         let usual = BenchSampling::default().margin;
         for (pixels, pixel_um, is_usual) in [
             (48, 0.5, true),

@@ -5,7 +5,7 @@ use std::path::Path;
 use metalith_cell::PublishedCell;
 use metalith_core::Silent;
 use metalith_design::Design;
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{
     BankSpec, BetweenNodes, ChipInLight, Detail, FrameOperator, KernelBank, SceneSpace, StrayLight, element_views,
@@ -72,7 +72,7 @@ impl Lenses {
     /// Compare the windows of a bench whose set is in a folder with those of a scene of a spot.
     fn see_a_spot_as_the_bench(&self, folder: &Path) {
         let focal_um = self.design.lens.focal_length_um;
-        let mut set = MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap();
+        let mut set = MeasuredSet::read(folder, &PillarsAt::STATED, &Silent).unwrap();
         set.divergence_rad = 0.0;
         for (led, [centre_nm, fwhm_nm]) in set.leds.iter_mut().zip(LAMPS) {
             (led.centre_nm, led.fwhm_nm) = (centre_nm, fwhm_nm);

@@ -55,7 +55,7 @@ mod tests {
     use crate::simulator::Simulator;
     use metalith_cell::{CellModel, PublishedCell};
     use metalith_core::Silent;
-    use metalith_gds::extract::GdsPillars;
+    use metalith_gds::extract::PillarsAt;
     use metalith_wave::{Accuracy, Scratch, Window};
     use num_complex::Complex64;
 
@@ -77,7 +77,7 @@ mod tests {
     fn measurements_show_what_the_made_chip_makes_of_every_effect() {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
-        let mut set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        let mut set = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
         // One wavelength and a point source: only chip, path and camera remain.
         set.leds.iter_mut().for_each(|led| led.fwhm_nm = 1e-6);
         set.divergence_rad = 0.0;

@@ -234,14 +234,14 @@ pub(crate) fn with_declared(set: &MeasuredSet, declared: &[DeclaredEffect]) -> R
 mod tests {
     use super::*;
     use metalith_core::Silent;
-    use metalith_gds::extract::GdsPillars;
+    use metalith_gds::extract::PillarsAt;
 
     /// A set that does not say where write fields meet may be searched as if it did.
     #[test]
     fn names_of_boundaries_are_reserved() {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
-        let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        let set = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
         assert!(set.field_boundary_um.is_none());
         let declared = |name: &str| {
             let file = folder.path().join("effects.toml");

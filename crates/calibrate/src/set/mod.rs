@@ -178,14 +178,14 @@ pub struct Measurement {
 mod tests {
     use super::*;
     use metalith_core::Silent;
-    use metalith_gds::extract::GdsPillars;
+    use metalith_gds::extract::PillarsAt;
 
     /// Sessions of one plan share simulations: whatever these depend on is compared.
     #[test]
     fn one_plan_has_one_place_of_elements_and_of_write_fields() {
         let folder = tempfile::tempdir().unwrap();
         metalith_testing::session::small_set(folder.path());
-        let read = || MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+        let read = || MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
         let (set, mut brighter, mut stitched, mut moved) = (read(), read(), read(), read());
         brighter.measurements.iter_mut().for_each(|c| c.scale_dn *= 2.0);
         assert!(set.same_plan(&brighter));
@@ -203,7 +203,7 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         let read = |text: String| {
             std::fs::write(&path, text).unwrap();
-            MeasuredSet::read(folder.path(), &GdsPillars, &Silent)
+            MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent)
         };
         let usual = read(text.clone()).unwrap().elements[ElementIndex::from(0)].clone();
         let first = "centre_um = [0.0, 0.0]";

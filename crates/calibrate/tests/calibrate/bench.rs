@@ -5,7 +5,7 @@ use std::fs;
 use metalith_attribution::Measurements;
 use metalith_calibrate::{MeasuredSet, Session};
 use metalith_core::Silent;
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
 use ndarray::Array2;
 
@@ -15,7 +15,7 @@ use crate::set::{SIMULATIONS, names, settings, synthetic};
 fn every_fault_of_a_set_is_named_in_one_go() {
     let folder = tempfile::tempdir().unwrap();
     let path = small_set(folder.path());
-    assert!(MeasuredSet::read(folder.path(), &GdsPillars, &Silent).is_ok());
+    assert!(MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).is_ok());
     fs::remove_file(folder.path().join("e0_500_z0.npy")).unwrap();
     write_npy(
         &folder.path().join("e0_500_z1.npy"),
@@ -33,7 +33,7 @@ fn every_fault_of_a_set_is_named_in_one_go() {
         .replace("index = [1, 0]\n", "index = [1, 0]\ncolour = \"red\"\n")
         .replacen("element = [1, 0]", "element = [7, 0]", 1);
     fs::write(&path, text).unwrap();
-    let error = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap_err();
+    let error = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap_err();
     assert_eq!(error.exit_code(), 2);
     let error = error.to_string();
     for fault in [
@@ -75,7 +75,7 @@ fn a_bench_with_exposures_filters_and_a_relay_is_read() {
         1,
     );
     fs::write(&path, text).unwrap();
-    let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+    let set = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
     assert_eq!((set.camera.pixel_um, set.camera.relay_blur_um), (0.5, 0.3));
     let first = &set.measurements.raw[0];
     assert_eq!((first.scale_dn, first.frames), (1.0, 64));
@@ -137,7 +137,7 @@ fn exposures_of_unlike_time_have_dark_frames_of_their_own() {
             )
             .replacen("scale_dn = 1.0\n", &format!("scale_dn = 8.0\n{of_exposure}"), 1);
         fs::write(&path, text).unwrap();
-        MeasuredSet::read(folder.path(), &GdsPillars, &Silent)
+        MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent)
     };
     let error = read("", "").unwrap_err().to_string();
     for part in ["unlike time", "8 DN", "dark_frames", "dark_holds_for"] {

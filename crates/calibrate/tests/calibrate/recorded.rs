@@ -5,7 +5,7 @@ use std::path::Path;
 
 use metalith_calibrate::{Diagnosis, MeasuredSet, Session, SetVerdict, Synthesizer};
 use metalith_core::Silent;
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 use metalith_sensor::ColourFilter;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
 use ndarray::Array2;
@@ -66,7 +66,7 @@ fn light() -> Vec<(String, Array2<f64>)> {
 
 /// The answer for the set in a folder, and the set.
 fn diagnosed(folder: &Path) -> (Diagnosis, MeasuredSet) {
-    let set = MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap();
+    let set = MeasuredSet::read(folder, &PillarsAt::STATED, &Silent).unwrap();
     let session = Session::new(&set, settings()).unwrap();
     let diagnosis = session.diagnose(&SIMULATIONS, &Silent).unwrap().0;
     (diagnosis, set)
@@ -93,7 +93,7 @@ fn a_bias_is_found_in_a_mosaic() {
     fs::write(&path, text).unwrap();
     let filter = ColourFilter::Grbg;
     let mut camera = SensorModel::new(1);
-    let set = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+    let set = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
     for ((name, light), measurement) in light().iter().zip(&set.measurements) {
         let pixels = filter.pixels_of(set.leds[measurement.led].channel).unwrap();
         let frame = Array2::from_shape_fn(light.dim(), |at| {
@@ -200,7 +200,7 @@ fn a_bias_is_found_behind_noisy_dark_and_flat_frames() {
         text.replace("flux_sigma = 0.01", "flux_sigma = 0.01\ndark_frame = \"dark.npy\""),
     )
     .unwrap();
-    let error = MeasuredSet::read(folder.path(), &GdsPillars, &Silent)
+    let error = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent)
         .unwrap_err()
         .to_string();
     assert!(error.contains("dark_frames"), "{error}");
@@ -224,7 +224,7 @@ fn a_gap_is_found_on_a_bare_sensor() {
         let dark = Array2::from_elem((EDGE, EDGE), LIKE.camera.black_level_dn as f32);
         write_npy(&folder.path().join(format!("{}.npy", measurement.name)), &dark);
     }
-    let like = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+    let like = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
     let synthesizer = Synthesizer::new(&like, &settings()).unwrap();
     let images = synthesizer.with_effect("defocus", &[DEFOCUS_UM], &Silent).unwrap();
     let set = synthesizer.draw(&images, 43);

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use metalith_calibrate::{BenchSampling, Diagnosis, MeasuredSet, Session, Settings, Simulations, Synthesizer};
 use metalith_core::Silent;
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 use metalith_testing::session::small_set;
 
 /// The small set on disk, and a folder for tables of cells: every test would solve the same ones. Both are emptied
@@ -23,7 +23,7 @@ pub(crate) static FOLDERS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
 pub(crate) static LIKE: LazyLock<MeasuredSet> = LazyLock::new(|| {
     let [folder, _] = &*FOLDERS;
     small_set(folder);
-    MeasuredSet::read(folder, &GdsPillars, &Silent).unwrap()
+    MeasuredSet::read(folder, &PillarsAt::STATED, &Silent).unwrap()
 });
 
 /// Simulations with some of the effects whose cells need not be solved again.

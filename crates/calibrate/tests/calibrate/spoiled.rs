@@ -4,7 +4,7 @@ use std::fs;
 
 use metalith_calibrate::{Diagnosis, MeasuredSet, MeasurementIndex, Session};
 use metalith_core::{Result, Silent};
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 use metalith_sensor::frame::Orientation;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
 use ndarray::Array2;
@@ -114,7 +114,7 @@ fn bits_at_the_left_are_refused_and_frames_are_turned_as_stated() {
     let text = fs::read_to_string(&path).unwrap();
     let frame = Array2::from_shape_fn((PIXELS, PIXELS), |(y, x)| (40 + y + 2 * x) as f32);
     let name = "e0_500_z0.npy";
-    let read = || MeasuredSet::read(folder.path(), &GdsPillars, &Silent);
+    let read = || MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent);
     write_npy(&folder.path().join(name), &(&frame * 16.0));
     let error = read().unwrap_err().to_string();
     assert!(error.contains("`saturation_dn`"), "{error}");

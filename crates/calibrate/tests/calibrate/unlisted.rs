@@ -6,7 +6,7 @@ use metalith_calibrate::{
     DeclaredEffect, Evidence, MeasuredSet, Session, Settings, Synthesizer, UnlistedEffect, propose,
 };
 use metalith_core::Silent;
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 use metalith_optics::CalibratedModel;
 use metalith_testing::session::set_of_three;
 
@@ -121,7 +121,7 @@ fn what_is_linear_in_the_place_of_the_element_is_proposed_and_adopted() {
     const TOLERANCE: f64 = 0.05;
     let folder = tempfile::tempdir().unwrap();
     set_of_three(folder.path());
-    let like = MeasuredSet::read(folder.path(), &GdsPillars, &Silent).unwrap();
+    let like = MeasuredSet::read(folder.path(), &PillarsAt::STATED, &Silent).unwrap();
     // A tilt in mrad is um per mm; the bias rises from (75, 75) um on.
     let file = folder.path().join("bias.toml");
     fs::write(

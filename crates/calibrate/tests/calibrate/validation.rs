@@ -2,7 +2,7 @@
 
 use metalith_calibrate::{Session, Settings, ValidationPlan, calibrate, validate};
 use metalith_core::Silent;
-use metalith_gds::extract::GdsPillars;
+use metalith_gds::extract::PillarsAt;
 
 use crate::set::{FOLDERS, LIKE, settings};
 
@@ -42,7 +42,7 @@ fn unknown_effects_are_refused_all_at_once() {
         ..ValidationPlan::default()
     };
     let outs = [FOLDERS[0].join("out")];
-    let by_run = calibrate(&FOLDERS[..1], &outs, &settings, &GdsPillars, &Silent)
+    let by_run = calibrate(&FOLDERS[..1], &outs, &settings, &PillarsAt::STATED, &Silent)
         .err()
         .unwrap();
     let by_validation = validate(&LIKE, &self::settings(), &plan, &Silent).err().unwrap();

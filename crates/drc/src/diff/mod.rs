@@ -57,10 +57,12 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     let (mut sites, mut shape) = (Vec::new(), None);
     for layout in [a, b] {
         match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress).map_err(Error::from) {
+            // What stands at an angle is compared as outlines: nothing is turned and rounded for that.
+            Ok(found) if found.turn.is_some() => {}
             Ok(found) => {
                 shape = Some(match shape {
-                    None => found.shape,
-                    Some(first) => both(first, found.shape)?,
+                    None => found.majority,
+                    Some(first) => both(first, found.majority)?,
                 });
                 // What is not exactly on its site is compared as an outline: half a step of the grid counts here.
                 let exact = found.sites.into_iter().zip(&found.fits);

@@ -1,5 +1,7 @@
 //! Discovery of the elements of any layout, and of the lattice on which they stand.
 
+use std::f64::consts::FRAC_PI_3;
+
 use super::failed;
 use super::lattices::{Cluster, FEWEST};
 use super::places::{Centre, PlaceFit, Places};
@@ -31,7 +33,7 @@ struct Look {
 const CLOSE: Look = Look {
     bits: FINE,
     widest_nm: 6000,
-    at_angles: false,
+    at_angles: true,
     turn: None,
 };
 /// Settings for wider pitches, up to the widest of a design. Marks and pads are taken for pillars then too: a second
@@ -42,6 +44,11 @@ const WIDE: Look = Look {
     at_angles: false,
     turn: None,
 };
+/// Rounding of places that are turned back, in roundings along one axis: that of both axes of the file, along a diagonal, and that of
+/// the place where it is turned to.
+const TURNED: f64 = 1.0 + std::f64::consts::SQRT_2;
+/// Turns that leave a hexagonal lattice as it is, but not the squares on it (rad).
+const SIXTHS: [f64; 3] = [0.0, FRAC_PI_3, -FRAC_PI_3];
 /// Squares for one upright rectangle, at most, of a layout whose pillars are such.
 const FEWEST_AMONG: u64 = 4;
 /// Elements found at most.
@@ -77,16 +84,25 @@ struct Search {
 #[derive(Clone, Debug)]
 pub struct Discovered {
     pub sites: Vec<ElementSite>,
-    /// Shape of most of its pillars.
+    /// Shape of its pillars: squares and circles together where there are both.
     pub shape: PillarShape,
+    /// Shape of most of its pillars.
+    pub majority: PillarShape,
     /// How the places of each element were found; none where they are exact.
     pub fits: Vec<PlaceFit>,
     /// Angle by which the layout was turned back before they were found (rad); none for most.
     pub turn: Option<f64>,
 }
 
+impl Discovered {
+    /// Angle by which the layout was turned back (degrees), to a billionth.
+    pub fn turned_deg(&self) -> Option<f64> {
+        self.turn.map(|turn| (turn.to_degrees() * 1e9).round() / 1e9)
+    }
+}
+
 /// Find the elements of a layout whose pillars are on these layers, each with the ends of its pillars: see
-/// [`ElementSite::widen`].
+/// [`ElementSite::widen`]. Where all of it stands at an angle, elements are those of the layout turned back by it.
 ///
 /// # Errors
 /// If there is no element on these layers or there are too many, or if the layout cannot be read.
@@ -97,44 +113,34 @@ pub fn discover(
     scale: Scale,
     progress: &dyn Progress,
 ) -> Result<Discovered> {
-    search(layout, from, layers, scale, false, progress)
-}
-
-/// Variant of [`discover`] that finds elements placed at any angle as a whole, too.
-///
-/// # Errors
-/// As [`discover`].
-pub(super) fn discover_turned(
-    layout: &Layout,
-    from: &Selection,
-    layers: &[LayerNumber],
-    scale: Scale,
-    progress: &dyn Progress,
-) -> Result<Discovered> {
-    search(layout, from, layers, scale, true, progress)
-}
-
-fn search(
-    layout: &Layout,
-    from: &Selection,
-    layers: &[LayerNumber],
-    scale: Scale,
-    at_angles: bool,
-    progress: &dyn Progress,
-) -> Result<Discovered> {
     let selection = Selection {
         layers: Some(layers.to_vec()),
         ..from.clone()
     };
     let fail = failed(layout.path());
     let look = |how: Look| seen(layout, &selection, scale, how, progress);
-    let close = look(Look { at_angles, ..CLOSE })?;
+    let close = look(CLOSE)?;
     let turned = match close.turn {
         None => None,
         // What a turned look cannot tell is no fault of the layout.
-        turn => look(Look { turn, ..CLOSE }).ok().filter(Seen::holds_a_lens),
+        Some(angle) => SIXTHS.into_iter().find_map(|more| {
+            let turn = Some(angle + more);
+            look(Look {
+                turn,
+                at_angles: false,
+                ..CLOSE
+            })
+            .ok()
+            .filter(Seen::holds_a_lens)
+        }),
     };
-    let Seen { sites, shape, turn, .. } = if let Some(turned) = turned {
+    let Seen {
+        sites,
+        shape,
+        majority,
+        turn,
+        ..
+    } = if let Some(turned) = turned {
         turned
     } else if let Some(cause) = close.cause {
         return Err(fail(cause));
@@ -171,6 +177,7 @@ fn search(
     Ok(Discovered {
         sites,
         shape,
+        majority,
         fits,
         turn,
     })
@@ -180,6 +187,8 @@ fn search(
 struct Seen {
     sites: Vec<(ElementSite, PlaceFit)>,
     shape: PillarShape,
+    /// The same, but squares or circles where there are both.
+    majority: PillarShape,
     /// Shapes that may be pillars by their outline, however wide.
     shapes: u64,
     /// Angle by which a layout is turned back in this search, or by which it should be in another one (rad).
@@ -207,7 +216,7 @@ impl Seen {
 fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progress: &dyn Progress) -> Result<Seen> {
     let fail = failed(layout.path());
     let mut map = Map::new(scale, how);
-    visit_turned(layout, selection, how.turn, &mut map, progress)?;
+    let is_rounded = visit_turned(layout, selection, how.turn, &mut map, progress)?;
     let [squares, circles] = map.shapes;
     let shapes = squares + circles + map.sizes.rectangles;
     let mostly_turned = how.at_angles && map.turned_shapes > squares + circles;
@@ -220,8 +229,9 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
         return Ok(Seen {
             sites: Vec::new(),
             shape: PillarShape::default(),
+            majority: PillarShape::default(),
             shapes,
-            turn: largest.and_then(|members| cluster_of(&tiles, members, scale, how).turn()),
+            turn: largest.and_then(|members| cluster_of(&tiles, members, scale, false).turn()),
             cause: None,
         });
     }
@@ -229,14 +239,18 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     // Squares are upright rectangles too, where others of several sizes stand among them.
     let among = circles == 0 && FEWEST_AMONG * map.sizes.rectangles > squares;
     let rectangles = (mostly || among)
-        .then(|| map.sizes.pillars(how.widest_nm))
+        .then(|| map.sizes.pillars(how.widest_nm, is_rounded))
         .flatten()
         .filter(|found| mostly || found.with_squares);
+    let square_or_circle = if circles > squares {
+        PillarShape::Circle
+    } else {
+        PillarShape::Square
+    };
     let shape = match &rectangles {
         Some(found) => found.shape,
-        None if how.at_angles && is_mixed([squares, circles]) => PillarShape::Mixed,
-        None if circles > squares => PillarShape::Circle,
-        None => PillarShape::Square,
+        None if is_mixed([squares, circles]) => PillarShape::Mixed,
+        None => square_or_circle,
     };
     let places = match rectangles {
         None => map.pillars,
@@ -263,7 +277,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     };
     let (mut sites, mut turn, mut failed) = (Vec::new(), how.turn, None);
     for members in tiles.clusters() {
-        let cluster = cluster_of(&tiles, &members, scale, how);
+        let cluster = cluster_of(&tiles, &members, scale, is_rounded);
         let found = cluster.element();
         if how.at_angles && turn.is_none() && found.as_ref().map_or(true, |f| f.as_ref().is_some_and(|f| f.is_poor)) {
             turn = cluster.turn();
@@ -277,6 +291,11 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     Ok(Seen {
         sites,
         shape,
+        majority: if shape == PillarShape::Mixed {
+            square_or_circle
+        } else {
+            shape
+        },
         shapes,
         turn,
         cause: failed,
@@ -291,13 +310,13 @@ fn is_mixed(shapes: [u64; 2]) -> bool {
     few >= FEWEST && SHARE * few >= all
 }
 
-/// Tiles of one group in a search.
-fn cluster_of<'a>(tiles: &'a TileMap, members: &'a [usize], scale: Scale, how: Look) -> Cluster<'a> {
-    // Corners of what is turned back were rounded twice.
-    let rounded = if how.turn.is_some() { 2.0 } else { 1.0 };
+/// Tiles of one group in a search; `is_turned` if places were turned back and rounded.
+fn cluster_of<'a>(tiles: &'a TileMap, members: &'a [usize], scale: Scale, is_turned: bool) -> Cluster<'a> {
+    let unit_halves = 2.0 * scale.steps_per_nm() as f64 * scale.nm(1.0);
     Cluster {
         steps_per_nm: scale.steps_per_nm(),
-        unit_halves: rounded * 2.0 * scale.steps_per_nm() as f64 * scale.nm(1.0),
+        unit_halves,
+        rounding_halves: if is_turned { TURNED } else { 1.0 } * unit_halves,
         tiles,
         members,
     }

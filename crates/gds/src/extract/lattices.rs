@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::places::PlaceFit;
+use super::rounded::place_slack;
 use super::tiles::TileMap;
 use crate::{CORNER_STEPS, ExtractionError, Point, Rect};
 use metalith_pillars::{DatabaseUnit, ElementSite, Lattice, LatticeKind, Pitch};
@@ -23,6 +24,8 @@ pub(super) struct Cluster<'a> {
     pub steps_per_nm: i64,
     /// Database unit (half steps).
     pub unit_halves: f64,
+    /// Step of a grid on which rounding moves places as far as they were moved (half steps): the unit, but where they were turned.
+    pub rounding_halves: f64,
     pub tiles: &'a TileMap,
     /// Numbers of its tiles.
     pub members: &'a [usize],
@@ -32,7 +35,7 @@ pub(super) struct Cluster<'a> {
 pub(super) struct FoundElement {
     pub site: ElementSite,
     pub fit: PlaceFit,
-    /// True if a good part of its centres are not on the lattice.
+    /// True if a good part of its centres are not on the lattice, or half of its sites have none.
     pub is_poor: bool,
 }
 
@@ -54,7 +57,14 @@ impl Cluster<'_> {
         let exactly = |site: ElementSite| FoundElement {
             is_poor: SHARE_OF_SITES as usize * on < (SHARE_OF_SITES as usize - 1) * all,
             site,
-            fit: PlaceFit::default(),
+            fit: PlaceFit {
+                slack_nm: if self.is_turned() {
+                    self.nm_of(place_slack(self.rounding_halves))
+                } else {
+                    0.0
+                },
+                ..PlaceFit::default()
+            },
         };
         if few_are_off(on, all)
             && let Ok(Some(site)) = exact
@@ -63,12 +73,17 @@ impl Cluster<'_> {
         }
         match self.rounded(&tiles).filter(|(fit, _)| !few_are_off(on, fit.count)) {
             Some((fit, grid)) => {
+                let is_poor = fit.is_half_empty;
                 let (site, fit) = self.fitted_site(&fit, grid, pillars)?;
-                let is_poor = false;
                 Ok(Some(FoundElement { site, fit, is_poor }))
             }
             None => Ok(exact?.map(exactly)),
         }
+    }
+
+    /// True if places were turned back and rounded.
+    fn is_turned(&self) -> bool {
+        self.rounding_halves > self.unit_halves
     }
 
     /// The lattice of whole steps that most samples are on.
@@ -276,7 +291,7 @@ impl Cluster<'_> {
 }
 
 /// True if nearly all of some places are on a lattice: a few may be faults.
-fn few_are_off(on: usize, all: usize) -> bool {
+pub(super) fn few_are_off(on: usize, all: usize) -> bool {
     /// One in so many may be off.
     const FEW: usize = 50;
     FEW * on >= (FEW - 1) * all

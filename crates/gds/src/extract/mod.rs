@@ -7,7 +7,7 @@
 mod discover;
 mod filler;
 mod lattices;
-mod layer_contents;
+mod left_out;
 mod named_shapes;
 mod pillars;
 mod places;
@@ -16,11 +16,12 @@ mod rounded;
 mod sites;
 mod sizes;
 mod stored_pillars;
-mod survey;
+pub(crate) mod survey;
 mod tiles;
 mod turned;
 mod unrecognised_shapes;
 
+pub use left_out::{LeftOut, MOST_LEFT_OUT};
 pub use plan::{Elements, ExtractedElement, Extraction, ExtractionPlan};
 pub use survey::{LayerSummary, Survey, TextSummary};
 pub use unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
@@ -34,10 +35,10 @@ use metalith_pillars::{EighthMap, PillarMap, PillarReader, PillarShape};
 use pillars::PillarCollector;
 use turned::visit_turned;
 
-use discover::discover_turned;
 pub use discover::{Discovered, discover};
 pub use filler::Filler;
 pub use places::PlaceFit;
+pub(crate) use plan::turned;
 pub use sites::Scale;
 pub use stored_pillars::StoredPillars;
 
@@ -102,8 +103,8 @@ fn failed(path: &Path) -> impl Fn(ExtractionError) -> Error {
     }
 }
 
-/// Reads pillars out of layouts, on a layer and below a cell that may be others than those that are stated.
-#[derive(Clone, Debug, Default)]
+/// Reads pillars out of layouts: where they are stated to be, or on another layer and below another cell.
+#[derive(Clone, Debug)]
 pub struct PillarsAt {
     /// Layer in place of the stated one.
     pub layer: Option<LayerNumber>,
@@ -112,6 +113,9 @@ pub struct PillarsAt {
 }
 
 impl PillarsAt {
+    /// Reads pillars where they are stated to be.
+    pub const STATED: Self = Self { layer: None, top: None };
+
     fn plan(&self, plan: ExtractionPlan) -> ExtractionPlan {
         ExtractionPlan {
             pillar_layer: self.layer.unwrap_or(plan.pillar_layer),
@@ -144,32 +148,6 @@ impl PillarReader for PillarsAt {
     ) -> metalith_core::Result<Vec<ElementSite>> {
         let file = Layout::open_with(layout, ReadLimits::default(), progress)?;
         Ok(sites_of(&file, &self.plan(ExtractionPlan::discover(layer)), progress)?.sites)
-    }
-}
-
-/// Reads pillars out of layouts where they are stated to be.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct GdsPillars;
-
-impl PillarReader for GdsPillars {
-    fn pillars(
-        &self,
-        layout: &Path,
-        layer: LayerNumber,
-        shape: PillarShape,
-        elements: &[ElementSite],
-        progress: &dyn Progress,
-    ) -> metalith_core::Result<Vec<PillarMap>> {
-        PillarsAt::default().pillars(layout, layer, shape, elements, progress)
-    }
-
-    fn elements(
-        &self,
-        layout: &Path,
-        layer: LayerNumber,
-        progress: &dyn Progress,
-    ) -> metalith_core::Result<Vec<ElementSite>> {
-        PillarsAt::default().elements(layout, layer, progress)
     }
 }
 
@@ -222,18 +200,19 @@ fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> 
         Elements::Given(sites) => Discovered {
             sites: sites.clone(),
             shape: PillarShape::default(),
+            majority: PillarShape::default(),
             fits: Vec::new(),
             turn: None,
         },
         Elements::Discover => {
             let scale = Scale::of(layout)?;
-            let found = discover_turned(layout, &plan.selection(), &[plan.pillar_layer], scale, progress);
+            let found = discover(layout, &plan.selection(), &[plan.pillar_layer], scale, progress);
             let mut found = match found {
                 Err(Error::Extraction {
                     path,
                     cause: ExtractionError::NoElements { layers, .. },
                 }) => {
-                    let contents = Some(layer_contents::words(layout, &plan.selection(), progress)?);
+                    let contents = Some(crate::inventory::contents::words(layout, &plan.selection(), progress)?);
                     let cause = ExtractionError::NoElements { layers, contents };
                     return Err(Error::Extraction { path, cause });
                 }
@@ -245,6 +224,20 @@ fn sites_of(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> 
     };
     found.shape = plan.shape.unwrap_or(found.shape);
     Ok(found)
+}
+
+/// The pillars of elements as they were discovered, below the cell and on the layer of a plan.
+///
+/// # Errors
+/// As [`extract`].
+pub(crate) fn recognise(
+    layout: &Layout,
+    plan: &ExtractionPlan,
+    mut found: Discovered,
+    progress: &dyn Progress,
+) -> Result<Extraction<StoredPillars>> {
+    ElementSite::widen(&mut found.sites);
+    extract_from(layout, plan, found, MOST_SITES, progress)
 }
 
 fn extract_from(

@@ -3,7 +3,7 @@
 use super::discover::Discovered;
 use super::filler::Filler;
 use super::named_shapes::name_of;
-use super::plan::{Extraction, ExtractionPlan};
+use super::plan::{Extraction, ExtractionPlan, turned};
 use super::sites::Scale;
 use super::stored_pillars::StoredPillars;
 use super::survey::Surveyor;
@@ -32,23 +32,19 @@ pub(super) struct PillarCollector {
 impl PillarCollector {
     /// Holds `most` sites.
     pub(crate) fn new(plan: &ExtractionPlan, found: Discovered, scale: Scale, most: u64) -> Self {
-        let Discovered {
-            sites,
-            shape,
-            fits,
-            turn,
-        } = found;
+        let turned_deg = found.turned_deg();
+        let Discovered { sites, shape, fits, .. } = found;
         Self {
             layer: plan.pillar_layer,
             shape,
-            turned_deg: turn.map(f64::to_degrees),
+            turned_deg,
             listed: plan.listed,
             scale,
             finder: PillarFinder::new(shape, scale.nm(1.0)),
             filler: Filler::new(sites, scale).fitted(&fits).holding(most).tolerant(),
             oddities: UnrecognisedShapes::default(),
             names: OutlineMemo::default(),
-            surveyor: Surveyor::default(),
+            surveyor: Surveyor::turned(turned_deg),
         }
     }
 
@@ -77,7 +73,7 @@ impl PillarCollector {
         let nm = |v: i64| self.scale.nm(v as f64);
         let oddity = UnrecognisedShape {
             why,
-            centre_nm: [nm(r.x0 + r.x1) / 2.0, nm(r.y0 + r.y1) / 2.0],
+            centre_nm: turned([nm(r.x0 + r.x1) / 2.0, nm(r.y0 + r.y1) / 2.0], self.turned_deg),
             size_nm: [nm(r.width()), nm(r.height())],
             offset,
         };

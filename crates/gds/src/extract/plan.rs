@@ -31,6 +31,8 @@ pub struct ExtractionPlan {
     pub top: Option<String>,
     /// Most oddities and texts that are listed; all are counted.
     pub listed: usize,
+    /// True if faults of the tree of cells are passed over.
+    pub lenient: bool,
 }
 
 impl ExtractionPlan {
@@ -42,6 +44,7 @@ impl ExtractionPlan {
             elements: Elements::Given(elements),
             top: None,
             listed: 1000,
+            lenient: false,
         }
     }
 
@@ -58,6 +61,7 @@ impl ExtractionPlan {
     pub(super) fn selection(&self) -> Selection {
         Selection {
             top: self.top.clone(),
+            lenient: self.lenient,
             ..Selection::default()
         }
     }
@@ -98,13 +102,18 @@ pub struct Extraction<W = PillarMap> {
 }
 
 impl<W> Extraction<W> {
+    /// Place in the layout of one in the rows and columns of its elements (nm): another one where the layout was turned back.
+    pub fn in_layout_nm(&self, at_nm: [f64; 2]) -> [f64; 2] {
+        turned(at_nm, self.turned_deg)
+    }
+
     /// Check that the pillars of all elements stand on lattices of one kind and pitch. `file` is what was read, `hint` what to do else.
     ///
     /// # Errors
     /// With the first element that stands on another one.
     pub fn check_one_lattice(&self, file: &Path, hint: &str) -> Result<()> {
-        let of = |e: &ExtractedElement<W>| (e.site.lattice.kind(), e.site.lattice.pitch_nm());
-        let Some(other) = self.elements.iter().find(|e| of(e) != of(&self.elements[0])) else {
+        let is_other = |e: &&ExtractedElement<W>| !e.site.lattice.is_like(&self.elements[0].site.lattice);
+        let Some(other) = self.elements.iter().find(is_other) else {
             return Ok(());
         };
         Err(Error::refused(
@@ -117,4 +126,11 @@ impl<W> Extraction<W> {
             hint,
         ))
     }
+}
+
+/// A place turned by an angle about the origin, if there is one (degrees).
+pub(crate) fn turned([x, y]: [f64; 2], deg: Option<f64>) -> [f64; 2] {
+    let Some(deg) = deg else { return [x, y] };
+    let (sin, cos) = deg.to_radians().sin_cos();
+    [cos * x - sin * y, sin * x + cos * y]
 }

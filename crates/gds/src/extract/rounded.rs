@@ -1,7 +1,7 @@
-//! Lattices whose places were rounded to the grid one by one, as loops of other programs draw them: any pitch in steps of
-//! 0.05 nm, rows of hexagonal lattices half the root of three of the pitch apart, a centre anywhere.
+//! Lattices whose places were rounded to the grid one by one, as loops of other programs draw them: any pitch, rows of hexagonal
+//! lattices half the root of three of the pitch apart, a centre anywhere.
 
-use super::lattices::{AXES, Cluster, SHARE_OF_SITES};
+use super::lattices::{AXES, Cluster, SHARE_OF_SITES, few_are_off};
 use super::places::PlaceFit;
 use super::turned::typical_distance;
 use crate::{CORNER_STEPS, ExtractionError, Point};
@@ -17,6 +17,11 @@ const NUMBERED: f64 = 0.25;
 const FIRST_REACH: f64 = 12.0;
 /// Pitch over the distance of neighbouring pillars, at least: 0.71 where every other site has a pillar.
 const SHARE_OF_DISTANCE: f64 = 0.6;
+/// Steps in a nanometre of pitches that people choose, the coarsest first.
+const DECIMALS: [f64; 7] = [1.0, 2.0, 10.0, 20.0, 100.0, 1e3, 1e4];
+/// Steps of the grid by which a rounder pitch or angle may move the outermost places of a lattice: half of what their tolerance leaves beside
+/// the rounding of corners.
+pub(super) const ROOM: f64 = 0.5 * CORNER_STEPS;
 /// Half the root of three: the distance of rows of a hexagonal lattice over its pitch.
 const ROW: f64 = 0.866_025_403_784_438_6;
 
@@ -44,6 +49,9 @@ pub(super) struct Fit {
     parity: i64,
     /// Samples on sites.
     pub count: usize,
+    /// True if nearly all of them are on every other site of a square lattice, as those of a wider one are that is turned by 45
+    /// degrees.
+    pub is_half_empty: bool,
 }
 
 impl Cluster<'_> {
@@ -82,10 +90,11 @@ impl Cluster<'_> {
     /// of 1 nm (half steps).
     pub(super) fn rounded(&self, tiles: &[Vec<Point>]) -> Option<(Fit, f64)> {
         let nanometre = 2.0 * self.steps_per_nm as f64;
-        let coarser = (self.unit_halves < nanometre).then_some(nanometre);
+        let coarser = nanometre * self.rounding_halves / self.unit_halves;
+        let coarser = (self.rounding_halves < coarser).then_some(coarser);
         // A lattice much closer than pillars are is one of their superlattices, turned.
         let least = SHARE_OF_DISTANCE * typical_distance(tiles)?;
-        [self.unit_halves].into_iter().chain(coarser).find_map(|grid| {
+        [self.rounding_halves].into_iter().chain(coarser).find_map(|grid| {
             let fits = self.fits(tiles, grid).into_iter();
             let fits = fits.filter(|fit| fit.pitch.nm() * nanometre >= least);
             fits.reduce(|best, fit| if fit.count > best.count { fit } else { best })
@@ -110,22 +119,20 @@ impl Cluster<'_> {
                 ),
             ];
             let fits = (kinds.into_iter())
-                .flat_map(|(kind, pitch)| self.pitches(pitch).map(move |pitch| (kind, pitch)))
-                .filter_map(|(kind, pitch)| self.fit(tiles, kind, pitch, grid));
+                .filter_map(|(kind, pitch)| self.fit(tiles, kind, self.roundest(pitch, grid)?, grid));
             found.extend(fits);
         }
         found
     }
 
-    /// Pitches near a fitted one (half steps), the rounder first: places of a small lens tell several from one another as little as
-    /// their rounding is.
-    fn pitches(&self, fitted: f64) -> impl Iterator<Item = Pitch> {
-        let nm = self.nm_of(fitted);
-        let rounded = move |per_nm: f64| Pitch::of_nm((nm * per_nm).round() / per_nm);
-        [1.0, 2.0, 10.0, 20.0]
-            .into_iter()
-            .filter_map(rounded)
-            .filter(|pitch| pitch.nm() > 0.0)
+    /// The roundest pitch that puts no place farther from where a fitted one (half steps) has it than rounding leaves room for.
+    fn roundest(&self, fitted: f64, grid: f64) -> Option<Pitch> {
+        let (nm, bounds) = (self.nm_of(fitted), self.bounds());
+        let steps = 0.5 * bounds.width().max(bounds.height()) as f64 / fitted;
+        let room_nm = self.nm_of(ROOM * grid) / steps.max(1.0);
+        let rounded = |per_nm: &f64| (nm * per_nm).round() / per_nm;
+        let nearest = DECIMALS.iter().map(rounded).find(|round| (round - nm).abs() <= room_nm);
+        Pitch::nearest(nearest.unwrap_or(nm)).filter(|pitch| pitch.nm() > 0.0)
     }
 
     fn fit(&self, tiles: &[Vec<Point>], kind: LatticeKind, pitch: Pitch, grid: f64) -> Option<Fit> {
@@ -161,10 +168,11 @@ impl Cluster<'_> {
             combs,
             parity,
             count,
+            is_half_empty: kind.is_square() && few_are_off(counts[0].max(counts[1]), count),
         })
     }
 
-    fn nm_of(&self, halves: f64) -> f64 {
+    pub(super) fn nm_of(&self, halves: f64) -> f64 {
         halves / (2 * self.steps_per_nm) as f64
     }
 
@@ -287,7 +295,7 @@ fn refined_step(tiles: &[Vec<Point>], axis: usize, grid: f64) -> Option<f64> {
 
 /// Distance along an axis at which a shape still stands on a place (half steps): half a step of the grid for the corners, and as much
 /// for the middle of a lattice or of a circle, which are found from rounded corners.
-fn place_slack(grid: f64) -> f64 {
+pub(super) fn place_slack(grid: f64) -> f64 {
     2.0 * CORNER_STEPS * grid
 }
 

@@ -17,7 +17,7 @@ pub struct Scale {
 /// Farthest coordinate at which a pillar is looked for (database units): products with [`Scale`] fit.
 const REACH: i64 = 1 << 35;
 
-/// Steps of pitches in a nanometre: see [`Pitch`](metalith_pillars::Pitch).
+/// Steps of pitches of designs in a nanometre: see [`Pitch`](metalith_pillars::Pitch).
 pub(super) const PITCHES_PER_NM: i64 = 20;
 
 /// Half steps of pitches in a nanometre: places of all lattices are whole numbers of them.
@@ -106,8 +106,8 @@ pub(super) enum SitePlace {
     Outside,
 }
 
-/// One element in scaled units (nm * den), [`PLACES_PER_NM`] times as fine, so that its places are whole: but for rows of a
-/// hexagonal lattice that are not rounded.
+/// One element in scaled units (nm * den), [`PLACES_PER_NM`] times as fine, so that its places are whole: but for pitches and
+/// rows that are fitted.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     first: [i64; 2],
@@ -127,10 +127,10 @@ impl Grid {
         let lattice = site.lattice;
         let scaled = |nm: f64| (nm * PLACES_PER_NM as f64).round() as i64 * scale.den;
         let step = lattice.steps_nm();
-        let step = if lattice.has_exact_rows() {
-            step.map(|nm| nm * (PLACES_PER_NM * scale.den) as f64)
-        } else {
+        let step = if lattice.has_whole_steps() {
             step.map(|nm| scaled(nm) as f64)
+        } else {
+            step.map(|nm| nm * (PLACES_PER_NM * scale.den) as f64)
         };
         let first = |axis: usize| {
             let from_centre = lattice.place_nm(axis, 0) + fit.offset_nm[axis];

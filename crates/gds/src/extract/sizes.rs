@@ -145,9 +145,9 @@ impl Sizes {
     }
 
     /// Rectangles found, if they are pillars no longer than this (nm): upright ones of several sizes, or rectangles of
-    /// the size that most have, by their rotation.
-    pub(crate) fn pillars(&self, longest_nm: i64) -> Option<FoundRectangles> {
-        self.upright(longest_nm).or_else(|| self.alike(longest_nm))
+    /// the size that most have, by their rotation. `are_turned` if they were turned back, which rounds upright ones.
+    pub(crate) fn pillars(&self, longest_nm: i64, are_turned: bool) -> Option<FoundRectangles> {
+        self.upright(longest_nm, are_turned).or_else(|| self.alike(longest_nm))
     }
 
     /// True if all rectangles are these pillars, and, where squares are too, all of so many squares.
@@ -167,7 +167,7 @@ impl Sizes {
     }
 
     /// Upright rectangles of more than one size, with edges in equal steps; squares among them are such too.
-    fn upright(&self, longest_nm: i64) -> Option<FoundRectangles> {
+    fn upright(&self, longest_nm: i64, are_turned: bool) -> Option<FoundRectangles> {
         let few = ((1.0 - PILLARS) * self.rectangles as f64).max(1.0);
         if self.tilted as f64 > few {
             return None;
@@ -189,13 +189,20 @@ impl Sizes {
             return None;
         }
         let squares = self.squares.iter().enumerate().filter(|(_, n)| **n as f64 > few);
-        let edges = most.iter().flat_map(|((a, b), _)| [*a, *b]);
-        let lengths: Option<Vec<u16>> = edges
-            .chain(squares.map(|(nm, _)| nm as i64))
-            .map(|nm| u16::try_from(nm).ok())
+        let squares = squares.map(|(nm, n)| (nm as i64, *n));
+        let edges = most.iter().flat_map(|((a, b), n)| [(*a, *n), (*b, *n)]);
+        let counted: Option<Vec<(u16, u64)>> = edges
+            .chain(squares)
+            .map(|(nm, n)| Some((u16::try_from(nm).ok()?, n)))
             .collect();
+        let counted = counted?;
+        let lengths = if are_turned {
+            rounded_lengths(counted)
+        } else {
+            counted.into_iter().map(|(nm, _)| nm).collect()
+        };
         Some(FoundRectangles {
-            shape: UprightRectangles::of_lengths(lengths?.into_iter())?.into(),
+            shape: UprightRectangles::of_lengths(lengths.into_iter())?.into(),
             with_squares: true,
             count: most.iter().map(|(_, n)| n).sum(),
         })
@@ -236,4 +243,18 @@ impl Sizes {
             count,
         })
     }
+}
+
+/// Lengths of edges that rounding has made several of, each with its count: their mean to an even number, for those that differ by less
+/// than what rounding makes of them.
+fn rounded_lengths(mut counted: Vec<(u16, u64)>) -> Vec<u16> {
+    counted.sort_unstable();
+    let near = |a: &(u16, u64), b: &(u16, u64)| i64::from(b.0 - a.0) <= ALIKE_NM;
+    let mean = |group: &[(u16, u64)]| {
+        let (sum, count) = group.iter().fold((0.0, 0.0), |(sum, count), (nm, n)| {
+            (sum + f64::from(*nm) * *n as f64, count + *n as f64)
+        });
+        (sum / count / 2.0).round() as u16 * 2
+    };
+    counted.chunk_by(near).map(mean).collect()
 }

@@ -7,7 +7,8 @@ use serde::Serialize;
 use super::sites::Scale;
 use metalith_core::text::printable_bytes;
 
-use crate::{LayerNumber, Point, Rect, Shape, Text, Transform};
+use crate::{LayerNumber, Layout, LayoutCell, Point, Rect, Result, Selection, Shape, Text, Transform, Visitor};
+use metalith_core::Progress;
 
 /// One layer with all references followed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -17,8 +18,7 @@ pub struct LayerSummary {
     pub shapes: u64,
     /// Texts.
     pub texts: u64,
-    /// Left, bottom, right, top of all areas (nm); none if there are no areas. Around a cell that is turned
-    /// by other than quarter turns, the box of its box.
+    /// Left, bottom, right, top of all areas (nm); none if there are no areas.
     pub bounds_nm: Option<[f64; 4]>,
 }
 
@@ -86,9 +86,27 @@ pub(super) struct Surveyor {
     placements: Vec<Transform>,
     total: Extents,
     texts: Vec<TextSummary>,
+    /// Transform back into the layout of shapes that come one by one, turned.
+    forward: Option<Transform>,
 }
 
 impl Surveyor {
+    /// Surveyor of a layout that comes turned back by an angle, if there is one (degrees).
+    pub(super) fn turned(deg: Option<f64>) -> Self {
+        let forward = deg.map(|deg| {
+            let (sin, cos) = deg.to_radians().sin_cos();
+            Transform::General {
+                matrix: [cos, -sin, sin, cos],
+                dx: 0.0,
+                dy: 0.0,
+            }
+        });
+        Self {
+            forward,
+            ..Self::default()
+        }
+    }
+
     /// A cell with these placements begins.
     pub(crate) fn begin(&mut self, placements: &[Transform]) {
         self.flush();
@@ -98,25 +116,25 @@ impl Surveyor {
 
     #[inline]
     pub(crate) fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
-        let bounds = shape.rect.unwrap_or_else(|| shape.outline.around());
-        if placements.first().is_some_and(Transform::is_square) || placements == self.placements {
+        if self.forward.is_none() && placements.first().is_some_and(Transform::is_square) {
             let entry = self.cell.entry(shape.layer);
             entry.shapes += 1;
-            entry.bounds.unite(&bounds);
-        } else {
-            // A copy with a chain of transforms of its own.
-            let extent = Extent {
-                shapes: 1,
-                texts: 0,
-                bounds,
-            };
-            add(&mut self.total, shape.layer, &extent, placements);
+            let own = || shape.rect.unwrap_or_else(|| shape.outline.around());
+            entry.bounds.unite(&own());
+            return;
+        }
+        let entry = self.total.entry(shape.layer);
+        let forward = self.forward.as_slice();
+        for placement in if forward.is_empty() { placements } else { forward } {
+            entry.shapes += 1;
+            (shape.outline.points()).for_each(|p| entry.bounds.include(placement.apply(p)));
         }
     }
 
     pub(crate) fn text(&mut self, text: &Text<'_>, placements: &[Transform], scale: Scale, most: usize) {
         self.cell.entry(text.layer).texts += 1;
-        for placement in placements {
+        let forward = self.forward.as_slice();
+        for placement in if forward.is_empty() { placements } else { forward } {
             if self.texts.len() >= most {
                 break;
             }
@@ -151,6 +169,32 @@ impl Surveyor {
             texts: self.texts,
         }
     }
+}
+
+/// Boxes around all areas below a cell by layer, each shape where it is placed (database units).
+pub(crate) fn boxes(layout: &Layout, from: &Selection, progress: &dyn Progress) -> Result<Vec<(LayerNumber, Rect)>> {
+    struct Boxes(Surveyor);
+    impl Visitor for Boxes {
+        fn cell(&mut self, _cell: &LayoutCell, placements: &[Transform]) -> metalith_core::Result<()> {
+            self.0.begin(placements);
+            Ok(())
+        }
+
+        fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
+            self.0.shape(shape, placements);
+            Ok(())
+        }
+    }
+    let mut boxes = Boxes(Surveyor::default());
+    layout.visit(from, &mut boxes, progress)?;
+    boxes.0.flush();
+    Ok(boxes
+        .0
+        .total
+        .of
+        .iter()
+        .map(|(layer, extent)| (*layer, extent.bounds))
+        .collect())
 }
 
 fn add(total: &mut Extents, layer: LayerNumber, extent: &Extent, placements: &[Transform]) {

@@ -3,21 +3,27 @@
 use std::f64::consts::TAU;
 
 use super::lattices::{Cluster, SHARE_OF_SITES};
+use super::rounded::ROOM;
 use crate::circle::circle_of;
-use crate::shape::rounding;
+use crate::shape::grid_step;
 use crate::{
-    Layout, LayoutCell, Outline, Point, Rect, Result, Selection, Shape, Text, Transform, Visitor, rectangle_of,
-    tilted_rectangle_of,
+    CORNER_STEPS, Layout, LayoutCell, Outline, Point, Rect, Result, Selection, Shape, Text, Transform, Visitor,
+    simplified, tilted_rectangle_of,
 };
 use metalith_core::Progress;
 use metalith_pillars::LatticeKind;
 
+/// Points of a closed outline of four corners.
+const CLOSED: usize = 5;
+/// What arithmetic on places adds to bounds that corners may reach (database units).
+const SLIVER: f64 = 1e-3;
 /// Steps of the lattice on either side of the middle that the first fit takes in.
 const FIRST_REACH: f64 = 12.0;
 /// Share of a step by which a place may be off in a fit.
 const NEAR: f64 = 0.25;
 
-/// Hand a layout to a visitor, turned back by an angle (rad) about the origin.
+/// Hand a layout to a visitor, turned back by an angle (rad) about the origin; whether corners were rounded by that, as they are where
+/// shapes are not placed at this angle but drawn so.
 ///
 /// # Errors
 /// As [`Layout::visit`].
@@ -27,9 +33,9 @@ pub(super) fn visit_turned<V: Visitor>(
     turn: Option<f64>,
     visitor: &mut V,
     progress: &dyn Progress,
-) -> Result<()> {
+) -> Result<bool> {
     let Some(turn) = turn else {
-        return layout.visit(selection, visitor, progress);
+        return layout.visit(selection, visitor, progress).map(|()| false);
     };
     let (sin, cos) = turn.sin_cos();
     let back = Transform::General {
@@ -37,21 +43,29 @@ pub(super) fn visit_turned<V: Visitor>(
         dx: 0.0,
         dy: 0.0,
     };
-    let unit_nm = layout.unit_nm();
     let mut turned = Turned {
         visitor,
         back,
-        unit_nm,
+        direction: [cos, sin],
+        unit_nm: layout.unit_nm(),
+        is_rounded: false,
+        placed: Vec::new(),
         points: Vec::new(),
     };
-    layout.visit(selection, &mut turned, progress)
+    layout.visit(selection, &mut turned, progress)?;
+    Ok(turned.is_rounded)
 }
 
 /// Visitor of a layout that is turned back: shapes come one by one, as they are placed.
 struct Turned<'v, V> {
     visitor: &'v mut V,
     back: Transform,
+    /// Cosine and sine of the angle.
+    direction: [f64; 2],
     unit_nm: f64,
+    /// True if a shape was at another angle.
+    is_rounded: bool,
+    placed: Vec<Point>,
     points: Vec<Point>,
 }
 
@@ -69,23 +83,21 @@ impl<V: Visitor> Visitor for Turned<'_, V> {
 
     fn shape(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         for placement in placements {
-            let Some(placement) = self.back(placement) else {
+            let Some(turned) = self.back(placement) else {
                 continue;
             };
             self.points.clear();
-            self.points.extend(shape.outline.points().map(|p| placement.apply(p)));
-            let rect = match (shape.rect, placement.is_square()) {
-                (Some(rect), true) => placement.apply_rect(&rect),
-                (None, true) => None,
-                (_, false) => nearly_upright(&self.points, self.unit_nm),
+            self.points.extend(shape.outline.points().map(|p| turned.apply(p)));
+            let (rect, circle) = if turned.is_square() {
+                let there = |r: Option<Rect>| turned.apply_rect(&r?);
+                (there(shape.rect), there(shape.circle))
+            } else {
+                self.is_rounded = true;
+                self.placed.clear();
+                self.placed.extend(shape.outline.points().map(|p| placement.apply(p)));
+                let rect = self.nearly_upright();
+                (rect, if rect.is_none() { self.circle() } else { None })
             };
-            let circle = shape.circle.and_then(|circle| {
-                if placement.is_square() {
-                    placement.apply_rect(&circle)
-                } else {
-                    circle_of(&self.points, self.unit_nm)
-                }
-            });
             let turned = Shape {
                 outline: Outline::new(&self.points),
                 rect,
@@ -109,29 +121,59 @@ impl<V: Visitor> Visitor for Turned<'_, V> {
     }
 }
 
-/// The upright rectangle that an outline is to the rounding of its corners, with edges at the mean of both corners; a square where its
-/// edges are equal to their rounding.
-fn nearly_upright(points: &[Point], unit_nm: f64) -> Option<Rect> {
-    if let Some(rect) = rectangle_of(points) {
-        return Some(rect);
+/// Methods that see a shape as it is drawn, with corners that were rounded once.
+impl<V> Turned<'_, V> {
+    /// A place, turned back.
+    fn turned(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [cos, sin] = self.direction;
+        [cos * x + sin * y, cos * y - sin * x]
     }
-    let tilted = tilted_rectangle_of(points, unit_nm)?;
-    let &[a, b, c, d, _] = points else { return None };
-    let slack = 2.0 * rounding(unit_nm);
-    let sorted = |mut v: [i64; 4]| {
-        v.sort_unstable();
-        let near = (v[1] - v[0]).max(v[3] - v[2]) as f64 <= slack;
-        near.then(|| [(v[0] + v[1]) as f64 / 2.0, (v[2] + v[3]) as f64 / 2.0])
-    };
-    let [x, y] = [sorted([a.x, b.x, c.x, d.x])?, sorted([a.y, b.y, c.y, d.y])?];
-    let mean = (x[1] - x[0] + y[1] - y[0]) / 2.0;
-    let edge = |[low, high]: [f64; 2]| {
-        let width = if tilted.is_square() { mean } else { high - low }.round();
-        let first = ((low + high - width) / 2.0).round() as i64;
-        (first, first + width as i64)
-    };
-    let ((x0, x1), (y0, y1)) = (edge(x), edge(y));
-    (x0 < x1 && y0 < y1).then_some(Rect { x0, y0, x1, y1 })
+
+    /// The upright rectangle that an outline becomes, to the rounding of its corners, with edges at the mean of both corners; a square
+    /// where its edges are equal to their rounding.
+    fn nearly_upright(&self) -> Option<Rect> {
+        tilted_rectangle_of(&self.placed, self.unit_nm)?;
+        let (simple, points) = (simplified(&self.placed), &self.placed);
+        let points = if points.len() == CLOSED { points } else { &simple };
+        let &[a, b, c, d, _] = points.as_slice() else {
+            return None;
+        };
+        let corners = [a, b, c, d].map(|p| self.turned([p.x as f64, p.y as f64]));
+        let [cos, sin] = self.direction.map(f64::abs);
+        let rounding = CORNER_STEPS * grid_step(self.unit_nm);
+        let ends = |axis: usize| {
+            let mut v = corners.map(|c| c[axis]);
+            v.sort_unstable_by(f64::total_cmp);
+            // Either of two corners is off by both of its roundings.
+            let near = (v[1] - v[0]).max(v[3] - v[2]) <= 2.0 * rounding * (cos + sin) + SLIVER;
+            near.then(|| [(v[0] + v[1]) / 2.0, (v[2] + v[3]) / 2.0])
+        };
+        let [x, y] = [ends(0)?, ends(1)?];
+        let [width, height] = [x[1] - x[0], y[1] - y[0]];
+        // Each corner changes the difference of the edges by this part of its rounding along either axis.
+        let is_square = (width - height).abs() <= 4.0 * rounding * cos.max(sin) + SLIVER;
+        let edge = |[low, high]: [f64; 2]| {
+            let width = if is_square { 0.5 * (width + height) } else { high - low }.round();
+            let first = ((low + high - width) / 2.0).round() as i64;
+            (first, first + width as i64)
+        };
+        let ((x0, x1), (y0, y1)) = (edge(x), edge(y));
+        (x0 < x1 && y0 < y1).then_some(Rect { x0, y0, x1, y1 })
+    }
+
+    /// The square around the circle that an outline stands for, turned back about the origin.
+    fn circle(&self) -> Option<Rect> {
+        let drawn = circle_of(&self.placed, self.unit_nm)?;
+        let middle = self.turned([drawn.x0 + drawn.x1, drawn.y0 + drawn.y1].map(|v| v as f64 / 2.0));
+        let width = drawn.width();
+        let [x0, y0] = middle.map(|v| (v - width as f64 / 2.0).round() as i64);
+        Some(Rect {
+            x0,
+            y0,
+            x1: x0 + width,
+            y1: y0 + width,
+        })
+    }
 }
 
 /// A lattice at any angle: places are `origin + step w`, as complex numbers, with w on the lattice of step 1.
@@ -250,16 +292,26 @@ impl Cluster<'_> {
         };
         let kinds = [LatticeKind::Square, LatticeKind::Hexagonal];
         let (_, angle) = kinds.into_iter().filter_map(of_kind).max_by_key(|(on, _)| *on)?;
-        (angle.abs() * reach > 2.0 * self.unit_halves).then_some(angle)
+        (angle.abs() * reach > 2.0 * self.unit_halves).then(|| roundest(angle, ROOM * self.unit_halves / reach))
     }
 }
 
-/// Distance of neighbouring places, in the middle of all (half steps).
+/// The roundest angle in degrees within some room about an angle: a lens that is placed at it is turned back without rounding (rad).
+fn roundest(angle: f64, room: f64) -> f64 {
+    let rounded = |per_degree: &f64| ((angle.to_degrees() * per_degree).round() / per_degree).to_radians();
+    let nearest = [1.0, 2.0, 10.0, 100.0, 1e3].iter().map(rounded);
+    nearest
+        .into_iter()
+        .find(|round| (round - angle).abs() <= room)
+        .unwrap_or(angle)
+}
+
+/// Distance of neighbouring places (half steps): of those one in ten from the nearest pair, since samples need not be neighbours.
 pub(super) fn typical_distance(tiles: &[Vec<Point>]) -> Option<f64> {
     let pairs = tiles.iter().flat_map(|tile| nearest_pairs(tile));
     let mut lengths: Vec<f64> = pairs.map(|[x, y]| x.hypot(y)).collect();
-    let middle = lengths.len() / 2;
-    (middle < lengths.len()).then(|| *lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let near = lengths.len() / 10;
+    (near < lengths.len()).then(|| *lengths.select_nth_unstable_by(near, f64::total_cmp).1)
 }
 
 /// Ways from each place to the nearest other one.

@@ -2,11 +2,14 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use crate::extract::survey;
 use crate::layout::Layout;
 use crate::limits::FARTHEST;
 use crate::shape::{Point, Rect};
 use crate::transform::Transform;
-use metalith_core::LayerNumber;
+use crate::visit::Selection;
+use crate::{Error, Result};
+use metalith_core::{LayerNumber, Progress};
 
 /// Boxes that are placed at most: each layer of each cell once for each rotation by which another refers to it.
 const MOST_BOXES: usize = 1 << 23;
@@ -20,6 +23,39 @@ pub(super) struct Boxes {
     pub cells: Vec<Rect>,
     /// Around the areas on each layer, of all roots together.
     pub layers: LayerBoxes,
+}
+
+/// True if a cell is placed by other than quarter turns.
+pub(super) fn has_turned(layout: &Layout) -> bool {
+    let counts = layout.cells().iter().filter_map(|cell| cell.counts.as_deref());
+    counts
+        .flat_map(|counts| &counts.reaches)
+        .any(|reach| !reach.turn.is_square())
+}
+
+/// Replaces the boxes of the layers, and of these cells, by those around all shapes as they are placed: boxes around turned boxes are
+/// too large. Layouts that have too many copies to be read keep theirs.
+pub(super) fn tighten(boxes: &mut Boxes, layout: &Layout, roots: &[usize], progress: &dyn Progress) -> Result<()> {
+    let mut layers = LayerBoxes::new();
+    for &root in roots {
+        let selection = Selection {
+            top: Some(layout.cells()[root].name.clone()),
+            lenient: true,
+            ..Selection::default()
+        };
+        let found = match survey::boxes(layout, &selection, progress) {
+            Ok(found) => found,
+            Err(Error::Layout { .. }) => return Ok(()),
+            Err(other) => return Err(other),
+        };
+        boxes.cells[root] = Rect::EMPTY;
+        for (layer, around) in found {
+            boxes.cells[root].unite(&around);
+            layers.entry(layer).or_insert(Rect::EMPTY).unite(&around);
+        }
+    }
+    boxes.layers = layers;
+    Ok(())
 }
 
 /// Boxes of everything below these cells; `None` if there are too many to be found.

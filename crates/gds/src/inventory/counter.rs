@@ -48,6 +48,18 @@ impl Default for KindTally {
 }
 
 impl KindTally {
+    /// Number of each kind, and the word for one.
+    pub fn named(&self) -> [(u64, &'static str); 6] {
+        [
+            (self.squares, "square"),
+            (self.circles, "circle"),
+            (self.rectangles, "rectangle"),
+            (self.rotated_rectangles, "rotated rectangle"),
+            (self.polygons, "polygon"),
+            (self.paths, "path"),
+        ]
+    }
+
     /// Areas that may be pillars.
     pub fn pillar_like(&self) -> u64 {
         [self.squares, self.rectangles, self.rotated_rectangles, self.circles]
@@ -80,7 +92,7 @@ impl KindTally {
     }
 
     /// Count a closed outline.
-    fn outline(&mut self, points: &[Point], unit_nm: f64, copies: u64) {
+    pub(super) fn outline(&mut self, points: &[Point], unit_nm: f64, copies: u64) {
         if let Some(rect) = rectangle_of(points).or_else(|| rectangle_of(&simplified(points))) {
             self.rectangle(&rect, copies);
         } else if let Some(square) = circle_of(points, unit_nm) {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::LayerInventory;
-use crate::extract::{Scale, discover};
+use crate::extract::{Discovered, ExtractionPlan, LeftOut, Scale, discover, recognise, turned};
 use crate::layout::Layout;
 use crate::visit::Selection;
 use crate::{Error, Result};
@@ -17,6 +17,10 @@ const LAYERS: usize = 8;
 /// Layers with fewer shapes that may be pillars than this part of those of the layer with the most are not looked at: marks
 /// and labels would cost another reading of the file.
 const LEAST_SHARE: u64 = 100;
+
+/// Shapes of a layer whose pillars are counted, at most: to look at each of the 58 million of nine lenses of 1 mm would take six times
+/// as long as all else.
+const MOST_COUNTED: u64 = 1 << 24;
 
 /// Elements that are listed for each layer; all are counted.
 const LISTED: usize = 1000;
@@ -40,16 +44,22 @@ pub struct LayerLattices {
     pub top: String,
     /// Shape of most pillars, in the plural.
     pub pillars: &'static str,
+    /// Number of pillars on sites; none if there are too many shapes to look at each.
+    pub pillar_count: Option<u64>,
+    /// Shapes of its elements that are no pillars, if there are any.
+    pub left_out: Option<LeftOut>,
+    /// Angle at which all of it stands (degrees), if it is not upright.
+    pub turned_deg: Option<f64>,
     pub element_count: usize,
     /// The first elements.
     pub elements: Vec<FoundElement>,
 }
 
 impl FoundElement {
-    fn of(site: &ElementSite) -> Self {
+    fn of(site: &ElementSite, turned_deg: Option<f64>) -> Self {
         let [columns, rows] = site.reach().map(|reach| reach.len());
         Self {
-            centre_nm: site.centre_nm,
+            centre_nm: turned(site.centre_nm.map(|nm| nm as f64), turned_deg).map(|nm| nm.round() as i64),
             lattice: match site.lattice.kind() {
                 LatticeKind::Square => "square",
                 LatticeKind::Hexagonal => "hexagonal",
@@ -86,15 +96,10 @@ pub(super) fn find(
             lenient: true,
             ..Selection::default()
         };
-        for layer in chosen.iter().take(LAYERS).map(|l| l.layer) {
-            match discover(layout, &selection, &[layer], scale, progress) {
-                Ok(seen) => found.push(LayerLattices {
-                    layer,
-                    top: top.clone(),
-                    pillars: seen.shape.plural(),
-                    element_count: seen.sites.len(),
-                    elements: seen.sites.iter().take(LISTED).map(FoundElement::of).collect(),
-                }),
+        for inventory in chosen.iter().take(LAYERS) {
+            let seen = discover(layout, &selection, &[inventory.layer], scale, progress);
+            match seen.and_then(|seen| lattices_of(layout, top, inventory, seen, progress)) {
+                Ok(lattices) => found.push(lattices),
                 // No lattice is no fault.
                 Err(Error::Extraction { .. }) => {}
                 Err(error @ Error::Layout { .. }) => return Ok((found, Some(words(&error)))),
@@ -103,6 +108,51 @@ pub(super) fn find(
         }
     }
     Ok((found, None))
+}
+
+/// Elements that were discovered on a layer, with their pillars counted if these are not too many.
+fn lattices_of(
+    layout: &Layout,
+    top: &str,
+    inventory: &LayerInventory,
+    seen: Discovered,
+    progress: &dyn Progress,
+) -> Result<LayerLattices> {
+    let layer = inventory.layer;
+    let turned_deg = seen.turned_deg();
+    let mut lattices = LayerLattices {
+        layer,
+        top: top.to_owned(),
+        pillars: seen.shape.plural(),
+        pillar_count: None,
+        left_out: None,
+        turned_deg,
+        element_count: seen.sites.len(),
+        elements: (seen
+            .sites
+            .iter()
+            .take(LISTED)
+            .map(|site| FoundElement::of(site, turned_deg)))
+        .collect(),
+    };
+    if inventory.shapes <= MOST_COUNTED {
+        let plan = ExtractionPlan {
+            top: Some(top.to_owned()),
+            listed: 0,
+            lenient: true,
+            ..ExtractionPlan::discover(layer)
+        };
+        match recognise(layout, &plan, seen, progress) {
+            Ok(found) => {
+                lattices.pillar_count = Some(found.pillars);
+                lattices.left_out = LeftOut::of(&found, layer);
+            }
+            // Elements that are too large to be held are elements.
+            Err(Error::Extraction { .. }) => {}
+            Err(other) => return Err(other),
+        }
+    }
+    Ok(lattices)
 }
 
 /// The first line of an error, without what to do.

@@ -2,6 +2,7 @@
 //! are arithmetic on what the first reading found: a file that describes more shapes than can be read is counted all the same.
 
 mod boxes;
+pub(crate) mod contents;
 mod counter;
 mod lattices;
 
@@ -49,8 +50,7 @@ pub struct LayerInventory {
     pub texts: u64,
     /// Smallest and largest side of squares and rectangles and diameter of circles, as drawn in their cells (nm).
     pub sides_nm: Option<[f64; 2]>,
-    /// Left, bottom, right, top of all areas (nm). Around a cell that is turned by other than quarter turns, the box of
-    /// its box. None if there are no areas or too many boxes.
+    /// Left, bottom, right, top of all areas (nm). None if there are no areas or too many boxes.
     pub bounds_nm: Option<[f64; 4]>,
 }
 
@@ -64,7 +64,8 @@ pub struct CellInventory {
     pub shapes: u64,
     pub texts: u64,
     pub references: u64,
-    /// Left, bottom, right, top of all below it (nm), in its own coordinates.
+    /// Left, bottom, right, top of all below it (nm), in its own coordinates. Of a cell that is no top cell and turns others by
+    /// other than quarter turns, around their boxes.
     pub bounds_nm: Option<[f64; 4]>,
 }
 
@@ -191,7 +192,10 @@ impl Layout {
         };
         let roots = self.roots(&selection)?;
         let (counts, _) = tree::count(self.cells(), &self.tree().order, &roots);
-        let boxes = boxes::boxes(self, &roots);
+        let mut boxes = boxes::boxes(self, &roots);
+        if let Some(boxes) = boxes.as_mut().filter(|_| boxes::has_turned(self)) {
+            boxes::tighten(boxes, self, &roots, progress)?;
+        }
         let nm = |r: &Rect| {
             let unit = self.unit_nm();
             (!r.is_empty()).then(|| [r.x0, r.y0, r.x1, r.y1].map(|v| v as f64 * unit))
@@ -248,6 +252,15 @@ impl Layout {
             on_layer.for_each(|(_, kinds)| sum.add(kinds, cell.placements));
         }
         sum
+    }
+
+    /// Number of areas on a layer, from all top cells.
+    pub fn shapes_on(&self, layer: LayerNumber) -> u64 {
+        let of_cell = |cell: &crate::LayoutCell| {
+            let tally = cell.layers.iter().find(|(l, _)| *l == layer)?;
+            Some(tally.1.shapes().saturating_mul(cell.placements))
+        };
+        self.cells().iter().filter_map(of_cell).fold(0, u64::saturating_add)
     }
 
     /// Layers with areas or texts below the top cells, in order.

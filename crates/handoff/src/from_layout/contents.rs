@@ -145,7 +145,7 @@ impl LeftOut {
                 "height of the pillars",
                 "rules about aspect ratios use the height that the rules file states",
             )],
-            Pattern::Shapes(_) => vec![
+            Pattern::Shapes { .. } => vec![
                 ("pads of the dose matrix", "no pillars were found to make them of"),
                 ("places to measure", "no pillars were found"),
             ],

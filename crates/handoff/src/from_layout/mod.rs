@@ -117,8 +117,11 @@ pub(crate) fn fill(
 fn piece(inputs: &LayoutInputs, fullest: [f64; 2], progress: &dyn Progress) -> Result<LayoutPiece> {
     let per_nm = 1.0 / inputs.layout.unit_nm();
     let middle = match &inputs.pattern {
-        Pattern::Pillars(found) => central(found).site.centre_nm.map(|nm| nm as f64 * per_nm),
-        Pattern::Shapes(_) => fullest,
+        Pattern::Pillars(found) => {
+            let centre_nm = central(found).site.centre_nm.map(|nm| nm as f64);
+            found.in_layout_nm(centre_nm).map(|nm| nm * per_nm)
+        }
+        Pattern::Shapes { .. } => fullest,
     };
     let edge_um = inputs.lab.process.dose_matrix.lens_diameter_um;
     LayoutPiece::of(&inputs.layout, &inputs.exposed, middle, edge_um, progress)
@@ -139,7 +142,7 @@ fn matrix(
             let lattice = central(found).site.lattice;
             (lattice.kind(), lattice.pitch_nm().nm().round() as i64)
         }
-        Pattern::Shapes(_) => (LatticeKind::Square, 1),
+        Pattern::Shapes { .. } => (LatticeKind::Square, 1),
     };
     let content = BlockContent {
         piece: Piece::Polygons(&polygons),
@@ -238,15 +241,18 @@ fn check(
     ];
     let pitch_nm = match &inputs.pattern {
         Pattern::Pillars(found) => Some(central(found).site.lattice.pitch_nm().nm()),
-        Pattern::Shapes(_) => None,
+        Pattern::Shapes { .. } => None,
     };
+    let left_out = inputs.left_out.as_ref();
+    let left_out = left_out.map_or_else(String::new, |left_out| format!("{}; ", left_out.words));
     let checked = rules::check(files, &subjects, &inputs.lab, pitch_nm, progress)?;
     contents.checks = vec![HandoffCheck {
         name: "pillars".into(),
-        verdict: Verdict::Pass,
+        verdict: Verdict::of(inputs.left_out.as_ref().is_none_or(|left_out| !left_out.is_much)),
         words: match &inputs.pattern {
             Pattern::Pillars(found) => format!(
-                "{} {} in {} were found; {} on layer {}{}",
+                "{}{} {} in {} were found; {} on layer {}{}",
+                left_out,
                 count(found.pillars),
                 found.shape.plural(),
                 counted(found.elements.len(), "element"),
@@ -259,9 +265,9 @@ fn check(
                     first.why.words()
                 ))
             ),
-            Pattern::Shapes(why) => {
+            Pattern::Shapes { why } => {
                 format!(
-                    "none were found: {why}; the shapes are exposed, and there are no pads and no places to measure"
+                    "{left_out}none were found: {why}; the shapes are exposed, and there are no pads and no places to measure"
                 )
             }
         },

@@ -157,8 +157,20 @@ fn picture(inputs: &LayoutInputs, c: &LayoutContents<'_>) -> Figure {
     }
     if let Pattern::Pillars(found) = &inputs.pattern {
         for element in &found.elements {
-            let [x, y] = element.site.ends_nm().map(|[a, b]| (a as f64 * 1e-3, b as f64 * 1e-3));
-            plan.rectangle(elements, (x.0, y.0), (x.1, y.1));
+            // The box around an element that stands at an angle.
+            let [x, y] = element.site.ends_nm().map(|ends| ends.map(|nm| nm as f64));
+            let corners = [0, 1, 2, 3].map(|k| found.in_layout_nm([x[k % 2], y[k / 2]]).map(|nm| nm * 1e-3));
+            let ends = |pick: fn(f64, f64) -> f64, from: f64| {
+                let [x, y] = corners
+                    .iter()
+                    .fold([from; 2], |[x, y], c| [pick(x, c[0]), pick(y, c[1])]);
+                (x, y)
+            };
+            plan.rectangle(
+                elements,
+                ends(f64::min, f64::INFINITY),
+                ends(f64::max, f64::NEG_INFINITY),
+            );
         }
     }
     let [x0, y0, x1, y1] = c.bounds_um;

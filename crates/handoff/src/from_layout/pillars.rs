@@ -84,7 +84,7 @@ pub(super) fn central(found: &Extraction) -> &ExtractedElement {
 pub(super) fn snapping(pattern: &Pattern, process: &Process) -> Result<Vec<(Beam, f64)>> {
     match pattern {
         Pattern::Pillars(found) => snapping_of(found.shape, &histogram(found), process),
-        Pattern::Shapes(_) => snapping_of(process.checks.some_shape(), &[], process),
+        Pattern::Shapes { .. } => snapping_of(process.checks.some_shape(), &[], process),
     }
 }
 
@@ -117,5 +117,16 @@ pub(super) fn sites(pattern: &Pattern, process: &Process) -> Vec<MetrologySite> 
             &mut sites,
         );
     }
+    for site in &mut sites {
+        [site.x_um, site.y_um] = in_layout_um(found, [site.x_um, site.y_um]);
+        if let (Some(x), Some(y)) = (&mut site.element_x_um, &mut site.element_y_um) {
+            [*x, *y] = in_layout_um(found, [*x, *y]);
+        }
+    }
     sites
+}
+
+/// A place or a way along rows and columns of the elements as it is in the layout (um).
+fn in_layout_um(found: &Extraction, at_um: [f64; 2]) -> [f64; 2] {
+    found.in_layout_nm(at_um.map(|um| um * 1e3)).map(|nm| nm * 1e-3)
 }

@@ -15,7 +15,7 @@ use crate::process::Process;
 use metalith_core::text::hex;
 use metalith_core::{AtomicFile, Error, LayerNumber, Progress, Result};
 use metalith_drc::{Deck, LayoutLayers};
-use metalith_gds::extract::{Extraction, ExtractionPlan, extract};
+use metalith_gds::extract::{Extraction, ExtractionPlan, LeftOut, extract};
 use metalith_gds::{FileFormat, Layout, ReadLimits};
 use metalith_pillars::{DatabaseUnit, PillarShape};
 use metalith_report::count;
@@ -67,6 +67,8 @@ pub(crate) struct LayoutInputs {
     /// Exposed layers, the pillars first.
     pub exposed: Vec<LayerNumber>,
     pub pattern: Pattern,
+    /// Shapes of elements that are no pillars, if there are any.
+    pub left_out: Option<LeftOut>,
     /// Checks of the decks that are not in force.
     pub waiting: Vec<&'static str>,
     pub lab: Lab,
@@ -76,7 +78,9 @@ pub(crate) struct LayoutInputs {
 pub(crate) enum Pattern {
     Pillars(Box<Extraction>),
     /// Shapes that are no pillars, with the reason in words.
-    Shapes(String),
+    Shapes {
+        why: String,
+    },
 }
 
 impl Pattern {
@@ -84,29 +88,37 @@ impl Pattern {
     pub(super) fn shape(&self) -> Option<PillarShape> {
         match self {
             Self::Pillars(found) => Some(found.shape),
-            Self::Shapes(_) => None,
+            Self::Shapes { .. } => None,
         }
     }
 
-    fn read(layout: &Layout, layer: LayerNumber, progress: &dyn Progress) -> Result<Self> {
-        match extract(layout, &ExtractionPlan::discover(layer), progress) {
+    /// What is on a layer, and the shapes of its elements that are no pillars.
+    fn read(layout: &Layout, layer: LayerNumber, progress: &dyn Progress) -> Result<(Self, Option<LeftOut>)> {
+        let found = match extract(layout, &ExtractionPlan::discover(layer), progress) {
+            Ok(found) => found,
+            Err(metalith_gds::Error::Extraction { cause, .. }) => {
+                let why = format!("{cause} ({})", cause.id());
+                return Ok((Self::Shapes { why }, None));
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let left_out = LeftOut::of(&found, layer);
+        let (pillars, shapes) = (count(found.pillars), found.shape.plural());
+        let pattern = if found.shape == PillarShape::Mixed {
             // No deck has rules for both.
-            Ok(found) if found.shape == PillarShape::Mixed => Ok(Self::Shapes(format!(
-                "the {} pillars on layer {layer} are {}, and rules are for one of them",
-                count(found.pillars),
-                found.shape.plural()
-            ))),
+            Self::Shapes {
+                why: format!("the {pillars} pillars on layer {layer} are {shapes}, and rules are for one of them"),
+            }
+        } else if found.pillars >= found.oddities.total().max(1) {
+            Self::Pillars(Box::new(found))
+        } else {
             // Pads and pitch from a few of the shapes would be of something else.
-            Ok(found) if found.pillars >= found.oddities.total().max(1) => Ok(Self::Pillars(Box::new(found))),
-            Ok(found) => Ok(Self::Shapes(format!(
-                "only {} of {} shapes on layer {layer} are {} on a lattice",
-                count(found.pillars),
-                count(found.pillars + found.oddities.total()),
-                found.shape.plural()
-            ))),
-            Err(metalith_gds::Error::Extraction { cause, .. }) => Ok(Self::Shapes(format!("{cause} ({})", cause.id()))),
-            Err(error) => Err(error.into()),
-        }
+            let all = count(found.pillars + found.oddities.total());
+            Self::Shapes {
+                why: format!("only {pillars} of {all} shapes on layer {layer} are {shapes} on a lattice"),
+            }
+        };
+        Ok((pattern, left_out))
     }
 }
 
@@ -144,7 +156,7 @@ impl LayoutInputs {
         }
         let statistics = LayoutStatistics::of(&layout, progress)?;
         let exposed = exposed_layers(source, &statistics)?;
-        let pattern = Pattern::read(&layout, exposed[0], progress)?;
+        let (pattern, left_out) = Pattern::read(&layout, exposed[0], progress)?;
         let named = [(DOSE_MARKS, "numbers"), (DOSE_LABEL, "labels")];
         let taken = named.map(|(number, what)| (number.layer as i16, format!("that of its {what}")));
         layer_is_free(taken, &process)?;
@@ -161,7 +173,7 @@ impl LayoutInputs {
         };
         let mut waiting = OF_A_DESIGN.to_vec();
         waiting.extend(layers.marks.is_none().then_some(OF_MARKS));
-        if let Pattern::Shapes(_) = pattern {
+        if let Pattern::Shapes { .. } = pattern {
             waiting.extend(OF_PILLARS);
         }
         let first = process.checks.of_shape(shape).expect("it was checked").clone();
@@ -183,6 +195,7 @@ impl LayoutInputs {
             statistics,
             exposed,
             pattern,
+            left_out,
             waiting,
             lab,
         })

@@ -12,6 +12,8 @@ use metalith_core::{Error, Result};
 
 /// Largest distance of which the square and the sum of two squares are held.
 const MOST_UNITS: u64 = 1 << 31;
+/// Width of a lattice, at most (nm): ten times as much in steps of places are held with their sign.
+const MOST_NM: f64 = 1e11;
 
 /// A lattice about the centre of an element, in a grid of `sites` x `sites` places.
 ///
@@ -89,11 +91,13 @@ impl Lattice {
                 "use a positive multiple of the grid",
             ));
         }
-        if sites == 0 || sites > 1 << 20 {
+        // Places are whole numbers of small steps, and of database units, to either side.
+        let is_too_wide = pitch.nm() * sites as f64 > MOST_NM;
+        if sites == 0 || sites > 1 << 20 || is_too_wide {
             return Err(Error::refused(
                 "lattice/site-count-out-of-range",
-                format!("the lattice has {sites} sites along an axis"),
-                "use 1 to 1,048,576 sites along an axis",
+                format!("the lattice has {sites} sites along an axis, {pitch} nm apart"),
+                "use 1 to 1,048,576 sites along an axis, over 100 m at most",
             ));
         }
         if is_hexagonal && sites.is_multiple_of(2) {
@@ -187,6 +191,16 @@ impl Lattice {
     /// database units.
     pub fn has_exact_rows(&self) -> bool {
         self.rows == Rows::Exact
+    }
+
+    /// True if the distances of places along both axes are multiples of half the step of pitches of designs (0.025 nm).
+    pub fn has_whole_steps(&self) -> bool {
+        self.rows == Rows::Whole && self.pitch.is_of_designs()
+    }
+
+    /// True if pillars of one cell may stand on it and on another one: of one kind, with pitches that no design distinguishes.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.kind == other.kind && self.pitch.is_near(other.pitch)
     }
 
     /// Arrangement of the sites.

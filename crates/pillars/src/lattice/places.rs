@@ -3,6 +3,11 @@
 use super::{Lattice, LatticeKind, Rows};
 use crate::Pitch;
 
+/// Units of distances on a hexagonal lattice whose rows are no whole number of database units, in a nanometre.
+const UNITS_PER_NM: i64 = 40;
+/// Steps of places in such a unit.
+const PLACES_PER_UNIT: i64 = Pitch::HALVES_PER_NM / UNITS_PER_NM;
+
 impl Lattice {
     /// Place of column (axis 0) or row (axis 1) number `i` from the centre in [`Pitch::HALVES_PER_NM`]: exact.
     #[inline]
@@ -13,7 +18,7 @@ impl Lattice {
             (LatticeKind::Hexagonal, 0) => self.half_index(i) / 2 * self.pitch.half(),
             (LatticeKind::Hexagonal, _) if self.rows == Rows::Exact => {
                 let rows = (self.half_index(i) / 2) as f64;
-                (rows * self.row_nm() * Pitch::HALVES_PER_NM as f64).round() as i64
+                (rows * self.row_nm() * UNITS_PER_NM as f64).round() as i64 * PLACES_PER_UNIT
             }
             (LatticeKind::Hexagonal, _) => {
                 let row = LatticeKind::row_units(self.pitch, self.unit);
@@ -57,8 +62,11 @@ impl Lattice {
             return 0.5 * self.unit.nm();
         }
         let off = |axis, i| (self.drawn_nm(axis, i) - self.place_nm(axis, i)).abs();
+        if !self.pitch.is_of_designs() {
+            return 0.5 * self.unit.nm();
+        }
         // Remainders repeat after so many places at most.
-        let places = self.sites.min(2 * Pitch::HALVES_PER_NM as usize);
+        let places = self.sites.min(2 * UNITS_PER_NM as usize);
         let all = (0..2).flat_map(|axis| (0..places).map(move |i| off(axis, i)));
         all.fold(0.0, f64::max)
     }
@@ -80,7 +88,10 @@ impl Lattice {
     pub fn units2(&self, ix: usize, iy: usize) -> i64 {
         match self.kind {
             LatticeKind::Square => self.half_radius2(ix, iy),
-            LatticeKind::Hexagonal if self.rows == Rows::Exact => self.place(0, ix).pow(2) + self.place(1, iy).pow(2),
+            LatticeKind::Hexagonal if self.rows == Rows::Exact => {
+                let [x, y] = [self.place(0, ix), self.place(1, iy)].map(whole_units);
+                x * x + y * y
+            }
             LatticeKind::Hexagonal => {
                 let steps = [
                     self.unit.of(self.pitch),
@@ -103,7 +114,7 @@ impl Lattice {
             LatticeKind::Hexagonal => {
                 let per_radius = match self.rows {
                     Rows::Whole => self.unit.per_nm(),
-                    Rows::Exact => Pitch::HALVES_PER_NM / 2,
+                    Rows::Exact => UNITS_PER_NM / 2,
                 };
                 (d * i128::from(per_radius)).pow(2).min(i64::MAX.into()) as i64
             }
@@ -114,18 +125,18 @@ impl Lattice {
     pub fn units_of_pitch(&self) -> i64 {
         match self.kind {
             LatticeKind::Square => 2,
-            LatticeKind::Hexagonal if self.rows == Rows::Exact => 2 * self.pitch.half(),
+            LatticeKind::Hexagonal if self.rows == Rows::Exact => whole_units(2 * self.pitch.half()),
             LatticeKind::Hexagonal => 2 * self.unit.of(self.pitch),
         }
     }
 
     /// A length of which distances along both axes are whole numbers: half a pitch, or on a hexagonal lattice half a database
-    /// unit, or half a step of pitches (0.025 nm) where rows are no whole number of units (nm).
+    /// unit, or 0.025 nm where rows are no whole number of units (nm).
     #[inline]
     pub fn unit_nm(&self) -> f64 {
         match self.kind {
             LatticeKind::Square => 0.5 * self.pitch.nm(),
-            LatticeKind::Hexagonal if self.rows == Rows::Exact => 1.0 / Pitch::HALVES_PER_NM as f64,
+            LatticeKind::Hexagonal if self.rows == Rows::Exact => 1.0 / UNITS_PER_NM as f64,
             LatticeKind::Hexagonal => 0.5 * self.unit.nm(),
         }
     }
@@ -155,4 +166,9 @@ impl Lattice {
         let (x, y) = (self.half_index(ix), self.half_index(iy));
         x * x + y * y
     }
+}
+
+/// Steps of places as units of distances, rounded.
+fn whole_units(places: i64) -> i64 {
+    (places + places.signum() * (PLACES_PER_UNIT / 2)) / PLACES_PER_UNIT
 }

@@ -113,8 +113,7 @@ impl LayoutPillars<'_> {
             found => found.unwrap_or_default(),
         };
         let stated = &sites[0].lattice;
-        let is_as_stated =
-            |f: &&ElementSite| f.lattice.kind() == stated.kind() && f.lattice.pitch_nm() == stated.pitch_nm();
+        let is_as_stated = |f: &&ElementSite| f.lattice.is_like(stated);
         let about = |e: usize| {
             let mut as_stated = found.iter().filter(is_as_stated);
             Some((
