@@ -56,7 +56,7 @@ pub(crate) struct DatasetArgs {
 
 /// The folder of a set that shards make.
 fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result<Outcome> {
-    standard_input::named([args.with.design.as_path(), &args.layout])?;
+    standard_input::named(standard_input::OF_PLANS, [args.with.design.as_path(), &args.layout])?;
     let request = PairsRequest {
         design: args.with.design.clone(),
         layout: args.layout.clone(),

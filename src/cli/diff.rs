@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::Result;
 use metalith::diff::{self, DiffPlan};
+use metalith::gds::USUAL_LAYER;
 
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
@@ -43,11 +44,14 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let files = [InputFile::of(&args.a)?, InputFile::of(&args.b)?];
     let open = |path: &Path| args.reading.open(path, terminal);
+    let (a, b) = (open(&files[0])?, open(&files[1])?);
+    // Where no layer is the one of the pillars, all shapes are compared as outlines.
+    let layer = args.reading.pillar_layer(&a, terminal).unwrap_or(USUAL_LAYER);
     let plan = DiffPlan {
-        pillar_layer: args.reading.pillar_layer(),
+        pillar_layer: layer,
         listed: args.listed,
     };
-    let found = diff::diff(&open(&files[0])?, &open(&files[1])?, &plan, terminal)?;
+    let found = diff::diff(&a, &b, &plan, terminal)?;
     terminal.clear();
     if let Some(path) = &args.report {
         diff::page(&found).write(path)?;

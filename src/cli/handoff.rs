@@ -54,7 +54,8 @@ pub(crate) struct HandoffArgs {
     #[command(flatten)]
     reading: FileArgs,
 
-    /// Of a layout: layer and datatype of the pillars. If left out, the only layer with shapes, else 1/0.
+    /// Of a layout: layer and datatype of the pillars. If left out, 1/0; if that has no shapes, the only layer with shapes or with
+    /// pillars on a lattice.
     #[arg(long, value_parser = layer)]
     layer: Option<LayerNumber>,
 

@@ -61,7 +61,7 @@ pub(crate) struct OptimiseArgs {
 
 pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.plan.is_some() {
-        standard_input::named([args.design.as_path()])?;
+        standard_input::named(standard_input::OF_PLANS, [args.design.as_path()])?;
     }
     let design = standard_input::design(&args.design, terminal)?;
     terminal.stop_on_interrupt();

@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use metalith::cell::{Analyser, Fidelity, Handedness, Polarisation};
 use metalith::design::CellFile;
 use metalith::gds::LayerNumber;
-use metalith::report::{count, exact, sig};
+use metalith::report::{count, counted, exact, sig};
 use metalith::verify::{
     LeftOut, STREHL_AGAINST, SimulationCase, SinglePsf, SinglePsfReport, focal_length_words, focus_words, plane_words,
     single_psfs, single_white, write_single_psf_report,
@@ -230,7 +230,7 @@ fn between(low: f64, high: f64) -> impl Fn(&str) -> std::result::Result<f64, Str
 }
 
 /// A figure of a layout of which most was left out would be a figure of something else.
-fn mostly_pillars(args: &PsfArgs, found: &Extraction, left_out: Option<&LeftOut>) -> Result<()> {
+fn mostly_pillars(args: &PsfArgs, layer: LayerNumber, found: &Extraction, left_out: Option<&LeftOut>) -> Result<()> {
     let others = found.oddities.total();
     if args.extract_only || others <= found.pillars {
         return Ok(());
@@ -243,7 +243,7 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction, left_out: Option<&LeftOut>
             args.layout.display(),
             count(found.pillars),
             count(found.pillars + others),
-            args.reading.pillar_layer(),
+            layer,
             found.shape.plural()
         ),
         "name the layer of the pillars with --layer, or look at what else is there with --extract-only --json",
@@ -372,10 +372,10 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     args.say_guesses(terminal);
     terminal.stop_on_interrupt();
     let layout = args.reading.open(&InputFile::of(&args.layout)?, terminal)?;
-    let plan = ExtractionPlan::discover(args.reading.pillar_layer());
-    let found = extract(&layout, &plan, terminal)?;
-    let left_out = LeftOut::of(&found, args.reading.pillar_layer());
-    mostly_pillars(args, &found, left_out.as_ref())?;
+    let layer = args.reading.pillar_layer(&layout, terminal)?;
+    let found = extract(&layout, &ExtractionPlan::discover(layer), terminal)?;
+    let left_out = LeftOut::of(&found, layer);
+    mostly_pillars(args, layer, &found, left_out.as_ref())?;
     one_kind(args, &found)?;
     known_light(args, &found)?;
     let light = if args.extract_only {
@@ -468,11 +468,8 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             },
         );
     }
-    print_line!(
-        "{} other shapes on layer {}",
-        count(found.oddities.total()),
-        args.reading.pillar_layer()
-    );
+    let others = counted(found.oddities.total() as usize, "other shape");
+    print_line!("{others} on layer {layer}");
     for (what, value) in &assumptions {
         print_line!("{what}: {value}");
     }

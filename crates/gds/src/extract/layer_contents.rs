@@ -44,7 +44,7 @@ impl Visitor for Counter {
 }
 
 /// Words such as `10/0: 4,427 squares; 20/0: 3 polygons; text on 63/0`; fullest layers first.
-pub(super) fn words(layout: &Layout, from: &Selection, progress: &dyn Progress) -> Result<String> {
+pub(crate) fn words(layout: &Layout, from: &Selection, progress: &dyn Progress) -> Result<String> {
     let mut counter = Counter::default();
     let all = Selection {
         layers: None,

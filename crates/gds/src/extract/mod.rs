@@ -7,7 +7,7 @@
 mod discover;
 mod filler;
 mod lattices;
-mod layer_contents;
+pub(crate) mod layer_contents;
 mod named_shapes;
 mod pillars;
 mod places;
