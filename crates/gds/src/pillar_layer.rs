@@ -46,6 +46,27 @@ impl Layout {
         layers
     }
 
+    /// Cells at the top with shapes on a layer, in them or below.
+    pub fn tops_on(&self, layer: LayerNumber) -> Vec<usize> {
+        let cells = self.cells();
+        let mut order: Vec<usize> = (0..cells.len()).collect();
+        order.sort_by_key(|&cell| cells[cell].depth);
+        let mut has = vec![false; cells.len()];
+        for cell in order {
+            let own = cells[cell]
+                .layers
+                .iter()
+                .any(|(l, tally)| *l == layer && tally.shapes() > 0);
+            has[cell] = own
+                || cells[cell]
+                    .children
+                    .iter()
+                    .filter_map(|child| child.cell)
+                    .any(|child| has[child]);
+        }
+        self.tops().iter().copied().filter(|&top| has[top]).collect()
+    }
+
     /// Layers, of these, on which pillars stand on a lattice.
     fn layers_with_lattices(&self, layers: &[LayerNumber], progress: &dyn Progress) -> Result<Vec<LayerNumber>> {
         let scale = Scale::of(self)?;
