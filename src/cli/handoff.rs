@@ -11,7 +11,7 @@ use metalith::handoff::{
     DesignSource, Handoff, HandoffOptions, HandoffSource, HandoffVerification, LayoutSource, handoff, handoff_name,
     verify_handoff,
 };
-use metalith::report::Verdict;
+use metalith::report::{Verdict, counted};
 use metalith::{Accuracy, Design, Error, Result};
 
 use super::compensated::judged_as_made;
@@ -258,7 +258,8 @@ fn tell(made: &Handoff) {
             print_line!("  {limit}{}: {}: {}", broken.rule, broken.requirement, broken.cure);
         }
     }
-    print_line!("{} files, seal {}", made.manifest.files.len(), made.manifest.seal);
+    let files = counted(made.manifest.files.len(), "file");
+    print_line!("{files}, seal {}", made.manifest.seal);
 }
 
 fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {

@@ -111,7 +111,7 @@ fn head(found: &Inventory, out: &mut String) {
         format!(
             ", {} to {} in {}",
             counted(found.references as usize, "reference"),
-            counted(found.copies as usize, "copy").replace("copys", "copies"),
+            counted(found.copies as usize, "copy"),
             counted(found.depth as usize + 1, "level"),
         )
     } else {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command};
 
 use clap::{Args, Subcommand};
-use metalith::report::sig;
+use metalith::report::{counted, sig};
 use metalith::study::{
     MANIFEST, PairsPlan, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan, submissions,
     write_page,
@@ -127,10 +127,10 @@ fn plan_study(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     let plan = plan(&args.tolerance, &args.out, settings, terminal)?;
     terminal.clear();
     print_line!(
-        "{} draws of {:.2} s in {} shards of {}: {}",
-        plan.draws,
+        "{} of {:.2} s in {} of {}: {}",
+        counted(plan.draws as usize, "draw"),
         plan.seconds_per_draw,
-        plan.cut().shards(),
+        counted(plan.cut().shards() as usize, "shard"),
         plan.draws_per_shard,
         args.out.display()
     );
@@ -196,7 +196,7 @@ fn by_processes(args: &RunArgs, missing: &[u64], jobs: usize, terminal: &Termina
     }
     Err(Error::refused(
         "study/shards-not-made",
-        format!("{} shards failed, the first is {}", failed.len(), failed[0]),
+        format!("{} failed, the first is {}", counted(failed.len(), "shard"), failed[0]),
         "their messages are above; run again with --missing",
     ))
 }
@@ -232,7 +232,7 @@ fn submit(args: &SubmitArgs) -> Result<Outcome> {
     for submission in submissions(&cut, &slurm, &missing)? {
         let shards = submission.shards.len();
         if args.dry_run {
-            print_line!("{} shards: sbatch {}", shards, submission.script.display());
+            print_line!("{}: sbatch {}", counted(shards, "shard"), submission.script.display());
             continue;
         }
         let answer = Command::new("sbatch")
@@ -250,7 +250,11 @@ fn submit(args: &SubmitArgs) -> Result<Outcome> {
                 "correct the file that --slurm names; --dry-run writes the scripts alone",
             ));
         }
-        print_line!("{} shards: {}", shards, String::from_utf8_lossy(&answer.stdout).trim());
+        print_line!(
+            "{}: {}",
+            counted(shards, "shard"),
+            String::from_utf8_lossy(&answer.stdout).trim()
+        );
     }
     Ok(Outcome::Fine)
 }
@@ -281,7 +285,7 @@ fn merge_pairs(plan: &PairsPlan, args: &MergeArgs, terminal: &Terminal) -> Resul
     without_table(args)?;
     let manifest = plan.merge(terminal)?;
     terminal.clear();
-    print_line!("{} pairs in {}", manifest.pairs.len(), args.study.display());
+    print_line!("{} in {}", counted(manifest.pairs.len(), "pair"), args.study.display());
     Ok(Outcome::Fine)
 }
 

@@ -83,6 +83,23 @@ pub fn table_rows(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
+/// A count with its digits in groups of three: `12,000`.
+pub fn count(n: u64) -> String {
+    grouped(&n.to_string())
+}
+
+/// Digits in groups of three.
+pub fn grouped(digits: &str) -> String {
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
 /// Bytes as hexadecimal digits, such as those of a digest.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
@@ -102,6 +119,18 @@ fn push(out: &mut String, c: char) {
         out.push(c);
     } else {
         let _ = write!(out, "\\u{{{:x}}}", u32::from(c));
+    }
+}
+
+/// A count with what is counted, in the singular for one: `1 term`, `12,000 terms`, `2 copies`.
+pub fn counted(n: usize, what: &str) -> String {
+    let stem = what
+        .strip_suffix('y')
+        .filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));
+    match (n, stem) {
+        (1, _) => format!("1 {what}"),
+        (_, Some(stem)) => format!("{} {stem}ies", count(n as u64)),
+        _ => format!("{} {what}s", count(n as u64)),
     }
 }
 
@@ -132,5 +161,11 @@ mod tests {
     fn long_texts_are_cut() {
         assert_eq!(quoted(&"ä".repeat(200)), format!("{}...", "ä".repeat(80)));
         assert_eq!(quoted("short"), "short");
+    }
+
+    #[test]
+    fn one_is_singular() {
+        let words = [(1, "term"), (0, "term"), (12_000, "copy"), (2, "array")].map(|(n, what)| counted(n, what));
+        assert_eq!(words, ["1 term", "0 terms", "12,000 copies", "2 arrays"]);
     }
 }

@@ -254,8 +254,8 @@ pub fn junit(report: &DrcReport) -> String {
                     .map(|m| format!("{} [{}]", m.words, m.hash))
                     .collect();
                 format!(
-                    "<failure message=\"{} violations of: {}\">{}</failure>",
-                    r.open(),
+                    "<failure message=\"{} of: {}\">{}</failure>",
+                    counted(r.open() as usize, "violation"),
                     escaped(&r.words),
                     escaped(&lines.join("\n"))
                 )

@@ -1,5 +1,9 @@
 //! Formatting of numbers for readers: fixed rules, the same on every machine.
 
+pub use metalith_core::text::count;
+pub use metalith_core::text::counted;
+use metalith_core::text::grouped;
+
 /// `x` to a given number of significant digits: `0.01234`, `12.3`, `5.77×10⁷`, `1.2×10⁻⁷`. From 0.0001 to below ten million it
 /// is written without a power of ten, and all digits before its point are given, even if there are more: `6,411,448`.
 pub fn sig(x: f64, digits: usize) -> String {
@@ -55,16 +59,6 @@ pub fn fixed(x: f64, decimals: usize) -> String {
     text
 }
 
-/// A count with its thousands grouped.
-pub fn count(n: u64) -> String {
-    grouped(&n.to_string())
-}
-
-/// A count with what is counted, in the singular for one: `1 term`, `12,000 terms`.
-pub fn counted(n: usize, what: &str) -> String {
-    format!("{} {what}{}", count(n as u64), if n == 1 { "" } else { "s" })
-}
-
 /// `10⁻³` and the like.
 pub(crate) fn power_of_ten(exponent: i32) -> String {
     format!("10{}", superscript(exponent))
@@ -77,17 +71,6 @@ fn not_finite(x: f64) -> String {
         _ => "−∞",
     }
     .into()
-}
-
-fn grouped(digits: &str) -> String {
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
 }
 
 fn superscript(exponent: i32) -> String {
