@@ -248,7 +248,21 @@ fn outcome(made: &Handoff) -> Outcome {
     }
 }
 
+/// The verdict, with what fails and what did not run.
+fn verdict(made: &Handoff) -> String {
+    let named = |verdict| {
+        let checks = made.checks.iter().filter(|c| c.verdict == verdict);
+        checks.map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    match (named(Verdict::Fail), named(Verdict::NotRun)) {
+        (fail, _) if !fail.is_empty() => format!("FAIL: {fail}"),
+        (_, not_run) if !not_run.is_empty() => format!("NOT ALL CHECKED: {not_run}"),
+        _ => format!("PASS: {}", counted(made.checks.len(), "check")),
+    }
+}
+
 fn tell(made: &Handoff) {
+    print_line!("{}", verdict(made));
     print_line!("{}  start with index.html", made.folder.display());
     print_line!("{}  the same, packed", made.archive.display());
     for check in &made.checks {
