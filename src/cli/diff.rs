@@ -9,17 +9,17 @@ use metalith::gds::USUAL_LAYER;
 
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, output, print_line};
 
 /// Compare the geometry of two layouts, whatever their hierarchy.
 #[derive(Args)]
 #[command(after_help = "Exit codes: 0 same geometry, 1 different, 2 bad input.\n\
     Example:\n  metalith diff golden/lens.gds out/lens_pillars.gds --report diff.html")]
 pub(crate) struct DiffArgs {
-    /// The first layout.
+    /// The first layout, `-` for standard input.
     a: PathBuf,
 
-    /// The second layout.
+    /// The second layout, `-` for standard input.
     b: PathBuf,
 
     #[command(flatten)]
@@ -51,8 +51,9 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
         pillar_layer: layer,
         listed: args.listed,
     };
-    let found = diff::diff(&a, &b, &plan, terminal)?;
+    let mut found = diff::diff(&a, &b, &plan, terminal)?;
     terminal.clear();
+    (found.a, found.b) = (output::shown(found.a), output::shown(found.b));
     if let Some(path) = &args.report {
         diff::page(&found).write(path)?;
     }

@@ -80,6 +80,13 @@ fn head(found: &Inventory, out: &mut String) {
                 .unwrap_or_default();
             format!("GDSII {version}{modified}")
         }
+        FormatInventory::Dxf { version, unit } => {
+            let version = version.as_ref().map_or_else(
+                || "DXF without a version".to_owned(),
+                |version| format!("DXF {}", printable(version)),
+            );
+            format!("{version}, {unit}")
+        }
         FormatInventory::Oasis {
             compressed_blocks,
             table_offsets_in_end,

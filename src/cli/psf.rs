@@ -368,10 +368,14 @@ fn print_psfs(psfs: &[SinglePsf], pixel_um: &str) {
 
 pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let stated = args.cell.as_deref().map(CellFile::read).transpose()?;
-    let args = &args.clone().with_design(stated);
+    let mut args = args.clone().with_design(stated);
     args.say_guesses(terminal);
     terminal.stop_on_interrupt();
-    let layout = args.reading.open(&InputFile::of(&args.layout)?, terminal)?;
+    let file = InputFile::of(&args.layout)?;
+    // Messages name what is read.
+    args.layout = file.to_path_buf();
+    let args = &args;
+    let layout = args.reading.open(&file, terminal)?;
     let layer = args.reading.pillar_layer(&layout, terminal)?;
     let found = extract(&layout, &ExtractionPlan::discover(layer), terminal)?;
     let left_out = LeftOut::of(&found, layer);

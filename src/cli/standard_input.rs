@@ -76,6 +76,7 @@ impl InputFile {
         }
         let mut input = take()?;
         let folder = TempDir::new().map_err(Error::io("create a folder in", &std::env::temp_dir()))?;
+        super::output::hide_folder(folder.path());
         let path = folder.path().join(NAME);
         let copied = File::create(&path).and_then(|mut copy| io::copy(&mut input, &mut copy));
         copied.map_err(Error::io("copy standard input to", &path))?;

@@ -144,6 +144,7 @@ impl LayoutInputs {
         }
         let statistics = LayoutStatistics::of(&layout, progress)?;
         let exposed = exposed_layers(source, &layout, &statistics, progress)?;
+        say_never_exposed(&statistics, &exposed, progress);
         let pattern = Pattern::read(&layout, exposed[0], progress)?;
         let named = [(DOSE_MARKS, "numbers"), (DOSE_LABEL, "labels")];
         let taken = named.map(|(number, what)| (number.layer as i16, format!("that of its {what}")));
@@ -228,6 +229,26 @@ pub fn handoff_name(layout: &Path) -> String {
         }
     }
     legal_name(name).replace(char::is_whitespace, "_")
+}
+
+/// State the layers with shapes that are not exposed.
+fn say_never_exposed(statistics: &LayoutStatistics, exposed: &[LayerNumber], progress: &dyn Progress) {
+    let drawn = statistics.layers.iter().filter(|l| l.shapes > 0);
+    let never = drawn.filter(|l| !exposed.contains(&LayerNumber::new(l.layer, l.datatype)));
+    let never: Vec<String> = never
+        .map(|l| {
+            format!(
+                "{}/{} with {}",
+                l.layer,
+                l.datatype,
+                counted(l.shapes as usize, "shape")
+            )
+        })
+        .collect();
+    if !never.is_empty() {
+        let never = never.join(", ");
+        progress.warn(&format!("note: never exposed: {never}; --expose adds a layer"));
+    }
 }
 
 /// The exposed layers, the pillars first; all of them have shapes.
