@@ -48,13 +48,13 @@ pub struct NewSet {
 }
 
 /// Begin a set: write `measurement.toml` and a page of the frames beside it. `frames` are files and folders of frames; the pillars
-/// are on `layer` of the layout.
+/// are on `layer` of the layout, or where it is left out on that of [`Layout::pillar_layer`].
 ///
 /// # Errors
 /// If `out` exists, the layout has no element on this layer, there is no frame, or a file cannot be written.
 pub fn new_set(
-    layout: &Path,
-    layer: LayerNumber,
+    layout: &Layout,
+    layer: Option<LayerNumber>,
     frames: &[PathBuf],
     out: &Path,
     progress: &dyn Progress,
@@ -68,11 +68,15 @@ pub fn new_set(
     }
     let frames = recognised(&files_of(frames)?);
     progress.begin("pillars of the layout", 0);
-    let found = extract(&Layout::open(layout)?, &ExtractionPlan::discover(layer), progress)?;
+    let layer = match layer {
+        Some(layer) => layer,
+        None => layout.pillar_layer(progress)?,
+    };
+    let found = extract(layout, &ExtractionPlan::discover(layer), progress)?;
     let folder = out.parent().unwrap_or(Path::new(""));
     let mut open = Vec::new();
     let text = text(
-        layout,
+        layout.path(),
         layer,
         (&found.elements, found.shape),
         &frames,
@@ -490,15 +494,8 @@ mod tests {
         let whole = metalith_testing::session::small_set(folder.path());
         std::fs::remove_file(whole).unwrap();
         let out = folder.path().join("measurement.toml");
-        let layout = folder.path().join("layout.gds");
-        let begun = new_set(
-            &layout,
-            LayerNumber::new(1, 0),
-            &[folder.path().to_owned()],
-            &out,
-            &Silent,
-        )
-        .unwrap();
+        let layout = Layout::open(&folder.path().join("layout.gds")).unwrap();
+        let begun = new_set(&layout, None, &[folder.path().to_owned()], &out, &Silent).unwrap();
         assert_eq!(begun.frames.len(), 8);
         assert!(begun.page.is_file());
         let text = std::fs::read_to_string(&out).unwrap();
@@ -535,13 +532,7 @@ mod tests {
         std::fs::write(&out, stated).unwrap();
         let read = metalith_calibrate::MeasuredSet::read(&out, &metalith_gds::extract::PillarsAt::STATED, &Silent);
         assert_eq!(read.unwrap().measurements.len(), 8);
-        let again = new_set(
-            &layout,
-            LayerNumber::new(1, 0),
-            &[folder.path().to_owned()],
-            &out,
-            &Silent,
-        );
+        let again = new_set(&layout, None, &[folder.path().to_owned()], &out, &Silent);
         assert_eq!(again.unwrap_err().id(), "new/exists");
     }
 }

@@ -83,12 +83,16 @@ def verify(
     fast: bool = False,
     model: PathLike | None = None,
     out: PathLike | None = None,
+    layer: tuple[int, int] | None = None,
+    top: str | None = None,
     progress: Progress | None = None,
 ) -> Verification:
     """Read a layout back, compare every pillar with the design, simulate it and judge it by the limits of the design.
 
-    ``model``: judge the chip as made, by the model of a calibration. ``out``: a folder for the page."""
-    text, passed = _native.verify(design._native, layout, fast, model, out, progress)
+    ``model``: judge the chip as made, by the model of a calibration. ``out``: a folder for the page. ``layer`` (layer and
+    datatype) is that of the pillars, if it is not as the design says; ``top`` the cell to start from, if the layout has several."""
+    on = None if layer is None else _arguments.layer(layer)
+    text, passed = _native.verify(design._native, layout, fast, model, out, progress, on, top)
     found = json.loads(text)
     return Verification(passed=passed, checks=found["checks"], numbers=found)
 
@@ -123,15 +127,19 @@ def plan(
     *,
     layout: PathLike | None = None,
     effects: Sequence[str] = (),
+    layer: tuple[int, int] | None = None,
+    top: str | None = None,
     progress: Progress | None = None,
 ) -> MeasurementPlan:
     """Plan a bench session into the folder ``out``: the fewest measurements that find every effect of a chip at a wanted size
     and tell it from the others.
 
     ``bench``: a file of what the bench can do and what is wanted. ``layout``: the one that was written; left out, the pillars
-    of the design are written into ``out``. ``effects``: plan for these alone. A folder with frames is not overwritten. It
-    takes minutes."""
-    text, finds_all, sentence = _native.plan(design._native, bench, out, layout, list(effects), progress)
+    of the design are written into ``out``. ``effects``: plan for these alone. ``layer`` and ``top``: as in :func:`verify`. A
+    folder with frames is not overwritten. It takes minutes."""
+    on = None if layer is None else _arguments.layer(layer)
+    told = _native.plan(design._native, bench, out, layout, list(effects), progress, on, top)
+    text, finds_all, sentence = told
     found = json.loads(text)
     return MeasurementPlan(
         folder=Path(found["folder"]),

@@ -341,19 +341,20 @@ def _rectangles(shape: Shape) -> Rectangles:
 def read_layout(
     path: PathLike,
     *,
-    layer: tuple[int, int] = (1, 0),
+    layer: tuple[int, int] | None = None,
     top: str | None = None,
     design: Design | None = None,
     array: Array | None = None,
     progress: Progress | None = None,
 ) -> Layout:
     """Read the pillars of a GDSII or OASIS file, written by any program: at the elements of ``design`` or of ``array``, or
-    wherever squares or circles stand on a lattice on ``layer`` (layer and datatype). Rectangles need one of the two. All
+    wherever squares or circles stand on a lattice on ``layer`` (layer and datatype; if left out the one of the design, else 1/0,
+    or if that has no shapes, the only layer with shapes or with pillars on a lattice). Rectangles need one of the two. All
     elements stand on lattices of one kind and pitch. Of squares and circles in one lens (shape ``mixed``) the number of a
     circle is 32768 more than its diameter (nm)."""
     natives = (design._native if design is not None else None, array._native if array is not None else None)
     names, centres, widths, pitch_nm, lattice, pillars, others, found, shape = _native.read_layout(
-        path, _arguments.layer(layer), top, *natives, progress
+        path, None if layer is None else _arguments.layer(layer), top, *natives, progress
     )
     return Layout(
         widths=widths,

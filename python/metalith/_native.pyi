@@ -71,7 +71,7 @@ class Array:
 def main(arguments: list[str]) -> int: ...
 def read_layout(
     path: PathLike,
-    layer: tuple[int, int] = (1, 0),
+    layer: tuple[int, int] | None = None,
     top: str | None = None,
     design: Design | None = None,
     array: Array | None = None,
@@ -172,6 +172,8 @@ def verify(
     model: PathLike | None = None,
     out: PathLike | None = None,
     progress: Progress | None = None,
+    layer: tuple[int, int] | None = None,
+    top: str | None = None,
 ) -> tuple[str, bool]: ...
 def calibrate(
     set: PathLike,
@@ -188,6 +190,8 @@ def plan(
     layout: PathLike | None = None,
     effects: list[str] = ...,
     progress: Progress | None = None,
+    layer: tuple[int, int] | None = None,
+    top: str | None = None,
 ) -> tuple[str, bool, str]: ...
 def study_plan(
     tolerance: PathLike,

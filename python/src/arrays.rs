@@ -14,6 +14,7 @@ use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::lattices::{PitchNm, check_places, check_shape, kind_of, lattice_of};
+use crate::reading::Reading;
 use crate::shapes::{ToldShape, shape_of, told};
 use crate::work::{error, work};
 
@@ -318,26 +319,33 @@ type ReadLayout<'py> = (
 /// Read the pillars of a layout: at the elements of a design or of an array, or wherever there are squares or circles on a
 /// lattice.
 #[pyfunction]
-#[pyo3(signature = (path, layer=(1, 0), top=None, design=None, array=None, progress=None))]
+#[pyo3(signature = (path, layer=None, top=None, design=None, array=None, progress=None))]
 pub fn read_layout<'py>(
     py: Python<'py>,
     path: PathBuf,
-    layer: (u16, u16),
+    layer: Option<(u16, u16)>,
     top: Option<String>,
     design: Option<&Design>,
     array: Option<&Array>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<ReadLayout<'py>> {
-    let layer = LayerNumber::new(layer.0, layer.1);
-    let design = design.map(|d| &d.design);
+    let reading = Reading { layer, top };
+    let design = design.map(|d| reading.design(&d.design));
     let found = work(py, progress, |p| {
         let layout = Layout::open_with(&path, ReadLimits::default(), p)?;
-        let plan = match (design, array) {
-            (Some(design), _) => extraction_plan(design),
-            (None, Some(array)) => ExtractionPlan::given(layer, sites(array)).of_shape(array.array.shape),
-            (None, None) => ExtractionPlan::discover(layer),
+        let layout = match &reading.top {
+            Some(top) => layout.below(top)?,
+            None => layout,
         };
-        let found = extract(&layout, &ExtractionPlan { top, ..plan }, p)?;
+        let plan = match (&design, array) {
+            (Some(design), _) => extraction_plan(design),
+            (None, Some(array)) => {
+                let layer = reading.pillar_layer(&layout, p)?;
+                ExtractionPlan::given(layer, sites(array)).of_shape(array.array.shape)
+            }
+            (None, None) => ExtractionPlan::discover(reading.pillar_layer(&layout, p)?),
+        };
+        let found = extract(&layout, &plan, p)?;
         found.check_one_lattice(&path, "name a cell with elements of one kind by `top`")?;
         Ok(found)
     })?;

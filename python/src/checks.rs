@@ -14,6 +14,7 @@ use metalith::{
 use pyo3::prelude::*;
 
 use crate::arrays::Design;
+use crate::reading::Reading;
 use crate::work::work;
 
 /// Plain data as JSON.
@@ -76,7 +77,8 @@ pub fn check(
 /// A layout read back, compared with its design, simulated and judged: the numbers of `report.json`, as JSON, and
 /// whether all limits hold. With a folder the page is written too.
 #[pyfunction]
-#[pyo3(signature = (design, layout, fast=false, model=None, out=None, progress=None))]
+#[pyo3(signature = (design, layout, fast=false, model=None, out=None, progress=None, layer=None, top=None))]
+#[allow(clippy::too_many_arguments)]
 pub fn verify(
     py: Python<'_>,
     design: &Design,
@@ -85,9 +87,13 @@ pub fn verify(
     model: Option<PathBuf>,
     out: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
+    layer: Option<(u16, u16)>,
+    top: Option<String>,
 ) -> PyResult<(String, bool)> {
-    let design = &design.design;
+    let reading = Reading { layer, top };
+    let design = &reading.design(&design.design);
     work(py, progress, |p| {
+        let layout = reading.below(&layout, p)?;
         let array = PillarArray::build(design, p)?;
         let model = model.as_deref().map(CalibratedModel::read).transpose()?;
         let chip = |model| -> Result<AsBuiltChip> {
@@ -107,7 +113,7 @@ pub fn verify(
         };
         let accuracy = if fast { Accuracy::Fast } else { Accuracy::Accurate };
         let cases = cases.with_through_focus();
-        let found = metalith::verify(design, &array, &layout, &cases, accuracy, p)?;
+        let found = metalith::verify(design, &array, &layout.path, &cases, accuracy, p)?;
         if let Some(folder) = out {
             let turn = metalith::FolderLock::wait(&folder, p, || ())?;
             turn.publish("report", &[], |folder| {
@@ -146,7 +152,8 @@ pub fn calibrate(
 /// A bench session planned into a folder: its plan as JSON, whether it finds every effect at its wanted size, and one line
 /// for a person.
 #[pyfunction]
-#[pyo3(signature = (design, bench, out, layout=None, effects=vec![], progress=None))]
+#[pyo3(signature = (design, bench, out, layout=None, effects=vec![], progress=None, layer=None, top=None))]
+#[allow(clippy::too_many_arguments)]
 pub fn plan(
     py: Python<'_>,
     design: &Design,
@@ -155,11 +162,16 @@ pub fn plan(
     layout: Option<PathBuf>,
     effects: Vec<String>,
     progress: Option<Py<PyAny>>,
+    layer: Option<(u16, u16)>,
+    top: Option<String>,
 ) -> PyResult<(String, bool, String)> {
-    let design = &design.design;
+    let reading = Reading { layer, top };
+    let design = &reading.design(&design.design);
     work(py, progress, |p| {
         let bench = BenchFile::read(&bench)?;
-        let planned = metalith::plan_session(design, &bench, layout.as_deref(), &out, effects, p)?;
+        let layout = layout.map(|path| reading.below(&path, p)).transpose()?;
+        let layout = layout.as_ref().map(|layout| layout.path.as_path());
+        let planned = metalith::plan_session(design, &bench, layout, &out, effects, p)?;
         Ok((json(&planned), planned.finds_all(), planned.sentence()))
     })
 }

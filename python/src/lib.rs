@@ -10,6 +10,7 @@ mod lattices;
 mod light;
 mod pictures;
 mod psf;
+mod reading;
 mod shapes;
 mod studies;
 mod wanted;

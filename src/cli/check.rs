@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::{LayerNumber, ReadLimits};
+use metalith::report::counted;
 use metalith::{AtomicFile, Error, Layout, Result};
 
 use super::compensated::CompensatedFor;
@@ -232,7 +233,7 @@ fn write_rules(layout: &Layout, layer: Option<LayerNumber>, path: &Path, termina
         0 => String::new(),
         n => format!(", {n} more as comments: the layout breaks them"),
     };
-    print_line!("{}: {} rules{left_out}", path.display(), rules.in_force);
+    print_line!("{}: {}{left_out}", path.display(), counted(rules.in_force, "rule"));
     Ok(Outcome::Fine)
 }
 

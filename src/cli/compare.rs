@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use metalith::baselines::{Comparison, DiffuserSpec, Lensless, ListedDesign, MaskSpec, write_comparison};
 use metalith::imaging::KernelCache;
+use metalith::report::counted;
 use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 
@@ -266,8 +267,8 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
         let plan = plan_comparison(&comparison, &args.out, terminal)?;
         terminal.clear();
         print_line!(
-            "{} cameras in as many shards: {}",
-            plan.cut().shards(),
+            "{} in as many shards: {}",
+            counted(plan.cut().shards() as usize, "camera"),
             args.out.display()
         );
         return Ok(Outcome::Fine);

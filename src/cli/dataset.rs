@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::imaging::scene::{images_in, read_far_scene};
 use metalith::imaging::{DatasetManifest, DatasetOrigin, ImagingSystem, check_images, write_dataset};
+use metalith::report::counted;
 use metalith::study::{PairsRequest, is_planned, plan_pairs};
 use metalith::{Error, Result};
 
@@ -56,7 +57,7 @@ pub(crate) struct DatasetArgs {
 
 /// The folder of a set that shards make.
 fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result<Outcome> {
-    standard_input::named([args.with.design.as_path(), &args.layout])?;
+    standard_input::named(standard_input::OF_PLANS, [args.with.design.as_path(), &args.layout])?;
     let request = PairsRequest {
         design: args.with.design.clone(),
         layout: args.layout.clone(),
@@ -69,10 +70,10 @@ fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result
     let plan = plan_pairs(&request, &args.out, args.images_per_shard, terminal)?;
     terminal.clear();
     print_line!(
-        "{} images of {:.2} s in {} shards of {}: {}",
-        plan.digests.len(),
+        "{} of {:.2} s in {} of {}: {}",
+        counted(plan.digests.len(), "image"),
         plan.seconds_per_image,
-        plan.cut().shards(),
+        counted(plan.cut().shards() as usize, "shard"),
         plan.images_per_shard,
         args.out.display()
     );
@@ -108,6 +109,6 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let turn = terminal.turn_at(&args.out)?;
     let manifest = write_dataset(&system, &operator, &images, &read, head, &turn, terminal)?;
     terminal.clear();
-    print_line!("{} pairs in {}", manifest.pairs.len(), args.out.display());
+    print_line!("{} in {}", counted(manifest.pairs.len(), "pair"), args.out.display());
     Ok(Outcome::Fine)
 }

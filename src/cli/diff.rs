@@ -5,20 +5,21 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::Result;
 use metalith::diff::{self, DiffPlan};
+use metalith::gds::USUAL_LAYER;
 
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, output, print_line};
 
 /// Compare the geometry of two layouts, whatever their hierarchy.
 #[derive(Args)]
 #[command(after_help = "Exit codes: 0 same geometry, 1 different, 2 bad input.\n\
     Example:\n  metalith diff golden/lens.gds out/lens_pillars.gds --report diff.html")]
 pub(crate) struct DiffArgs {
-    /// The first layout.
+    /// The first layout, `-` for standard input.
     a: PathBuf,
 
-    /// The second layout.
+    /// The second layout, `-` for standard input.
     b: PathBuf,
 
     #[command(flatten)]
@@ -43,12 +44,16 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let files = [InputFile::of(&args.a)?, InputFile::of(&args.b)?];
     let open = |path: &Path| args.reading.open(path, terminal);
+    let (a, b) = (open(&files[0])?, open(&files[1])?);
+    // Where no layer is the one of the pillars, all shapes are compared as outlines.
+    let layer = args.reading.pillar_layer(&a, terminal).unwrap_or(USUAL_LAYER);
     let plan = DiffPlan {
-        pillar_layer: args.reading.pillar_layer(),
+        pillar_layer: layer,
         listed: args.listed,
     };
-    let found = diff::diff(&open(&files[0])?, &open(&files[1])?, &plan, terminal)?;
+    let mut found = diff::diff(&a, &b, &plan, terminal)?;
     terminal.clear();
+    (found.a, found.b) = (output::shown(found.a), output::shown(found.b));
     if let Some(path) = &args.report {
         diff::page(&found).write(path)?;
     }

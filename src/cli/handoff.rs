@@ -11,7 +11,7 @@ use metalith::handoff::{
     DesignSource, Handoff, HandoffOptions, HandoffSource, HandoffVerification, LayoutSource, handoff, handoff_name,
     verify_handoff,
 };
-use metalith::report::Verdict;
+use metalith::report::{Verdict, counted};
 use metalith::{Accuracy, Design, Error, Result};
 
 use super::compensated::judged_as_made;
@@ -54,7 +54,8 @@ pub(crate) struct HandoffArgs {
     #[command(flatten)]
     reading: FileArgs,
 
-    /// Of a layout: layer and datatype of the pillars. If left out, the only layer with shapes, else 1/0.
+    /// Of a layout: layer and datatype of the pillars. If left out, 1/0; if that has no shapes, the only layer with shapes or with
+    /// pillars on a lattice.
     #[arg(long, value_parser = layer)]
     layer: Option<LayerNumber>,
 
@@ -257,7 +258,21 @@ fn outcome(made: &Handoff) -> Outcome {
     }
 }
 
+/// The verdict, with what fails and what did not run.
+fn verdict(made: &Handoff) -> String {
+    let named = |verdict| {
+        let checks = made.checks.iter().filter(|c| c.verdict == verdict);
+        checks.map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    match (named(Verdict::Fail), named(Verdict::NotRun)) {
+        (fail, _) if !fail.is_empty() => format!("FAIL: {fail}"),
+        (_, not_run) if !not_run.is_empty() => format!("NOT ALL CHECKED: {not_run}"),
+        _ => format!("PASS: {}", counted(made.checks.len(), "check")),
+    }
+}
+
 fn tell(made: &Handoff) {
+    print_line!("{}", verdict(made));
     print_line!("{}  start with index.html", made.folder.display());
     print_line!("{}  the same, packed", made.archive.display());
     for check in &made.checks {
@@ -267,7 +282,8 @@ fn tell(made: &Handoff) {
             print_line!("  {limit}{}: {}: {}", broken.rule, broken.requirement, broken.cure);
         }
     }
-    print_line!("{} files, seal {}", made.manifest.files.len(), made.manifest.seal);
+    let files = counted(made.manifest.files.len(), "file");
+    print_line!("{files}, seal {}", made.manifest.seal);
 }
 
 fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {

@@ -83,6 +83,13 @@ fn head(found: &Inventory, out: &mut String) {
                 .unwrap_or_default();
             format!("GDSII {version}{modified}")
         }
+        FormatInventory::Dxf { version, unit } => {
+            let version = version.as_ref().map_or_else(
+                || "DXF without a version".to_owned(),
+                |version| format!("DXF {}", printable(version)),
+            );
+            format!("{version}, {unit}")
+        }
         FormatInventory::Oasis {
             compressed_blocks,
             table_offsets_in_end,
@@ -114,7 +121,7 @@ fn head(found: &Inventory, out: &mut String) {
         format!(
             ", {} to {} in {}",
             counted(found.references as usize, "reference"),
-            counted(found.copies as usize, "copy").replace("copys", "copies"),
+            counted(found.copies as usize, "copy"),
             counted(found.depth as usize + 1, "level"),
         )
     } else {

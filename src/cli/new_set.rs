@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metalith::gds::LayerNumber;
 use metalith::{NewSet, Result, new_set};
 
-use super::psf::layer;
-use super::{Outcome, Terminal, print_line};
+use super::reading::ReadingArgs;
+use super::{Outcome, Terminal, print_line, standard_input};
 
 /// Begin a measured set: write measurement.toml from a layout and a folder of frames.
 ///
@@ -29,14 +28,15 @@ pub(crate) struct NewSetArgs {
     #[arg(long, short, value_name = "FILE", default_value = "measurement.toml")]
     out: PathBuf,
 
-    /// Layer of the pillars.
-    #[arg(long, default_value = "1/0", value_parser = layer)]
-    layer: LayerNumber,
+    #[command(flatten)]
+    reading: ReadingArgs,
 }
 
 pub(crate) fn run(args: &NewSetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
-    let begun = new_set(&args.layout, args.layer, &args.frames, &args.out, terminal)?;
+    standard_input::named(["a measured set", "the set refers to it"], [args.layout.as_path()])?;
+    let layout = args.reading.open(&args.layout, terminal)?;
+    let begun = new_set(&layout, args.reading.layer, &args.frames, &args.out, terminal)?;
     terminal.clear();
     describe(&begun);
     Ok(Outcome::Fine)

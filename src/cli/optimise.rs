@@ -9,7 +9,7 @@ use metalith::optimise::{
     Checkpoint, Deconvolution, OptimiseReport, OptimiseTask, Optimised, OverWavelength, StrehlSummary, TaskCells,
     lens_alone, mean_and_deviation, views, wavelengths, write_phase_table,
 };
-use metalith::report::sig;
+use metalith::report::{counted, sig};
 use metalith::study::plan_starts;
 use metalith::{Design, Hierarchy, PillarArray, Result, write_pillars};
 
@@ -64,7 +64,7 @@ const STALE: [&str; 4] = ["report.html", "report.json", "lens.gds", ".report.sha
 
 pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.plan.is_some() {
-        standard_input::named([args.design.as_path()])?;
+        standard_input::named(standard_input::OF_PLANS, [args.design.as_path()])?;
     }
     let design = standard_input::design(&args.design, terminal)?;
     terminal.stop_on_interrupt();
@@ -79,9 +79,9 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
         out.note()?;
         terminal.clear();
         print_line!(
-            "{} starts in {} shards: {}",
-            plan.starts,
-            plan.cut().shards(),
+            "{} in {}: {}",
+            counted(plan.starts as usize, "start"),
+            counted(plan.cut().shards() as usize, "shard"),
             folder.display()
         );
         return Ok(Outcome::Fine);

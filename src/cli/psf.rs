@@ -11,7 +11,7 @@ use metalith::cell::{Analyser, Fidelity, Handedness, Polarisation};
 use metalith::design::CellFile;
 use metalith::extract::LeftOut;
 use metalith::gds::LayerNumber;
-use metalith::report::{count, exact, sig};
+use metalith::report::{count, counted, exact, sig};
 use metalith::verify::{
     STREHL_AGAINST, SimulationCase, SinglePsf, SinglePsfReport, focal_length_words, focus_words, outline_warnings,
     plane_words, single_psfs, single_white, write_single_psf_report,
@@ -231,7 +231,7 @@ fn between(low: f64, high: f64) -> impl Fn(&str) -> std::result::Result<f64, Str
 }
 
 /// A figure of a layout of which most was left out would be a figure of something else.
-fn mostly_pillars(args: &PsfArgs, found: &Extraction, left_out: Option<&LeftOut>) -> Result<()> {
+fn mostly_pillars(args: &PsfArgs, layer: LayerNumber, found: &Extraction, left_out: Option<&LeftOut>) -> Result<()> {
     let others = found.oddities.total();
     if args.extract_only || others <= found.pillars {
         return Ok(());
@@ -244,7 +244,7 @@ fn mostly_pillars(args: &PsfArgs, found: &Extraction, left_out: Option<&LeftOut>
             args.layout.display(),
             count(found.pillars),
             count(found.pillars + others),
-            args.reading.pillar_layer(),
+            layer,
             found.shape.plural()
         ),
         "name the layer of the pillars with --layer, or look at what else is there with --extract-only --json",
@@ -369,14 +369,18 @@ fn print_psfs(psfs: &[SinglePsf], pixel_um: &str) {
 
 pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let stated = args.cell.as_deref().map(CellFile::read).transpose()?;
-    let args = &args.clone().with_design(stated);
+    let mut args = args.clone().with_design(stated);
     args.say_guesses(terminal);
     terminal.stop_on_interrupt();
-    let layout = args.reading.open(&InputFile::of(&args.layout)?, terminal)?;
-    let plan = ExtractionPlan::discover(args.reading.pillar_layer());
-    let found = extract(&layout, &plan, terminal)?;
-    let left_out = LeftOut::of(&found, args.reading.pillar_layer());
-    mostly_pillars(args, &found, left_out.as_ref())?;
+    let file = InputFile::of(&args.layout)?;
+    // Messages name what is read.
+    args.layout = file.to_path_buf();
+    let args = &args;
+    let layout = args.reading.open(&file, terminal)?;
+    let layer = args.reading.pillar_layer(&layout, terminal)?;
+    let found = extract(&layout, &ExtractionPlan::discover(layer), terminal)?;
+    let left_out = LeftOut::of(&found, layer);
+    mostly_pillars(args, layer, &found, left_out.as_ref())?;
     one_kind(args, &found)?;
     known_light(args, &found)?;
     let light = if args.extract_only {
@@ -476,11 +480,8 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             },
         );
     }
-    print_line!(
-        "{} other shapes on layer {}",
-        count(found.oddities.total()),
-        args.reading.pillar_layer()
-    );
+    let others = counted(found.oddities.total() as usize, "other shape");
+    print_line!("{others} on layer {layer}");
     for (what, value) in &assumptions {
         print_line!("{what}: {value}");
     }

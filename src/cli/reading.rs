@@ -12,7 +12,8 @@ use super::psf::layer;
 /// Options of every command that reads pillars out of a layout of any program.
 #[derive(Args, Clone)]
 pub(crate) struct ReadingArgs {
-    /// Layer and datatype of the pillars; if left out, those of the design, the rules or the set, else 1/0.
+    /// Layer and datatype of the pillars. If left out, those of the design, the rules or the set; else 1/0, or if that has no
+    /// shapes, the only layer with shapes or with pillars on a lattice.
     #[arg(long, value_name = "LAYER/DATATYPE", value_parser = layer)]
     pub(crate) layer: Option<LayerNumber>,
 
@@ -21,9 +22,15 @@ pub(crate) struct ReadingArgs {
 }
 
 impl ReadingArgs {
-    /// Layer of the pillars, where no other file says it.
-    pub(crate) fn pillar_layer(&self) -> LayerNumber {
-        self.layer.unwrap_or(LayerNumber::new(1, 0))
+    /// Layer of the pillars of a layout, where no other file says it.
+    ///
+    /// # Errors
+    /// As [`Layout::pillar_layer`].
+    pub(crate) fn pillar_layer(&self, layout: &Layout, terminal: &Terminal) -> Result<LayerNumber> {
+        match self.layer {
+            Some(layer) => Ok(layer),
+            None => Ok(layout.pillar_layer(terminal)?),
+        }
     }
 
     /// Look for the pillars of a design on the layer that is asked for.

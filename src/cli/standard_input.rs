@@ -24,16 +24,19 @@ fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Refuse standard input for files of a plan: shards read them again, by their names.
+/// Reason why a plan names its files.
+pub(crate) const OF_PLANS: [&str; 2] = ["a plan", "each shard reads it again"];
+
+/// Refuse standard input for files that are read again by their names.
 ///
 /// # Errors
 /// If one of these is `-`.
-pub(crate) fn named<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<()> {
+pub(crate) fn named<'p>([what, why]: [&str; 2], paths: impl IntoIterator<Item = &'p Path>) -> Result<()> {
     if paths.into_iter().any(is_standard_input) {
         Err(Error::refused(
             "option/plan-from-standard-input",
-            "a plan cannot use a file from standard input",
-            "name the file: each shard reads it again",
+            format!("{what} cannot use a file from standard input"),
+            format!("name the file: {why}"),
         ))
     } else {
         Ok(())
@@ -76,6 +79,7 @@ impl InputFile {
         }
         let mut input = take()?;
         let folder = TempDir::new().map_err(Error::io("create a folder in", &std::env::temp_dir()))?;
+        super::output::hide_folder(folder.path());
         let path = folder.path().join(NAME);
         let copied = File::create(&path).and_then(|mut copy| io::copy(&mut input, &mut copy));
         copied.map_err(Error::io("copy standard input to", &path))?;

@@ -6,7 +6,7 @@ mod submit;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use metalith::report::sig;
+use metalith::report::{counted, sig};
 use metalith::study::{PairsPlan, Plan, PlanSettings, REPORT, StartsPlan, TableFormat, Work, merge, plan, write_page};
 use metalith::{Error, Result};
 
@@ -94,10 +94,10 @@ fn plan_study(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     let plan = plan(&args.tolerance, &args.out, settings, terminal)?;
     terminal.clear();
     print_line!(
-        "{} draws of {:.2} s in {} shards of {}: {}",
-        plan.draws,
+        "{} of {:.2} s in {} of {}: {}",
+        counted(plan.draws as usize, "draw"),
         plan.seconds_per_draw,
-        plan.cut().shards(),
+        counted(plan.cut().shards() as usize, "shard"),
         plan.draws_per_shard,
         args.out.display()
     );
@@ -143,7 +143,7 @@ fn merge_pairs(plan: &PairsPlan, args: &MergeArgs, terminal: &Terminal) -> Resul
     without_table(args)?;
     let manifest = plan.merge(terminal)?;
     terminal.clear();
-    print_line!("{} pairs in {}", manifest.pairs.len(), args.study.display());
+    print_line!("{} in {}", counted(manifest.pairs.len(), "pair"), args.study.display());
     Ok(Outcome::Fine)
 }
 

@@ -8,6 +8,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use metalith::report::counted;
 use metalith::{FolderLock, Progress, Warning};
 
 use super::output;
@@ -157,7 +158,8 @@ impl Terminal {
         full.iter().for_each(|warning| self.say(&warning.to_string()));
         if !others.is_empty() {
             let others: Vec<String> = others.iter().map(|warning| format!("[{}]", warning.id)).collect();
-            self.say(&format!("and {} warnings more: {}", others.len(), others.join(" ")));
+            let more = counted(others.len(), "more warning");
+            self.say(&format!("and {more}: {}", others.join(" ")));
         }
     }
 

@@ -9,7 +9,7 @@ pub struct LayerNumber {
 
 impl LayerNumber {
     /// `LayerNumber::new(1, 0)` is written 1/0.
-    pub fn new(layer: u16, datatype: u16) -> Self {
+    pub const fn new(layer: u16, datatype: u16) -> Self {
         Self { layer, datatype }
     }
 }

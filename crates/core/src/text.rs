@@ -122,6 +122,18 @@ fn push(out: &mut String, c: char) {
     }
 }
 
+/// A count with what is counted, in the singular for one: `1 term`, `12,000 terms`, `2 copies`.
+pub fn counted(n: usize, what: &str) -> String {
+    let stem = what
+        .strip_suffix('y')
+        .filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));
+    match (n, stem) {
+        (1, _) => format!("1 {what}"),
+        (_, Some(stem)) => format!("{} {stem}ies", count(n as u64)),
+        _ => format!("{} {what}s", count(n as u64)),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,5 +161,11 @@ mod tests {
     fn long_texts_are_cut() {
         assert_eq!(quoted(&"ä".repeat(200)), format!("{}...", "ä".repeat(80)));
         assert_eq!(quoted("short"), "short");
+    }
+
+    #[test]
+    fn one_is_singular() {
+        let words = [(1, "term"), (0, "term"), (12_000, "copy"), (2, "array")].map(|(n, what)| counted(n, what));
+        assert_eq!(words, ["1 term", "0 terms", "12,000 copies", "2 arrays"]);
     }
 }

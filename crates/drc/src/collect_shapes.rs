@@ -30,6 +30,8 @@ const CLOSED: usize = 5;
 /// Bytes of a text that reports show.
 const LONGEST_TEXT: usize = 512;
 const TOO_FAR: &str = "shapes farther than 2^31 database units from the origin";
+/// Cells at the top that a message names.
+const TOPS_NAMED: usize = 4;
 /// Texts that are held.
 const MOST_TEXTS: usize = 100_000;
 
@@ -121,8 +123,28 @@ pub(super) fn gather<'a>(
         texts: visit.texts,
         text_count: visit.text_count,
         counts: visit.counts,
-        incomplete: unread.clone().or(visit.incomplete).or(unheld),
+        incomplete: unread
+            .clone()
+            .or_else(|| several_tops(layout, pillars))
+            .or(visit.incomplete)
+            .or(unheld),
         unread,
+    })
+}
+
+/// Reason why the pillars of a layout are not those of one chip: cells at the top lie on one another by chance.
+fn several_tops(layout: &Layout, pillars: LayerNumber) -> Option<String> {
+    let tops = layout.tops_on(pillars);
+    let names = tops
+        .iter()
+        .take(TOPS_NAMED)
+        .map(|&top| layout.cells()[top].name.as_str());
+    (tops.len() > 1).then(|| {
+        format!(
+            "{} cells at the top have shapes on {pillars}, such as {}: check each of them with --top",
+            tops.len(),
+            names.collect::<Vec<_>>().join(", ")
+        )
     })
 }
 

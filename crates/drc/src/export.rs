@@ -18,11 +18,11 @@ pub fn text(report: &DrcReport) -> String {
     }
     let _ = writeln!(
         out,
-        "{}: {} shapes, {}, {} pillars on their lattices{}\ndeck: {}\n",
+        "{}: {}, {}, {} on their lattices{}\ndeck: {}\n",
         printable(&report.layout),
-        report.shapes,
+        counted(report.shapes as usize, "shape"),
         counted(report.elements, "element"),
-        report.pillars_on_lattices,
+        counted(report.pillars_on_lattices as usize, "pillar"),
         (report.turned_deg).map_or_else(String::new, |deg| format!(", at an angle of {} deg", exact(deg))),
         report.deck
     );
@@ -35,7 +35,9 @@ pub fn text(report: &DrcReport) -> String {
         );
     }
     let mut reason = "";
-    for r in &report.rules {
+    // Of cells that lie on one another by chance, nothing else counts.
+    let (first, rest): (Vec<_>, Vec<_>) = report.rules.iter().partition(|r| r.check == "one_top" && r.open() > 0);
+    for r in first.into_iter().chain(rest) {
         let state = match &r.status {
             Status::Run if r.violations == 0 => "ok".to_owned(),
             Status::Run if r.open() == 0 => format!("{} waived", r.waived),
@@ -71,13 +73,13 @@ pub fn text(report: &DrcReport) -> String {
         .filter(|r| r.severity == Severity::Note)
         .map(RuleReport::open)
         .sum();
-    let run = report.rules.iter().filter(|r| r.status == Status::Run).count();
     let _ = writeln!(
         out,
-        "\n{} rules: {run} run, {} not run; {} violations, {notes} notes, {waived} waived: {}",
-        report.rules.len(),
-        report.not_run(),
-        report.open(),
+        "\n{}: {}; {}, {}, {waived} waived: {}",
+        counted(report.rules.len(), "rule"),
+        runs(report),
+        counted(report.open() as usize, "violation"),
+        counted(notes as usize, "note"),
         match report.exit_code() {
             0 => "clean",
             1 => "not clean",
@@ -85,6 +87,30 @@ pub fn text(report: &DrcReport) -> String {
         }
     );
     out
+}
+
+/// How many rules ran, and the names of those that did not.
+fn runs(report: &DrcReport) -> String {
+    let mut run = 0;
+    let mut others: [(&str, Vec<&str>); 3] =
+        ["not run", "not applicable", "not in force"].map(|word| (word, Vec::new()));
+    for rule in &report.rules {
+        let which = match rule.status {
+            Status::Run => {
+                run += 1;
+                continue;
+            }
+            Status::Skipped(_) | Status::Failed(_) => 0,
+            Status::NotApplicable(_) => 1,
+            Status::NotInForce => 2,
+        };
+        others[which].1.push(&rule.id);
+    }
+    let mut words = format!("{run} run");
+    for (word, rules) in others.iter().filter(|(_, rules)| !rules.is_empty()) {
+        let _ = write!(words, "; {} {word}: {}", rules.len(), rules.join(", "));
+    }
+    words
 }
 
 fn noun(rule: &RuleReport) -> &'static str {
@@ -232,8 +258,8 @@ pub fn junit(report: &DrcReport) -> String {
                     .map(|m| format!("{} [{}]", m.words, m.hash))
                     .collect();
                 format!(
-                    "<failure message=\"{} violations of: {}\">{}</failure>",
-                    r.open(),
+                    "<failure message=\"{} of: {}\">{}</failure>",
+                    counted(r.open() as usize, "violation"),
                     escaped(&r.words),
                     escaped(&lines.join("\n"))
                 )

@@ -2,11 +2,11 @@
 
 use super::deck::Deck;
 use super::input::CheckInput;
-use super::new_rules::most_pillars;
+use super::new_rules::pillar_layer;
 use super::recognition::add_recognition;
 use super::report::DrcReport;
 use metalith_core::{Progress, Result};
-use metalith_gds::{LayerNumber, Layout};
+use metalith_gds::{LayerNumber, Layout, USUAL_LAYER};
 use metalith_pillars::DatabaseUnit;
 
 /// Word for the shape of most pillars, as in the name of a deck.
@@ -32,8 +32,8 @@ fn deck_of(name: &str, layout: &Layout) -> Deck {
     }
 }
 
-/// Check a layout without a design against the deck of the shape of its pillars. They are on `layer`; if it is left out, on the layer
-/// of the deck, or if this has no shapes, on the one with most shapes that may be pillars.
+/// Check a layout without a design against the deck of the shape of its pillars. They are on `layer`; if it is left out, on that of
+/// [`Layout::pillar_layer`], or where several may be meant, on the one with most shapes that may be pillars.
 ///
 /// # Errors
 /// As [`super::check`].
@@ -43,20 +43,19 @@ pub fn check_generic(
     input: &CheckInput<'_>,
     progress: &dyn Progress,
 ) -> Result<DrcReport> {
-    let usual = Deck::named("squares").pillars[0];
-    let layer = layer.or_else(|| {
-        most_pillars(layout)
-            .ok()
-            .filter(|_| !layout.used_layers().contains(&usual))
-    });
+    let layer = match layer {
+        Some(layer) => layer,
+        None => pillar_layer(layout, progress)?,
+    };
     let deck_of = |name: &str| {
         let deck = deck_of(name, layout);
-        match layer {
-            Some(layer) => deck.with_pillars_on(layer),
-            None => deck,
+        if layer == USUAL_LAYER {
+            deck
+        } else {
+            deck.with_pillars_on(layer)
         }
     };
-    let name = plural(layout, layer.unwrap_or(usual));
+    let name = plural(layout, layer);
     let deck = deck_of(name);
     let mut report = super::check(layout, &deck, input, progress)?;
     // Pillars may be told apart from other shapes by their lattice alone.
@@ -64,6 +63,6 @@ pub fn check_generic(
         let deck = deck_of(report.shape.plural());
         report = super::check(layout, &deck, input, progress)?;
     }
-    add_recognition(&mut report, layout, layer.unwrap_or(usual), input, progress)?;
+    add_recognition(&mut report, layout, layer, input, progress)?;
     Ok(report)
 }

@@ -8,7 +8,7 @@ use super::input::CheckInput;
 use super::measure::{Measures, measure};
 use super::rule::Status;
 use metalith_core::{Error, Progress, Result};
-use metalith_gds::{LayerNumber, Layout};
+use metalith_gds::{LayerNumber, Layout, USUAL_LAYER};
 use metalith_report::{counted, exact};
 
 /// Steps of a nanometre that a gap is rounded down to.
@@ -69,7 +69,7 @@ impl NewRule {
 pub fn new_rules(layout: &Layout, layer: Option<LayerNumber>, progress: &dyn Progress) -> Result<NewRules> {
     let pillars = match layer {
         Some(layer) => layer,
-        None => most_pillars(layout)?,
+        None => pillar_layer(layout, progress)?,
     };
     let found = measure(layout, pillars, progress)?;
     let mut rules = rules(layout, pillars, &found);
@@ -108,21 +108,24 @@ pub fn new_rules(layout: &Layout, layer: Option<LayerNumber>, progress: &dyn Pro
     ))
 }
 
-/// The layer with most shapes that may be pillars.
-pub(super) fn most_pillars(layout: &Layout) -> Result<LayerNumber> {
-    let layers = layout.used_layers();
+/// The layer of the pillars; where several may be meant, the one with most shapes that may be pillars: rules say something of any
+/// layer.
+pub(super) fn pillar_layer(layout: &Layout, progress: &dyn Progress) -> Result<LayerNumber> {
+    let cause = match layout.pillar_layer(progress) {
+        Err(cause @ metalith_gds::Error::Extraction { .. }) => cause,
+        other => return Ok(other?),
+    };
+    let layers = layout.drawn_layers();
     let most = layers.iter().max_by_key(|&&layer| {
         let kinds = layout.kinds_on(layer);
         // Of two layers the first.
         (kinds.pillar_like(), std::cmp::Reverse(layer))
     });
-    most.copied().ok_or_else(|| {
-        Error::refused(
-            "check/no-shapes",
-            format!("{} holds no shapes", layout.path().display()),
-            "name a layout with pillars",
-        )
-    })
+    let most = most.copied().unwrap_or(USUAL_LAYER);
+    progress.warn(&format!(
+        "note: {cause}; layer {most} is checked as that of the pillars: --layer names another"
+    ));
+    Ok(most)
 }
 
 /// Name of a layer in the deck.

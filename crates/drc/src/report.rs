@@ -76,10 +76,15 @@ pub struct DrcReport {
 }
 
 impl DrcReport {
-    /// Rules in force that did not run.
+    /// Number of rules in force that did not run.
     pub fn not_run(&self) -> usize {
+        self.not_run_names().count()
+    }
+
+    /// Rules in force that did not run.
+    pub fn not_run_names(&self) -> impl Iterator<Item = &str> {
         let not_run = |r: &&RuleReport| matches!(r.status, Status::Skipped(_) | Status::Failed(_));
-        self.rules.iter().filter(not_run).count()
+        self.rules.iter().filter(not_run).map(|r| r.id.as_str())
     }
 
     /// Violations of errors and warnings that no waiver covers.

@@ -249,7 +249,10 @@ fn one_nanometre_and_one_letter_are_differences() {
         b
     };
     let found = of_chips(&a, &shifted(1));
-    assert_eq!((found.elements[0].removed, found.changes), (1, 2));
+    let e = &found.elements[0];
+    assert_eq!((e.removed, e.moved, found.changes), (0, 1, 1));
+    assert!(text(&found).contains("moved by (1, 0) nm"), "{}", text(&found));
+    assert!(metalith_drc::diff::page(&found).html().contains("moved by (1, 0) nm"));
     let with_text = |string: &str| {
         let mut b = Chip::clean();
         b.extra.text(11, string, 0, 0);

@@ -242,6 +242,9 @@ pub enum ExtractionError {
         /// What other layers hold, if that was looked for.
         contents: Option<String>,
     },
+    /// No layer is named, and several may be meant.
+    #[error("several layers hold shapes, and 1/0 none: {contents}")]
+    WhichLayer { contents: String },
     #[error("{groups} separate groups of shapes on layer {layers}")]
     Groups { groups: usize, layers: String, most: usize },
     #[error("small shapes are spread over more than {most} places of 8 um")]
@@ -340,6 +343,7 @@ impl ExtractionError {
         match self {
             Self::Sites { .. } => "extract/too-many-sites",
             Self::NoElements { .. } => "extract/no-elements",
+            Self::WhichLayer { .. } => "extract/which-layer",
             Self::Groups { .. } => "extract/too-many-groups",
             Self::Scattered { .. } => "extract/shapes-scattered",
             Self::Sparse { .. } => "extract/sites-mostly-empty",
@@ -357,6 +361,7 @@ impl ExtractionError {
                 )
             }
             Self::NoElements { .. } => "name the layer that the pillars are on, or give the design".into(),
+            Self::WhichLayer { .. } => "name the layer of the pillars with --layer".into(),
             Self::Groups { most, .. } => format!("up to {most} elements are read; is this the layer of the pillars?"),
             Self::Scattered { .. } => "give the design, which says where the elements are".into(),
             Self::Sparse { .. } => "this is no lens on a lattice; give the design to say where its elements are".into(),

@@ -55,7 +55,8 @@ impl Source {
         }
         let mut unpacked = gzip::unpacked(path, meta.len())?;
         let mut drawing = None;
-        if let Some((file, remarks)) = dxf::unpacked(path, unpacked.as_deref().unwrap_or(path))? {
+        if let Some((file, mut remarks)) = dxf::unpacked(path, unpacked.as_deref().unwrap_or(path))? {
+            remarks.gzip = unpacked.is_some();
             (unpacked, drawing) = (Some(file), Some(Arc::new(remarks)));
         }
         let bytes = match &unpacked {
@@ -96,7 +97,13 @@ impl Source {
     }
 
     pub(crate) fn is_gzip(&self) -> bool {
-        matches!(self, Self::File { unpacked: Some(_), .. })
+        match self {
+            Self::File {
+                drawing: Some(drawing), ..
+            } => drawing.gzip,
+            Self::File { unpacked, .. } => unpacked.is_some(),
+            Self::Memory { .. } => false,
+        }
     }
 
     pub(crate) fn bytes(&self) -> u64 {

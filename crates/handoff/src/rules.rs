@@ -17,7 +17,7 @@ use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_drc::{CheckInput, Date, Deck, DrcReport, Waiver, Waivers};
 use metalith_gds::Layout;
-use metalith_report::{Verdict, write_json};
+use metalith_report::{Verdict, counted, write_json};
 
 /// Kinds of files that a check writes, with their purpose.
 const FILES: [(&str, &str); 3] = [
@@ -247,12 +247,13 @@ fn summary(name: &str, report: &DrcReport, deck: &Deck, process: &Process, pitch
         .collect();
     let waived: u64 = report.rules.iter().map(|r| r.waived).sum();
     let mut words = format!(
-        "{} rules, {} violations, {waived} waived",
-        report.rules.len(),
-        report.open()
+        "{}, {}, {waived} waived",
+        counted(report.rules.len(), "rule"),
+        counted(report.open() as usize, "violation")
     );
     if report.not_run() > 0 {
-        words.push_str(&format!(", {} rules did not run", report.not_run()));
+        let not_run = report.not_run_names().collect::<Vec<_>>().join(", ");
+        words.push_str(&format!(", {} not run: {not_run}", counted(report.not_run(), "rule")));
     }
     let named = |assumed: bool| {
         let rules = broken.iter().filter(|rule| rule.assumed == assumed);

@@ -1,6 +1,7 @@
 //! Formatting of numbers for readers: fixed rules, the same on every machine.
 
 pub use metalith_core::text::count;
+pub use metalith_core::text::counted;
 use metalith_core::text::grouped;
 
 /// `x` to a given number of significant digits: `0.01234`, `12.3`, `5.77×10⁷`, `1.2×10⁻⁷`. From 0.0001 to below ten million it
@@ -56,11 +57,6 @@ pub fn fixed(x: f64, decimals: usize) -> String {
         text.push_str(fraction);
     }
     text
-}
-
-/// A count with what is counted, in the singular for one: `1 term`, `12,000 terms`.
-pub fn counted(n: usize, what: &str) -> String {
-    format!("{} {what}{}", count(n as u64), if n == 1 { "" } else { "s" })
 }
 
 /// `10⁻³` and the like.

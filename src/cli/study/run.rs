@@ -7,6 +7,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::time::Duration;
 
 use clap::Args;
+use metalith::report::counted;
 use metalith::study::Work;
 use metalith::{Error, Progress, Result};
 
@@ -147,7 +148,7 @@ fn by_processes(args: &RunArgs, work: &Work, missing: Vec<u64>, jobs: usize, ter
     }
     Err(Error::refused(
         "study/shards-not-made",
-        format!("{} shards failed, the first is {}", failed.len(), failed[0]),
+        format!("{} failed, the first is {}", counted(failed.len(), "shard"), failed[0]),
         "their messages are above; run again with --missing",
     ))
 }

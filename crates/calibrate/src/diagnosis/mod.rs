@@ -7,7 +7,7 @@ use std::path::Path;
 
 use metalith_attribution::SetVerdict;
 use metalith_core::Result;
-use metalith_report::sig;
+use metalith_report::{counted, sig};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -219,7 +219,10 @@ impl Diagnosis {
             SetVerdict::DataUnfit if self.left_out.is_empty() => {
                 "data unfit: one measurement alone leaves nothing to judge a finding by; take others, of another colour, element or distance".into()
             }
-            SetVerdict::DataUnfit => format!("data unfit: {} measurements cannot be used", self.left_out.len()),
+            SetVerdict::DataUnfit => format!(
+                "data unfit: {} cannot be used",
+                counted(self.left_out.len(), "measurement")
+            ),
             verdict => verdict.sentence(&list, &remainder),
         }
     }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::DiffPlan;
 use super::area::{MOST_SIDES, Sides};
 use super::content::{Content, Outlines, Ring, TextCopy};
+use super::pairs::{self, Counted, Held};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, MissingDiff, TextAt, TreeDiff};
 use metalith_core::text::printable_bytes;
 use metalith_gds::extract::{ExtractedElement, StoredPillars};
@@ -22,18 +23,17 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
         listed: Vec::new(),
         examples: BTreeMap::new(),
         map: map_over(&a, &b, unit_nm),
+        held: Some(Vec::new()),
     };
-    let elements: Vec<ElementDiff> = a
-        .elements
-        .iter()
-        .zip(&b.elements)
-        .map(|(own, other)| element(own, other, a.shape, &mut changes))
-        .collect();
+    let mut elements: Vec<ElementDiff> = Vec::new();
+    for (number, (own, other)) in a.elements.iter().zip(&b.elements).enumerate() {
+        elements.push(element((own, other), a.shape, number, &mut changes));
+    }
     let mut numbers: Vec<LayerNumber> = a.counts.keys().chain(b.counts.keys()).copied().collect();
     numbers.sort_unstable();
     numbers.dedup();
     let nothing = Outlines::default();
-    let layers: Vec<LayerDiff> = numbers
+    let mut layers: Vec<LayerDiff> = numbers
         .into_iter()
         .map(|number| {
             let outlines = |c: &'_ Content| c.outlines.contains_key(&number);
@@ -56,11 +56,13 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
     };
     let (texts_only_in_a, texts_only_in_b) = (texts(texts_a), texts(texts_b));
     let same = |l: &LayerDiff| l.same_area || l.only_in_a + l.only_in_b == 0;
+    let same_geometry = elements.iter().all(|e| e.changed() == 0) && layers.iter().all(same) && texts_apart == [0, 0];
+    changes.finish(&mut elements, &mut layers);
     LayoutDiff {
         a: String::new(),
         b: String::new(),
         same_bytes: false,
-        same_geometry: elements.iter().all(|e| e.changed() == 0) && layers.iter().all(same) && texts_apart == [0, 0],
+        same_geometry,
         tree: TreeDiff::default(),
         pillar_layer: plan.pillar_layer,
         elements,
@@ -83,10 +85,71 @@ struct Changes {
     /// The first change in each tile of the map.
     examples: BTreeMap<usize, Change>,
     map: ChangeMap,
+    /// Changes that may yet be found to be of one shape; none if there are more than are held.
+    held: Option<Vec<Held>>,
 }
 
+/// Distance within which shapes off every lattice may be one (nm).
+const REACH_NM: f64 = 400.0;
+
 impl Changes {
-    fn add(&mut self, what: &'static str, layer: LayerNumber, bounds_nm: [f64; 4], width_nm: Option<[u16; 2]>) {
+    fn add(&mut self, change: Change, counted: Counted) {
+        match &mut self.held {
+            Some(held) if held.len() < pairs::MOST_HELD => held.push(Held { change, counted }),
+            held => {
+                let held = held.take();
+                held.into_iter().flatten().for_each(|held| self.count(held.change));
+                self.count(change);
+            }
+        }
+    }
+
+    /// Count the changes that are held, two of one shape as one.
+    fn finish(&mut self, elements: &mut [ElementDiff], layers: &mut [LayerDiff]) {
+        let held = self.held.take().unwrap_or_default();
+        let reach = elements
+            .iter()
+            .map(|e| e.pitch_nm.nm())
+            .reduce(f64::max)
+            .unwrap_or(REACH_NM);
+        let mut partner = vec![usize::MAX; held.len()];
+        for [a, b] in pairs::pairs(&held, reach) {
+            (partner[a], partner[b]) = (b, a);
+            let first = [a, b].into_iter().find_map(|k| match held[k].counted {
+                Counted::Element(e) => Some(e),
+                _ => None,
+            });
+            for (which, k) in [a, b].into_iter().enumerate() {
+                let on_layer = layers.iter_mut().find(|l| l.layer == held[k].change.layer);
+                match (held[k].counted, on_layer) {
+                    (Counted::Element(e), _) if which == 0 => elements[e].removed -= 1,
+                    (Counted::Element(e), _) => elements[e].added -= 1,
+                    (_, Some(l)) => {
+                        *(if which == 0 { &mut l.only_in_a } else { &mut l.only_in_b }) -= 1;
+                        l.moved += u64::from(which == 0 && first.is_none());
+                    }
+                    _ => {}
+                }
+            }
+            if let Some(e) = first {
+                elements[e].moved += 1;
+            }
+        }
+        for (k, own) in held.iter().enumerate() {
+            match held.get(partner[k]) {
+                None => self.count(own.change.clone()),
+                // The second of a pair is counted with the first.
+                Some(_) if partner[k] < k => {}
+                Some(other) if pairs::side(&own.change) == Some(0) => {
+                    self.count(pairs::joined(&own.change, &other.change))
+                }
+                Some(other) => self.count(pairs::joined(&other.change, &own.change)),
+            }
+        }
+    }
+
+    fn count(&mut self, change: Change) {
+        let bounds_nm = change.bounds_nm;
         self.total += 1;
         let map = &mut self.map;
         if map.counts.is_empty() {
@@ -101,15 +164,9 @@ impl Changes {
         let row = tile(bounds_nm[1], bounds_nm[3], y0, y1, map.rows);
         let tile = row * map.columns + column;
         map.counts[tile] += 1;
-        let change = || Change {
-            what,
-            layer,
-            bounds_nm,
-            width_nm,
-        };
-        self.examples.entry(tile).or_insert_with(change);
+        self.examples.entry(tile).or_insert_with(|| change.clone());
         if self.listed.len() < self.plan.listed {
-            self.listed.push(change());
+            self.listed.push(change);
         }
     }
 }
@@ -164,9 +221,9 @@ fn size([x, y]: [u16; 2]) -> (u32, u16) {
 }
 
 fn element(
-    a: &ExtractedElement<StoredPillars>,
-    b: &ExtractedElement<StoredPillars>,
+    (a, b): (&ExtractedElement<StoredPillars>, &ExtractedElement<StoredPillars>),
     shape: PillarShape,
+    number: usize,
     changes: &mut Changes,
 ) -> ElementDiff {
     let rotated = shape.has_one_size();
@@ -183,6 +240,7 @@ fn element(
         widened: 0,
         narrowed: 0,
         rotated: 0,
+        moved: 0,
         largest_change_nm: 0,
         rms_change_nm: 0.0,
     };
@@ -212,7 +270,21 @@ fn element(
         let y = a.site.centre_nm[1] as f64 + lattice.drawn_nm(1, row);
         let half = shape.widest_nm(PillarId(from.max(to))) / 2.0;
         let widths = shape.has_width().then_some([from, to]);
-        changes.add(what, layer, [x - half, y - half, x + half, y + half], widths);
+        let change = Change {
+            what,
+            layer,
+            bounds_nm: [x - half, y - half, x + half, y + half],
+            width_nm: widths,
+            moved_nm: None,
+            size_nm: None,
+        };
+        // The box around a rotated rectangle is not its own.
+        let counted = if shape.has_width() {
+            Counted::Element(number)
+        } else {
+            Counted::Alone
+        };
+        changes.add(change, counted);
     };
     for row in 0..n {
         let from = a.widths.row(row, 0..n, &mut room);
@@ -241,6 +313,7 @@ fn layer(
         shapes,
         only_in_a: only_in_a as u64,
         only_in_b: only_in_b as u64,
+        moved: 0,
         same_area: false,
     };
     if only_in_a + only_in_b == 0 {
@@ -265,7 +338,15 @@ fn layer(
                 [r.x0, r.y0, r.x1, r.y1].map(|v| v as f64 * unit_nm)
             };
             for bounds in boxes.chain(rings.iter().map(around)) {
-                changes.add(what, number, bounds, None);
+                let change = Change {
+                    what,
+                    layer: number,
+                    bounds_nm: bounds,
+                    width_nm: None,
+                    moved_nm: None,
+                    size_nm: None,
+                };
+                changes.add(change, Counted::Outline);
             }
         }
     }

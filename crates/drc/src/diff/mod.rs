@@ -8,6 +8,7 @@ mod area;
 mod compare;
 mod content;
 mod missing;
+mod pairs;
 mod picture;
 mod report;
 mod sites;

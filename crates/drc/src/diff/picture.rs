@@ -11,7 +11,7 @@ const DRAWN: usize = 400;
 const PLACES: usize = 6;
 /// Least width of what a figure shows around its first change (um).
 const AROUND_UM: f64 = 1.0;
-/// Texts and references that the page lists of each layout.
+/// Texts, references and moved shapes that the page lists.
 const LABELS: usize = 50;
 /// Distance from the first change of a figure to the farthest that it draws (nm): changes far apart would be dots.
 const SPAN_NM: f64 = 20_000.0;
@@ -46,6 +46,10 @@ pub fn page(diff: &LayoutDiff) -> Page {
         for (k, changes) in places.iter().enumerate() {
             page.figure(shapes(diff, changes, k + 1));
         }
+    }
+    if diff.listed.iter().any(|c| !c.words().is_empty()) {
+        page.section("Moved and resized");
+        page.table(moved(diff));
     }
     page.section("Elements");
     page.table(elements(diff));
@@ -145,6 +149,26 @@ fn shapes(diff: &LayoutDiff, changes: &[&Change], place: usize) -> metalith_repo
     ))
 }
 
+/// Shapes of both layouts that are at another place or of another size.
+fn moved(diff: &LayoutDiff) -> Table {
+    let mut table = Table::new([
+        Column::text("Layer"),
+        Column::number("x", "um"),
+        Column::number("y", "um"),
+        Column::text("Change from a to b"),
+    ]);
+    for change in diff.listed.iter().filter(|c| !c.words().is_empty()).take(LABELS) {
+        let [x0, y0, x1, y1] = change.bounds_nm;
+        table.row([
+            Cell::from(change.layer.to_string()),
+            Cell::from(fixed(f64::midpoint(x0, x1) * 1e-3, 3)),
+            Cell::from(fixed(f64::midpoint(y0, y1) * 1e-3, 3)),
+            Cell::from(change.words()),
+        ]);
+    }
+    table
+}
+
 /// Texts and references to missing cells that only one layout has.
 fn labels(diff: &LayoutDiff) -> Table {
     let mut table = Table::new([
@@ -191,6 +215,7 @@ fn elements(diff: &LayoutDiff) -> Table {
         Column::number("Removed", ""),
         Column::number("Widened", ""),
         Column::number("Narrowed", ""),
+        Column::number("Moved or resized", ""),
         Column::number("Largest change", "nm"),
         Column::number("rms change", "nm"),
         Column::verdict(),
@@ -205,6 +230,7 @@ fn elements(diff: &LayoutDiff) -> Table {
             count(e.removed),
             count(e.widened),
             count(e.narrowed),
+            count(e.moved),
             count(u64::from(e.largest_change_nm)),
             Cell::sig(e.rms_change_nm, 4),
             Cell::from(Verdict::of(e.changed() == 0)),
@@ -220,6 +246,7 @@ fn layers(diff: &LayoutDiff) -> Table {
         Column::number("in b", ""),
         Column::number("Outlines only in a", ""),
         Column::number("only in b", ""),
+        Column::number("Moved or resized", ""),
         Column::number("Pillars that differ", ""),
         Column::verdict(),
     ]);
@@ -234,6 +261,7 @@ fn layers(diff: &LayoutDiff) -> Table {
             count(l.shapes[1]),
             count(l.only_in_a),
             count(l.only_in_b),
+            count(l.moved),
             count(pillars),
             Cell::from(Verdict::of(l.same_area && pillars == 0)),
         ]);

@@ -26,6 +26,9 @@ pub struct ElementDiff {
     /// Number of sites of rectangles whose pillar is rotated otherwise; their edges are equal.
     #[serde(skip_serializing_if = "is_zero")]
     pub rotated: u64,
+    /// Pillars that both layouts have, in the second less than a pitch away or of another size, off the site.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub moved: u64,
     /// Largest change of width where both have a pillar (nm).
     pub largest_change_nm: u16,
     /// Root of the mean squared change over all sites where both have a pillar (nm).
@@ -39,7 +42,7 @@ fn is_zero(count: &u64) -> bool {
 impl ElementDiff {
     /// Sites that differ.
     pub fn changed(&self) -> u64 {
-        self.added + self.removed + self.widened + self.narrowed + self.rotated
+        self.added + self.removed + self.widened + self.narrowed + self.rotated + self.moved
     }
 }
 
@@ -52,6 +55,9 @@ pub struct LayerDiff {
     /// Outlines that only one of the layouts has.
     pub only_in_a: u64,
     pub only_in_b: u64,
+    /// Outlines that both layouts have, moved or resized by less than a pitch.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub moved: u64,
     /// True if the outlines that differ cover the same area, only cut up differently.
     pub same_area: bool,
 }
@@ -92,13 +98,35 @@ impl MissingDiff {
 /// One place that differs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// `added`, `removed`, `widened`, `narrowed`, `rotated` for pillars; `only in a`, `only in b` for other outlines.
+    /// `added`, `removed`, `widened`, `narrowed`, `rotated` for pillars; `only in a`, `only in b` for other outlines;
+    /// `moved`, `resized`, `moved and resized` for a shape of both.
     pub what: &'static str,
     pub layer: LayerNumber,
     /// Left, bottom, right, top (nm).
     pub bounds_nm: [f64; 4],
     /// Widths of a pillar (nm), zero where there is none.
     pub width_nm: Option<[u16; 2]>,
+    /// Move of a shape of both along x and y (nm).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moved_nm: Option<[f64; 2]>,
+    /// Extents of a shape of both along x and y in each layout (nm), if they differ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_nm: Option<[[f64; 2]; 2]>,
+}
+
+impl Change {
+    /// Change of place and size in words: `moved by (1, 0) nm, width 150 -> 151 nm`; empty for a shape of one layout.
+    pub fn words(&self) -> String {
+        let moved = self.moved_nm.map(|[dx, dy]| format!("moved by ({dx}, {dy}) nm"));
+        let size = self.size_nm.map(|[[a, b], [c, d]]| {
+            if a == b && c == d {
+                format!("width {a} -> {c} nm")
+            } else {
+                format!("{a} x {b} -> {c} x {d} nm")
+            }
+        });
+        moved.into_iter().chain(size).collect::<Vec<_>>().join(", ")
+    }
 }
 
 /// References of one cell to another, arrays counted out.
@@ -185,7 +213,7 @@ pub fn text(diff: &LayoutDiff) -> String {
         }
         let _ = writeln!(
             out,
-            "{} at ({:.1}, {:.1}) um: {} added, {} removed, {} widened, {} narrowed{} of {}; largest change {} nm, rms {:.4} nm",
+            "{} at ({:.1}, {:.1}) um: {} added, {} removed, {} widened, {} narrowed{}{} of {}; largest change {} nm, rms {:.4} nm",
             e.name,
             e.centre_nm[0] as f64 * 1e-3,
             e.centre_nm[1] as f64 * 1e-3,
@@ -198,18 +226,28 @@ pub fn text(diff: &LayoutDiff) -> String {
             } else {
                 String::new()
             },
+            if e.moved > 0 {
+                format!(", {} moved or resized", e.moved)
+            } else {
+                String::new()
+            },
             e.pillars[0],
             e.largest_change_nm,
             e.rms_change_nm
         );
     }
-    for l in diff.layers.iter().filter(|l| l.only_in_a + l.only_in_b > 0) {
+    for l in diff.layers.iter().filter(|l| l.only_in_a + l.only_in_b + l.moved > 0) {
         let _ = writeln!(
             out,
-            "layer {}: {} outlines only in a, {} only in b{}",
+            "layer {}: {} only in a, {} only in b{}{}",
             l.layer,
-            l.only_in_a,
+            counted(l.only_in_a as usize, "outline"),
             l.only_in_b,
+            if l.moved > 0 {
+                format!(", {} moved or resized", l.moved)
+            } else {
+                String::new()
+            },
             if l.same_area { ", which cover the same area" } else { "" }
         );
     }
@@ -254,9 +292,11 @@ pub fn text(diff: &LayoutDiff) -> String {
         let widths = c
             .width_nm
             .map_or_else(String::new, |[a, b]| format!(", {a} to {b} nm wide"));
+        let words = c.words();
+        let between = if words.is_empty() { "" } else { ", " };
         let _ = writeln!(
             out,
-            "  {} on {}: ({:.3}, {:.3}) to ({:.3}, {:.3}) um{widths}",
+            "  {} on {}: ({:.3}, {:.3}) to ({:.3}, {:.3}) um{widths}{between}{words}",
             c.what, c.layer, b[0], b[1], b[2], b[3]
         );
     }
@@ -267,8 +307,12 @@ pub fn text(diff: &LayoutDiff) -> String {
         let t = &diff.tree;
         let _ = writeln!(
             out,
-            "cells: {} in {} levels, {} in {} levels; {} pairs of cells with another number of references",
-            t.cells[0], t.levels[0], t.cells[1], t.levels[1], t.references_changed
+            "cells: {} in {}, {} in {}; {} of cells with another number of references",
+            t.cells[0],
+            counted(t.levels[0] as usize, "level"),
+            t.cells[1],
+            counted(t.levels[1] as usize, "level"),
+            counted(t.references_changed, "pair")
         );
     }
     out

@@ -29,7 +29,7 @@ fn what_does_not_run_is_not_clean() {
     assert_eq!(report.exit_code(), 3);
     let junit = metalith_drc::junit(&report);
     assert_eq!(junit.matches("<error message=").count(), report.not_run());
-    insta::assert_snapshot!(metalith_drc::text(&report).lines().last().unwrap(), @"44 rules: 32 run, 7 not run; 0 violations, 0 notes, 0 waived: not clean, and not all was checked");
+    insta::assert_snapshot!(metalith_drc::text(&report).lines().last().unwrap(), @"44 rules: 32 run; 7 not run: pillar.lattice, pillar.exposure_grid, density.fill, density.gradient, field.cut, field.in_lens, mark.keep_out; 5 not in force: mark.complete, design.pillar_count, design.width_map, design.phase_step, design.lattice_orders; 0 violations, 0 notes, 0 waived: not clean, and not all was checked");
     // A layout too large to be expanded: what needs its shapes fails, what counts runs.
     let mut bomb = Gds::library();
     bomb.cell("L0").square(1, 0, 0, 200).end_cell();
@@ -185,4 +185,30 @@ fn damaged_layouts_never_panic() {
         }
     }
     assert!(judged > 100, "{judged}");
+}
+
+/// Of pillars below two cells at the top, the cause is stated first, and nothing is said of places that they share by chance.
+#[test]
+fn several_tops_are_stated_first() {
+    let mut gds = Gds::library();
+    for cell in ["AA", "BB"] {
+        gds.cell(cell);
+        for k in 0..36 {
+            gds.square(1, 350 * (k % 6), 350 * (k / 6), 150);
+        }
+        gds.end_cell();
+    }
+    let report = metalith_drc::check_generic(&layout(gds.end()), None, &input(), &Silent).unwrap();
+    assert_eq!(super::broken(&report), [("cell.one_top", 1)]);
+    assert_eq!(report.exit_code(), 3);
+    let text = metalith_drc::text(&report);
+    let first = text.lines().nth(3).unwrap();
+    assert!(
+        first.starts_with("cell.one_top ") && first.contains("1 error"),
+        "{text}"
+    );
+    assert!(
+        text.contains("2 cells at the top have shapes on 1/0, such as AA, BB: check each of them with --top"),
+        "{text}"
+    );
 }

@@ -4,6 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use super::Fault;
 use super::pairs::{Pair, Pairs};
+use metalith_core::text::printable_bytes;
 
 /// Kinds of entities. Of those that draw nothing none is held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +87,8 @@ pub(super) struct Drawing<'a> {
     pub bytes: &'a [u8],
     /// Number that $INSUNITS has.
     pub units: Option<i32>,
+    /// Version of the format in $ACADVER, such as AC1015.
+    pub version: Option<String>,
     pub blocks: Vec<Block>,
     /// Blocks by name, in capital letters: names are the same in either.
     pub by_name: HashMap<Vec<u8>, usize>,
@@ -110,6 +113,7 @@ impl<'a> Drawing<'a> {
         let mut drawing = Self {
             bytes,
             units: None,
+            version: None,
             blocks: Vec::new(),
             by_name: HashMap::new(),
             model: Vec::new(),
@@ -161,6 +165,9 @@ impl<'a> Drawing<'a> {
                 (9, name) => variable = name,
                 (70, _) if section == Section::Header && variable == b"$INSUNITS" => {
                     drawing.units = Some(pair.number()? as i32);
+                }
+                (1, version) if section == Section::Header && variable == b"$ACADVER" => {
+                    drawing.version = Some(printable_bytes(version));
                 }
                 _ if in_block_head => drawing.block_head(block, pair)?,
                 (67, b"1") if held && block.is_none() => {

@@ -76,6 +76,13 @@ impl From<std::io::Error> for Failure {
 pub(super) struct Remarks {
     /// Unit and layers, in words.
     pub taken: String,
+    /// Version of the format, and the unit, in words.
+    pub version: Option<String>,
+    pub unit: String,
+    /// Size of the drawing (bytes), unpacked.
+    pub bytes: u64,
+    /// True if the drawing was compressed by gzip.
+    pub gzip: bool,
     /// What was left out by kind: how many, and the line of the first.
     pub left_out: BTreeMap<&'static str, (u64, u64)>,
 }
@@ -153,6 +160,9 @@ fn to_gds(bytes: &[u8], out: impl Write) -> Result<Remarks, Failure> {
     let (unit_um, unit) = unit_of(&drawing);
     let mut remarks = Remarks {
         taken: format!("a drawing in DXF: {unit}; layers: {}", layers.words()),
+        version: drawing.version.clone(),
+        unit,
+        bytes: bytes.len() as u64,
         ..Remarks::default()
     };
     cells::write(&drawing, &layers, 1e3 * unit_um, out, &mut remarks)?;

@@ -149,6 +149,14 @@ pub enum FormatInventory {
         /// Date of the last change, "2026-11-28 12:00:00".
         modified: Option<String>,
     },
+    /// Drawing that is read as GDSII.
+    #[serde(rename = "DXF")]
+    Dxf {
+        /// Version in $ACADVER, such as AC1015.
+        version: Option<String>,
+        /// Unit of the drawing, and what states it.
+        unit: String,
+    },
     #[serde(rename = "OASIS")]
     Oasis {
         compressed_blocks: u64,
@@ -212,13 +220,20 @@ impl Layout {
         });
         let cells = cells.collect();
         let (lattices, lattices_left_out) = lattices::find(self, &roots, &layers, progress)?;
+        let drawing = self.source().drawing();
         let sum = |of: &dyn Fn(usize) -> u64| (0..self.cells().len()).map(of).fold(0, u64::saturating_add);
         Ok(Inventory {
             path: self.path().to_owned(),
-            bytes: self.bytes(),
+            bytes: drawing.map_or(self.bytes(), |drawing| drawing.bytes),
             gzip: self.is_gzip(),
-            format: FormatInventory::of(self.details()),
-            library: self.library().to_owned(),
+            format: match drawing {
+                Some(drawing) => FormatInventory::Dxf {
+                    version: drawing.version.clone(),
+                    unit: drawing.unit.clone(),
+                },
+                None => FormatInventory::of(self.details()),
+            },
+            library: drawing.map_or(self.library(), |_| "").to_owned(),
             database_unit_nm: self.unit_nm(),
             units_per_user_unit: 1.0 / self.user_unit(),
             tops: self.tops().iter().map(|&top| self.cells()[top].name.clone()).collect(),

@@ -5,6 +5,7 @@ mod drawn;
 mod dxf;
 mod folded;
 mod oasis;
+mod pillar_layer;
 mod pillars;
 mod trees;
 

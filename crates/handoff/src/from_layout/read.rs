@@ -18,7 +18,7 @@ use metalith_drc::{Deck, LayoutLayers};
 use metalith_gds::extract::{Extraction, ExtractionPlan, LeftOut, extract};
 use metalith_gds::{FileFormat, Layout, ReadLimits};
 use metalith_pillars::{DatabaseUnit, PillarShape};
-use metalith_report::count;
+use metalith_report::{count, counted};
 
 /// Layers of marks and labels in the dose matrix, as the shipped decks have them.
 pub(super) const DOSE_MARKS: LayerNumber = LayerNumber { layer: 3, datatype: 0 };
@@ -155,7 +155,8 @@ impl LayoutInputs {
             ));
         }
         let statistics = LayoutStatistics::of(&layout, progress)?;
-        let exposed = exposed_layers(source, &statistics)?;
+        let exposed = exposed_layers(source, &layout, &statistics, progress)?;
+        say_never_exposed(&statistics, &exposed, progress);
         let (pattern, left_out) = Pattern::read(&layout, exposed[0], progress)?;
         let named = [(DOSE_MARKS, "numbers"), (DOSE_LABEL, "labels")];
         let taken = named.map(|(number, what)| (number.layer as i16, format!("that of its {what}")));
@@ -243,14 +244,39 @@ pub fn handoff_name(layout: &Path) -> String {
     legal_name(name).replace(char::is_whitespace, "_")
 }
 
+/// State the layers with shapes that are not exposed.
+fn say_never_exposed(statistics: &LayoutStatistics, exposed: &[LayerNumber], progress: &dyn Progress) {
+    let drawn = statistics.layers.iter().filter(|l| l.shapes > 0);
+    let never = drawn.filter(|l| !exposed.contains(&LayerNumber::new(l.layer, l.datatype)));
+    let never: Vec<String> = never
+        .map(|l| {
+            format!(
+                "{}/{} with {}",
+                l.layer,
+                l.datatype,
+                counted(l.shapes as usize, "shape")
+            )
+        })
+        .collect();
+    if !never.is_empty() {
+        let never = never.join(", ");
+        progress.warn(&format!("note: never exposed: {never}; --expose adds a layer"));
+    }
+}
+
 /// The exposed layers, the pillars first; all of them have shapes.
-fn exposed_layers(source: &LayoutSource, statistics: &LayoutStatistics) -> Result<Vec<LayerNumber>> {
+fn exposed_layers(
+    source: &LayoutSource,
+    layout: &Layout,
+    statistics: &LayoutStatistics,
+    progress: &dyn Progress,
+) -> Result<Vec<LayerNumber>> {
     let drawn: Vec<_> = statistics.layers.iter().filter(|l| l.shapes > 0).collect();
     let known: Vec<LayerNumber> = drawn.iter().map(|l| LayerNumber::new(l.layer, l.datatype)).collect();
     let listed = || {
         let of = drawn
             .iter()
-            .map(|l| format!("{}/{}: {} shapes", l.layer, l.datatype, l.shapes));
+            .map(|l| format!("{}/{}: {}", l.layer, l.datatype, counted(l.shapes as usize, "shape")));
         let words: Vec<String> = of.collect();
         format!("layers with shapes: {}", words.join("; "))
     };
@@ -261,22 +287,9 @@ fn exposed_layers(source: &LayoutSource, statistics: &LayoutStatistics) -> Resul
             "is this the right file, and the right cell?",
         ));
     }
-    let usual = LayerNumber::new(1, 0);
     let pillars = match source.layer {
         Some(layer) => layer,
-        None if known.len() == 1 => known[0],
-        None if known.contains(&usual) => usual,
-        None => {
-            return Err(Error::refused(
-                "handoff/which-layer",
-                format!(
-                    "{} has shapes on several layers, none of them 1/0; {}",
-                    statistics.file,
-                    listed()
-                ),
-                "name the layer of the pillars with --layer",
-            ));
-        }
+        None => layout.pillar_layer(progress)?,
     };
     let mut exposed = vec![pillars];
     for layer in &source.exposed {

@@ -7,7 +7,7 @@ use crate::contents::Contents;
 use crate::layout_statistics::LayoutStatistics;
 use crate::pictures;
 use metalith_core::Result;
-use metalith_report::{Cell, Column, Page, Table, count, counted};
+use metalith_report::{Cell, Column, Page, Table, counted};
 
 pub(super) fn chip(page: &mut Page, c: &Contents<'_>, folder: &Path) -> Result<()> {
     page.section("Chip");
@@ -139,11 +139,11 @@ fn tree(file: &LayoutStatistics) -> String {
     for cell in cells.iter().take(SHOWN) {
         let indent = "  ".repeat(cell.depth as usize);
         text.push_str(&format!(
-            "{indent}{}: {} shapes, {} references, placed {} times\n",
+            "{indent}{}: {}, {}, placed {}\n",
             cell.name,
-            count(cell.shapes),
-            count(cell.references),
-            count(cell.placements)
+            counted(cell.shapes as usize, "shape"),
+            counted(cell.references as usize, "reference"),
+            counted(cell.placements as usize, "time")
         ));
     }
     if cells.len() > SHOWN {

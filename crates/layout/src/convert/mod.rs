@@ -7,7 +7,7 @@ mod to_oasis;
 
 use std::path::Path;
 
-use metalith_core::text::printable_bytes;
+use metalith_core::text::{counted, printable, printable_bytes};
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::{FileFormat, Layout};
 
@@ -44,19 +44,24 @@ pub fn convert(layout: &Layout, format: LayoutFormat, path: &Path, progress: &dy
     let mut remarks = changes.remarks();
     let with_properties: u64 = layout.cells().iter().map(|c| c.with_properties).sum();
     if with_properties > 0 {
-        remarks.push(format!(
-            "{with_properties} elements have properties, which are not written"
-        ));
+        let elements = counted(with_properties as usize, "element");
+        remarks.push(format!("{elements} with properties, which are not written"));
     }
     if layout.has_notes() && (layout.format() == FileFormat::Oasis || format != LayoutFormat::Gds) {
         remarks.push("the notes in cell $$$CONTEXT_INFO$$$ are no layout and are not written in OASIS".into());
     }
+    if format != LayoutFormat::Gds && !(layout.library().is_empty() || layout.is_drawing()) {
+        let name = printable(layout.library());
+        remarks.push(format!(
+            "the name of the library, {name}, is not written: OASIS has no place for it"
+        ));
+    }
     let missing = layout.dangling();
     if let Some(first) = missing.first() {
         let (cell, name) = (&first.cell, &first.name);
-        let count = missing.len();
+        let count = counted(missing.len(), "reference");
         remarks.push(format!(
-            "{count} references are to cells that are not in the file, such as that of {cell} to {name}: they were kept"
+            "{count} to cells that are not in the file, such as from {cell} to {name}: kept"
         ));
     }
     if layout.format() == FileFormat::Oasis && format == LayoutFormat::Gds {
@@ -107,15 +112,17 @@ impl Changes {
     fn remarks(&self) -> Vec<String> {
         let cut = (self.outlines > 0).then(|| {
             format!(
-                "{} outlines of up to {} points were cut along lines into {} parts: GDSII has 8191 points an outline",
-                self.outlines, self.most_points, self.parts
+                "{} of up to {} points cut along lines into {}: GDSII has 8191 points an outline",
+                counted(self.outlines as usize, "outline"),
+                self.most_points,
+                counted(self.parts, "part")
             )
         });
         let escaped = self.first.as_ref().map(|first| {
             format!(
-                "{} names and texts hold bytes that OASIS has not, such as \"{first}\": each byte was written as \\x and \
-                 two hexadecimal digits, and is read back as the byte",
-                self.strings
+                "{} with bytes that OASIS has not, such as \"{first}\": each byte was written as \\x and two hexadecimal \
+                 digits, and is read back as the byte",
+                counted(self.strings as usize, "name or text").replace("name or texts", "names and texts")
             )
         });
         cut.into_iter().chain(escaped).collect()

@@ -67,7 +67,8 @@ pub(super) fn write(layout: &Layout, path: &Path, changes: &mut Changes, progres
         open: false,
         changes,
     };
-    let mut library = GdsLibrary::new("LIB");
+    let name = Some(layout.library()).filter(|name| !name.is_empty() && name.is_ascii());
+    let mut library = GdsLibrary::new(name.unwrap_or("LIB"));
     library.units = GdsUnits::new(layout.user_unit(), layout.unit_nm() * 1e-9);
     // The date of everything: a file must not depend on when it was written.
     let date = chrono::DateTime::UNIX_EPOCH.naive_utc();
