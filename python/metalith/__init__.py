@@ -3,7 +3,8 @@
 Lengths carry their unit in their names; angles are degrees; arrays have their rows along +y and their columns along +x.
 Everything that cannot be done raises :class:`MetalithError` with the words and the remedy that the program prints.
 Long calls release the interpreter's lock, stop at Ctrl-C, and take ``progress``, a callable of what is done, the steps
-that are done, and all of them.
+that are done, and all of them. They work in forked children and in several threads at once; each has as many threads as
+``RAYON_NUM_THREADS`` says, or one for each core.
 """
 
 from __future__ import annotations

@@ -14,6 +14,9 @@ from . import _arguments, _native
 from ._types import Bools, Float64, Int64, PathLike, Progress, Widths
 
 
+ROTATIONS = "give degrees, NaN where there is no pillar"
+
+
 @dataclass(frozen=True)
 class Rectangles:
     """Rectangular pillars of one size, which differ by their rotation."""
@@ -28,13 +31,17 @@ class Rectangles:
     def numbers(self, rotations_deg: npt.ArrayLike) -> Widths:
         """The numbers that stand in maps for rotations (degrees, from x towards y), each for the nearest step: 1 to
         ``steps``, zero where a rotation is NaN."""
-        values = np.ascontiguousarray(rotations_deg, dtype=np.float64)
+        return self._numbers("rotations_deg", rotations_deg)
+
+    def _numbers(self, name: str, rotations_deg: npt.ArrayLike) -> Widths:
+        values = _arguments.numbers(name, rotations_deg, np.float64, nan=True, remedy=ROTATIONS)
+        _arguments.refuse(name, values, abs(values) > _arguments.MOST_DEG, ROTATIONS)
         numbers = _native.rotation_numbers(values.ravel(), *_told(self)[1:])
         return numbers.reshape(values.shape)
 
     def rotations_deg(self, numbers: npt.ArrayLike) -> Float64:
         """Rotations (degrees) from 0 up to 180; NaN where there is no pillar."""
-        values = _arguments.widths(np.asarray(numbers))
+        values = _arguments.pillars("numbers", numbers)
         rotations = _native.rotations_deg(values.ravel(), *_told(self)[1:])
         return rotations.reshape(values.shape)
 
@@ -54,16 +61,16 @@ class UprightRectangles:
     def numbers(self, widths_x_nm: npt.ArrayLike, widths_y_nm: npt.ArrayLike) -> Widths:
         """The numbers that stand in maps for widths along x and y (nm): 1 to ``lengths`` squared, first along x; zero where
         both widths are."""
-        x, y = (_arguments.widths(np.asarray(widths)) for widths in (widths_x_nm, widths_y_nm))
+        x, y = _arguments.widths("widths_x_nm", widths_x_nm), _arguments.widths("widths_y_nm", widths_y_nm)
         if x.shape != y.shape:
             raise _native.MetalithError(
-                f"widths along x of shape {x.shape}, along y of {y.shape}\n  help: give both for each pillar"
+                f"`widths_x_nm` of shape {x.shape}, `widths_y_nm` of {y.shape}\n  help: give both for each pillar"
             )
         return _native.upright_numbers(x.ravel(), y.ravel(), *_told(self)[1:]).reshape(x.shape)
 
     def widths_nm(self, numbers: npt.ArrayLike) -> tuple[Widths, Widths]:
         """Widths along x and along y (nm); zero where there is no pillar."""
-        values = _arguments.widths(np.asarray(numbers))
+        values = _arguments.pillars("numbers", numbers)
         x, y = _native.upright_widths(values.ravel(), *_told(self)[1:])
         return x.reshape(values.shape), y.reshape(values.shape)
 
@@ -331,6 +338,18 @@ class Layout:
         return _rectangles(self.shape).rotations_deg(self.widths[k])
 
 
+def _map(name: str, given: npt.ArrayLike, shape: Shape) -> Widths:
+    """One map of widths, or of the numbers of rectangles."""
+    if isinstance(shape, Rectangles):
+        found = shape._numbers(name, given)
+    elif isinstance(shape, UprightRectangles):
+        found = _arguments.pillars(name, given)
+    else:
+        found = _arguments.widths(name, given)
+    _arguments.square(name, found)
+    return found
+
+
 def _rectangles(shape: Shape) -> Rectangles:
     if isinstance(shape, Rectangles):
         return shape
@@ -390,19 +409,9 @@ def write_layout(
     stand: :func:`places` has the places of a map, and on a hexagonal lattice, of circles alone, those that are sites.
     ``centres_nm`` are the places of the maps; one map alone stands at the origin. Maps that are copies of one another, or
     symmetric, are stored once. Returns the array that was written."""
-    if isinstance(widths, np.ndarray) and widths.ndim == 2:
-        widths = [widths]
-    if isinstance(shape, Rectangles):
-        maps = [shape.numbers(w) for w in widths]
-    else:
-        maps = [_arguments.widths(np.asarray(w)) for w in widths]
-    if centres_nm is None and len(maps) == 1:
-        centres_nm = [(0, 0)]
-    for one in maps:
-        _arguments.square("widths", one)
-    most = _arguments.MOST_NM
-    along = [[_arguments.whole("centres_nm", int(nm), -most, most) for nm in centre] for centre in centres_nm or []]
-    centres = [(x, y) for x, y in along]
+    maps = [_map("widths", one, shape) for one in _arguments.several("widths", widths)]
+    alone = [(0, 0)] if len(maps) == 1 else []
+    centres = alone if centres_nm is None else _arguments.centres(centres_nm)
     pitch_nm = _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32)
     array = Array(_native.array_of_widths(maps, pitch_nm, lattice, centres, _told(shape), progress))
     array.write(path, hierarchy=hierarchy, layer=layer, progress=progress)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from . import _arguments, _native
 from ._figures import imported
-from ._layouts import Array, Lattice, Layout, Rectangles, Shape, _told
+from ._layouts import Array, Lattice, Layout, Shape, _map, _told
 from ._types import Complex64, Complex128, Float64, Json, PathLike, Progress, Widths
 
 if TYPE_CHECKING:
@@ -311,13 +311,13 @@ def _maps(
 ) -> tuple[list[Widths], list[tuple[int, int]], int, Lattice, Shape]:
     """Pillars and centre (nm) of each element, and how they stand."""
     if isinstance(of, Layout):
-        return of.widths, of.centres_nm, of.pitch_nm, of.lattice, of.shape
+        maps = [_arguments.widths("of.widths", one) for one in of.widths]
+        return maps, of.centres_nm, of.pitch_nm, of.lattice, of.shape
     if isinstance(of, Array):
         return [of.widths(k) for k in range(len(of))], of.centres_nm, of.pitch_nm, of.lattice, of.shape
     if pitch_nm is None:
         raise _native.MetalithError("a map of widths has no pitch\n  help: give `pitch_nm`")
-    one = shape.numbers(of) if isinstance(shape, Rectangles) else _arguments.widths(np.asarray(of))
-    _arguments.square("of", one)
+    one = _map("of", of, shape)
     return [one], [(0, 0)], _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32), lattice, shape
 
 
@@ -400,7 +400,9 @@ def cell(
     Widths of circles are diameters; on a hexagonal lattice pillars are circles, and ``pitch_nm`` is a whole number.
     A width of zero is a site without pillar, the bare substrate; a negative one is refused. No widths or no wavelengths give an
     empty array, as numpy's own functions do. ``.to_xarray()`` and ``.plot()`` show it with its widths and wavelengths."""
-    widths, wavelengths = np.asarray(width_nm, dtype=float), _arguments.wavelengths("wavelength_nm", wavelength_nm)
+    widths = _arguments.numbers("width_nm", width_nm, np.float64)
+    _arguments.refuse("width_nm", widths, abs(widths) > _arguments.MOST_32, "give widths up to the pitch, in nanometres")
+    wavelengths = _arguments.wavelengths("wavelength_nm", wavelength_nm)
     found = _native.cell(
         widths.ravel(),
         wavelengths.ravel(),
@@ -445,18 +447,26 @@ def propagate(
     cell: ``pitch_nm`` apart, of weight pitch squared, on a square lattice; on a hexagonal one zero where there is no site.
     The window is about ``at_um``, its samples ``step_um`` apart (the pitch if left out). ``direct`` takes the Rayleigh-Sommerfeld sum
     over all samples instead of folded transforms: slow, and what they are tested against."""
-    values = np.asarray(aperture, dtype=np.complex128)
+    values = _arguments.numbers("aperture", aperture, np.complex128)
     _arguments.square("aperture", values)
+    most = _arguments.MOST_MODULUS
+    _arguments.refuse("aperture", values, abs(values) > most, f"give transmissions of moduli up to {most:g}")
+    along = _arguments.pair("incidence_deg", incidence_deg)
+    if max(map(abs, along)) >= 90:
+        raise _native.MetalithError(f"`incidence_deg` = {along}\n  help: give angles of less than 90 degrees")
+    wavelength = _arguments.wavelengths("wavelength_nm", wavelength_nm)
+    if wavelength.ndim != 0:
+        raise _native.MetalithError(f"`wavelength_nm` of shape {wavelength.shape}\n  help: give one number")
     return _native.propagate(
-        np.ascontiguousarray(values),
+        values,
         _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32),
         lattice,
-        float(_arguments.wavelengths("wavelength_nm", wavelength_nm)),
+        float(wavelength),
         distance_um,
-        at_um,
+        _arguments.pair("at_um", at_um),
         _arguments.whole("samples", samples, 1, MOST_SAMPLES),
         step_um,
-        incidence_deg,
+        along,
         fast,
         direct,
         progress,

@@ -77,9 +77,11 @@ class ImagingSystem:
     def frame(self, planes: Sequence[npt.ArrayLike]) -> Frame:
         """The frame that a camera recorded, to be restored: ``planes`` as those of :attr:`Frame.planes`, full scale being 1 and no
         signal 0. How bright its pictures are follows from ``white`` in ``[exposure]`` of the camera."""
-        signals = [np.ascontiguousarray(plane, dtype=np.float32) for plane in planes]
+        signals = [_arguments.numbers("planes", plane, np.float32) for plane in _arguments.several("planes", planes)]
+        most = _arguments.MOST_SIGNAL
         for plane in signals:
             _arguments.square("planes", plane)
+            _arguments.refuse("planes", plane, abs(plane) > most, f"divide by full scale: signals reach {most:g} at most")
         return Frame(self._native.frame(signals))
 
     def truth(self, scene: npt.ArrayLike) -> Float64:
@@ -103,7 +105,10 @@ class ImagingSystem:
 
 def _scene(given: npt.ArrayLike) -> Float64:
     """A scene in three colours."""
-    return _arguments.colours("scene", np.asarray(given, dtype=np.float64))
+    light = _arguments.numbers("scene", given, np.float64)
+    most = _arguments.MOST_LIGHT
+    _arguments.refuse("scene", light, ~((light >= 0) & (light <= most)), f"give values from 0 to {most:g}, white being 1")
+    return _arguments.colours("scene", light)
 
 
 def denoise(
@@ -111,13 +116,16 @@ def denoise(
 ) -> npt.NDArray[np.float32]:
     """A picture ``[row, column, colour]`` of sRGB values from 0 to 1 without its normal noise, or a grey one ``[row, column]``,
     which stays grey. ``deviation``: of the noise, in the same unit; one number, or one for each value."""
-    given = np.asarray(values, dtype=np.float32)
-    noise = np.asarray(deviation, dtype=np.float32)
+    given = _arguments.numbers("values", values, np.float32)
+    noise = _arguments.numbers("deviation", deviation, np.float32)
+    most = _arguments.MOST_PICTURE
+    _arguments.refuse("values", given, abs(given) > most, f"give values of at most {most:g}, white being 1")
+    _arguments.refuse("deviation", noise, ~((noise >= 0) & (noise <= most)), f"give deviations from 0 to {most:g}, white being 1")
     try:
         everywhere = np.broadcast_to(noise, given.shape)
     except ValueError:
         raise _native.MetalithError(
-            f"a deviation of shape {noise.shape} for values of {given.shape}\n"
+            f"`deviation` of shape {noise.shape} for `values` of {given.shape}\n"
             "  help: give one number, or one for each value"
         ) from None
     found = _native.denoise(_arguments.colours("values", given), _arguments.colours("deviation", everywhere), weights)

@@ -6,16 +6,16 @@ use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
 use metalith::{
-    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarId, PillarMap, PillarShape,
-    Pitch, Wedge, extract,
+    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarMap, PillarShape, Pitch,
+    Wedge, extract,
 };
 use numpy::ndarray::Array2;
-use numpy::{PyArray2, PyReadonlyArray2};
+use numpy::{Element, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::lattices::{PitchNm, check_places, check_shape, kind_of, lattice_of};
 use crate::reading::Reading;
-use crate::shapes::{ToldShape, shape_of, told};
+use crate::shapes::{ToldShape, check_numbers, shape_of, told};
 use crate::work::{error, work};
 
 /// A design: what is built, how it is written, and what must hold of it.
@@ -28,15 +28,15 @@ pub struct Design {
 impl Design {
     /// Read a design file, and the files that it names.
     #[staticmethod]
-    fn read(path: PathBuf) -> PyResult<Self> {
-        let design = metalith::Design::read(&path).map_err(error)?;
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let design = work(py, None, |_| metalith::Design::read(&path))?;
         Ok(Self { design })
     }
 
     /// The design of a text; files that it names count from the folder of `path`.
     #[staticmethod]
-    fn parse(text: &str, path: PathBuf) -> PyResult<Self> {
-        let design = metalith::Design::parse(&path, text).map_err(error)?;
+    fn parse(py: Python<'_>, text: &str, path: PathBuf) -> PyResult<Self> {
+        let design = work(py, None, |_| metalith::Design::parse(&path, text))?;
         Ok(Self { design })
     }
 
@@ -173,7 +173,7 @@ impl Array {
                 format!("this array has elements 0 to {}", self.array.placed.len() - 1),
             ))
         })?;
-        let widths = py.detach(|| self.array.widths(placed).into_owned());
+        let widths = work(py, None, |_| Ok(self.array.widths(placed).into_owned()))?;
         Ok(PyArray2::from_owned_array(py, widths.number))
     }
 
@@ -248,17 +248,21 @@ pub fn array_of_widths(
         )));
     }
     let kind = kind_of(lattice).map_err(error)?;
-    let maps: Vec<PillarMap> = widths
-        .iter()
-        .map(|w| width_map(w.as_array().to_owned(), pitch_nm, kind, shape))
-        .collect::<metalith::Result<_>>()
-        .map_err(error)?;
-    drop(widths);
+    let maps = given(widths);
     let array = work(py, progress, |p| {
-        let placed = maps.into_iter().zip(centres_nm).collect();
+        let maps = maps.into_iter().map(|w| width_map(w, pitch_nm, kind, shape));
+        let placed = maps
+            .zip(centres_nm)
+            .map(|(map, centre)| Ok((map?, centre)))
+            .collect::<metalith::Result<_>>()?;
         PillarArray::of_maps(shape, placed, p)
     })?;
     Ok(Array { array, design: None })
+}
+
+/// Copies of arrays of Python, for when its lock is not held.
+pub fn given<T: Element + Clone>(arrays: Vec<PyReadonlyArray2<'_, T>>) -> Vec<Array2<T>> {
+    arrays.iter().map(|array| array.as_array().to_owned()).collect()
 }
 
 /// A map of pillars of a shape as the library has it.
@@ -271,7 +275,7 @@ pub fn width_map(
     check_shape(kind, shape)?;
     let lattice = lattice_of(kind, pitch_nm, width_nm.dim(), "map")?;
     let widest_nm = kind.widest_nm(pitch_nm.into(), lattice.unit());
-    if let (Some(PillarId(last)), Some((_, longer))) = (shape.last(), shape.edge_range_nm()) {
+    if let (Some(_), Some((_, longer))) = (shape.last(), shape.edge_range_nm()) {
         if u32::from(longer) > pitch_nm {
             return Err(Error::refused(
                 "array/pillar-too-wide",
@@ -279,13 +283,7 @@ pub fn width_map(
                 "give edges of at most the pitch",
             ));
         }
-        if let Some(wrong) = width_nm.iter().find(|n| **n > last) {
-            return Err(Error::refused(
-                "array/unknown-pillar",
-                format!("a rectangle of number {wrong}"),
-                format!("numbers go from 1 to {last}: the steps of half a turn, or the pairs of widths"),
-            ));
-        }
+        check_numbers(shape, &width_nm)?;
     } else if let Some(wrong) = width_nm.iter().find(|w| **w % 2 != 0 || u32::from(**w) > widest_nm) {
         return Err(Error::refused(
             "array/pillar-too-wide",

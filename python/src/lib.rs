@@ -1,7 +1,7 @@
 //! metalith from Python: the native half of the package. What it is for people stands in `metalith/*.py`, which is
 //! written against these functions; their types are in `metalith/_native.pyi`.
 //!
-//! Every call that takes longer than a moment runs on a separate thread without the interpreter's lock, while the
+//! Every call that takes longer than a moment runs on threads of its own without the interpreter's lock, while the
 //! caller's thread looks for Ctrl-C and reports progress: see [`work`].
 
 mod arrays;
@@ -16,6 +16,9 @@ mod studies;
 mod wanted;
 mod work;
 
+use std::sync::OnceLock;
+
+use metalith::Error;
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -27,10 +30,20 @@ create_exception!(
     "Something that metalith cannot do, with the words and the remedy that the program would print."
 );
 
-/// The program, with the arguments of a process; returns its exit code.
+/// The program, with the arguments of a process; returns its exit code. It counts on the threads of its process, which are not
+/// there in a child of one that ran it.
 #[pyfunction]
-fn main(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
-    py.detach(|| metalith::cli::run_with(arguments))
+fn main(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> PyResult<u8> {
+    static RAN_IN: OnceLock<u32> = OnceLock::new();
+    let process = std::process::id();
+    if *RAN_IN.get_or_init(|| process) != process {
+        return Err(work::error(Error::refused(
+            "threads/forked",
+            "the program was run in the process that this one was forked from",
+            "start `metalith` by `subprocess.run`, or processes by the method `spawn`",
+        )));
+    }
+    Ok(py.detach(|| metalith::cli::run_with(arguments)))
 }
 
 #[pymodule]

@@ -13,7 +13,7 @@ use ndarray::Array3;
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
-use crate::arrays::Design;
+use crate::arrays::{Design, given};
 use crate::work::{error, work};
 
 /// Distance of a scene of which none is said (um).
@@ -105,16 +105,17 @@ impl ImagingSystem {
     }
 
     /// The frame of signals that a camera recorded, full scale being one.
-    fn frame(&self, planes: Vec<PyReadonlyArray2<'_, f32>>) -> PyResult<Frame> {
-        let signals = planes.iter().map(|plane| plane.as_array().to_owned()).collect();
-        let frame = self.system.frame_of(signals).map_err(error)?;
+    fn frame(&self, py: Python<'_>, planes: Vec<PyReadonlyArray2<'_, f32>>) -> PyResult<Frame> {
+        let signals = given(planes);
+        let frame = work(py, None, |_| self.system.frame_of(signals))?;
         Ok(Frame { frame })
     }
 
     /// Image of a scene by an ideal camera of the same channels, linear sRGB.
     fn truth<'py>(&self, py: Python<'py>, scene: PyReadonlyArray3<'py, f64>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let scene = self.scene(&scene.as_array().to_owned()).map_err(error)?;
-        Ok(PyArray3::from_owned_array(py, self.system.truth(&scene)))
+        let rgb = scene.as_array().to_owned();
+        let truth = work(py, None, |_| Ok(self.system.truth(&self.scene(&rgb)?)))?;
+        Ok(PyArray3::from_owned_array(py, truth))
     }
 
     /// The picture restored from a frame, linear sRGB.
@@ -175,8 +176,12 @@ impl ImagingSystem {
     }
 
     fn operator_error(&self, operator: &imaging::FrameOperator<'_>) -> &OperatorError {
-        self.operator_error
-            .get_or_init(|| ForecastScene::new(&self.system, operator).operator_error)
+        if let Some(known) = self.operator_error.get() {
+            return known;
+        }
+        // Computed outside the lock: a child that is forked meanwhile would wait for it without end.
+        let made = ForecastScene::new(&self.system, operator).operator_error;
+        self.operator_error.get_or_init(|| made)
     }
 }
 

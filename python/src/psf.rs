@@ -15,7 +15,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Array, no_wedge, width_map};
+use crate::arrays::{Array, given, no_wedge, width_map};
 use crate::checks::json;
 use crate::lattices::{kind_of, stack_on};
 use crate::light::stack;
@@ -31,6 +31,9 @@ const PIXELS_UM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 /// Diameters of openings that are taken (um), as by the program.
 const APERTURES_UM: std::ops::RangeInclusive<f64> = 0.1..=1e5;
+
+/// Distances to the sensor that are taken (um): beyond them no light is resolved in double precision.
+const DISTANCES_UM: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 
 /// Succeeds if a length that is given lies within a range (um).
 fn within(what: &str, um: Option<f64>, range: &std::ops::RangeInclusive<f64>) -> Result<()> {
@@ -368,21 +371,20 @@ pub fn psf_of_widths<'py>(
     let wanted = Wanted::of(fidelity, model.as_deref()).map_err(error)?;
     within("pixel_um", pixel_um, &PIXELS_UM).map_err(error)?;
     within("aperture_um", aperture_um, &APERTURES_UM).map_err(error)?;
+    within("distance_um", Some(distance_um), &DISTANCES_UM).map_err(error)?;
     let shape = shape_of(shape).map_err(error)?;
     let light = polarised(arriving, analyser, shape).map_err(error)?;
     let kind = kind_of(lattice).map_err(error)?;
     if let Wanted::Cell(fidelity) = wanted {
         refuse(fidelity, shape, kind).map_err(error)?;
     }
-    let maps = widths
-        .iter()
-        .map(|w| width_map(w.as_array().to_owned(), pitch_nm, kind, shape));
-    let maps = maps.collect::<Result<Vec<_>>>().map_err(error)?;
-    drop(widths);
+    let maps = given(widths);
     let stack = stack(f64::from(pitch_nm), height_nm, pillar, substrate)
         .and_then(|stack| stack_on(stack, kind, shape))
         .map_err(error)?;
     let found = work(py, progress, |p| {
+        let maps = maps.into_iter().map(|w| width_map(w, pitch_nm, kind, shape));
+        let maps = maps.collect::<Result<Vec<_>>>()?;
         let (cell, made) = match &wanted {
             Wanted::Cell(fidelity) => (Some(cell_of(*fidelity, stack, &maps, light, &wavelengths_nm)?), None),
             Wanted::Model(model) => {

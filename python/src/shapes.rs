@@ -1,6 +1,7 @@
 //! Shapes of pillars, between Python and the library.
 
-use metalith::{Error, PillarShape, Rectangles, Result, RotatedRectangles, UprightRectangles};
+use metalith::{Error, PillarId, PillarShape, Rectangles, Result, RotatedRectangles, UprightRectangles};
+use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
@@ -16,6 +17,31 @@ const MIXED: &str = "mixed";
 
 /// Most rotations in half a turn.
 const MOST_STEPS: u16 = 3600;
+
+/// Largest rotation (degrees): a double resolves a millionth of a degree there.
+const MOST_DEG: f64 = 1e9;
+
+/// Numbers of rectangles, of which each is there.
+fn known<'a>(numbers: &'a PyReadonlyArray1<'_, u16>, shape: PillarShape) -> Result<ArrayView1<'a, u16>> {
+    let numbers = numbers.as_array();
+    check_numbers(shape, numbers)?;
+    Ok(numbers)
+}
+
+/// Succeeds if rectangles of a shape have all these numbers; of other shapes they are widths.
+pub fn check_numbers<'a>(shape: PillarShape, numbers: impl IntoIterator<Item = &'a u16>) -> Result<()> {
+    let Some(PillarId(last)) = shape.last() else {
+        return Ok(());
+    };
+    match numbers.into_iter().find(|n| **n > last) {
+        Some(wrong) => Err(Error::refused(
+            "array/unknown-pillar",
+            format!("a rectangle of number {wrong}"),
+            format!("numbers go from 1 to {last}: the steps of half a turn, or the pairs of widths"),
+        )),
+        None => Ok(()),
+    }
+}
 
 /// A shape as Python has it.
 pub fn told(shape: PillarShape) -> ToldShape {
@@ -115,7 +141,7 @@ pub fn upright_widths<'py>(
     lengths: u16,
 ) -> PyResult<(Bound<'py, PyArray1<u16>>, Bound<'py, PyArray1<u16>>)> {
     let pillars = upright(shortest_nm, step_nm, lengths).map_err(error)?;
-    let numbers = numbers.as_array();
+    let numbers = known(&numbers, pillars.into()).map_err(error)?;
     let along = |axis: usize| {
         numbers
             .iter()
@@ -157,11 +183,11 @@ pub fn rotation_numbers<'py>(
 ) -> PyResult<Bound<'py, PyArray1<u16>>> {
     let pillars = rectangles(width_nm, length_nm, steps).map_err(error)?;
     let rotations = rotations_deg.as_array();
-    if rotations.iter().any(|deg| deg.is_infinite()) {
+    if let Some(wrong) = rotations.iter().find(|deg| deg.abs() > MOST_DEG) {
         return Err(error(Error::refused(
             "array/not-numbers",
-            "a rotation that is infinite",
-            "give degrees, or NaN where there is no pillar",
+            format!("a rotation of {wrong:e} degrees"),
+            format!("give degrees from -{MOST_DEG:e} to {MOST_DEG:e}, or NaN where there is no pillar"),
         )));
     }
     let number = |deg: &f64| {
@@ -191,6 +217,6 @@ pub fn rotations_deg<'py>(
             pillars.rotation(*n).to_degrees()
         }
     };
-    let numbers = numbers.as_array();
+    let numbers = known(&numbers, pillars.into()).map_err(error)?;
     Ok(PyArray1::from_iter(py, numbers.iter().map(rotation)))
 }

@@ -6,7 +6,7 @@ use metalith::FolderLock;
 use metalith::study::{self, Plan, PlanSettings, Work};
 use pyo3::prelude::*;
 
-use crate::work::{error, work};
+use crate::work::work;
 
 /// Plan a study into a folder, or read the plan that is there; its manifest, with the number of shards.
 #[pyfunction]
@@ -26,7 +26,7 @@ pub fn study_plan(
 /// Shards that are there.
 #[pyfunction]
 pub fn study_status(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
-    let status = py.detach(|| Work::open(&folder)?.cut().status()).map_err(error)?;
+    let status = work(py, None, |_| Work::open(&folder)?.cut().status())?;
     Ok(serde_json::json!(status).to_string())
 }
 

@@ -183,18 +183,19 @@ impl OnnxNetwork {
     }
 
     fn ready_for(&self, size: [usize; 2]) -> TractResult<Arc<TypedRunnableModel>> {
-        let mut ready = self.ready.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some((last, network)) = &*ready
+        let ready = || self.ready.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((last, network)) = &*ready()
             && *last == size
         {
             return Ok(Arc::clone(network));
         }
+        // Prepared outside the lock: a process that is forked meanwhile would wait for it without end.
         let mut model = self.model.clone();
         for (k, shape) in self.form.shapes(size).into_iter().enumerate() {
             model.set_input_fact(k, f32::fact(shape).into())?;
         }
         let network = model.into_optimized()?.into_runnable()?;
-        *ready = Some((size, Arc::clone(&network)));
+        *ready() = Some((size, Arc::clone(&network)));
         Ok(network)
     }
 }
