@@ -2,7 +2,7 @@
 //! Layouts have mutants of their own, in the crates that read them.
 //!
 //! The n-th mutant of a format is the same in every run. More of them: `METALITH_MUTANTS=40000 cargo test --release --test mutants`;
-//! only some formats: `METALITH_FORMATS=camera,npy`. One that fails stays in the folder that is named.
+//! only some formats or groups of them: `METALITH_FORMATS=camera,studies`. One that fails stays in the folder that is named.
 
 mod damage;
 mod formats;
@@ -37,12 +37,12 @@ fn damaged_files_of_every_format_are_read_or_refused() {
     let count = std::env::var("METALITH_MUTANTS").map_or(USUAL, |n| n.parse().expect("a number of mutants"));
     let wanted = std::env::var("METALITH_FORMATS").ok();
     let folder = tempfile::tempdir().unwrap();
-    for format in formats::all(folder.path()) {
-        if wanted
-            .as_ref()
-            .is_none_or(|w| w.split(',').any(|name| name == format.name))
-        {
-            survive(&format, count);
+    let is_wanted = |name: &str| wanted.as_ref().is_none_or(|w| w.split(',').any(|own| own == name));
+    for group in formats::GROUPS {
+        for format in formats::of_group(group, folder.path()) {
+            if is_wanted(group.0) || is_wanted(format.name) {
+                survive(&format, count);
+            }
         }
     }
 }
@@ -88,6 +88,8 @@ fn survive(format: &Format, count: u64) {
         largest = largest.max(mutant.len() as u64);
     }
     let peak = process::peak_bytes();
+    // Other formats may read it with their own files.
+    fs::write(&format.file, &format.corpus[0]).unwrap();
     println!(
         "{:16} {count} mutants, {accepted} still good, {:.1} CPU s, slowest {slowest:.2}, peak {} MB",
         format.name,
