@@ -288,7 +288,7 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
 /// Write the page and the numbers of a comparison, and print its table.
 pub(crate) fn tell(comparison: &ComparisonResult, folder: &Path) -> Result<Outcome> {
     write_comparison(comparison, folder)?;
-    output::line(format_args!("{}", comparison.markdown()));
+    output::print_text(&comparison.markdown());
     output::line(format_args!("page: {}", folder.join("compare.html").display()));
     Ok(Outcome::Fine)
 }

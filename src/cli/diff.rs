@@ -8,7 +8,7 @@ use metalith::diff::{self, DiffPlan};
 
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, print_json, print_text};
 
 /// Compare the geometry of two layouts, whatever their hierarchy.
 #[derive(Args)]
@@ -53,12 +53,9 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
         diff::page(&found).write(path)?;
     }
     if args.json {
-        print_line!(
-            "{:#}",
-            serde_json::to_value(&found).expect("a comparison is plain data")
-        );
+        print_json(&serde_json::to_value(&found).expect("a comparison is plain data"));
     } else {
-        print_line!("{}", diff::text(&found).trim_end());
+        print_text(diff::text(&found).trim_end());
     }
     Ok(Outcome::of(found.same_geometry))
 }
