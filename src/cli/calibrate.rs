@@ -16,7 +16,7 @@ use metalith::{Error, Result};
 use super::out_folder::OutFolder;
 use super::paths::apart;
 use super::reading::ReadingArgs;
-use super::{Outcome, Terminal, print_json, print_line};
+use super::{Outcome, Terminal, print_json, print_line, print_text};
 
 /// Find the effects by which a measured set differs from its prediction.
 #[derive(Args)]
@@ -179,7 +179,7 @@ fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -
         if args.json {
             print_json(&validation);
         } else {
-            print_line!("{}", validation.text().trim_end());
+            print_text(validation.text().trim_end());
             print_line!("{}", out.join("validation.html").display());
         }
         return Ok(Outcome::Fine);

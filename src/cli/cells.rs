@@ -14,7 +14,7 @@ use metalith::{AtomicFile, Design, Error, PolarisationBasis, Progress, Result};
 use super::out_folder::OutFolder;
 use super::paths::name_of;
 use super::section_text::with_keys;
-use super::{Outcome, Terminal, print_json, print_line, standard_input};
+use super::{Outcome, Terminal, print_json, print_line, print_text, standard_input};
 
 /// Tabulate the unit cell of a design by RCWA, fit it, and report the errors of its mapping.
 #[derive(Args)]
@@ -254,7 +254,7 @@ fn rotations(args: &CellsArgs, design: &Design, out: &OutFolder, terminal: &Term
         line(&counted(fit.mapping.sines.len(), "term"), fit.error);
     }
     if let Some(fit) = study.fits.get(1) {
-        print_line!("{}", rotation_keys(fit, &study.mapped_cell));
+        print_text(&rotation_keys(fit, &study.mapped_cell));
     }
     print_line!("report: {}", folder.join("cells.html").display());
     Ok(Outcome::Fine)

@@ -6,6 +6,7 @@ use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::counted;
+use metalith::text::printable_json;
 use metalith::{AtomicFile, Error, Layout, Result};
 
 use super::compensated::CompensatedFor;
@@ -13,7 +14,7 @@ use super::output::is_standard_output;
 use super::paths::name_of;
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, print_line, standard_input};
+use super::{Outcome, Terminal, print_line, print_text, standard_input};
 
 /// Check a layout against design rules.
 #[derive(Args)]
@@ -177,7 +178,7 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
         }
     }
     write_together(&files, terminal)?;
-    print_line!("{}", text(&report).trim_end());
+    print_text(text(&report).trim_end());
     Ok(match report.exit_code() {
         0 => Outcome::Fine,
         1 => Outcome::OutsideLimits,
@@ -238,5 +239,6 @@ fn write_rules(layout: &Layout, layer: Option<LayerNumber>, path: &Path, termina
 }
 
 fn json(report: &DrcReport) -> String {
-    format!("{:#}", serde_json::to_value(report).expect("a report is plain data"))
+    let value = serde_json::to_value(report).expect("a report is plain data");
+    printable_json(&format!("{value:#}")).into_owned()
 }

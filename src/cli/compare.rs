@@ -292,6 +292,6 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
 
 /// Print the table of a comparison and where its page is.
 pub(crate) fn tell(table: &str, folder: &Path) {
-    output::line(format_args!("{table}"));
+    output::print_text(table);
     output::line(format_args!("page: {}", folder.join("compare.html").display()));
 }

@@ -25,7 +25,7 @@ pub(crate) struct ManualArgs {
 pub(crate) fn run(args: &CompletionsArgs, _terminal: &Terminal) -> Result<Outcome> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut Arguments::command(), "metalith", &mut text);
-    output::line(format_args!("{}", String::from_utf8_lossy(&text).trim_end()));
+    output::print_text(String::from_utf8_lossy(&text).trim_end());
     Ok(Outcome::Fine)
 }
 

@@ -9,7 +9,7 @@ use metalith::gds::USUAL_LAYER;
 
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, output, print_line};
+use super::{Outcome, Terminal, output, print_json, print_text};
 
 /// Compare the geometry of two layouts, whatever their hierarchy.
 #[derive(Args)]
@@ -58,12 +58,9 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
         diff::page(&found).write(path)?;
     }
     if args.json {
-        print_line!(
-            "{:#}",
-            serde_json::to_value(&found).expect("a comparison is plain data")
-        );
+        print_json(&serde_json::to_value(&found).expect("a comparison is plain data"));
     } else {
-        print_line!("{}", diff::text(&found).trim_end());
+        print_text(diff::text(&found).trim_end());
     }
     Ok(Outcome::of(found.same_geometry))
 }

@@ -21,7 +21,7 @@ use super::psf::layer;
 use super::reading::FileArgs;
 use super::standard_input::InputFile;
 use super::verify::FidelityArg;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, print_json, print_line};
 
 /// Make the folder and the archive for the cleanroom, from a design or from a layout of any program, or check that a received
 /// folder is complete.
@@ -227,15 +227,12 @@ fn make(source: HandoffSource, out: OutFolder, args: &HandoffArgs, terminal: &Te
     out.note()?;
     terminal.clear();
     if args.json {
-        print_line!(
-            "{:#}",
-            serde_json::json!({
-                "folder": made.folder,
-                "archive": made.archive,
-                "checks": made.checks,
-                "manifest": made.manifest,
-            })
-        );
+        print_json(&serde_json::json!({
+            "folder": made.folder,
+            "archive": made.archive,
+            "checks": made.checks,
+            "manifest": made.manifest,
+        }));
     } else {
         tell(&made);
     }
@@ -292,7 +289,7 @@ fn look(folder: &Path, json: bool, terminal: &Terminal) -> Result<Outcome> {
     if json {
         let mut value = serde_json::to_value(&found).expect("plain data serialises");
         value["whole_and_unaltered"] = found.holds().into();
-        print_line!("{value:#}");
+        print_json(&value);
     } else {
         describe(&found);
     }

@@ -11,7 +11,7 @@ use metalith::text::printable;
 
 use super::reading::FileArgs;
 use super::standard_input::InputFile;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, print_json, print_text};
 
 /// Cells, texts, elements and faults that the summary lists; `--json` has the first thousand of each.
 const SHOWN: usize = 12;
@@ -48,12 +48,9 @@ pub(crate) fn run(args: &InfoArgs, terminal: &Terminal) -> Result<Outcome> {
     let found = layout.inventory(terminal)?;
     terminal.clear();
     if args.json {
-        print_line!(
-            "{:#}",
-            serde_json::to_value(&found).expect("an inventory is plain data")
-        );
+        print_json(&serde_json::to_value(&found).expect("an inventory is plain data"));
     } else {
-        print_line!("{}", text(&found).trim_end());
+        print_text(text(&found).trim_end());
     }
     Ok(Outcome::Fine)
 }

@@ -10,7 +10,7 @@ use metalith::report::{count, counted, sig};
 use metalith::{Design, FolderLock, Hierarchy, PillarArray, Result, write_layer_properties};
 
 use super::out_folder::OutFolder;
-use super::{Outcome, Terminal, print_line, standard_input};
+use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Write the pillar layout, the aperture layout and the layer colours of a design.
 #[derive(Args)]
@@ -247,7 +247,7 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
             "bytes": [written.pillars.bytes, written.apertures.bytes],
             "compensation": compensation.as_ref().map(|c| &c.2.summary),
         });
-        print_line!("{json:#}");
+        print_json(&json);
     } else if !terminal.is_quiet() {
         for file in [&written.pillars, &written.apertures] {
             print_line!("{}  {:.3} MB", file.path.display(), file.bytes as f64 * 1e-6);

@@ -38,17 +38,18 @@ mod terminal;
 mod train;
 mod verify;
 
+use std::borrow::Cow;
 use std::ffi::OsString;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use clap::{Parser, Subcommand};
-use miette::{Diagnostic, GraphicalReportHandler, SourceCode};
+use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, SourceCode};
 
 use metalith::text::{printable, printable_lines};
 use metalith::{Error, Faults};
-use output::{print_json, print_line};
+use output::{print_json, print_line, print_text};
 pub use terminal::Terminal;
 
 /// Outcome of a command that did its work.
@@ -150,8 +151,14 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = match Arguments::try_parse_from(&given) {
         Ok(arguments) => arguments,
         Err(error) => {
-            // Help is no error, and goes to standard output.
-            let _ = error.print();
+            // Help is no error, and goes to standard output. Errors repeat what was given, which may be the name of a file.
+            let plain = error.render().to_string();
+            match printable_lines(&plain) {
+                Cow::Borrowed(_) => {
+                    let _ = error.print();
+                }
+                Cow::Owned(words) => output::tell(&words),
+            }
             if let Some(hint) = renamed::hint(&error, &given) {
                 output::tell(&format!("\n  help: {hint}\n"));
             }
@@ -233,22 +240,18 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
 /// which stays when the words change.
 fn report(error: &Error) {
     if let Error::Text(faults) = error {
-        let mut drawn = String::new();
+        let (mut drawn, mut plain) = (String::new(), String::new());
         let headline = Headline(faults);
-        if GraphicalReportHandler::new()
-            .render_report(&mut drawn, &headline)
-            .is_ok()
+        let drawer = GraphicalReportHandler::new();
+        let drawer_of_plain = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
+        if drawer.render_report(&mut drawn, &headline).is_ok()
+            && drawer_of_plain.render_report(&mut plain, &headline).is_ok()
         {
-            output::tell(&drawn);
+            output::tell_drawn(&drawn, &plain);
             return;
         }
     }
-    // Names from files may hold what moves a cursor.
-    output::tell(&format!(
-        "error[{}]: {}\n",
-        error.id(),
-        printable_lines(&error.to_string())
-    ));
+    output::tell(&format!("error[{}]: {error}\n", error.id()));
 }
 
 /// The faults of a file under one line that counts them; each is then drawn at its place.

@@ -25,7 +25,7 @@ use self::light::{PsfLight, USUAL_DISTANCE_UM};
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::verify::FidelityArg;
-use super::{Outcome, Terminal, print_line};
+use super::{Outcome, Terminal, print_json, print_line};
 
 /// Find the elements of any layout in GDSII or OASIS, read their pillars, and simulate their PSFs.
 #[derive(Args, Clone)]
@@ -456,7 +456,7 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             "camera": white.as_ref().map(|w| &w.0),
             "white": white.as_ref().map(|w| &w.1),
         });
-        print_line!("{json:#}");
+        print_json(&json);
         return Ok(outcome);
     }
     if let Some(left_out) = &left_out {

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use metalith::report::counted;
+use metalith::text::printable;
 use metalith::{FolderLock, Progress, Warning};
 
 use super::output;
@@ -227,7 +228,7 @@ impl Progress for Terminal {
             .expect("the template is a constant");
         let bar = ProgressBar::new(steps.max(1))
             .with_style(style)
-            .with_message(what.to_owned());
+            .with_message(printable(what).into_owned());
         *self.bar() = Some(bar);
     }
 
@@ -243,7 +244,7 @@ impl Progress for Terminal {
 
     fn note(&self, text: &str) {
         if let Some(bar) = &*self.bar() {
-            bar.set_prefix(text.to_owned());
+            bar.set_prefix(printable(text).into_owned());
             return;
         }
         let line = self.log().note(text, Instant::now());

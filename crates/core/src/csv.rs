@@ -1,7 +1,7 @@
 //! Tables as CSV: a head that names the columns, in any order, then a row in each line, with commas between its fields. Empty lines,
 //! comments, which begin with #, and the mark of a byte order do not count.
 
-use crate::text::{quoted, table_rows};
+use crate::text::{printable, quoted, table_rows};
 
 /// Maker of the error for a mistake, from its line and what it is.
 type Refuse<'a, E> = &'a dyn Fn(Option<usize>, String) -> E;
@@ -42,6 +42,19 @@ impl<E> CsvRow<'_, E> {
     /// Error for a mistake in this row.
     pub fn refused(&self, what: impl Into<String>) -> E {
         (self.refuse)(Some(self.line), what.into())
+    }
+}
+
+/// A text as one field of a row, as RFC 4180 asks: quoted where a comma or a quote would be taken for structure; a line break is
+/// written out. A text that a spreadsheet would compute as a formula has an apostrophe before it, which makes it a text there.
+pub fn csv_field(text: &str) -> String {
+    let shown = printable(text);
+    let is_formula = shown.trim_start().starts_with(['=', '+', '-', '@']) && shown.parse::<f64>().is_err();
+    let apostrophe = if is_formula { "'" } else { "" };
+    if shown.contains([',', '"']) {
+        format!("\"{apostrophe}{}\"", shown.replace('"', "\"\""))
+    } else {
+        format!("{apostrophe}{shown}")
     }
 }
 
@@ -107,6 +120,35 @@ mod tests {
     fn read(text: &str) -> Result<Vec<[f64; 2]>, String> {
         let refuse = |line: Option<usize>, what: String| format!("{line:?}: {what}");
         csv_rows(text, "x,y", &refuse)?.map(|row| row?.numbers()).collect()
+    }
+
+    #[test]
+    fn fields_are_neither_structure_nor_formulas() {
+        let fields = [
+            "",
+            "LENS_1",
+            "a, \"b\"",
+            "-1.5",
+            "+2.50",
+            "=1+1",
+            " @SUM(A1)",
+            "+x,y",
+            "a\r\nb",
+            "\u{202e}x",
+        ]
+        .map(csv_field);
+        insta::assert_snapshot!(fields.join("\n"), @r#"
+
+        LENS_1
+        "a, ""b"""
+        -1.5
+        +2.50
+        '=1+1
+        ' @SUM(A1)
+        "'+x,y"
+        a\u{d}\u{a}b
+        \u{202e}x
+        "#);
     }
 
     #[test]

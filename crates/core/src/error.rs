@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::text::printable;
+
 /// Cause of an error, for [`std::error::Error::source`].
 pub(crate) type Cause = Box<dyn std::error::Error + Send + Sync>;
 
@@ -18,7 +20,7 @@ pub enum Error {
     Text(Box<crate::document::Faults>),
 
     /// A layout file breaks the GDSII format, or a limit that keeps reading it bounded.
-    #[error("{}, byte {offset}: {what}\n  help: {hint}", path.display())]
+    #[error("{}, byte {offset}: {what}\n  help: {hint}", name(path))]
     Layout {
         path: PathBuf,
         /// Offset of the record at fault from the start of the file.
@@ -30,7 +32,7 @@ pub enum Error {
     },
 
     /// The operating system refused.
-    #[error("cannot {action} {}: {source}{}", path.display(), io_hint(source))]
+    #[error("cannot {action} {}: {source}{}", name(path), io_hint(source))]
     Io {
         action: &'static str,
         path: PathBuf,
@@ -38,7 +40,7 @@ pub enum Error {
     },
 
     /// A file of numbers (CSV, NPY) that does not hold what was expected.
-    #[error("{}{}: {what}\n  help: {hint}", path.display(), at_line(*line))]
+    #[error("{}{}: {what}\n  help: {hint}", name(path), at_line(*line))]
     Table {
         path: PathBuf,
         /// Line of a text file, counted from one; none for a binary one.
@@ -129,6 +131,11 @@ impl Error {
             Self::Io { .. } | Self::Interrupted => 3,
         }
     }
+}
+
+/// Name of a file in one line, whatever it holds.
+fn name(path: &Path) -> String {
+    printable(&path.to_string_lossy()).into_owned()
 }
 
 fn at_line(line: Option<usize>) -> String {

@@ -28,7 +28,7 @@ mod wedge;
 mod zernike;
 
 pub use alignment_cross::cross_corners;
-pub use csv::{CsvRow, csv_columns, csv_rows};
+pub use csv::{CsvRow, csv_columns, csv_field, csv_rows};
 #[cfg(feature = "documents")]
 pub use document::{Fault, FaultKind, Faults};
 pub use error::{Error, Result};

@@ -1,19 +1,26 @@
 //! Texts from files, made safe to print: names and titles that somebody else chose may hold control characters
-//! that move a cursor, change a terminal, reverse a line, or that HTML, XML and CSV cannot carry.
+//! that move a cursor, change a terminal, reverse a line, or that HTML, XML and CSV cannot carry. The sinks of the program call these
+//! functions: the terminal, pages, JSON, XML and CSV.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 
 /// True if a character can stand unchanged in one line of a terminal, of HTML and of XML 1.0: no control character, no
-/// end of a line, nothing that changes the direction of a line, no code point that is no character.
+/// end of a line, nothing that changes the direction of a line, nothing without a width, no code point that is no character.
 pub fn is_printable(c: char) -> bool {
     let directs = matches!(
         c,
-        '\u{61C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}'
+        '\u{61C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{206F}'
+    );
+    // Two names that look alike could differ by these, the tags of U+E0000 among them.
+    let has_no_width = matches!(
+        c,
+        '\u{AD}' | '\u{180E}' | '\u{200B}'..='\u{200D}' | '\u{2060}'..='\u{2065}' | '\u{FEFF}' | '\u{FFF9}'..='\u{FFFB}'
+            | '\u{E0000}'..='\u{E007F}'
     );
     let ends_a_line = matches!(c, '\u{2028}' | '\u{2029}');
     let is_none = matches!(c, '\u{FDD0}'..='\u{FDEF}') || u32::from(c) & 0xFFFE == 0xFFFE;
-    !(c.is_control() || directs || ends_a_line || is_none || c == '\u{FEFF}')
+    !(c.is_control() || directs || has_no_width || ends_a_line || is_none)
 }
 
 /// The first character of a text that is not [printable](is_printable).
@@ -44,6 +51,27 @@ pub fn printable_lines(text: &str) -> Cow<'_, str> {
             out.push(c);
         } else {
             push(&mut out, c);
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// JSON in which strings hold no character that is not [printable](is_printable): such a one is written as `\u202e`, which readers
+/// take for the same character. Ends of lines between values stay.
+pub fn printable_json(json: &str) -> Cow<'_, str> {
+    let stays = |c: char| is_printable(c) || c == '\n';
+    if json.chars().all(stays) {
+        return Cow::Borrowed(json);
+    }
+    let mut out = String::with_capacity(json.len() + 16);
+    for c in json.chars() {
+        if stays(c) {
+            out.push(c);
+        } else {
+            for unit in c.encode_utf16(&mut [0; 2]) {
+                // Writing to a string cannot fail.
+                let _ = write!(out, "\\u{unit:04x}");
+            }
         }
     }
     Cow::Owned(out)
@@ -147,6 +175,22 @@ mod tests {
             assert!(matches!(printable(plain), Cow::Borrowed(same) if same == plain));
         }
         assert_eq!(first_unprintable("ab\u{fffe}"), Some('\u{fffe}'));
+    }
+
+    #[test]
+    fn what_has_no_width_is_written_out() {
+        assert_eq!(printable("a\u{200b}b\u{2060}c\u{ad}"), "a\\u{200b}b\\u{2060}c\\u{ad}");
+        assert_eq!(printable("\u{2066}\u{2028}\u{e0041}"), "\\u{2066}\\u{2028}\\u{e0041}");
+    }
+
+    /// The characters come back, whatever plane they are of.
+    #[test]
+    fn json_keeps_its_meaning() {
+        assert_eq!(
+            printable_json("{\n\"a\u{202e}\": \"\u{7f}\u{e0041}µ\"}"),
+            "{\n\"a\\u202e\": \"\\u007f\\udb40\\udc41µ\"}"
+        );
+        assert!(matches!(printable_json("{\"µ\": 1}"), Cow::Borrowed(_)));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use metalith_core::text::{is_printable, printable};
+use metalith_core::text::{is_printable, printable, printable_json};
 use metalith_report::{counted, exact, sig};
 use serde_json::json;
 
@@ -349,5 +349,5 @@ pub fn sarif(report: &DrcReport) -> String {
             "results": results,
         }],
     });
-    format!("{sarif:#}\n")
+    printable_json(&format!("{sarif:#}\n")).into_owned()
 }

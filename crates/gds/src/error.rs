@@ -225,7 +225,7 @@ impl Limit {
             Self::FlatShapesOfShortFile => {
                 "arrays of arrays multiply: is this the layout that was meant? Write it in parts"
             }
-            Self::FlatTexts => "a long text stands in an array of cells: write it once, at the top",
+            Self::FlatTexts => "references multiply the texts of cells: write each text once, at the top",
         }
     }
 }

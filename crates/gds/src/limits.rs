@@ -24,9 +24,11 @@ pub struct ReadLimits {
     /// few hundred bytes any number of shapes. A lens of elements that share their eighths has 8 shapes a byte.
     pub short_file_shapes: u64,
     pub shapes_per_byte: u64,
-    /// Bytes of all texts with every reference followed, and 64 for each of them: whoever keeps texts keeps them
-    /// one by one.
+    /// Largest number of bytes of all texts from a short file, with every reference followed and 64 for each text, and how many
+    /// more for each of its bytes: whoever keeps texts keeps them one by one, and arrays make of a short text any number of texts.
+    /// A text takes 36 bytes or more of GDSII, three or more of OASIS.
     pub flat_text_bytes: u64,
+    pub flat_text_bytes_per_byte: u64,
 }
 
 impl ReadLimits {
@@ -35,6 +37,12 @@ impl ReadLimits {
         let in_proportion = self.shapes_per_byte.saturating_mul(bytes);
         self.flat_shapes
             .min(self.short_file_shapes.saturating_add(in_proportion))
+    }
+
+    /// Bytes of texts that are read of a file of so many bytes, every reference followed.
+    pub(super) fn text_bytes_of(&self, bytes: u64) -> u64 {
+        let in_proportion = self.flat_text_bytes_per_byte.saturating_mul(bytes);
+        self.flat_text_bytes.saturating_add(in_proportion)
     }
 }
 
@@ -56,6 +64,7 @@ impl Default for ReadLimits {
             short_file_shapes: 1 << 24,
             shapes_per_byte: 64,
             flat_text_bytes: 1 << 26,
+            flat_text_bytes_per_byte: 32,
         }
     }
 }

@@ -194,7 +194,7 @@ pub(super) fn beyond(
         (
             Limit::FlatTexts,
             flat_text_bytes(cells, placements),
-            limits.flat_text_bytes,
+            limits.text_bytes_of(bytes),
         ),
         (Limit::Placements, copies, limits.placements),
     ]

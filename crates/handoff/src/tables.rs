@@ -10,7 +10,7 @@ use super::metrology_sites::{Cross, MetrologySite};
 use super::pad::DrawnSize;
 use super::process::Process;
 use super::structures::Structure;
-use metalith_core::{AtomicFile, Result};
+use metalith_core::{AtomicFile, Result, csv_field};
 use metalith_pillars::PillarShape;
 
 /// Rows of text under a head.
@@ -24,27 +24,13 @@ impl Csv {
     }
 
     fn row<T: AsRef<str>>(&mut self, cells: &[T]) {
-        let cells: Vec<_> = cells.iter().map(|c| quoted(c.as_ref())).collect();
+        let cells: Vec<_> = cells.iter().map(|c| csv_field(c.as_ref())).collect();
         self.0.push_str(&cells.join(","));
         self.0.push_str("\r\n");
     }
 
     fn write(&self, path: &Path) -> Result<()> {
         AtomicFile::write(path, self.0.as_bytes())
-    }
-}
-
-/// Cell of a table as RFC 4180 asks: quoted where a comma, quote or line end would be taken for structure. A text that
-/// a spreadsheet would compute as a formula has an apostrophe before it, which makes it a text there.
-fn quoted(cell: &str) -> String {
-    let cell = match cell.chars().next() {
-        Some('=' | '+' | '-' | '@' | '\t' | '\r') if cell.parse::<f64>().is_err() => format!("'{cell}"),
-        _ => cell.to_owned(),
-    };
-    if cell.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", cell.replace('"', "\"\""))
-    } else {
-        cell
     }
 }
 
@@ -245,25 +231,4 @@ pub(super) fn write_structures(path: &Path, structures: &[Structure], shape: Pil
         csv.row(&cells);
     }
     csv.write(path)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn texts_are_no_formulas_and_numbers_stay_numbers() {
-        for (cell, written) in [
-            ("=1+1", "'=1+1"),
-            ("@SUM(A1)", "'@SUM(A1)"),
-            ("-cmd|' /C calc'!A0", "'-cmd|' /C calc'!A0"),
-            ("+2.50", "+2.50"),
-            ("-75.000", "-75.000"),
-            ("=a,\"b\"", "\"'=a,\"\"b\"\"\""),
-            ("plain", "plain"),
-            ("", ""),
-        ] {
-            assert_eq!(quoted(cell), written);
-        }
-    }
 }

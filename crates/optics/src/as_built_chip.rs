@@ -66,7 +66,7 @@ impl AsBuiltChip {
             let all: Vec<String> = faults.iter().map(ToString::to_string).collect();
             return Err(Error::refused(
                 "model/impossible-values",
-                all.join("\n"),
+                all.join("; "),
                 "correct these values of the calibrated model",
             ));
         }

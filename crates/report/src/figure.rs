@@ -8,6 +8,7 @@ use svg::node::element::{Description, Group, Image, Line, Path, Rectangle, SVG, 
 use super::axis::Fitted;
 use super::number::short;
 use super::{HeatMap, ImageGrid, Matrix, PhotoRow, PillarZoom, Plan, Ranking};
+use metalith_core::text::printable;
 use metalith_core::{AtomicFile, Result};
 
 /// Styles of all drawings, for light, dark and print.
@@ -40,9 +41,9 @@ impl Figure {
         let svg = SVG::new()
             .set("viewBox", format!("0 0 {} {}", short(width), short(height)))
             .set("role", "img")
-            .set("aria-label", title)
-            .add(Title::new(title))
-            .add(Description::new().add(Words::new(words)))
+            .set("aria-label", printable(title).into_owned())
+            .add(Title::new(printable(title)))
+            .add(Description::new().add(Words::new(printable(words))))
             .add(drawing);
         Self {
             svg,
@@ -94,7 +95,7 @@ pub(super) fn text(x: f64, y: f64, anchor: Anchor, content: impl Into<String>) -
         Anchor::Middle => "middle",
         Anchor::End => "end",
     };
-    Text::new(content)
+    Text::new(printable(&content.into()))
         .set("x", short(x))
         .set("y", short(y))
         .set("text-anchor", anchor)

@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use metalith_core::AtomicFile;
+use metalith_core::text::printable_json;
 use metalith_core::{Error, Result};
 
 /// Write `report.json`: the fields of `numbers`, led by `report` (which command's numbers these are) and
@@ -34,7 +35,7 @@ pub fn write_json(path: &Path, report: &str, numbers: &impl Serialize) -> Result
     whole.extend(fields);
     let mut text = format!("{:#}", Value::Object(whole));
     text.push('\n');
-    AtomicFile::write(path, text.as_bytes())
+    AtomicFile::write(path, printable_json(&text).as_bytes())
 }
 
 /// Write values as an indented JSON file, as they are.
@@ -47,7 +48,7 @@ pub fn write_json(path: &Path, report: &str, numbers: &impl Serialize) -> Result
 pub fn write_plain_json(path: &Path, values: &impl Serialize) -> Result<()> {
     let mut text = serde_json::to_string_pretty(values).expect("plain data serialises");
     text.push('\n');
-    AtomicFile::write(path, text.as_bytes())
+    AtomicFile::write(path, printable_json(&text).as_bytes())
 }
 
 /// Words for a number, or for lists of numbers, to four digits.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::figure::{Figure, STYLE};
 use super::table::{Table, Verdict};
+use metalith_core::text::printable_lines;
 use metalith_core::{AtomicFile, Result};
 
 /// Styles of text and tables; those of drawings, and the colours of both, stand beside the drawings.
@@ -215,9 +216,10 @@ impl Page {
     }
 }
 
-/// Text that cannot be taken for markup.
+/// Text that cannot be taken for markup, and that shows what is not printable.
 pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
+    printable_lines(text)
+        .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
@@ -263,5 +265,6 @@ mod tests {
         page.paragraph("<img src=x>").verdict(Verdict::Fail, "<b>");
         let html = page.html();
         assert!(!html.contains("<script") && !html.contains("<img src") && !html.contains("<b>"));
+        assert_eq!(inline("a\u{202e}b `c\u{1b}`"), "a\\u{202e}b <code>c\\u{1b}</code>");
     }
 }

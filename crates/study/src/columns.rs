@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use metalith_core::csv_field;
 use metalith_core::document::Scalar;
 
 use crate::merge::StudyResult;
@@ -45,7 +46,7 @@ impl Values {
             Self::Whole(v) => v[row].to_string(),
             Self::Number(v) => v[row].map_or_else(String::new, |v| v.to_string()),
             Self::Switch(v) => v[row].to_string(),
-            Self::Text(v) => quoted(&v[row]),
+            Self::Text(v) => csv_field(&v[row]),
         }
     }
 }
@@ -89,7 +90,7 @@ pub(crate) fn columns(result: &StudyResult) -> Vec<Column> {
 
 /// One row for each of so many draws; empty where there is no number.
 pub(crate) fn csv(columns: &[Column], draws: usize) -> String {
-    let names: Vec<String> = columns.iter().map(|c| quoted(&c.name)).collect();
+    let names: Vec<String> = columns.iter().map(|c| csv_field(&c.name)).collect();
     let mut text = names.join(",") + "\n";
     for row in 0..draws {
         let fields: Vec<String> = columns.iter().map(|c| c.values.field(row)).collect();
@@ -99,24 +100,9 @@ pub(crate) fn csv(columns: &[Column], draws: usize) -> String {
     text
 }
 
-/// A text as one field of CSV.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn texts_are_one_field() {
-        assert_eq!(quoted("all_powers"), "all_powers");
-        assert_eq!(quoted("a \"b\", c"), "\"a \"\"b\"\", c\"");
-    }
 
     #[test]
     fn a_key_is_a_column_of_numbers_of_switches_or_of_texts() {

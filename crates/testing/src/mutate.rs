@@ -22,6 +22,7 @@ pub const LIMITS: ReadLimits = ReadLimits {
     short_file_shapes: 1 << 14,
     shapes_per_byte: 0,
     flat_text_bytes: 1 << 16,
+    flat_text_bytes_per_byte: 32,
 };
 
 /// Change a few bytes, cut, repeat or move a piece, or splice in a piece of another file.

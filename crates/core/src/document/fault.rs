@@ -200,14 +200,14 @@ impl fmt::Display for Faults {
             write!(
                 f,
                 "{}:{line}:{column}: {}\n  help: {}",
-                self.path.display(),
+                printable(&self.path.to_string_lossy()),
                 fault.what,
                 fault.hint
             )?;
         }
         match self.total - self.faults.len() {
             0 => Ok(()),
-            more => write!(f, "\n{}: {more} more mistakes", self.path.display()),
+            more => write!(f, "\n{}: {more} more mistakes", printable(&self.path.to_string_lossy())),
         }
     }
 }
