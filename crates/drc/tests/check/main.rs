@@ -4,6 +4,7 @@
 mod circles;
 mod decks;
 mod design;
+mod foreign;
 mod forms;
 mod hexagonal;
 mod on_lattice;

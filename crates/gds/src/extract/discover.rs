@@ -14,7 +14,7 @@ use crate::{
     Shape, TiltedRectangle, Transform, Visitor, tilted_rectangle_of,
 };
 use metalith_core::Progress;
-use metalith_pillars::{ElementSite, PillarShape};
+use metalith_pillars::{ElementSite, LatticeKind, PillarShape};
 
 /// Settings of one search of a layout.
 #[derive(Clone, Copy)]
@@ -25,8 +25,8 @@ struct Look {
     widest_nm: i64,
     /// True if an angle is looked for at which all stands.
     at_angles: bool,
-    /// The angle by which the layout is turned back (rad).
-    turn: Option<f64>,
+    /// The angle by which the layout is turned back (rad), and the kind of its lattice.
+    turn: Option<(f64, LatticeKind)>,
 }
 
 /// Settings that nearly all lenses need.
@@ -123,8 +123,8 @@ pub fn discover(
     let turned = match close.turn {
         None => None,
         // What a turned look cannot tell is no fault of the layout.
-        Some(angle) => SIXTHS.into_iter().find_map(|more| {
-            let turn = Some(angle + more);
+        Some((angle, kind)) => SIXTHS[..if kind.is_square() { 1 } else { 3 }].iter().find_map(|more| {
+            let turn = Some((angle + more, kind));
             look(Look {
                 turn,
                 at_angles: false,
@@ -179,7 +179,7 @@ pub fn discover(
         shape,
         majority,
         fits,
-        turn,
+        turn: turn.map(|(angle, _)| angle),
     })
 }
 
@@ -191,8 +191,9 @@ struct Seen {
     majority: PillarShape,
     /// Shapes that may be pillars by their outline, however wide.
     shapes: u64,
-    /// Angle by which a layout is turned back in this search, or by which it should be in another one (rad).
-    turn: Option<f64>,
+    /// Angle by which a layout is turned back in this search, or by which it should be in another one (rad), and the kind of its
+    /// lattice.
+    turn: Option<(f64, LatticeKind)>,
     /// Reason why there is no element, where another angle may show one.
     cause: Option<ExtractionError>,
 }
@@ -216,7 +217,7 @@ impl Seen {
 fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progress: &dyn Progress) -> Result<Seen> {
     let fail = failed(layout.path());
     let mut map = Map::new(scale, how);
-    let is_rounded = visit_turned(layout, selection, how.turn, &mut map, progress)?;
+    let is_rounded = visit_turned(layout, selection, how.turn.map(|(angle, _)| angle), &mut map, progress)?;
     let [squares, circles] = map.shapes;
     let shapes = squares + circles + map.sizes.rectangles;
     let mostly_turned = how.at_angles && map.turned_shapes > squares + circles;
@@ -268,7 +269,13 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
                 finder: PillarFinder::new(shape, scale.nm(1.0)),
                 pillars: Places::new(scale, how.bits),
             };
-            visit_turned(layout, selection, how.turn, &mut search, progress)?;
+            visit_turned(
+                layout,
+                selection,
+                how.turn.map(|(angle, _)| angle),
+                &mut search,
+                progress,
+            )?;
             search.pillars
         }
     };

@@ -248,8 +248,8 @@ impl Oblique {
 }
 
 impl Cluster<'_> {
-    /// Angle by which most centres are on a lattice that is turned (rad), if they are and it moves any of them.
-    pub(super) fn turn(&self) -> Option<f64> {
+    /// Angle by which most centres are on a lattice that is turned (rad), if they are and it moves any of them, and its kind.
+    pub(super) fn turn(&self) -> Option<(f64, LatticeKind)> {
         let tiles = self.sampled();
         let pairs: Vec<[f64; 2]> = tiles.iter().flat_map(|tile| nearest_pairs(tile)).collect();
         let length = typical_distance(&tiles)?;
@@ -285,14 +285,14 @@ impl Cluster<'_> {
                     let angle = lattice.step[1].atan2(lattice.step[0]);
                     let folded = angle - (angle * fold / TAU).round() * TAU / fold;
                     let enough = SHARE_OF_SITES as usize * on >= (SHARE_OF_SITES as usize - 1) * places.len();
-                    return enough.then_some((on, folded));
+                    return enough.then_some((on, folded, kind));
                 }
                 within *= 2.0;
             }
         };
         let kinds = [LatticeKind::Square, LatticeKind::Hexagonal];
-        let (_, angle) = kinds.into_iter().filter_map(of_kind).max_by_key(|(on, _)| *on)?;
-        (angle.abs() * reach > 2.0 * self.unit_halves).then(|| roundest(angle, ROOM * self.unit_halves / reach))
+        let (_, angle, kind) = kinds.into_iter().filter_map(of_kind).max_by_key(|(on, ..)| *on)?;
+        (angle.abs() * reach > 2.0 * self.unit_halves).then(|| (roundest(angle, ROOM * self.unit_halves / reach), kind))
     }
 }
 

@@ -490,6 +490,34 @@ mod tests {
         );
     }
 
+    /// A square at 45 degrees in a cell that is placed at 45 degrees, in a cell that is placed at 90: its own edge, not the box of a box.
+    #[test]
+    fn boxes_of_turned_cells_are_those_of_their_shapes() {
+        let mut records = Records::new();
+        records
+            .cell("AA")
+            .outline(&[[0, -1000], [1000, 0], [0, 1000], [-1000, 0], [0, -1000]]);
+        records.put(kind::ENDSTR, 0, &[]);
+        for (cell, child, angle) in [
+            ("BB", "AA", 0x422D_0000_0000_0000u64),
+            ("CC", "BB", 0x425A_0000_0000_0000),
+        ] {
+            records
+                .cell(cell)
+                .put(kind::SREF, 0, &[])
+                .put(kind::SNAME, 6, child.as_bytes())
+                .put(kind::STRANS, 1, &[0, 0])
+                .put(kind::ANGLE, 5, &angle.to_be_bytes())
+                .xy(&[[5000, 0]])
+                .put(kind::ENDSTR, 0, &[]);
+        }
+        let found = records.inventory();
+        let half = 707.0;
+        let want = [5000.0 - half, 5000.0 - half, 5000.0 + half, 5000.0 + half];
+        assert_eq!(found.layers[0].bounds_nm, Some(want));
+        assert_eq!(found.cells[2].bounds_nm, Some(want));
+    }
+
     /// References that lead nowhere and round in circles are named; what can be counted is.
     #[test]
     fn faults_of_the_tree_are_named() {
