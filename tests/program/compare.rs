@@ -94,6 +94,8 @@ fn a_table_comes_out_of_photographs() {
     assert!(page.contains("Cameras side by side"));
     let numbers = fs::read_to_string(Path::new(&out).join("compare.json")).unwrap();
     assert!(numbers.contains("psnr_linear_db"));
+    // Seconds are printed; in files they would make two runs differ.
+    assert!(numbers.contains("\"cpu_s\": null") && !page.contains("CPU"));
 }
 
 /// Weights of the perceptual distance that find no difference anywhere: zeros of the shapes of AlexNet.

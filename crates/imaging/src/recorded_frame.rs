@@ -171,6 +171,7 @@ mod tests {
     use super::*;
     use crate::exposure::expose;
     use crate::files::FrameFile;
+    use metalith_core::FolderLock;
     use metalith_sensor::ColourFilter;
 
     /// A small sensor with a filter, and its frame of light that fills it here and there.
@@ -198,6 +199,23 @@ mod tests {
             let again = Frame::of_signals(&camera, &[1.0; 3], planes);
             assert!(again.saturated == frame.saturated && again.saturated > 0);
         }
+    }
+
+    #[test]
+    fn a_frame_of_another_run_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let (camera, frame) = recorded_by(ColourFilter::Rggb);
+        let turn = FolderLock::of(folder.path()).unwrap();
+        let path = folder.path().join(FrameFile::NAME);
+        let write = |into: &Path| FrameFile::of(&camera, &frame).write(&frame, into).map(drop);
+        turn.publish("picture", &[], write).unwrap();
+        read_signals(&path, &camera, FrameNumbers::default()).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        std::fs::write(&path, bytes).unwrap();
+        let refused = read_signals(&path, &camera, FrameNumbers::default()).unwrap_err();
+        assert_eq!(refused.id(), "file/altered");
     }
 
     /// Twelve bits in a file of sixteen, above a level of black, and eight bits that need no word.

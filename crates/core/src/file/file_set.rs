@@ -342,9 +342,10 @@ impl FileSet {
                 Vec::new()
             });
         };
-        let old = match new.is_listed {
-            true => SetManifest::read(&self.manifest)?.unwrap_or_default(),
-            false => SetManifest::default(),
+        let old = if new.is_listed {
+            SetManifest::read(&self.manifest)?.unwrap_or_default()
+        } else {
+            SetManifest::default()
         };
         let mut coming = Vec::new();
         for name in new.names() {

@@ -21,7 +21,7 @@ fn versions(folder: &Path) -> Vec<usize> {
     let text = |name: &str| fs::read_to_string(folder.join(name)).ok();
     let of_file = |name: &&str| text(name).map(|t| t[..1].parse().unwrap());
     let all = NAMES.iter().flatten().collect::<std::collections::BTreeSet<_>>();
-    let files = all.into_iter().filter_map(|name| of_file(name));
+    let files = all.into_iter().filter_map(of_file);
     let list = text(".set.sha256").map(|t| usize::from(t.contains("new.png")));
     files.chain(list).collect()
 }
