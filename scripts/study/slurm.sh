@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A study through Slurm on this machine alone: daemons of its own in a folder, arrays below MaxArraySize, one task killed
 # and healed by submitting again, and the same draws as a single process makes. Needs root and Debian's slurm-wlm.
-# Usage: scripts/study/slurm.sh [METALITH] [FOLDER]; the log of a run is in docs/guide/study.md.
+# Usage: scripts/study/slurm.sh [METALITH] [FOLDER]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 metalith=$(realpath "${1:-target/release/metalith}")
@@ -71,6 +71,10 @@ max_array_size = 17
 CONF
 "$metalith" study plan "$folder/tolerance.toml" --out "$folder/study" --draws-per-shard 1 --quiet
 "$metalith" study submit "$folder/study" --slurm "$folder/cluster.toml"
+# What is queued is left out: no job is new.
+jobs=$(wc -l <"$folder/study/slurm/submitted.jsonl")
+"$metalith" study submit "$folder/study" --slurm "$folder/cluster.toml"
+[ "$(wc -l <"$folder/study/slurm/submitted.jsonl")" = "$jobs" ]
 killed=
 until [ -n "$killed" ]; do
     sleep 0.2

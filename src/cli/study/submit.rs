@@ -83,16 +83,19 @@ impl SubmitArgs {
 pub(super) fn run(args: &SubmitArgs, terminal: &Terminal) -> Result<Outcome> {
     let slurm = args.settings()?;
     let (cut, tolerance) = args.work()?;
-    let found = cut.status()?;
-    found.check_usable()?;
     if args.print {
+        let found = cut.status()?;
+        found.check_usable()?;
         for shard in found.missing {
             print_line!("{}", slurm.command(&cut, shard)?);
         }
         return Ok(Outcome::Fine);
     }
     let _turn = terminal.turn_at(&args.study.join("slurm"))?;
+    // Asked before the shards are looked at: a task that ends in between has made its shard.
     let mut queue = Queue::of(args)?;
+    let found = cut.status()?;
+    found.check_usable()?;
     let queued = queue.shards(&cut)?;
     let missing: Vec<u64> = found.missing.into_iter().filter(|n| !queued.contains(n)).collect();
     if !queued.is_empty() {
@@ -197,7 +200,7 @@ impl Queue {
     fn submit(&self, job: &Job, variable: &str, after: &[String], args: &SubmitArgs) -> Result<String> {
         // One plan is enough. A merge that is queued waits for the arrays before: another one follows those of now.
         let same = self.numbers.iter().find(|(name, _)| *name == job.name);
-        if let Some((_, number)) = same.filter(|_| self.is_asked && variable == "plan") {
+        if let Some((_, number)) = same.filter(|_| variable == "plan") {
             return Ok(number.clone());
         }
         let what = match job.shards.len() {
