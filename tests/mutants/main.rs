@@ -32,6 +32,9 @@ const MEMORY_PER_BYTE: u64 = 64;
 /// Bytes of reasons that a person may be shown: fifty mistakes, each with its lines.
 const LONGEST_TEXT: usize = 64 << 10;
 
+/// Letters of longer ones that are shown.
+const REASONS_SHOWN: usize = 600;
+
 #[test]
 fn damaged_files_of_every_format_are_read_or_refused() {
     let count = std::env::var("METALITH_MUTANTS").map_or(USUAL, |n| n.parse().expect("a number of mutants"));
@@ -79,9 +82,11 @@ fn survive(format: &Format, count: u64) {
             Ok(()) => accepted += 1,
             Err(why) => assert!(
                 !why.is_empty() && why.len() <= LONGEST_TEXT,
-                "{}, mutant {n}: {} bytes of reasons",
+                "{}, mutant {n}, kept as {}: {} bytes of reasons: {}",
                 format.name,
-                why.len()
+                keep(&format.file),
+                why.len(),
+                why.chars().take(REASONS_SHOWN).collect::<String>()
             ),
         }
         slowest = slowest.max(took);

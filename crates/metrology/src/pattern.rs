@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use metalith_core::text::quoted;
+
 /// Values of the names in a pattern.
 pub(crate) type Named = BTreeMap<String, String>;
 
@@ -38,10 +40,10 @@ impl NamePattern {
             let close = rest[open..].find('}').ok_or("a brace is not closed")? + open;
             let name = &rest[open + 1..close];
             if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-                return Err(format!("{{{name}}} is no name"));
+                return Err(format!("{{{}}} is no name", quoted(name)));
             }
             if parts.contains(&Part::Name(name.into())) {
-                return Err(format!("{{{name}}} stands twice"));
+                return Err(format!("{{{}}} stands twice", quoted(name)));
             }
             if open > 0 {
                 parts.push(Part::Literal(rest[..open].into()));
