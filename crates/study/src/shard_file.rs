@@ -97,11 +97,13 @@ impl ShardState {
         }
         if place.map(|shard| plan.header(shard)).as_ref() != Some(&header) {
             let last = header.end.saturating_sub(1);
-            let why = format!(
-                "holds {}s {} to {last} as shard {}, of a plan that was cut otherwise or under another name",
-                plan.part, header.first, header.shard
+            return Self::Foreign(
+                "study/shard-range-differs",
+                format!(
+                    "holds {}s {} to {last} as shard {}, of a plan that was cut otherwise or under another name",
+                    plan.part, header.first, header.shard
+                ),
             );
-            return Self::Foreign("study/shard-range-differs", why);
         }
         // One line is the header.
         let lines = text.bytes().filter(|byte| *byte == b'\n').count() as u64;
