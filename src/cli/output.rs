@@ -72,7 +72,9 @@ fn write(printable: &str) {
 
 /// Write a text to standard error, as `eprint!` does, but without a panic where it cannot be written: what it says is no answer.
 pub(crate) fn tell(text: &str) {
-    let _ = stderr().lock().write_all(printable_lines(&shown(text.to_owned())).as_bytes());
+    let _ = stderr()
+        .lock()
+        .write_all(printable_lines(&shown(text.to_owned())).as_bytes());
 }
 
 /// Variant of [`tell`] for a text that is drawn with colours: as it is if `plain`, the same without colours, is printable.

@@ -17,6 +17,7 @@ mod cube;
 mod depth;
 mod exr;
 mod folder;
+mod jpeg;
 mod pictures;
 mod pixel_count;
 mod read;

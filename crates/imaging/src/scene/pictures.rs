@@ -4,16 +4,16 @@ use std::io::Cursor;
 use std::path::Path;
 
 use metalith_core::{Result, file_kind, tiff};
-use ndarray::{Array3, Axis};
+use ndarray::Array3;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::colours::Colours;
-use super::exr;
 use super::pixel_count::SIDES;
 use super::read::{check_sides, fault, sides};
+use super::{exr, jpeg};
 
 /// Pixels of an image file.
 pub(super) enum Stored {
@@ -37,9 +37,14 @@ pub(super) fn stored(path: &Path, bytes: &[u8]) -> Result<Stored> {
     if bytes.starts_with(b"\x89PNG") {
         let png = png_values(path, bytes)?;
         let colours = png.colours.map_err(|what| fault(path, what))?;
-        Ok(Stored::of(upright(png.values, png.orientation), &colours))
+        let (rows, columns, _) = png.values.dim();
+        let values = match png.orientation {
+            1 => png.values,
+            other => upright([rows, columns], other, |y, x, c| png.values[[y, x, c]]),
+        };
+        Ok(Stored::of(values, &colours))
     } else if bytes.starts_with(&[0xff, 0xd8]) {
-        jpeg(path, bytes)
+        jpeg_values(path, bytes)
     } else if [&b"II*\0"[..], b"MM\0*", b"II+\0", b"MM\0+"]
         .iter()
         .any(|m| bytes.starts_with(m))
@@ -81,14 +86,15 @@ fn tiff_values(path: &Path, bytes: &[u8]) -> Result<Stored> {
     if own > colours && (0..rows).any(|y| (0..columns).any(|x| value(y, x, colours) < 1.0)) {
         return Err(fault(path, TRANSPARENT));
     }
-    let values = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| value(y, x, c.min(colours - 1)));
+    let values = upright([rows, columns], read.orientation, |y, x, c| {
+        value(y, x, c.min(colours - 1))
+    });
     finite(path, &values)?;
     let colours = match (&read.profile, page.largest) {
         (Some(profile), _) => Some(Colours::of_profile(profile).map_err(|what| fault(path, what))?),
         (None, Some(_)) => None,
         (None, None) => Some(Colours::linear(None)),
     };
-    let values = upright(values, read.orientation);
     Ok(match colours {
         Some(colours) => Stored::of(values, &colours),
         None => Stored::Srgb(values),
@@ -97,6 +103,9 @@ fn tiff_values(path: &Path, bytes: &[u8]) -> Result<Stored> {
 
 /// Word on a picture that is not opaque.
 const TRANSPARENT: &str = "parts of it are transparent";
+
+/// Most bytes that one byte of a deflated stream stands for (RFC 1951: 258 bytes by two bits).
+const DEFLATED: usize = 1032;
 
 /// An opaque PNG.
 pub(super) struct Png {
@@ -120,6 +129,14 @@ pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<Png> {
     let size = reader
         .output_buffer_size()
         .ok_or_else(|| fault(path, "it is too large"))?;
+    let least = (reader.info().raw_bytes() / DEFLATED) as u64;
+    if least > bytes.len() as u64 {
+        let what = format!(
+            "{} bytes are too few for {columns} x {rows} pixels: it ends early",
+            bytes.len()
+        );
+        return Err(fault(path, what));
+    }
     let mut data = vec![0; size];
     let info = reader.next_frame(&mut data).map_err(wrong)?;
     let samples = info.color_type.samples();
@@ -149,9 +166,11 @@ pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<Png> {
     })
 }
 
-fn jpeg(path: &Path, bytes: &[u8]) -> Result<Stored> {
+fn jpeg_values(path: &Path, bytes: &[u8]) -> Result<Stored> {
+    jpeg::check_whole(bytes).map_err(|what| fault(path, what))?;
     let options = DecoderOptions::default()
         .jpeg_set_out_colorspace(ColorSpace::RGB)
+        .set_strict_mode(true)
         .set_max_width(*SIDES.end())
         .set_max_height(*SIDES.end());
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
@@ -161,10 +180,25 @@ fn jpeg(path: &Path, bytes: &[u8]) -> Result<Stored> {
     if data.len() != rows * columns * 3 {
         return Err(fault(path, "its colours are not those of a picture"));
     }
-    let stored = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
+    // A decoder takes blocks that are missing before the mark of the end as grey.
+    let differs = |probed: Vec<u8>| {
+        let probed = JpegDecoder::new_with_options(ZCursor::new(&probed[..]), options.set_strict_mode(false)).decode();
+        probed.map_or(Some(0), |probed| {
+            data.iter().zip(&probed).position(|(own, other)| own != other)
+        })
+    };
+    if let Some(first) = jpeg::probed(bytes).and_then(differs) {
+        let row = first / (3 * columns);
+        return Err(fault(
+            path,
+            format!("it ends early: its data stop by row {row} of {rows}"),
+        ));
+    }
+    let orientation = decoder.exif().map_or(1, |exif| orientation(exif));
+    let stored = upright([rows, columns], orientation, |y, x, c| {
         f64::from(data[(y * columns + x) * 3 + c]) / 255.0
     });
-    let stored = upright(stored, decoder.exif().map_or(1, |exif| orientation(exif)));
+    drop(data);
     Ok(match decoder.icc_profile() {
         Some(profile) => Stored::of(
             stored,
@@ -202,16 +236,22 @@ pub(super) fn orientation(exif: &[u8]) -> u16 {
     said().filter(|o| (1..=8).contains(o)).unwrap_or(1)
 }
 
-/// A picture as it was seen by a camera that was held so.
-fn upright(mut stored: Array3<f64>, orientation: u16) -> Array3<f64> {
-    if orientation >= 5 {
-        stored.swap_axes(0, 1);
-    }
-    if matches!(orientation, 3 | 4 | 7 | 8) {
-        stored.invert_axis(Axis(0));
-    }
-    if matches!(orientation, 2 | 3 | 6 | 7) {
-        stored.invert_axis(Axis(1));
-    }
-    stored.as_standard_layout().into_owned()
+/// A picture of so many rows and columns as it was seen by a camera that was held so. Made at once from `stored`, row, column and
+/// colour: a copy of a large picture costs as much memory as everything else.
+fn upright([rows, columns]: [usize; 2], orientation: u16, stored: impl Fn(usize, usize, usize) -> f64) -> Array3<f64> {
+    let is_turned = orientation >= 5;
+    let (seen_rows, seen_columns) = if is_turned { (columns, rows) } else { (rows, columns) };
+    Array3::from_shape_fn((seen_rows, seen_columns, 3), |(y, x, c)| {
+        let y = if matches!(orientation, 3 | 4 | 7 | 8) {
+            seen_rows - 1 - y
+        } else {
+            y
+        };
+        let x = if matches!(orientation, 2 | 3 | 6 | 7) {
+            seen_columns - 1 - x
+        } else {
+            x
+        };
+        if is_turned { stored(x, y, c) } else { stored(y, x, c) }
+    })
 }

@@ -88,7 +88,7 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
                 grey_or_colour(path, light(path, &bytes)?)?
             } else {
                 match stored(path, &bytes)? {
-                    Stored::Srgb(values) => values.mapv(srgb::linear),
+                    Stored::Srgb(values) => values.mapv_into(srgb::linear),
                     Stored::Light(light) => light,
                 }
             };
@@ -104,11 +104,11 @@ pub fn read_scene(file: &SceneFile) -> Result<SceneImage> {
 pub fn read_picture(path: &Path) -> Result<Array3<f64>> {
     let bytes = read_at_most(path, LONGEST, "a picture")?;
     if is_npy(&bytes) {
-        return Ok(grey_or_colour(path, light(path, &bytes)?)?.mapv(srgb::encoded));
+        return Ok(grey_or_colour(path, light(path, &bytes)?)?.mapv_into(srgb::encoded));
     }
     Ok(match stored(path, &bytes)? {
         Stored::Srgb(values) => values,
-        Stored::Light(light) => light.mapv(srgb::encoded),
+        Stored::Light(light) => light.mapv_into(srgb::encoded),
     })
 }
 
