@@ -74,7 +74,7 @@ TOLERANCE = """schema = 1
 design = "{design}"
 draws = {draws}
 [[vary]]
-effect = "gap"
+effect = "defocus"
 distribution = "uniform"
 low = -4.0
 high = 4.0
