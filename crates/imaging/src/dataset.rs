@@ -232,6 +232,8 @@ impl<'a> PairWriter<'a> {
             png16::source_of(&bytes).is_some_and(|s| s == of).then_some(bytes)
         };
         let pair = if let (Some(frame), Some(truth)) = (kept(&frame_file, &of_frame), kept(&truth_file, &of_truth)) {
+            AtomicFile::clear(&frame_file);
+            AtomicFile::clear(&truth_file);
             [frame, truth]
         } else {
             let scene = read(image)?;

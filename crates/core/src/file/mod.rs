@@ -8,6 +8,7 @@ mod folder_lock;
 mod part;
 mod set_manifest;
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -74,6 +75,15 @@ impl AtomicFile {
         }
     }
 
+    /// Remove what a killed run left unfinished of the file at `target`; what a living one writes stays.
+    pub fn clear(target: &Path) {
+        let left = target.file_name().map(|name| part_of(target, name));
+        if left.is_some_and(|part| fs::symlink_metadata(part).is_ok()) {
+            // Dropped before it is complete, it goes.
+            let _ = Self::create(target);
+        }
+    }
+
     /// Begin to write the file that is to stand at `target`, creating its folder if need be.
     ///
     /// # Errors
@@ -98,7 +108,7 @@ impl AtomicFile {
                 "name a file in it, or another file",
             ));
         }
-        let part = target.with_file_name(format!(".{}.part", name.to_string_lossy()));
+        let part = part_of(target, name);
         let locked = part::open(&part, target)?;
         let is_locked = locked.is_some();
         let (part, file) = match locked {
@@ -140,6 +150,11 @@ impl AtomicFile {
         self.out = None;
         part::flush_folder_of(&self.target).map_err(Error::io("flush the folder of", &self.target))
     }
+}
+
+/// Path of the unfinished file.
+fn part_of(target: &Path, name: &OsStr) -> PathBuf {
+    target.with_file_name(format!(".{}.part", name.to_string_lossy()))
 }
 
 impl Write for AtomicFile {

@@ -152,6 +152,9 @@ fn a_killed_process_leaves_nothing_in_the_way() {
     holder.wait().unwrap();
     assert_eq!(std::fs::read(&target).unwrap(), b"old");
     assert!(part_of(&target).exists());
+    AtomicFile::clear(&target);
+    assert!(!part_of(&target).exists());
+    assert_eq!(std::fs::read(&target).unwrap(), b"old");
     AtomicFile::write(&target, b"new").unwrap();
     assert_eq!(std::fs::read(&target).unwrap(), b"new");
     assert!(!part_of(&target).exists());
