@@ -113,6 +113,9 @@ fn tell_status(args: &StatusArgs) -> Result<Outcome> {
         for (path, why) in found.damaged.iter().chain(&found.unusable) {
             print_line!("{} {why}", path.display());
         }
+        if let Some(words) = found.of_several_processors() {
+            print_line!("{words}");
+        }
     }
     Ok(Outcome::Fine)
 }
@@ -123,7 +126,7 @@ fn merge_shards(args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
         Work::Pairs(plan) => merge_pairs(&plan, args, terminal),
         #[cfg(feature = "baselines")]
         Work::Comparison(plan) => merge_comparison(&plan, args, terminal),
-        Work::Starts(plan) => merge_starts(&plan, args),
+        Work::Starts(plan) => merge_starts(&plan, args, terminal),
     }
 }
 
@@ -158,9 +161,9 @@ fn merge_comparison(plan: &metalith::study::ComparisonPlan, args: &MergeArgs, te
     Ok(Outcome::Fine)
 }
 
-fn merge_starts(plan: &StartsPlan, args: &MergeArgs) -> Result<Outcome> {
+fn merge_starts(plan: &StartsPlan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     without_table(args)?;
-    let result = plan.merge()?;
+    let result = plan.merge(terminal)?;
     let best = &result.starts[result.best];
     print_line!(
         "best of {} starts: number {}, merit {}",

@@ -68,7 +68,7 @@ impl ComparisonPlan {
     /// # Errors
     /// If cameras are missing or there twice; as [`ComparisonPlan::run`].
     pub fn merge(&self, progress: &dyn Progress) -> Result<ComparisonResult> {
-        let mut cameras: Vec<ComparedCamera> = self.cut().whole(&|_| None)?;
+        let mut cameras: Vec<ComparedCamera> = self.cut().whole(&|_| None, progress)?;
         if key(&self.comparison, progress)? != self.key {
             return Err(another_plan(&self.folder));
         }

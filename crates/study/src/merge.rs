@@ -48,7 +48,7 @@ pub struct StudyResult {
 /// If shards are missing, damaged or of another plan, all named; if amounts are not those that the plan draws; as
 /// [`Run::open`].
 pub fn merge(plan: &Plan, show: usize, progress: &dyn Progress) -> Result<StudyResult> {
-    let draws = plan.cut().whole(&|d: &DrawRecord| Some(d.draw))?;
+    let draws = plan.cut().whole(&|d: &DrawRecord| Some(d.draw), progress)?;
     check_counts(plan, &draws)?;
     let run = Run::open(plan, progress)?;
     run.check(&draws)?;

@@ -118,7 +118,7 @@ impl PairsPlan {
     /// If pairs are missing or there twice, one of their files is not what its shard wrote, all named; if the manifest cannot be
     /// written, or the user stopped it.
     pub fn merge(&self, progress: &dyn Progress) -> Result<DatasetManifest> {
-        let pairs: Vec<DatasetPair> = self.cut().whole(&|_| None)?;
+        let pairs: Vec<DatasetPair> = self.cut().whole(&|_| None, progress)?;
         self.check_files(&pairs, progress)?;
         let manifest = DatasetManifest {
             pairs,

@@ -29,13 +29,18 @@ pub(crate) struct Header {
     pub shard: u64,
     pub first: u64,
     pub end: u64,
+    /// Processor and vector instructions that made it: see [`vector_instructions`](metalith_core::vector_instructions).
+    pub instructions: String,
 }
 
 /// State of the file of a shard.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum ShardState {
-    /// A shard of this plan at its place: its text without the digest.
-    Whole(String),
+    /// A shard of this plan at its place: its text without the digest, and the instructions that it was made with.
+    Whole {
+        text: String,
+        instructions: String,
+    },
     Absent,
     /// The file ends before its digest, or has none.
     Truncated,
@@ -95,7 +100,9 @@ impl ShardState {
         if header.plan != plan.key {
             return Self::of_another_plan();
         }
-        if place.map(|shard| plan.header(shard)).as_ref() != Some(&header) {
+        let instructions = header.instructions.clone();
+        let own = place.map(|shard| plan.header(shard, &instructions));
+        if own.as_ref() != Some(&header) {
             let last = header.end.saturating_sub(1);
             return Self::Foreign(
                 "study/shard-range-differs",
@@ -110,7 +117,7 @@ impl ShardState {
         if lines != 1 + header.end - header.first {
             return Self::Damaged;
         }
-        Self::Whole(text)
+        Self::Whole { text, instructions }
     }
 
     /// State of a file that does not end in a digest: a part of a shard, or something else.
@@ -147,7 +154,7 @@ mod tests {
     }
 
     fn text(plan: &Sharding, number: u64) -> String {
-        let header = plan.header(plan.shard(number).unwrap());
+        let header = plan.header(plan.shard(number).unwrap(), "x86_64 avx2");
         let text = format!(
             "{}\n{{\"draw\":0}}\n{{\"draw\":1}}\n",
             serde_json::to_string(&header).unwrap()
@@ -162,13 +169,16 @@ mod tests {
         let own = text(&plan, 0);
         let shard = plan.shard(0).ok();
         let of = |bytes: &[u8]| ShardState::of_bytes(&plan, bytes.to_vec(), shard);
-        assert!(matches!(of(own.as_bytes()), ShardState::Whole(_)));
+        assert!(matches!(of(own.as_bytes()), ShardState::Whole { .. }));
         for at in 0..own.len() {
             assert_eq!(of(&own.as_bytes()[..at]), ShardState::Truncated, "{at}");
             for bit in 0..8 {
                 let mut bytes = own.clone().into_bytes();
                 bytes[at] ^= 1 << bit;
-                assert!(!matches!(of(&bytes), ShardState::Whole(_)), "bit {bit} of byte {at}");
+                assert!(
+                    !matches!(of(&bytes), ShardState::Whole { .. }),
+                    "bit {bit} of byte {at}"
+                );
             }
         }
     }
@@ -206,7 +216,7 @@ mod tests {
         fs::write(at("whole"), text(&plan, 0)).unwrap();
         std::os::unix::fs::symlink(at("whole"), at("link")).unwrap();
         let of = |path: &Path| ShardState::of(&plan, path, plan.shard(0).ok()).unwrap();
-        assert!(matches!(of(&at("whole")), ShardState::Whole(_)));
+        assert!(matches!(of(&at("whole")), ShardState::Whole { .. }));
         assert_eq!(of(&at("none")), ShardState::Absent);
         for other in [&at("link"), folder.path(), Path::new("/dev/zero")] {
             assert!(

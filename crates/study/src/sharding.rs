@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_core::{AtomicFile, Error, Progress, Result, vector_instructions};
 use serde::{Deserialize, Serialize};
 
 use crate::manifest::MANIFEST;
@@ -86,12 +86,13 @@ impl Sharding {
         self.shards_folder().join(format!("{number:06}.jsonl"))
     }
 
-    pub(crate) fn header(&self, shard: Shard) -> Header {
+    pub(crate) fn header(&self, shard: Shard, instructions: &str) -> Header {
         Header {
             plan: self.key.clone(),
             shard: shard.number,
             first: shard.first,
             end: shard.end,
+            instructions: instructions.to_owned(),
         }
     }
 
@@ -170,7 +171,7 @@ impl Sharding {
         if self.finished(number)? {
             return Ok(true);
         }
-        let mut text = line(&self.header(shard));
+        let mut text = line(&self.header(shard, &vector_instructions()));
         progress.begin(&format!("shard {number}"), shard.end - shard.first);
         for k in shard.first..shard.end {
             progress.check_stopped()?;
@@ -180,7 +181,7 @@ impl Sharding {
         text.push_str(&digest_line(&text));
         file.write_all(text.as_bytes()).map_err(Error::io("write", &path))?;
         match file.commit() {
-            // On a file system without locks: the other run writes the same bytes.
+            // On a file system without locks: the other run writes the same parts.
             Err(error) if error.id() == "file/changed-meanwhile" => {
                 if !self.finished(number)? {
                     AtomicFile::write(&path, text.as_bytes())?;
@@ -207,7 +208,7 @@ impl Sharding {
         let shard = self.shard(number)?;
         let path = self.path(number);
         match ShardState::of(self, &path, Some(shard))? {
-            ShardState::Whole(_) => Ok(true),
+            ShardState::Whole { .. } => Ok(true),
             ShardState::Absent | ShardState::Truncated | ShardState::Damaged => Ok(false),
             ShardState::Foreign(id, why) => Err(Error::refused(
                 id,

@@ -121,8 +121,8 @@ impl StartsPlan {
     ///
     /// # Errors
     /// If starts are missing or there twice, none has a merit, or a file cannot be written.
-    pub fn merge(&self) -> Result<StartsResult> {
-        let starts = self.cut().whole(&|s: &StartRecord| Some(s.start))?;
+    pub fn merge(&self, progress: &dyn Progress) -> Result<StartsResult> {
+        let starts = self.cut().whole(&|s: &StartRecord| Some(s.start), progress)?;
         let design = Design::read(&self.design)?;
         let task = OptimiseTask::of(&design)?;
         let finite = starts.iter().enumerate().filter(|(_, s)| s.merit.is_finite());

@@ -167,7 +167,7 @@ fn starts_of_the_optimiser_are_runs_with_their_seeds() {
     let planned = plan_starts(&path, 3, 2, &folder.path().join("starts"), &Silent).unwrap();
     let work = Work::open(&planned.folder).unwrap();
     work.run(&[1, 0], &Silent).unwrap();
-    let result = planned.merge().unwrap();
+    let result = planned.merge(&Silent).unwrap();
     assert_eq!(result.starts.iter().map(|s| s.seed).collect::<Vec<_>>(), [5, 7, 9]);
     let best = result.starts.iter().map(|s| s.merit).fold(f64::MIN, f64::max);
     assert_eq!(result.starts[result.best].merit, best);

@@ -90,7 +90,7 @@ fn examples(folder: &Path) -> Vec<Example> {
 /// A shard of an example, without the line of its digest.
 fn shard(example: &Example, number: u64) -> String {
     let (first, end) = (number * example.per_shard, (number + 1) * example.per_shard);
-    let header = json!({ "plan": key(), "shard": number, "first": first, "end": end });
+    let header = json!({ "plan": key(), "shard": number, "first": first, "end": end, "instructions": "x86_64 avx2" });
     let lines = [header].into_iter().chain((first..end).map(example.part));
     lines.map(|line| format!("{line}\n")).collect()
 }
@@ -105,7 +105,7 @@ fn read(folder: &Path) -> metalith::Result<()> {
         Work::Study(plan) => merge(plan, 0, &Silent).map(drop),
         Work::Pairs(plan) => plan.merge(&Silent).map(drop),
         Work::Comparison(plan) => plan.merge(&Silent).map(drop),
-        Work::Starts(plan) => plan.merge().map(drop),
+        Work::Starts(plan) => plan.merge(&Silent).map(drop),
     };
     merged.or_else(|error| {
         if OF_OTHER_FILES.contains(&error.id()) {
@@ -124,30 +124,13 @@ pub(super) fn all(folder: &Path) -> Vec<Format> {
         let plan = format!("{:#}\n", example.plan);
         let shards: Vec<String> = (0..PARTS / example.per_shard).map(|n| shard(&example, n)).collect();
         let at = |n: usize| own.join("shards").join(format!("{n:06}.jsonl"));
-        let write = |ending: Option<(&Ending, &Ending)>| -> Vec<Vec<u8>> {
-            let [plan, shards] = match ending {
-                Some((of_plan, of_shard)) => [
-                    vec![of_plan.sealed(plan.as_bytes())],
-                    shards.iter().map(|s| of_shard.sealed(s.as_bytes())).collect(),
-                ],
-                None => [
-                    vec![plan.clone().into()],
-                    shards.iter().map(|s| s.clone().into()).collect(),
-                ],
-            };
-            fs::write(own.join("plan.json"), &plan[0]).unwrap();
-            for (n, shard) in shards.iter().enumerate() {
-                fs::write(at(n), shard).unwrap();
-            }
-            plan.into_iter().chain(shards).collect()
-        };
-        // Files with digests, where the reader knows these.
-        let mut files = write(Some((&PLAN_ENDING, &SHARD_ENDING)));
-        let has_digests = Work::open(&own).is_ok();
-        if !has_digests {
-            files = write(None);
+        let mut files = vec![PLAN_ENDING.sealed(plan.as_bytes())];
+        files.extend(shards.iter().map(|shard| SHARD_ENDING.sealed(shard.as_bytes())));
+        fs::write(own.join("plan.json"), &files[0]).unwrap();
+        for (n, shard) in files[1..].iter().enumerate() {
+            fs::write(at(n), shard).unwrap();
         }
-        let kind = |ending: &'static Ending| if has_digests { Kind::Ended(ending) } else { Kind::Text };
+        let kind = |ending: &'static Ending| Kind::Ended(ending);
         let reads = |folder: PathBuf| move |_: &Path| read(&folder);
         let shards = files.split_off(1);
         all.push(Format::new(

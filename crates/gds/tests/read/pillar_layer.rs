@@ -2,7 +2,7 @@
 
 use super::layout;
 use metalith_core::Silent;
-use metalith_gds::{LayerNumber, Layout};
+use metalith_gds::{Error, ExtractionError, LayerNumber, Layout};
 use metalith_testing::gds::Gds;
 
 /// A layout of lenses of 10 x 10 squares and of marks, each on its layers.
@@ -46,8 +46,10 @@ fn layers_that_may_be_meant_are_listed() {
         ),
         (&[], &[7, 20], "7/0: 1 polygon; 20/0: 1 polygon; text on 63/0"),
     ] {
-        let error = metalith_core::Error::from(drawn(lenses, marks).pillar_layer(&Silent).unwrap_err());
-        assert_eq!(error.id(), "extract/which-layer");
-        assert!(error.to_string().contains(words), "{error}");
+        let error = drawn(lenses, marks).pillar_layer(&Silent).unwrap_err();
+        assert!(
+            matches!(&error, Error::Extraction { cause: ExtractionError::WhichLayer { contents }, .. } if contents == words),
+            "{error}"
+        );
     }
 }

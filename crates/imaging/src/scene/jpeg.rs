@@ -164,22 +164,14 @@ mod tests {
         let path = folder.path().join("cut.jpg");
         let read = |bytes: &[u8]| {
             std::fs::write(&path, bytes).unwrap();
-            read_picture(&path).map_err(|e| e.to_string())
+            read_picture(&path)
         };
         read(WHOLE).unwrap();
-        let mut late = 0;
         for kept in (2..WHOLE.len() - 2).step_by(10) {
             let cut = &WHOLE[..kept];
-            let why = read(cut).unwrap_err();
-            assert!(
-                why.contains("it ends early") || why.contains("is no mark"),
-                "{kept}: {why}"
-            );
-            if read(&[cut, &[0xff, 0xd9]].concat()).is_ok() {
-                late += 1;
-            }
+            read(cut).unwrap_err();
+            read(&[cut, &[0xff, 0xd9]].concat()).unwrap_err();
         }
-        assert_eq!(late, 0);
     }
 
     /// A file of few bytes that says that it is large.
@@ -191,7 +183,7 @@ mod tests {
             .position(|pair| matches!(pair, [0xff, 0xc0..=0xc2]))
             .unwrap();
         claims[head + 5..head + 9].copy_from_slice(&[0x10, 0, 0x10, 0]);
-        let why = super::check_whole(&claims).unwrap_err();
-        assert!(why.contains("too few for the") && why.contains("4096 x 4096"), "{why}");
+        super::check_whole(WHOLE).unwrap();
+        super::check_whole(&claims).unwrap_err();
     }
 }
