@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::process::{Child, Command};
 
 use clap::{Args, Subcommand};
+use metalith::gds::LayerNumber;
 use metalith::report::{counted, sig};
 use metalith::study::{
-    MANIFEST, PairsPlan, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan, submissions,
-    write_page,
+    MANIFEST, PairsPlan, PillarPlace, Plan, PlanSettings, REPORT, Slurm, StartsPlan, TableFormat, Work, merge, plan,
+    submissions, write_page,
 };
 use metalith::{Error, Progress, Result};
 
@@ -50,6 +51,14 @@ struct PlanArgs {
     /// Draws in a shard; as many as take ten minutes if left out. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     draws_per_shard: Option<u64>,
+
+    /// Layer and datatype of the pillars in the layout that the tolerance file names; that of the design if left out.
+    #[arg(long, value_name = "LAYER/DATATYPE", value_parser = super::psf::layer)]
+    layer: Option<LayerNumber>,
+
+    /// Cell of this layout to start from; the top cell if there is only one.
+    #[arg(long, value_name = "CELL")]
+    top: Option<String>,
 }
 
 #[derive(Args)]
@@ -123,6 +132,10 @@ pub(crate) fn run(args: &StudyArgs, terminal: &Terminal) -> Result<Outcome> {
 fn plan_study(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     let settings = PlanSettings {
         draws_per_shard: args.draws_per_shard,
+        place: PillarPlace {
+            layer: args.layer,
+            top: args.top.clone(),
+        },
     };
     let plan = plan(&args.tolerance, &args.out, settings, terminal)?;
     terminal.clear();
