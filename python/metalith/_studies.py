@@ -47,19 +47,30 @@ class StudyResult:
 
 
 class Study:
-    """A study of ``tolerance.toml`` in a folder, which is planned when it is first needed."""
+    """A study of ``tolerance.toml`` in a folder, which is planned when it is first needed. ``layer`` (layer and datatype) is that
+    of the pillars of the layout that the tolerance file names, if it is not as its design says; ``top`` the cell to start
+    from, if this layout has several."""
 
     def __init__(
-        self, tolerance: PathLike, folder: PathLike | None = None, *, draws_per_shard: int | None = None
+        self,
+        tolerance: PathLike,
+        folder: PathLike | None = None,
+        *,
+        draws_per_shard: int | None = None,
+        layer: tuple[int, int] | None = None,
+        top: str | None = None,
     ) -> None:
         self.tolerance = Path(tolerance)
         self.folder = Path(folder) if folder is not None else self.tolerance.with_suffix(".study")
         self._draws_per_shard = _arguments.maybe_whole("draws_per_shard", draws_per_shard, 1, _arguments.MOST_64)
+        self._layer = None if layer is None else _arguments.layer(layer)
+        self._top = top
         self._shards: int | None = None
 
     def plan(self, progress: Progress | None = None) -> Json:
         """Plan it, if it is not planned: the manifest. Tables of cells are made here, once."""
-        found = json.loads(_native.study_plan(self.tolerance, self.folder, self._draws_per_shard, progress))
+        settings = (self._draws_per_shard, progress, self._layer, self._top)
+        found = json.loads(_native.study_plan(self.tolerance, self.folder, *settings))
         self._shards = int(found["shards"])
         plan: Json = found["plan"]
         return plan

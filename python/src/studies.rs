@@ -3,22 +3,29 @@
 use std::path::PathBuf;
 
 use metalith::FolderLock;
-use metalith::study::{self, Plan, PlanSettings, Work};
+use metalith::gds::LayerNumber;
+use metalith::study::{self, PillarPlace, Plan, PlanSettings, Work};
 use pyo3::prelude::*;
 
 use crate::work::work;
 
 /// Plan a study into a folder, or read the plan that is there; its manifest, with the number of shards.
 #[pyfunction]
-#[pyo3(signature = (tolerance, folder, draws_per_shard=None, progress=None))]
+#[pyo3(signature = (tolerance, folder, draws_per_shard=None, progress=None, layer=None, top=None))]
 pub fn study_plan(
     py: Python<'_>,
     tolerance: PathBuf,
     folder: PathBuf,
     draws_per_shard: Option<u64>,
     progress: Option<Py<PyAny>>,
+    layer: Option<(u16, u16)>,
+    top: Option<String>,
 ) -> PyResult<String> {
-    let settings = PlanSettings { draws_per_shard };
+    let layer = layer.map(|(layer, datatype)| LayerNumber::new(layer, datatype));
+    let settings = PlanSettings {
+        draws_per_shard,
+        place: PillarPlace { layer, top },
+    };
     let plan = work(py, progress, |p| study::plan(&tolerance, &folder, settings, p))?;
     Ok(serde_json::json!({ "plan": plan, "shards": plan.cut().shards() }).to_string())
 }

@@ -57,6 +57,13 @@ pub(crate) struct DatasetArgs {
 
 /// The folder of a set that shards make.
 fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result<Outcome> {
+    if args.reading.layer.is_some() || args.reading.file.top.is_some() {
+        return Err(Error::refused(
+            "option/not-with-plan",
+            "--layer or --top is given with --plan, and shards read the layout as the design says",
+            "state the layer in [layout.layers] of the design, or write the cell to its own file: metalith convert IN OUT --top CELL",
+        ));
+    }
     standard_input::named(standard_input::OF_PLANS, [args.with.design.as_path(), &args.layout])?;
     let request = PairsRequest {
         design: args.with.design.clone(),

@@ -6,8 +6,11 @@ mod submit;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use metalith::gds::LayerNumber;
 use metalith::report::{counted, sig};
-use metalith::study::{PairsPlan, Plan, PlanSettings, REPORT, StartsPlan, TableFormat, Work, merge, plan, write_page};
+use metalith::study::{
+    PairsPlan, PillarPlace, Plan, PlanSettings, REPORT, StartsPlan, TableFormat, Work, merge, plan, write_page,
+};
 use metalith::{Error, Result};
 
 use super::paths::{apart, name_of, outside};
@@ -49,6 +52,14 @@ struct PlanArgs {
     /// Draws in a shard; as many as take ten minutes if left out. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     draws_per_shard: Option<u64>,
+
+    /// Layer and datatype of the pillars in the layout that the tolerance file names; that of the design if left out.
+    #[arg(long, value_name = "LAYER/DATATYPE", value_parser = super::psf::layer)]
+    layer: Option<LayerNumber>,
+
+    /// Cell of this layout to start from; the top cell if there is only one.
+    #[arg(long, value_name = "CELL")]
+    top: Option<String>,
 }
 
 #[derive(Args)]
@@ -90,6 +101,10 @@ pub(crate) fn run(args: &StudyArgs, terminal: &Terminal) -> Result<Outcome> {
 fn plan_study(args: &PlanArgs, terminal: &Terminal) -> Result<Outcome> {
     let settings = PlanSettings {
         draws_per_shard: args.draws_per_shard,
+        place: PillarPlace {
+            layer: args.layer,
+            top: args.top.clone(),
+        },
     };
     let plan = plan(&args.tolerance, &args.out, settings, terminal)?;
     terminal.clear();

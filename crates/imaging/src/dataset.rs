@@ -19,7 +19,7 @@ use sha2::{Digest, Sha256};
 
 use crate::imaging_system::ImagingSystem;
 use crate::operator::FrameOperator;
-use crate::png16;
+use crate::png16::{self, FrameLevels};
 use crate::scene::SceneImage;
 
 /// Name of the file that lists the pairs.
@@ -27,7 +27,7 @@ const MANIFEST: &str = "manifest.json";
 /// Images of one shard: a folder named by the range of their numbers.
 const SHARD: usize = 1000;
 /// Format of the files of a set, in words that change with it: files of an older format are made anew.
-const FORMAT: &str = "frames above a black level";
+const FORMAT: &str = "frames with their levels";
 /// Black level over the deviation of what reading adds: one dark pixel of a thousand million is cut at zero.
 const DEVIATIONS: f64 = 6.0;
 /// Least and largest black level (numbers of the file).
@@ -192,7 +192,7 @@ pub struct PairWriter<'a> {
     folder: &'a Path,
     /// Digest of chip and camera.
     system_digest: [u8; 32],
-    black: u16,
+    levels: FrameLevels,
 }
 
 impl<'a> PairWriter<'a> {
@@ -204,7 +204,10 @@ impl<'a> PairWriter<'a> {
             seed,
             folder,
             system_digest: system.digest(),
-            black: black_level(&system.camera),
+            levels: FrameLevels {
+                black: black_level(&system.camera),
+                camera: png16::camera_digest(&system.camera),
+            },
         }
     }
 
@@ -240,7 +243,7 @@ impl<'a> PairWriter<'a> {
             let scene = self.system.simulated(&scene);
             let recorded = self.system.record(self.operator, &scene, own_seed)?;
             let ideal = self.system.truth(&scene).mapv(srgb::encoded);
-            let frame = png16::grey(&recorded.planes, self.black, &of_frame);
+            let frame = png16::grey(&recorded.planes, &self.levels, &of_frame);
             let truth = png16::colour(&ideal, Some(&of_truth));
             // It speaks of other pairs from now on.
             AtomicFile::discard(&self.folder.join(MANIFEST))?;
@@ -291,7 +294,7 @@ mod tests {
             let light = vec![Array2::zeros((300, 300)); 3];
             let frame = expose(&camera, &[1.0; 3], &light, 5);
             assert!(frame.planes[0].iter().any(|v| *v < 0.0) || read_noise_e == 0.0);
-            let numbers = png16::tests::numbers(&png16::grey(&frame.planes, black, ""));
+            let numbers = png16::tests::numbers(&png16::grey(&frame.planes, &png16::tests::above(black), ""));
             let range = f64::from(png16::WHITE - black);
             for (signal, number) in frame.planes.iter().flatten().zip(&numbers) {
                 let off = f64::from(*number) - f64::from(black) - range * f64::from(*signal);

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::dataset::black_level;
 use crate::exposure::Frame;
-use crate::png16;
+use crate::png16::{self, FrameLevels};
 
 /// A frame as a PNG of 16 bits.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -21,6 +21,8 @@ pub struct FrameFile {
     pub black_level: u16,
     /// Number of full scale.
     pub white: u16,
+    /// Digest of the camera, without its name: SHA-256 in hexadecimal. It stands in the file of the frame too.
+    pub camera_sha256: String,
     /// Signal of a unit of light in each channel, of full scale: light is (number - black_level) / (white - black_level) / gain.
     pub gain: Vec<f64>,
 }
@@ -35,6 +37,7 @@ impl FrameFile {
             file: Self::NAME.into(),
             black_level: black_level(camera),
             white: png16::WHITE,
+            camera_sha256: png16::camera_digest(camera),
             gain: frame.gain.clone(),
         }
     }
@@ -45,7 +48,11 @@ impl FrameFile {
     /// If it cannot be written.
     pub fn write(&self, frame: &Frame, folder: &Path) -> Result<PathBuf> {
         let path = folder.join(&self.file);
-        let bytes = png16::grey(&frame.planes, self.black_level, "frame of metalith picture");
+        let levels = FrameLevels {
+            black: self.black_level,
+            camera: self.camera_sha256.clone(),
+        };
+        let bytes = png16::grey(&frame.planes, &levels, "frame of metalith picture");
         AtomicFile::write(&path, &bytes)?;
         Ok(path)
     }

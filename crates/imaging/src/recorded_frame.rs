@@ -8,10 +8,9 @@ use metalith_core::{Error, Result};
 use metalith_sensor::Camera;
 use ndarray::Array2;
 
-use crate::dataset::black_level;
 use crate::exposure::{Frame, planes_of, recorded};
 use crate::imaging_system::ImagingSystem;
-use crate::png16;
+use crate::png16::{self, FrameLevels};
 
 /// Meaning of the numbers of a frame's file.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,8 +25,8 @@ pub struct FrameNumbers {
 struct Grey {
     numbers: Vec<u16>,
     is_deep: bool,
-    /// True if this program wrote it, with levels that are known.
-    is_own: bool,
+    /// Levels of a frame that this program wrote and nobody changed.
+    own: Option<FrameLevels>,
 }
 
 /// The signals, of full scale, of a grey PNG of 8 or 16 bits: the mosaic of a sensor with a colour filter array, else channel by
@@ -82,8 +81,28 @@ fn signals<'a>(
     grey: &Grey,
     numbers: FrameNumbers,
 ) -> Result<Box<dyn Fn(u16) -> f32 + 'a>> {
-    if grey.is_own && numbers.black_level.is_none() && numbers.white.is_none() {
-        let black = f64::from(black_level(camera));
+    if let Some(own) = grey
+        .own
+        .as_ref()
+        .filter(|_| numbers.black_level.is_none() && numbers.white.is_none())
+    {
+        if own.camera != png16::camera_digest(camera) {
+            return Err(Error::refused(
+                "restore/frame-of-another-camera",
+                format!(
+                    "{} was recorded by another camera than {}: no signal has the number {} in it",
+                    path.display(),
+                    camera.name,
+                    own.black
+                ),
+                format!(
+                    "give the camera that it was simulated with, or say what its numbers mean: --black-level {} --white {}",
+                    own.black,
+                    png16::WHITE
+                ),
+            ));
+        }
+        let black = f64::from(own.black);
         let range = f64::from(png16::WHITE) - black;
         // In steps of the sensor, as it was before it had 16 bits.
         return Ok(Box::new(move |number| {
@@ -158,7 +177,7 @@ fn read_grey(path: &Path, [rows, columns]: [usize; 2]) -> Result<Grey> {
     Ok(Grey {
         numbers,
         is_deep,
-        is_own: png16::source_of(&bytes).is_some(),
+        own: png16::source_of(&bytes).and_then(|_| png16::levels_of(&bytes)),
     })
 }
 
@@ -199,6 +218,31 @@ mod tests {
             let again = Frame::of_signals(&camera, &[1.0; 3], planes);
             assert!(again.saturated == frame.saturated && again.saturated > 0);
         }
+    }
+
+    /// A camera with more noise has another black level; its picture would be wrong.
+    #[test]
+    fn a_frame_of_another_camera_needs_its_levels_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let (camera, frame) = recorded_by(ColourFilter::Rggb);
+        let file = FrameFile::of(&camera, &frame);
+        let path = file.write(&frame, folder.path()).unwrap();
+        let mut other = camera.clone();
+        other.exposure.time_s *= 2.0;
+        let refused = read_signals(&path, &other, FrameNumbers::default()).unwrap_err();
+        assert_eq!(refused.id(), "restore/frame-of-another-camera");
+        let stated = FrameNumbers {
+            black_level: Some(file.black_level),
+            white: Some(file.white),
+        };
+        assert_eq!(read_signals(&path, &other, stated).unwrap().len(), frame.planes.len());
+        // A name changes nothing.
+        other = camera.clone();
+        other.name = "another name".into();
+        assert_eq!(
+            read_signals(&path, &other, FrameNumbers::default()).unwrap(),
+            frame.planes
+        );
     }
 
     #[test]

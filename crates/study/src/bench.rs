@@ -17,7 +17,7 @@ use crate::bias::check_biases;
 use crate::draw::Sampler;
 use crate::manifest::another_plan;
 use crate::picture::{KnownChip, PictureBench, TakenPicture};
-use crate::plan::{Plan, key};
+use crate::plan::{PillarPlace, Plan, key};
 use crate::record::{DrawRecord, LimitStatement, figures, finite};
 use crate::study_file::Tolerance;
 
@@ -39,6 +39,7 @@ pub(crate) struct StudyBench {
 /// Paths of the layout and the tables of each design, by its number.
 pub(crate) struct Files {
     pub layouts: Vec<std::path::PathBuf>,
+    pub place: PillarPlace,
     pub cells: Vec<std::path::PathBuf>,
 }
 
@@ -105,7 +106,7 @@ impl StudyBench {
         let tolerance = Tolerance::read(&plan.tolerance)?;
         let files = plan.files();
         let known = if files.layouts.len() as u64 == tolerance.designs() {
-            Some(key(&tolerance, &files.layouts, progress)?)
+            Some(key(&tolerance, &files.layouts, &files.place, progress)?)
         } else {
             None
         };
@@ -175,7 +176,11 @@ impl StudyBench {
         bank: &dyn Fn(&CellStack, BankRange) -> Result<CellBank>,
         progress: &dyn Progress,
     ) -> Result<Subject> {
-        let design = self.tolerance.design(number, progress)?;
+        let mut design = self.tolerance.design(number, progress)?;
+        if let Some(layer) = self.files.place.layer {
+            let pillars = &mut design.layout.layers.pillars;
+            (pillars.layer, pillars.datatype) = (layer.layer as i16, layer.datatype as i16);
+        }
         if design.verify.incidence == CellIncidence::Oblique {
             return Err(Error::refused(
                 "study/oblique-unsupported",
@@ -187,6 +192,10 @@ impl StudyBench {
         let array = PillarArray::build(&design, &Quiet(progress))?;
         let path: &Path = &self.files.layouts[number as usize];
         let opened = Layout::open_with(path, ReadLimits::default(), progress)?;
+        let opened = match &self.files.place.top {
+            Some(top) => opened.below(top)?,
+            None => opened,
+        };
         let layout = ReadLayout::of(&design, &array, &opened, progress)?;
         check_biases(
             &self.drawer,

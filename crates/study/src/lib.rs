@@ -69,7 +69,7 @@ pub use merge::{StudyResult, TableFormat, merge};
 pub use page::{REPORT, write_page};
 pub use pairs::{PairsPlan, PairsRequest, plan_pairs};
 pub use picture::{KnownKernels, PictureSpec, SceneChoice, TakenPicture};
-pub use plan::{Layout, Plan, PlanSettings, plan, planned_later};
+pub use plan::{Layout, PillarPlace, Plan, PlanSettings, plan, planned_later};
 pub use record::{DrawRecord, LimitStatement};
 pub use response::{Response, Tightening};
 pub use shard::Run;

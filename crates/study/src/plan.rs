@@ -9,7 +9,7 @@ use metalith_cell::CellStack;
 use metalith_cell::cache_file::solver_of;
 use metalith_core::file::file_digest;
 use metalith_core::text::hex;
-use metalith_core::{Error, Progress, Quiet, Result};
+use metalith_core::{Error, LayerNumber, Progress, Quiet, Result};
 use metalith_design::array::PillarArray;
 use metalith_layout::write_pillars;
 use metalith_optics::{BankRange, CellBank};
@@ -37,6 +37,21 @@ pub enum Layout {
     Written(String),
 }
 
+/// Where the pillars of a given layout are, if not where its design says.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PillarPlace {
+    pub layer: Option<LayerNumber>,
+    /// Cell to start from.
+    pub top: Option<String>,
+}
+
+impl PillarPlace {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// The manifest of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -48,6 +63,8 @@ pub struct Plan {
     pub tolerance: PathBuf,
     /// Layouts of the designs: one, or one for each combination of values of keys of the design.
     pub layouts: Vec<Layout>,
+    #[serde(default, skip_serializing_if = "PillarPlace::is_default")]
+    pub place: PillarPlace,
     /// Tables of cells of each design, by their names in the folder of the study; designs of one pillar share them.
     pub cells: Vec<String>,
     /// Name and unit of what varies; those of a grid first.
@@ -66,10 +83,11 @@ pub struct Plan {
 }
 
 /// Settings of a plan of a study.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct PlanSettings {
     /// Draws of a shard; as many as take ten minutes if left out.
     pub draws_per_shard: Option<u64>,
+    pub place: PillarPlace,
 }
 
 impl Plan {
@@ -108,6 +126,7 @@ impl Plan {
         let cells = self.cells.iter().map(|name| self.folder.join(name));
         Files {
             layouts: layouts.collect(),
+            place: self.place.clone(),
             cells: cells.collect(),
         }
     }
@@ -139,6 +158,14 @@ fn layout_path(layout: &Layout, folder: &Path) -> PathBuf {
 pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progress: &dyn Progress) -> Result<Plan> {
     let tolerance_path = absolute(tolerance_path)?;
     let tolerance = Tolerance::read(&tolerance_path)?;
+    let place = settings.place;
+    if tolerance.layout.is_none() && !place.is_default() {
+        return Err(Error::refused(
+            "study/layout-not-given",
+            "a layer or a top cell is given, and the layout is written from the design",
+            "leave out --layer and --top, or name a layout by `layout` in the tolerance file",
+        ));
+    }
     fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
     let known = is_planned(folder);
     let layouts = layouts(&tolerance, folder, known, progress)?;
@@ -146,7 +173,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
     if known && !paths.iter().all(|path| path.exists()) {
         return Err(another_plan(folder));
     }
-    let key = key(&tolerance, &paths, progress)?;
+    let key = key(&tolerance, &paths, &place, progress)?;
     if let Some(known) = Plan::known_in(folder, &hex(&key))? {
         return Ok(known);
     }
@@ -155,6 +182,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
     let own = (0..designs).map(|d| folder.join(named("cells", "bank", d, designs)));
     let files = Files {
         layouts: paths,
+        place: place.clone(),
         cells: own.collect(),
     };
     let bench = StudyBench::new(tolerance, key, files)?;
@@ -164,6 +192,7 @@ pub fn plan(tolerance_path: &Path, folder: &Path, settings: PlanSettings, progre
         key: hex(&key),
         tolerance: tolerance_path,
         layouts,
+        place,
         cells: Vec::new(),
         quantities: bench.drawer.names(),
         limits: Vec::new(),
@@ -266,7 +295,12 @@ impl Plan {
 }
 
 /// SHA-256 of everything that decides the answers; how a study is cut is no part of it.
-pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf], progress: &dyn Progress) -> Result<[u8; 32]> {
+pub(crate) fn key(
+    tolerance: &Tolerance,
+    layouts: &[PathBuf],
+    place: &PillarPlace,
+    progress: &dyn Progress,
+) -> Result<[u8; 32]> {
     let mut hash = Sha256::new();
     let mut add = |what: &str, bytes: &[u8]| {
         hash.update((bytes.len() as u64).to_le_bytes());
@@ -296,6 +330,12 @@ pub(crate) fn key(tolerance: &Tolerance, layouts: &[PathBuf], progress: &dyn Pro
     for path in files {
         add("file", &file_digest(&path)?);
     }
+    if let Some(layer) = place.layer {
+        add("layer", layer.to_string().as_bytes());
+    }
+    if let Some(top) = &place.top {
+        add("top", top.as_bytes());
+    }
     Ok(hash.finalize().into())
 }
 
@@ -320,6 +360,7 @@ pub(crate) fn test_plan(folder: &Path, layout: Layout, draws: u64, draws_per_sha
         key: hex(&[0; 32]),
         tolerance: "tolerance.toml".into(),
         layouts: vec![layout],
+        place: PillarPlace::default(),
         cells: vec!["cells.bank".into()],
         quantities: Vec::new(),
         limits: Vec::new(),

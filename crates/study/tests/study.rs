@@ -22,6 +22,7 @@ fn run_shard(plan: &Plan, number: u64) -> metalith_core::Result<()> {
 fn in_shards(tolerance: &Path, folder: &Path, draws_per_shard: u64) -> Plan {
     let settings = PlanSettings {
         draws_per_shard: Some(draws_per_shard),
+        ..PlanSettings::default()
     };
     plan(tolerance, folder, settings, &Silent).unwrap()
 }
