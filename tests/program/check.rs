@@ -171,7 +171,7 @@ fn a_dash_is_standard_input_or_output() {
     let printed = |args: &[&str], code: i32| run(args).code(code).get_output().stdout.clone();
     let piped = String::from_utf8(printed(&["check", "-", "--rules", rules], 1)).unwrap();
     assert!(
-        piped.contains("standard input: 14409 shapes") && piped.contains("1 violations"),
+        piped.contains("standard input: 14,409 shapes") && piped.contains("1 violation"),
         "{piped}"
     );
     printed(&["diff", "-", "broken.gds"], 0);

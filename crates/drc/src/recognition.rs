@@ -26,7 +26,9 @@ pub fn add_recognition(
     input: &CheckInput<'_>,
     progress: &dyn Progress,
 ) -> Result<()> {
-    if input.design.is_some() || layout.shapes_on(layer) == report.pillars_on_lattices {
+    // Pillars below several tops are of several layouts, which is a finding of another rule.
+    let is_of_several = layout.tops_on(layer).len() > 1;
+    if input.design.is_some() || is_of_several || layout.shapes_on(layer) == report.pillars_on_lattices {
         return Ok(());
     }
     let plan = ExtractionPlan {

@@ -103,12 +103,21 @@ pub(crate) fn source_of(bytes: &[u8]) -> Option<String> {
     reader.next_frame(&mut data).ok()?;
     reader.finish().ok()?;
     let texts = &reader.info().uncompressed_latin1_text;
-    let (source, digest) = texts.iter().find(|t| t.keyword == SOURCE)?.text.rsplit_once(' ')?;
-    (digest == digest_of(&data)).then(|| source.to_owned())
+    let words_of = |keyword: &str| texts.iter().find(|t| t.keyword == keyword).map(|t| t.text.as_str());
+    let (source, digest) = words_of(SOURCE)?.rsplit_once(' ')?;
+    (digest == digest_of_all(&data, words_of(LEVELS))).then(|| source.to_owned())
 }
 
 fn digest_of(data: &[u8]) -> String {
     hex(&Sha256::digest(data))
+}
+
+/// Digest of the numbers of a picture, and of what they mean.
+fn digest_of_all(data: &[u8], levels: Option<&str>) -> String {
+    match levels {
+        Some(words) => digest_of(&[data, words.as_bytes()].concat()),
+        None => digest_of(data),
+    }
 }
 
 fn number(value: f64, black: u16) -> [u8; 2] {
@@ -129,14 +138,18 @@ fn encode(
     let mut encoder = png::Encoder::new(&mut bytes, columns as u32, rows as u32);
     encoder.set_color(colour);
     encoder.set_depth(png::BitDepth::Sixteen);
+    let levels = levels.map(FrameLevels::words);
     if let Some(source) = source {
         encoder
-            .add_text_chunk(SOURCE.into(), format!("{source} {}", digest_of(data)))
+            .add_text_chunk(
+                SOURCE.into(),
+                format!("{source} {}", digest_of_all(data, levels.as_deref())),
+            )
             .expect("digits and plain words");
     }
     if let Some(levels) = levels {
         encoder
-            .add_text_chunk(LEVELS.into(), levels.words())
+            .add_text_chunk(LEVELS.into(), levels)
             .expect("digits and plain words");
     }
     // Writing to memory fails only for a wrong size, which is ours to keep.

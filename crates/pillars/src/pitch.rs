@@ -25,7 +25,7 @@ impl Pitch {
         let steps = (nm * STEPS_PER_NM as f64).round();
         (0.0..=f64::from(u32::MAX) * STEPS_PER_NM as f64)
             .contains(&steps)
-            .then(|| Self(steps as u64))
+            .then_some(Self(steps as u64))
     }
 
     /// The pitch of so many nanometres; `None` if it is no multiple of 0.05 nm.

@@ -69,16 +69,13 @@ impl Sharding {
             }
             Ok(())
         })?;
-        match self.refusal(&found) {
-            Some(error) => Err(error),
-            None => {
-                found
-                    .of_several_processors()
-                    .iter()
-                    .for_each(|words| progress.warn(words));
-                Ok(parts)
-            }
+        if let Some(error) = self.refusal(&found) {
+            return Err(error);
         }
+        if let Some(words) = found.of_several_processors() {
+            progress.warn(&words);
+        }
+        Ok(parts)
     }
 
     /// Progress of the work; the text of each shard that is whole is given to `whole`, in the order of their numbers.

@@ -108,8 +108,12 @@ fn by_processes(args: &RunArgs, work: &Work, missing: Vec<u64>, jobs: usize, ter
             .stdin(Stdio::piped())
             .spawn()
             .map_err(Error::io("start", &program))?;
-        let _pipe = process.stdin.take();
-        Ok(Running { shard, process, _pipe })
+        let pipe = process.stdin.take();
+        Ok(Running {
+            shard,
+            process,
+            _pipe: pipe,
+        })
     };
     loop {
         while running.len() < jobs {

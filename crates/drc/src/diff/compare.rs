@@ -141,7 +141,7 @@ impl Changes {
                 // The second of a pair is counted with the first.
                 Some(_) if partner[k] < k => {}
                 Some(other) if pairs::side(&own.change) == Some(0) => {
-                    self.count(pairs::joined(&own.change, &other.change))
+                    self.count(pairs::joined(&own.change, &other.change));
                 }
                 Some(other) => self.count(pairs::joined(&other.change, &own.change)),
             }

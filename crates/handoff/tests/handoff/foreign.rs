@@ -232,7 +232,6 @@ fn layouts_with_nothing_to_expose_are_refused() {
     fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
     for (path, layer, id) in [
         (&empty, None, "handoff/nothing-drawn"),
-        (&two, None, "extract/which-layer"),
         (&two, Some((5, 0)), "handoff/layer-empty"),
         (&tops, None, "layout"),
         (&cut, None, "layout"),
