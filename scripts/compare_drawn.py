@@ -19,6 +19,8 @@ import numpy as np
 
 # Largest difference of two PSFs over the peak: half a nanometre of place and width of each pillar makes less.
 TOLERANCE = 1e-3
+# No design has a pitch of 1000/3 nm. The lens of 333.3 nm beside it has its outermost pillars 1.5 nm elsewhere.
+TOLERANCE_OTHER_PITCH = 2e-3
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 MINI = {
@@ -150,10 +152,11 @@ def main():
         got, as_drawn = psf(layout, *light, folder / f"{name}_drawn")
         off = np.abs(got - want).max() / want.max() if got.shape == want.shape else math.inf
         read = (as_written["pillars"], as_drawn["pillars"], len(shapes))
-        failed |= off > TOLERANCE or len(set(read)) > 1
+        allowed = TOLERANCE_OTHER_PITCH if name == "any_pitch" else TOLERANCE
+        failed |= off > allowed or len(set(read)) > 1
         print(f"{name:10} {read[1]:6} of {read[2]} pillars, PSF off by {off:.1e} of the peak")
     if failed:
-        sys.exit(f"pillars are missing, or PSFs are off by more than {TOLERANCE} of the peak")
+        sys.exit(f"pillars are missing, or PSFs are off by more than {TOLERANCE} ({TOLERANCE_OTHER_PITCH} for another pitch) of the peak")
 
 
 main()
