@@ -37,8 +37,7 @@ FULL = {
     "a_limit_on_no_figure_is_told",
     "pictures_are_figures_of_a_draw",
     "shards_by_processes_are_those_of_one_process",
-    # Chips as fabricated, in every command.
-    "every_effect_is_the_same_in_every_command",
+    # Chips as fabricated.
     "real_pillars_between_the_nodes_are_those_solved_exactly",
     # The library of a cell.
     "the_command_reports_on_a_cell_and_reuses_its_library",
