@@ -18,6 +18,8 @@ import sys
 DIFFERENCE = 3e-6
 # An x86_64 processor with SSE4.2 and without AVX.
 WITHOUT_AVX = "Nehalem"
+# Longest time for fetching the emulator: 60 MB.
+FETCH_SECONDS = 60
 TOLERANCE = """schema = 1
 design = "small.toml"
 draws = 2
@@ -40,7 +42,9 @@ def emulator(folder):
     if found or not shutil.which("apt-get"):
         return found
     quiet = {"cwd": folder, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    if subprocess.run(["apt-get", "download", "qemu-user-static"], **quiet).returncode:
+    try:
+        subprocess.run(["apt-get", "download", "qemu-user-static"], check=True, timeout=FETCH_SECONDS, **quiet)
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired):
         return None
     for package in folder.glob("qemu-user-static_*.deb"):
         subprocess.run(["dpkg", "-x", package.name, "emulator"], check=True, **quiet)
