@@ -97,7 +97,7 @@ fn pairs_of_shards_are_those_of_one_run() {
     let old = fs::read_to_string(at("parts/plan.json")).unwrap();
     fs::create_dir(at("old")).unwrap();
     fs::write(at("old/plan.json"), old.replacen("\"schema\": 2", "\"schema\": 1", 1)).unwrap();
-    assert_eq!(Work::open(&at("old")).err().unwrap().id(), "study/version-differs");
+    assert_eq!(Work::open(&at("old")).err().unwrap().id(), "study/plan-damaged");
     let bad = PairsRequest {
         images: [&images[..], &[at("camera.toml")]].concat(),
         ..request.clone()
