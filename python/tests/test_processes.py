@@ -206,12 +206,18 @@ with tempfile.TemporaryDirectory() as folder:
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="no list of threads")
 @pytest.mark.parametrize("wanted", [1, 3])
 def test_the_number_of_threads_is_the_one_that_is_asked_for(wanted: int) -> None:
+    # A thread names itself after its start, so that the count is read until it stands.
     said = run(f"""
-import os
+import os, time
 os.environ["RAYON_NUM_THREADS"] = "{wanted}"
 {USED}
-names = [open(f"/proc/self/task/{{k}}/comm").read() for k in os.listdir("/proc/self/task")]
-print(sum(name.startswith("metalith") for name in names))
+def named():
+    names = [open(f"/proc/self/task/{{k}}/comm").read() for k in os.listdir("/proc/self/task")]
+    return sum(name.startswith("metalith") for name in names)
+until = time.monotonic() + 20
+while named() < {wanted} and time.monotonic() < until:
+    time.sleep(0.01)
+print(named())
 """)
     assert int(said) == wanted
 
