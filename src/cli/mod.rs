@@ -38,7 +38,6 @@ mod terminal;
 mod train;
 mod verify;
 
-use std::borrow::Cow;
 use std::ffi::OsString;
 use std::fmt;
 use std::path::PathBuf;
@@ -152,12 +151,14 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help is no error, and goes to standard output. Errors repeat what was given, which may be the name of a file.
+            // A break in a name would begin a line: the error is that of the names as they are shown.
+            let names = given.iter().map(|name| printable(&name.to_string_lossy()).into_owned());
+            let error = Arguments::try_parse_from(names).err().unwrap_or(error);
             let plain = error.render().to_string();
-            match printable_lines(&plain) {
-                Cow::Borrowed(_) => {
-                    let _ = error.print();
-                }
-                Cow::Owned(words) => output::tell(&words),
+            if printable_lines(&plain) == plain {
+                let _ = error.print();
+            } else {
+                output::tell(&plain);
             }
             if let Some(hint) = renamed::hint(&error, &given) {
                 output::tell(&format!("\n  help: {hint}\n"));

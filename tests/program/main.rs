@@ -17,6 +17,7 @@ mod plan;
 mod polarisation;
 mod predict;
 mod run;
+mod strangers;
 mod study;
 mod train;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::text::printable;
+use crate::text::{printable, printable_message};
 
 /// Cause of an error, for [`std::error::Error::source`].
 pub(crate) type Cause = Box<dyn std::error::Error + Send + Sync>;
@@ -20,7 +20,12 @@ pub enum Error {
     Text(Box<crate::document::Faults>),
 
     /// A layout file breaks the GDSII format, or a limit that keeps reading it bounded.
-    #[error("{}, byte {offset}: {what}\n  help: {hint}", name(path))]
+    #[error(
+        "{}, byte {offset}: {}\n  help: {}",
+        name(path),
+        printable_message(what),
+        printable_message(hint)
+    )]
     Layout {
         path: PathBuf,
         /// Offset of the record at fault from the start of the file.
@@ -40,7 +45,7 @@ pub enum Error {
     },
 
     /// A file of numbers (CSV, NPY) that does not hold what was expected.
-    #[error("{}{}: {what}\n  help: {hint}", name(path), at_line(*line))]
+    #[error("{}{}: {}\n  help: {}", name(path), at_line(*line), printable_message(what), printable_message(hint))]
     Table {
         path: PathBuf,
         /// Line of a text file, counted from one; none for a binary one.
@@ -50,7 +55,7 @@ pub enum Error {
     },
 
     /// A value that cannot be: out of range, inconsistent, not physical.
-    #[error("{what}\n  help: {hint}")]
+    #[error("{}\n  help: {}", printable_message(what), printable_message(hint))]
     Invalid {
         /// The identity of the refusal, `subject/cause`: the text may change, the identity stays.
         id: &'static str,

@@ -56,6 +56,17 @@ pub fn printable_lines(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
+/// Variant of [`printable`] for messages: a break before two spaces, which begins a remedy or an entry of a list, stays. A break in a
+/// name is written out, since it would begin a line that the program did not say.
+pub fn printable_message(text: &str) -> Cow<'_, str> {
+    const OWN: &str = "\n  ";
+    if text.chars().all(is_printable) {
+        return Cow::Borrowed(text);
+    }
+    let lines: Vec<_> = text.split(OWN).map(printable).collect();
+    Cow::Owned(lines.join(OWN))
+}
+
 /// JSON in which strings hold no character that is not [printable](is_printable): such a one is written as `\u202e`, which readers
 /// take for the same character. Ends of lines between values stay.
 pub fn printable_json(json: &str) -> Cow<'_, str> {
@@ -171,6 +182,10 @@ mod tests {
         assert_eq!(printable("a\u{1b}[2Jb\u{7}\n"), "a\\u{1b}[2Jb\\u{7}\\u{a}");
         assert_eq!(printable("\u{fffe}\u{9b}1m\u{202e}x"), "\\u{fffe}\\u{9b}1m\\u{202e}x");
         assert_eq!(printable_lines("a\n\tb\r"), "a\n\tb\\u{d}");
+        assert_eq!(
+            printable_message("2 of 3:\n  a\npass\n  b\r"),
+            "2 of 3:\n  a\\u{a}pass\n  b\\u{d}"
+        );
         for plain in ["LENS_1", "Ünïcode µm 透镜", "<&\"=", ""] {
             assert!(matches!(printable(plain), Cow::Borrowed(same) if same == plain));
         }

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::text::printable_message;
+
 /// A warning: it stands first on the terminal, in the report and in its JSON file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
@@ -31,6 +33,7 @@ impl Warning {
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "warning: {} [{}]\n  help: {}", self.what, self.id, self.hint)
+        let [what, hint] = [&self.what, &self.hint].map(|text| printable_message(text));
+        write!(f, "warning: {what} [{}]\n  help: {hint}", self.id)
     }
 }

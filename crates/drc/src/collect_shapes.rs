@@ -32,8 +32,6 @@ const LONGEST_TEXT: usize = 512;
 const TOO_FAR: &str = "shapes farther than 2^31 database units from the origin";
 /// Cells at the top that a message names.
 const TOPS_NAMED: usize = 4;
-/// Texts that are held.
-const MOST_TEXTS: usize = 100_000;
 
 /// Visit the layout and its companions.
 pub(super) fn gather<'a>(
@@ -79,7 +77,6 @@ pub(super) fn gather<'a>(
         odd_on_lattice: 0,
         pillar_shapes: 0,
         texts: Vec::new(),
-        text_count: 0,
         counts: BTreeMap::new(),
         incomplete: None,
         allowance: *allowance,
@@ -121,7 +118,6 @@ pub(super) fn gather<'a>(
         off_lattice: visit.off_lattice,
         odd_on_lattice: visit.odd_on_lattice,
         texts: visit.texts,
-        text_count: visit.text_count,
         counts: visit.counts,
         incomplete: unread
             .clone()
@@ -188,7 +184,6 @@ struct Gather<'r, 'p> {
     odd_on_lattice: u64,
     pillar_shapes: u64,
     texts: Vec<PlacedText>,
-    text_count: u64,
     counts: BTreeMap<LayerNumber, u64>,
     incomplete: Option<String>,
     allowance: Allowance,
@@ -434,16 +429,12 @@ impl Visitor for Gather<'_, '_> {
     }
 
     fn text(&mut self, text: &Text<'_>, placements: &[Transform]) -> Result<()> {
-        self.text_count += placements.len() as u64;
-        let room = MOST_TEXTS.saturating_sub(self.texts.len());
-        if room == 0 {
-            return Ok(());
-        }
+        // The reader bounds them by the size of the file.
         let (layer, string) = (
             self.known_as(text.layer),
             Arc::from(printable_bytes(&text.string[..text.string.len().min(LONGEST_TEXT)])),
         );
-        let placed = placements.iter().take(room).map(|placement| PlacedText {
+        let placed = placements.iter().map(|placement| PlacedText {
             layer,
             string: Arc::clone(&string),
             at: placement.apply(text.at),

@@ -85,7 +85,6 @@ pub(super) struct FlatLayout<'a> {
     /// Squares of odd width on a site: kept with the loose ones, because their edges are not symmetric.
     pub odd_on_lattice: u64,
     pub texts: Vec<PlacedText>,
-    pub text_count: u64,
     /// Areas by layer, references followed.
     pub counts: BTreeMap<LayerNumber, u64>,
     /// Reason why the layout was not read to its end, if it was not.

@@ -102,12 +102,6 @@ impl Rule for LayerRule {
                 Ok(())
             }
             Self::NoText(layers) => {
-                if flat.text_count > flat.texts.len() as u64 {
-                    return Err(NotRun::Failed(format!(
-                        "{} texts are more than are held",
-                        flat.text_count
-                    )));
-                }
                 for t in flat.texts.iter().filter(|t| layers.contains(&t.layer)) {
                     found.at(&[t.at], || format!("text \"{}\" on {}", t.string, t.layer));
                 }

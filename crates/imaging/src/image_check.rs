@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use metalith_core::text::printable;
 use metalith_core::{Error, Progress, Result};
 use rayon::prelude::*;
 
@@ -36,7 +37,7 @@ pub fn check_images(images: &[PathBuf], progress: &dyn Progress) -> Result<()> {
             ),
             Err(error) => reason(error),
         };
-        bad.push(format!("\n  {}: {why}", image.display()));
+        bad.push(format!("\n  {}: {why}", printable(&image.to_string_lossy())));
     }
     if bad.is_empty() {
         return Ok(());

@@ -25,6 +25,7 @@ use toml::de::DeTable;
 use binary_kind::binary_kind;
 
 use crate::error::{Error, Result};
+use crate::text::printable_message;
 
 /// The text of one file, its parsed table, and the faults found so far.
 pub struct Document<'t> {
@@ -133,8 +134,8 @@ impl<'t> Document<'t> {
             key,
             span,
             // An error of another file has its own remedy, in a separate line.
-            what: what.into().replace("\n  help: ", "; "),
-            hint: hint.into(),
+            what: printable_message(&what.into().replace("\n  help: ", "; ")).into_owned(),
+            hint: printable_message(&hint.into()).into_owned(),
         }));
         Some(faults.len() - 1)
     }
