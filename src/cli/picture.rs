@@ -201,7 +201,7 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
                 // What is lost by other methods depends on more than the spectrum of a scene.
                 if method == RestorationMethod::Tikhonov && joint && !args.no_forecast {
                     let forecast = forecast_scene.forecast(&system, &operator, terminal)?;
-                    restoration.forecast_db = forecast.psnr_linear_db(&ScenePower::natural());
+                    restoration.forecast_db = forecast.psnr_linear_db(&system.natural_power());
                     restoration.forecast_of_scene_db = forecast.psnr_linear_db(&ScenePower::of(&truth));
                 }
                 found.push(restoration);

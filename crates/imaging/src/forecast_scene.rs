@@ -7,7 +7,7 @@ use ndarray::Array2;
 
 use crate::colour::ChannelColours;
 use crate::exposure::{counts_channel, expose};
-use crate::forecast::{Exposed, Forecast};
+use crate::forecast::{Exposed, Forecast, ScenePower, reduction};
 use crate::imaging_system::ImagingSystem;
 use crate::operator::{Detail, FrameOperator, SceneInputs};
 use crate::operator_error::OperatorError;
@@ -20,6 +20,14 @@ pub struct ForecastScene {
     light: Vec<Array2<f32>>,
     /// Error of the operator of the restoration against the simulation.
     pub operator_error: OperatorError,
+}
+
+impl ImagingSystem {
+    /// Expected power of photographs that are reduced to the pixels of the scenes of this system.
+    pub fn natural_power(&self) -> ScenePower {
+        let [given, simulated] = [self.given, self.view].map(|view| view.rows.max(view.columns));
+        ScenePower::natural(reduction(given, simulated))
+    }
 }
 
 /// Seed of the scene and of its noise.

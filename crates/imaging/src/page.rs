@@ -119,9 +119,9 @@ fn page(pages: &PicturePages<'_>) -> Page {
         }
     };
     let linear = fixed(whole.psnr_linear_db, 1);
-    let of_linear_light = match first.forecast_db.first() {
+    let of_linear_light = match first.forecast_of_scene_db.first() {
         Some(forecast) => (
-            "PSNR of linear light, forecast for natural scenes",
+            "PSNR of linear light, forecast from the spectrum of this scene",
             format!("{linear} dB, {} dB", fixed(*forecast, 1)),
         ),
         None => ("PSNR of linear light", format!("{linear} dB")),
@@ -247,7 +247,7 @@ fn scores(page: &mut Page, report: &PictureReport) {
         }
     }
     let forecasts = if report.restorations.iter().any(|r| !r.forecast_db.is_empty()) {
-        "The forecasts come from a random scene. It shows the share of detail of each size that is lost in each zone. One forecast is for the mean over photographs (GB82), the other for the detail of this scene in each zone. Single photographs differ from the mean by some 3 dB. "
+        "The forecasts come from a random scene. It shows the share of detail of each size that is lost in each zone. One forecast is for the mean over photographs (GB82), reduced to the pixels of this scene; the other is for the detail of this scene in each zone. Single photographs differ from the mean by some 3 dB. "
     } else {
         ""
     };

@@ -9,8 +9,8 @@ use metalith_design::Design;
 use metalith_gds::extract::Extraction;
 use metalith_imaging::scene::{BuiltIn, SceneImage, chart, read_far_scene};
 use metalith_imaging::{
-    ForecastScene, Frame, FrameOperator, ImagingSystem, OperatorError, SCORED_SIDES, ScenePower, Zone, ZoneScore,
-    check_scored, sampling_of, scores,
+    ForecastScene, Frame, FrameOperator, ImagingSystem, OperatorError, SCORED_SIDES, Zone, ZoneScore, check_scored,
+    sampling_of, scores,
 };
 use metalith_optics::{AsBuiltChip, SimulationCase};
 use metalith_restoration::RestorationMethod;
@@ -229,7 +229,7 @@ impl PictureBench {
         let forecast_db = match method {
             RestorationMethod::Tikhonov => forecast_scene
                 .forecast(&system, &operator, progress)?
-                .psnr_linear_db(&ScenePower::natural()),
+                .psnr_linear_db(&system.natural_power()),
             _ => Vec::new(),
         };
         let truth = system.truth(&self.scene);

@@ -15,6 +15,7 @@ use ndarray::Array3;
 use bands::ZONES;
 use power::{CELLS, means_by_cell, zone_means, zone_of};
 
+pub(crate) use natural::reduction;
 pub use power::ScenePower;
 
 /// Forecast of what a camera and a restoration lose of any scene, and of what they make of noise.

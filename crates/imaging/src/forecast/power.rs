@@ -9,7 +9,7 @@ use num_complex::Complex32;
 use rayon::prelude::*;
 
 use super::bands::{BANDS, Bands, ZONES};
-use super::natural::NATURAL;
+use super::natural::{NATURAL, NaturalZone, reduced};
 use crate::score::Zone;
 
 /// Cells an axis of the field that power is distinguished in, two for each third of it. Within a zone what is lost
@@ -53,11 +53,13 @@ impl ScenePower {
         }
     }
 
-    /// Expected of photographs: the mean of 25, which have less detail the farther from the middle.
-    pub fn natural() -> Self {
+    /// Expected of photographs of which a pixel averages so many along an axis (1 or more): the mean of 25, which have less detail
+    /// the farther from the middle.
+    pub fn natural(reduction: f64) -> Self {
         let zones = (0..CELLS * CELLS).map(|cell| &NATURAL[zone_of(cell)]);
+        let reduced_planes = |zone: &NaturalZone| zone.planes.iter().map(|native| reduced(native, reduction)).collect();
         Self {
-            cells: zones.clone().map(|zone| zone.planes.to_vec()).collect(),
+            cells: zones.clone().map(reduced_planes).collect(),
             light: zones.map(|zone| zone.light).collect(),
         }
     }
@@ -211,7 +213,7 @@ mod tests {
     fn photographs_have_the_power_of_their_statistics_where_they_are_sharp() {
         /// Twice or half: the statistics are one curve for all planes and zones.
         const OF_THE_CURVE: f64 = 2.0;
-        let natural = ScenePower::natural().by_zone();
+        let natural = ScenePower::natural(1.0).by_zone();
         let wanted = SceneStatistics::colours().band_powers(&BANDS);
         let (zone, _, planes) = &natural[0];
         assert_eq!(*zone, Zone::Centre);
