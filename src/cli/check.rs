@@ -227,6 +227,13 @@ fn has_shapes(layout: &Layout, layer: LayerNumber) -> Result<()> {
 
 /// Write the rules that a layout keeps.
 fn write_rules(layout: &Layout, layer: Option<LayerNumber>, path: &Path, terminal: &Terminal) -> Result<Outcome> {
+    if path.exists() {
+        return Err(Error::refused(
+            "new/exists",
+            format!("{} exists", path.display()),
+            "give another name, or move the file away: limits that a person changed are kept",
+        ));
+    }
     let rules = drc::new_rules(layout, layer, terminal)?;
     AtomicFile::write(path, rules.text.as_bytes())?;
     terminal.clear();

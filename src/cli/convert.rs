@@ -37,7 +37,8 @@ pub(crate) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<Outcome> {
     super::paths::apart([args.from.as_path()], &[&args.to])?;
     let format = args.format.map_or_else(|| LayoutFormat::of_name(&args.to), Into::into);
     terminal.stop_on_interrupt();
-    let layout = args.reading.open(&InputFile::of(&args.from)?, terminal)?;
+    let from = InputFile::of(&args.from)?;
+    let layout = args.reading.open(&from, terminal)?;
     let written = convert(&layout, format, &args.to, terminal)?;
     terminal.clear();
     for remark in &written.remarks {

@@ -151,6 +151,14 @@ fn rules_from_a_layout_find_a_narrower_gap() {
         layout.as_ref(),
     ])
     .code(2);
+    // Rules that a person has changed.
+    run(&[
+        "check".as_ref(),
+        layout.as_ref(),
+        "--new-rules".as_ref(),
+        rules.as_ref(),
+    ])
+    .code(2);
 }
 
 /// `-` is what is piped in, and what is printed; both are as with files.
@@ -175,6 +183,9 @@ fn a_dash_is_standard_input_or_output() {
         "{piped}"
     );
     printed(&["diff", "-", "broken.gds"], 0);
+    printed(&["convert", "-", "copy.oas"], 0);
+    printed(&["diff", "broken.gds", "copy.oas"], 0);
+    printed(&["info", "-"], 0);
     // It ends where it has been read once.
     printed(&["diff", "-", "-"], 2);
     printed(&["check", "broken.gds", "--junit", "broken.xml", "--rules", rules], 1);

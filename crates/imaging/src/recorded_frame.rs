@@ -81,6 +81,22 @@ fn signals<'a>(
     grey: &Grey,
     numbers: FrameNumbers,
 ) -> Result<Box<dyn Fn(u16) -> f32 + 'a>> {
+    let contradicts = |own: &FrameLevels| {
+        let differs = |given: Option<u16>, own: u16| given.is_some_and(|given| given != own);
+        differs(numbers.black_level, own.black) || differs(numbers.white, png16::WHITE)
+    };
+    if let Some(own) = grey.own.as_ref().filter(|own| contradicts(own)) {
+        return Err(Error::refused(
+            "restore/levels-differ",
+            format!(
+                "{} states that no signal has the number {} in it and full scale {}, and the options state others",
+                path.display(),
+                own.black,
+                png16::WHITE
+            ),
+            "leave --black-level and --white out",
+        ));
+    }
     if let Some(own) = grey
         .own
         .as_ref()
@@ -236,6 +252,11 @@ mod tests {
             white: Some(file.white),
         };
         assert_eq!(read_signals(&path, &other, stated).unwrap().len(), frame.planes.len());
+        let (black, white) = (Some(file.black_level - 1), Some(file.white - 1));
+        for (black_level, white) in [(black, None), (None, white), (black, white)] {
+            let refused = read_signals(&path, &camera, FrameNumbers { black_level, white }).unwrap_err();
+            assert_eq!(refused.id(), "restore/levels-differ");
+        }
         // A name changes nothing.
         other = camera.clone();
         other.name = "another name".into();

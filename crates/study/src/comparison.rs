@@ -46,6 +46,7 @@ impl ComparisonPlan {
             parts: self.comparison.count() as u64,
             per_shard: 1,
             folder: self.folder.clone(),
+            files_of: None,
         }
     }
 

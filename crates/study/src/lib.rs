@@ -73,7 +73,7 @@ pub use plan::{Layout, PillarPlace, Plan, PlanSettings, plan, planned_later};
 pub use record::{DrawRecord, LimitStatement};
 pub use response::{Response, Tightening};
 pub use shard::Run;
-pub use sharding::{Shard, Sharding};
+pub use sharding::{FilesOfPart, Shard, Sharding};
 pub use slurm::{JOB_NAME, Job, Queued, Slurm, queued_shards, submitted};
 pub use starts::{StartRecord, StartsPlan, StartsResult, plan_starts};
 pub use status::Status;

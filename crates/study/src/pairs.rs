@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::manifest::{Manifest, absolute, another_plan, manifest};
-use crate::sharding::{Sharding, parts_per_shard, ranges};
+use crate::sharding::{Sharding, parts_per_shard};
 
 /// Version of the format of the manifest. Frames of version 1 have no black level.
 const SCHEMA: u32 = 2;
@@ -82,6 +82,7 @@ impl PairsPlan {
             parts: self.digests.len() as u64,
             per_shard: self.images_per_shard,
             folder: self.folder.clone(),
+            files_of: Some(files_of_pair),
         }
     }
 
@@ -115,11 +116,10 @@ impl PairsPlan {
     /// Write the manifest of the set when all pairs are there.
     ///
     /// # Errors
-    /// If pairs are missing or there twice, one of their files is not what its shard wrote, all named; if the manifest cannot be
+    /// If pairs are missing, or one of their files is not what its shard wrote, all named; if the manifest cannot be
     /// written, or the user stopped it.
     pub fn merge(&self, progress: &dyn Progress) -> Result<DatasetManifest> {
         let pairs: Vec<DatasetPair> = self.cut().whole(&|_| None, progress)?;
-        self.check_files(&pairs, progress)?;
         let manifest = DatasetManifest {
             pairs,
             ..self.head.clone()
@@ -129,42 +129,10 @@ impl PairsPlan {
     }
 }
 
-impl PairsPlan {
-    /// Checks that the files of all pairs have the digests that their shards state.
-    fn check_files(&self, pairs: &[DatasetPair], progress: &dyn Progress) -> Result<()> {
-        progress.begin("checking the pairs", pairs.len() as u64);
-        let is =
-            |name: &str, digest: &str| file_digest(&self.folder.join(name)).is_ok_and(|found| hex(&found) == digest);
-        let mut bad = Vec::new();
-        for (k, pair) in pairs.iter().enumerate() {
-            progress.check_stopped()?;
-            if !is(&pair.frame, &pair.frame_sha256) || !is(&pair.truth, &pair.truth_sha256) {
-                bad.push(k as u64);
-            }
-            progress.advance(1);
-        }
-        if bad.is_empty() {
-            return Ok(());
-        }
-        let mut shards: Vec<u64> = bad.iter().map(|k| k / self.images_per_shard).collect();
-        shards.dedup();
-        let first = self.cut().path(shards[0]);
-        Err(Error::refused(
-            "study/damaged-pairs",
-            format!(
-                "files of {} of {} pairs are damaged or missing: {}",
-                bad.len(),
-                pairs.len(),
-                ranges(&bad)
-            ),
-            format!(
-                "remove the files of their shards ({}; the first is {}), then make them again by `metalith study run {} --missing`",
-                ranges(&shards),
-                first.display(),
-                self.folder.display()
-            ),
-        ))
-    }
+/// Files of the pair of a line.
+fn files_of_pair(line: &str) -> Option<Vec<(String, String)>> {
+    let pair: DatasetPair = serde_json::from_str(line).ok()?;
+    Some(vec![(pair.frame, pair.frame_sha256), (pair.truth, pair.truth_sha256)])
 }
 
 impl PairsRequest {

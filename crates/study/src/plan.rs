@@ -99,6 +99,7 @@ impl Plan {
             parts: self.draws,
             per_shard: self.draws_per_shard,
             folder: self.folder.clone(),
+            files_of: None,
         }
     }
 
@@ -349,6 +350,7 @@ pub fn planned_later(tolerance: &Tolerance, draws_per_shard: u64, folder: &Path)
         parts: draws,
         per_shard: draws_per_shard.clamp(1, draws),
         folder: folder.to_owned(),
+        files_of: None,
     }
 }
 

@@ -4,13 +4,13 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use metalith_core::file::read_at_most;
+use metalith_core::file::{file_digest, read_at_most};
 use metalith_core::text::hex;
 use metalith_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::sharding::{Shard, Sharding};
+use crate::sharding::{FilesOfPart, Shard, Sharding};
 
 /// Longest shard that is read (bytes): hundreds of times one of ten minutes, and it is held in memory.
 const LONGEST: u64 = 1 << 30;
@@ -46,6 +46,8 @@ pub(crate) enum ShardState {
     Truncated,
     /// The digest is another.
     Damaged,
+    /// Files of these parts are damaged or missing.
+    PartsDamaged(Vec<u64>),
     /// A file that is no shard of this plan with this number: identity of the refusal, and what it is.
     Foreign(&'static str, String),
 }
@@ -53,6 +55,21 @@ pub(crate) enum ShardState {
 /// The digest line of a text.
 pub(crate) fn digest_line(text: &str) -> String {
     format!("{BEFORE}{}{AFTER}", hex(&Sha256::digest(text)))
+}
+
+/// Numbers of the parts of a shard whose files are not what their lines state.
+fn damaged_parts(plan: &Sharding, text: &str, files_of: FilesOfPart) -> Vec<u64> {
+    let is = |(name, digest): &(String, String)| {
+        file_digest(&plan.folder.join(name)).is_ok_and(|found| hex(&found) == *digest)
+    };
+    let mut lines = text.lines();
+    let header = lines.next().and_then(|line| serde_json::from_str::<Header>(line).ok());
+    let numbers = header.map_or(0..0, |header| header.first..header.end);
+    let damaged = |line: &str| !files_of(line).is_some_and(|files| files.iter().all(is));
+    let all = numbers.zip(lines);
+    all.filter(|(_, line)| damaged(line))
+        .map(|(number, _)| number)
+        .collect()
 }
 
 /// Length of the text before the line of its digest, and whether the digest is right; none without such a line.
@@ -82,7 +99,18 @@ impl ShardState {
             return no_shard("is longer than any shard");
         }
         let bytes = read_at_most(path, LONGEST, "a shard")?;
-        Ok(Self::of_bytes(plan, bytes, place))
+        let state = Self::of_bytes(plan, bytes, place);
+        match (&state, plan.files_of) {
+            (Self::Whole { text, .. }, Some(files_of)) => {
+                let damaged = damaged_parts(plan, text, files_of);
+                Ok(if damaged.is_empty() {
+                    state
+                } else {
+                    Self::PartsDamaged(damaged)
+                })
+            }
+            _ => Ok(state),
+        }
     }
 
     fn of_bytes(plan: &Sharding, mut bytes: Vec<u8>, place: Option<Shard>) -> Self {
@@ -150,6 +178,7 @@ mod tests {
             parts: 5,
             per_shard: 2,
             folder: folder.to_owned(),
+            files_of: None,
         }
     }
 

@@ -23,7 +23,7 @@ const PAUSE: Duration = Duration::from_millis(200);
 const SHARD_SECONDS: f64 = 600.0;
 
 /// Work of many parts, each known by its number.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Sharding {
     /// SHA-256 of all that decides the answers, in hexadecimal.
     pub key: String,
@@ -33,7 +33,12 @@ pub struct Sharding {
     pub per_shard: u64,
     /// Folder of the plan.
     pub folder: PathBuf,
+    /// Files of a part besides its line, if parts have some.
+    pub files_of: Option<FilesOfPart>,
 }
+
+/// Names from the folder of the plan and SHA-256 of the files that the line of a part states; none if it is no such line.
+pub type FilesOfPart = fn(&str) -> Option<Vec<(String, String)>>;
 
 /// Some of the parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -209,7 +214,7 @@ impl Sharding {
         let path = self.path(number);
         match ShardState::of(self, &path, Some(shard))? {
             ShardState::Whole { .. } => Ok(true),
-            ShardState::Absent | ShardState::Truncated | ShardState::Damaged => Ok(false),
+            ShardState::Absent | ShardState::Truncated | ShardState::Damaged | ShardState::PartsDamaged(_) => Ok(false),
             ShardState::Foreign(id, why) => Err(Error::refused(
                 id,
                 format!("{} {why}", path.display()),

@@ -76,6 +76,7 @@ impl StartsPlan {
             parts: self.starts,
             per_shard: self.starts_per_shard,
             folder: self.folder.clone(),
+            files_of: None,
         }
     }
 

@@ -175,12 +175,11 @@ impl Sharding {
             more => format!(", and {more} more"),
         };
         let named = &bad[..bad.len().min(MOST_NAMED)];
-        let (id, hint) = match found.refused_as {
-            None => ("study/shards-damaged", format!("make them again with {run}")),
-            Some(id) => (
-                id,
-                format!("remove files that came here by mistake; what is missing or damaged is made with {run}"),
-            ),
+        let id = found.refused_as.unwrap_or("study/shards-damaged");
+        let hint = if found.unusable.is_empty() {
+            format!("make them again with {run}")
+        } else {
+            format!("remove files that came here by mistake; what is missing or damaged is made with {run}")
         };
         let what = format!(
             "{} files in {} cannot be used: {}{more}",
@@ -200,6 +199,11 @@ impl Status {
             ShardState::Whole { .. } | ShardState::Absent => (),
             ShardState::Truncated => self.damaged.push((path, "ends before its digest".into())),
             ShardState::Damaged => self.damaged.push((path, "is damaged: its digest differs".into())),
+            ShardState::PartsDamaged(parts) => {
+                let why = format!("is of files that are damaged or missing, those of {}", ranges(&parts));
+                self.refused_as.get_or_insert("study/damaged-pairs");
+                self.damaged.push((path, why));
+            }
             ShardState::Foreign(id, why) => {
                 self.refused_as.get_or_insert(id);
                 self.unusable.push((path, why));
@@ -256,6 +260,7 @@ mod tests {
             parts,
             per_shard: 2,
             folder: folder.to_owned(),
+            files_of: None,
         }
     }
 

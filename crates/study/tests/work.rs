@@ -88,10 +88,11 @@ fn pairs_of_shards_are_those_of_one_run() {
     let refused = work.merge(&Silent).unwrap_err();
     assert_eq!(refused.id(), "study/damaged-pairs");
     insta::assert_snapshot!(metalith_testing::without_folder(refused, folder.path()), @r"
-    files of 1 of 5 pairs are damaged or missing: 2
-      help: remove the files of their shards (1; the first is parts/shards/000001.jsonl), then make them again by `metalith study run parts --missing`
+    1 files in parts/shards cannot be used: 000001.jsonl is of files that are damaged or missing, those of 2
+      help: make them again with `metalith study run FOLDER --missing`
     ");
-    fs::remove_file(work.cut().path(1)).unwrap();
+    let status = work.cut().status().unwrap();
+    assert_eq!((status.missing, status.damaged.len()), (vec![1], 1));
     run(&[1]).unwrap();
     assert_eq!(work.merge(&Silent).unwrap(), right);
     let old = fs::read_to_string(at("parts/plan.json")).unwrap();
