@@ -70,6 +70,27 @@ centre_nm = 660
 width_nm = 4
 """
 
+BENCH = """schema = 1
+[source]
+kind = "collimated"
+divergence_mrad = 2.35
+divergence_axes = "uniform disc"
+[camera]
+pixel_um = 0.5
+rows = 48
+cols = 48
+black_level_dn = 40.0
+gain_e_per_dn = 5.0
+read_noise_dn = 2.0
+saturation_dn = 4095
+registration_sigma_px = 0.5
+flux_sigma = 0.01
+[[led]]
+centre_nm = 660
+fwhm_nm = 6.0
+[captures]
+"""
+
 TOLERANCE = """schema = 1
 design = "{design}"
 draws = {draws}
@@ -118,6 +139,7 @@ CASES = [
     Case("cells", ["--orders", "5", "--tolerance", "0.1"]),
     Case("optimize", ["--no-report"], sets=2),
     Case("calibrate", ["--effects", "defocus,pixel_blur"], kind="set"),
+    Case("plan", ["--effects", "defocus,pixel_blur"], kind="design and bench"),
     Case("verify", ["--fast", "--fidelity", "published"], kind="design and layout"),
     Case("psf", ["--layer", "1/0", "--wavelength-nm", "660"], kind="layout"),
     Case("check", [], kind="layout"),
@@ -191,11 +213,13 @@ class Bench:
             description.write_text(description.read_text().replace("small chip", f"chip {n}"))
             return folder
         # What sees pictures has one chip, and two scenes.
-        version = n if kind in ("design", "design and layout", "layout", "study") else 0
+        version = n if kind in ("design", "design and bench", "design and layout", "layout", "study") else 0
         path = self.folder / f"design-{version}.toml"
         text = re.sub(r'(?m)^title = .*$', f'title = "version {version}"', small_design(), count=1)
         path.write_text(text.replace("width_max_nm = 300", f"width_max_nm = {300 + 10 * version}"))
-        if kind == "design":
+        if kind == "design and bench":
+            (self.folder / "bench.toml").write_text(BENCH)
+        if kind in ("design", "design and bench"):
             return path
         made = self.folder / f"layout-{version}"
         # All have one name, so that files of one replace those of the other.
@@ -238,6 +262,7 @@ class Bench:
         reports = [word for form in ("lyrdb", "junit", "sarif") for word in (f"--{form}", f"{out}/found.{form}")]
         words = {
             "verify": [str(self.folder / f"design-{n}.toml"), given],
+            "plan": [given, "--bench", str(self.folder / "bench.toml")],
             "psf": [given, "--distance-um", str(48 + 4 * n)],
             "check": [given, "--design", design, *reports],
             "picture": [*self.seen(self.inputs[n]), *(["--separate"] if n else [])],

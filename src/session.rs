@@ -1,6 +1,6 @@
 //! A bench session planned from a design: its layout, then its measurements.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use metalith_bench_plan::{BenchFile, MeasurementPlan, PlanRequest, check_not_begun, check_plannable, plan};
 use metalith_cell::cache_folder;
@@ -32,6 +32,8 @@ pub fn plan_session(
         progress.warn("another run writes into this folder: waiting for it");
     })?;
     check_not_begun(folder)?;
+    let inputs = design.inputs();
+    let turn = turn.keeping(inputs.iter().map(PathBuf::as_path).chain(layout));
     // Not listed: a person fills some of these files in.
     let planned = turn.replace("plan", &[], |into| {
         let (layout, layout_in_set) = if let Some(file) = layout {

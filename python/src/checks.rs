@@ -95,7 +95,8 @@ pub fn verify(
     work(py, progress, |p| {
         let layout = reading.below(&layout, p)?;
         let array = PillarArray::build(design, p)?;
-        let model = model.as_deref().map(CalibratedModel::read).transpose()?;
+        let model_file = model;
+        let model = model_file.as_deref().map(CalibratedModel::read).transpose()?;
         let chip = |model| -> Result<AsBuiltChip> {
             Ok(AsBuiltChip::in_light(&design.lit_stack()?, model)?.cached_in(cache_folder().as_deref()))
         };
@@ -115,7 +116,10 @@ pub fn verify(
         let cases = cases.with_through_focus();
         let found = metalith::verify(design, &array, &layout.path, &cases, accuracy, p)?;
         if let Some(folder) = out {
+            let inputs = design.inputs();
+            let named = [layout.path.as_path()].into_iter().chain(model_file.as_deref());
             let turn = metalith::FolderLock::wait(&folder, p, || ())?;
+            let turn = turn.keeping(inputs.iter().map(PathBuf::as_path).chain(named));
             turn.publish("report", &[], |folder| {
                 metalith::write_report(design, &array, &found, None, folder)
             })?;

@@ -55,9 +55,11 @@ pub fn study_merge(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     work(py, progress, |p| {
-        let result = study::merge(&Plan::open(&folder)?, psfs, p)?;
+        let plan = Plan::open(&folder)?;
+        let result = study::merge(&plan, psfs, p)?;
         if let Some(out) = out {
-            let turn = FolderLock::wait(&out, p, || ())?;
+            let inputs = plan.inputs()?;
+            let turn = FolderLock::wait(&out, p, || ())?.keeping(inputs.iter().map(PathBuf::as_path));
             turn.publish("report", &[], |folder| study::write_page(&result, folder))?;
         }
         Ok(serde_json::json!({ "study": result, "draws": result.draws }).to_string())

@@ -10,11 +10,12 @@ use metalith::calibrate::{
 };
 use metalith::cell::cache_folder;
 use metalith::extract::PillarsAt;
+use metalith::file::InputFiles;
 use metalith::metrology::{self, Answer, SetKind, kind_of};
 use metalith::{Error, Result};
 
 use super::out_folder::OutFolder;
-use super::paths::apart;
+use super::paths::paths;
 use super::reading::ReadingArgs;
 use super::{Outcome, Terminal, print_json, print_line, print_text};
 
@@ -121,8 +122,10 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome> 
 /// Calibrate or validate the sets, each into its folder.
 fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -> Result<Outcome> {
     // Those of an earlier run are removed, and an effect may be declared by one.
+    let inputs = InputFiles::of(paths(&args.sets).chain(args.declare.as_deref()));
     for out in outs {
-        apart(args.declare.as_deref(), &[&out.join("proposal.toml")])?;
+        let answers = ["diagnosis.json", "report.html", "model.toml", "proposal.toml"].map(|name| out.join(name));
+        answers.iter().try_for_each(|answer| inputs.check_output(answer))?;
     }
     let kinds: Vec<_> = args.sets.iter().map(|set| kind_of(set)).collect();
     if kinds.iter().any(Option::is_some) {
@@ -173,7 +176,7 @@ fn calibrate_into(args: &CalibrateArgs, outs: &[PathBuf], terminal: &Terminal) -
         };
         let validation = validate(&set, &settings, &plan, terminal)?;
         terminal
-            .turn_at(out)?
+            .turn_at(out, paths(&set.inputs()))?
             .publish("validation", &[], |folder| write_validation(folder, &validation))?;
         terminal.clear();
         if args.json {

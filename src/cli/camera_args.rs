@@ -1,11 +1,12 @@
 //! Options of all commands that take pictures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::sensor::Camera;
 use metalith::{CalibratedModel, Design, Error, Result};
 
+use super::paths::inputs_of;
 use super::{Terminal, standard_input};
 
 /// The chip, the camera that it is in, and the field of its scenes.
@@ -48,6 +49,19 @@ pub(crate) fn distance_um(distance_mm: Option<f64>) -> Result<f64> {
             "the distance of the scene is not positive",
             "give a positive --distance-mm",
         )),
+    }
+}
+
+impl CameraFiles {
+    /// Paths of these files, and others that a command reads: what no result replaces.
+    pub(crate) fn inputs<'p>(
+        &'p self,
+        args: &'p CameraArgs,
+        others: impl IntoIterator<Item = &'p Path>,
+    ) -> Vec<PathBuf> {
+        let camera = self.camera.files.iter().map(PathBuf::as_path);
+        let named = camera.chain(args.model.as_deref());
+        inputs_of(&self.design, named.chain(others))
     }
 }
 

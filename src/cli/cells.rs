@@ -12,7 +12,7 @@ use metalith::report::{counted, fixed, sig};
 use metalith::{AtomicFile, Design, Error, PolarisationBasis, Progress, Result};
 
 use super::out_folder::OutFolder;
-use super::paths::name_of;
+use super::paths::{name_of, paths};
 use super::section_text::with_keys;
 use super::{Outcome, Terminal, print_json, print_line, print_text, standard_input};
 
@@ -99,7 +99,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         study.steered = study_steered(&design, cache.as_deref(), terminal)?;
         terminal.clear();
     }
-    let turn = out.turn(terminal)?;
+    let turn = out.turn(paths(&design.inputs()), terminal)?;
     turn.publish("cells", &[], |folder| write_cell_report(&study, folder))?;
     drop(turn);
     let folder = out.path;
@@ -208,9 +208,9 @@ fn write_mapping(path: &Path, design: &Design, best: &MappingStudy, terminal: &T
         let changed = with_keys(&text, "[mapping]", 0, &keys);
         with_keys(&changed, "[mapping.cell]", 0, &stated)
     };
-    // Tables that the design names stand beside it.
+    // Tables that the design names stand beside it; both are to be replaced.
     let beside = path.parent().unwrap_or(Path::new(""));
-    terminal.turn_at(beside)?.replace(&name_of(path), &[], |folder| {
+    terminal.turn_at(beside, [])?.replace(&name_of(path), &[], |folder| {
         if is_table {
             let rows = cell.to_comments() + &best.table.to_csv();
             AtomicFile::write(&folder.join(&table), rows.as_bytes())?;
@@ -230,7 +230,7 @@ fn write_mapping(path: &Path, design: &Design, best: &MappingStudy, terminal: &T
 fn rotations(args: &CellsArgs, design: &Design, out: &OutFolder, terminal: &Terminal) -> Result<Outcome> {
     let study = RotationStudy::new(design, terminal)?;
     terminal.clear();
-    let turn = out.turn(terminal)?;
+    let turn = out.turn(paths(&design.inputs()), terminal)?;
     let folder = turn.folder();
     turn.publish("cells", &[], |folder| write_rotation_report(&study, folder))?;
     if args.json {
@@ -268,7 +268,7 @@ fn library(args: &CellsArgs, design: &Design, out: &OutFolder, terminal: &Termin
     let cache = args.cache.clone().or_else(cache_folder);
     let study = LibraryStudy::new(design, cache.as_deref(), terminal)?;
     terminal.clear();
-    let turn = out.turn(terminal)?;
+    let turn = out.turn(paths(&design.inputs()), terminal)?;
     let folder = turn.folder();
     turn.publish("cells", &[], |folder| write_library_report(&study, folder))?;
     if args.json {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
+use metalith::file::InputFiles;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::counted;
 use metalith::text::printable_json;
@@ -93,7 +94,7 @@ impl CheckArgs {
                 "give `-` to one of --lyrdb, --junit and --sarif, without --json",
             ));
         }
-        super::paths::apart(inputs.map(PathBuf::as_path), &files)
+        InputFiles::of(inputs.map(PathBuf::as_path)).check_outputs(&files)
     }
 
     /// Paths of the results, each with its form.
@@ -201,8 +202,9 @@ fn write_together(files: &[(&Path, String)], terminal: &Terminal) -> Result<()> 
             AtomicFile::write(path, text.as_bytes())?;
             continue;
         }
+        // None of them is an input: asked at first.
         terminal
-            .turn_at(&folder_of(first))?
+            .turn_at(&folder_of(first), [])?
             .replace(&name_of(first), &[], |folder| {
                 let mut each = of_one.iter();
                 each.try_for_each(|(path, text)| AtomicFile::write(&folder.join(name_of(path)), text.as_bytes()))

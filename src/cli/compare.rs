@@ -5,12 +5,13 @@ use std::str::FromStr;
 
 use clap::Args;
 use metalith::baselines::{Comparison, DiffuserSpec, Lensless, ListedDesign, MaskSpec, write_comparison};
+use metalith::file::InputFiles;
 use metalith::imaging::KernelCache;
 use metalith::report::counted;
 use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 
-use super::paths::apart;
+use super::paths::paths;
 use super::picture::Assume;
 use super::{Outcome, Terminal, images, output, print_json, print_line};
 
@@ -258,11 +259,9 @@ impl CompareArgs {
 pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let comparison = args.comparison(terminal)?;
+    let inputs = comparison.inputs();
     let outputs = ["compare.html", "compare.json"].map(|n| args.out.join(n));
-    apart(
-        comparison.photographs.iter().map(PathBuf::as_path),
-        &[&outputs[0], &outputs[1]],
-    )?;
+    InputFiles::of(paths(&inputs)).check_outputs(&[&outputs[0], &outputs[1]])?;
     if args.plan {
         let plan = plan_comparison(&comparison, &args.out, terminal)?;
         terminal.clear();
@@ -281,7 +280,7 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.clear();
     let table = comparison.markdown();
     let stated = if args.timings { comparison } else { comparison.untimed() };
-    write_comparison(&stated, &terminal.turn_at(&args.out)?)?;
+    write_comparison(&stated, &terminal.turn_at(&args.out, paths(&inputs))?)?;
     if args.json {
         print_json(&stated);
     } else {

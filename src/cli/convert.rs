@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metalith::Result;
+use metalith::file::InputFiles;
 use metalith::layout::{LayoutFormat, convert};
 
 use super::layout::FormatArg;
@@ -34,7 +35,7 @@ pub(crate) struct ConvertArgs {
 }
 
 pub(crate) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<Outcome> {
-    super::paths::apart([args.from.as_path()], &[&args.to])?;
+    InputFiles::of([args.from.as_path()]).check_output(&args.to)?;
     let format = args.format.map_or_else(|| LayoutFormat::of_name(&args.to), Into::into);
     terminal.stop_on_interrupt();
     let from = InputFile::of(&args.from)?;

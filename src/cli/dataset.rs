@@ -3,13 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::file::InputFiles;
 use metalith::imaging::scene::{images_in, read_far_scene};
-use metalith::imaging::{DatasetManifest, DatasetOrigin, ImagingSystem, check_images, write_dataset};
+use metalith::imaging::{
+    DatasetManifest, DatasetOrigin, ImagingSystem, check_images, check_pairs_apart, write_dataset,
+};
 use metalith::report::counted;
 use metalith::study::{PairsRequest, is_planned, plan_pairs};
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles};
+use super::paths::paths;
 use super::reading::ReadingArgs;
 use super::standard_input::{self, InputFile};
 use super::{Outcome, Terminal, print_line};
@@ -89,13 +93,15 @@ fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result
 
 pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
+    let files = args.with.read(terminal)?;
+    let images = images_in(&args.images)?;
+    let inputs = files.inputs(&args.with, paths(&images).chain([args.layout.as_path()]));
     let CameraFiles {
         mut design,
         camera,
         model,
-    } = args.with.read(terminal)?;
+    } = files;
     args.reading.aim(&mut design);
-    let images = images_in(&args.images)?;
     if args.plan {
         return plan(args, images, terminal);
     }
@@ -106,6 +112,7 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
             "make them by `metalith study run FOLDER --missing`, or name another folder with --out",
         ));
     }
+    check_pairs_apart(images.len(), &args.out, &InputFiles::of(paths(&inputs)))?;
     check_images(&images, terminal)?;
     let read = |path: &Path| read_far_scene(path, args.with.field_deg);
     let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
@@ -113,7 +120,7 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
     let operator = system.simulation();
     let head = DatasetManifest::of(&system, origin, args.seed);
-    let turn = terminal.turn_at(&args.out)?;
+    let turn = terminal.turn_at(&args.out, paths(&inputs))?;
     let manifest = write_dataset(&system, &operator, &images, &read, head, &turn, terminal)?;
     terminal.clear();
     print_line!("{} in {}", counted(manifest.pairs.len(), "pair"), args.out.display());

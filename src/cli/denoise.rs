@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use metalith::file::InputFiles;
 use metalith::imaging::scene::read_picture;
 use metalith::imaging::write_picture;
 use metalith::prior::{NetworkDenoiser, with_noise};
@@ -11,7 +12,6 @@ use metalith::{Error, Result};
 use ndarray::Array3;
 use serde::Serialize;
 
-use super::paths::apart;
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Remove noise from a picture with the network of the learnt prior.
@@ -79,12 +79,8 @@ pub(crate) fn run(args: &DenoiseArgs, terminal: &Terminal) -> Result<Outcome> {
                 "name a file that ends in .png",
             ));
         }
-        apart(
-            [Some(args.picture.as_path()), args.weights.as_deref()]
-                .into_iter()
-                .flatten(),
-            &[out],
-        )?;
+        let inputs = [Some(args.picture.as_path()), args.weights.as_deref()];
+        InputFiles::of(inputs.into_iter().flatten()).check_output(out)?;
     }
     let given = read_picture(&args.picture)?;
     let denoiser = match &args.weights {

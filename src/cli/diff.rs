@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::Result;
 use metalith::diff::{self, DiffPlan};
+use metalith::file::InputFiles;
 use metalith::gds::USUAL_LAYER;
 
 use super::reading::ReadingArgs;
@@ -40,7 +41,7 @@ pub(crate) struct DiffArgs {
 
 pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     let report: Vec<_> = args.report.as_deref().into_iter().collect();
-    super::paths::apart([args.a.as_path(), &args.b], &report)?;
+    InputFiles::of([args.a.as_path(), &args.b]).check_outputs(&report)?;
     terminal.stop_on_interrupt();
     let files = [InputFile::of(&args.a)?, InputFile::of(&args.b)?];
     let open = |path: &Path| args.reading.open(path, terminal);

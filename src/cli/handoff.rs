@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::compensate::compensated_name;
+use metalith::file::InputFiles;
 use metalith::gds::LayerNumber;
 use metalith::handoff::{
     DesignSource, Handoff, HandoffOptions, HandoffSource, HandoffVerification, LayoutSource, handoff, handoff_name,
@@ -211,7 +212,7 @@ fn make(source: HandoffSource, out: OutFolder, args: &HandoffArgs, terminal: &Te
         &args.waivers,
     ];
     let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
-    super::paths::outside(&out.path, &inputs)?;
+    InputFiles::of(inputs).check_outside(&out.path)?;
     let options = HandoffOptions {
         source,
         process: args.process.clone(),

@@ -10,6 +10,7 @@ use metalith::report::{count, counted, sig};
 use metalith::{Design, FolderLock, Hierarchy, PillarArray, Result, write_layer_properties};
 
 use super::out_folder::OutFolder;
+use super::paths::{inputs_of, paths};
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Write the pillar layout, the aperture layout and the layer colours of a design.
@@ -225,7 +226,8 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         let intended = std::mem::replace(&mut array, compensated.array.clone());
         compensation = Some((model, intended, compensated));
     }
-    let turn = out.turn(terminal)?;
+    let inputs = inputs_of(&design, args.compensate.as_deref());
+    let turn = out.turn(paths(&inputs), terminal)?;
     let report = |files: &Files, folder: &Path| match &compensation {
         Some((model, intended, compensated)) => {
             let pillars = &files.pillars.path;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::cell::cache_folder;
+use metalith::file::InputFiles;
 use metalith::layout::read_pillars;
 use metalith::optimise::{
     Checkpoint, Deconvolution, OptimiseReport, OptimiseTask, Optimised, OverWavelength, StrehlSummary, TaskCells,
@@ -11,10 +12,10 @@ use metalith::optimise::{
 };
 use metalith::report::{counted, sig};
 use metalith::study::plan_starts;
-use metalith::{Design, Hierarchy, PillarArray, Result, write_pillars};
+use metalith::{AtomicFile, Design, Hierarchy, PillarArray, Result, write_pillars};
 
 use super::out_folder::OutFolder;
-use super::paths::apart;
+use super::paths::paths;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
 /// Find the best phase of every ring over the whole band, and report the gain.
@@ -88,10 +89,11 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let phase = args.phase.clone().unwrap_or_else(|| folder.join("phase.csv"));
     let kept = folder.join("checkpoint.bin");
-    apart([args.design.as_path()], &[&phase, &kept])?;
+    let inputs = design.inputs();
+    InputFiles::of(paths(&inputs)).check_outputs(&[&phase, &kept])?;
     let task = OptimiseTask::of(&design)?;
     let cells = TaskCells::of(&design, !args.no_report, cache_folder().as_deref(), terminal)?;
-    let turn = terminal.turn_at(&folder)?;
+    let turn = terminal.turn_at(&folder, paths(&inputs))?;
     out.note()?;
     let checkpoint = if args.fresh {
         Checkpoint::begin(&design)
@@ -115,6 +117,7 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
         return Ok(Outcome::NotDone);
     }
     // Only of use to an interrupted run; there may be none.
+    AtomicFile::clear(&kept);
     let _ = std::fs::remove_file(&kept);
     if !args.json {
         print_line!("phase: {}", phase.display());

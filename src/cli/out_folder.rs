@@ -48,12 +48,16 @@ impl OutFolder {
         }
     }
 
-    /// Wait for the turn to write into the folder, and note the file that it is made from.
+    /// Wait for the turn to write into the folder, and note the file that it is made from. The `inputs` are not replaced.
     ///
     /// # Errors
     /// As [`Terminal::turn_at`] and [`OutFolder::note`].
-    pub(crate) fn turn(&self, terminal: &Terminal) -> Result<FolderLock> {
-        let turn = terminal.turn_at(&self.path)?;
+    pub(crate) fn turn<'p>(
+        &self,
+        inputs: impl IntoIterator<Item = &'p Path>,
+        terminal: &Terminal,
+    ) -> Result<FolderLock> {
+        let turn = terminal.turn_at(&self.path, inputs)?;
         self.note()?;
         Ok(turn)
     }

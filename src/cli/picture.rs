@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use metalith::file::InputFiles;
 use metalith::imaging::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::imaging::{
     ForecastScene, Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport,
@@ -14,7 +15,7 @@ use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use metalith::{Error, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
-use super::paths::{apart, name_of};
+use super::paths::{name_of, paths};
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
@@ -157,18 +158,19 @@ impl PictureArgs {
 pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let methods = RestorationMethod::of_names(&args.method)?;
+    let files = args.with.read(terminal)?;
+    let others = [&args.depth, &args.prior].into_iter().filter_map(Option::as_deref);
+    let inputs = files.inputs(&args.with, others.chain([args.layout.as_path(), args.scene.as_ref()]));
     let CameraFiles {
         mut design,
         camera,
         model,
-    } = args.with.read(terminal)?;
+    } = files;
     args.reading.aim(&mut design);
     let scene = args.scene()?;
     let outputs = args.outputs(&methods);
-    let inputs = [&args.layout, &args.with.design, &args.with.camera].map(PathBuf::as_path);
-    let others = [Path::new(&args.scene)].into_iter().chain(args.depth.as_deref());
-    let written: Vec<&Path> = outputs.iter().map(PathBuf::as_path).collect();
-    apart(inputs.into_iter().chain(others), &written)?;
+    let written: Vec<&Path> = paths(&outputs).collect();
+    InputFiles::of(paths(&inputs)).check_outputs(&written)?;
     let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
     let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
@@ -247,7 +249,7 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         camera: &camera,
         uncertainty: uncertainty.as_ref(),
     };
-    write_pages(&pages, &terminal.turn_at(&args.out)?)?;
+    write_pages(&pages, &terminal.turn_at(&args.out, paths(&inputs))?)?;
     terminal.clear();
     if args.json {
         print_json(&report);

@@ -425,8 +425,10 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
             model: model.as_ref(),
             white: white.as_ref(),
         };
+        let named = [&args.cell, &args.model, &args.camera];
+        let inputs = named.into_iter().flatten().chain([&args.layout]).map(PathBuf::as_path);
         terminal
-            .turn_at(folder)?
+            .turn_at(folder, inputs)?
             .publish("report", &[], |folder| write_single_psf_report(&report, folder))?;
     }
     terminal.clear();

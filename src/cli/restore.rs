@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::Result;
+use metalith::file::InputFiles;
 use metalith::imaging::scene::SceneImage;
 use metalith::imaging::{
     ForecastScene, FrameNumbers, FrameStatement, ImagingSystem, RestoredPicture, RestoredReport, check_scored,
@@ -13,7 +14,7 @@ use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use ndarray::Array3;
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
-use super::paths::{apart, name_of};
+use super::paths::{name_of, paths};
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line};
@@ -80,11 +81,14 @@ pub(crate) struct RestoreArgs {
 pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let wanted = pictures(&args.method, args.separate)?;
+    let files = args.with.read(terminal)?;
+    let others = [&args.layout, &args.frame].into_iter().chain(&args.prior);
+    let inputs = files.inputs(&args.with, others.map(PathBuf::as_path));
     let CameraFiles {
         mut design,
         camera,
         model,
-    } = args.with.read(terminal)?;
+    } = files;
     args.reading.aim(&mut design);
     let distance_um = distance_um(args.distance_mm)?;
     let side = usize::from(args.pixels);
@@ -101,9 +105,8 @@ pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
         .chain(wanted.iter().map(|(restored, _)| restored.picture.as_str()))
         .map(|name| args.out.join(name))
         .collect();
-    let inputs = [&args.layout, &args.frame, &args.with.design, &args.with.camera].map(PathBuf::as_path);
-    let written: Vec<&Path> = outputs.iter().map(PathBuf::as_path).collect();
-    apart(inputs, &written)?;
+    let written: Vec<&Path> = paths(&outputs).collect();
+    InputFiles::of(paths(&inputs)).check_outputs(&written)?;
     let numbers = FrameNumbers {
         black_level: args.black_level,
         white: args.white,
@@ -138,7 +141,12 @@ pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
         of_frame,
         pictures: wanted.into_iter().map(|(picture, _)| picture).collect(),
     };
-    report.write(&frame, &restored, &camera, &terminal.turn_at(&args.out)?)?;
+    report.write(
+        &frame,
+        &restored,
+        &camera,
+        &terminal.turn_at(&args.out, paths(&inputs))?,
+    )?;
     terminal.clear();
     if args.json {
         print_json(&report);

@@ -6,6 +6,7 @@ use clap::Args;
 use metalith::{Error, PillarArray, Result};
 
 use super::layout::Target;
+use super::paths::paths;
 use super::verify::{Judging, REPORT_FILES};
 use super::{Outcome, Terminal, standard_input};
 
@@ -36,7 +37,7 @@ pub(crate) fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     args.judging.check_drawn(&design, &array)?;
-    let turn = out.turn(terminal)?;
+    let turn = out.turn(paths(&args.judging.inputs(&design)), terminal)?;
     // A report speaks of the layout beside it: the old one must not stand beside a new layout, whatever happens.
     let written = args
         .target

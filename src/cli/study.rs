@@ -6,6 +6,7 @@ mod submit;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use metalith::file::InputFiles;
 use metalith::gds::LayerNumber;
 use metalith::report::{counted, sig};
 use metalith::study::{
@@ -13,7 +14,7 @@ use metalith::study::{
 };
 use metalith::{Error, Result};
 
-use super::paths::{apart, name_of, outside};
+use super::paths::{name_of, paths};
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Simulate many chips with the tolerances of a process and a bench: the yield, and the effects that limit it.
@@ -170,7 +171,10 @@ fn merge_comparison(plan: &metalith::study::ComparisonPlan, args: &MergeArgs, te
     without_table(args)?;
     let comparison = plan.merge(terminal)?;
     let table = comparison.markdown();
-    metalith::baselines::write_comparison(&comparison.untimed(), &terminal.turn_at(&args.study)?)?;
+    metalith::baselines::write_comparison(
+        &comparison.untimed(),
+        &terminal.turn_at(&args.study, paths(&plan.comparison.inputs()))?,
+    )?;
     terminal.clear();
     super::compare::tell(&table, &args.study);
     Ok(Outcome::Fine)
@@ -196,14 +200,16 @@ fn merge_study(plan: &Plan, args: &MergeArgs, terminal: &Terminal) -> Result<Out
     let [page, numbers] = REPORT.map(|name| folder.join(name));
     let inputs = plan.inputs()?;
     let outputs = [out.as_path(), &page, &numbers];
-    apart(inputs.iter().map(PathBuf::as_path), &outputs)?;
-    outside(&plan.cut().shards_folder(), &outputs)?;
+    InputFiles::of(paths(&inputs)).check_outputs(&outputs)?;
+    InputFiles::of(outputs).check_outside(&plan.cut().shards_folder())?;
     TableFormat::of(&out)?;
     let result = merge(plan, args.psfs, terminal)?;
-    terminal.turn_at(&folder)?.publish(&name_of(&out), &[], |folder| {
-        result.write(&folder.join(name_of(&out)))?;
-        write_page(&result, folder)
-    })?;
+    terminal
+        .turn_at(&folder, paths(&inputs))?
+        .publish(&name_of(&out), &[], |folder| {
+            result.write(&folder.join(name_of(&out)))?;
+            write_page(&result, folder)
+        })?;
     terminal.clear();
     for y in &result.yields {
         print_line!(

@@ -188,14 +188,22 @@ impl Terminal {
         }
     }
 
-    /// Wait until no other process writes the files of a folder, which are made together.
-    pub fn turn_at(&self, folder: &Path) -> metalith::Result<FolderLock> {
-        FolderLock::wait(folder, self, || {
+    /// Wait until no other process writes the files of a folder, which are made together. They replace none of the `inputs`.
+    ///
+    /// # Errors
+    /// As [`FolderLock::wait`].
+    pub fn turn_at<'p>(
+        &self,
+        folder: &Path,
+        inputs: impl IntoIterator<Item = &'p Path>,
+    ) -> metalith::Result<FolderLock> {
+        let turn = FolderLock::wait(folder, self, || {
             self.say(&format!(
                 "another process writes into {}: waiting for it",
                 folder.display()
             ));
-        })
+        });
+        Ok(turn?.keeping(inputs))
     }
 
     /// Let Ctrl-C ask for a stop between two steps instead of ending the process; one more, a second later or more, ends it.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use metalith::baselines::{Comparison, StageKind};
+use metalith::file::InputFiles;
 use metalith::imaging::KernelCache;
 use metalith::imaging::scene::images_in;
 use metalith::imaging::scene::read_picture;
@@ -11,7 +12,7 @@ use metalith::training::{Photographs, Stacks, TrainingReport, TrainingSpec, trai
 use metalith::{Error, Result};
 
 use super::compare::{BaselineKind, ComparedDesign, LenslessArgs};
-use super::paths::{apart, writable};
+use super::paths::{paths, writable};
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Train a network on the photographs of a folder: the denoiser of the learnt prior, or the last stage of a camera.
@@ -154,7 +155,7 @@ pub(crate) fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
     let files = images_in(&args.folder)?;
     let out = args.out();
     let state = beside(&out, ".state");
-    apart(files.iter().map(PathBuf::as_path), &[&out, &state])?;
+    InputFiles::of(paths(&files).chain(args.camera.as_deref())).check_outputs(&[&out, &state])?;
     writable(&[&out, &state])?;
     let report = match args.stage {
         Some(kind) => args.stage(kind, files, &spec, [&out, &state], terminal)?,

@@ -16,6 +16,7 @@ use metalith::{
 };
 
 use super::compensated::{CompensatedFor, judged_as_made};
+use super::paths::{inputs_of, paths};
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
@@ -247,6 +248,11 @@ impl Judging {
         self.report(design, array, &found, picture, turn, terminal)
     }
 
+    /// Files that the judgement of a layout of this design reads, besides the layout.
+    pub(crate) fn inputs(&self, design: &Design) -> Vec<PathBuf> {
+        inputs_of(design, self.model.as_deref().into_iter().chain(self.picture.as_deref()))
+    }
+
     /// The cell of the pillars as drawn that judges a layout of this design.
     fn fidelity(&self, design: &Design) -> Fidelity {
         self.fidelity.map_or(design.verify.fidelity, Fidelity::from)
@@ -346,6 +352,7 @@ pub(crate) fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
         ..args.judging.clone()
     };
     judging.check_drawn(&design, &array)?;
-    let turn = terminal.turn_at(&folder)?;
+    let inputs = judging.inputs(&design).into_iter().chain([args.layout.clone()]);
+    let turn = terminal.turn_at(&folder, paths(&inputs.collect::<Vec<_>>()))?;
     judging.judge(&design, &array, &layout, &turn, terminal)
 }

@@ -6,6 +6,7 @@ mod cells;
 mod check;
 mod compare;
 mod dataset;
+mod files;
 mod handoff;
 mod hexagonal;
 mod made;

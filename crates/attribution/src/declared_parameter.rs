@@ -4,6 +4,7 @@ use std::path::Path;
 
 use metalith_core::Result;
 use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::file::check_unaltered;
 
 /// Most parameters of one effect: a step of the search fits all of them at once.
 pub const MOST_PARAMETERS: usize = 6;
@@ -38,6 +39,7 @@ pub fn read_declared_effects<E>(
     read: impl Fn(&Section<'_, '_>) -> Option<E>,
     name: impl Fn(&E) -> &str,
 ) -> Result<Vec<E>> {
+    check_unaltered(path)?;
     let text = load(path)?;
     Document::read(path, &text, |root| {
         let sections = root.sections("effect");

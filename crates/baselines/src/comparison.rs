@@ -47,6 +47,19 @@ pub struct Comparison {
     pub lpips: Option<PathBuf>,
 }
 
+impl Comparison {
+    /// All files that it names: what no result replaces.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        let of_designs = self
+            .designs
+            .iter()
+            .flat_map(|d| [&d.design, &d.layout].into_iter().chain(&d.camera));
+        let weights = self.learnt.iter().chain(&self.lpips);
+        let all = of_designs.chain(&self.photographs).chain(weights).chain([&self.camera]);
+        all.cloned().collect()
+    }
+}
+
 /// A design that is compared.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -138,6 +138,8 @@ fn conclude(
     let turn = FolderLock::wait(out, progress, || {
         progress.warn("another run writes into this folder: waiting for it");
     })?;
+    let inputs = session.set().inputs();
+    let turn = turn.keeping(inputs.iter().map(PathBuf::as_path));
     write(session, simulations, diagnosis, (evidence, proposal), &turn)
 }
 

@@ -5,6 +5,7 @@ mod cell_file;
 mod cells;
 mod design;
 mod digest;
+mod files;
 mod focus;
 mod lattice_orders;
 pub mod phase;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::lab::{InputCopy, Lab};
 use super::options::{DesignSource, HandoffOptions};
 use super::process::Process;
-use metalith_core::file::read_at_most;
-use metalith_core::{Error, Progress, Result, document};
+use metalith_core::file::{InputFiles, read_at_most};
+use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_optics::CalibratedModel;
 use metalith_rcwa::Material;
@@ -33,7 +33,7 @@ impl Sources {
     /// # Errors
     /// Mistakes in one of them; a file that cannot be read, is no ordinary file, or changes while it is read.
     pub(crate) fn read(source: &DesignSource, options: &HandoffOptions, progress: &dyn Progress) -> Result<Self> {
-        let (mut design, kept) = read_design(&source.path, progress)?;
+        let (mut design, kept) = read_design(&source.path, &options.out, progress)?;
         let cell = &design.cell;
         let process = match &options.process {
             Some(path) => Process::read(path)?,
@@ -52,9 +52,9 @@ impl Sources {
         let mut model =
             |path: &Option<PathBuf>, kind: &str, purpose: &'static str| -> Result<Option<CalibratedModel>> {
                 let Some(path) = path else { return Ok(None) };
-                let text = document::load(path)?;
+                let (model, text) = CalibratedModel::read_with_text(path)?;
                 lab.keep_copy(InputCopy::new(kind, path, purpose, text.as_bytes()));
-                CalibratedModel::parse(path, &text).map(Some)
+                Ok(Some(model))
             };
         let compensated = model(
             &source.compensate,
@@ -80,8 +80,10 @@ impl Sources {
 
 /// Read the design and the files it names. What is kept is what was read: the files are read before and after the
 /// design is, and must not change in between.
-fn read_design(path: &Path, progress: &dyn Progress) -> Result<(Design, Vec<InputCopy>)> {
+fn read_design(path: &Path, out: &Path, progress: &dyn Progress) -> Result<(Design, Vec<InputCopy>)> {
     let named = files_of(path, &Design::read_with(path, progress)?)?;
+    // The folder is replaced as a whole.
+    InputFiles::of(named.iter().map(|(path, ..)| path.as_path())).check_outside(out)?;
     let before = bytes_of(&named)?;
     let design = Design::read_with(path, progress)?;
     let same_files = files_of(path, &design)? == named;
@@ -112,20 +114,8 @@ fn bytes_of(files: &[Named]) -> Result<Vec<Vec<u8>>> {
 /// The design file and the tables that it names: those that are read as tables, whatever else lies there.
 fn files_of(path: &Path, design: &Design) -> Result<Vec<Named>> {
     let mut files: Vec<Named> = vec![(path.to_owned(), "design_", "the design")];
-    if let Some(table) = &design.mapping.table_file {
-        files.push((table.clone(), "", "phase to width, the mapping of the design"));
-    }
-    if let Some(library) = &design.mapping.pillar_library_file {
-        files.push((
-            library.clone(),
-            "",
-            "phases of upright pillars, the library of the design",
-        ));
-    }
-    let own = design.array.placed.iter().filter_map(|placed| placed.lens.as_ref());
-    for lens in std::iter::once(&design.lens).chain(own) {
-        files.extend(lens.phase_files().map(|(file, purpose)| (file.to_owned(), "", purpose)));
-    }
+    let tables = design.tables().into_iter();
+    files.extend(tables.map(|(file, purpose)| (file.to_owned(), "", purpose)));
     if let Some(camera) = &design.verify.camera {
         for file in Camera::read(camera)?.files {
             files.push((file, "camera_", "the camera that white light was simulated for"));

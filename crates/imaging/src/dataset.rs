@@ -9,7 +9,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_core::file::{file_digest, read_at_most};
+use metalith_core::file::{InputFiles, file_digest, read_at_most};
 use metalith_core::text::hex;
 use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result, srgb};
 use metalith_design::Design;
@@ -106,6 +106,11 @@ fn shard(i: usize) -> String {
     format!("{first:06}-{:06}", first + SHARD - 1)
 }
 
+/// Names of the frame and the scene of image number `i`, from the folder of the set.
+fn pair_files(i: usize) -> [String; 2] {
+    ["frame", "truth"].map(|kind| format!("{}/{i:06}.{kind}.png", shard(i)))
+}
+
 /// Number of a frame where there is no signal: reading does not bring it below zero, and neither do the steps of the sensor.
 pub(crate) fn black_level(camera: &Camera) -> u16 {
     let read = camera.sensor.noise.of_exposure(camera.exposure.time_s).read;
@@ -136,8 +141,9 @@ impl DatasetManifest {
 /// gives the scene of an image. Ask [`check_images`](crate::check_images) first: here an image that cannot be used stops the work.
 ///
 /// # Errors
-/// If an image cannot be read or is not of the size that the imaging system was opened for, a file cannot be written, or the user
-/// stopped it; what is complete is kept. If another process without a lock wrote other pairs meanwhile.
+/// If an image cannot be read or is not of the size that the imaging system was opened for, a pair would replace an input of the turn,
+/// a file cannot be written, or the user stopped it; what is complete is kept. If another process without a lock wrote other pairs
+/// meanwhile.
 pub fn write_dataset(
     system: &ImagingSystem,
     operator: &FrameOperator<'_>,
@@ -147,6 +153,8 @@ pub fn write_dataset(
     turn: &FolderLock,
     progress: &dyn Progress,
 ) -> Result<DatasetManifest> {
+    check_pairs_apart(images.len(), turn.folder(), turn.inputs())?;
+    clear_unfinished(turn);
     progress.begin("recording frames", images.len() as u64);
     let writer = PairWriter::new(system, operator, manifest.seed, turn.folder());
     for (i, image) in images.iter().enumerate() {
@@ -159,6 +167,43 @@ pub fn write_dataset(
         check_own(turn.folder(), &manifest)?;
     }
     Ok(manifest)
+}
+
+/// Refuse a folder in which the pairs of so many images would replace an input, such as frames of another set that are used as
+/// images: asked before any work.
+///
+/// # Errors
+/// With the path of the first such file.
+pub fn check_pairs_apart(images: usize, folder: &Path, inputs: &InputFiles) -> Result<()> {
+    inputs.check_output(&folder.join(MANIFEST))?;
+    let mut files = (0..images).flat_map(pair_files);
+    files.try_for_each(|name| inputs.check_output(&folder.join(name)))
+}
+
+/// Remove what killed runs left of files of pairs, those of images that this set has not among them.
+fn clear_unfinished(turn: &FolderLock) {
+    if !turn.is_held() {
+        return;
+    }
+    let names = |folder: &Path| -> Vec<String> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten();
+        entries
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+            .collect()
+    };
+    let is_pair_of = |shard_name: &str, file: &str| {
+        let number = file.split('.').next().and_then(|number| number.parse().ok());
+        number.is_some_and(|i| shard(i) == shard_name && pair_files(i).iter().any(|name| name.ends_with(file)))
+    };
+    for shard_name in names(turn.folder()) {
+        let folder = turn.folder().join(&shard_name);
+        for left in names(&folder) {
+            let file = left.strip_prefix('.').and_then(|name| name.strip_suffix(".part"));
+            if let Some(file) = file.filter(|file| is_pair_of(&shard_name, file)) {
+                AtomicFile::clear(&folder.join(file));
+            }
+        }
+    }
 }
 
 /// Succeeds if the pairs that are there are those of a manifest; else the manifest is removed.
@@ -227,8 +272,7 @@ impl<'a> PairWriter<'a> {
         hasher.update(FORMAT);
         let source = hex(&hasher.finalize());
         let [of_frame, of_truth] = ["frame", "truth"].map(|kind| format!("{source} {kind}"));
-        let name = format!("{}/{i:06}", shard(i));
-        let (frame, truth) = (format!("{name}.frame.png"), format!("{name}.truth.png"));
+        let [frame, truth] = pair_files(i);
         let (frame_file, truth_file) = (self.folder.join(&frame), self.folder.join(&truth));
         let kept = |file: &Path, of: &str| {
             let bytes = read_at_most(file, png16::LONGEST, "a picture of the set").ok()?;

@@ -45,7 +45,9 @@ pub use approximation_scores::{AssumedScore, without_dispersion, worth_of_assump
 pub use approximation_set::ApproximationSet;
 pub use chip::{ChipInLight, ElementInLight, element_views, sampling_of, sensor_um};
 pub use colour::ChannelColours;
-pub use dataset::{DatasetManifest, DatasetOrigin, DatasetPair, PairWriter, write_dataset, write_dataset_manifest};
+pub use dataset::{
+    DatasetManifest, DatasetOrigin, DatasetPair, PairWriter, check_pairs_apart, write_dataset, write_dataset_manifest,
+};
 pub use exposure::{Frame, channel_at, counts_channel, expose, gains, sensitivity};
 pub use files::{FrameFile, picture_file};
 pub use forecast::{Forecast, ScenePower};

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{Perturbation, PerturbationFault};
 use metalith_cell::CellStack;
 use metalith_core::document::{self, Fault, FaultKind, Faults};
+use metalith_core::file::check_unaltered;
 use metalith_core::text::quoted;
 use metalith_core::{AtomicFile, Error, Result};
 use metalith_pillars::PillarId;
@@ -148,9 +149,19 @@ impl CalibratedModel {
     /// Read a model file.
     ///
     /// # Errors
-    /// If it cannot be read; as [`CalibratedModel::parse`].
+    /// If it cannot be read, or is not the one that its calibration wrote; as [`CalibratedModel::parse`].
     pub fn read(path: &Path) -> Result<Self> {
-        Self::parse(path, &document::load(path)?)
+        Self::read_with_text(path).map(|(model, _)| model)
+    }
+
+    /// Variant of [`CalibratedModel::read`] that returns the text too.
+    ///
+    /// # Errors
+    /// As [`CalibratedModel::read`].
+    pub fn read_with_text(path: &Path) -> Result<(Self, String)> {
+        check_unaltered(path)?;
+        let text = document::load(path)?;
+        Self::parse(path, &text).map(|model| (model, text))
     }
 
     /// A model from the text of the file at `path`.

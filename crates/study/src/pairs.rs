@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use metalith_core::file::{file_digest, read_at_most};
+use metalith_core::file::{InputFiles, file_digest, read_at_most};
 use metalith_core::text::hex;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
 use metalith_imaging::scene::{SceneImage, read_far_scene};
 use metalith_imaging::{
     DatasetManifest, DatasetOrigin, DatasetPair, ImagingSystem, KernelCache, PairWriter, check_images,
-    write_dataset_manifest,
+    check_pairs_apart, write_dataset_manifest,
 };
 use metalith_optics::CalibratedModel;
 use metalith_sensor::Camera;
@@ -202,6 +202,11 @@ pub fn plan_pairs(
     progress: &dyn Progress,
 ) -> Result<PairsPlan> {
     let request = request.placed()?;
+    check_pairs_apart(
+        request.images.len(),
+        folder,
+        &InputFiles::of(request.images.iter().map(PathBuf::as_path)),
+    )?;
     progress.begin("digests of the images", request.images.len() as u64);
     let mut digests = Vec::new();
     for image in &request.images {

@@ -68,6 +68,17 @@ impl Term {
             Self::Pair(i, j) => x[i] * x[j],
         }
     }
+
+    /// Power of a factor on some quantities in this term.
+    fn degree(self, which: &[bool]) -> usize {
+        let of = |i: usize| usize::from(which[i]);
+        match self {
+            Self::One => 0,
+            Self::Linear(i) => of(i),
+            Self::Square(i) => 2 * of(i),
+            Self::Pair(i, j) => of(i) + of(j),
+        }
+    }
 }
 
 impl Quadratic {
@@ -209,42 +220,76 @@ impl Table {
             let only = (0..self.names.len()).map(|k| k == i).collect();
             cases.push((self.names[i].clone(), only));
         }
-        let judge = |which: &[bool], factor: f64| self.yield_at(which, factor, limits, responses, records);
         cases
             .into_iter()
             .map(|(quantity, which)| {
-                let steps = (0..=100).rev().map(|p| f64::from(p) / 100.0);
-                let factor = steps.into_iter().find(|f| judge(&which, *f) >= wanted);
+                let draws = self.scaled_margins(&which, limits, responses, records);
+                let held = |factor: f64| {
+                    draws
+                        .iter()
+                        .filter(|draw| draw.iter().all(|m| m.at(factor) >= 0.0))
+                        .count()
+                };
+                let yield_at = |factor: f64| held(factor) as f64 / records.len().max(1) as f64;
+                let mut steps = (0..=100).rev().map(|p| f64::from(p) / 100.0);
                 Tightening {
                     quantity,
-                    factor,
-                    best_yield: judge(&which, 0.0),
+                    factor: steps.find(|factor| yield_at(*factor) >= wanted),
+                    best_yield: yield_at(0.0),
                 }
             })
             .collect()
     }
 
-    /// Yield with the spread of some quantities multiplied by a factor: each draw keeps what the fit misses of it, so
-    /// that a factor of one gives what was counted.
-    fn yield_at(
+    /// Margins of the limits that depend on the draw, over the spread of some quantities: each draw keeps what the fit misses of it, so
+    /// that a factor of one gives what was counted. Draws that miss another limit are left out: they hold at no factor.
+    fn scaled_margins(
         &self,
         which: &[bool],
-        factor: f64,
         limits: &[LimitStatement],
         responses: &[Response],
         records: &[DrawRecord],
-    ) -> f64 {
-        let held = records.iter().zip(&self.x).filter(|(record, x)| {
-            let scaled = x.iter().zip(which).map(|(v, w)| if *w { factor * v } else { *v });
-            let scaled: Vec<f64> = scaled.collect();
-            limits.iter().enumerate().all(|(k, limit)| {
-                let Some(reached) = record.reached[k] else { return false };
-                let moved = responses.iter().find(|r| r.limit == k);
-                let change = moved.map_or(0.0, |r| r.fit.value(&scaled) - r.fit.value(x));
-                limit.margin(reached) + change >= 0.0
-            })
-        });
-        held.count() as f64 / records.len().max(1) as f64
+    ) -> Vec<Vec<ScaledMargin>> {
+        let moved: Vec<Option<&Quadratic>> = (0..limits.len())
+            .map(|k| responses.iter().find(|r| r.limit == k).map(|r| &r.fit))
+            .collect();
+        let margins = |(record, x): (&DrawRecord, &Vec<f64>)| {
+            let mut margins = Vec::new();
+            for (k, limit) in limits.iter().enumerate() {
+                let margin = limit.margin(record.reached[k]?);
+                match moved[k] {
+                    Some(fit) => margins.push(ScaledMargin::new(margin, fit, x, which)),
+                    None if margin >= 0.0 => {}
+                    None => return None,
+                }
+            }
+            Some(margins)
+        };
+        records.iter().zip(&self.x).filter_map(margins).collect()
+    }
+}
+
+/// Margin of a draw over the factor on the spread of some quantities: a polynomial of second order, in closed form for a search over
+/// many factors.
+struct ScaledMargin {
+    margin: f64,
+    /// Sum of the terms with one of the quantities, and of those with two.
+    linear: f64,
+    square: f64,
+}
+
+impl ScaledMargin {
+    fn new(margin: f64, fit: &Quadratic, x: &[f64], which: &[bool]) -> Self {
+        let mut sums = [0.0; 3];
+        for (term, coefficient) in fit.terms.iter().zip(&fit.coefficients) {
+            sums[term.degree(which)] += coefficient * term.value(x);
+        }
+        let [_, linear, square] = sums;
+        Self { margin, linear, square }
+    }
+
+    fn at(&self, factor: f64) -> f64 {
+        self.margin + (factor - 1.0) * self.linear + (factor * factor - 1.0) * self.square
     }
 }
 

@@ -91,7 +91,7 @@ pub(super) fn run(args: &SubmitArgs, terminal: &Terminal) -> Result<Outcome> {
         }
         return Ok(Outcome::Fine);
     }
-    let _turn = terminal.turn_at(&args.study.join("slurm"))?;
+    let _turn = terminal.turn_at(&args.study.join("slurm"), args.slurm.as_deref())?;
     // Asked before the shards are looked at: a task that ends in between has made its shard.
     let mut queue = Queue::of(args)?;
     let found = cut.status()?;

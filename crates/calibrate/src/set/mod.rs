@@ -42,6 +42,11 @@ pub struct MeasuredSet {
 }
 
 impl MeasuredSet {
+    /// The description of the set and its layout: what no result replaces.
+    pub fn inputs(&self) -> [PathBuf; 2] {
+        [self.path.clone(), self.layout.clone()]
+    }
+
     /// The element and the lattice site of a width by SEM; none if it is on no lattice.
     pub fn site_of(&self, site: &SemSite) -> Option<(ElementIndex, usize)> {
         let (index, element) = self.elements.iter_enumerated().find(|(_, e)| e.index == site.element)?;

@@ -38,7 +38,8 @@ impl FolderLock {
     /// side by side.
     ///
     /// # Errors
-    /// What `write` returns; if the disk refuses; if another process without a lock wrote the same files meanwhile.
+    /// What `write` returns; if one of the files of [`FolderLock::keeping`] would be replaced or removed; if the disk refuses; if
+    /// another process without a lock wrote the same files meanwhile.
     pub fn publish<T>(&self, set: &str, stale: &[&str], write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
         self.put(set, stale, true, write)
     }
@@ -57,7 +58,10 @@ impl FolderLock {
         let mut unfinished = Unfinished::new(&set)?;
         let written = write(&unfinished.0)
             .and_then(|value| {
-                set.complete(&unfinished.0, stale, is_listed)?;
+                let new = set.complete(&unfinished.0, stale, is_listed)?;
+                let replaced = set.replaced_by(&new)?;
+                let mut replaced = replaced.iter().map(|name| self.folder().join(name));
+                replaced.try_for_each(|path| self.inputs().check_output(&path))?;
                 Ok(value)
             })
             .map_err(|error| set.in_its_place(error, &unfinished.0))?;
@@ -255,7 +259,7 @@ impl FileSet {
     }
 
     /// List the written files in their folder, when all are there and can take their places.
-    fn complete(&self, unfinished: &Path, stale: &[&str], is_listed: bool) -> Result<()> {
+    fn complete(&self, unfinished: &Path, stale: &[&str], is_listed: bool) -> Result<SetManifest> {
         let mut names = Vec::new();
         for name in entries(unfinished).map_err(Error::io("read", unfinished))? {
             let target = self.folder.join(&name);
@@ -272,7 +276,8 @@ impl FileSet {
         names.sort();
         let manifest = SetManifest::of(unfinished, &names, stale, is_listed)?;
         let list = unfinished.join(self.manifest.file_name().expect("it has a name"));
-        AtomicFile::write(&list, manifest.text().as_bytes())
+        AtomicFile::write(&list, manifest.text().as_bytes())?;
+        Ok(manifest)
     }
 
     /// An error of writing, by the path that the user knows.
@@ -331,6 +336,26 @@ impl FileSet {
         })
     }
 
+    /// List of the files that make place for new ones, besides those of their names.
+    fn old(&self, new: &SetManifest) -> Result<SetManifest> {
+        if new.is_listed {
+            Ok(SetManifest::read(&self.manifest)?.unwrap_or_default())
+        } else {
+            Ok(SetManifest::default())
+        }
+    }
+
+    /// Names of all files that new ones replace or remove.
+    fn replaced_by(&self, new: &SetManifest) -> Result<Vec<String>> {
+        let old = self.old(new)?;
+        Ok(old
+            .names()
+            .chain(new.stale())
+            .chain(new.names())
+            .map(str::to_owned)
+            .collect())
+    }
+
     /// Everything that is left to do.
     fn steps(&self) -> Result<Vec<Step>> {
         let list = self.decided.join(self.manifest.file_name().expect("it has a name"));
@@ -342,11 +367,7 @@ impl FileSet {
                 Vec::new()
             });
         };
-        let old = if new.is_listed {
-            SetManifest::read(&self.manifest)?.unwrap_or_default()
-        } else {
-            SetManifest::default()
-        };
+        let old = self.old(&new)?;
         let mut coming = Vec::new();
         for name in new.names() {
             let from = self.decided.join(name);

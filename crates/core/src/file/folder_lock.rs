@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::file_set;
+use super::inputs::InputFiles;
 use crate::error::{Error, Result};
 use crate::progress::{Progress, Silent};
 
@@ -18,6 +19,8 @@ pub struct FolderLock {
     folder: PathBuf,
     /// The folder itself, locked; none where folders or their file system have no locks.
     locked: Option<File>,
+    /// Files that nothing written here replaces.
+    inputs: InputFiles,
 }
 
 impl FolderLock {
@@ -30,6 +33,7 @@ impl FolderLock {
         let turn = Self {
             folder: folder.to_owned(),
             locked: Self::locked(folder, progress, wait)?,
+            inputs: InputFiles::default(),
         };
         file_set::settle(&turn)?;
         Ok(turn)
@@ -43,6 +47,18 @@ impl FolderLock {
         Self::wait(folder, &Silent, || ())
     }
 
+    /// The same turn, in which none of these files is replaced or removed: what the results are made from.
+    #[must_use]
+    pub fn keeping<'p>(mut self, inputs: impl IntoIterator<Item = &'p Path>) -> Self {
+        inputs.into_iter().for_each(|path| self.inputs.add(path));
+        self
+    }
+
+    /// Files that nothing written here replaces.
+    pub fn inputs(&self) -> &InputFiles {
+        &self.inputs
+    }
+
     /// The folder.
     pub fn folder(&self) -> &Path {
         &self.folder
@@ -53,6 +69,7 @@ impl FolderLock {
         Self {
             folder: folder.to_owned(),
             locked: None,
+            inputs: InputFiles::default(),
         }
     }
 

@@ -5,6 +5,7 @@ mod direct_io;
 mod file_set;
 mod folder;
 mod folder_lock;
+mod inputs;
 mod part;
 mod set_manifest;
 
@@ -18,6 +19,7 @@ pub use direct_io::{Ahead, Block};
 pub use file_set::{check_unaltered, settled};
 pub use folder::AtomicFolder;
 pub use folder_lock::FolderLock;
+pub use inputs::InputFiles;
 
 use crate::error::{Error, Result};
 

@@ -13,6 +13,7 @@ use metalith_cell::{
     UnitCellTable,
 };
 use metalith_core::document::{Limits, Section};
+use metalith_core::file::check_unaltered;
 use metalith_core::{Error, Progress, Result};
 use metalith_pillars::PolarisationBasis;
 
@@ -298,6 +299,12 @@ impl MappingSpec {
     /// Read the table or the library, if there is one. A library that is to be made may be of other sizes: it is left out.
     pub(crate) fn load(&mut self, cell: &CellSpec, library: LibraryFile) -> Result<()> {
         let own = cell.mapped(self.wavelength_um);
+        let read = self
+            .pillar_library_file
+            .iter()
+            .filter(|_| library == LibraryFile::Needed);
+        let mut tables = self.table_file.iter().chain(read);
+        tables.try_for_each(|file| check_unaltered(file))?;
         match self.table_file.as_ref().or(self.pillar_library_file.as_ref()) {
             // A library that is to be made is for this cell.
             Some(file) if library == LibraryFile::ToBeMade && !file.exists() => self.identity.is_stated = true,

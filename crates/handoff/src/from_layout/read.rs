@@ -12,6 +12,7 @@ use crate::layout_statistics::LayoutStatistics;
 use crate::options::{HandoffOptions, LayoutSource};
 use crate::preconditions::{has_rules, layer_is_free, makes_pillars};
 use crate::process::Process;
+use metalith_core::file::InputFiles;
 use metalith_core::text::hex;
 use metalith_core::{AtomicFile, Error, LayerNumber, Progress, Result};
 use metalith_drc::{Deck, LayoutLayers};
@@ -141,6 +142,8 @@ impl LayoutInputs {
         let process = Process::read(process)?;
         makes_pillars(&process)?;
         let path = source.path.clone();
+        // The folder is replaced as a whole.
+        InputFiles::of([path.as_path()]).check_outside(&options.out)?;
         let digest = copy_unpacked(&path, &mut std::io::sink(), progress)?;
         let layout = Layout::open_with(&path, ReadLimits::default(), progress)?;
         let layout = match &source.top {

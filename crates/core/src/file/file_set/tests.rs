@@ -172,6 +172,24 @@ fn what_is_not_complete_replaces_nothing() {
 }
 
 #[test]
+fn no_input_is_replaced_or_removed() {
+    let (place, turn) = begun();
+    let before = names(place.path());
+    drop(turn);
+    // Of the new files, one that goes as the earlier result had it, and one that the new result makes stale.
+    for input in ["a.png", "old.png", STALE] {
+        let path = place.path().join(input);
+        let turn = FolderLock::of(place.path()).unwrap().keeping([path.as_path()]);
+        assert_eq!(publish(&turn, 1).unwrap_err().id(), "option/same-file", "{input}");
+        assert_eq!(names(place.path()), before);
+        assert_eq!(versions(place.path()), [0; 4]);
+    }
+    let turn = FolderLock::of(place.path()).unwrap();
+    publish(&turn.keeping([place.path().join(FOREIGN).as_path()]), 1).unwrap();
+    assert_eq!(versions(place.path()), [1; 4]);
+}
+
+#[test]
 fn a_file_of_another_run_is_refused_by_name() {
     let (place, _turn) = begun();
     let [file, other] = ["a.png", "b.json"].map(|name| place.path().join(name));
