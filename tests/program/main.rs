@@ -5,6 +5,7 @@ mod calibrate;
 mod cells;
 mod check;
 mod compare;
+mod cut_pictures;
 mod dataset;
 mod handoff;
 mod hexagonal;
