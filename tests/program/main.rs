@@ -18,6 +18,7 @@ mod plan;
 mod polarisation;
 mod predict;
 mod run;
+mod sinks;
 mod strangers;
 mod study;
 mod train;
