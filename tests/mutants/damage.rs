@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use sha2::{Digest, Sha256};
 
 use super::formats::{Format, Kind};
+use super::json::text_or_json;
 
 /// Bytes of the checksum at the end of sealed files.
 const CHECKSUM: usize = 32;
@@ -47,7 +48,7 @@ impl Ending {
 }
 
 /// Values that programs stumble over, in place of a number or a word.
-const VALUES: [&str; 26] = [
+pub(crate) const VALUES: [&str; 26] = [
     "0",
     "-1",
     "1e999",
@@ -83,10 +84,11 @@ pub(crate) fn mutant(rng: &mut ChaCha8Rng, format: &Format) -> Vec<u8> {
         Kind::Bytes => bytes(rng, corpus),
         _ if rng.random_range(0..3) == 0 => bytes(rng, corpus),
         Kind::Text => text(rng, corpus),
+        Kind::Json => text_or_json(rng, corpus, false),
         Kind::Sealed => sealed(rng, corpus),
         Kind::Ended(ending) => {
             let bare: Vec<_> = corpus.iter().map(|b| ending.bare(b)).collect();
-            ending.sealed(&text(rng, &bare))
+            ending.sealed(&text_or_json(rng, &bare, ending.plain.is_empty()))
         }
         Kind::Png => png(rng, corpus),
         Kind::Safetensors => safetensors(rng, corpus),
@@ -95,7 +97,34 @@ pub(crate) fn mutant(rng: &mut ChaCha8Rng, format: &Format) -> Vec<u8> {
 
 /// Bytes that are changed, lost, doubled, moved and taken from another file.
 fn bytes(rng: &mut ChaCha8Rng, corpus: &[Vec<u8>]) -> Vec<u8> {
-    metalith_testing::mutate::mutate(rng, corpus)
+    if rng.random_range(0..2) == 0 {
+        in_place(rng, corpus)
+    } else {
+        metalith_testing::mutate::mutate(rng, corpus)
+    }
+}
+
+/// Bytes and numbers that are others, at their places: what stands behind is found, so that readers go on to judge it.
+fn in_place(rng: &mut ChaCha8Rng, corpus: &[Vec<u8>]) -> Vec<u8> {
+    /// Numbers at the ends of their ranges, and small ones.
+    const NUMBERS: [u32; 9] = [0, 1, 2, 16, 0xFFFF, 0x1_0000, 0x7FFF_FFFF, 0x8000_0000, u32::MAX];
+    let mut bytes = corpus[rng.random_range(0..corpus.len())].clone();
+    if bytes.is_empty() {
+        return bytes;
+    }
+    for _ in 0..rng.random_range(1..=4) {
+        let at = rng.random_range(0..bytes.len());
+        let number = NUMBERS[rng.random_range(0..NUMBERS.len())];
+        let new = match rng.random_range(0..5) {
+            0 => vec![rng.random()],
+            1 => vec![bytes[at] ^ 1 << rng.random_range(0..8)],
+            2 => (number as u16).to_le_bytes().to_vec(),
+            3 => number.to_le_bytes().to_vec(),
+            _ => number.to_be_bytes().to_vec(),
+        };
+        bytes[at..].iter_mut().zip(new).for_each(|(to, byte)| *to = byte);
+    }
+    bytes
 }
 
 /// Damage to the content of a chunk of a PNG, with the checksum of that; or a chunk lost or doubled.
@@ -126,12 +155,16 @@ fn png(rng: &mut ChaCha8Rng, corpus: &[Vec<u8>]) -> Vec<u8> {
     }
     let mut out = whole[..BEFORE].to_vec();
     for (name, content) in chunks {
-        out.extend((content.len() as u32).to_be_bytes());
-        let checked = [name, content].concat();
-        out.extend(&checked);
-        out.extend(checksum(&checked).to_be_bytes());
+        out.extend(chunk(&name, &content));
     }
     out
+}
+
+/// A chunk of a PNG with its length and checksum.
+pub(crate) fn chunk(name: &[u8], content: &[u8]) -> Vec<u8> {
+    let checked = [name, content].concat();
+    let length = (content.len() as u32).to_be_bytes();
+    [&length[..], &checked, &checksum(&checked).to_be_bytes()].concat()
 }
 
 /// Checksum of a chunk of a PNG (CRC-32).
@@ -147,7 +180,7 @@ fn safetensors(rng: &mut ChaCha8Rng, corpus: &[Vec<u8>]) -> Vec<u8> {
     let whole = &corpus[rng.random_range(0..corpus.len())];
     let (length, rest) = whole.split_first_chunk().unwrap();
     let (header, data) = rest.split_at(u64::from_le_bytes(*length) as usize);
-    let header = text(rng, &[header.to_vec()]);
+    let header = text_or_json(rng, &[header.to_vec()], false);
     [&(header.len() as u64).to_le_bytes()[..], &header, data].concat()
 }
 
@@ -165,7 +198,7 @@ const BETWEEN: &str = " ,=[]:{}();\t";
 
 /// Lines lost, doubled, moved, very long and taken from another file; keys with other names; values that are something else or
 /// nested.
-fn text(rng: &mut ChaCha8Rng, corpus: &[Vec<u8>]) -> Vec<u8> {
+pub(crate) fn text(rng: &mut ChaCha8Rng, corpus: &[Vec<u8>]) -> Vec<u8> {
     /// Most repeats of a line.
     const REPEATS: usize = 200;
     /// Length of a line that is long for any reader (bytes); it costs time, so that only one repeat in so many has it.
@@ -177,7 +210,12 @@ fn text(rng: &mut ChaCha8Rng, corpus: &[Vec<u8>]) -> Vec<u8> {
             .map(str::to_owned)
             .collect::<Vec<_>>()
     };
-    let mut lines = of(rng.random_range(0..corpus.len()));
+    let k = rng.random_range(0..corpus.len());
+    let mut lines = of(k);
+    if corpus[k].ends_with(b"\n") {
+        // The end of the last line stays: before a digest the reader needs it.
+        lines.push(String::new());
+    }
     for _ in 0..rng.random_range(1..=3) {
         if lines.is_empty() {
             break;

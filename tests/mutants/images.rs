@@ -2,7 +2,8 @@
 
 use std::io::Cursor;
 
-use tiff::encoder::{TiffEncoder, colortype};
+use exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, WritableImage};
+use tiff::encoder::{Compression, TiffEncoder, colortype};
 
 /// Types of numbers in NPY files, as their headers name them, and the bytes of one.
 pub(crate) const FLOAT: (&str, usize) = ("<f4", 4);
@@ -40,8 +41,13 @@ pub(crate) fn npy(shape: &[usize], (kind, size): (&str, usize)) -> Vec<u8> {
 
 /// A grey TIFF of 16 bits and some pages.
 pub(crate) fn tiff(size: usize, pages: usize) -> Vec<u8> {
+    packed_tiff(size, pages, Compression::Uncompressed)
+}
+
+/// Variant of [`tiff`] with a compression.
+pub(crate) fn packed_tiff(size: usize, pages: usize, compression: Compression) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
-    let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+    let mut encoder = TiffEncoder::new(&mut bytes).unwrap().with_compression(compression);
     for page in 0..pages {
         let values: Vec<u16> = (0..size * size).map(|i| (i * 3 % 4000 + page) as u16).collect();
         encoder
@@ -114,6 +120,23 @@ pub(crate) fn exr() -> Vec<u8> {
     out
 }
 
+/// An EXR of three channels in half precision, with an encoding.
+pub(crate) fn packed_exr(encoding: Encoding) -> Vec<u8> {
+    const SIDE: usize = 40;
+    let channels = SpecificChannels::rgb(|at: exr::math::Vec2<usize>| {
+        let value = |k: usize| exr::prelude::f16::from_f32(((7 * at.x() + 5 * at.y() + k) % 61) as f32 / 60.0);
+        (value(0), value(1), value(2))
+    });
+    let layer = Layer::new((SIDE, SIDE), LayerAttributes::named("light"), encoding, channels);
+    let mut bytes = Cursor::new(Vec::new());
+    Image::from_layer(layer)
+        .write()
+        .non_parallel()
+        .to_buffered(&mut bytes)
+        .unwrap();
+    bytes.into_inner()
+}
+
 /// A FITS file of 16 bits.
 pub(crate) fn fits(size: usize) -> Vec<u8> {
     let axes = ["NAXIS1", "NAXIS2"].map(|key| format!("{key:<8}= {size}"));
@@ -142,3 +165,58 @@ pub(crate) const DRAWING: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n13\n0
     0\nINSERT\n8\n2\n2\nP\n10\n3\n20\n0\n41\n2\n42\n1\n50\n30\n70\n2\n71\n2\n44\n1\n45\n1\n\
     0\nLINE\n8\n1\n10\n0\n20\n0\n11\n1\n21\n0\n0\nARC\n8\n1\n10\n0.5\n20\n0\n40\n0.5\n50\n0\n51\n180\n\
     0\nTEXT\n8\n1\n10\n0\n20\n0\n1\nlens\n0\nENDSEC\n0\nEOF\n";
+
+/// A grey TIFF of 16 bits whose directory stands before its one strip, as programs that write while they record do it; `keep` is how
+/// much of the strip is there, of which the directory says that it is all.
+pub(crate) fn directory_first(size: usize, compression: Compression, keep: impl Fn(usize) -> usize) -> Vec<u8> {
+    let written = packed_tiff(size, 1, compression);
+    let number = |at: usize| u32::from_le_bytes(written[at..at + 4].try_into().unwrap());
+    let directory = number(4) as usize;
+    let entries = usize::from(u16::from_le_bytes(
+        written[directory..directory + 2].try_into().unwrap(),
+    ));
+    let value = |tag: u16| {
+        let mut places = (0..entries).map(|k| directory + 2 + 12 * k);
+        let at = places.find(|at| written[*at..at + 2] == tag.to_le_bytes()).unwrap();
+        number(at + 8)
+    };
+    let (offset, length) = (value(273) as usize, value(279) as usize);
+    let side = size as u32;
+    let all = written[offset..][..keep(length)].to_vec();
+    let tags = [
+        (256, side),
+        (257, side),
+        (258, 16),
+        (259, value(259) & 0xFFFF),
+        (262, 1),
+        (273, 0),
+        (277, 1),
+        (278, side),
+        (279, all.len() as u32),
+    ];
+    tiff_of_tags(&tags, &all)
+}
+
+/// A TIFF whose directory has these tags in rising order, and stands before its pixels: where these begin is put in place of the
+/// value of their tag.
+pub(crate) fn tiff_of_tags(tags: &[(u16, u32)], pixels: &[u8]) -> Vec<u8> {
+    /// Length of the header, of an entry, and the tags of strips and tiles.
+    const HEADER: usize = 8;
+    const ENTRY: usize = 12;
+    const BEGIN: [u16; 2] = [273, 324];
+    let begin = (HEADER + 2 + ENTRY * tags.len() + 4) as u32;
+    let mut out = [
+        &b"II*\0"[..],
+        &(HEADER as u32).to_le_bytes(),
+        &(tags.len() as u16).to_le_bytes(),
+    ]
+    .concat();
+    for (tag, value) in tags {
+        out.extend([tag.to_le_bytes(), 4u16.to_le_bytes()].concat());
+        let value = if BEGIN.contains(tag) { begin } else { *value };
+        out.extend([1, value].map(u32::to_le_bytes).concat());
+    }
+    out.extend([0; 4]);
+    out.extend(pixels);
+    out
+}

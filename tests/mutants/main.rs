@@ -4,9 +4,12 @@
 //! The n-th mutant of a format is the same in every run. More of them: `METALITH_MUTANTS=40000 cargo test --release --test mutants`;
 //! only some formats or groups of them: `METALITH_FORMATS=camera,studies`. One that fails stays in the folder that is named.
 
+mod cuts;
 mod damage;
 mod formats;
 mod images;
+mod json;
+mod plain_png;
 mod process;
 
 use std::fs;

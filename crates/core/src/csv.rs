@@ -45,11 +45,14 @@ impl<E> CsvRow<'_, E> {
     }
 }
 
+/// Beginnings of formulas; a spreadsheet takes the wide forms of East Asian text for the same.
+const FORMULA: [char; 8] = ['=', '+', '-', '@', '\u{FF1D}', '\u{FF0B}', '\u{FF0D}', '\u{FF20}'];
+
 /// A text as one field of a row, as RFC 4180 asks: quoted where a comma or a quote would be taken for structure; a line break is
 /// written out. A text that a spreadsheet would compute as a formula has an apostrophe before it, which makes it a text there.
 pub fn csv_field(text: &str) -> String {
     let shown = printable(text);
-    let is_formula = shown.trim_start().starts_with(['=', '+', '-', '@']) && shown.parse::<f64>().is_err();
+    let is_formula = shown.trim_start().starts_with(FORMULA) && shown.parse::<f64>().is_err();
     let apostrophe = if is_formula { "'" } else { "" };
     if shown.contains([',', '"']) {
         format!("\"{apostrophe}{}\"", shown.replace('"', "\"\""))
@@ -133,6 +136,7 @@ mod tests {
             "=1+1",
             " @SUM(A1)",
             "+x,y",
+            "\u{ff1d}1+1",
             "a\r\nb",
             "\u{202e}x",
         ]
@@ -146,6 +150,7 @@ mod tests {
         '=1+1
         ' @SUM(A1)
         "'+x,y"
+        '＝1+1
         a\u{d}\u{a}b
         \u{202e}x
         "#);

@@ -1,4 +1,4 @@
-//! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY, TIFF and FITS.
+//! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY, PNG, TIFF and FITS.
 
 mod alignment_cross;
 mod csv;
@@ -17,6 +17,8 @@ mod memo;
 #[cfg(feature = "npy")]
 pub mod npy;
 mod plane;
+#[cfg(feature = "frames")]
+pub mod png;
 mod processor;
 mod progress;
 pub mod srgb;

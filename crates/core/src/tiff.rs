@@ -42,6 +42,27 @@ fn wrong(error: tiff::TiffError) -> String {
     format!("it is no TIFF file that can be read: {error}")
 }
 
+/// Refuse a page whose pixels stand, by its directory, beyond the end of the file: a decoder that stops once it has all pixels would
+/// not notice.
+fn check_within<R: Read + Seek>(decoder: &mut Decoder<R>, length: u64) -> Result<(), String> {
+    for [offsets, counts] in [
+        [Tag::StripOffsets, Tag::StripByteCounts],
+        [Tag::TileOffsets, Tag::TileByteCounts],
+    ] {
+        let [Ok(offsets), Ok(counts)] = [offsets, counts].map(|tag| decoder.get_tag_u64_vec(tag)) else {
+            continue;
+        };
+        let ends = offsets
+            .iter()
+            .zip(&counts)
+            .map(|(from, count)| from.saturating_add(*count));
+        if ends.max().is_some_and(|end| end > length) {
+            return Err("it ends early: its pixels stand beyond its end".into());
+        }
+    }
+    Ok(())
+}
+
 fn opened<R: Read + Seek>(from: R) -> Result<Decoder<R>, String> {
     let mut decoder = Decoder::new(from).map_err(wrong)?;
     if decoder
@@ -69,9 +90,12 @@ pub fn size(from: impl Read + Seek) -> Result<(usize, usize), String> {
 /// # Errors
 /// What is wrong with the file, in words, and what `takes` says.
 pub fn read<R: Read + Seek>(
-    from: R,
+    mut from: R,
     mut takes: impl FnMut(usize, [usize; 3]) -> Result<(), String>,
 ) -> Result<Tiff, String> {
+    let unreadable = |e: std::io::Error| format!("it cannot be read: {e}");
+    let length = from.seek(SeekFrom::End(0)).map_err(unreadable)?;
+    from.rewind().map_err(unreadable)?;
     let mut decoder = opened(from)?;
     let mut limits = Limits::default();
     // A colour profile is the longest value of a tag.
@@ -100,6 +124,7 @@ pub fn read<R: Read + Seek>(
         limits.decoding_buffer_size = bytes;
         limits.intermediate_buffer_size = bytes + BESIDE;
         decoder = decoder.with_limits(limits.clone());
+        check_within(&mut decoder, length)?;
         pages.push(page(&mut decoder, [rows, columns, channels], colour.bit_depth())?);
         if !decoder.more_images() {
             break;

@@ -14,7 +14,7 @@ pub fn text(report: &DrcReport) -> String {
     const SHOWN: usize = 5;
     let mut out = String::new();
     if let Some(words) = &report.not_understood {
-        let _ = writeln!(out, "{words}");
+        let _ = writeln!(out, "{}", printable(words));
     }
     let _ = writeln!(
         out,
@@ -48,16 +48,25 @@ pub fn text(report: &DrcReport) -> String {
         let _ = writeln!(out, "{:28} {:>18}  {}", r.id, state, r.words);
         if let Status::Skipped(why) | Status::NotApplicable(why) | Status::Failed(why) = &r.status {
             let said = std::mem::replace(&mut reason, why) == why;
-            let _ = writeln!(out, "{:28} {}", "", if said { "for the same reason" } else { why });
+            let _ = writeln!(
+                out,
+                "{:28} {}",
+                "",
+                if said {
+                    "for the same reason".into()
+                } else {
+                    printable(why)
+                }
+            );
         }
         for (name, value) in &r.facts {
-            let _ = writeln!(out, "{:28} {name}: {}", "", exact(*value));
+            let _ = writeln!(out, "{:28} {}: {}", "", printable(name), exact(*value));
         }
         for m in r.markers.iter().filter(|m| !m.waived).take(SHOWN) {
             let place = m.outline_nm.first().map_or_else(String::new, |p| {
                 format!(" at ({:.3}, {:.3}) um", p[0] * 1e-3, p[1] * 1e-3)
             });
-            let _ = writeln!(out, "{:28} {}{place}  [{}]", "", m.words, m.hash);
+            let _ = writeln!(out, "{:28} {}{place}  [{}]", "", printable(&m.words), m.hash);
         }
         if r.open() > SHOWN as u64 {
             let _ = writeln!(out, "{:28} and {} more", "", r.open() - SHOWN as u64);
@@ -134,7 +143,7 @@ fn escaped(text: &str) -> String {
             '"' => out.push_str("&quot;"),
             '\'' => out.push_str("&apos;"),
             // What XML has no place for, and what would change how a line is shown.
-            c if !is_printable(c) && c != '\n' => out.push_str(&printable(c.encode_utf8(&mut [0; 4]))),
+            c if !is_printable(c) => out.push_str(&printable(c.encode_utf8(&mut [0; 4]))),
             c => out.push(c),
         }
     }
@@ -255,13 +264,13 @@ pub fn junit(report: &DrcReport) -> String {
                     .markers
                     .iter()
                     .filter(|m| !m.waived)
-                    .map(|m| format!("{} [{}]", m.words, m.hash))
+                    .map(|m| escaped(&format!("{} [{}]", m.words, m.hash)))
                     .collect();
                 format!(
                     "<failure message=\"{} of: {}\">{}</failure>",
                     counted(r.open() as usize, "violation"),
                     escaped(&r.words),
-                    escaped(&lines.join("\n"))
+                    lines.join("\n")
                 )
             }
             Status::Run => String::new(),

@@ -5,6 +5,7 @@ use super::findings::Findings;
 use super::flat_layout::FlatLayout;
 use super::rule::{Needs, Rule, RuleOutcome};
 use metalith_core::document::Section;
+use metalith_core::text::printable;
 use metalith_gds::{Faulty, Layout};
 
 enum TreeRule {
@@ -59,12 +60,8 @@ impl Rule for TreeRule {
 
 impl TreeRule {
     fn file(&self, layout: &Layout, found: &mut Findings) {
-        let file = layout
-            .path()
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let file = layout.path().file_name().unwrap_or_default().to_string_lossy();
+        let file = printable(&file);
         let mut faults = |list: Vec<Faulty>, words: &dyn Fn(&Faulty) -> String| {
             for f in &list {
                 found.plain(&format!("{} {}", f.cell, f.name), || {

@@ -12,6 +12,7 @@ use super::layouts::{Layouts, OfEach};
 use super::listing::Listing;
 use super::process::Process;
 use super::structures::{Structure, middle_of_reference};
+use metalith_core::text::printable;
 use metalith_core::{AtomicFile, Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
@@ -241,6 +242,7 @@ fn warn_once(reports: &mut RuleReports) {
 fn summary(name: &str, report: &DrcReport, deck: &Deck, process: &Process, pitch_nm: Option<f64>) -> HandoffCheck {
     let (file, _) = deck.source();
     let file = file.file_name().unwrap_or_default().to_string_lossy();
+    let file = printable(&file);
     let rules = report.rules.iter();
     let broken: Vec<BrokenRule> = rules
         .filter_map(|rule| BrokenRule::of(rule, &file, process.assumes(deck), process, pitch_nm))

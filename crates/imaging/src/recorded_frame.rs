@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use metalith_core::file::{check_unaltered, read_at_most};
-use metalith_core::{Error, Result};
+use metalith_core::{Error, Result, png};
 use metalith_sensor::Camera;
 use ndarray::Array2;
 
@@ -159,40 +159,20 @@ fn signals<'a>(
 fn read_grey(path: &Path, [rows, columns]: [usize; 2]) -> Result<Grey> {
     const SAVE: &str = "give a grey PNG of 8 or 16 bits as the sensor recorded it, no colours and no corrections";
     let bytes = read_at_most(path, png16::LONGEST, "a frame")?;
-    let wrong = |e: png::DecodingError| fault(path, &format!("it is no PNG that can be read: {e}"), SAVE);
-    let mut reader = png::Decoder::new(Cursor::new(&bytes)).read_info().map_err(wrong)?;
-    let info = reader.info();
-    let (found_rows, found_columns) = (info.height as usize, info.width as usize);
-    if (found_rows, found_columns) != (rows, columns) {
-        return Err(fault(
-            path,
-            &format!(
-                "the frame is of another camera: it has {found_columns} x {found_rows} pixels, and the camera gives {columns} x {rows}"
-            ),
-            "give the camera that it was recorded with, and the whole frame",
-        ));
-    }
-    let is_deep = match (info.color_type, info.bit_depth) {
-        (png::ColorType::Grayscale, png::BitDepth::Eight) => false,
-        (png::ColorType::Grayscale, png::BitDepth::Sixteen) => true,
-        (colour, depth) => {
-            let what = format!("its pixels are {colour:?} of {depth:?} bits");
-            return Err(fault(path, &what, SAVE));
+    let mut other_size = None;
+    let read = png::read_grey(Cursor::new(&bytes), |found_rows, found_columns| {
+        if (found_rows, found_columns) == (rows, columns) {
+            return Ok(());
         }
-    };
-    let mut data = vec![0; rows * columns * if is_deep { 2 } else { 1 }];
-    if reader.output_buffer_size() != Some(data.len()) {
-        return Err(fault(path, "its size is not that of its pixels", SAVE));
-    }
-    reader.next_frame(&mut data).map_err(wrong)?;
-    let numbers = if is_deep {
-        data.as_chunks().0.iter().map(|b| u16::from_be_bytes(*b)).collect()
-    } else {
-        data.iter().map(|b| u16::from(*b)).collect()
-    };
+        other_size = Some("give the camera that it was recorded with, and the whole frame");
+        Err(format!(
+            "the frame is of another camera: it has {found_columns} x {found_rows} pixels, and the camera gives {columns} x {rows}"
+        ))
+    });
+    let read = read.map_err(|what| fault(path, &what, other_size.unwrap_or(SAVE)))?;
     Ok(Grey {
-        numbers,
-        is_deep,
+        numbers: read.numbers,
+        is_deep: read.is_deep,
         own: png16::source_of(&bytes).and_then(|_| png16::levels_of(&bytes)),
     })
 }
@@ -291,14 +271,14 @@ mod tests {
         let (camera, _) = recorded_by(ColourFilter::Rggb);
         let write = |depth, of: &dyn Fn(usize) -> Vec<u8>| {
             let mut bytes = Vec::new();
-            let mut encoder = png::Encoder::new(&mut bytes, 24, 18);
-            encoder.set_color(png::ColorType::Grayscale);
+            let mut encoder = ::png::Encoder::new(&mut bytes, 24, 18);
+            encoder.set_color(::png::ColorType::Grayscale);
             encoder.set_depth(depth);
             let data: Vec<u8> = (0..18 * 24).flat_map(of).collect();
             encoder.write_header().unwrap().write_image_data(&data).unwrap();
             std::fs::write(&path, bytes).unwrap();
         };
-        write(png::BitDepth::Sixteen, &|i| {
+        write(::png::BitDepth::Sixteen, &|i| {
             ((100 + 10 * i.min(399)) as u16).to_be_bytes().to_vec()
         });
         let read = |black_level, white| read_signals(&path, &camera, FrameNumbers { black_level, white });
@@ -314,7 +294,7 @@ mod tests {
                 .to_string()
                 .contains("above --black-level")
         );
-        write(png::BitDepth::Eight, &|i| vec![(i % 256) as u8]);
+        write(::png::BitDepth::Eight, &|i| vec![(i % 256) as u8]);
         let plane = read(None, None).unwrap().remove(0);
         assert!(plane[[10, 15]] == full && plane[[10, 16]] == 0.0);
         let mut other = camera.clone();

@@ -33,6 +33,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use metalith_cell::{Fidelity, SolvedMapping};
+use metalith_core::text::printable;
 use metalith_core::{Progress, Result, Warning};
 use metalith_design::array::{PillarArray, PillarRule, PlacedElement, Symmetry};
 use metalith_design::phase::{ElementPhase, LensPhase};
@@ -435,7 +436,7 @@ fn facts<W>(layout: &Layout, extraction: &Extraction<W>, path: &Path) -> LayoutF
     LayoutFacts {
         file: path
             .file_name()
-            .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+            .map_or_else(String::new, |n| printable(&n.to_string_lossy()).into_owned()),
         bytes: layout.bytes(),
         top_cell: extraction.top.clone(),
         cells: layout.cells().len(),

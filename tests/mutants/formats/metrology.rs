@@ -162,4 +162,28 @@ fn stacks(folder: &Path) -> Vec<Format> {
             ("stack_mask", "mask.npy", Kind::Bytes),
         ],
     )
+    .into_iter()
+    .chain(masks(folder, text))
+    .collect()
+}
+
+/// A mask in each of the other formats.
+fn masks(folder: &Path, text: &str) -> Vec<Format> {
+    let rows: Vec<String> = (0..SIDE * SIDE).map(|k| format!("{}.5", k % 97)).collect();
+    let csv: String = rows.chunks(SIDE).map(|row| row.join(",") + "\n").collect();
+    let side = SIDE as u32;
+    let files = [
+        ("stack_mask_png", "mask.png", Kind::Png, {
+            images::png(side, side, png::ColorType::Grayscale, png::BitDepth::Sixteen)
+        }),
+        ("stack_mask_tiff", "mask.tif", Kind::Bytes, images::tiff(SIDE, 1)),
+        ("stack_mask_fits", "mask.fits", Kind::Bytes, images::fits(SIDE)),
+        ("stack_mask_csv", "mask.csv", Kind::Text, csv.into_bytes()),
+    ];
+    let of = |(name, file, kind, bytes): (&'static str, &str, Kind, Vec<u8>)| {
+        let (path, set) = (folder.join(file), folder.join(format!("with_{file}.toml")));
+        fs::write(&set, text.replace("mask.npy\"\nsample", &format!("{file}\"\nsample"))).unwrap();
+        Format::new(name, path, kind, vec![bytes], move |_| StackSet::read(&set).map(drop))
+    };
+    files.into_iter().map(of).collect()
 }

@@ -22,6 +22,8 @@ pub(crate) enum Kind {
     Bytes,
     /// Lines and values too.
     Text,
+    /// A text that is JSON.
+    Json,
     /// Ends with the SHA-256 of what comes before.
     Sealed,
     /// A text that ends with such a digest in words.

@@ -4,8 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use metalith::CalibratedModel;
-use metalith::bench_plan::BenchFile;
+use metalith::bench_plan::{BenchFile, check_not_begun};
 use metalith::calibrate::DeclaredEffect;
+use metalith::design::CellFile;
 use metalith::drc::{Deck, Waivers};
 use metalith::handoff::Process;
 use metalith::optics::Perturbation;
@@ -31,7 +32,35 @@ pub(super) fn all(folder: &Path) -> Vec<Format> {
         .write(&model)
         .unwrap();
     let model_text = fs::read(&model).unwrap();
+    let lit = toml("lit.toml");
+    let camera = fs::read_to_string(folder.join("gt1930.toml")).unwrap();
+    let light = "source = \"file\"\nfile = \"light.csv\" #";
+    fs::write(&lit, camera.replacen("source = \"d65\"", light, 1)).unwrap();
+    let session = toml("session");
+    fs::create_dir_all(&session).unwrap();
+    fs::write(session.join("plan.json"), "{}").unwrap();
     vec![
+        Format::new(
+            "illuminant",
+            toml("light.csv"),
+            Kind::Text,
+            files("cameras", "csv"),
+            move |_| Camera::read(&lit),
+        ),
+        Format::new(
+            "cell",
+            toml("cell.toml"),
+            Kind::Text,
+            files("designs", "toml"),
+            CellFile::read,
+        ),
+        Format::new(
+            "plan of a session",
+            session.join("plan.json"),
+            Kind::Json,
+            vec![br#"{"written": {"measurement.toml": "00"}, "effects": [], "captures": 3}"#.to_vec()],
+            move |_| check_not_begun(&session),
+        ),
         Format::new(
             "camera",
             toml("camera.toml"),

@@ -1,5 +1,6 @@
 //! Page of the places of all changes.
 
+use metalith_core::text::printable;
 use ndarray::Array2;
 
 use super::report::{Change, LayoutDiff};
@@ -18,7 +19,10 @@ const SPAN_NM: f64 = 20_000.0;
 
 /// The page of a comparison.
 pub fn page(diff: &LayoutDiff) -> Page {
-    let mut page = Page::new("Two layouts", format!("{} and {}", diff.a, diff.b));
+    let mut page = Page::new(
+        "Two layouts",
+        format!("{} and {}", printable(&diff.a), printable(&diff.b)),
+    );
     let words = match (diff.same_geometry, diff.same_bytes, diff.tree.same) {
         (true, true, _) => "The files are the same, byte by byte.",
         (true, _, true) => "The geometry is the same; only bytes differ.",

@@ -6,6 +6,7 @@ use metalith_pillars::Pitch;
 use metalith_report::counted;
 use serde::Serialize;
 
+use metalith_core::text::printable;
 use metalith_gds::LayerNumber;
 
 /// Pillars of one element in both layouts.
@@ -199,7 +200,7 @@ pub fn text(diff: &LayoutDiff) -> String {
     const SHOWN: usize = 10;
     let mut out = String::new();
     let yes = |b: bool| if b { "same" } else { "different" };
-    let _ = writeln!(out, "a: {}\nb: {}\n", diff.a, diff.b);
+    let _ = writeln!(out, "a: {}\nb: {}\n", printable(&diff.a), printable(&diff.b));
     let _ = writeln!(
         out,
         "bytes {}, hierarchy {}, geometry {}",

@@ -231,7 +231,8 @@ impl LayoutInputs {
     }
 }
 
-/// Name of the hand-off of a layout: that of its file without endings.
+/// Name of the hand-off of a layout: that of its file without endings. Quotes and letters that job files or a shell read as more than
+/// text become underscores.
 pub fn handoff_name(layout: &Path) -> String {
     let name = layout.file_name().unwrap_or_default().to_string_lossy();
     let mut name = name.as_ref();
@@ -244,7 +245,8 @@ pub fn handoff_name(layout: &Path) -> String {
             name = &name[..at];
         }
     }
-    legal_name(name).replace(char::is_whitespace, "_")
+    let is_more = |c: char| c.is_whitespace() || "'`$&;".contains(c);
+    legal_name(name).replace(is_more, "_")
 }
 
 /// State the layers with shapes that are not exposed.

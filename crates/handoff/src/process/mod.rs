@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use metalith_core::Result;
 use metalith_core::document::load;
+use metalith_core::text::printable;
 use metalith_design::Design;
 use metalith_drc::Deck;
 use metalith_pillars::{DatabaseUnit, OutlineForm, PillarShape, Rectangles, UprightRectangles};
@@ -353,8 +354,8 @@ impl Process {
         if self.standard {
             format!("process {} (shipped)", self.name)
         } else {
-            let file = self.path.file_name().unwrap_or_default();
-            format!("process {} in {}", self.name, file.to_string_lossy())
+            let file = self.path.file_name().unwrap_or_default().to_string_lossy();
+            format!("process {} in {}", self.name, printable(&file))
         }
     }
 

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use metalith_core::{Result, file_kind, tiff};
+use metalith_core::{Result, file_kind, png, tiff};
 use ndarray::Array3;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -104,9 +104,6 @@ fn tiff_values(path: &Path, bytes: &[u8]) -> Result<Stored> {
 /// Word on a picture that is not opaque.
 const TRANSPARENT: &str = "parts of it are transparent";
 
-/// Most bytes that one byte of a deflated stream stands for (RFC 1951: 258 bytes by two bits).
-const DEFLATED: usize = 1032;
-
 /// An opaque PNG.
 pub(super) struct Png {
     /// Red, green and blue as they are stored, full scale being one.
@@ -120,33 +117,17 @@ pub(super) struct Png {
 }
 
 pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<Png> {
-    let wrong = |e: png::DecodingError| fault(path, e.to_string());
-    let mut decoder = png::Decoder::new(Cursor::new(bytes));
-    decoder.set_transformations(png::Transformations::EXPAND);
-    let mut reader = decoder.read_info().map_err(wrong)?;
-    let (columns, rows) = (reader.info().width as usize, reader.info().height as usize);
-    check_sides(path, rows, columns)?;
-    let size = reader
-        .output_buffer_size()
-        .ok_or_else(|| fault(path, "it is too large"))?;
-    let least = (reader.info().raw_bytes() / DEFLATED) as u64;
-    if least > bytes.len() as u64 {
-        let what = format!(
-            "{} bytes are too few for {columns} x {rows} pixels: it ends early",
-            bytes.len()
-        );
-        return Err(fault(path, what));
-    }
-    let mut data = vec![0; size];
-    let info = reader.next_frame(&mut data).map_err(wrong)?;
-    let samples = info.color_type.samples();
-    let deep = info.bit_depth == png::BitDepth::Sixteen;
+    let png = png::read(Cursor::new(bytes), |info| {
+        sides(info.height as usize, info.width as usize)
+    });
+    let png = png.map_err(|what| fault(path, what))?;
+    let (rows, columns, samples) = (png.info.height as usize, png.info.width as usize, png.channels);
     let value = |y: usize, x: usize, c: usize| {
-        let at = y * info.line_size + (x * samples + c) * if deep { 2 } else { 1 };
-        if deep {
-            f64::from(u16::from_be_bytes([data[at], data[at + 1]])) / 65535.0
+        let at = y * png.row_bytes + (x * samples + c) * if png.is_deep { 2 } else { 1 };
+        if png.is_deep {
+            f64::from(u16::from_be_bytes([png.data[at], png.data[at + 1]])) / 65535.0
         } else {
-            f64::from(data[at]) / 255.0
+            f64::from(png.data[at]) / 255.0
         }
     };
     if samples % 2 == 0 && (0..rows).any(|y| (0..columns).any(|x| value(y, x, samples - 1) < 1.0)) {
@@ -155,14 +136,11 @@ pub(super) fn png_values(path: &Path, bytes: &[u8]) -> Result<Png> {
     let values = Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| {
         value(y, x, if samples < 3 { 0 } else { c })
     });
-    // EXIF may stand behind the pixels; what is damaged there is no fault of them.
-    let _ = reader.finish();
-    let info = reader.info();
     Ok(Png {
         values,
-        deep,
-        colours: Colours::of_png(info),
-        orientation: info.exif_metadata.as_deref().map_or(1, orientation),
+        deep: png.is_deep,
+        colours: Colours::of_png(&png.info),
+        orientation: png.info.exif_metadata.as_deref().map_or(1, orientation),
     })
 }
 

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use metalith_core::{fits, npy, tiff};
+use metalith_core::{fits, npy, png, tiff};
 use ndarray::Array2;
 use num_complex::Complex64;
 
@@ -97,28 +97,12 @@ fn from_npy(path: &Path) -> Result<Vec<Array2<f32>>, String> {
 }
 
 fn from_png(path: &Path) -> Result<Array2<f32>, String> {
-    let wrong = |e: png::DecodingError| format!("it is no PNG file that can be read: {e}");
-    let file = File::open(path).map_err(|e| format!("it cannot be read: {e}"))?;
-    let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(wrong)?;
-    let info = reader.info();
-    let (rows, cols) = (info.height as usize, info.width as usize);
-    check_size(rows, cols)?;
-    let bytes = match (info.color_type, info.bit_depth) {
-        (png::ColorType::Grayscale, png::BitDepth::Eight) => 1,
-        (png::ColorType::Grayscale, png::BitDepth::Sixteen) => 2,
-        (colour, depth) => {
-            return Err(format!(
-                "its pixels are {colour:?} of {depth:?} bits, not grey of 8 or 16"
-            ));
-        }
-    };
-    let mut data = vec![0; bytes * rows * cols];
-    if reader.output_buffer_size() != Some(data.len()) {
-        return Err("its size differs from the number of its pixels".into());
-    }
-    reader.next_frame(&mut data).map_err(wrong)?;
-    let value = |b: &[u8]| b.iter().fold(0.0, |sum, byte| 256.0 * sum + f32::from(*byte));
-    shaped(rows, cols, data.chunks_exact(bytes).map(value).collect())
+    let mut size = (0, 0);
+    let read = png::read_grey(opened(path)?, |rows, cols| {
+        size = (rows, cols);
+        check_size(rows, cols)
+    })?;
+    shaped(size.0, size.1, read.numbers.into_iter().map(f32::from).collect())
 }
 
 fn from_csv(path: &Path) -> Result<Array2<f32>, String> {

@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use metalith_core::{file_kind, fits, npy, tiff};
+use metalith_core::{file_kind, fits, npy, png, tiff};
 
-use super::{MOST_PIXELS, Pages, other_size, png};
+use super::{MOST_PIXELS, Pages, other_size};
 
 /// Endings of the names of frames.
 pub const ENDINGS: [&str; 7] = ["npy", "png", "tif", "tiff", "fits", "fit", "fts"];
@@ -78,7 +78,13 @@ pub(super) fn pages(path: &Path, rows: usize, cols: usize) -> Result<Pages, Stri
         )),
     };
     match Format::of(path)? {
-        Format::Png => png::read(path, rows, cols),
+        Format::Png => {
+            let read = png::read_grey(opened(path)?, |own_rows, own_cols| sized((own_rows, own_cols)))?;
+            Ok(Pages {
+                largest: Some(read.largest().into()),
+                values: vec![read.numbers.into_iter().map(f32::from).collect()],
+            })
+        }
         Format::Tiff => {
             let read = tiff::read(opened(path)?, |page, [own_rows, own_cols, channels]| {
                 sized((own_rows, own_cols))?;

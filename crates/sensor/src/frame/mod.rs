@@ -4,7 +4,6 @@ mod expected;
 mod file;
 mod merge_exposures;
 mod orientation;
-mod png;
 mod sensor;
 
 pub use expected::expected;
@@ -152,26 +151,26 @@ mod tests {
     fn grey_png_files_hold_dn() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        let write = |depth: ::png::BitDepth, data: &[u8]| {
-            let mut encoder = ::png::Encoder::new(File::create(&path).unwrap(), 3, 2);
-            encoder.set_color(::png::ColorType::Grayscale);
+        let write = |depth: png::BitDepth, data: &[u8]| {
+            let mut encoder = png::Encoder::new(File::create(&path).unwrap(), 3, 2);
+            encoder.set_color(png::ColorType::Grayscale);
             encoder.set_depth(depth);
             encoder.write_header().unwrap().write_image_data(data).unwrap();
         };
-        write(::png::BitDepth::Eight, &[1, 2, 3, 4, 5, 255]);
+        write(png::BitDepth::Eight, &[1, 2, 3, 4, 5, 255]);
         assert_eq!(
             read(&path, 2, 3, 255.0).unwrap().dn,
             ndarray::arr2(&[[1.0, 2.0, 3.0], [4.0, 5.0, 255.0]])
         );
         // A file of 8 bits does not say how far its full pixels went.
         assert!(read(&path, 2, 3, FULL).unwrap_err().contains("largest number"));
-        write(::png::BitDepth::Sixteen, &[0, 1, 1, 0, 0, 3, 0, 4, 0, 5, 255, 255]);
+        write(png::BitDepth::Sixteen, &[0, 1, 1, 0, 0, 3, 0, 4, 0, 5, 255, 255]);
         assert_eq!(
             read(&path, 2, 3, FULL).unwrap().dn,
             ndarray::arr2(&[[1.0, 256.0, 3.0], [4.0, 5.0, 65535.0]])
         );
         assert!(read(&path, 3, 3, FULL).unwrap_err().contains("2 x 3"));
-        write(::png::BitDepth::One, &[0, 0]);
+        write(png::BitDepth::One, &[0, 0]);
         assert!(read(&path, 2, 3, FULL).unwrap_err().contains("not grey of 8 or 16"));
     }
 
