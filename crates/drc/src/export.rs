@@ -9,6 +9,19 @@ use serde_json::json;
 use super::report::{DrcReport, RuleReport};
 use super::rule::{Severity, Status};
 
+/// Middle of the box around an outline: the place that other commands name a shape by.
+fn middle_nm(outline_nm: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let ends = |axis: usize| {
+        let each = || outline_nm.iter().map(|p| p[axis]);
+        (
+            each().fold(f64::INFINITY, f64::min),
+            each().fold(f64::NEG_INFINITY, f64::max),
+        )
+    };
+    let middle = |(low, high): (f64, f64)| low + 0.5 * (high - low);
+    (!outline_nm.is_empty()).then(|| [middle(ends(0)), middle(ends(1))])
+}
+
 /// Plain text: one line for each rule, followed by its first violations.
 pub fn text(report: &DrcReport) -> String {
     const SHOWN: usize = 5;
@@ -63,7 +76,7 @@ pub fn text(report: &DrcReport) -> String {
             let _ = writeln!(out, "{:28} {}: {}", "", printable(name), exact(*value));
         }
         for m in r.markers.iter().filter(|m| !m.waived).take(SHOWN) {
-            let place = m.outline_nm.first().map_or_else(String::new, |p| {
+            let place = middle_nm(&m.outline_nm).map_or_else(String::new, |p| {
                 format!(" at ({:.3}, {:.3}) um", p[0] * 1e-3, p[1] * 1e-3)
             });
             let _ = writeln!(out, "{:28} {}{place}  [{}]", "", printable(&m.words), m.hash);

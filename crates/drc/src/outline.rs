@@ -6,7 +6,8 @@ use super::findings::Findings;
 use super::rule::Rule;
 use super::tolerance::ROUNDING_DEG;
 use metalith_core::document::{Limits, Section};
-use metalith_gds::{LayerNumber, circle_of, tilted_rectangle_of};
+use metalith_gds::{LayerNumber, are_of_square, circle_of, grid_step, tilted_rectangle_of};
+use metalith_report::exact;
 
 #[derive(Clone, Copy, PartialEq)]
 enum OutlineCheck {
@@ -91,8 +92,12 @@ impl OutlineRule {
             OutlineCheck::Square => {
                 let nm = |v: i64| v as f64 * outline.unit_nm;
                 match outline.rectangle() {
-                    Some(r) if r.width() == r.height() => None,
-                    Some(r) => Some(format!("{} by {} nm is not square", nm(r.width()), nm(r.height()))),
+                    Some(r) if are_of_square([r.width(), r.height()], grid_step(outline.unit_nm)) => None,
+                    Some(r) => Some(format!(
+                        "{} by {} nm is not square",
+                        exact(nm(r.width())),
+                        exact(nm(r.height()))
+                    )),
                     None => Some("not a square".into()),
                 }
             }

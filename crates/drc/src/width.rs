@@ -7,6 +7,7 @@ use super::rule::Rule;
 use super::tolerance::{EQUAL_NM, ROUNDING};
 use metalith_core::document::{Limits, Section};
 use metalith_gds::{LayerNumber, circle_of, tilted_rectangle_of};
+use metalith_report::exact;
 
 /// Limit on the smaller and the larger side of a pillar (nm).
 enum WidthLimit {
@@ -68,10 +69,11 @@ pub(super) fn read(check: &str, s: &Section<'_, '_>, context: &Context) -> Optio
 impl WidthBound {
     fn wrong(&self, small: f64, large: f64) -> Option<String> {
         match &self.want {
-            WidthLimit::Min(nm) if small < nm - EQUAL_NM => Some(format!("{small} nm wide, at least {nm} nm")),
-            WidthLimit::Max(nm) if large > nm + EQUAL_NM => Some(format!("{large} nm wide, at most {nm} nm")),
+            WidthLimit::Min(nm) if small < nm - EQUAL_NM => Some(format!("{} nm wide, at least {nm} nm", exact(small))),
+            WidthLimit::Max(nm) if large > nm + EQUAL_NM => Some(format!("{} nm wide, at most {nm} nm", exact(large))),
             WidthLimit::Aspect { height_nm, most } if height_nm / small > most * (1.0 + ROUNDING) => Some(format!(
-                "{small} nm wide and {height_nm} nm high, 1 : {:.2}, at most 1 : {most}",
+                "{} nm wide and {height_nm} nm high, 1 : {:.2}, at most 1 : {most}",
+                exact(small),
                 height_nm / small
             )),
             WidthLimit::Library {
@@ -83,13 +85,19 @@ impl WidthBound {
                 let steps = (small - first) / step;
                 if (steps - steps.round()).abs() * step > EQUAL_NM {
                     return Some(format!(
-                        "{small} nm wide, the library has {first} nm and steps of {step} nm"
+                        "{} nm wide, the library has {first} nm and steps of {step} nm",
+                        exact(small)
                     ));
                 }
                 let range = forbidden
                     .iter()
                     .find(|(a, b)| small >= a - EQUAL_NM && small <= b + EQUAL_NM)?;
-                Some(format!("{small} nm wide, {} to {} nm are forbidden", range.0, range.1))
+                Some(format!(
+                    "{} nm wide, {} to {} nm are forbidden",
+                    exact(small),
+                    range.0,
+                    range.1
+                ))
             }
             _ => None,
         }

@@ -251,6 +251,7 @@ fn one_nanometre_and_one_letter_are_differences() {
     let found = of_chips(&a, &shifted(1));
     let e = &found.elements[0];
     assert_eq!((e.removed, e.moved, found.changes), (0, 1, 1));
+    assert_eq!((e.largest_move_nm, e.largest_change_nm), (1.0, 0));
     assert!(text(&found).contains("moved by (1, 0) nm"), "{}", text(&found));
     assert!(metalith_drc::diff::page(&found).html().contains("moved by (1, 0) nm"));
     let with_text = |string: &str| {

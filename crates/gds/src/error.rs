@@ -275,6 +275,20 @@ fn in_block(inner: Option<u64>) -> String {
 }
 
 impl LayoutError {
+    /// True if the file is sound: what was asked of it does not say which cell is meant.
+    fn is_of_selection(&self) -> bool {
+        matches!(self, Self::NoSuchCell { .. } | Self::SeveralTops { .. })
+    }
+
+    /// Identity of the error, `subject/cause`.
+    fn id(&self) -> &'static str {
+        match self {
+            Self::NoSuchCell { .. } => "layout/no-such-cell",
+            Self::SeveralTops { .. } => "layout/several-tops",
+            _ => "layout/malformed",
+        }
+    }
+
     /// Remedy for the error.
     pub fn remedy(&self) -> String {
         match self {
@@ -405,6 +419,9 @@ impl From<Error> for metalith_core::Error {
             Error::Io { action, path, source } => return Self::Io { action, path, source },
             Error::Interrupted => return Self::Interrupted,
             Error::Visitor(error) => return error,
+            Error::Layout {
+                ref path, ref cause, ..
+            } if cause.is_of_selection() => (cause.id(), format!("{}: {cause}", path.display()), cause.remedy()),
             Error::Layout {
                 ref path,
                 offset,

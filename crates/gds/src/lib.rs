@@ -50,7 +50,7 @@ pub use pillar_layer::USUAL_LAYER;
 pub use placements::MissingCell;
 pub use read_warnings::{ReadWarning, ReadWarnings};
 pub use rectangle::{TiltedRectangle, tilted_rectangle_of};
-pub use shape::{CORNER_STEPS, Outline, Point, Rect, Shape, ShapeKind, Text};
+pub use shape::{CORNER_STEPS, Outline, Point, Rect, Shape, ShapeKind, Text, are_of_square, grid_step};
 pub use shape::{rectangle_of, simplified};
 pub use transform::Transform;
 pub use visit::{Selection, Visitor};

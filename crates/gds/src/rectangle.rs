@@ -1,7 +1,10 @@
 //! Outlines that stand for rectangles at any angle.
 
-use super::shape::{Point, Rect, rounding, simplified};
-use metalith_pillars::{PillarId, PillarShape};
+use super::shape::{Point, Rect, one_rounding, rounding, simplified};
+use metalith_pillars::{PillarId, PillarShape, RotatedRectangles};
+
+/// Corners of a rectangle.
+const CORNERS: f64 = 4.0;
 
 /// A rectangle at any angle, as its corners on the grid show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,16 +39,9 @@ pub fn tilted_rectangle_of(points: &[Point], unit_nm: f64) -> Option<TiltedRecta
         (around.y0 + around.y1) as f64 / 2.0,
     ];
     let corners = [a, b, c, d].map(|p| [p.x as f64 - middle[0], p.y as f64 - middle[1]]);
-    let [first, second] = [0, 1].map(|k| [corners[k + 1][0] - corners[k][0], corners[k + 1][1] - corners[k][1]]);
-    let [long, other] = [first, second].map(|e| e[0].hypot(e[1]));
-    // Diagonals of a parallelogram have one middle; those of one with right angles are equal. Rounding moves both by less than the
-    // tolerance of a corner.
-    let halves = |sign: f64, k: usize| [0, 1].map(|axis| (corners[k][axis] + sign * corners[k + 2][axis]) / 2.0);
-    let [p, q] = [0, 1].map(|k| halves(1.0, k));
-    let [r, s] = [0, 1].map(|k| halves(-1.0, k)).map(|[x, y]| x.hypot(y));
     let slack = rounding(unit_nm);
-    let is_rectangle = (p[0] - q[0]).hypot(p[1] - q[1]) <= slack && (r - s).abs() <= slack;
-    let edges = [long.min(other), long.max(other)];
+    let edges = edges_of(&corners);
+    let is_rectangle = off_rectangle(&corners) <= CORNERS.sqrt() * slack;
     (is_rectangle && edges[0] > 2.0 * slack).then_some(TiltedRectangle {
         around,
         corners,
@@ -54,8 +50,36 @@ pub fn tilted_rectangle_of(points: &[Point], unit_nm: f64) -> Option<TiltedRecta
     })
 }
 
+/// Lengths of the shorter and the longer edge of a quadrilateral, each the mean of both sides.
+fn edges_of(c: &[[f64; 2]; 4]) -> [f64; 2] {
+    let mean = |k: usize| {
+        let along = |axis: usize| c[k + 1][axis] - c[k][axis] + c[(k + 2) % 4][axis] - c[(k + 3) % 4][axis];
+        0.5 * along(0).hypot(along(1))
+    };
+    let [first, second] = [0, 1].map(mean);
+    [first.min(second), first.max(second)]
+}
+
+/// Root of the sum of the squares of the distances of four corners from those of the nearest rectangle. Diagonals of a parallelogram
+/// have one middle, those of one with right angles are as long. The nearest rectangle is a projection: corners that were moved from a
+/// rectangle are no farther from it, in this sum, than they were moved.
+fn off_rectangle(corners: &[[f64; 2]; 4]) -> f64 {
+    let half = |sign: f64, k: usize| [0, 1].map(|axis| (corners[k][axis] + sign * corners[k + 2][axis]) / 2.0);
+    let [p, q] = [0, 1].map(|k| half(1.0, k));
+    let [r, s] = [0, 1].map(|k| half(-1.0, k)).map(|[x, y]| x.hypot(y));
+    (p[0] - q[0]).hypot(p[1] - q[1]).hypot(r - s)
+}
+
 impl TiltedRectangle {
-    /// Tolerance of its edges (database units): corners on the grid move an edge by less than one and a half of it.
+    /// True if it may be rotated by a whole number of steps, so many in half a turn; a database unit is so long (nm). One rounding of
+    /// its corners turns a rectangle, in the least squares, by no more than it moves a corner over half of the diagonal.
+    pub fn is_rotated_in_steps(&self, steps: u16, unit_nm: f64) -> bool {
+        let half_diagonal = 0.5 * self.edges[0].hypot(self.edges[1]);
+        let off = RotatedRectangles::off_step(&self.corners, steps);
+        off.is_some_and(|off| off.abs() * half_diagonal <= one_rounding(unit_nm))
+    }
+
+    /// Tolerance of its edges (database units): what both corners of an edge give way by.
     pub fn edges_off(&self) -> f64 {
         self.slack
     }

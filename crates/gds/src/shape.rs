@@ -1,5 +1,7 @@
 //! Shapes on a layer.
 
+use std::f64::consts::SQRT_2;
+
 use super::transform::{Transform, turned};
 use metalith_core::LayerNumber;
 use metalith_pillars::{OutlineForm, PillarShape};
@@ -8,19 +10,34 @@ use metalith_pillars::{OutlineForm, PillarShape};
 /// of the grid. Rounding to the grid moves a corner no farther. Two corners make an edge: one of a step more or less is the same.
 pub const CORNER_STEPS: f64 = 0.5;
 
-/// Tolerance of the place of a corner of a circle or a rectangle, in steps of the grid: [`CORNER_STEPS`] along both axes, twice
-/// where a cell is placed at an angle, and what the middle of all corners is moved by.
-const ROUNDED: f64 = 3.0 * CORNER_STEPS;
+/// Times that a corner of a circle or a rectangle is rounded to the grid at most: in the file, and where its cell is placed at an angle
+/// or turned back.
+const ROUNDINGS: f64 = 2.0;
+
+/// Tolerance of the place of a corner of a circle or a rectangle, in steps of the grid: [`CORNER_STEPS`] along both axes, each time it
+/// is rounded.
+const ROUNDED: f64 = ROUNDINGS * CORNER_STEPS * SQRT_2;
 
 /// Step of the grid that corners may be rounded to, in database units, of which one is so long (nm): the unit or a nanometre,
 /// whichever is more.
-pub(super) fn grid_step(unit_nm: f64) -> f64 {
+pub fn grid_step(unit_nm: f64) -> f64 {
     (1.0 / unit_nm).max(1.0)
 }
 
 /// Tolerance of the place of a corner in database units, of which one is so long (nm).
 pub(super) fn rounding(unit_nm: f64) -> f64 {
     ROUNDED * grid_step(unit_nm)
+}
+
+/// True if edges of these lengths may be those of a square whose corners were rounded to a grid of this step, one after the other
+/// along each axis: two corners give way by [`CORNER_STEPS`] along both.
+pub fn are_of_square([width, height]: [i64; 2], step: f64) -> bool {
+    (width - height).abs() as f64 <= 4.0 * CORNER_STEPS * step
+}
+
+/// Largest distance that one rounding moves a corner by, in database units, of which one is so long (nm).
+pub(super) fn one_rounding(unit_nm: f64) -> f64 {
+    rounding(unit_nm) / ROUNDINGS
 }
 
 /// A place in database units.

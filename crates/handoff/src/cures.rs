@@ -72,6 +72,7 @@ fn cure(check: &str, id: &str, deck: &str, assumed: bool, process: &Process, pit
         "square" | "circle" | "rectangle" => {
             return "draw pillars of one shape, or use rules for the other shape".into();
         }
+        "recognised" => return "draw pillars of one kind on lattices, or name their layer by --layer".into(),
         "exposure_grid" | "grid" => return "round places and sizes to the step of the rule".into(),
         "active_area" => return "move the layout into the area, or make the chip larger".into(),
         "mark_keep_out" => return "move the marks away from the pillars".into(),

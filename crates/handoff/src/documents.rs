@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::dose::{Beam, DoseRow, Exposure, WriteTime, doses};
+use super::dose_matrix::DoseBlock;
 use super::exposure::{exposures, snapping};
 use super::job::{self, JobPatterns};
 use super::kind_words::KindWords;
@@ -14,6 +15,7 @@ use super::process::{JobSpec, Process};
 use super::tables;
 use metalith_core::Result;
 use metalith_design::Design;
+use metalith_pillars::PillarShape;
 
 /// Content of the tables.
 #[derive(Serialize)]
@@ -45,32 +47,33 @@ pub(super) fn write(
         sites: sites(design, process, &layouts.array, &layouts.structures),
         crosses: crosses(design),
     };
-    dose_tables(files, design, process, layouts, &documents)?;
+    let matrix = (&documents.doses[..], &layouts.blocks[..]);
+    dose_tables(files, process, Some(design.cell.shape), matrix, &documents.exposures)?;
     measuring_tables(files, design, process, layouts, &documents)?;
     let patterns = JobPatterns::of(design);
     jobs(files, &patterns, process, &documents.crosses, &documents.snapping)?;
     Ok(documents)
 }
 
-fn dose_tables(
+/// Write the doses of the dose matrix and the times of each file, of pillars of a shape or of none.
+pub(super) fn dose_tables(
     files: &mut Listing,
-    design: &Design,
     process: &Process,
-    layouts: &Layouts,
-    documents: &Documents,
+    shape: Option<PillarShape>,
+    (doses, blocks): (&[DoseRow], &[DoseBlock]),
+    exposures: &[(String, Exposure, Vec<WriteTime>)],
 ) -> Result<()> {
     tables::write_doses(
         &files.add(
             "dose/dose_table.csv",
             "the nine doses, where each is, a column to fill in",
         ),
-        &documents.doses,
-        &layouts.blocks,
+        doses,
+        blocks,
         process.dose_matrix.layer,
-        Some(design.cell.shape),
+        shape,
     )?;
-    let times: Vec<_> = documents
-        .exposures
+    let times: Vec<_> = exposures
         .iter()
         .map(|(file, _, times)| (file.clone(), times.clone()))
         .collect();
@@ -78,6 +81,17 @@ fn dose_tables(
         &files.add("dose/write_time.csv", "time of each file of step 1 at each current"),
         &times,
     )
+}
+
+/// Write the places to measure pillars of a shape at.
+pub(super) fn site_table(
+    files: &mut Listing,
+    process: &Process,
+    shape: PillarShape,
+    sites: &[MetrologySite],
+) -> Result<()> {
+    let purpose = format!("where to measure {}, columns to fill in", KindWords::of(shape).measured);
+    tables::write_sites(&files.add("metrology/cd_table.csv", purpose), sites, process, shape)
 }
 
 fn measuring_tables(
@@ -92,18 +106,7 @@ fn measuring_tables(
         &layouts.structures,
         design.cell.shape,
     )?;
-    tables::write_sites(
-        &files.add(
-            "metrology/cd_table.csv",
-            format!(
-                "where to measure {}, columns to fill in",
-                KindWords::of(design.cell.shape).measured
-            ),
-        ),
-        &documents.sites,
-        process,
-        design.cell.shape,
-    )?;
+    site_table(files, process, design.cell.shape, &documents.sites)?;
     let layers = &design.layout.layers;
     let both = format!(
         "{}/{} step 1, {}/{} step 2",

@@ -17,7 +17,7 @@ use metalith_core::{AtomicFile, Progress, Result};
 use metalith_design::Design;
 use metalith_design::array::PillarArray;
 use metalith_drc::{CheckInput, Date, Deck, DrcReport, Waiver, Waivers};
-use metalith_gds::Layout;
+use metalith_gds::{LayerNumber, Layout};
 use metalith_report::{Verdict, counted, write_json};
 
 /// Kinds of files that a check writes, with their purpose.
@@ -45,6 +45,8 @@ pub(super) struct Subject<'a> {
     pub with: Option<&'a Layout>,
     /// The design that it should hold, and its pillars.
     pub design: Option<(&'a Design, &'a PillarArray)>,
+    /// Layer whose shapes are to be pillars, where no design says what it should hold.
+    pub recognised: Option<LayerNumber>,
     /// Structures that break rules by intention.
     pub structures: Cow<'a, [Structure]>,
 }
@@ -140,8 +142,15 @@ impl<'a> Subject<'a> {
             deck,
             with: None,
             design: None,
+            recognised: None,
             structures: Cow::Borrowed(&[]),
         }
+    }
+
+    /// This layout, of whose shapes on a layer are told how many are pillars, as `metalith check` does.
+    pub(super) fn recognising(mut self, layer: LayerNumber) -> Self {
+        self.recognised = Some(layer);
+        self
     }
 
     /// Check one layout; what it breaks on purpose is waived, and the waivers are written.
@@ -179,7 +188,11 @@ impl<'a> Subject<'a> {
             today: Date::today(),
             markers,
         };
-        metalith_drc::check(self.layout, self.deck, &input, progress)
+        let mut report = metalith_drc::check(self.layout, self.deck, &input, progress)?;
+        if let Some(layer) = self.recognised {
+            metalith_drc::add_recognition(&mut report, self.layout, layer, &input, progress)?;
+        }
+        Ok(report)
     }
 }
 

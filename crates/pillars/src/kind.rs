@@ -186,7 +186,8 @@ pub trait PillarKind {
         true
     }
 
-    /// The pillar with these corners about its middle (nm), in any order, if each is within `slack_nm` of one of its own. Kinds
+    /// The pillar with these corners about its middle (nm), in any order, if they are within `slack_nm` of its own: each, or in the
+    /// mean of the squares. Kinds
     /// that are recognised by the box around them have none.
     fn recognised(&self, _corners: &[[f64; 2]; 4], _slack_nm: f64) -> Option<PillarId> {
         None

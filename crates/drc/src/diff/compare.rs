@@ -133,6 +133,11 @@ impl Changes {
             }
             if let Some(e) = first {
                 elements[e].moved += 1;
+                let [dx, dy] = pairs::joined(&held[a].change, &held[b].change)
+                    .moved_nm
+                    .unwrap_or_default();
+                let largest = &mut elements[e].largest_move_nm;
+                *largest = largest.max(dx.abs()).max(dy.abs());
             }
         }
         for (k, own) in held.iter().enumerate() {
@@ -241,6 +246,7 @@ fn element(
         narrowed: 0,
         rotated: 0,
         moved: 0,
+        largest_move_nm: 0.0,
         largest_change_nm: 0,
         rms_change_nm: 0.0,
     };

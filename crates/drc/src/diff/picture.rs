@@ -220,7 +220,8 @@ fn elements(diff: &LayoutDiff) -> Table {
         Column::number("Widened", ""),
         Column::number("Narrowed", ""),
         Column::number("Moved or resized", ""),
-        Column::number("Largest change", "nm"),
+        Column::number("Largest move", "nm"),
+        Column::number("Largest change of width", "nm"),
         Column::number("rms change", "nm"),
         Column::verdict(),
     ]);
@@ -235,6 +236,7 @@ fn elements(diff: &LayoutDiff) -> Table {
             count(e.widened),
             count(e.narrowed),
             count(e.moved),
+            Cell::exact(e.largest_move_nm),
             count(u64::from(e.largest_change_nm)),
             Cell::sig(e.rms_change_nm, 4),
             Cell::from(Verdict::of(e.changed() == 0)),

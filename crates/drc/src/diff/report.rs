@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use metalith_pillars::Pitch;
-use metalith_report::counted;
+use metalith_report::{counted, exact};
 use serde::Serialize;
 
 use metalith_core::text::printable;
@@ -30,10 +30,17 @@ pub struct ElementDiff {
     /// Pillars that both layouts have, in the second less than a pitch away or of another size, off the site.
     #[serde(skip_serializing_if = "is_zero")]
     pub moved: u64,
+    /// Largest distance along an axis that a pillar was moved by (nm).
+    #[serde(skip_serializing_if = "is_still")]
+    pub largest_move_nm: f64,
     /// Largest change of width where both have a pillar (nm).
     pub largest_change_nm: u16,
     /// Root of the mean squared change over all sites where both have a pillar (nm).
     pub rms_change_nm: f64,
+}
+
+fn is_still(nm: &f64) -> bool {
+    *nm == 0.0
 }
 
 fn is_zero(count: &u64) -> bool {
@@ -214,7 +221,7 @@ pub fn text(diff: &LayoutDiff) -> String {
         }
         let _ = writeln!(
             out,
-            "{} at ({:.1}, {:.1}) um: {} added, {} removed, {} widened, {} narrowed{}{} of {}; largest change {} nm, rms {:.4} nm",
+            "{} at ({:.1}, {:.1}) um: {} added, {} removed, {} widened, {} narrowed{}{} of {}; largest change of width {} nm, rms {:.4} nm{}",
             e.name,
             e.centre_nm[0] as f64 * 1e-3,
             e.centre_nm[1] as f64 * 1e-3,
@@ -234,7 +241,12 @@ pub fn text(diff: &LayoutDiff) -> String {
             },
             e.pillars[0],
             e.largest_change_nm,
-            e.rms_change_nm
+            e.rms_change_nm,
+            if e.largest_move_nm > 0.0 {
+                format!("; moved by up to {} nm", exact(e.largest_move_nm))
+            } else {
+                String::new()
+            }
         );
     }
     for l in diff.layers.iter().filter(|l| l.only_in_a + l.only_in_b + l.moved > 0) {

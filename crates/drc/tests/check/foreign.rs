@@ -1,9 +1,10 @@
 //! Layouts without a design: their pillars are recognised as simulations recognise them.
 
 use metalith_core::{LayerNumber, Silent};
-use metalith_drc::{DrcReport, Severity, check_generic};
+use metalith_drc::{Deck, DrcReport, Severity, check_generic};
 use metalith_gds::extract::{ExtractionPlan, LeftOut, extract};
 use metalith_gds::{Layout, ReadLimits};
+use metalith_pillars::PillarShape;
 use metalith_testing::gds::Gds;
 
 use super::input;
@@ -97,5 +98,30 @@ fn pillars_are_recognised_as_simulations_recognise_them() {
         let middle = [0, 1].map(|k| corners.iter().map(|c| c[k]).sum::<f64>() / corners.len() as f64);
         assert!((0..2).all(|k| (middle[k] - want[k]).abs() < 2.0), "{middle:?} {want:?}");
         assert_ne!(report.exit_code(), 0);
+    }
+}
+
+/// Squares that rounding made a step or two unequal are pillars of a lens and squares of the rule; farther off they are neither.
+#[test]
+fn squares_have_one_tolerance() {
+    for (longer, is_square) in [(0, true), (1, true), (2, true), (3, false)] {
+        let mut gds = Gds::library();
+        gds.cell("TOP");
+        for (x, y) in (-8..8).flat_map(|j| (-8..8).map(move |i| (400 * i, 400 * j))) {
+            let (low, high) = (longer / 2, longer - longer / 2);
+            gds.rect(1, x - 106, y - 106 - low, x + 106, y + 106 + high);
+        }
+        gds.end_cell();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("squares.gds");
+        std::fs::write(&path, gds.end()).unwrap();
+        let layout = Layout::open_counted(&path, ReadLimits::default(), &Silent).unwrap();
+        let plan = ExtractionPlan::discover(LayerNumber::new(1, 0)).of_shape(PillarShape::Square);
+        let read = extract(&layout, &plan, &Silent);
+        let deck = Deck::read(&metalith_testing::root().join("rules/squares.toml")).unwrap();
+        let report = metalith_drc::check(&layout, &deck, &input(), &Silent).unwrap();
+        let rule = report.rules.iter().find(|rule| rule.id == "pillar.square").unwrap();
+        assert_eq!(rule.violations == 0, is_square, "{longer}");
+        assert_eq!(read.is_ok_and(|read| read.pillars == 256), is_square, "{longer}");
     }
 }

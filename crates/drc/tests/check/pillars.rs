@@ -34,7 +34,7 @@ const CASES: &[Case] = &[
         |c| {
             remove(c, 5, 5);
             let (x, y) = (site(5), site(5));
-            c.extra.rect(1, x - 100, y - 100, x + 100, y + 102);
+            c.extra.rect(1, x - 100, y - 100, x + 100, y + 104);
         },
         &[],
     ),

@@ -101,7 +101,11 @@ impl Remarks {
     /// Texts for whoever waits.
     pub(super) fn texts(&self) -> impl Iterator<Item = String> {
         let left_out = self.left_out.iter().map(|(what, (count, line))| {
-            format!("warning[layout/odd]: {count} {what} were left out, the first at line {line}")
+            if *count == 1 {
+                format!("warning[layout/odd]: {what} were left out: 1, at line {line}")
+            } else {
+                format!("warning[layout/odd]: {what} were left out: {count}, the first at line {line}")
+            }
         });
         std::iter::once(format!("note: {}", self.taken)).chain(left_out)
     }

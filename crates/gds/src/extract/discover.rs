@@ -3,8 +3,9 @@
 use std::f64::consts::FRAC_PI_3;
 
 use super::failed;
-use super::lattices::{Cluster, FEWEST};
-use super::places::{Centre, PlaceFit, Places};
+use super::lattices::{Cluster, FEWEST, few_are_off};
+use super::phases::PartVisitor;
+use super::places::{Centre, PlaceFit, Places, bits_of_tiles};
 use super::sites::Scale;
 use super::sizes::Sizes;
 use super::tiles::{COARSE, FINE, MOST_TILES, TileMap};
@@ -286,6 +287,27 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
     for members in tiles.clusters() {
         let cluster = cluster_of(&tiles, &members, scale, is_rounded);
         let found = cluster.element();
+        let is_whole = found.as_ref().is_ok_and(|f| f.as_ref().is_none_or(|f| f.is_whole));
+        let parts = if is_whole { Vec::new() } else { cluster.parts() };
+        if !parts.is_empty() {
+            let bits = bits_of_tiles(scale, how.bits);
+            let mut visitor = PartVisitor::new(parts, shape, scale, bits, how.widest_nm);
+            visit_turned(
+                layout,
+                selection,
+                how.turn.map(|(angle, _)| angle),
+                &mut visitor,
+                progress,
+            )?;
+            let element = |tiles: &TileMap, members: &[usize]| cluster_of(tiles, members, scale, is_rounded).element();
+            // Parts that leave out more than a few pillars are none.
+            let pillars: u64 = members.iter().map(|&k| tiles.pillars(k)).sum();
+            if few_are_off(visitor.pillars() as usize, pillars as usize) {
+                let found = visitor.finish(element).map_err(&fail)?;
+                sites.extend(found.into_iter().map(|found| (found.site, found.fit)));
+                continue;
+            }
+        }
         if how.at_angles && turn.is_none() && found.as_ref().map_or(true, |f| f.as_ref().is_some_and(|f| f.is_poor)) {
             turn = cluster.turn();
         }
@@ -389,17 +411,17 @@ impl Map {
         self.turned.add(placements, centre);
         true
     }
+}
 
-    /// The middle of the box around a shape, if it may be a pillar by that.
-    #[inline]
-    fn square(r: &Rect, scale: Scale, widest_nm: i64) -> Option<Centre> {
-        let centre = Centre::of(r, scale)?;
-        let width_nm = match scale.whole_nm(r.width()) {
-            Some(nm) if r.width() == r.height() => nm,
-            _ => scale.rounded_width_nm(r)?,
-        };
-        (width_nm <= widest_nm).then_some(centre)
-    }
+/// The middle of the box around a shape, if it may be a pillar by that.
+#[inline]
+pub(super) fn square_about(r: &Rect, scale: Scale, widest_nm: i64) -> Option<Centre> {
+    let centre = Centre::of(r, scale)?;
+    let width_nm = match scale.whole_nm(r.width()) {
+        Some(nm) if r.width() == r.height() => nm,
+        _ => scale.rounded_width_nm(r)?,
+    };
+    (width_nm <= widest_nm).then_some(centre)
 }
 
 impl Visitor for Search {
@@ -463,7 +485,7 @@ impl Visitor for Map {
         let widest_nm = self.widest_nm;
         let centre = |placement: &Transform| {
             let placed = placement.apply_rect(rect)?;
-            Self::square(&placed, scale, widest_nm)
+            square_about(&placed, scale, widest_nm)
         };
         self.pillars.add(placements, centre);
         Ok(())

@@ -37,6 +37,8 @@ pub(super) struct FoundElement {
     pub fit: PlaceFit,
     /// True if a good part of its centres are not on the lattice, or half of its sites have none.
     pub is_poor: bool,
+    /// True if nearly all centres are on the lattice.
+    pub is_whole: bool,
 }
 
 impl Cluster<'_> {
@@ -56,6 +58,7 @@ impl Cluster<'_> {
         };
         let exactly = |site: ElementSite| FoundElement {
             is_poor: SHARE_OF_SITES as usize * on < (SHARE_OF_SITES as usize - 1) * all,
+            is_whole: few_are_off(on, all),
             site,
             fit: PlaceFit {
                 slack_nm: if self.is_turned() {
@@ -73,9 +76,14 @@ impl Cluster<'_> {
         }
         match self.rounded(&tiles).filter(|(fit, _)| !few_are_off(on, fit.count)) {
             Some((fit, grid)) => {
-                let is_poor = fit.is_half_empty;
+                let (is_poor, is_whole) = (fit.is_half_empty, few_are_off(fit.count, all));
                 let (site, fit) = self.fitted_site(&fit, grid, pillars)?;
-                Ok(Some(FoundElement { site, fit, is_poor }))
+                Ok(Some(FoundElement {
+                    site,
+                    fit,
+                    is_poor,
+                    is_whole,
+                }))
             }
             None => Ok(exact?.map(exactly)),
         }

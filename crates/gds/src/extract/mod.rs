@@ -9,6 +9,7 @@ mod filler;
 mod lattices;
 mod left_out;
 mod named_shapes;
+mod phases;
 mod pillars;
 mod places;
 mod plan;

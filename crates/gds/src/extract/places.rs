@@ -47,12 +47,17 @@ pub(super) struct Places {
     scattered: bool,
 }
 
+/// Bits of the side of a tile (half steps) that is two to the power of `bits` half nanometres, or less than twice that.
+pub(super) fn bits_of_tiles(scale: Scale, bits: u32) -> u32 {
+    let finer = (scale.steps_per_nm() as u64).next_power_of_two().trailing_zeros();
+    (bits + finer).min(COARSE)
+}
+
 impl Places {
     /// Places by tiles whose side is two to the power of `bits` (half nm), or less than twice that; on fine grids
     /// as large as the numbers of places allow.
     pub(crate) fn new(scale: Scale, bits: u32) -> Self {
-        let finer = (scale.steps_per_nm() as u64).next_power_of_two().trailing_zeros();
-        let bits = (bits + finer).min(COARSE);
+        let bits = bits_of_tiles(scale, bits);
         Self {
             scale,
             tiles: TileMap::new(bits),

@@ -1,7 +1,7 @@
 //! Lattices whose places were rounded to the grid one by one, as loops of other programs draw them: any pitch, rows of hexagonal
 //! lattices half the root of three of the pitch apart, a centre anywhere.
 
-use super::lattices::{AXES, Cluster, SHARE_OF_SITES, few_are_off};
+use super::lattices::{AXES, Cluster, FoundElement, SHARE_OF_SITES, few_are_off};
 use super::places::PlaceFit;
 use super::turned::typical_distance;
 use crate::{CORNER_STEPS, ExtractionError, Point};
@@ -27,14 +27,14 @@ const ROW: f64 = 0.866_025_403_784_438_6;
 
 /// Places along an axis: the first, and the distance of two (half steps).
 #[derive(Clone, Copy)]
-struct Comb {
+pub(super) struct Comb {
     first: f64,
-    step: f64,
+    pub(super) step: f64,
 }
 
 impl Comb {
     /// Number of the nearest place, and the distance from it.
-    fn nearest(&self, v: f64) -> (f64, f64) {
+    pub(super) fn nearest(&self, v: f64) -> (f64, f64) {
         let k = ((v - self.first) / self.step).round();
         (k, v - self.first - k * self.step)
     }
@@ -62,14 +62,27 @@ impl Cluster<'_> {
         tiles.map(|&k| self.tiles.all_samples(k).collect()).collect()
     }
 
+    /// Places of the lattice of an element along x and y, whose middle is so far from its centre (nm).
+    pub(super) fn combs(&self, site: &ElementSite, offset_nm: [f64; 2]) -> [Comb; 2] {
+        let (lattice, nanometre) = (site.lattice, self.steps_per_nm as f64 * 2.0);
+        [0, 1].map(|axis| Comb {
+            first: (site.centre_nm[axis] as f64 + offset_nm[axis] + lattice.place_nm(axis, 0)) * nanometre,
+            step: lattice.steps_nm()[axis] * nanometre,
+        })
+    }
+
+    /// Distance along an axis at which a shape stands on a place of an element as it was found (half steps).
+    pub(super) fn slack_of(&self, found: &FoundElement) -> f64 {
+        let nanometre = self.steps_per_nm as f64 * 2.0;
+        let rounding = found.site.lattice.rounding_nm() * nanometre + CORNER_STEPS * self.unit_halves;
+        rounding.max(found.fit.slack_nm * nanometre)
+    }
+
     /// Number of samples on the sites of a lattice whose places are as they should be: shapes of odd width half a unit beside.
     pub(super) fn count_on(&self, site: &ElementSite, tiles: &[Vec<Point>]) -> usize {
         let (lattice, nanometre) = (site.lattice, self.steps_per_nm as f64 * 2.0);
         let rounding = lattice.rounding_nm() * nanometre;
-        let combs = [0, 1].map(|axis| Comb {
-            first: (site.centre_nm[axis] as f64 + lattice.place_nm(axis, 0)) * nanometre,
-            step: lattice.steps_nm()[axis] * nanometre,
-        });
+        let combs = self.combs(site, [0.0; 2]);
         let is_on = |p: &&Point| {
             let [(column, x), (row, y)] = [0, 1].map(|axis| {
                 let place = AXES[axis](**p) as f64;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::places::PlaceFit;
-use crate::shape::grid_step;
+use crate::shape::{are_of_square, grid_step};
 use crate::{CORNER_STEPS, Layout, Rect, Result};
 use metalith_pillars::ElementSite;
 
@@ -85,8 +85,7 @@ impl Scale {
         let (width, height) = (r.width(), r.height());
         let step = self.step_of(r);
         let width_nm = self.nm((width + height) as f64 / 2.0).round_ties_even() as i64;
-        // Two corners off by half a step to either side along each axis.
-        ((width - height).abs() as f64 <= 4.0 * CORNER_STEPS * step && width_nm > 0).then_some(width_nm)
+        (are_of_square([width, height], step) && width_nm > 0).then_some(width_nm)
     }
 
     /// True if a rectangle is near enough for arithmetic.
@@ -245,17 +244,23 @@ impl Sites {
         let y = (pillar.y0 + pillar.y1) * half;
         // Half a database unit. Asked for only where a pillar is off its site: this is the innermost loop of reading.
         let slack = || [pillar.x1 - pillar.x0, pillar.y1 - pillar.y0].map(|edge| (edge % 2 * half) as f64);
-        if let Some(standing) = self.try_element(*guess, x, y, slack) {
+        let first = self.try_element(*guess, x, y, slack);
+        if let Some(standing @ SitePlace::Site(..)) = first {
             return standing;
         }
+        // Lattices of two elements may reach over one another: a place between the sites of one may be a site of the other.
+        let mut between = first;
         let tile = (x.div_euclid(self.tile), y.div_euclid(self.tile));
         for &element in self.tiles.get(&tile).map_or(&[][..], Vec::as_slice) {
-            if let Some(standing) = self.try_element(element, x, y, slack) {
-                *guess = element;
-                return standing;
+            match self.try_element(element, x, y, slack) {
+                Some(standing @ SitePlace::Site(..)) => {
+                    *guess = element;
+                    return standing;
+                }
+                other => between = between.or(other),
             }
         }
-        SitePlace::Outside
+        between.unwrap_or(SitePlace::Outside)
     }
 
     #[inline]

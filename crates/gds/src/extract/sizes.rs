@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::sites::Scale;
 use crate::outline_memo::{BoxMemo, OutlineMemo};
-use crate::{Point, Rect, Shape, Transform, pillar_of, tilted_rectangle_of};
+use crate::{Point, Rect, Shape, Transform, tilted_rectangle_of};
 use metalith_pillars::{PillarShape, RotatedRectangles, UprightRectangles};
 
 /// Sizes that are distinguished: a layout has one, and what its corners make of it.
@@ -96,15 +96,8 @@ impl Sizes {
                 numbers.insert(key, counted.len());
                 counted.push(Size::default());
             }
-            let [width_nm, length_nm] = edges.map(|nm| nm.round() as u16);
-            let steps = STEPS;
-            let alike = RotatedRectangles {
-                width_nm,
-                length_nm,
-                steps,
-            };
             Some(SeenRectangle {
-                by_steps: tilted.number(alike.into(), scale.nm(1.0)).is_some(),
+                by_steps: tilted.is_rotated_in_steps(STEPS, scale.nm(1.0)),
                 edges,
                 size: numbers.get(&key).copied(),
                 around: tilted.around.moved(Point::new(-points[0].x, -points[0].y)),
@@ -126,14 +119,8 @@ impl Sizes {
                 seen.by_steps
             } else {
                 let corners = shape.outline.placed(placed);
-                let [width_nm, length_nm] = seen.edges.map(|nm| nm.round() as u16);
-                let steps = STEPS;
-                let alike = RotatedRectangles {
-                    width_nm,
-                    length_nm,
-                    steps,
-                };
-                pillar_of(&corners, alike.into(), scale.nm(1.0)).is_some()
+                let tilted = tilted_rectangle_of(&corners, scale.nm(1.0));
+                tilted.is_some_and(|t| t.is_rotated_in_steps(STEPS, scale.nm(1.0)))
             };
             size.between += if by_steps { 0 } else { copies };
             (0..2).for_each(|k| size.sums[k] += seen.edges[k] * copies as f64);
@@ -145,9 +132,9 @@ impl Sizes {
     }
 
     /// Rectangles found, if they are pillars no longer than this (nm): upright ones of several sizes, or rectangles of
-    /// the size that most have, by their rotation. `are_turned` if they were turned back, which rounds upright ones.
-    pub(crate) fn pillars(&self, longest_nm: i64, are_turned: bool) -> Option<FoundRectangles> {
-        self.upright(longest_nm, are_turned).or_else(|| self.alike(longest_nm))
+    /// the size that most have, by their rotation. `are_rounded` if they were turned back, which rounds upright ones.
+    pub(crate) fn pillars(&self, longest_nm: i64, are_rounded: bool) -> Option<FoundRectangles> {
+        self.upright(longest_nm, are_rounded).or_else(|| self.alike(longest_nm))
     }
 
     /// True if all rectangles are these pillars, and, where squares are too, all of so many squares.
@@ -167,7 +154,7 @@ impl Sizes {
     }
 
     /// Upright rectangles of more than one size, with edges in equal steps; squares among them are such too.
-    fn upright(&self, longest_nm: i64, are_turned: bool) -> Option<FoundRectangles> {
+    fn upright(&self, longest_nm: i64, are_rounded: bool) -> Option<FoundRectangles> {
         let few = ((1.0 - PILLARS) * self.rectangles as f64).max(1.0);
         if self.tilted as f64 > few {
             return None;
@@ -196,7 +183,7 @@ impl Sizes {
             .map(|(nm, n)| Some((u16::try_from(nm).ok()?, n)))
             .collect();
         let counted = counted?;
-        let lengths = if are_turned {
+        let lengths = if are_rounded {
             rounded_lengths(counted)
         } else {
             counted.into_iter().map(|(nm, _)| nm).collect()

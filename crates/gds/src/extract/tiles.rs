@@ -310,6 +310,20 @@ impl TileMap {
         true
     }
 
+    /// Side of a tile (half steps).
+    pub(crate) fn side(&self) -> i64 {
+        1 << self.bits
+    }
+
+    /// Tiles that touch one, corners included.
+    pub(crate) fn neighbours(&self, tile: usize) -> impl Iterator<Item = usize> + '_ {
+        let (x, y) = self.tiles[tile].0;
+        let around = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+        around
+            .into_iter()
+            .filter_map(move |(dx, dy)| self.numbers.get(&(x + dx, y + dy)).map(|&k| k as usize))
+    }
+
     /// Tiles that touch, corners included.
     pub(crate) fn clusters(&self) -> Vec<Vec<usize>> {
         let mut seen = vec![false; self.tiles.len()];
@@ -321,13 +335,11 @@ impl TileMap {
             let mut cluster = vec![start];
             let mut next = 0;
             while next < cluster.len() {
-                let (x, y) = self.tiles[cluster[next]].0;
+                let tile = cluster[next];
                 next += 1;
-                for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
-                    if let Some(&k) = self.numbers.get(&(x + dx, y + dy))
-                        && !std::mem::replace(&mut seen[k as usize], true)
-                    {
-                        cluster.push(k as usize);
+                for k in self.neighbours(tile) {
+                    if !std::mem::replace(&mut seen[k], true) {
+                        cluster.push(k);
                     }
                 }
             }

@@ -302,7 +302,15 @@ fn one_top_of_several_is_chosen() {
     let names: Vec<&str> = below.cells().iter().map(|c| c.name.as_str()).collect();
     assert_eq!((names, below.tops().len()), (vec!["SUB", "B"], 1));
     assert_eq!(boxes(&below).len(), 2);
-    assert!(layout(bytes).below("C").is_err());
+    let id = |error: metalith_gds::Error| metalith_core::Error::from(error).id();
+    let whole = layout(bytes.clone());
+    let visited = whole.visit(&Selection::default(), &mut super::Flat(Vec::new()), &Silent);
+    // The file is sound: what was asked of it is not.
+    assert_eq!(id(visited.unwrap_err()), "layout/several-tops");
+    assert_eq!(
+        id(layout(bytes).below("C").map(|_| ()).unwrap_err()),
+        "layout/no-such-cell"
+    );
 }
 
 /// A file that gzip made is unpacked; one cut short, or that unpacks to far more than layouts do, is refused. DXF is named.

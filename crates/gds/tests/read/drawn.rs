@@ -325,3 +325,55 @@ fn squares_and_circles_stand_in_one_lens() {
     let circle = SquaresAndCircles::number(true, 150).unwrap().0;
     assert!(numbers.copied().all(|n| n == 140 || n == circle));
 }
+
+/// Thin rectangles at any angle, as they are and in a lens that is drawn at an angle: rounding turns a short edge by more than it
+/// turns a long one.
+#[test]
+fn thin_rectangles_at_any_angle_are_read() {
+    for (turn, pitch) in [(0.0, 350.0), (0.0, 1000.0 / 3.0), (12.0, 350.0)] {
+        let places = places(20, pitch, false);
+        let (sin, cos) = f64::to_radians(turn).sin_cos();
+        let read = drawn(1.0, |gds| {
+            for (k, [x, y]) in places.iter().enumerate() {
+                let at = [cos * x - sin * y, sin * x + cos * y];
+                put(gds, &rectangle(80.0, 230.0, 0.777 * k as f64 + turn), at, 1.0);
+            }
+        });
+        assert_all(&read, places.len(), pitch, LatticeKind::Square);
+    }
+}
+
+/// Arrays of lenses nearer than tiles show, whose distance is no multiple of the pitch: each lens is an element about its own middle,
+/// and a single row of them too.
+#[test]
+fn near_lenses_off_step_are_elements_of_their_own() {
+    for (pitch, apart, rows, is_hexagonal) in [
+        (350.0, 14_700.0 + 113.0, 2, false),
+        (350.0, 22_000.0, 3, false),
+        (1000.0 / 3.0, 15_100.0, 2, false),
+        (400.0, 17_111.0, 2, true),
+    ] {
+        let places = places(20, pitch, is_hexagonal);
+        for columns in [1, rows] {
+            let middles: Vec<[f64; 2]> = (0..rows * columns)
+                .map(|k| [f64::from(k % columns) * apart, f64::from(k / columns) * apart])
+                .collect();
+            let read = drawn(1.0, |gds| {
+                for [x, y] in &middles {
+                    let square = rectangle(200.0, 200.0, 0.0);
+                    (places.iter()).for_each(|place| put(gds, &square, [x + place[0], y + place[1]], 1.0));
+                }
+            });
+            let count = places.len() * middles.len();
+            let what = format!("{pitch} {apart} {columns}");
+            assert_eq!((read.pillars, read.oddities.total()), (count as u64, 0), "{what}");
+            assert_eq!(read.elements.len(), middles.len(), "{what}");
+            for (element, middle) in read.elements.iter().zip(&middles) {
+                let off = [0, 1].map(|axis| (element.site.centre_nm[axis] as f64 - middle[axis]).abs());
+                // Of hexagonal lattices the middle is a site near it.
+                let near = if is_hexagonal { pitch } else { 1.0 };
+                assert!(off[0].max(off[1]) <= near, "{what}: {off:?}");
+            }
+        }
+    }
+}

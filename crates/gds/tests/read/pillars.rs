@@ -294,7 +294,8 @@ fn two_arrays_are_one_hexagonal_lattice() {
     );
     assert_eq!(element.widths.pillars(), 81 * 49 + 82 * 48);
     if let Ok(other) = rows(false) {
-        assert!(other.elements.iter().all(|e| e.site.lattice.is_square()));
+        let sites: Vec<_> = other.elements.iter().map(|e| &e.site).collect();
+        assert!(sites.iter().all(|site| site.lattice.is_square()), "{sites:?}");
     }
 }
 

@@ -18,18 +18,16 @@ use self::pillars::{central, pads, sites, snapping};
 use self::places::{LayoutPiece, Places};
 use self::read::{DOSE_LABEL, DOSE_MARKS, Pattern};
 use crate::contents::HandoffCheck;
-use crate::documents::jobs;
 use crate::dose::doses;
 use crate::dose_matrix::{self, BlockContent, DoseBlock, Piece};
 use crate::drawing::Drawing;
 use crate::exposure::{exposure_of, is_of_dose_matrix, times};
 use crate::job::JobPatterns;
-use crate::kind_words::KindWords;
 use crate::layout_statistics::LayoutStatistics;
 use crate::listing::Listing;
 use crate::options::HandoffOptions;
 use crate::rules::{self, Subject};
-use crate::{raith, tables, write_fields};
+use crate::{documents, raith, write_fields};
 use metalith_core::{LayerNumber, Progress, Result};
 use metalith_gds::{Layout, ReadLimits};
 use metalith_pillars::{DatabaseUnit, LatticeKind};
@@ -183,35 +181,12 @@ fn on_a_grid(piece: &LayoutPiece, unit_nm: f64) -> (DatabaseUnit, Vec<Vec<(i64, 
 
 fn write_tables(files: &mut Listing, inputs: &LayoutInputs, contents: &LayoutContents<'_>) -> Result<()> {
     let (process, shape) = (&inputs.lab.process, inputs.pattern.shape());
-    tables::write_doses(
-        &files.add(
-            "dose/dose_table.csv",
-            "the nine doses, where each is, a column to fill in",
-        ),
-        &contents.doses,
-        &contents.blocks,
-        process.dose_matrix.layer,
-        shape,
-    )?;
-    let times: Vec<_> = contents
-        .exposures
-        .iter()
-        .map(|(file, _, times)| (file.clone(), times.clone()))
-        .collect();
-    tables::write_times(
-        &files.add("dose/write_time.csv", "time of each file of step 1 at each current"),
-        &times,
-    )?;
+    let matrix = (&contents.doses[..], &contents.blocks[..]);
+    documents::dose_tables(files, process, shape, matrix, &contents.exposures)?;
     if let Some(shape) = shape {
-        let purpose = format!("where to measure {}, columns to fill in", KindWords::of(shape).measured);
-        tables::write_sites(
-            &files.add("metrology/cd_table.csv", purpose),
-            &contents.sites,
-            process,
-            shape,
-        )?;
+        documents::site_table(files, process, shape, &contents.sites)?;
     }
-    jobs(files, &patterns(inputs, contents), process, &[], &contents.snapping)
+    documents::jobs(files, &patterns(inputs, contents), process, &[], &contents.snapping)
 }
 
 /// The patterns of the job.
@@ -236,7 +211,7 @@ fn check(
 ) -> Result<()> {
     let first = inputs.lab.first_step();
     let subjects = [
-        Subject::of("layout", &inputs.layout, inputs.lab.deck(&first.pillar_rules)),
+        Subject::of("layout", &inputs.layout, inputs.lab.deck(&first.pillar_rules)).recognising(inputs.exposed[0]),
         Subject::of("dose_matrix", matrix, inputs.lab.deck(&first.dose_rules)),
     ];
     let pitch_nm = match &inputs.pattern {

@@ -9,6 +9,7 @@ use metalith_gds::{Layout, Selection};
 use metalith_handoff::{
     Handoff, HandoffOptions, HandoffSource, LayoutSource, LayoutStatistics, handoff, verify_handoff,
 };
+use metalith_report::Verdict;
 
 use crate::{DESIGN, PROCESS, SUMMED, Squares, options, rows_in, source};
 
@@ -188,6 +189,27 @@ fn a_layout_is_handed_over_as_it_is_with_doses_sites_and_times() {
         "{deck}"
     );
     assert!(deck.contains("(520,300) um"), "{deck}");
+}
+
+/// Shapes among the pillars that are none are violations of the layout, as `metalith check` counts them.
+#[test]
+fn shapes_among_pillars_are_violations() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut cell = lens();
+    let all = cell.elems.len();
+    let odd = cell.elems.split_off(all - all / 10);
+    for k in 0..odd.len() as i32 {
+        let (x, y) = (PITCH * (k % 8 - 4) + PITCH / 2, PITCH * (k / 8) + PITCH / 2);
+        cell.elems.push(boundary(PILLARS, &[(x, y), (x + 60, y), (x, y + 50)]));
+    }
+    let path = drawn(folder.path(), "odd.gds", vec![cell]);
+    let made = handoff(&of_layout(&path, Some(PILLARS), &folder.path().join("out")), &Silent).unwrap();
+    let verdict = |name: &str| made.checks.iter().find(|check| check.name == name).unwrap();
+    assert_eq!(verdict("pillars").verdict, Verdict::Fail);
+    let of_rules = verdict("design rules, layout");
+    assert_ne!(of_rules.verdict, Verdict::Pass);
+    let broken = of_rules.broken.iter().find(|rule| rule.rule == "element.recognised");
+    assert_eq!(broken.map(|rule| rule.violations), Some(odd.len() as u64));
 }
 
 #[test]

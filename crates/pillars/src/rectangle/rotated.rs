@@ -1,6 +1,6 @@
 //! Rectangular pillars of one size, which differ by their rotation.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 use serde::Serialize;
 
@@ -71,6 +71,14 @@ impl RotatedRectangles {
         let axis = 0.5 * (2.0 * sum(|e| e.0 * e.1)).atan2(sum(|e| e.0 * e.0 - e.1 * e.1)) - PI / 2.0;
         let apart = axis - self.rotation(number);
         apart - PI * (apart / PI).round()
+    }
+
+    /// Rotation of the rectangle nearest to four corners in the least squares, less the nearest of so many rotations in half a turn
+    /// (rad). None if the corners are in no four quadrants of a rectangle about their middle.
+    pub fn off_step(corners: &[[f64; 2]; 4], steps: u16) -> Option<f64> {
+        let fitted = FittedRectangle::of(corners)?;
+        let step = PI / f64::from(steps.max(1));
+        Some(fitted.rotation - step * (fitted.rotation / step).round())
     }
 
     /// Rotation of a pillar as it is drawn, its corners on the grid (rad).
@@ -179,22 +187,16 @@ impl PillarKind for RotatedRectangles {
     }
 
     fn recognised(&self, corners: &[[f64; 2]; 4], slack_nm: f64) -> Option<PillarId> {
-        let edge = |k: usize| {
-            let (a, b) = (corners[k], corners[(k + 1) % 4]);
-            [b[0] - a[0], b[1] - a[1]]
+        let fitted = FittedRectangle::of(corners)?;
+        let number = self.number(fitted.rotation);
+        let half = [self.width_nm, self.length_nm].map(|nm| 0.5 * f64::from(nm));
+        let (sin, cos) = self.rotation(number).sin_cos();
+        let off = |[x, y]: &[f64; 2]| {
+            let along = [cos * x + sin * y, cos * y - sin * x];
+            [0, 1].map(|k| (along[k].abs() - half[k]).powi(2)).iter().sum::<f64>()
         };
-        let (first, second) = (edge(0), edge(1));
-        // The longer edge is the truer one: its direction is a quarter turn from the rotation.
-        let along = if first[0].hypot(first[1]) > second[0].hypot(second[1]) {
-            first
-        } else {
-            second
-        };
-        let number = self.number(along[1].atan2(along[0]) - PI / 2.0);
-        let drawn = self.on_grid(number).map(|(x, y)| [x as f64, y as f64]);
-        let near = |p: &[f64; 2]| drawn.iter().any(|q| (p[0] - q[0]).hypot(p[1] - q[1]) <= slack_nm);
-        let distinct = |k: usize| edge(k)[0].hypot(edge(k)[1]) > 2.0 * slack_nm;
-        ((0..4).all(distinct) && corners.iter().all(near)).then_some(PillarId(number))
+        let most = slack_nm + WHOLE_SIZES_NM;
+        (fitted.about_middle.iter().map(off).sum::<f64>() <= 4.0 * most * most).then_some(PillarId(number))
     }
 
     fn words(&self, PillarId(number): PillarId) -> String {
@@ -225,6 +227,54 @@ impl PillarKind for RotatedRectangles {
     fn solver_revision(&self) -> u32 {
         1
     }
+}
+
+/// Largest distance of a corner of a rectangle whose edges are whole nanometres from that of the nearest one with any edges (nm): a
+/// quarter along and a quarter across, since half of an edge is off by half of what the edge is.
+const WHOLE_SIZES_NM: f64 = 0.25 * SQRT_2;
+
+/// The rectangle nearest to four corners in the least squares.
+struct FittedRectangle {
+    /// From x towards y to the shorter edge (rad), in any half turn.
+    rotation: f64,
+    /// The corners from their middle.
+    about_middle: [[f64; 2]; 4],
+}
+
+impl FittedRectangle {
+    /// None if the corners are in no four quadrants of a rectangle about their middle.
+    fn of(corners: &[[f64; 2]; 4]) -> Option<Self> {
+        let middle = [0, 1].map(|axis| corners.iter().map(|c| c[axis]).sum::<f64>() / 4.0);
+        let about_middle = corners.map(|[x, y]| [x - middle[0], y - middle[1]]);
+        let edge = |k: usize| [0, 1].map(|axis| 0.5 * (corner_sum(&about_middle, axis, k)));
+        let length = |[x, y]: [f64; 2]| x.hypot(y);
+        let (first, second) = (edge(0), edge(1));
+        let (short, long) = if length(first) > length(second) {
+            (second, first)
+        } else {
+            (first, second)
+        };
+        let half = [0.5 * length(short), 0.5 * length(long)];
+        // The longer edge is the truer one: its direction is a quarter turn from the rotation.
+        let rotation = long[1].atan2(long[0]) - PI / 2.0;
+        let (sin, cos) = rotation.sin_cos();
+        let (mut turned, mut quadrants) = (0.0, 0u8);
+        for [x, y] in about_middle {
+            let (u, v) = (cos * x + sin * y, cos * y - sin * x);
+            quadrants |= 1 << (u8::from(u > 0.0) + 2 * u8::from(v > 0.0));
+            turned += half[0].copysign(u) * v - half[1].copysign(v) * u;
+        }
+        let squared = half[0] * half[0] + half[1] * half[1];
+        (quadrants == 0b1111 && squared > 0.0).then_some(Self {
+            rotation: rotation + turned / (4.0 * squared),
+            about_middle,
+        })
+    }
+}
+
+/// Twice the mean of two opposite edges of a quadrilateral along an axis, from corner `k` to the next.
+fn corner_sum(c: &[[f64; 2]; 4], axis: usize, k: usize) -> f64 {
+    c[k + 1][axis] - c[k][axis] + c[(k + 2) % 4][axis] - c[(k + 3) % 4][axis]
 }
 
 /// An angle (degrees) without the rounding of its computation.
@@ -282,6 +332,8 @@ mod tests {
     fn corners_are_on_the_rectangle_and_are_recognised_in_any_order() {
         // Half the diagonal of a step of the grid.
         const ROUNDED: f64 = 0.7072;
+        // More than a corner may be off by where the others are on their places.
+        const OFF: f64 = 5.0;
         // What that may turn half of the longer edge by, with two corners that give way to opposite sides.
         const TURNED: f64 = ROUNDED / 125.0;
         for number in 1..=180 {
@@ -298,13 +350,13 @@ mod tests {
             let mut corners = drawn.map(|(x, y)| [x as f64, y as f64]);
             for _ in 0..4 {
                 corners.rotate_left(1);
-                assert_eq!(PILLARS.recognised(&corners, 0.1), Some(PillarId(number)));
+                assert_eq!(PILLARS.recognised(&corners, ROUNDED), Some(PillarId(number)));
                 let mut back = corners;
                 back.reverse();
-                assert_eq!(PILLARS.recognised(&back, 0.1), Some(PillarId(number)));
+                assert_eq!(PILLARS.recognised(&back, ROUNDED), Some(PillarId(number)));
             }
-            corners[0][0] += 3.0;
-            assert_eq!(PILLARS.recognised(&corners, 1.5), None);
+            corners[0][0] += OFF;
+            assert_eq!(PILLARS.recognised(&corners, ROUNDED), None);
         }
         let thinner = RotatedRectangles {
             width_nm: 90,
