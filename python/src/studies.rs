@@ -60,7 +60,8 @@ pub fn study_merge(
         if let Some(out) = out {
             let inputs = plan.inputs()?;
             let turn = FolderLock::wait(&out, p, || ())?.keeping(inputs.iter().map(PathBuf::as_path));
-            turn.publish("report", &[], |folder| study::write_page(&result, folder))?;
+            let files = study::report_files("result.csv");
+            turn.publish("report", &[], |folder| study::write_page(&result, &files, folder))?;
         }
         Ok(serde_json::json!({ "study": result, "draws": result.draws }).to_string())
     })

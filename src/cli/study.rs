@@ -10,7 +10,7 @@ use metalith::file::InputFiles;
 use metalith::gds::LayerNumber;
 use metalith::report::{counted, sig};
 use metalith::study::{
-    PairsPlan, PillarPlace, Plan, PlanSettings, REPORT, StartsPlan, TableFormat, Work, merge, plan, write_page,
+    PairsPlan, PillarPlace, Plan, PlanSettings, StartsPlan, TableFormat, Work, merge, plan, report_files, write_page,
 };
 use metalith::{Error, Result};
 
@@ -197,7 +197,8 @@ fn merge_starts(plan: &StartsPlan, args: &MergeArgs, terminal: &Terminal) -> Res
 fn merge_study(plan: &Plan, args: &MergeArgs, terminal: &Terminal) -> Result<Outcome> {
     let out = args.out.clone().unwrap_or_else(|| args.study.join("result.csv"));
     let folder = out.parent().map_or_else(PathBuf::new, std::path::Path::to_owned);
-    let [page, numbers] = REPORT.map(|name| folder.join(name));
+    let files = report_files(&name_of(&out));
+    let [page, numbers] = files.each_ref().map(|name| folder.join(name));
     let inputs = plan.inputs()?;
     let outputs = [out.as_path(), &page, &numbers];
     InputFiles::of(paths(&inputs)).check_outputs(&outputs)?;
@@ -208,7 +209,7 @@ fn merge_study(plan: &Plan, args: &MergeArgs, terminal: &Terminal) -> Result<Out
         .turn_at(&folder, paths(&inputs))?
         .publish(&name_of(&out), &[], |folder| {
             result.write(&folder.join(name_of(&out)))?;
-            write_page(&result, folder)
+            write_page(&result, &files, folder)
         })?;
     terminal.clear();
     for y in &result.yields {

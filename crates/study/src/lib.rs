@@ -66,7 +66,7 @@ pub use draw::Drawn;
 pub use grid_points::{GridPoint, Spread};
 pub use manifest::{MANIFEST, is_planned};
 pub use merge::{StudyResult, TableFormat, merge};
-pub use page::{REPORT, write_page};
+pub use page::{report_files, write_page};
 pub use pairs::{PairsPlan, PairsRequest, plan_pairs};
 pub use picture::{KnownKernels, PictureSpec, SceneChoice, TakenPicture};
 pub use plan::{Layout, PillarPlace, Plan, PlanSettings, plan, planned_later};

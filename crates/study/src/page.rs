@@ -21,15 +21,26 @@ const TRUSTED: f64 = 0.8;
 /// Limits whose shares of variance are drawn.
 const MOST_DRAWN: usize = 6;
 
-/// Files of the report of a study: the page, and its numbers.
-pub const REPORT: [&str; 2] = ["report.html", "report.json"];
+/// Names of the page of a study and of its numbers, of which the table of draws has this name: `report.html` and `report.json` beside
+/// `result.csv`, `draws_report.html` and `draws_report.json` beside `draws.csv`, so that tables of several studies have a folder in
+/// common.
+pub fn report_files(table: &str) -> [String; 2] {
+    let stem = Path::new(table).file_stem().unwrap_or_default().to_string_lossy();
+    ["html", "json"].map(|ending| match &*stem {
+        DEFAULT_STEM => format!("report.{ending}"),
+        stem => format!("{stem}_report.{ending}"),
+    })
+}
 
-/// Write the files of [`REPORT`] into a folder.
+/// Name of a table of draws without its ending, where nobody has named it.
+const DEFAULT_STEM: &str = "result";
+
+/// Write the page of a study and its numbers into a folder, under the names of [`report_files`].
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write_page(result: &StudyResult, folder: &Path) -> Result<()> {
-    let [html, json] = REPORT.map(|name| folder.join(name));
+pub fn write_page(result: &StudyResult, files: &[String; 2], folder: &Path) -> Result<()> {
+    let [html, json] = files.each_ref().map(|name| folder.join(name));
     write_json(&json, "study", result)?;
     page(result).write(&html)
 }

@@ -60,6 +60,7 @@ impl FolderLock {
             .and_then(|value| {
                 let new = set.complete(&unfinished.0, stale, is_listed)?;
                 let replaced = set.replaced_by(&new)?;
+                set.check_not_of_others(&replaced, &unfinished.0)?;
                 let mut replaced = replaced.iter().map(|name| self.folder().join(name));
                 replaced.try_for_each(|path| self.inputs().check_output(&path))?;
                 Ok(value)
@@ -147,6 +148,14 @@ fn finish_decided(turn: &FolderLock) -> Result<()> {
             wait_for_other(&set.decided)?;
         }
         set.finish()?;
+        // A run leaves nothing in it that its list does not name.
+        if turn.is_held() && is_there(&set.decided)? {
+            return Err(Error::refused(
+                "file/foreign-remains",
+                format!("{} holds what no run of this program has put there", set.decided.display()),
+                "remove this hidden folder, and try again",
+            ));
+        }
     }
     Ok(())
 }
@@ -354,6 +363,33 @@ impl FileSet {
             .chain(new.names())
             .map(str::to_owned)
             .collect())
+    }
+
+    /// Refuse to replace or remove files that the list of another result names, unless they stay the same: that result would be mixed.
+    fn check_not_of_others(&self, replaced: &[String], unfinished: &Path) -> Result<()> {
+        for entry in entries(&self.folder).unwrap_or_default() {
+            let list = entry.to_string_lossy();
+            let path = self.folder.join(&entry);
+            if !(list.starts_with('.') && list.ends_with(MANIFEST)) || path == self.manifest {
+                continue;
+            }
+            let Some(other) = SetManifest::read(&path)? else {
+                continue;
+            };
+            let is_mixed = |name: &&String| {
+                other.names().any(|listed| listed == *name)
+                    && self.folder.join(name).exists()
+                    && !other.digest(name).is_some_and(|digest| digest.is_of(&unfinished.join(name)))
+            };
+            if let Some(name) = replaced.iter().find(is_mixed) {
+                return Err(Error::refused(
+                    "file/of-another-result",
+                    format!("{} is of another result, whose files {list} beside it lists", self.folder.join(name).display()),
+                    format!("write into another folder, or remove the other result and {list}"),
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Everything that is left to do.
