@@ -48,7 +48,7 @@ fn levels(folder: &Path) -> Format {
     let mut camera = Camera::three_bands(5.86);
     [camera.sensor.columns, camera.sensor.rows] = SENSOR.map(Into::into);
     let own = folder.join("own.png");
-    let [width, height] = [camera.sensor.columns, 3 * camera.sensor.rows].map(|n| n as u32);
+    let [width, height] = [camera.sensor.columns, 3 * camera.sensor.rows];
     let data = vec![1u8; 2 * (width * height) as usize];
     let read = move |words: &Path| -> metalith::Result<()> {
         let words: String = fs::read(words).unwrap().into_iter().map(char::from).collect();

@@ -13,6 +13,7 @@ use metalith::optics::Perturbation;
 use metalith::sensor::{Camera, Spectrum};
 use metalith::study::{Slurm, Tolerance};
 use metalith_testing::design;
+use sha2::{Digest, Sha256};
 
 use super::{Format, Kind, copy, example, file, files};
 
@@ -38,7 +39,10 @@ pub(super) fn all(folder: &Path) -> Vec<Format> {
     fs::write(&lit, camera.replacen("source = \"d65\"", light, 1)).unwrap();
     let session = toml("session");
     fs::create_dir_all(&session).unwrap();
-    fs::write(session.join("plan.json"), "{}").unwrap();
+    let filled_in = "title = \"session\"\n";
+    fs::write(session.join("measurement.toml"), filled_in).unwrap();
+    let digest = format!("{:x}", Sha256::digest(filled_in));
+    let plan = serde_json::json!({ "written": { "measurement.toml": digest }, "effects": [], "captures": 3 });
     vec![
         Format::new(
             "illuminant",
@@ -58,7 +62,7 @@ pub(super) fn all(folder: &Path) -> Vec<Format> {
             "plan of a session",
             session.join("plan.json"),
             Kind::Json,
-            vec![br#"{"written": {"measurement.toml": "00"}, "effects": [], "captures": 3}"#.to_vec()],
+            vec![plan.to_string().into_bytes()],
             move |_| check_not_begun(&session),
         ),
         Format::new(

@@ -17,6 +17,9 @@ const LONGEST: u64 = 1 << 24;
 /// Largest file whose digest is listed (bytes): reading a layout of gigabytes again would cost more than making it.
 const LARGEST_DIGESTED: u64 = 1 << 26;
 
+/// Longest name of a file that file systems hold (bytes): a longer one in a list would fill a message.
+const LONGEST_NAME: usize = 255;
+
 /// Beginnings of lines that `sha256sum -c` takes for comments.
 const UNDIGESTED: &str = "# without digest: ";
 const STALE: &str = "# removed: ";
@@ -124,5 +127,6 @@ impl SetManifest {
 pub(super) fn is_plain(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     matches!((parts.next(), parts.next()), (Some(Component::Normal(only)), None) if only == name)
+        && name.len() <= LONGEST_NAME
         && name.chars().all(|c| is_printable(c) && c != '\\')
 }
