@@ -103,8 +103,7 @@ impl Bench {
 
     fn run(&self, words: &[&str]) -> assert_cmd::assert::Assert {
         let mut command = super::metalith();
-        command.args(words).arg("-q").current_dir(self.folder.path());
-        command.env("METALITH_CACHE", self.at("cache")).assert()
+        command.args(words).arg("-q").current_dir(self.folder.path()).assert()
     }
 
     fn said(&self, words: &[&str], code: i32) {
@@ -193,6 +192,7 @@ fn no_command_replaces_its_inputs() {
 
 /// Commands of pictures, whose images may be those of an earlier result.
 #[test]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn no_image_is_replaced_by_what_is_made_of_it() {
     let bench = Bench::new();
     let refused = |words: &[&str], input: &str| {
@@ -316,6 +316,7 @@ fn a_file_beside_those_of_another_run_is_named() {
 
 /// What a killed run has begun, in the forms that files under way have, of this input and of one with more images.
 #[test]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn what_killed_runs_began_is_removed_by_the_next() {
     let bench = Bench::new();
     let commands: [(&str, Vec<&str>); 4] = [
