@@ -12,7 +12,7 @@ use metalith_imaging::scene::{BuiltIn, chart};
 use metalith_imaging::{ForecastScene, ImagingSystem, scores};
 use metalith_optics::{CalibratedModel, Perturbation};
 use metalith_restoration::RestorationMethod;
-use metalith_study::{Plan, PlanSettings, Run, Work, merge, plan, write_page};
+use metalith_study::{Plan, PlanSettings, Run, Work, merge, plan, report_files, write_page};
 use sha2::Digest as _;
 
 fn run_shard(plan: &Plan, number: u64) -> metalith_core::Result<()> {
@@ -44,7 +44,7 @@ fn the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads() {
     assert_eq!(a.draws, b.draws);
     assert_eq!(a.yields, b.yields);
     assert_ne!(a.draws[0].figures, a.draws[1].figures);
-    write_page(&b, folder.path()).unwrap();
+    write_page(&b, &report_files("result.csv"), folder.path()).unwrap();
     let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
     assert!(page.contains("Worst draws"));
     b.write(&folder.path().join("result.csv")).unwrap();
@@ -164,7 +164,7 @@ fn designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables() {
     let mean = of_it.map(|d| d.figures["strehl_660nm_0deg"].unwrap()).sum::<f64>() / 12.0;
     // The same twelve numbers, added in the same order.
     assert_eq!(short.figures["strehl_660nm_0deg"].mean, mean);
-    write_page(&a, folder.path()).unwrap();
+    write_page(&a, &report_files("result.csv"), folder.path()).unwrap();
     let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
     for part in ["Over the grid", "lens.focal_length_um", "Combinations"] {
         assert!(page.contains(part), "{part}");
@@ -337,7 +337,7 @@ fn pictures_are_figures_of_a_draw() {
         let merged = merge(&plan, 1, &Silent).unwrap();
         assert_eq!(merged.shown[0].record.draw, merged.worst[0]);
         assert!(merged.shown[0].picture.is_some());
-        write_page(&merged, &plan.folder).unwrap();
+        write_page(&merged, &report_files("result.csv"), &plan.folder).unwrap();
         let page = fs::read_to_string(plan.folder.join("report.html")).unwrap();
         assert!(page.contains("frame as recorded"));
         let figures = merged.draws.iter().map(|d| d.figures.clone());

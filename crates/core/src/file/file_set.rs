@@ -152,7 +152,10 @@ fn finish_decided(turn: &FolderLock) -> Result<()> {
         if turn.is_held() && is_there(&set.decided)? {
             return Err(Error::refused(
                 "file/foreign-remains",
-                format!("{} holds what no run of this program has put there", set.decided.display()),
+                format!(
+                    "{} holds what no run of this program has put there",
+                    set.decided.display()
+                ),
                 "remove this hidden folder, and try again",
             ));
         }
@@ -379,12 +382,17 @@ impl FileSet {
             let is_mixed = |name: &&String| {
                 other.names().any(|listed| listed == *name)
                     && self.folder.join(name).exists()
-                    && !other.digest(name).is_some_and(|digest| digest.is_of(&unfinished.join(name)))
+                    && !other
+                        .digest(name)
+                        .is_some_and(|digest| digest.is_of(&unfinished.join(name)))
             };
             if let Some(name) = replaced.iter().find(is_mixed) {
                 return Err(Error::refused(
                     "file/of-another-result",
-                    format!("{} is of another result, whose files {list} beside it lists", self.folder.join(name).display()),
+                    format!(
+                        "{} is of another result, whose files {list} beside it lists",
+                        self.folder.join(name).display()
+                    ),
                     format!("write into another folder, or remove the other result and {list}"),
                 ));
             }
