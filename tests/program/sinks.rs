@@ -157,7 +157,7 @@ fn no_name_of_a_layout_is_anything_but_text() {
     for first in ['=', '-'] {
         let [layout, deck] = chip(folder.path(), &hostile(first));
         let [layout, deck] = [&layout, &deck].map(|path| path.to_str().unwrap());
-        let out = folder.path().join("out");
+        let out = folder.path().join(format!("out_{}", u32::from(first)));
         fs::create_dir_all(&out).unwrap();
         let file = |name: &str| out.join(name).to_str().unwrap().to_owned();
         let check = ["check", layout, "--rules", deck];

@@ -311,13 +311,15 @@ impl OpenComparison<'_> {
         }
         let first = &photographs[0];
         let system = ImagingSystem::open_cached(design, &listed.layout, camera, None, first, cache, progress)?;
+        let note = system.pillars.as_ref().and_then(|pillars| pillars.note());
+        let noted = note.map_or_else(String::new, |note| format!(" Warning: {note}."));
         if !as_the_paper {
             let elements = match design.elements().len() {
                 1 => "one element".into(),
                 n => format!("{n} elements"),
             };
             let words = format!(
-                "the layout of `{}` behind `{}`, {elements}, pillars by the cell `{}`, stray light and dispersion included.",
+                "the layout of `{}` behind `{}`, {elements}, pillars by the cell `{}`, stray light and dispersion included.{noted}",
                 design.name, camera.name, design.verify.fidelity
             );
             let ready = ArrayCamera::new(&system, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
@@ -327,7 +329,7 @@ impl OpenComparison<'_> {
         drop(system);
         let system = narrow.assuming(ApproximationSet::paper())?;
         let words = format!(
-            "`{}` as the paper assumes such cameras to be: one kernel for each element and colour, brightness by a Butterworth filter, one wavelength a colour, no stray light, patches of 420 x 420 pixels.",
+            "`{}` as the paper assumes such cameras to be: one kernel for each element and colour, brightness by a Butterworth filter, one wavelength a colour, no stray light, patches of 420 x 420 pixels.{noted}",
             design.name
         );
         let ready = ArrayCamera::new(&system, &self.methods, self.of.separate);

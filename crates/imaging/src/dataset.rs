@@ -137,7 +137,8 @@ impl DatasetManifest {
     }
 }
 
-/// Write one pair for each image into the folder of a turn, and the manifest when all are there: `manifest` with these pairs. `read`
+/// Write one pair for each image into the folder of a turn, and the manifest when all are there: `manifest` with these pairs. Pairs
+/// of an earlier set with more images are removed. `read`
 /// gives the scene of an image. Ask [`check_images`](crate::check_images) first: here an image that cannot be used stops the work.
 ///
 /// # Errors
@@ -163,6 +164,7 @@ pub fn write_dataset(
         progress.advance(1);
     }
     write_dataset_manifest(turn.folder(), &manifest)?;
+    clear_beyond(turn, images.len())?;
     if !turn.is_held() {
         check_own(turn.folder(), &manifest)?;
     }
@@ -182,28 +184,51 @@ pub fn check_pairs_apart(images: usize, folder: &Path, inputs: &InputFiles) -> R
 
 /// Remove what killed runs left of files of pairs, those of images that this set has not among them.
 fn clear_unfinished(turn: &FolderLock) {
-    if !turn.is_held() {
-        return;
-    }
-    let names = |folder: &Path| -> Vec<String> {
-        let entries = std::fs::read_dir(folder).into_iter().flatten();
-        entries
-            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-            .collect()
-    };
-    let is_pair_of = |shard_name: &str, file: &str| {
-        let number = file.split('.').next().and_then(|number| number.parse().ok());
-        number.is_some_and(|i| shard(i) == shard_name && pair_files(i).iter().any(|name| name.ends_with(file)))
-    };
-    for shard_name in names(turn.folder()) {
-        let folder = turn.folder().join(&shard_name);
-        for left in names(&folder) {
-            let file = left.strip_prefix('.').and_then(|name| name.strip_suffix(".part"));
-            if let Some(file) = file.filter(|file| is_pair_of(&shard_name, file)) {
-                AtomicFile::clear(&folder.join(file));
-            }
+    for path in files_in_shards(turn) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let finished = name.strip_prefix('.').and_then(|name| name.strip_suffix(".part"));
+        if let Some(file) = finished.map(|name| path.with_file_name(name))
+            && number_of(&file).is_some()
+        {
+            AtomicFile::clear(&file);
         }
     }
+}
+
+/// Remove the pairs that an earlier set in this folder had beyond so many images. Files that this program has not written stay.
+fn clear_beyond(turn: &FolderLock, images: usize) -> Result<()> {
+    for path in files_in_shards(turn) {
+        let is_beyond = number_of(&path).is_some_and(|number| number >= images);
+        let is_ours = || {
+            let bytes = read_at_most(&path, png16::LONGEST, "a picture of the set");
+            bytes.is_ok_and(|bytes| png16::source_of(&bytes).is_some())
+        };
+        if is_beyond && !turn.inputs().contains(&path) && is_ours() {
+            AtomicFile::discard(&path)?;
+        }
+    }
+    Ok(())
+}
+
+/// Files in the folders of shards; none without a lock, where they may be those of another run.
+fn files_in_shards(turn: &FolderLock) -> Vec<PathBuf> {
+    if !turn.is_held() {
+        return Vec::new();
+    }
+    let entries = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.map(|entry| entry.path()).collect::<Vec<_>>()
+    };
+    entries(turn.folder()).iter().flat_map(|shard| entries(shard)).collect()
+}
+
+/// Number of the image that a file with the path of one of a pair is of.
+fn number_of(file: &Path) -> Option<usize> {
+    let number = file.file_name()?.to_str()?.split('.').next()?.parse().ok()?;
+    pair_files(number)
+        .iter()
+        .any(|own| file.ends_with(own))
+        .then_some(number)
 }
 
 /// Succeeds if the pairs that are there are those of a manifest; else the manifest is removed.

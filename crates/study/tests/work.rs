@@ -117,12 +117,12 @@ fn pairs_of_shards_are_those_of_one_run() {
     let first = scene(&images[0]).unwrap();
     let system = ImagingSystem::open_cached(&design, &layout, &camera, None, &first, &kept, &Silent).unwrap();
     let origin = DatasetOrigin::of(&design, &layout, &camera, None).unwrap();
-    let write = |seed| {
+    let write_of = |images: &[PathBuf], seed| {
         let head = DatasetManifest::of(&system, origin.clone(), seed);
         write_dataset(
             &system,
             &system.simulation(),
-            &images,
+            images,
             &scene,
             head,
             &FolderLock::of(&at("alone")).unwrap(),
@@ -130,6 +130,7 @@ fn pairs_of_shards_are_those_of_one_run() {
         )
         .unwrap()
     };
+    let write = |seed| write_of(&images, seed);
     let alone = write(3);
     assert_eq!((alone.black_level, alone.white), (64, 65535));
     assert_eq!(alone.made_from, origin);
@@ -152,6 +153,22 @@ fn pairs_of_shards_are_those_of_one_run() {
     assert_eq!(fs::metadata(&other).unwrap().modified().unwrap(), untouched);
     write(4);
     assert!(fs::read(&frame).unwrap() != right);
+    // Pairs of a larger set go, files of others stay.
+    fs::write(at("alone/000000-000999/000004.truth.png"), "of somebody else").unwrap();
+    write_of(&images[..2], 4);
+    let mut left: Vec<_> = fs::read_dir(at("alone/000000-000999")).unwrap().collect();
+    left.sort_by_key(|entry| entry.as_ref().unwrap().file_name());
+    let left = left
+        .into_iter()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let expected = [
+        "000000.frame",
+        "000000.truth",
+        "000001.frame",
+        "000001.truth",
+        "000004.truth",
+    ];
+    assert_eq!(left.collect::<Vec<_>>(), expected.map(|name| format!("{name}.png")));
 }
 
 /// The best of several starts, whoever makes them.

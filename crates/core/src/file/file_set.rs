@@ -69,6 +69,17 @@ impl FolderLock {
         let mut own = set.identities(&unfinished.0)?;
         own.retain(|(path, _)| is_listed || *path != set.manifest);
         finish_decided(self)?;
+        // A run leaves nothing in it that its list does not name.
+        if self.is_held() && is_there(&set.decided)? {
+            return Err(Error::refused(
+                "file/foreign-remains",
+                format!(
+                    "{} holds what no run of this program has put there",
+                    set.decided.display()
+                ),
+                "remove this hidden folder, and try again",
+            ));
+        }
         rename(&unfinished.0, &set.decided).map_err(|error| set.not_decided(error))?;
         // From here on the new ones stand: nothing is thrown away.
         unfinished.0 = PathBuf::new();
@@ -148,17 +159,6 @@ fn finish_decided(turn: &FolderLock) -> Result<()> {
             wait_for_other(&set.decided)?;
         }
         set.finish()?;
-        // A run leaves nothing in it that its list does not name.
-        if turn.is_held() && is_there(&set.decided)? {
-            return Err(Error::refused(
-                "file/foreign-remains",
-                format!(
-                    "{} holds what no run of this program has put there",
-                    set.decided.display()
-                ),
-                "remove this hidden folder, and try again",
-            ));
-        }
     }
     Ok(())
 }

@@ -163,7 +163,7 @@ fn forms_of_the_report() {
     assert!(junit.contains("failures=\"1\"") && junit.contains("errors=\"0\"") && junit.contains("skipped=\"4\""));
     let text = metalith_drc::text(&report);
     let marker = text.lines().find(|line| line.ends_with(&format!("[{fingerprint}]")));
-    insta::assert_snapshot!(marker.unwrap().trim().replace(fingerprint, "HASH"), @"98 nm wide, at least 100 nm at (0.126, 0.126) um  [HASH]");
+    insta::assert_snapshot!(marker.unwrap().trim().replace(fingerprint, "HASH"), @"98 nm wide, at least 100 nm at (0.175, 0.175) um  [HASH]");
 }
 
 /// Damaged layouts that can still be read are judged, whatever is in them.

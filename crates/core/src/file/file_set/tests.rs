@@ -169,6 +169,31 @@ fn what_is_not_complete_replaces_nothing() {
     // Those that no run makes are of somebody else.
     assert!(!left.exists() && kept.iter().all(|folder| folder.join("a.png").exists()));
     assert_eq!(versions(place.path()), [0; 4]);
+    fs::remove_dir(place.path().join("new.png")).unwrap();
+    fs::create_dir_all(place.path().join(".set.publish/foreign")).unwrap();
+    let turn = FolderLock::of(place.path()).unwrap();
+    assert_eq!(publish(&turn, 1).unwrap_err().id(), "file/foreign-remains");
+    assert_eq!(versions(place.path()), [0; 4]);
+}
+
+#[test]
+fn no_file_of_another_result_is_replaced() {
+    let (place, turn) = begun();
+    let other = |names: &[&str], text: &str| {
+        turn.publish("other", &[], |folder| {
+            names
+                .iter()
+                .try_for_each(|name| AtomicFile::write(&folder.join(name), text.as_bytes()))
+        })
+    };
+    let refused = other(&["c.png", "a.png"], "of another").unwrap_err();
+    assert_eq!(refused.id(), "file/of-another-result");
+    assert_eq!(versions(place.path()), [0; 4]);
+    assert!(!place.path().join("c.png").exists());
+    // Equal files may be of both.
+    other(&["a.png"], "0 a.png").unwrap();
+    other(&["c.png"], "of another").unwrap_err();
+    publish(&turn, 0).unwrap();
 }
 
 #[test]
