@@ -126,6 +126,13 @@ impl Bench {
         names.sort();
         names
     }
+
+    /// The command ends before it replaces its input.
+    fn refuses_to_replace(&self, words: &[&str], input: &str) {
+        let before = fs::read(self.at(input)).unwrap();
+        self.run(words).code(2).stderr(contains(refusal("option/same-file")));
+        assert!(fs::read(self.at(input)).unwrap() == before, "{words:?}");
+    }
 }
 
 fn photograph(path: &Path) {
@@ -139,11 +146,7 @@ const SEEN: [&str; 6] = ["--design", "lens.toml", "--camera", "camera.toml", "--
 #[test]
 fn no_command_replaces_its_inputs() {
     let bench = Bench::new();
-    let refused = |words: &[&str], input: &str| {
-        let before = fs::read(bench.at(input)).unwrap();
-        bench.run(words).code(2).stderr(contains(refusal("option/same-file")));
-        assert!(fs::read(bench.at(input)).unwrap() == before, "{words:?}");
-    };
+    let refused = |words: &[&str], input: &str| bench.refuses_to_replace(words, input);
     fs::create_dir(bench.at("kit")).unwrap();
     // A table that the design names.
     let of_design: [(&str, &str, &[&str]); 5] = [
@@ -195,11 +198,7 @@ fn no_command_replaces_its_inputs() {
 #[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn no_image_is_replaced_by_what_is_made_of_it() {
     let bench = Bench::new();
-    let refused = |words: &[&str], input: &str| {
-        let before = fs::read(bench.at(input)).unwrap();
-        bench.run(words).code(2).stderr(contains(refusal("option/same-file")));
-        assert!(fs::read(bench.at(input)).unwrap() == before, "{words:?}");
-    };
+    let refused = |words: &[&str], input: &str| bench.refuses_to_replace(words, input);
     let picture = [&["picture", "lens_pillars.gds", "0.png", "--no-forecast"], &SEEN[..]].concat();
     bench.said(&[&picture[..], &["--out", "p"]].concat(), 0);
     bench.list("picture", "0.png", &bench.digest("0.png"));

@@ -9,7 +9,7 @@ use metalith::drc::Deck;
 use metalith_testing::lens::Chip;
 use metalith_testing::{design, root};
 
-/// Name that is a formula, markup, words of a shell, a line of its own and a command of a terminal, behind a first character.
+/// Name with a formula, markup, commands of a shell and of a terminal, and a line break, after a first character.
 fn hostile(first: char) -> String {
     format!("{first}1+1|x\"'>`touch forged`$(touch forged)<script>forged()</script>&\u{1b}[31m\u{202e}\nFORGED")
         .replace('/', ":")

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::metalith;
 
-/// A name that would forge a verdict in a line of its own, colour it and turn it round.
+/// Name with a line break before a forged verdict, a colour and a change of direction.
 const FORGED: &str = "x\nerror[none]: PASS\u{1b}[32m\u{202e}.gds";
 
 #[test]

@@ -17,7 +17,7 @@ pub struct Png {
     pub channels: usize,
     /// True if numbers have 16 bits.
     pub is_deep: bool,
-    /// What the file says, behind the pixels too.
+    /// Properties and texts of the file, those behind the pixels too.
     pub info: Info<'static>,
 }
 

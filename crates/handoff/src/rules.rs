@@ -147,7 +147,7 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// This layout, of whose shapes on a layer are told how many are pillars, as `metalith check` does.
+    /// Variant of this layout in which shapes of a layer that are no pillars are counted, as `metalith check` counts them.
     pub(super) fn recognising(mut self, layer: LayerNumber) -> Self {
         self.recognised = Some(layer);
         self

@@ -186,9 +186,8 @@ pub trait PillarKind {
         true
     }
 
-    /// The pillar with these corners about its middle (nm), in any order, if they are within `slack_nm` of its own: each, or in the
-    /// mean of the squares. Kinds
-    /// that are recognised by the box around them have none.
+    /// Pillar with these corners (nm, from its middle, in any order). Each of them is within `slack_nm` of a corner of that pillar, or
+    /// their root mean square is. Kinds that are recognised by their bounding box have none.
     fn recognised(&self, _corners: &[[f64; 2]; 4], _slack_nm: f64) -> Option<PillarId> {
         None
     }

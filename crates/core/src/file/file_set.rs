@@ -38,8 +38,8 @@ impl FolderLock {
     /// side by side.
     ///
     /// # Errors
-    /// What `write` returns; if one of the files of [`FolderLock::keeping`] would be replaced or removed; if the disk refuses; if
-    /// another process without a lock wrote the same files meanwhile.
+    /// What `write` returns; if one of the files of [`FolderLock::keeping`], or of another result, would be replaced or removed; if
+    /// the disk refuses; if another process without a lock wrote the same files meanwhile.
     pub fn publish<T>(&self, set: &str, stale: &[&str], write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
         self.put(set, stale, true, write)
     }
@@ -104,6 +104,21 @@ pub fn settled(path: &Path, progress: &dyn Progress) -> Result<()> {
     Ok(())
 }
 
+/// Names and contents of the lists of all results in a folder; none of a folder that may not be listed.
+fn lists_in(folder: &Path) -> Result<Vec<(String, SetManifest)>> {
+    let mut lists = Vec::new();
+    for entry in entries(folder).unwrap_or_default() {
+        let name = entry.to_string_lossy();
+        if name.starts_with('.')
+            && name.ends_with(MANIFEST)
+            && let Some(list) = SetManifest::read(&folder.join(&entry))?
+        {
+            lists.push((name.into_owned(), list));
+        }
+    }
+    Ok(lists)
+}
+
 /// Refuse a file that is not the one that was written with the others of its result: one that was altered, or one of another run.
 /// A file that no list of a result names is taken as it is.
 ///
@@ -114,14 +129,7 @@ pub fn check_unaltered(path: &Path) -> Result<()> {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
         return Ok(());
     };
-    for entry in entries(part::folder_of(path)).unwrap_or_default() {
-        let list = entry.to_string_lossy();
-        if !(list.starts_with('.') && list.ends_with(MANIFEST)) {
-            continue;
-        }
-        let Some(manifest) = SetManifest::read(&path.with_file_name(&entry))? else {
-            continue;
-        };
+    for (list, manifest) in lists_in(part::folder_of(path))? {
         if manifest.digest(name).is_some_and(|wanted| !wanted.is_of(path)) {
             return Err(Error::refused(
                 "file/altered",
@@ -370,15 +378,8 @@ impl FileSet {
 
     /// Refuse to replace or remove files that the list of another result names, unless they stay the same: that result would be mixed.
     fn check_not_of_others(&self, replaced: &[String], unfinished: &Path) -> Result<()> {
-        for entry in entries(&self.folder).unwrap_or_default() {
-            let list = entry.to_string_lossy();
-            let path = self.folder.join(&entry);
-            if !(list.starts_with('.') && list.ends_with(MANIFEST)) || path == self.manifest {
-                continue;
-            }
-            let Some(other) = SetManifest::read(&path)? else {
-                continue;
-            };
+        let lists = lists_in(&self.folder)?.into_iter();
+        for (list, other) in lists.filter(|(list, _)| self.folder.join(list) != self.manifest) {
             let is_mixed = |name: &&String| {
                 other.names().any(|listed| listed == *name)
                     && self.folder.join(name).exists()

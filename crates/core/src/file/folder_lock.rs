@@ -47,7 +47,7 @@ impl FolderLock {
         Self::wait(folder, &Silent, || ())
     }
 
-    /// The same turn, in which none of these files is replaced or removed: what the results are made from.
+    /// Variant of this lock in which no result replaces or removes these files, which it is made from.
     #[must_use]
     pub fn keeping<'p>(mut self, inputs: impl IntoIterator<Item = &'p Path>) -> Self {
         inputs.into_iter().for_each(|path| self.inputs.add(path));

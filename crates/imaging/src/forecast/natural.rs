@@ -24,20 +24,16 @@ pub(crate) fn reduction(given_pixels: usize, simulated_pixels: usize) -> f64 {
 }
 
 /// Powers of a photograph that is reduced by a factor. A band of the reduced photograph holds the power of lower frequencies of the
-/// photograph itself, as averaging attenuates it, and half a pixel's alias.
+/// photograph itself, attenuated by the average over a pixel, and their alias.
 pub(super) fn reduced(native: &Bands, factor: f64) -> Bands {
-    let mut lower = 0.0;
+    let (mut lower, mut below) = (0.0, 0.0);
     std::array::from_fn(|band| {
         let upper = BANDS[band].min(SQUARE);
-        let power = up_to(native, upper / factor)
-            - if lower > 0.0 {
-                up_to(native, lower / factor)
-            } else {
-                0.0
-            };
+        let up_to_here = up_to(native, upper / factor);
         let passed = averaged((f64::max(lower, 0.5 * upper) * upper).sqrt(), factor);
-        lower = upper;
-        passed * power
+        let power = passed * (up_to_here - below);
+        (lower, below) = (upper, up_to_here);
+        power
     })
 }
 
@@ -136,7 +132,7 @@ mod tests {
         /// Ratio of the sum of the bands finer than 0.1 cycles a pixel, which a camera loses in part.
         const OF_DETAIL: f64 = 1.15;
         // By `examples/scene_power` of the same photographs, averaged over 3 x 3 and 6 x 6 pixels: grey, middle and corner.
-        let counted: [(f64, usize, Bands); 4] = [
+        const COUNTED: [(f64, usize, Bands); 4] = [
             (
                 3.0,
                 0,
@@ -170,7 +166,7 @@ mod tests {
                 ],
             ),
         ];
-        for (factor, zone, counted) in counted {
+        for (factor, zone, counted) in COUNTED {
             let found = reduced(&NATURAL[zone].planes[0], factor);
             // A band of coarser waves than a few of the picture holds what its zone happens to have.
             for (a, b) in found.iter().zip(&counted).skip(3) {
