@@ -60,9 +60,9 @@ impl FolderLock {
             .and_then(|value| {
                 let new = set.complete(&unfinished.0, stale, is_listed)?;
                 let replaced = set.replaced_by(&new)?;
+                let mut paths = replaced.iter().map(|name| self.folder().join(name));
+                paths.try_for_each(|path| self.inputs().check_output(&path))?;
                 set.check_not_of_others(&replaced, &unfinished.0)?;
-                let mut replaced = replaced.iter().map(|name| self.folder().join(name));
-                replaced.try_for_each(|path| self.inputs().check_output(&path))?;
                 Ok(value)
             })
             .map_err(|error| set.in_its_place(error, &unfinished.0))?;
