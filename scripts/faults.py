@@ -61,7 +61,7 @@ name = "mono"
 efficiency = 0.6
 band_nm = [658, 662]
 [exposure]
-time_ms = 10
+time_ms = "auto"
 white = 0.9
 [illuminant]
 source = "leds"

@@ -230,6 +230,8 @@ class ImagingSystem:
         distance_mm: float | None = None,
         model: PathLike | None = None,
         prior: PathLike | None = None,
+        lux: float | None = None,
+        time_ms: float | None = None,
         progress: Progress | None = None,
     ) -> ImagingSystem: ...
     def record(self, scene: Float64, seed: int = 1, progress: Progress | None = None) -> Frame: ...

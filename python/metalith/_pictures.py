@@ -44,7 +44,9 @@ class ImagingSystem:
     ``shape``: rows and columns of the scenes. Pixels finer than half a pixel of the sensor are averaged to these, and truth
     and pictures have their number. ``field_deg``: angle from their left to their right edge.
     ``distance_mm``: of their plane; far if left out. ``model``: the chip as made, by the model of a calibration.
-    ``prior``: weights for the method ``prior`` that ``metalith train`` wrote; those of the program if left out."""
+    ``prior``: weights for the method ``prior`` that ``metalith train`` wrote; those of the program if left out.
+    ``lux`` and ``time_ms``: illuminance of the scenes (lux) and time of the exposure (ms), in place of what the camera file
+    states."""
 
     def __init__(
         self,
@@ -57,6 +59,8 @@ class ImagingSystem:
         distance_mm: float | None = None,
         model: PathLike | None = None,
         prior: PathLike | None = None,
+        lux: float | None = None,
+        time_ms: float | None = None,
         progress: Progress | None = None,
     ) -> None:
         if len(shape) != 2:
@@ -65,7 +69,7 @@ class ImagingSystem:
         self.shape = shape
         self.field_deg = field_deg
         self._native = _native.ImagingSystem.open(
-            design._native, layout, camera, rows, columns, field_deg, distance_mm, model, prior, progress
+            design._native, layout, camera, rows, columns, field_deg, distance_mm, model, prior, lux, time_ms, progress
         )
 
     def record(self, scene: npt.ArrayLike, *, seed: int = 1, progress: Progress | None = None) -> Frame:

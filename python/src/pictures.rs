@@ -7,7 +7,7 @@ use metalith::imaging::scene::SceneImage;
 use metalith::imaging::{self, ForecastScene, OperatorError};
 use metalith::prior::NetworkDenoiser;
 use metalith::restoration::{LearnedDenoiser, RestorationMethod};
-use metalith::sensor::Camera;
+use metalith::sensor::{Camera, StatedExposure};
 use metalith::{CalibratedModel, Error, Result};
 use ndarray::Array3;
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
@@ -53,7 +53,7 @@ impl ImagingSystem {
     /// Kernels and stray light of a layout, made or taken from the disk. Scenes whose pixels are finer than half of one of the sensor are
     /// averaged to these; truth and pictures have the size of the averaged scene then.
     #[staticmethod]
-    #[pyo3(signature = (design, layout, camera, rows, columns, field_deg, distance_mm=None, model=None, prior=None, progress=None))]
+    #[pyo3(signature = (design, layout, camera, rows, columns, field_deg, distance_mm=None, model=None, prior=None, lux=None, time_ms=None, progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn open(
         py: Python<'_>,
@@ -66,11 +66,13 @@ impl ImagingSystem {
         distance_mm: Option<f64>,
         model: Option<PathBuf>,
         prior: Option<PathBuf>,
+        lux: Option<f64>,
+        time_ms: Option<f64>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let design = &design.design;
         let system = work(py, progress, |p| {
-            let camera = Camera::read(&camera)?;
+            let camera = Camera::read(&camera)?.stated(&StatedExposure { lux, time_ms })?;
             let model = model.as_deref().map(CalibratedModel::read).transpose()?;
             let prior = prior.as_deref().map(LearnedDenoiser::read).transpose()?;
             let black = Array3::zeros((rows, columns, 3));

@@ -52,7 +52,7 @@ gain_e = 2.5
 name = "green"
 band_nm = [655, 665]
 [exposure]
-time_ms = 10
+time_ms = "auto"
 white = 0.8
 [illuminant]
 source = "equal_energy"

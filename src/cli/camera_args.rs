@@ -6,6 +6,7 @@ use clap::Args;
 use metalith::sensor::Camera;
 use metalith::{CalibratedModel, Design, Error, Result};
 
+use super::exposure_args::ExposureArgs;
 use super::paths::inputs_of;
 use super::{Terminal, standard_input};
 
@@ -27,6 +28,9 @@ pub(crate) struct CameraArgs {
     /// Angle from the left to the right edge of a scene (degrees).
     #[arg(long, default_value_t = 90.0)]
     pub field_deg: f64,
+
+    #[command(flatten)]
+    pub exposure: ExposureArgs,
 }
 
 /// Contents of the files of [`CameraArgs`].
@@ -81,7 +85,7 @@ impl CameraArgs {
             .try_for_each(|model| model.check_shape(design.cell.shape))?;
         Ok(CameraFiles {
             design,
-            camera: Camera::read(&self.camera)?,
+            camera: Camera::read(&self.camera)?.stated(&self.exposure.stated())?,
             model,
         })
     }

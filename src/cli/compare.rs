@@ -11,6 +11,7 @@ use metalith::report::counted;
 use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 
+use super::exposure_args::{self, ExposureArgs};
 use super::paths::paths;
 use super::picture::Assume;
 use super::{Outcome, Terminal, images, output, print_json, print_line};
@@ -74,6 +75,13 @@ pub(crate) struct CompareArgs {
     /// empty without them.
     #[arg(long, value_name = "FILE")]
     lpips: Option<PathBuf>,
+
+    #[command(flatten)]
+    exposure: ExposureArgs,
+
+    /// Also take the first photograph in light of these illuminances (lux), separated by commas, for a curve of PSNR over light.
+    #[arg(long, value_parser = exposure_args::light_of, value_delimiter = ',', value_name = "LUX,...")]
+    lux_curve: Vec<f64>,
 
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
@@ -252,6 +260,8 @@ impl CompareArgs {
             pixels: self.pixels.map(usize::from),
             learnt: self.learnt.clone(),
             lpips: self.lpips.clone(),
+            exposure: self.exposure.stated(),
+            curve_lux: self.lux_curve.clone(),
         })
     }
 }

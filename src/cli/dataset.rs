@@ -75,6 +75,7 @@ fn plan(args: &DatasetArgs, images: Vec<PathBuf>, terminal: &Terminal) -> Result
         camera: args.with.camera.clone(),
         model: args.with.model.clone(),
         field_deg: args.with.field_deg,
+        exposure: args.with.exposure.stated(),
         seed: args.seed,
         images,
     };
@@ -118,6 +119,7 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
     let origin = DatasetOrigin::of(&design, &layout, &camera, args.with.model.as_deref())?;
     let system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
+    system.light().notes().iter().for_each(|note| terminal.say(note));
     let operator = system.simulation();
     let head = DatasetManifest::of(&system, origin, args.seed);
     let turn = terminal.turn_at(&args.out, paths(&inputs))?;

@@ -12,6 +12,7 @@ mod convert;
 mod dataset;
 mod denoise;
 mod diff;
+mod exposure_args;
 mod handoff;
 mod images;
 mod info;

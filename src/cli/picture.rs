@@ -183,9 +183,8 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let frame = system.record(&simulation, &scene, args.seed)?;
     let truth = system.truth(&scene);
     drop(simulation);
-    if let Some(note) = frame.saturation_note(&truth) {
-        terminal.say(&note);
-    }
+    let notes = system.notes(&frame, &truth);
+    notes.iter().for_each(|note| terminal.say(note));
     let operator = system.restoration();
     let forecast_scene = ForecastScene::new(&system, &operator);
     let error = &forecast_scene.operator_error;
@@ -239,7 +238,7 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         )?;
         report.worth = worth_of_assumptions(&system, &narrow, &scene, args.seed, terminal)?;
     }
-    report.of_frame.notes = system.notes(&frame, &truth);
+    report.of_frame.notes = notes;
     report.of_frame.notes.extend(limited);
     let pages = PicturePages {
         report: &report,
@@ -278,6 +277,13 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             uncertainty.rank_correlation
         );
     }
+    let light = &report.of_frame.light;
+    print_line!(
+        "{}; a white pixel: {} electrons, SNR {}",
+        light.words(),
+        light.each(|w| Some(w.electrons), 0),
+        light.each(|w| w.snr, 1)
+    );
     print_line!("page: {}", outputs[0].display());
     print_line!("frame: {}", args.out.join(FrameFile::NAME).display());
     for restoration in &report.restorations {

@@ -8,7 +8,7 @@ use metalith::file::InputFiles;
 use metalith::imaging::scene::SceneImage;
 use metalith::imaging::{
     ForecastScene, FrameNumbers, FrameStatement, ImagingSystem, RestoredPicture, RestoredReport, check_scored,
-    read_signals,
+    is_simulated, read_signals,
 };
 use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use ndarray::Array3;
@@ -117,6 +117,10 @@ pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
     if let Some(prior) = prior {
         system.prior = prior;
+    }
+    if !is_simulated(&args.frame)? {
+        // Nothing is known of the light before a bench.
+        system.exposure = system.exposure.by_white(&camera);
     }
     let frame = system.frame_of(signals)?;
     let operator = system.restoration();

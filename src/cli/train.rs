@@ -114,6 +114,8 @@ impl TrainArgs {
             pixels: self.pixels.map(usize::from),
             learnt: Vec::new(),
             lpips: None,
+            exposure: metalith::sensor::StatedExposure::default(),
+            curve_lux: Vec::new(),
         })
     }
 

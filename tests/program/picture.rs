@@ -36,8 +36,8 @@ fn what_cannot_be_pictured_is_refused() {
     let beside = write("beside.toml", "offset_um = [0, 0] ", "offset_um = [9000, 0] ");
     let dark = write(
         "dark.toml",
-        "source = \"d65\"",
-        "source = \"leds\"\n[[illuminant.led]]\ncentre_nm = 900\nwidth_nm = 5",
+        &plain[plain.find("source = \"d65\"").unwrap()..],
+        "source = \"leds\"\nradiance_w_m2_sr = 1\n[[illuminant.led]]\ncentre_nm = 900\nwidth_nm = 5\n",
     );
     let gt = "cameras/gt1930.toml";
     let cases: [(&[&str], &str); 7] = [

@@ -2,7 +2,7 @@
 
 use metalith_core::{Progress, Result};
 use metalith_imaging::scene::SceneImage;
-use metalith_imaging::{ForecastScene, Frame, FrameOperator, ImagingSystem, OperatorError};
+use metalith_imaging::{ForecastScene, Frame, FrameOperator, ImagingSystem, LightStatement, OperatorError};
 use metalith_restoration::{Blend, FrameModel, Recorded, RestorationMethod, restore_each};
 use ndarray::{Array2, Array3, Zip};
 
@@ -107,8 +107,13 @@ impl BaselineCamera for ArrayCamera<'_> {
         self.error.note(&self.channel_names())
     }
 
-    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
-        self.system.record(&self.simulation, scene, seed)
+    fn record_in(&self, scene: &SceneImage, brighter: f64, seed: u64) -> Result<Frame> {
+        let exposure = self.system.exposure.in_light(&self.system.camera, brighter);
+        self.system.record_in(&self.simulation, scene, &exposure, seed)
+    }
+
+    fn light(&self) -> LightStatement {
+        self.system.light()
     }
 
     fn truth(&self, scene: &SceneImage) -> Array3<f64> {
@@ -131,7 +136,7 @@ impl BaselineCamera for ArrayCamera<'_> {
     }
 
     fn pictures(&self, frame: &Frame, kind: StageKind, progress: &dyn Progress) -> Result<Vec<Array3<f64>>> {
-        frame.is_of(self.restoration.frame(), self.system.gain.len())?;
+        frame.is_of(self.restoration.frame(), self.system.exposure.gain.len())?;
         let (light, inverse_variance) = frame.light(&self.system.camera, &self.error);
         let recorded = Recorded {
             operator: &self.restoration,

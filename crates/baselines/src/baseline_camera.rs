@@ -1,8 +1,8 @@
 //! Interface of a camera that can be compared.
 
 use metalith_core::{Progress, Result};
-use metalith_imaging::Frame;
 use metalith_imaging::scene::SceneImage;
+use metalith_imaging::{Frame, LightStatement};
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
@@ -45,7 +45,18 @@ pub trait BaselineCamera {
     ///
     /// # Errors
     /// If the scene has another size or field than the camera was made ready for.
-    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame>;
+    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
+        self.record_in(scene, 1.0, seed)
+    }
+
+    /// The frame that its sensor records of a scene in light that is so many times as bright, noise drawn from a seed.
+    ///
+    /// # Errors
+    /// As [`BaselineCamera::record`].
+    fn record_in(&self, scene: &SceneImage, brighter: f64, seed: u64) -> Result<Frame>;
+
+    /// Light, time and electrons of its exposure.
+    fn light(&self) -> LightStatement;
 
     /// Image by a perfect camera of the same channels, linear sRGB `[row, column, colour]`.
     fn truth(&self, scene: &SceneImage) -> Array3<f64>;

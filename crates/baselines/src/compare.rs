@@ -3,7 +3,7 @@
 use metalith_core::srgb::encoded;
 use metalith_core::{Error, Progress, Result};
 use metalith_imaging::scene::SceneImage;
-use metalith_imaging::{Frame, Zone, ZoneScore, scores};
+use metalith_imaging::{Frame, LightStatement, Zone, ZoneScore, scores};
 use metalith_prior::PerceptualDistance;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
@@ -42,6 +42,12 @@ pub struct ComparedCamera {
     /// Limit of its restorations, in words, if something but its frames limits them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<String>,
+    /// Light, time and electrons of its exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<LightStatement>,
+    /// Illuminance (lux), and PSNR of linear light (dB) of the first photograph in it by the first method.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub curve: Vec<[f64; 2]>,
     /// The first photograph; it is not kept with the scores.
     #[serde(skip)]
     pub shown: Option<ShownPictures>,
@@ -76,7 +82,7 @@ pub struct ComparisonResult {
 }
 
 /// Let a camera take photographs and restore them in all its ways. `name` and `words` are those of the table; pictures are judged by a
-/// perceptual distance too, if there is one.
+/// perceptual distance too, if there is one. `curve_lux`: illuminances in which the first photograph is also taken.
 ///
 /// # Errors
 /// If there are none, they differ in size, or the user stopped it.
@@ -86,6 +92,7 @@ pub fn compare(
     photographs: &[SceneImage],
     seed: u64,
     perceptual: Option<&PerceptualDistance>,
+    curve_lux: &[f64],
     progress: &dyn Progress,
 ) -> Result<ComparedCamera> {
     let first = photographs.first().ok_or_else(|| {
@@ -95,6 +102,10 @@ pub fn compare(
             "give at least one photograph",
         )
     })?;
+    let light = camera.light();
+    for note in light.notes() {
+        progress.warn(&format!("{name}: {note}"));
+    }
     let limits = camera.limits();
     if let Some(limits) = &limits {
         progress.warn(&format!("{name}: {limits}"));
@@ -169,8 +180,32 @@ pub fn compare(
         ways: frames.into_iter().chain(restored).collect(),
         frame_cpu_s: each(frame_s),
         limits,
+        curve: curve(camera, &light, first, seed, curve_lux, progress)?,
+        light: Some(light),
         shown,
     })
+}
+
+/// PSNR of linear light (dB) of a photograph by the first way of a camera, in light of each of these illuminances (lux).
+fn curve(
+    camera: &dyn BaselineCamera,
+    light: &LightStatement,
+    photograph: &SceneImage,
+    seed: u64,
+    curve_lux: &[f64],
+    progress: &dyn Progress,
+) -> Result<Vec<[f64; 2]>> {
+    let Some(own) = light.illuminance_lux else {
+        return Ok(Vec::new());
+    };
+    let truth = camera.truth(photograph);
+    let at = |lux: &f64| {
+        progress.check_stopped()?;
+        let frame = camera.record_in(photograph, lux / own, seed)?;
+        let picture = camera.restore(&frame, 0, progress)?;
+        Ok([*lux, scores(&picture, &truth)?[0].psnr_linear_db])
+    };
+    curve_lux.iter().map(at).collect()
 }
 
 /// Pictures of one way, judged.

@@ -8,7 +8,7 @@ use metalith_imaging::scene::{SceneImage, read_far_scene};
 use metalith_imaging::{ApproximationSet, ImagingSystem, KernelCache, SceneView, check_scored, simulated_view};
 use metalith_prior::PerceptualDistance;
 use metalith_restoration::RestorationMethod;
-use metalith_sensor::Camera;
+use metalith_sensor::{Camera, StatedExposure};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +45,12 @@ pub struct Comparison {
     /// Weights of the learned perceptual distance, if pictures are judged by it.
     #[serde(default)]
     pub lpips: Option<PathBuf>,
+    /// Light and time of all cameras, in place of what their files state.
+    #[serde(default, skip_serializing_if = "StatedExposure::is_none")]
+    pub exposure: StatedExposure,
+    /// Illuminances in which the first photograph is also taken (lux).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub curve_lux: Vec<f64>,
 }
 
 impl Comparison {
@@ -117,7 +123,7 @@ impl Comparison {
             ));
         }
         let methods = self.methods.iter().map(|m| m.parse()).collect::<Result<_>>()?;
-        let camera = Camera::read(&self.camera)?;
+        let camera = self.read_camera(&self.camera)?;
         let photographs: Vec<SceneImage> = self
             .photographs
             .iter()
@@ -141,7 +147,7 @@ impl Comparison {
             ));
         }
         let own = |listed: &ListedDesign| {
-            let own = listed.camera.as_deref().map(Camera::read).transpose()?;
+            let own = listed.camera.as_deref().map(|p| self.read_camera(p)).transpose()?;
             Ok((
                 Design::read_with(&listed.design, progress)?,
                 own.unwrap_or_else(|| camera.clone()),
@@ -180,6 +186,11 @@ impl Comparison {
             field_deg: given.field_deg,
             ..view
         })
+    }
+
+    /// Camera of a file, in the light and for the time that all cameras have.
+    fn read_camera(&self, path: &Path) -> Result<Camera> {
+        Camera::read(path)?.stated(&self.exposure)
     }
 
     fn photograph(&self, path: &Path) -> Result<SceneImage> {
@@ -243,7 +254,15 @@ impl OpenComparison<'_> {
         let mut found = None;
         self.ready(k, cache, progress, &mut |camera, names, all| {
             let (all, perceptual) = (&all[..photographs.min(all.len())], self.perceptual.as_ref());
-            found = Some(compare(camera, names, all, self.of.seed, perceptual, progress)?);
+            found = Some(compare(
+                camera,
+                names,
+                all,
+                self.of.seed,
+                perceptual,
+                &self.of.curve_lux,
+                progress,
+            )?);
             Ok(())
         })?;
         Ok(found.expect("a camera that is ready takes photographs"))
@@ -410,6 +429,8 @@ mod tests {
             pixels: None,
             learnt: Vec::new(),
             lpips: None,
+            exposure: StatedExposure::default(),
+            curve_lux: Vec::new(),
         };
         let open = comparison.open(&Silent).unwrap();
         let found = open.comparison(Vec::new());

@@ -4,7 +4,7 @@ use metalith_core::{Error, Progress, Result};
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::spectra::{SceneSpectrum, rgb_basis};
 use metalith_imaging::{
-    ChannelColours, Frame, SceneView, counts_channel, expose, gains, sensitivity, without_dispersion,
+    ChannelColours, ChosenExposure, Frame, LightStatement, SceneView, counts_channel, expose, without_dispersion,
 };
 use metalith_sensor::{Camera, Sampling};
 use ndarray::{Array2, Array3, Zip};
@@ -20,7 +20,7 @@ pub struct LenslessBench {
     colours: ChannelColours,
     /// Fall-off of light at sines far from the normal, at each pixel of the scene.
     falloff: Array2<f32>,
-    gain: Vec<f64>,
+    exposure: ChosenExposure,
 }
 
 /// A camera without a lens: what stands before its sensor, and how a picture is made of its frame.
@@ -67,9 +67,15 @@ impl<T: Lensless> BaselineCamera for T {
         self.bench().channel_names()
     }
 
-    fn record(&self, scene: &SceneImage, seed: u64) -> Result<Frame> {
-        self.bench().sees(scene)?;
-        Ok(self.bench().record(&self.light(scene), seed))
+    fn record_in(&self, scene: &SceneImage, brighter: f64, seed: u64) -> Result<Frame> {
+        let bench = self.bench();
+        bench.sees(scene)?;
+        let exposure = bench.exposure.in_light(&bench.camera, brighter);
+        Ok(expose(&bench.camera, &exposure, &Lensless::light(self, scene), seed))
+    }
+
+    fn light(&self) -> LightStatement {
+        LightStatement::of(&self.bench().camera, &self.bench().exposure, None)
     }
 
     fn truth(&self, scene: &SceneImage) -> Array3<f64> {
@@ -168,16 +174,17 @@ impl LenslessBench {
             sampling,
             colours,
             falloff,
-            gain: Vec::new(),
+            exposure: ChosenExposure::of_gain(camera, &[]),
         })
     }
 
-    /// This bench with the exposure that suits the light of a white scene.
+    /// This bench with the exposure that the camera asks for in the light of a white scene. `etendue`: area times projected solid
+    /// angle of a unit of light in a pixel (um^2 sr).
     ///
     /// # Errors
     /// If none of it reaches the sensor.
-    pub fn exposed(mut self, white: &[Array2<f32>]) -> Result<Self> {
-        self.gain = gains(&self.camera, &sensitivity(&self.camera, &self.sampling.channels), white)?;
+    pub fn exposed(mut self, white: &[Array2<f32>], etendue: f64) -> Result<Self> {
+        self.exposure = ChosenExposure::new(&self.camera, &self.sampling.channels, white, etendue)?;
         Ok(self)
     }
 
@@ -269,7 +276,7 @@ impl LenslessBench {
 
     /// Record light.
     pub fn record(&self, light: &[Array2<f32>], seed: u64) -> Frame {
-        expose(&self.camera, &self.gain, light, seed)
+        expose(&self.camera, &self.exposure, light, seed)
     }
 
     /// Checks that a scene is one of those that this bench is for.

@@ -2,7 +2,7 @@
 
 use metalith_core::{FolderLock, Result, srgb};
 use metalith_imaging::{Zone, shown};
-use metalith_report::{Cell, Column, Page, PhotoRow, Table, write_json};
+use metalith_report::{Axis, Cell, Chart, Column, Page, PhotoRow, Table, write_json};
 
 use crate::compare::{ComparedCamera, ComparisonResult};
 
@@ -42,6 +42,9 @@ fn page(comparison: &ComparisonResult) -> Page {
         "The first photograph, {}, restored from the frame of each camera by the method with the best score over all photographs. The photograph fills the field of each camera.",
         comparison.photographs.first().map_or("", String::as_str)
     )));
+    if let Some(words) = comparison.unequal_times() {
+        page.note(&words);
+    }
     page.section("Scores");
     table(&mut page, comparison, "PSNR", "dB", 2, |s| s.psnr_db);
     table(&mut page, comparison, "SSIM", "", 3, |s| s.ssim);
@@ -56,12 +59,32 @@ fn page(comparison: &ComparisonResult) -> Page {
     page.paragraph(format!(
         "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values unless stated otherwise. {timed}Frames of cameras without a lens are not pictures and have no scores. LPIPS needs its weights (`--lpips`); without them the column is empty."
     ));
+    curves(&mut page, comparison);
     for camera in &comparison.cameras {
         one(&mut page, camera);
     }
     page.section("Photographs");
     page.list(&comparison.photographs);
     page
+}
+
+/// PSNR of each camera over the light of the scene, if it was asked for.
+fn curves(page: &mut Page, comparison: &ComparisonResult) {
+    if comparison.cameras.iter().all(|c| c.curve.is_empty()) {
+        return;
+    }
+    page.section("Light");
+    let mut chart = Chart::new(
+        "PSNR of linear light over illuminance",
+        Axis::log("illuminance", "lux"),
+        Axis::linear("PSNR", "dB"),
+    );
+    for camera in &comparison.cameras {
+        chart.line(camera.name.as_str(), camera.curve.iter().map(|[lux, db]| (*lux, *db)));
+    }
+    page.figure(chart.caption(
+        "The first photograph by the first method of each camera, noise and full scale included. With `auto` the time follows the light, up to the longest.",
+    ));
 }
 
 impl ComparedCamera {
@@ -116,6 +139,9 @@ fn one(page: &mut Page, camera: &ComparedCamera) {
         "{} Its scenes fill {} degrees.",
         camera.words, camera.field_deg
     ));
+    if let Some(light) = &camera.light {
+        page.paragraph(light.sentence());
+    }
     if let Some(limits) = &camera.limits {
         page.note(limits);
     }
@@ -145,6 +171,8 @@ mod tests {
             ways: Vec::new(),
             frame_cpu_s: None,
             limits: limits.map(str::to_owned),
+            light: None,
+            curve: Vec::new(),
             shown: None,
         };
         let comparison = |camera: ComparedCamera| ComparisonResult {

@@ -121,7 +121,9 @@ pub(crate) fn encoded(picture: &Array3<f64>) -> Array3<f32> {
 /// SHA-256 of all that decides frames but the scene and the noise: what stands before the sensor, the sensor and its light, the field.
 pub(crate) fn camera_digest(optics: &impl Serialize, camera: &Camera, view: &SceneView) -> Result<String> {
     let field = [view.rows as f64, view.columns as f64, view.field_deg];
-    let text = serde_json::to_vec(&(optics, camera, field))
+    let mut camera = camera.clone();
+    camera.exposure = camera.exposure.of_brightness();
+    let text = serde_json::to_vec(&(optics, &camera, field))
         .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
     Ok(hex(&Sha256::digest(text)))
 }

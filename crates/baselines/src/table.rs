@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use metalith_imaging::Zone;
+use metalith_report::sig;
 
 use crate::compare::{ComparisonResult, MethodScores};
 
@@ -29,6 +30,21 @@ impl ComparisonResult {
         let from = self.averaged_from;
         from.map_or_else(String::new, |[rows, columns]| {
             format!(" (averaged from {columns} x {rows})")
+        })
+    }
+
+    /// Words for cameras that are exposed for different times, which compares apertures less than it seems to.
+    pub fn unequal_times(&self) -> Option<String> {
+        /// Ratio of times that count as equal.
+        const EQUAL: f64 = 1.01;
+        let times = self.cameras.iter().filter_map(|c| Some(c.light.as_ref()?.time_ms));
+        let [least, most] = times.fold([f64::INFINITY, 0.0], |[a, b], ms| [a.min(ms), b.max(ms)]);
+        (most > EQUAL * least).then(|| {
+            format!(
+                "the cameras are exposed for different times, {} to {} ms: give --time-ms to compare them at equal time",
+                sig(least, 3),
+                sig(most, 3)
+            )
         })
     }
 
@@ -61,6 +77,9 @@ impl ComparisonResult {
             self.camera,
             self.seed
         ));
+        if let Some(words) = self.unequal_times() {
+            line(format!("Note: {words}.\n"));
+        }
         line(
             "| camera | picture | PSNR (dB) | SSIM | 1 - LPIPS | PSNR of linear light (dB) | CPU s |\n| --- | --- | --- | --- | --- | --- | --- |"
                 .into(),
@@ -87,7 +106,16 @@ impl ComparisonResult {
         }
         line(String::new());
         for camera in &self.cameras {
-            line(format!("- {}: {}", camera.name, camera.words));
+            let light = camera
+                .light
+                .as_ref()
+                .map_or_else(String::new, |l| format!(" {}", l.sentence()));
+            line(format!("- {}: {}{light}", camera.name, camera.words));
+            if !camera.curve.is_empty() {
+                let all = camera.curve.iter().map(|[lux, db]| format!("{db:.2} dB at {lux} lux"));
+                let all: Vec<String> = all.collect();
+                line(format!("  Linear light, first photograph: {}.", all.join(", ")));
+            }
         }
         text
     }

@@ -3,7 +3,7 @@
 use metalith_core::{Progress, Result};
 use metalith_design::Design;
 use metalith_restoration::RestorationMethod;
-use metalith_sensor::{Camera, Channel, ChannelSampling, Illuminant, Response};
+use metalith_sensor::{Camera, Channel, ChannelSampling, Exposure, Illuminant, LightLevel, Response, SceneLight};
 use serde::Serialize;
 
 use crate::approximation_set::{ApproximationSet, PATCH};
@@ -41,6 +41,18 @@ pub fn without_dispersion(camera: &Camera, channels: &[ChannelSampling]) -> Came
         channels: lines.map(line).collect(),
         // A mean may lie between two lamps.
         illuminant: Illuminant::EqualEnergy,
+        exposure: Exposure {
+            light: SceneLight {
+                // As many electrons, from a band 1 nm wide: a thousandth of a um.
+                level: Some(LightLevel::StandingFor {
+                    spectral: camera.spectral_radiance() * most * 1e-3,
+                    lux: camera.illuminance_lux(),
+                    radiance: camera.radiance_w_m2_sr(),
+                }),
+                ..camera.exposure.light
+            },
+            ..camera.exposure
+        },
         ..camera.clone()
     }
 }
@@ -165,6 +177,10 @@ mod tests {
             // The balance of the channels stays: sums over parts 1 nm wide.
             let ratio = |of: &[ChannelSampling]| counted(&of[k]) / counted(&of[0]);
             assert!((ratio(&sampling.channels) / ratio(&all.channels) - 1.0).abs() < 1e-6);
+            // Both leave out thousandths at the ends of a band.
+            let electrons =
+                [(&narrow, &sampling), (&camera, &all)].map(|(c, s)| c.electrons_per_s(counted(&s.channels[k])));
+            assert!((electrons[0] / electrons[1] - 1.0).abs() < 5e-3, "{electrons:?}");
         }
     }
 }

@@ -131,7 +131,7 @@ impl DatasetManifest {
             field_deg: system.view.field_deg,
             black_level: black_level(&system.camera),
             white: png16::WHITE,
-            gain: system.gain.clone(),
+            gain: system.exposure.gain.clone(),
             pairs: Vec::new(),
         }
     }
@@ -337,7 +337,7 @@ impl<'a> PairWriter<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exposure::expose;
+    use crate::exposure::{ChosenExposure, expose};
     use metalith_sensor::SensorNoise;
     use ndarray::Array2;
 
@@ -361,7 +361,7 @@ mod tests {
             };
             let black = black_level(&camera);
             let light = vec![Array2::zeros((300, 300)); 3];
-            let frame = expose(&camera, &[1.0; 3], &light, 5);
+            let frame = expose(&camera, &ChosenExposure::of_gain(&camera, &[1.0; 3]), &light, 5);
             assert!(frame.planes[0].iter().any(|v| *v < 0.0) || read_noise_e == 0.0);
             let numbers = png16::tests::numbers(&png16::grey(&frame.planes, &png16::tests::above(black), ""));
             let range = f64::from(png16::WHITE - black);

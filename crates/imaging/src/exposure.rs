@@ -3,11 +3,12 @@
 use metalith_core::{Error, Result};
 use metalith_report::sig;
 use metalith_sensor::Noise;
-use metalith_sensor::{Camera, ColourFilter};
+use metalith_sensor::{Camera, ChannelSampling, ColourFilter};
 use metalith_wave::kernels::box_sums;
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use crate::operator_error::OperatorError;
 
@@ -27,15 +28,96 @@ pub struct Frame {
     pub saturated: usize,
 }
 
-/// Sensitivity of each channel to the light of the scene, relative to the channel that counts most.
-pub fn sensitivity(camera: &Camera, channels: &[metalith_sensor::ChannelSampling]) -> Vec<f64> {
-    let counted: Vec<f64> = channels
-        .iter()
-        .map(|c| c.parts.iter().map(|p| p.weight).sum())
-        .collect();
-    let most = counted.iter().copied().fold(0.0, f64::max);
-    debug_assert_eq!(camera.channels.len(), channels.len());
-    counted.iter().map(|c| c / most).collect()
+/// Exposure of a camera behind its optics: the time, and what a white scene gives.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChosenExposure {
+    /// Time (s).
+    pub time_s: f64,
+    /// Signal, of full scale, of a unit of light in each channel.
+    pub gain: Vec<f64>,
+    /// Electrons that the light of a white scene gives in the brightest pixel of each channel, whatever fills that.
+    pub white_e: Vec<f64>,
+}
+
+impl ChosenExposure {
+    /// Exposure of a camera to a scene that is white: the time of the camera file, or with `auto` that after which the brightest
+    /// pixel has the signal `white`, unless this takes longer than the longest time. `etendue`: area times projected solid angle of a
+    /// unit of light in a pixel (um^2 sr).
+    ///
+    /// # Errors
+    /// If no light of a white scene reaches the sensor.
+    pub fn new(camera: &Camera, channels: &[ChannelSampling], white: &[Array2<f32>], etendue: f64) -> Result<Self> {
+        let counted: Vec<f64> = channels
+            .iter()
+            .map(|c| c.parts.iter().map(|p| p.weight).sum())
+            .collect();
+        let brightest = |frame: &Array2<f32>| f64::from(frame.iter().copied().fold(0.0, f32::max));
+        let brightest: Vec<f64> = white.iter().map(brightest).collect();
+        if brightest.iter().all(|b| *b <= 0.0) {
+            return Err(Error::refused(
+                "scene/no-light-on-sensor",
+                "no light of the scene reaches the sensor",
+                "check `offset_um`, `columns` and `rows` of the sensor against the chip, and the field of the scene",
+            ));
+        }
+        let per_s: Vec<f64> = counted.iter().map(|c| camera.electrons_per_s(*c) * etendue).collect();
+        let a_second = Self {
+            time_s: 1.0,
+            gain: per_s.iter().map(|e| e / camera.sensor.full_scale_e()).collect(),
+            white_e: per_s.iter().zip(&brightest).map(|(e, b)| e * b).collect(),
+        };
+        Ok(a_second.in_light(camera, 1.0))
+    }
+
+    /// Exposure of the same camera in which a unit of light has a known signal in each channel.
+    pub fn of_gain(camera: &Camera, gain: &[f64]) -> Self {
+        Self {
+            time_s: camera.exposure.time_s,
+            gain: gain.to_vec(),
+            white_e: gain.iter().map(|g| g * camera.sensor.full_scale_e()).collect(),
+        }
+    }
+
+    /// Exposure of the same camera to a scene that is so many times as bright.
+    #[must_use]
+    pub fn in_light(&self, camera: &Camera, brighter: f64) -> Self {
+        let exposure = &camera.exposure;
+        let longest = brighter * exposure.time_s / self.time_s;
+        let times = if exposure.auto {
+            self.up_to_white(camera).min(longest)
+        } else {
+            longest
+        };
+        Self {
+            time_s: self.time_s * times / brighter,
+            ..self.times(times)
+        }
+    }
+
+    /// This exposure of a scene whose light is unknown: as bright as brings its brightest pixel to the signal `white`.
+    #[must_use]
+    pub fn by_white(&self, camera: &Camera) -> Self {
+        self.times(self.up_to_white(camera))
+    }
+
+    /// The light that brings the brightest pixel to the signal `white`, over the light of this exposure.
+    fn up_to_white(&self, camera: &Camera) -> f64 {
+        camera.exposure.white * camera.sensor.full_scale_e() / self.brightest_e()
+    }
+
+    fn times(&self, times: f64) -> Self {
+        let all = |v: &[f64]| v.iter().map(|v| v * times).collect();
+        Self {
+            time_s: self.time_s,
+            gain: all(&self.gain),
+            white_e: all(&self.white_e),
+        }
+    }
+
+    /// Electrons of the brightest pixel of a white scene.
+    pub fn brightest_e(&self) -> f64 {
+        self.white_e.iter().copied().fold(0.0, f64::max)
+    }
 }
 
 /// Channel that a pixel counts; `None` for a sensor whose pixels count all.
@@ -49,36 +131,13 @@ pub fn counts_channel(filter: ColourFilter, names: &[String], [row, column]: [us
     channel_at(filter, names, row, column).is_none_or(|c| c == channel)
 }
 
-/// Signal of a unit of light in each channel, so that the brightest pixel of a white scene has the signal that the camera
-/// file states.
-///
-/// # Errors
-/// If no light of a white scene reaches the sensor.
-pub fn gains(camera: &Camera, sensitivity: &[f64], white: &[Array2<f32>]) -> Result<Vec<f64>> {
-    let brightest = white
-        .iter()
-        .zip(sensitivity)
-        .map(|(frame, s)| f64::from(frame.iter().copied().fold(0.0, f32::max)) * s)
-        .fold(0.0, f64::max);
-    if brightest <= 0.0 {
-        return Err(Error::refused(
-            "scene/no-light-on-sensor",
-            "no light of the scene reaches the sensor",
-            "check `offset_um`, `columns` and `rows` of the sensor against the chip, and the field of the scene",
-        ));
-    }
-    Ok(sensitivity
-        .iter()
-        .map(|s| s * camera.exposure.white / brightest)
-        .collect())
-}
-
 /// Expose a sensor to the light of each channel: photons and reading, full well, whole steps.
 ///
 /// Noise of all pixels is drawn from `seed`, in reading order, channel by channel.
-pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -> Frame {
+pub fn expose(camera: &Camera, exposure: &ChosenExposure, light: &[Array2<f32>], seed: u64) -> Frame {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let noise = camera.sensor.noise.of_exposure(camera.exposure.time_s);
+    let noise = camera.sensor.noise.of_exposure(exposure.time_s);
+    let gain = &exposure.gain;
     let sensor = &camera.sensor;
     let names = camera.channel_names();
     let signal = |channel: usize, i: (usize, usize)| gain[channel] * f64::from(light[channel][i]);
@@ -94,7 +153,7 @@ pub fn expose(camera: &Camera, gain: &[f64], light: &[Array2<f32>], seed: u64) -
     let planes = ideal
         .iter()
         .map(|plane| noise.expose(plane, &mut random).mapv(|v| recorded(camera, v)));
-    Frame::of_signals(camera, gain, planes.collect())
+    Frame::of_signals(camera, exposure, planes.collect())
 }
 
 /// The signal that a camera says for one that falls on its sensor, both of full scale.
@@ -112,16 +171,15 @@ pub(crate) fn planes_of(camera: &Camera) -> usize {
 }
 
 impl Frame {
-    /// Frame of signals that were recorded, as shares of full scale, in the planes that the sensor of a camera has;
-    /// `gain` as [`gains`] has it.
-    pub fn of_signals(camera: &Camera, gain: &[f64], planes: Vec<Array2<f32>>) -> Self {
+    /// Frame of signals that were recorded, as shares of full scale, in the planes that the sensor of a camera has.
+    pub fn of_signals(camera: &Camera, exposure: &ChosenExposure, planes: Vec<Array2<f32>>) -> Self {
         let full = recorded(camera, f64::INFINITY);
         Self {
             saturated: planes.iter().flatten().filter(|v| **v >= full).count(),
             planes,
             filter: camera.sensor.filter,
-            gain: gain.to_vec(),
-            noise: camera.sensor.noise.of_exposure(camera.exposure.time_s),
+            gain: exposure.gain.clone(),
+            noise: camera.sensor.noise.of_exposure(exposure.time_s),
             full,
         }
     }
@@ -250,7 +308,85 @@ const NEAR: usize = 16;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_sensor::SensorNoise;
+    use crate::geometry::ElementView;
+    use metalith_sensor::{Illuminant, Led, LightLevel, Response, SceneLight, SensorNoise};
+
+    /// The camera equation: the illuminance on the axis behind a perfect lens is pi L / (4 N^2). In light of one wavelength its
+    /// photons follow from lumens by hand.
+    #[test]
+    fn electrons_of_a_white_pixel_are_those_of_the_camera_equation() {
+        const PERCENT: f64 = 0.01;
+        let mut camera = Camera::three_bands(5.86);
+        camera.channels.truncate(1);
+        camera.channels[0].response = Response::Band {
+            band_nm: [500.0, 600.0],
+            efficiency: 0.6,
+        };
+        camera.illuminant = Illuminant::Leds(vec![Led {
+            centre_nm: 555.0,
+            width_nm: 2.0,
+            power: 1.0,
+        }]);
+        camera.exposure.auto = false;
+        let channels = camera.sampling([400.0, 700.0], 12.5).unwrap().channels;
+        for (diameter_um, focal_um, lux, time_s) in [
+            (1000.0, 2400.0, 500.0, 0.01),
+            (250.0, 2400.0, 500.0, 0.01),
+            (1000.0, 2400.0, 50.0, 0.01),
+            (1000.0, 2400.0, 500.0, 0.003),
+            (200.0, 1440.0, 5000.0, 0.1),
+        ] {
+            camera.exposure.time_s = time_s;
+            camera.exposure.light = SceneLight {
+                level: Some(LightLevel::IlluminanceLux(lux)),
+                reflectance: 0.9,
+            };
+            let lens = ElementView {
+                centre_um: [0.0; 2],
+                wedge: metalith_core::Wedge {
+                    wavelength_um: 0.55,
+                    sin_x: 0.0,
+                    sin_y: 0.0,
+                },
+                area: 1.0,
+                sensor_um: focal_um,
+                slope: [0.0; 2],
+            };
+            let light = lens.flux_per_um2([0.0; 2]) * camera.sensor.pixel_um.powi(2);
+            let white = [Array2::from_elem((1, 1), light as f32)];
+            let area_um2 = 0.25 * std::f64::consts::PI * diameter_um * diameter_um;
+            let found = ChosenExposure::new(&camera, &channels, &white, area_um2).unwrap();
+            let f_number = focal_um / diameter_um;
+            let sensor_lux = 0.9 * lux / (4.0 * f_number * f_number);
+            let joule = sensor_lux / 683.0 * (5.86e-6f64).powi(2) * time_s;
+            let want = 0.6 * joule * 555e-9 / (6.626e-34 * 2.998e8);
+            assert!((found.brightest_e() / want - 1.0).abs() < PERCENT, "{found:?} {want}");
+            assert_eq!(found.time_s, time_s);
+            let twice = found.in_light(&camera, 2.0);
+            assert!(twice.time_s == time_s && (twice.brightest_e() / found.brightest_e() - 2.0).abs() < 1e-9);
+        }
+    }
+
+    /// Time that follows the light up to the longest.
+    #[test]
+    fn an_automatic_exposure_ends_at_white_or_at_its_longest_time() {
+        const ROUNDING: f64 = 1e-9;
+        let camera = Camera::three_bands(5.86);
+        let channels = camera.sampling([400.0, 700.0], 12.5).unwrap().channels;
+        let white = vec![Array2::from_elem((2, 2), 1e-6f32); 3];
+        let found = ChosenExposure::new(&camera, &channels, &white, 1e6).unwrap();
+        let full_e = camera.sensor.full_scale_e();
+        assert!((found.brightest_e() / full_e - 0.9).abs() < ROUNDING && found.time_s < 1.0);
+        let bright = found.in_light(&camera, 10.0);
+        assert!(
+            (bright.time_s / found.time_s - 0.1).abs() < ROUNDING
+                && (bright.gain[0] / found.gain[0] - 1.0).abs() < ROUNDING
+        );
+        let dark = found.in_light(&camera, 1e-6);
+        assert!((dark.time_s - 1.0).abs() < ROUNDING && dark.brightest_e() < 0.1 * full_e);
+        assert!((dark.by_white(&camera).brightest_e() / full_e - 0.9).abs() < ROUNDING);
+        assert!((dark.in_light(&camera, 1e6).time_s / found.time_s - 1.0).abs() < ROUNDING);
+    }
 
     /// Whole steps in single precision lie on either side of those in double precision.
     #[test]
@@ -266,7 +402,7 @@ mod tests {
         for gain_e in [7.7, 7.8, 7.81, 7.85, 8.0] {
             camera.sensor.gain_e = gain_e;
             let light = [2.0, 2.0, 0.5].map(|v| Array2::from_elem((20, 20), v));
-            let frame = expose(&camera, &[1.0; 3], &light, 3);
+            let frame = expose(&camera, &ChosenExposure::of_gain(&camera, &[1.0; 3]), &light, 3);
             assert_eq!(frame.saturated, 800, "{gain_e}");
             assert_eq!(frame.saturated_share(), 2.0 / 3.0);
             let note = frame.saturation_note(&Array3::from_elem((1, 1, 3), 2.0)).unwrap();
@@ -304,7 +440,7 @@ mod tests {
             channel.name = name.into();
         }
         let light: Vec<Array2<f32>> = [0.2, 0.5, 2.0].map(|v| Array2::from_elem((40, 40), v)).into();
-        let frame = expose(&camera, &[1.0, 1.0, 1.0], &light, 3);
+        let frame = expose(&camera, &ChosenExposure::of_gain(&camera, &[1.0; 3]), &light, 3);
         let plane = &frame.planes[0];
         assert_eq!(frame.saturated, 400, "red is above full scale");
         let step = 1.0 / 256.0;
@@ -323,7 +459,10 @@ mod tests {
         };
         // 400 pixels with noise of 0.007: three standard errors.
         assert!((mean(1, 1) - 0.2).abs() < 1e-3 && (mean(0, 1) - 0.5).abs() < 1.2e-3);
-        assert_eq!(expose(&camera, &[1.0, 1.0, 1.0], &light, 3).planes, frame.planes);
+        assert_eq!(
+            expose(&camera, &ChosenExposure::of_gain(&camera, &[1.0; 3]), &light, 3).planes,
+            frame.planes
+        );
         // A quarter, of a scene whose white is one.
         let note = frame.saturation_note(&Array3::from_elem((1, 1, 3), 1.0)).unwrap();
         assert!(note.starts_with("25.0 %") && note.ends_with("fell on them"), "{note}");

@@ -75,7 +75,7 @@ pub(crate) fn write_restored(path: &Path, picture: &Array3<f64>) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exposure::expose;
+    use crate::exposure::{ChosenExposure, expose};
     use crate::scene::read_picture;
     use ndarray::Array2;
 
@@ -86,7 +86,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let camera = Camera::three_bands(5.86);
         let light: Vec<Array2<f32>> = [0.0, 0.3, 0.7].map(|v| Array2::from_elem((20, 24), v)).into();
-        let frame = expose(&camera, &[0.5; 3], &light, 4);
+        let frame = expose(&camera, &ChosenExposure::of_gain(&camera, &[0.5; 3]), &light, 4);
         let file = FrameFile::of(&camera, &frame);
         let path = file.write(&frame, folder.path()).unwrap();
         let numbers = png16::tests::numbers(&std::fs::read(path).unwrap());

@@ -77,7 +77,7 @@ impl ForecastScene {
         restoration: &FrameOperator<'_>,
         progress: &dyn Progress,
     ) -> Result<Forecast> {
-        let frame = expose(&system.camera, &system.gain, &self.light, SEED);
+        let frame = expose(&system.camera, &system.exposure, &self.light, SEED);
         let error = &self.operator_error;
         let [noisy, clean] = system.restore_alike(restoration, error, &frame, &self.light, progress)?;
         let truth = system.truth(&self.scene);

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use metalith_core::{Error, Progress, Result};
 use metalith_design::Design;
+use metalith_design::phase::OpenAreas;
 use metalith_restoration::{
     FrameModel, LearnedDenoiser, Recorded, RestorationMethod, SceneStatistics, restore_joint, restore_samples,
     restore_separate,
@@ -14,7 +15,7 @@ use sha2::{Digest, Sha256};
 
 use crate::approximation_set::ApproximationSet;
 use crate::colour::ChannelColours;
-use crate::exposure::{Frame, expose, gains, sensitivity};
+use crate::exposure::{ChosenExposure, Frame, expose};
 use crate::geometry::{ElementView, SceneSpace, SceneView};
 use crate::kernels::KernelBank;
 use crate::layout::PillarCount;
@@ -50,8 +51,8 @@ pub struct ImagingSystem {
     pub given: SceneView,
     /// Count of the pillars of its design that the layout has, if it was counted.
     pub pillars: Option<PillarCount>,
-    /// Signal of a unit of light in each channel.
-    pub gain: Vec<f64>,
+    /// Exposure of the camera behind this chip.
+    pub exposure: ChosenExposure,
     pub colours: ChannelColours,
     /// True if kernels and stray light were found on the disk.
     pub from_cache: [bool; 2],
@@ -68,12 +69,13 @@ pub struct ImagingSystem {
 const TOGETHER: f64 = 2.0;
 
 impl ImagingSystem {
-    /// This system with the gain of each channel that the exposure of the camera asks for.
+    /// This system with the exposure that the camera asks for behind it.
     pub(crate) fn exposed(mut self) -> Result<Self> {
         let operator = self.restoration();
         let white = operator.apply(&operator.white());
         drop(operator);
-        self.gain = gains(&self.camera, &sensitivity(&self.camera, &self.channels), &white)?;
+        let lens_um2 = OpenAreas::of(&self.design).lens_um2;
+        self.exposure = ChosenExposure::new(&self.camera, &self.channels, &white, lens_um2)?;
         Ok(self)
     }
 
@@ -155,6 +157,20 @@ impl ImagingSystem {
     /// # Errors
     /// If the scene has other spectra or another field than this was opened for.
     pub fn record(&self, operator: &FrameOperator<'_>, scene: &SceneImage, seed: u64) -> Result<Frame> {
+        self.record_in(operator, scene, &self.exposure, seed)
+    }
+
+    /// The frame that the sensor records of a scene in an exposure, noise drawn from a seed.
+    ///
+    /// # Errors
+    /// As [`ImagingSystem::record`].
+    pub fn record_in(
+        &self,
+        operator: &FrameOperator<'_>,
+        scene: &SceneImage,
+        exposure: &ChosenExposure,
+        seed: u64,
+    ) -> Result<Frame> {
         let scene = self.simulated(scene);
         if scene.view != self.view || scene.basis[..] != self.basis[..self.scene_spectra] {
             return Err(Error::refused(
@@ -167,7 +183,7 @@ impl ImagingSystem {
             ));
         }
         let light = operator.apply(&scene.planes);
-        Ok(expose(&self.camera, &self.gain, &light, seed))
+        Ok(expose(&self.camera, exposure, &light, seed))
     }
 
     /// SHA-256 of all that decides the frame of a scene but its noise: kernels and stray light, elements, camera, field, exposure.
@@ -184,7 +200,7 @@ impl ImagingSystem {
             self.bank.elements,
             self.elements,
             self.view,
-            self.gain,
+            self.exposure.gain,
             self.assumed.digest_text()
         ));
         if self.between != BetweenNodes::Linear {
@@ -280,7 +296,7 @@ impl ImagingSystem {
         error: &OperatorError,
         frame: &Frame,
     ) -> Result<[Vec<Array2<f32>>; 2]> {
-        frame.is_of(operator.frame(), self.gain.len())?;
+        frame.is_of(operator.frame(), self.exposure.gain.len())?;
         let (light, inverse_variance) = frame.light(&self.camera, error);
         if inverse_variance.iter().flatten().any(|t| *t > 0.0) {
             Ok([light, inverse_variance])
@@ -307,7 +323,7 @@ impl ImagingSystem {
     /// A frame as a picture without any restoration, linear sRGB `[row, column, colour]`: pixels where they look, over those
     /// of a white scene.
     pub fn unrestored(&self, operator: &FrameOperator<'_>, frame: &Frame) -> Array3<f64> {
-        let (light, inverse_variance) = frame.light(&self.camera, &OperatorError::none(self.gain.len()));
+        let (light, inverse_variance) = frame.light(&self.camera, &OperatorError::none(self.exposure.gain.len()));
         self.colours.rgb(&operator.unrestored(&light, &inverse_variance))
     }
 

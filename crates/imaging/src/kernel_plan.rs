@@ -14,6 +14,7 @@ use serde::Serialize;
 use crate::approximation_set::ApproximationSet;
 use crate::chip::{ChipInLight, element_views, sampling_of, sensor_um};
 use crate::colour::ChannelColours;
+use crate::exposure::ChosenExposure;
 use crate::field_of_view::{check_coverage, check_view, check_windows};
 use crate::geometry::{ElementView, SceneView};
 use crate::imaging_system::ImagingSystem;
@@ -184,7 +185,7 @@ impl<'a> KernelPlan<'a> {
         let mut unexposed = self.camera.clone();
         // What only acts after the light has landed, and the colour of the filter, do not decide kernels.
         unexposed.name = String::new();
-        unexposed.exposure = Camera::three_bands(1.0).exposure;
+        unexposed.exposure = Camera::three_bands(1.0).exposure.of_brightness();
         let inputs = Inputs {
             solver: metalith_cell::cache_file::solver_of(self.design.cell.shape),
             layout,
@@ -274,7 +275,7 @@ impl<'a> KernelPlan<'a> {
             view: self.scene.view,
             given: self.given,
             pillars: None,
-            gain: Vec::new(),
+            exposure: ChosenExposure::of_gain(self.camera, &[]),
             from_cache: [false; 2],
             assumed: ApproximationSet::default(),
             prior: LearnedDenoiser::shipped()?,

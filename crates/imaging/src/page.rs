@@ -141,6 +141,16 @@ fn page(pages: &PicturePages<'_>) -> Page {
                 .join(", "),
         ),
         ("Pixels at full scale", report.of_frame.saturated_words()),
+        ("Light and exposure", report.of_frame.light.words()),
+        (
+            "Electrons of a white pixel",
+            report.of_frame.light.each(|w| Some(w.electrons), 0),
+        ),
+        ("SNR of a white pixel", report.of_frame.light.each(|w| w.snr, 1)),
+        (
+            "Dynamic range used (dB)",
+            report.of_frame.light.each(|w| w.dynamic_range_db, 1),
+        ),
     ]);
     zooms(&mut page, pages);
     errors(&mut page, pages);

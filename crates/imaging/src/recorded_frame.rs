@@ -46,6 +46,15 @@ pub fn read_signals(path: &Path, camera: &Camera, numbers: FrameNumbers) -> Resu
     Ok(grey.numbers.chunks_exact(rows * columns).map(plane).collect())
 }
 
+/// True if a file is a frame that this program wrote and nobody changed: its light is that of the camera file.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn is_simulated(path: &Path) -> Result<bool> {
+    let bytes = read_at_most(path, png16::LONGEST, "a frame")?;
+    Ok(png16::levels_of(&bytes).is_some())
+}
+
 impl ImagingSystem {
     /// The frame of signals that the camera recorded, of full scale, in planes as those of [`Frame::planes`].
     ///
@@ -68,8 +77,11 @@ impl ImagingSystem {
                 "give finite signals, full scale being one",
             ));
         }
-        let frame = Frame::of_signals(&self.camera, &self.gain, signals);
-        frame.is_of([sensor.rows as usize, sensor.columns as usize], self.gain.len())?;
+        let frame = Frame::of_signals(&self.camera, &self.exposure, signals);
+        frame.is_of(
+            [sensor.rows as usize, sensor.columns as usize],
+            self.exposure.gain.len(),
+        )?;
         Ok(frame)
     }
 }
@@ -112,7 +124,7 @@ fn signals<'a>(
                     own.black
                 ),
                 format!(
-                    "give the camera that it was simulated with, or say what its numbers mean: --black-level {} --white {}",
+                    "give the camera that it was simulated with, and its --lux and --time-ms, or say what its numbers mean: --black-level {} --white {}",
                     own.black,
                     png16::WHITE
                 ),
@@ -184,7 +196,7 @@ fn fault(path: &Path, what: &str, hint: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exposure::expose;
+    use crate::exposure::{ChosenExposure, expose};
     use crate::files::FrameFile;
     use metalith_core::FolderLock;
     use metalith_sensor::ColourFilter;
@@ -199,7 +211,7 @@ mod tests {
         }
         let light = |c: usize| Array2::from_shape_fn((18, 24), |(y, x)| ((5 * y + 3 * x + c) % 12) as f32 / 10.0);
         let light: Vec<_> = (0..3).map(light).collect();
-        let frame = expose(&camera, &[1.0; 3], &light, 7);
+        let frame = expose(&camera, &ChosenExposure::of_gain(&camera, &[1.0; 3]), &light, 7);
         (camera, frame)
     }
 
@@ -211,7 +223,7 @@ mod tests {
             let path = FrameFile::of(&camera, &frame).write(&frame, folder.path()).unwrap();
             let planes = read_signals(&path, &camera, FrameNumbers::default()).unwrap();
             assert_eq!(planes, frame.planes);
-            let again = Frame::of_signals(&camera, &[1.0; 3], planes);
+            let again = Frame::of_signals(&camera, &ChosenExposure::of_gain(&camera, &[1.0; 3]), planes);
             assert!(again.saturated == frame.saturated && again.saturated > 0);
         }
     }

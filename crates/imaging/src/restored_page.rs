@@ -78,12 +78,14 @@ impl RestoredReport {
             row.photo(format!("{}{way}", restored.method), &picture.mapv(srgb::encoded));
         }
         page.figure(row.caption(
-            "The mosaic of the frame is shown as colours. Pictures are restored from this frame alone. `white` in [exposure] of the camera sets their brightness.",
+            "The mosaic of the frame is shown as colours. Pictures are restored from this frame alone. Their brightness is that of the light on the page; in a frame from a bench `white` in [exposure] of the camera sets it.",
         ));
         page.facts(&[
             ("Pixels at full scale", of.saturated_words()),
             ("Mean signal, of full scale", fixed(frame.mean_signal(), 3)),
             ("Error of the operator of the restoration", of.error_words()),
+            ("Light and exposure", of.light.words()),
+            ("Electrons of a white pixel", of.light.each(|w| Some(w.electrons), 0)),
         ]);
         list_assumptions(&mut page, &of.assumptions);
         page

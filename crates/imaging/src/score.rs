@@ -60,7 +60,7 @@ pub struct ZoneScore {
     /// Peak signal to noise ratio of sRGB values (dB), at most [`MOST_DB`].
     #[serde(deserialize_with = "decibels")]
     pub psnr_db: f64,
-    /// Peak signal-to-noise ratio of linear light (dB).
+    /// Peak signal-to-noise ratio of linear light from 0 to 1 (dB), as saved pictures hold it.
     #[serde(deserialize_with = "decibels")]
     pub psnr_linear_db: f64,
     /// Structural similarity of sRGB values, mean over the colours.
@@ -126,6 +126,8 @@ pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScor
         ));
     }
     let (shown, wanted) = (picture.mapv(encoded), truth.mapv(encoded));
+    // Files hold no light below 0 and above 1.
+    let [saved, saved_truth] = [picture, truth].map(|p| p.mapv(|v| v.clamp(0.0, 1.0)));
     let score = |zone: Zone| {
         let parts = zone.rectangles(rows, columns);
         let (mut error, mut linear, mut ssim) = (0.0, 0.0, 0.0);
@@ -134,7 +136,7 @@ pub fn scores(picture: &Array3<f64>, truth: &Array3<f64>) -> Result<Vec<ZoneScor
             let share = 1.0 / parts.len() as f64;
             let mean = |db: f64| 10f64.powf(-0.1 * db) * share;
             error += mean(psnr_db(cut(&shown).view(), cut(&wanted).view())?);
-            linear += mean(psnr_db(cut(picture).view(), cut(truth).view())?);
+            linear += mean(psnr_db(cut(&saved).view(), cut(&saved_truth).view())?);
             ssim += ssim_colour(cut(&shown).view(), cut(&wanted).view())? * share;
         }
         Ok(ZoneScore {
@@ -170,6 +172,18 @@ mod tests {
         assert!(at(Zone::Corner).ssim < at(Zone::Edge).ssim);
         wrong[[3, 3, 0]] = f64::NAN;
         assert_eq!(scores(&wrong, &truth).unwrap_err().id(), "score/not-numbers");
+    }
+
+    /// A picture below black and above white is saved as black and white.
+    #[test]
+    fn light_that_no_file_holds_is_no_error() {
+        let truth = Array3::from_shape_fn((40, 40, 3), |(y, _, _)| f64::from(u8::from(y < 20)));
+        let found = scores(&truth.mapv(|v| 1.5 * v - 0.2), &truth).unwrap();
+        assert!(
+            found
+                .iter()
+                .all(|s| s.psnr_linear_db == MOST_DB && s.psnr_db == MOST_DB)
+        );
     }
 
     /// Scores of equal pictures go through a file, also of one that has nothing in place of infinity.

@@ -6,7 +6,10 @@ use metalith_core::document::{Document, Limits, Section, load};
 use metalith_core::{Error, Result};
 use serde::Serialize;
 
-use crate::{Channel, ColourFilter, Exposure, Illuminant, Led, Response, Sensor, SensorNoise, Spectrum};
+use crate::{
+    Channel, ColourFilter, Exposure, Illuminant, Led, LightLevel, Response, SceneLight, Sensor, SensorNoise, Spectrum,
+    StatedExposure,
+};
 
 /// Version of the format of camera files that this program reads.
 const SCHEMA: i64 = 1;
@@ -85,17 +88,46 @@ impl Camera {
             channels: vec![band("blue", 0.0), band("green", 1.0), band("red", 2.0)],
             illuminant: Illuminant::EqualEnergy,
             exposure: Exposure {
-                time_s: 0.01,
+                time_s: 1.0,
+                auto: true,
                 white: 0.9,
+                light: SceneLight::unstated(),
             },
             files: Vec::new(),
         }
     }
 
-    /// Every channel must count something.
+    /// This camera in the light and for the time that a command states.
+    ///
+    /// # Errors
+    /// If one is out of its range, or an illuminance is stated and next to none of the light of its illuminant is visible.
+    pub fn stated(mut self, stated: &StatedExposure) -> Result<Self> {
+        stated.check()?;
+        if let Some(time_ms) = stated.time_ms {
+            (self.exposure.auto, self.exposure.time_s) = (false, 1e-3 * time_ms);
+        }
+        let Some(lux) = stated.lux else {
+            return Ok(self);
+        };
+        self.exposure.light.level = Some(LightLevel::IlluminanceLux(lux));
+        let path = self.files.first().cloned().unwrap_or_default();
+        self.check_light(&path)
+    }
+
+    /// Every channel must count something, and light in lux must be visible.
     fn check_light(self, path: &Path) -> Result<Self> {
         let dark = self.channels.iter().find(|c| !c.counts_any(&self.illuminant));
         match dark {
+            None if matches!(self.exposure.light.level, Some(LightLevel::IlluminanceLux(_))) && !self.is_seen() => {
+                Err(Error::refused(
+                    "camera/light-not-visible",
+                    format!(
+                        "{}: next to none of the light is visible, so that lux do not state it",
+                        path.display()
+                    ),
+                    "give `radiance_w_m2_sr` of a white surface instead of `illuminance_lux`",
+                ))
+            }
             None => Ok(self),
             Some(channel) => Err(Error::refused(
                 "camera/channel-without-light",
@@ -150,11 +182,12 @@ impl Draft {
         let sensor_section = root.section("sensor");
         let sensor = read_sensor(&sensor_section);
         let channels = read_channels(root, &sensor_section, &sensor);
+        let illuminant = root.section("illuminant");
         Self {
             name,
             channels,
-            illuminant: read_illuminant(&root.section("illuminant")),
-            exposure: Exposure::read(&root.section("exposure"), &sensor_section, &sensor),
+            exposure: Exposure::read(&root.section("exposure"), &illuminant, &sensor_section, &sensor),
+            illuminant: read_illuminant(&illuminant),
             sensor,
         }
     }

@@ -12,6 +12,7 @@
 //! | which light a channel counts | `channel` |
 //! | how much light is let in | `exposure` |
 //! | the light of the scene | `illuminant` |
+//! | lux, radiance and photons: electrons of a pixel | `photometry` |
 //! | how a person sees it | `observer` |
 //! | curves over wavelength, from CSV | `spectrum` |
 //! | a camera cut into wavelengths that are simulated | `wavelength_sampling` |
@@ -28,6 +29,7 @@ mod illuminant;
 mod intensity_transfer;
 mod noise;
 mod observer;
+mod photometry;
 mod pixels;
 mod relay;
 mod sensor;
@@ -36,12 +38,13 @@ mod wavelength_sampling;
 
 pub use camera_file::Camera;
 pub use channel::{Channel, Response};
-pub use exposure::Exposure;
+pub use exposure::{Exposure, StatedExposure};
 pub use filter::{Colour, ColourFilter, ColourPixels};
 pub use illuminant::{Illuminant, Led};
 pub use intensity_transfer::Optic;
 pub use noise::Noise;
 pub use observer::observer;
+pub use photometry::{LightLevel, SceneLight, luminous_efficiency};
 pub use pixels::{PixelGrid, Reading};
 pub use relay::{RelayCamera, SATURATED};
 pub use sensor::{Sensor, SensorNoise};

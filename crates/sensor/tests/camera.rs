@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use metalith_core::{Error, Fault};
-use metalith_sensor::{Camera, ColourFilter, Illuminant, SensorNoise};
+use metalith_sensor::{Camera, ColourFilter, Illuminant, LightLevel, SensorNoise, StatedExposure};
 
 fn shipped(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cameras").join(name)
@@ -154,7 +154,7 @@ fn what_does_not_fit_together_is_said() {
         camera.toml:17:10: there is no diode
           help: add one or more sections [[illuminant.led]]
         camera.toml:18:1: unknown key `file` in [illuminant]
-          help: known here: led, source
+          help: known here: illuminance_lux, led, radiance_w_m2_sr, reflectance, source
         camera.toml:18:8: `file` is of no use with this source
           help: remove it, or change `source`
         camera.toml: channel `mono` receives no light of the illuminant
@@ -163,6 +163,60 @@ fn what_does_not_fit_together_is_said() {
           help: give a smaller `white`, or a `gain_e` of 2.1978 electrons a step and more
         "#);
     assert_eq!(errors.map(|error| error.ids().join(" ")), cases.map(|case| case.2));
+}
+
+#[test]
+fn the_light_is_stated_once_and_in_a_unit_that_it_has() {
+    let with = |exposure: &str, light: &str| {
+        let text = PLAIN.replace("time_ms = 10", exposure);
+        read(&format!("{text}{light}"))
+    };
+    let camera = with(
+        "time_ms = \"auto\"\nlongest_ms = 20",
+        "illuminance_lux = 300\nreflectance = 0.5",
+    )
+    .unwrap();
+    assert!(camera.exposure.auto && camera.exposure.time_s == 0.02);
+    assert_eq!(camera.exposure.light.level, Some(LightLevel::IlluminanceLux(300.0)));
+    assert_eq!(camera.exposure.light.reflectance, 0.5);
+    // A file that says nothing of the light.
+    let silent = with("time_ms = 10", "").unwrap();
+    assert!(!silent.exposure.auto && silent.exposure.light.level.is_none());
+    for (exposure, light, id) in [
+        (
+            "time_ms = 10",
+            "illuminance_lux = 3\nradiance_w_m2_sr = 1",
+            "illuminant.radiance_w_m2_sr/inconsistent",
+        ),
+        (
+            "time_ms = 10",
+            "radiance_w_m2_sr = 1\nreflectance = 0.5",
+            "illuminant.reflectance/inconsistent",
+        ),
+        ("time_ms = 10\nlongest_ms = 20", "", "exposure.longest_ms/inconsistent"),
+        ("time_ms = \"long\"", "", "exposure.time_ms/wrong-type"),
+    ] {
+        assert_eq!(with(exposure, light).unwrap_err().ids(), [id]);
+    }
+    let stated = |lux: Option<f64>, time_ms: Option<f64>| silent.clone().stated(&StatedExposure { lux, time_ms });
+    let lit = stated(Some(20.0), Some(5.0)).unwrap();
+    assert_eq!(lit.exposure.light.level, Some(LightLevel::IlluminanceLux(20.0)));
+    assert_eq!((lit.exposure.time_s, lit.exposure.auto), (0.005, false));
+    assert_eq!(stated(None, None).unwrap(), silent);
+    for (lux, time_ms) in [
+        (Some(f64::NAN), None),
+        (Some(-1.0), None),
+        (None, Some(0.0)),
+        (None, Some(1e9)),
+    ] {
+        assert_eq!(stated(lux, time_ms).unwrap_err().id(), "camera/exposure-out-of-range");
+    }
+    let infrared = PLAIN
+        .replace("[450, 650]", "[1500, 1600]")
+        .replace("equal_energy", "leds");
+    let diode = "[[illuminant.led]]\ncentre_nm = 1550\nwidth_nm = 30";
+    let error = read(&format!("{infrared}illuminance_lux = 500\n{diode}")).unwrap_err();
+    assert_eq!(error.ids(), ["camera/light-not-visible"]);
 }
 
 #[test]

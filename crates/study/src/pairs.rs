@@ -13,7 +13,7 @@ use metalith_imaging::{
     check_pairs_apart, write_dataset_manifest,
 };
 use metalith_optics::CalibratedModel;
-use metalith_sensor::Camera;
+use metalith_sensor::{Camera, StatedExposure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -36,6 +36,9 @@ pub struct PairsRequest {
     pub model: Option<PathBuf>,
     /// Angle from the left to the right edge of a scene (degrees).
     pub field_deg: f64,
+    /// Light and time, in place of what the camera file states.
+    #[serde(default, skip_serializing_if = "StatedExposure::is_none")]
+    pub exposure: StatedExposure,
     /// Seed of the noise.
     pub seed: u64,
     /// Paths in the order of the pairs.
@@ -148,6 +151,9 @@ impl PairsRequest {
             self.field_deg,
             self.seed
         ));
+        if !self.exposure.is_none() {
+            hash.update(format!("{:?}", self.exposure));
+        }
         // The file itself for what it verifies: by which cell, at which wavelengths.
         let mut files = vec![self.design.clone(), self.layout.clone()];
         files.extend(Camera::read(&self.camera)?.files);
@@ -168,7 +174,7 @@ impl PairsRequest {
 
     fn system(&self, cache: &KernelCache, progress: &dyn Progress) -> Result<ImagingSystem> {
         let design = Design::read_with(&self.design, progress)?;
-        let camera = Camera::read(&self.camera)?;
+        let camera = Camera::read(&self.camera)?.stated(&self.exposure)?;
         let model = self.model.as_deref().map(CalibratedModel::read).transpose()?;
         let first = self.images.first();
         let first = first.ok_or_else(|| {

@@ -47,6 +47,7 @@ fn pairs_of_shards_are_those_of_one_run() {
         camera: at("camera.toml"),
         model: None,
         field_deg: 50.0,
+        exposure: metalith_sensor::StatedExposure::default(),
         seed: 3,
         images: images.clone(),
     };
@@ -246,6 +247,8 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         pixels: None,
         learnt: Vec::new(),
         lpips: None,
+        exposure: metalith_sensor::StatedExposure::default(),
+        curve_lux: Vec::new(),
     };
     let planned = plan_comparison(&comparison, &at("parts"), &Silent).unwrap();
     assert_eq!(planned.cut().shards(), 4);

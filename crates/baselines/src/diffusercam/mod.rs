@@ -163,7 +163,9 @@ impl DiffuserCam {
             stage: None,
         };
         let white = camera.light(&camera.bench.white());
-        camera.bench = camera.bench.exposed(&white)?;
+        // A caustic is a share of the light of the opening, from a place of the scene a step wide.
+        let open_um2 = (opening[0] * opening[1]) as f64 * pixel * pixel;
+        camera.bench = camera.bench.exposed(&white, open_um2 * step * step)?;
         camera.error = camera.operator_error();
         Ok(camera)
     }

@@ -110,7 +110,9 @@ impl FlatCam {
             stage: None,
         };
         let white = camera.light(&camera.bench.white());
-        camera.bench = camera.bench.exposed(&white)?;
+        // Light is the mean over the pixels of the scene of what each sends through the mask.
+        let solid_angle = (view.rows * view.columns) as f64 * view.pixel().powi(2);
+        camera.bench = camera.bench.exposed(&white, pixel * pixel * solid_angle)?;
         camera.strength = camera.chosen_strengths();
         Ok(camera)
     }

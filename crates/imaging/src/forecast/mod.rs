@@ -134,7 +134,8 @@ mod tests {
         /// Products of bands are zero over the whole picture, but for mirrors that do not fit the square of its
         /// transform; not in its parts.
         const TOLERANCE: [f64; 4] = [0.03, 0.1, 0.1, 0.1];
-        let picture = random(3, 150, 120);
+        // Scores are of light from 0 to 1.
+        let picture = random(3, 150, 120).mapv(|v| v.clamp(0.0, 1.0));
         let power = ScenePower::of(&picture);
         // Lost altogether.
         let all = Forecast {

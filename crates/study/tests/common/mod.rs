@@ -65,7 +65,7 @@ name = "mono"
 band_nm = [600, 680]
 efficiency = 0.6
 [exposure]
-time_ms = 10
+time_ms = "auto"
 white = 0.9
 [illuminant]
 source = "equal_energy"

@@ -1,0 +1,40 @@
+//! Options that state light and time in place of a camera file.
+
+use clap::Args;
+use metalith::sensor::StatedExposure;
+
+/// Light of the scene and time of the exposure.
+#[derive(Args)]
+pub(crate) struct ExposureArgs {
+    /// Illuminance of the scene (lux); what the camera file states if left out.
+    #[arg(long, value_parser = light_of, value_name = "LUX")]
+    lux: Option<f64>,
+
+    /// Time of the exposure (ms); what the camera file states if left out.
+    #[arg(long, value_parser = time_of, value_name = "MS")]
+    time_ms: Option<f64>,
+}
+
+impl ExposureArgs {
+    /// What the options state.
+    pub(crate) fn stated(&self) -> StatedExposure {
+        StatedExposure {
+            lux: self.lux,
+            time_ms: self.time_ms,
+        }
+    }
+}
+
+/// A number within limits.
+fn within(text: &str, limits: std::ops::RangeInclusive<f64>, unit: &str) -> std::result::Result<f64, String> {
+    let number = text.parse().ok().filter(|v| limits.contains(v));
+    number.ok_or_else(|| format!("give a number from {} to {} {unit}", limits.start(), limits.end()))
+}
+
+pub(crate) fn light_of(text: &str) -> std::result::Result<f64, String> {
+    within(text, StatedExposure::LUX, "lux")
+}
+
+fn time_of(text: &str) -> std::result::Result<f64, String> {
+    within(text, StatedExposure::TIMES_MS, "ms")
+}
