@@ -135,7 +135,7 @@ mod tests {
         /// transform; not in its parts.
         const TOLERANCE: [f64; 4] = [0.03, 0.1, 0.1, 0.1];
         // Scores are of light from 0 to 1.
-        let picture = random(3, 150, 120).mapv(|v| v.clamp(0.0, 1.0));
+        let picture = random(3, 150, 120).mapv(|v| 0.4 + 0.2 * v);
         let power = ScenePower::of(&picture);
         // Lost altogether.
         let all = Forecast {
