@@ -6,6 +6,7 @@ use metalith_sensor::{Camera, ChannelSampling};
 
 use crate::chip::element_views;
 use crate::geometry::{ElementView, SceneView};
+use crate::kernel_plan::WIDEST_FIELD_DEG;
 use crate::kernels::BankSpec;
 use crate::scene::SceneImage;
 use crate::stray_light::{LightShares, StrayLight};
@@ -57,19 +58,11 @@ pub(crate) fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Cam
             "give a field from 1 to 174 degrees and a positive distance",
         ));
     }
-    let sensor = &camera.sensor;
-    let half = [f64::from(sensor.columns), f64::from(sensor.rows)].map(|n| 0.5 * n * sensor.pixel_um);
-    // Places of the scene along its border and its middle.
     let seen = |row: f64, column: f64| {
-        elements.iter().any(|e| {
-            let sines = e.sines(view.tangents(row, column), view.distance_um);
-            let um = e.wedge.wavelength_um;
-            e.landing_um(sines, um).is_some_and(|p| {
-                let on = |a: usize| (p[a] + e.centre_um[a] - sensor.offset_um[a]).abs() <= half[a];
-                p.iter().all(|v| v.abs() <= spec.reach_um) && on(0) && on(1)
-            })
-        })
+        let tangents = view.tangents(row, column);
+        (elements.iter()).any(|e| off_axis_um(e, camera, view, tangents).is_some_and(|um| um <= spec.reach_um))
     };
+    // Places of the scene along its border and its middle.
     let (last_row, last_column) = (view.rows as f64 - 1.0, view.columns as f64 - 1.0);
     if !seen(0.5 * last_row, 0.5 * last_column) {
         return Err(Error::refused(
@@ -88,18 +81,44 @@ pub(crate) fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Cam
         return Err(Error::refused(
             "scene/field-too-wide",
             format!(
-                "the scene is wider than the field of view of the array: no element images its border at ({:.1}, {:.1}) degrees onto the sensor",
+                "the scene is wider than the field of view of the array: no element images its border at ({:.1}, {:.1}) degrees onto the sensor by light that leaves within {WIDEST_FIELD_DEG} degrees of its axis",
                 tx.atan().to_degrees(),
                 ty.atan().to_degrees()
             ),
-            "give a smaller field of the scene",
+            "give a smaller field of the scene, or a larger sensor",
         ));
     }
     Ok(())
 }
 
+/// Distance along either axis from an element's axis to the image of a place of a scene (um); `None` if that is not on the sensor.
+fn off_axis_um(element: &ElementView, camera: &Camera, view: &SceneView, tangents: [f64; 2]) -> Option<f64> {
+    let sensor = &camera.sensor;
+    let half = [sensor.columns, sensor.rows].map(|n| 0.5 * f64::from(n) * sensor.pixel_um);
+    let sines = element.sines(tangents, view.distance_um);
+    let place = element.landing_um(sines, element.wedge.wavelength_um)?;
+    let on = |a: usize| (place[a] + element.centre_um[a] - sensor.offset_um[a]).abs() <= half[a];
+    (on(0) && on(1)).then(|| place[0].abs().max(place[1].abs()))
+}
+
+/// Distance from the axes of elements (um) within which each place of a scene has an image that is on the sensor, if it has one
+/// at any distance.
+pub(crate) fn needed_reach_um(elements: &[ElementView], camera: &Camera, view: &SceneView) -> f64 {
+    /// Steps between places along each axis of the scene.
+    const STEPS: usize = 8;
+    let at = |k: usize, n: usize| k as f64 / STEPS as f64 * (n as f64 - 1.0);
+    let nearest = |row: f64, column: f64| {
+        let all = (elements.iter()).filter_map(|e| off_axis_um(e, camera, view, view.tangents(row, column)));
+        all.reduce(f64::min)
+    };
+    let places = (0..=STEPS).flat_map(|i| (0..=STEPS).map(move |k| (at(i, view.rows), at(k, view.columns))));
+    places
+        .filter_map(|(row, column)| nearest(row, column))
+        .fold(0.0, f64::max)
+}
+
 /// The widest field, in whole degrees up to `most_deg`, of a square scene of so many pixels an axis that is far away and that the
-/// array sees.
+/// array sees by light that leaves within the least field of the kernels.
 ///
 /// # Errors
 /// If it sees not even one degree.

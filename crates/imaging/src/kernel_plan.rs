@@ -15,7 +15,7 @@ use crate::approximation_set::ApproximationSet;
 use crate::chip::{ChipInLight, element_views, sampling_of, sensor_um};
 use crate::colour::ChannelColours;
 use crate::exposure::ChosenExposure;
-use crate::field_of_view::{check_coverage, check_view, check_windows};
+use crate::field_of_view::{check_coverage, check_view, check_windows, needed_reach_um};
 use crate::geometry::{ElementView, SceneView};
 use crate::imaging_system::ImagingSystem;
 use crate::kernels::{BankSpec, KernelBank, SMALL_UM};
@@ -24,24 +24,29 @@ use crate::scene::SceneImage;
 use crate::spectra::{SceneSpectrum, rgb_basis};
 use crate::stray_light::StrayLight;
 
-/// Field of an element that kernels are made for: the angle from its axis, behind it (degrees). Light that leaves more
-/// steeply is the stray light's. A lens of the paper sees 60 degrees.
+/// Field of an element that kernels are at least made for: the angle from its axis, behind it (degrees). Light that leaves
+/// more steeply is the stray light's. A lens of the paper sees 60 degrees.
 const FIELD_DEG: f64 = 30.0;
-/// Nodes an axis of this field.
+/// Nodes an axis of this field. A wider field has its nodes as far apart.
 const NODES: usize = 17;
-/// Number of nodes in light of narrow bands, where nothing but the sensor's pixels smooths the images, if so many can
-/// be held: two steps for one. A restoration knows no more of them than of the others.
-const NODES_OF_NARROW: usize = 2 * (NODES - 1) + 1;
-/// Number of nodes where six of them are to hold the rings of an image out of focus (455 nm behind a lens of 140 um) to
-/// a thousandth of its peak.
-const NODES_OF_SIXFOLD: usize = 5 * (NODES - 1) / 2 + 1;
-/// Steps an axis between the nodes that a restoration knows.
-const RESTORED_STEPS: usize = (NODES - 1) / 2;
+/// Widest field that kernels are made for (degrees), where a scene needs it: three times as far from the axis.
+pub(crate) const WIDEST_FIELD_DEG: f64 = 60.0;
+/// Steps of a field from node to node by which it is widened: as many on both sides of the axis, and a restoration knows every
+/// second node.
+const WIDENED_BY: usize = 4;
+/// Steps between nodes in light of narrow bands, where nothing but the sensor's pixels smooths the images, for one in light
+/// of wide bands, if so many can be held. A restoration knows no more of them than of the others.
+const NARROW_STEPS: [usize; 2] = [2, 1];
+/// Steps for one where six nodes are to hold the rings of an image out of focus (455 nm behind a lens of 140 um) to a
+/// thousandth of its peak.
+const SIXFOLD_STEPS: [usize; 2] = [5, 2];
+/// Steps between nodes for one between the nodes that a restoration knows.
+const RESTORED_STEP: usize = 2;
 /// Pixels an axis of a kernel.
 const WINDOW: usize = 64;
 
 impl BankSpec {
-    /// Specification for the elements of a design before a camera, in light of wide bands.
+    /// Specification for the elements of a design before a camera, in light of wide bands, over the least field.
     pub fn standard(design: &Design, camera: &Camera) -> Self {
         Self {
             pixel_um: camera.sensor.pixel_um,
@@ -52,19 +57,34 @@ impl BankSpec {
         }
     }
 
+    /// This specification over a field in which elements image each place of a scene that they image onto the sensor at all, up to
+    /// the widest one. Nodes stay as far apart.
+    #[must_use]
+    pub(crate) fn over(self, elements: &[ElementView], camera: &Camera, view: &SceneView) -> Self {
+        let step_um = self.reach_um / ((self.nodes - 1) / 2) as f64;
+        let widest = WIDEST_FIELD_DEG.to_radians().tan() / FIELD_DEG.to_radians().tan();
+        let most = (widest * (self.nodes - 1) as f64).round() as usize + 1;
+        let mut wider = self;
+        let needed_um = needed_reach_um(elements, camera, view);
+        while wider.reach_um < needed_um && wider.nodes < most {
+            wider.nodes += WIDENED_BY;
+            wider.reach_um = step_um * ((wider.nodes - 1) / 2) as f64;
+        }
+        wider
+    }
+
     /// This specification with the nodes that light of a camera asks for, by how images follow from those at its
     /// wavelengths ([`Sampling::blend`](metalith_sensor::Sampling)).
     #[must_use]
     pub fn in_light(self, blend: Blend) -> Self {
-        match blend {
-            Blend::Linear => self,
-            Blend::Cubic => Self {
-                nodes: match self.between_nodes(blend) {
-                    BetweenNodes::Linear => NODES_OF_NARROW,
-                    BetweenNodes::Sixfold => NODES_OF_SIXFOLD,
-                },
-                ..self
-            },
+        let [steps, of] = match (blend, self.between_nodes(blend)) {
+            (Blend::Linear, _) => [1, 1],
+            (Blend::Cubic, BetweenNodes::Linear) => NARROW_STEPS,
+            (Blend::Cubic, BetweenNodes::Sixfold) => SIXFOLD_STEPS,
+        };
+        Self {
+            nodes: (self.nodes - 1) * steps / of + 1,
+            ..self
         }
     }
 
@@ -92,8 +112,10 @@ pub(crate) struct KernelPlan<'a> {
     /// Wavelengths between which images follow a cubic (nm), in light of narrow bands.
     cubic_nm: Option<Vec<f64>>,
     between: BetweenNodes,
-    /// Nodes an axis that are enough where those of the specification are too many to be held.
-    fewer_nodes: Option<usize>,
+    /// Nodes an axis in light of wide bands. They are enough where those of the specification are too many to be held.
+    wide_nodes: usize,
+    /// True in light of narrow bands, unless the nodes are given.
+    more_nodes: bool,
     /// Spectra of the scenes, and the primaries of the restoration among or after them.
     basis: Vec<SceneSpectrum>,
     /// Index where the primaries begin.
@@ -151,7 +173,8 @@ impl<'a> KernelPlan<'a> {
             channels,
             blend,
         } = sampling_of(design, camera)?;
-        let spec = BankSpec::standard(design, camera).in_light(blend);
+        let wide = BankSpec::standard(design, camera).over(&elements, camera, &given);
+        let spec = wide.in_light(blend);
         StrayLight::check_size(&camera.sensor, channels.len(), basis.len())?;
         if primaries > 0 {
             check_coverage(&scene, &channels)?;
@@ -166,7 +189,8 @@ impl<'a> KernelPlan<'a> {
             channels,
             cubic_nm: (blend == Blend::Cubic).then_some(wavelengths_nm),
             between: spec.between_nodes(blend),
-            fewer_nodes: (blend == Blend::Cubic).then_some(NODES),
+            wide_nodes: wide.nodes,
+            more_nodes: blend == Blend::Cubic,
             basis,
             primaries,
             spec,
@@ -219,30 +243,30 @@ impl<'a> KernelPlan<'a> {
 
     /// This plan with so many nodes whatever the light, and linear between them.
     pub(crate) fn with_nodes(mut self, nodes: usize) -> Self {
-        (self.spec.nodes, self.between, self.fewer_nodes) = (nodes, BetweenNodes::Linear, None);
+        (self.spec.nodes, self.between, self.more_nodes) = (nodes, BetweenNodes::Linear, false);
         self
     }
 
     /// This plan as in light of wide bands, for one wavelength that stands for such a band.
     pub(crate) fn for_wide_bands(self) -> Self {
-        self.with_nodes(NODES)
+        let nodes = self.wide_nodes;
+        self.with_nodes(nodes)
     }
 
     /// Every how many-th node of a bank a restoration knows.
     fn restored_step(&self, spec: &BankSpec) -> usize {
-        match self.fewer_nodes {
-            Some(_) => (spec.nodes - 1) / RESTORED_STEPS,
-            None => 2,
+        if self.more_nodes {
+            RESTORED_STEP * (spec.nodes - 1) / (self.wide_nodes - 1)
+        } else {
+            RESTORED_STEP
         }
     }
 
     /// The kernels of a chip.
     pub(crate) fn bank(&self, chip: &ChipInLight<'_>, progress: &dyn Progress) -> Result<KernelBank> {
         let mut spec = self.spec;
-        if let Some(fewer) = self.fewer_nodes
-            && KernelBank::check_size(chip, self.basis.len(), &spec).is_err()
-        {
-            spec.nodes = fewer;
+        if self.more_nodes && KernelBank::check_size(chip, self.basis.len(), &spec).is_err() {
+            spec.nodes = self.wide_nodes;
         }
         KernelBank::build(chip, &self.basis, spec, progress)
     }
@@ -309,13 +333,14 @@ mod tests {
         for (camera, narrow) in [("gt1930", false), ("gt1930_mono", false), ("gt1930_narrow", true)] {
             let camera = Camera::read(format!("../../cameras/{camera}.toml").as_ref()).unwrap();
             let plan = KernelPlan::new(&design, &camera, &scene).unwrap();
-            let (nodes, step) = if narrow { (NODES_OF_NARROW, 4) } else { (NODES, 2) };
+            let (nodes, step) = if narrow { (33, 4) } else { (NODES, 2) };
             assert_eq!(plan.spec.nodes, nodes);
-            assert_eq!(plan.fewer_nodes.is_some(), narrow);
+            assert_eq!(plan.more_nodes, narrow);
             // A restoration knows as many of both, and of those behind small lenses.
             assert_eq!(plan.restored_step(&plan.spec), step);
             let small = BankSpec {
                 accurate: true,
+                nodes: NODES,
                 ..plan.spec
             };
             let small = small.in_light(if narrow { Blend::Cubic } else { Blend::Linear });
