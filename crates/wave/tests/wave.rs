@@ -178,6 +178,10 @@ fn fold_agrees_with_the_direct_sum_for_small_lenses_wherever_they_look() {
         (0.2, -0.1, 0.45),
         (-0.45, 0.0, 0.63),
         (0.5, 0.1, 0.45),
+        // At 41, 50 and 58 degrees, as lenses that do not steer see the edge of a wide scene.
+        (0.0, 0.66, 0.55),
+        (0.0, 0.77, 0.45),
+        (0.0, 0.85, 0.65),
     ] {
         let lens = small(steer);
         let wave = PlaneWave {
