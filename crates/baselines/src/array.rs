@@ -104,7 +104,8 @@ impl BaselineCamera for ArrayCamera<'_> {
     }
 
     fn limits(&self) -> Option<String> {
-        self.error.note(&self.channel_names())
+        let all = [self.system.steep_note(), self.error.note(&self.channel_names())];
+        all.into_iter().flatten().reduce(|a, b| format!("{a}; {b}"))
     }
 
     fn record_in(&self, scene: &SceneImage, brighter: f64, seed: u64) -> Result<Frame> {

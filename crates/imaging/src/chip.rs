@@ -1,20 +1,21 @@
 //! The chip before its sensor: elements as read from a layout, in light.
 
-use metalith_cell::{Illumination, PolarisedLight};
+use metalith_cell::{Fidelity, Illumination, PolarisedLight};
 use metalith_core::{Progress, Result};
 use metalith_design::array::Symmetry;
 use metalith_design::phase::OpenAreas;
-use metalith_design::{Design, Element};
+use metalith_design::{CellIncidence, Design, Element};
 use metalith_gds::extract::Extraction;
 use metalith_optics::{
     ArrivingLight, AsBuiltElement, CaseOptics, ClassFields, ClassTable, DrawnElement, IncoherentFields, PathChange,
     SimulationCase,
 };
-use metalith_pillars::PillarMap;
+use metalith_pillars::{LatticeKind, PillarMap};
 use metalith_sensor::{Camera, Sampling, WavelengthSteps};
 use metalith_wave::PlaneWave;
 
 use crate::ElementView;
+use crate::directional_cells::DirectionalCells;
 
 /// An element that differs from all others by more than a symmetry.
 pub struct DistinctChipElement<'a> {
@@ -36,6 +37,9 @@ pub struct ChipInLight<'a> {
     pub distinct: Vec<DistinctChipElement<'a>>,
     pub sampling: Sampling,
     optics: CaseOptics<'a>,
+    /// The direction that cells are solved for.
+    incidence: CellIncidence,
+    lattice: LatticeKind,
     polarised: PolarisedLight,
     /// Change on the path of the chip.
     path: PathChange,
@@ -50,7 +54,7 @@ pub struct ElementInLight<'c> {
     chip: &'c ChipInLight<'c>,
     distinct: usize,
     /// Fields by wavelength of the camera; `None` for wavelengths that were not asked for.
-    classes: Vec<Option<ClassFields>>,
+    classes: Vec<Option<DirectionalCells>>,
 }
 
 /// Distance from the pillar tops of a design to the sensor of a camera, below the middle of the chip (um): as the
@@ -117,7 +121,17 @@ impl<'a> ChipInLight<'a> {
         let full = |nm: &f64| Ok(case.full_transmission(nm * 1e-3)?.powi(2));
         let optics = case.optics(design.cell.lattice, design.cell.most());
         let wavelengths_um: Vec<f64> = sampling.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect();
-        progress.begin("solving the cells", (chosen.len() * wavelengths_um.len()) as u64);
+        // Coupled models are solved for the viewing direction of each element alone.
+        let incidence = match design.verify.fidelity {
+            Fidelity::Neighbours => CellIncidence::Normal,
+            _ => design.verify.incidence,
+        };
+        let lattice = design.cell.lattice;
+        let directions = DirectionalCells::<()>::count(incidence);
+        progress.begin(
+            "solving the cells",
+            (chosen.len() * wavelengths_um.len() * directions) as u64,
+        );
         let mut distinct = Vec::new();
         for (k, symmetries) in chosen {
             let element = &design.elements()[k];
@@ -131,7 +145,12 @@ impl<'a> ChipInLight<'a> {
                 symmetries,
                 open_um2: areas.elements_um2[k],
             });
-            let solve = |light: &Illumination<'_>| optics.respond_over(&wavelengths_um, light, progress);
+            let solve = |light: &Illumination<'_>| {
+                DirectionalCells::solve(incidence, lattice, light, |light| {
+                    optics.respond_over(&wavelengths_um, light, progress)
+                })
+                .map(|_| ())
+            };
             in_band(&elements[k], wavelengths_um[0], design.verify.light(), solve)?;
         }
         Ok(Self {
@@ -141,6 +160,8 @@ impl<'a> ChipInLight<'a> {
             sampling,
             elements,
             optics,
+            incidence,
+            lattice,
             polarised: design.verify.light(),
             path: perturbation.path,
             source_per_m: 1e6 / scene_distance_um,
@@ -158,12 +179,16 @@ impl<'a> ChipInLight<'a> {
         wavelengths: &[usize],
         progress: &dyn Progress,
     ) -> Result<ElementInLight<'a>> {
-        let mut classes: Vec<Option<ClassFields>> = self.sampling.wavelengths_nm.iter().map(|_| None).collect();
+        let mut classes: Vec<Option<DirectionalCells>> = self.sampling.wavelengths_nm.iter().map(|_| None).collect();
         let element = &self.distinct[distinct];
         for i in wavelengths {
             progress.check_stopped()?;
-            let of = |light: &Illumination<'_>| self.optics.classes(&element.made, element.widths, light, progress);
             let um = self.sampling.wavelengths_nm[*i] * 1e-3;
+            let of = |light: &Illumination<'_>| {
+                DirectionalCells::solve(self.incidence, self.lattice, light, |light| {
+                    self.optics.classes(&element.made, element.widths, light, progress)
+                })
+            };
             classes[*i] = Some(in_band(&element.view, um, self.polarised, of)?);
         }
         Ok(ElementInLight {
@@ -201,7 +226,8 @@ impl ElementInLight<'_> {
             ..chip.path.clone()
         };
         let light = ArrivingLight::new(&stated, &path);
-        self.at(wavelength).lit(&chip.distinct[self.distinct].made, light)
+        let made = &chip.distinct[self.distinct].made;
+        self.classes_at(wavelength).from(sines).lit(made, light)
     }
 
     /// Tables of light whose direction is asked for, each with how often it has the phase of the element: see
@@ -225,7 +251,12 @@ impl ElementInLight<'_> {
         self.at(wavelength).zeroth_order(&element.made, all)
     }
 
+    /// Cells along the normal.
     fn at(&self, wavelength: usize) -> &ClassFields {
+        &self.classes_at(wavelength).normal
+    }
+
+    fn classes_at(&self, wavelength: usize) -> &DirectionalCells {
         self.classes[wavelength]
             .as_ref()
             .expect("wavelengths are asked for before")

@@ -92,7 +92,7 @@ pub(crate) fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Cam
 }
 
 /// Distance along either axis from an element's axis to the image of a place of a scene (um); `None` if that is not on the sensor.
-fn off_axis_um(element: &ElementView, camera: &Camera, view: &SceneView, tangents: [f64; 2]) -> Option<f64> {
+pub(crate) fn off_axis_um(element: &ElementView, camera: &Camera, view: &SceneView, tangents: [f64; 2]) -> Option<f64> {
     let sensor = &camera.sensor;
     let half = [sensor.columns, sensor.rows].map(|n| 0.5 * f64::from(n) * sensor.pixel_um);
     let sines = element.sines(tangents, view.distance_um);

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use metalith_cell::{Fidelity, PolarisedLight};
 use metalith_core::{Error, Progress, Result};
-use metalith_design::Design;
+use metalith_design::{CellIncidence, Design};
 use metalith_gds::extract::Extraction;
 use metalith_optics::{CalibratedModel, SimulationCase};
 use metalith_restoration::LearnedDenoiser;
@@ -141,6 +141,9 @@ struct Inputs<'a> {
     model: &'a str,
     /// The cell that pillars are simulated by, and the wavelengths that it has tables of dissimilar neighbours for.
     fidelity: Fidelity,
+    /// True if cells are solved along the directions of arrival.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    oblique: bool,
     tabulated_um: &'a [f64],
     /// Light of the scene, and the part of it that reaches the sensor, for pillars that change polarisation.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -219,6 +222,7 @@ impl<'a> KernelPlan<'a> {
             camera: &unexposed,
             model: &model_text,
             fidelity: model.map_or(self.design.verify.fidelity, |_| Fidelity::Calibrated),
+            oblique: self.design.verify.incidence == CellIncidence::Oblique,
             tabulated_um: &self.design.verify.wavelengths_um,
             polarised: (self.design.cell.shape.basis()).map(|_| self.design.verify.light()),
             basis: &self.basis,

@@ -1,8 +1,8 @@
 //! Report of a picture.
 
 use metalith_cell::{Fidelity, FocusedLight, PolarisedLight};
-use metalith_design::Design;
 use metalith_design::phase::OpenAreas;
+use metalith_design::{CellIncidence, Design};
 use metalith_optics::{CalibratedModel, ModelStatement};
 use metalith_restoration::RestorationMethod;
 use metalith_sensor::Camera;
@@ -205,7 +205,12 @@ impl ImagingSystem {
     /// Notes on a frame, to read before its picture is viewed; `truth` is the scene in linear sRGB.
     pub fn notes(&self, frame: &Frame, truth: &Array3<f64>) -> Vec<String> {
         let layout = self.pillars.as_ref().and_then(PillarCount::note);
-        let all = [frame.saturation_note(truth), layout, averaging(&self.given, &self.view)];
+        let all = [
+            self.steep_note(),
+            frame.saturation_note(truth),
+            layout,
+            averaging(&self.given, &self.view),
+        ];
         self.light()
             .notes()
             .into_iter()
@@ -292,7 +297,12 @@ impl ImagingSystem {
                     nm.join(", ")
                 )
             }
-            _ => format!("`{fidelity}`, solved at normal incidence for every angle of arrival"),
+            _ => match self.design.verify.incidence {
+                CellIncidence::Normal => format!("`{fidelity}`, solved at normal incidence for every angle of arrival"),
+                CellIncidence::Oblique => format!(
+                    "`{fidelity}`, solved for angles of arrival up to 64 degrees in two planes and interpolated between these, mean of both polarisations; stray light is that of cells at normal incidence"
+                ),
+            },
         };
         let assumption = |what: &str, value: String| Assumption {
             what: what.to_owned(),

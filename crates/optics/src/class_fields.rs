@@ -4,6 +4,7 @@ use super::{ArrivingLight, AsBuiltElement, CameraChange, ClassTable, IncoherentF
 
 /// Fields of the classes of an element in one light, for pictures: from any direction, along which cells are not solved
 /// anew.
+#[derive(Clone)]
 pub struct ClassFields {
     pub(crate) tables: Vec<ClassTable>,
     pub(crate) departing: Option<Vec<(ClassTable, i32)>>,
@@ -13,6 +14,33 @@ pub struct ClassFields {
 }
 
 impl ClassFields {
+    /// Fields of the same classes between directions that cells are solved for, by weights whose sum is one. The phase that all
+    /// classes share turns fast with the direction and no intensity depends on it: it is taken out before tables are added.
+    ///
+    /// # Panics
+    /// If there are none.
+    #[must_use]
+    pub fn between(parts: &[(f64, &Self)]) -> Self {
+        // Along the normal one table is that of all polarisations.
+        let first = parts.iter().map(|(_, part)| *part).max_by_key(|part| part.tables.len());
+        let first = first.expect("there is one at least");
+        let table = |k: usize| {
+            let of = |part: &'_ Self| k.min(part.tables.len() - 1);
+            let tables: Vec<_> = parts
+                .iter()
+                .map(|(weight, part)| (*weight, &part.tables[of(part)]))
+                .collect();
+            ClassTable::between(&tables)
+        };
+        Self {
+            tables: (0..first.tables.len()).map(table).collect(),
+            departing: None,
+            weight: first.weight,
+            defocus_um: first.defocus_um,
+            camera: first.camera.clone(),
+        }
+    }
+
     /// The element in light from a direction.
     pub fn lit<'e>(&self, element: &'e AsBuiltElement, light: ArrivingLight) -> IncoherentFields<'e> {
         let (tables, camera) = (self.tables.clone(), self.camera.clone());

@@ -88,6 +88,28 @@ impl ClassTable {
             .sum()
     }
 
+    /// Table between some of the same classes, by weights whose sum is one, each turned to the phase of the first.
+    pub(super) fn between(parts: &[(f64, &Self)]) -> Self {
+        let mut all = Self {
+            t: vec![Complex32::ZERO; parts[0].1.t.len()],
+            to_rim: Vec::new(),
+            scattered: 0.0,
+            sites: parts[0].1.sites.clone(),
+        };
+        for (weight, part) in parts {
+            let overlap: Complex32 = part
+                .t
+                .iter()
+                .zip(&parts[0].1.t)
+                .map(|(t, first)| t.conj() * first)
+                .sum();
+            let turn = Complex32::from_polar(*weight as f32, overlap.arg());
+            all.t.iter_mut().zip(&part.t).for_each(|(sum, t)| *sum += turn * t);
+            all.scattered += weight * part.scattered;
+        }
+        all
+    }
+
     /// These sites with all light multiplied by this.
     #[must_use]
     pub fn scaled(mut self, by: f32) -> Self {
