@@ -20,6 +20,7 @@ mod layout;
 mod new;
 mod new_set;
 mod optimise;
+mod optimise_camera;
 mod out_folder;
 mod output;
 mod paths;

@@ -14,6 +14,7 @@ use metalith::report::{counted, sig};
 use metalith::study::plan_starts;
 use metalith::{AtomicFile, Design, Hierarchy, PillarArray, Result, write_pillars};
 
+use super::optimise_camera::{self, CameraSearch};
 use super::out_folder::OutFolder;
 use super::paths::paths;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
@@ -38,6 +39,11 @@ pub(crate) struct OptimiseArgs {
     #[arg(long, value_name = "FILE")]
     phase: Option<PathBuf>,
 
+    /// Search a whole camera before the sensor and in the light of this camera file: the section [optimise.camera] of the design says
+    /// which.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["phase", "fresh", "no_report", "plan"])]
+    camera: Option<PathBuf>,
+
     /// Ignore the state of an interrupted run.
     #[arg(long)]
     fresh: bool,
@@ -60,12 +66,21 @@ pub(crate) struct OptimiseArgs {
     starts_per_shard: u64,
 }
 
+/// Reason why a search of cameras names its design.
+const OF_CAMERAS: [&str; 2] = [
+    "a search of cameras",
+    "its text is that of the designs that are found, but for the elements",
+];
+
 /// Files that speak of a phase, and their list.
 const STALE: [&str; 4] = ["report.html", "report.json", "lens.gds", ".report.sha256"];
 
 pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
     if args.plan.is_some() {
         standard_input::named(standard_input::OF_PLANS, [args.design.as_path()])?;
+    }
+    if args.camera.is_some() {
+        standard_input::named(OF_CAMERAS, [args.design.as_path()])?;
     }
     let design = standard_input::design(&args.design, terminal)?;
     terminal.stop_on_interrupt();
@@ -75,6 +90,17 @@ pub(crate) fn run(args: &OptimiseArgs, terminal: &Terminal) -> Result<Outcome> {
         Some(out) => out.clone(),
         None => out.path.join("optimise"),
     };
+    if let Some(camera) = &args.camera {
+        let search = CameraSearch {
+            design: &design,
+            camera,
+            folder: &folder,
+            out: &out,
+            command: format!("{} --camera {}", command(args), camera.display()),
+            json: args.json,
+        };
+        return optimise_camera::run(&search, terminal);
+    }
     if let Some(starts) = args.plan {
         let plan = plan_starts(&args.design, starts, args.starts_per_shard, &folder, terminal)?;
         out.note()?;

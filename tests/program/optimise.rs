@@ -242,3 +242,38 @@ fn a_lens_of_rotated_rectangles_is_optimised() {
     assert!((own / judged - 1.0).abs() < AS_VERIFIED, "{own} {judged}");
     assert!((mean("after", "1") / own - 1.0).abs() < OF_A_BAND, "{own}");
 }
+
+/// A search of one small camera writes its design, which the program reads, beside front and page.
+#[test]
+fn a_camera_is_searched_and_its_design_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = fs::read_to_string("designs/imaging_3x3.toml").unwrap();
+    let table = Path::new("designs/phases/imaging.csv").canonicalize().unwrap();
+    let phase = format!("\"{}\"", table.display());
+    let (head, _) = design.split_once("[optimise]").unwrap();
+    let section = "[optimise]\ncell = \"published\"\n\n[optimise.camera]\nfield_deg = 80\nmost_track_um = 2400\ncolumns = [2]\n\
+                   rows = [1]\ndiameters_um = [60]\nstarts = 1\nsteps = 1\nfinal_steps = 1\n";
+    let path = folder.path().join("small.toml");
+    fs::write(
+        &path,
+        format!("{}{section}", head.replace("\"phases/imaging.csv\"", &phase)),
+    )
+    .unwrap();
+    let out = folder.path().join("out");
+    let search = |design: &Path| {
+        let mut command = super::metalith();
+        command.arg("optimise").arg(design).arg("--out").arg(&out);
+        command.arg("--camera").arg("cameras/gt1930.toml");
+        command
+    };
+    search(&path).assert().success();
+    let front = fs::read_to_string(out.join("front.csv")).unwrap();
+    assert_eq!(front.lines().count(), 2);
+    assert!(out.join("report.html").is_file() && out.join("report.json").is_file());
+    let found = Design::read(&out.join("camera_500.toml")).unwrap();
+    assert_eq!(found.array.elements().len(), 2);
+    assert_eq!(found.lens.diameter_nm, 60_000);
+    // A design without the section sets no task.
+    let text = String::from_utf8(search(Path::new("designs/imaging_3x3.toml")).output().unwrap().stderr).unwrap();
+    assert!(text.contains(&crate::refusal("optimise/no-camera-section")), "{text}");
+}

@@ -19,6 +19,7 @@
 //! restored images (`deconvolution`), any weighted sum, and the expectation of the first three over errors
 //! of fabrication (`robust`).
 
+pub mod camera;
 mod cells;
 mod image;
 mod merit;

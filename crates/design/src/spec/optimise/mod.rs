@@ -1,6 +1,9 @@
 //! `[optimise]`: how `metalith optimise` finds the radial phase.
 
+mod camera;
 mod refusals;
+
+pub use camera::CameraSearchSpec;
 
 use serde::Serialize;
 
@@ -32,6 +35,9 @@ pub struct OptimiseSpec {
     pub merit: MeritSpec,
     pub robust: Option<RobustSpec>,
     pub views: ViewSpec,
+    /// Whole cameras that are searched in place of a radial phase.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraSearchSpec>,
     /// Bound of all kernels together (MB).
     pub memory_mb: u64,
 }
@@ -182,6 +188,7 @@ impl OptimiseSpec {
             merit,
             robust: s.optional_section("robust").map(|r| RobustSpec::read(&r)),
             views: views.map_or_else(|| default.views.clone(), |v| ViewSpec::read(&v)),
+            camera: s.optional_section("camera").map(|c| CameraSearchSpec::read(&c)),
             memory_mb: s
                 .optional_integer("memory_mb", 16..=1 << 20, "MB")
                 .map_or(if images { 8192 } else { default.memory_mb }, |m| m as u64),
@@ -241,6 +248,7 @@ impl Default for OptimiseSpec {
                 shared_filter: 0.5,
                 drawn: 3,
             },
+            camera: None,
             memory_mb: 1024,
         }
     }

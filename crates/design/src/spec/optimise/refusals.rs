@@ -149,4 +149,35 @@ mod tests {
             the solver `adam` with the coupled model
             ");
     }
+
+    /// Settings of a search of cameras that no camera can have.
+    #[test]
+    fn cameras_that_cannot_be_are_refused() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/imaging_3x3.toml");
+        let design = std::fs::read_to_string(&path).unwrap();
+        let ids = |change: [&str; 2]| {
+            let section = "\n[optimise.camera]\nfield_deg = 80\nmost_track_um = 2400\ncolumns = [2]\nrows = [2]\ndiameters_um = [200]\n";
+            match Design::parse(&path, &format!("{design}{}", section.replace(change[0], change[1]))) {
+                Ok(_) => Vec::new(),
+                Err(error) => error.ids().iter().map(ToString::to_string).collect(),
+            }
+        };
+        assert!(ids(["", ""]).is_empty());
+        let wrong = [
+            ["rows = [2]", "rows = [2, 3]"],
+            ["rows = [2]", "rows = [1.5]"],
+            ["columns = [2]\nrows = [2]", "columns = [9]\nrows = [9]"],
+            ["diameters_um = [200]", "diameters_um = []"],
+            [
+                "diameters_um = [200]",
+                "diameters_um = [200]\nfocal_lengths_um = [2500]",
+            ],
+            ["diameters_um = [200]", "diameters_um = [200]\nwedge_shares = [2]"],
+            ["field_deg = 80", "field_deg = 180"],
+            ["field_deg = 80", "field_deg = 80\nwall = \"yes\""],
+        ];
+        for change in wrong {
+            assert_eq!(ids(change).len(), 1, "{change:?}: {:?}", ids(change));
+        }
+    }
 }

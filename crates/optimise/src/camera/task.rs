@@ -1,0 +1,280 @@
+//! The cameras that a design asks for, tried one after the other, and the best of them for each light.
+
+use metalith_cell::CellModel;
+use metalith_core::{Error, Progress, Result};
+use metalith_design::array::PillarRule;
+use metalith_design::{CameraSearchSpec, Design};
+use metalith_sensor::Camera;
+
+use super::design_text::design_text;
+use super::efficiency::efficiency;
+use super::element::CameraElement;
+use super::light::CameraLight;
+use super::model::{CameraModel, Judged, ModelSettings, WINDOW_UM};
+use super::scene::NaturalScene;
+use super::search::{Arrangement, CameraStart};
+use crate::rings::mapping::Mapping;
+
+/// Band that lenses of glass and silicon nitride are simulated in where the camera counts (nm).
+const BAND_NM: [f64; 2] = [400.0, 700.0];
+/// Steps of wavelength while cameras are compared, and of the last descent (nm).
+const STEPS_NM: [f64; 2] = [25.0, 12.5];
+/// Points along half of the field while cameras are compared, and in the last descent.
+const NODES: [usize; 2] = [3, 4];
+/// Share of the wavelength by which the channels of a colour camera are wide: what a wedge smears.
+const WIDTH: f64 = 0.2;
+
+/// One camera that was tried.
+#[derive(Clone, Debug)]
+pub struct TriedCamera {
+    pub lux: f64,
+    pub arrangement: Arrangement,
+    pub start: CameraStart,
+    pub judged: Judged,
+    pub overlaps: bool,
+    /// Elements, of the best cameras after their last descent.
+    pub elements: Vec<CameraElement>,
+}
+
+/// Search of a whole camera.
+pub struct CameraTask {
+    pub spec: CameraSearchSpec,
+    camera: Camera,
+    settings: ModelSettings,
+    mapping: Mapping,
+    seed: u64,
+}
+
+/// Cameras that were tried.
+pub struct CameraFindings {
+    /// All of them, each after its first descents.
+    pub tried: Vec<TriedCamera>,
+    /// The best for each light, after the last descent.
+    pub best: Vec<TriedCamera>,
+    /// True if the user stopped the search before all were tried.
+    pub interrupted: bool,
+}
+
+impl CameraTask {
+    /// The task that a design sets before a camera.
+    ///
+    /// # Errors
+    /// If the design has no section [optimise.camera], its pillars have no width, or no camera fits its limits.
+    pub fn of(design: &Design, camera: Camera) -> Result<Self> {
+        let Some(spec) = design.optimise.camera.clone() else {
+            return Err(Error::refused(
+                "optimise/no-camera-section",
+                format!("the design `{}` has no section [optimise.camera]", design.name),
+                "add the section with `field_deg`, `most_track_um`, `columns`, `rows` and `diameters_um`, or leave --camera out",
+            ));
+        };
+        crate::cells::check_shape(design)?;
+        if design.cell.shape.rotated().is_some() {
+            return Err(Error::refused(
+                "optimise/camera-of-rotated-pillars",
+                "whole cameras are searched for pillars that their width distinguishes",
+                "take a cell with round or square pillars",
+            ));
+        }
+        let settings = ModelSettings {
+            scene: NaturalScene::new(spec.field_deg, spec.scene_pixels),
+            field_deg: spec.field_deg,
+            wedge_um: design.array.wedge_wavelength_um,
+            walls: spec.walls,
+            window_um: WINDOW_UM,
+        };
+        Ok(Self {
+            settings,
+            camera,
+            mapping: Mapping::new(&PillarRule::new(&design.cell, &design.mapping)),
+            seed: design.optimise.seed,
+            spec,
+        })
+    }
+
+    fn light(&self, lux: f64, step_nm: f64, cell: &dyn CellModel) -> Result<CameraLight> {
+        let share = |um: f64| efficiency(cell, &self.mapping, um);
+        CameraLight::new(&self.camera, lux, self.spec.time_s, BAND_NM, step_nm, &share)
+    }
+
+    fn edge(&self) -> f64 {
+        (0.5 * self.spec.field_deg).to_radians().tan()
+    }
+
+    /// Arrangements to try.
+    ///
+    /// # Errors
+    /// If none keeps the limits.
+    pub fn arrangements(&self, light: &CameraLight) -> Result<Vec<Arrangement>> {
+        let spec = &self.spec;
+        let mut all = Vec::new();
+        for &count in &spec.arrangements {
+            let largest = Arrangement::largest_um(count, light, self.edge()).min(spec.most_track_um);
+            // Whole micrometres.
+            let own = [largest.floor()];
+            let distances = if spec.focal_lengths_um.is_empty() {
+                &own[..]
+            } else {
+                &spec.focal_lengths_um
+            };
+            for &distance_um in distances {
+                for &diameter_um in &spec.diameters_um {
+                    for &wedge_share in &spec.wedge_shares {
+                        all.push(Arrangement {
+                            count,
+                            distance_um,
+                            diameter_um,
+                            wedge_share,
+                            steering_deg: 0.0,
+                        });
+                    }
+                }
+            }
+        }
+        all.retain(|a| (0..2).all(|axis| a.count[axis] == 1 || a.pitch_um(axis, light, self.edge()) > a.diameter_um));
+        if all.is_empty() {
+            return Err(Error::refused(
+                "optimise/no-camera-fits",
+                "the elements of every arrangement overlap on a chip of the size of the sensor",
+                "use smaller `diameters_um` or fewer columns and rows",
+            ));
+        }
+        Ok(all)
+    }
+
+    fn settings_of(&self, arrangement: &Arrangement) -> ModelSettings {
+        // What a wedge smears within a channel.
+        let smear = arrangement.wedge_share * self.edge() * arrangement.distance_um * WIDTH;
+        ModelSettings {
+            window_um: WINDOW_UM.max(0.45 * arrangement.diameter_um).max(2.5 * smear),
+            ..self.settings
+        }
+    }
+
+    /// Try all cameras, and improve the best for each light. The same task gives the same cameras on any number of threads.
+    ///
+    /// # Errors
+    /// If the cell is not known at a wavelength of the camera, the light is not visible, or no camera fits.
+    pub fn search(&self, cell: &dyn CellModel, progress: &dyn Progress) -> Result<CameraFindings> {
+        let mut findings = CameraFindings {
+            tried: Vec::new(),
+            best: Vec::new(),
+            interrupted: false,
+        };
+        let lights = &self.spec.illuminance_lux;
+        let coarse = lights
+            .iter()
+            .map(|lux| self.light(*lux, STEPS_NM[0], cell))
+            .collect::<Result<Vec<_>>>()?;
+        let fine = lights
+            .iter()
+            .map(|lux| self.light(*lux, STEPS_NM[1], cell))
+            .collect::<Result<Vec<_>>>()?;
+        let arrangements = self.arrangements(&coarse[0])?;
+        progress.begin("cameras", (lights.len() * (arrangements.len() + 1)) as u64);
+        for ((&lux, light), fine) in lights.iter().zip(&coarse).zip(&fine) {
+            for arrangement in &arrangements {
+                match self.first(lux, light, arrangement, progress) {
+                    Ok(camera) => findings.tried.push(camera),
+                    Err(_) if progress.check_stopped().is_err() => {
+                        findings.interrupted = true;
+                        break;
+                    }
+                    Err(other) => return Err(other),
+                }
+                progress.advance(1);
+            }
+            let own = findings.tried.iter().filter(|c| c.lux == lux);
+            let Some(best) = own.min_by(|a, b| a.judged.error.total_cmp(&b.judged.error)).cloned() else {
+                break;
+            };
+            findings
+                .best
+                .push(self.last(best, fine, &mut findings.interrupted, progress)?);
+            progress.advance(1);
+            if findings.interrupted {
+                break;
+            }
+        }
+        if findings.best.is_empty() {
+            progress.check_stopped()?;
+        }
+        Ok(findings)
+    }
+
+    /// A camera after short descents from each start.
+    fn first(
+        &self,
+        lux: f64,
+        light: &CameraLight,
+        arrangement: &Arrangement,
+        progress: &dyn Progress,
+    ) -> Result<TriedCamera> {
+        let settings = self.settings_of(arrangement);
+        let model = CameraModel::new(light.clone(), &settings, arrangement.distance_um, NODES[0]);
+        let mut best: Option<TriedCamera> = None;
+        for start in CameraStart::ALL.into_iter().take(self.spec.starts) {
+            let elements = arrangement.elements(light, self.edge(), start, self.seed);
+            let (elements, judged) = arrangement.descend(&model, &elements, self.spec.steps, progress)?;
+            if best.as_ref().is_none_or(|b| judged.error < b.judged.error) {
+                best = Some(TriedCamera {
+                    lux,
+                    arrangement: *arrangement,
+                    start,
+                    judged,
+                    overlaps: !self.spec.walls && arrangement.overlaps(light, self.edge()),
+                    elements,
+                });
+            }
+        }
+        Ok(best.expect("there is a start"))
+    }
+
+    /// The best camera after a long descent at more wavelengths and places; as it is if the user stopped.
+    fn last(
+        &self,
+        best: TriedCamera,
+        light: &CameraLight,
+        interrupted: &mut bool,
+        progress: &dyn Progress,
+    ) -> Result<TriedCamera> {
+        let settings = self.settings_of(&best.arrangement);
+        let model = CameraModel::new(light.clone(), &settings, best.arrangement.distance_um, NODES[1]);
+        match best
+            .arrangement
+            .descend(&model, &best.elements, self.spec.final_steps, progress)
+        {
+            Ok((elements, judged)) => Ok(TriedCamera {
+                judged,
+                elements,
+                ..best
+            }),
+            Err(_) if progress.check_stopped().is_err() => {
+                *interrupted = true;
+                let judged = model.judge(&best.elements, false);
+                Ok(TriedCamera { judged, ..best })
+            }
+            Err(other) => Err(other),
+        }
+    }
+
+    /// A camera as a design: the text of the design that it was searched for, with the camera's elements.
+    pub fn design_text(&self, text: &str, name: &str, camera: &TriedCamera) -> String {
+        let [x, y] = camera.arrangement.count;
+        let title = format!(
+            "{x} by {y} elements of {} um for {} lux, {:.2} dB expected",
+            camera.arrangement.diameter_um,
+            camera.lux,
+            camera.judged.psnr_db()
+        );
+        let wedge_um = self.settings.wedge_um;
+        design_text(
+            text,
+            name,
+            &title,
+            &camera.elements,
+            camera.arrangement.distance_um,
+            wedge_um,
+        )
+    }
+}

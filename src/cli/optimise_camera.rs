@@ -1,0 +1,69 @@
+//! `metalith optimise --camera`: a whole camera.
+
+use std::path::Path;
+
+use metalith::cell::cache_folder;
+use metalith::file::InputFiles;
+use metalith::optimise::TaskCells;
+use metalith::optimise::camera::{CameraReport, CameraTask};
+use metalith::sensor::Camera;
+use metalith::{Design, Error, Result};
+
+use super::out_folder::OutFolder;
+use super::paths::{inputs_of, paths};
+use super::{Outcome, Terminal, print_json, print_line};
+
+/// What is asked for.
+pub(super) struct CameraSearch<'a> {
+    pub design: &'a Design,
+    pub camera: &'a Path,
+    /// Folder of the results, and its note.
+    pub folder: &'a Path,
+    pub out: &'a OutFolder,
+    pub command: String,
+    pub json: bool,
+}
+
+/// Files of a search that may be there already, and their list.
+const STALE: [&str; 4] = ["report.html", "report.json", "front.csv", ".report.sha256"];
+
+pub(super) fn run(asked: &CameraSearch<'_>, terminal: &Terminal) -> Result<Outcome> {
+    let design = asked.design;
+    let camera = Camera::read(asked.camera)?;
+    let task = CameraTask::of(design, camera.clone())?;
+    let text = std::fs::read_to_string(&design.path).map_err(Error::io("read", &design.path))?;
+    let inputs = inputs_of(design, camera.files.iter().map(std::path::PathBuf::as_path));
+    InputFiles::of(paths(&inputs)).check_outputs(&[&asked.folder.join("report.json")])?;
+    let cells = TaskCells::of(design, false, cache_folder().as_deref(), terminal)?;
+    let turn = terminal.turn_at(asked.folder, paths(&inputs))?;
+    asked.out.note()?;
+    let found = task.search(cells.own(), terminal)?;
+    let report = CameraReport::new(design, &text, &task, &camera.name, &found, asked.command.clone())?;
+    turn.publish("report", &STALE, |folder| report.write(folder))?;
+    terminal.clear();
+    if asked.json {
+        print_json(&report);
+    } else {
+        for best in &report.best {
+            print_line!(
+                "{} lux: {} x {} elements of {} um, {} um before the sensor: {:.2} dB expected, {}",
+                best.illuminance_lux,
+                best.columns,
+                best.rows,
+                best.diameter_um,
+                best.distance_um,
+                best.psnr_linear_db,
+                asked.folder.join(best.file.as_deref().unwrap_or_default()).display()
+            );
+        }
+        print_line!("report: {}", asked.folder.join("report.html").display());
+    }
+    for warning in &report.warnings {
+        terminal.say(warning);
+    }
+    Ok(if found.interrupted {
+        Outcome::NotDone
+    } else {
+        Outcome::Fine
+    })
+}
