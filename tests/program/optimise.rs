@@ -250,8 +250,8 @@ fn a_camera_is_searched_and_its_design_is_read() {
     let design = fs::read_to_string("designs/imaging_3x3.toml").unwrap();
     let table = Path::new("designs/phases/imaging.csv").canonicalize().unwrap();
     let phase = format!("\"{}\"", table.display());
-    let (head, _) = design.split_once("[optimise]").unwrap();
-    let section = "[optimise]\ncell = \"published\"\n\n[optimise.camera]\nfield_deg = 80\nmost_track_um = 2400\ncolumns = [2]\n\
+    let (head, _) = design.split_once("\n[optimise]").unwrap();
+    let section = "\n[optimise]\ncell = \"published\"\n\n[optimise.camera]\nfield_deg = 80\nmost_track_um = 2400\ncolumns = [2]\n\
                    rows = [1]\ndiameters_um = [60]\nstarts = 1\nsteps = 1\nfinal_steps = 1\n";
     let path = folder.path().join("small.toml");
     fs::write(
