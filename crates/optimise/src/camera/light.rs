@@ -1,6 +1,6 @@
 //! Light of a camera: wavelengths of its channels, what the metasurface does to them, electrons and noise.
 
-use metalith_sensor::{Camera, Colour, ColourFilter, WavelengthSteps};
+use metalith_sensor::{Camera, Colour, ColourFilter, StatedExposure, WavelengthSteps};
 
 use metalith_core::Result;
 
@@ -57,7 +57,10 @@ impl CameraLight {
         step_nm: f64,
         efficiency: &dyn Fn(f64) -> Result<Efficiency>,
     ) -> Result<Self> {
-        let camera = camera.clone().in_lux(lux)?;
+        let camera = camera.clone().stated(&StatedExposure {
+            lux: Some(lux),
+            time_ms: None,
+        })?;
         let sampling = camera.sampling(band_nm, WavelengthSteps::from(step_nm))?;
         let wavelengths_um: Vec<f64> = sampling.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect();
         let shares = wavelengths_um
