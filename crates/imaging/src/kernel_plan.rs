@@ -356,6 +356,42 @@ mod tests {
         }
     }
 
+    /// Fields of scenes that 30 degrees hold have the kernels of these; wider ones have kernels as far apart, up to 60 degrees.
+    #[test]
+    fn the_field_of_kernels_follows_the_scene() {
+        let camera = Camera::read("../../cameras/gt1930.toml".as_ref()).unwrap();
+        let one = [
+            ("elements = [3, 3]", "elements = [1, 1]"),
+            ("steering_deg = 15", "steering_deg = 0"),
+        ];
+        let of = |name: &str, changed: &[(&str, &str)]| {
+            let text = metalith_testing::accepting(&metalith_testing::changed(name, changed));
+            Design::parse(&metalith_testing::design(name), &text).unwrap()
+        };
+        let steering = of("prototype_3x3", &[]);
+        let alone = of("prototype_3x3", &one);
+        let nodes = |design: &Design, field_deg: f64| {
+            let scene = SceneImage::of_rgb("dark", &Array3::zeros((64, 64, 3)), field_deg, f64::INFINITY);
+            KernelPlan::new(design, &camera, &scene).map(|plan| {
+                let BankSpec { nodes, reach_um, .. } = plan.spec;
+                assert_eq!(plan.restored_step(&plan.spec), 2);
+                (nodes, (reach_um / 2400.0).atan().to_degrees())
+            })
+        };
+        let standard = BankSpec::standard(&steering, &camera);
+        for design in [(&steering, 80.0), (&steering, 60.0), (&alone, 60.0)] {
+            assert_eq!(nodes(design.0, design.1).unwrap().0, NODES, "{}", design.1);
+        }
+        let (count, reach_deg) = nodes(&alone, 80.0).unwrap();
+        // The step of nodes is that of the standard field, and the reach is no more than a restored step farther than needed.
+        assert_eq!(count, 25);
+        let step_um = standard.node_um(1) - standard.node_um(0);
+        let farther = 2400.0 * (reach_deg.to_radians().tan() - 40f64.to_radians().tan());
+        assert!((0.0..2.0 * step_um).contains(&farther), "{reach_deg}");
+        // The sensor ends at 56 degrees along y, before the kernels do.
+        assert_eq!(nodes(&alone, 118.0).unwrap_err().id(), "scene/field-too-wide");
+    }
+
     /// Scenes that are finer than half a pixel of the sensor are averaged to that, and others stay as they are.
     #[test]
     fn fine_scenes_are_averaged_to_what_is_simulated() {
