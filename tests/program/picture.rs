@@ -40,10 +40,9 @@ fn what_cannot_be_pictured_is_refused() {
         "source = \"leds\"\nradiance_w_m2_sr = 1\n[[illuminant.led]]\ncentre_nm = 900\nwidth_nm = 5\n",
     );
     let gt = "cameras/gt1930.toml";
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 6] = [
         (&["--camera", &beside], "error[camera/sensor-misplaced]"),
         (&["--camera", &dark], "error[camera/channel-without-light]"),
-        (&["--camera", gt, "--field-deg", "150"], "error[scene/field-too-wide]"),
         (&["--camera", gt, "--method", "magic"], "error[restore/unknown-method]"),
         (&["--camera", gt, "--distance-mm", "0"], "error[option/out-of-range]"),
         (
