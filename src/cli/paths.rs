@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith::{Design, Result};
+use metalith::Design;
 
 /// Paths of all inputs: those of a design, and those that arguments name.
 pub(crate) fn inputs_of<'p>(design: &Design, named: impl IntoIterator<Item = &'p Path>) -> Vec<PathBuf> {
@@ -27,7 +27,7 @@ pub(crate) fn name_of(path: &Path) -> String {
 ///
 /// # Errors
 /// As [`metalith::AtomicFile::create`].
-pub(crate) fn writable(outputs: &[&Path]) -> Result<()> {
+pub(crate) fn writable(outputs: &[&Path]) -> metalith::Result<()> {
     outputs
         .iter()
         .try_for_each(|output| metalith::AtomicFile::create(output).map(drop))

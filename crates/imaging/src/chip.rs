@@ -63,6 +63,14 @@ pub fn sensor_um(design: &Design, camera: &Camera) -> f64 {
     camera.sensor.distance_um.unwrap_or(design.lens.focal_length_um)
 }
 
+/// Direction that the cells of pictures are solved for: coupled models are solved for the viewing direction of each element alone.
+pub(crate) fn incidence(design: &Design) -> CellIncidence {
+    match design.verify.fidelity {
+        Fidelity::Neighbours => CellIncidence::Normal,
+        _ => design.verify.incidence,
+    }
+}
+
 /// Views of the elements of a design before a sensor: one plane for all, whatever their focal lengths.
 pub fn element_views(design: &Design, camera: &Camera) -> Vec<ElementView> {
     views_of(design, camera, &OpenAreas::of(design))
@@ -121,12 +129,7 @@ impl<'a> ChipInLight<'a> {
         let full = |nm: &f64| Ok(case.full_transmission(nm * 1e-3)?.powi(2));
         let optics = case.optics(design.cell.lattice, design.cell.most());
         let wavelengths_um: Vec<f64> = sampling.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect();
-        // Coupled models are solved for the viewing direction of each element alone.
-        let incidence = match design.verify.fidelity {
-            Fidelity::Neighbours => CellIncidence::Normal,
-            _ => design.verify.incidence,
-        };
-        let lattice = design.cell.lattice;
+        let (incidence, lattice) = (incidence(design), design.cell.lattice);
         let directions = DirectionalCells::<()>::count(incidence);
         progress.begin(
             "solving the cells",

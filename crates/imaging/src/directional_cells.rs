@@ -34,7 +34,7 @@ impl<T> DirectionalCells<T> {
     /// Answers to a light along the normal, and to the same light from all directions.
     ///
     /// # Errors
-    /// As `solve`.
+    /// Errors of `solve`.
     pub(crate) fn solve(
         incidence: CellIncidence,
         lattice: LatticeKind,

@@ -12,7 +12,7 @@ use metalith_sensor::{Blend, Camera, ChannelSampling, Sampling};
 use serde::Serialize;
 
 use crate::approximation_set::ApproximationSet;
-use crate::chip::{ChipInLight, element_views, sampling_of, sensor_um};
+use crate::chip::{ChipInLight, element_views, incidence, sampling_of, sensor_um};
 use crate::colour::ChannelColours;
 use crate::exposure::ChosenExposure;
 use crate::field_of_view::{check_coverage, check_view, check_windows, needed_reach_um};
@@ -222,7 +222,7 @@ impl<'a> KernelPlan<'a> {
             camera: &unexposed,
             model: &model_text,
             fidelity: model.map_or(self.design.verify.fidelity, |_| Fidelity::Calibrated),
-            oblique: self.design.verify.incidence == CellIncidence::Oblique,
+            oblique: incidence(self.design) == CellIncidence::Oblique,
             tabulated_um: &self.design.verify.wavelengths_um,
             polarised: (self.design.cell.shape.basis()).map(|_| self.design.verify.light()),
             basis: &self.basis,

@@ -3,6 +3,7 @@
 use metalith_cell::Fidelity;
 use metalith_design::CellIncidence;
 
+use crate::chip::incidence;
 use crate::field_of_view::off_axis_um;
 use crate::geometry::SceneView;
 use crate::imaging_system::ImagingSystem;
@@ -14,11 +15,10 @@ const MISLEADING: f64 = 0.45;
 impl ImagingSystem {
     /// Note on light of the scene that is imaged by cells which are solved for another direction.
     pub fn steep_note(&self) -> Option<String> {
-        let verify = &self.design.verify;
-        let coupled = verify.fidelity == Fidelity::Neighbours;
-        if verify.incidence == CellIncidence::Oblique && !coupled {
+        if incidence(&self.design) == CellIncidence::Oblique {
             return None;
         }
+        let coupled = self.design.verify.fidelity == Fidelity::Neighbours;
         let view: &SceneView = &self.view;
         let (last_row, last_column) = (view.rows as f64 - 1.0, view.columns as f64 - 1.0);
         let ends = |last: f64| [0.0, 0.5 * last, last];

@@ -1,30 +1,19 @@
 //! Elements whose cells are solved along the directions of arrival, against cells that are solved for each direction.
 
+mod one_wavelength;
+
 use metalith_cell::Illumination;
 use metalith_core::Silent;
 use metalith_design::{Design, cell_models};
 use metalith_imaging::ChipInLight;
 use metalith_layout::read_pillars;
 use metalith_optics::{Placement, SimulationCase};
-use metalith_sensor::{Camera, Channel, Illuminant, Response};
 use metalith_wave::{Accuracy, Scratch, Window};
+
+use one_wavelength::camera;
 
 /// Wavelength at which light from the side meets orders of the lattice (nm).
 const NM: f64 = 530.0;
-
-fn camera() -> Camera {
-    Camera {
-        channels: vec![Channel {
-            name: "band".into(),
-            response: Response::Band {
-                band_nm: [NM, NM + 1.0],
-                efficiency: 1.0,
-            },
-        }],
-        illuminant: Illuminant::EqualEnergy,
-        ..Camera::three_bands(1.5)
-    }
-}
 
 /// Light of an image at directions between those that are solved, in both planes and between these.
 #[test]
@@ -32,7 +21,7 @@ fn light_between_solved_directions_meets_the_cells_of_its_own() {
     /// Light of the image, relative to that with cells of its own direction: orders of the lattice begin between two solved
     /// directions (0.092 at 30 degrees).
     const BETWEEN: f64 = 0.12;
-    /// The same with cells along the normal, at 40 degrees in the plane between both solved ones (4.25).
+    /// Light with cells along the normal, relative to the same, at 40 degrees in the plane between both solved ones (4.25).
     const ALONG_THE_NORMAL: f64 = 4.0;
     let text = metalith_testing::accepting(&metalith_testing::changed(
         "mini_3x3",
@@ -49,7 +38,7 @@ fn light_between_solved_directions_meets_the_cells_of_its_own() {
     let extraction = read_pillars(&design, &folder.path().join("lens.gds"), &Silent).unwrap();
     let cell = cell_models(&design, &[design.verify.fidelity]).unwrap().remove(0);
     let case = SimulationCase::from(cell.as_ref());
-    let chip = ChipInLight::new(&design, &extraction, case, &camera(), f64::INFINITY, &Silent).unwrap();
+    let chip = ChipInLight::new(&design, &extraction, case, &camera(NM), f64::INFINITY, &Silent).unwrap();
     let light = chip.in_light(0, &[0], &Silent).unwrap();
     let um = chip.sampling.wavelengths_nm[0] * 1e-3;
     let optics = case.optics(design.cell.lattice, design.cell.most());

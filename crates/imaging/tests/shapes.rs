@@ -1,5 +1,8 @@
 //! Pictures of lenses that are no squares on a square lattice: where their light goes, against what their cells pass.
 
+mod direct_psf;
+mod one_wavelength;
+
 use metalith_cell::{Analyser, CellModel, CellResponse, Illumination, PolarisedTables};
 use metalith_core::Silent;
 use metalith_design::{Design, cell_models};
@@ -8,9 +11,11 @@ use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{BankSpec, ChipInLight, KernelBank, StrayLight};
 use metalith_layout::read_pillars;
 use metalith_optics::SimulationCase;
-use metalith_sensor::{Camera, Channel, Illuminant, Response, Sensor};
-use metalith_wave::{Direct, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
+use metalith_wave::{Pillars, Window};
 use ndarray::Array3;
+
+use direct_psf::direct_psf;
+use one_wavelength::camera;
 
 /// Degrees of the scene from side to side.
 const FIELD_DEG: f64 = 16.0;
@@ -22,27 +27,6 @@ fn lens(name: &str, changed: &[(&str, &str)]) -> (Design, Extraction) {
     let (design, _, folder) = metalith_testing::layouts::written(design);
     let extraction = read_pillars(&design, &folder.path().join("lens.gds"), &Silent).unwrap();
     (design, extraction)
-}
-
-/// A small sensor that counts the light of two nanometres.
-fn camera(nm: f64) -> Camera {
-    let plain = Camera::three_bands(1.5);
-    Camera {
-        sensor: Sensor {
-            columns: 64,
-            rows: 64,
-            ..plain.sensor
-        },
-        channels: vec![Channel {
-            name: "band".into(),
-            response: Response::Band {
-                band_nm: [nm, nm + 1.0],
-                efficiency: 1.0,
-            },
-        }],
-        illuminant: Illuminant::EqualEnergy,
-        ..plain
-    }
 }
 
 struct Taken<'a> {
@@ -145,20 +129,7 @@ fn a_hexagonal_lens_takes_pictures() {
             samples: 96,
             distance_um: design.lens.focal_length_um,
         };
-        let direct = Direct::plan(design.lattice(), um, window).unwrap();
-        let wave = PlaneWave {
-            wavelength_um: um,
-            sin_x: sines[0],
-            sin_y: sines[1],
-        };
-        let psf = Psf::formed(
-            &direct as &dyn Propagator,
-            &pillars,
-            &wave,
-            &[],
-            &mut Scratch::default(),
-        )
-        .unwrap();
+        let psf = direct_psf(&design, &pillars, um, sines, window);
         let wanted = psf.values.sum() * window.step_um.powi(2) / taken.chip.arriving_um2(0, index);
         let (unique, _) = taken.bank.distinct[0].nodes[node[0] * spec.nodes + node[1]];
         let found = f64::from(taken.bank.distinct[0].in_window[unique * nm_of_chip.len() + index]);

@@ -1,5 +1,8 @@
 //! Kernels far from the axis of an element, against direct sums over all pillars.
 
+mod direct_psf;
+mod one_wavelength;
+
 use metalith_cell::{Fidelity, Illumination};
 use metalith_core::Silent;
 use metalith_design::{Design, cell_models};
@@ -7,28 +10,15 @@ use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{BankSpec, ChipInLight, KernelBank};
 use metalith_layout::read_pillars;
 use metalith_optics::SimulationCase;
-use metalith_sensor::{Camera, Channel, Illuminant, Response};
-use metalith_wave::{Direct, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
+use metalith_wave::{Pillars, Window};
 use ndarray::Array3;
+
+use direct_psf::direct_psf;
+use one_wavelength::camera;
 
 const NM: f64 = 550.0;
 /// Samples of the direct sum along each axis of a quarter of a pixel.
 const FINER: usize = 2;
-
-fn camera() -> Camera {
-    let plain = Camera::three_bands(1.5);
-    Camera {
-        channels: vec![Channel {
-            name: "band".into(),
-            response: Response::Band {
-                band_nm: [NM, NM + 1.0],
-                efficiency: 1.0,
-            },
-        }],
-        illuminant: Illuminant::EqualEnergy,
-        ..plain
-    }
-}
 
 /// Errors of kernels at the end of a field along x and in its corner: the angle of the chief ray (degrees), the worst error of the
 /// share of light in a pixel over the largest share, and the share of light in the window.
@@ -51,7 +41,7 @@ fn errors(diameter_um: u32, focal_um: u32, reach_deg: f64, pixels: usize) -> Vec
     let extraction = read_pillars(&design, &folder.path().join("lens.gds"), &Silent).unwrap();
     let cell = cell_models(&design, &[Fidelity::Published]).unwrap().remove(0);
     let case = SimulationCase::from(cell.as_ref());
-    let chip = ChipInLight::new(&design, &extraction, case, &camera(), f64::INFINITY, &Silent).unwrap();
+    let chip = ChipInLight::new(&design, &extraction, case, &camera(NM), f64::INFINITY, &Silent).unwrap();
     let reach_um = f64::from(focal_um) * reach_deg.to_radians().tan();
     let spec = BankSpec {
         pixel_um: 1.5,
@@ -85,20 +75,7 @@ fn errors(diameter_um: u32, focal_um: u32, reach_deg: f64, pixels: usize) -> Vec
                 samples: 4 * FINER * pixels,
                 distance_um: f64::from(focal_um),
             };
-            let direct = Direct::plan(design.lattice(), um, window).unwrap();
-            let wave = PlaneWave {
-                wavelength_um: um,
-                sin_x: sines[0],
-                sin_y: sines[1],
-            };
-            let psf = Psf::formed(
-                &direct as &dyn Propagator,
-                &pillars,
-                &wave,
-                &[],
-                &mut Scratch::default(),
-            );
-            let psf = psf.unwrap();
+            let psf = direct_psf(&design, &pillars, um, sines, window);
             let unit = step_um * step_um / chip.arriving_um2(0, index);
             // The kernel of white: the sum over its spectra. Its pixels are at every half of one; those of even places are within
             // whole pixels of the window that begins a quarter of a pixel later.

@@ -92,7 +92,7 @@ impl ClassTable {
     pub(super) fn between(parts: &[(f64, &Self)]) -> Self {
         let mut all = Self {
             t: vec![Complex32::ZERO; parts[0].1.t.len()],
-            to_rim: Vec::new(),
+            to_rim: vec![Complex32::ZERO; parts[0].1.to_rim.len()],
             scattered: 0.0,
             sites: parts[0].1.sites.clone(),
         };
@@ -105,6 +105,8 @@ impl ClassTable {
                 .sum();
             let turn = Complex32::from_polar(*weight as f32, overlap.arg());
             all.t.iter_mut().zip(&part.t).for_each(|(sum, t)| *sum += turn * t);
+            let rims = all.to_rim.iter_mut().zip(&part.to_rim);
+            rims.for_each(|(sum, rim)| *sum += rim * *weight as f32);
             all.scattered += weight * part.scattered;
         }
         all

@@ -49,7 +49,9 @@ pub use learned::LearnedDenoiser;
 pub use method::RestorationMethod;
 pub use quality::{psnr_db, ssim, ssim_colour};
 pub use recorded::Recorded;
-pub use scene_statistics::{SceneStatistics, squared_frequencies};
+pub use scene_statistics::{
+    GREY_POWER, MEAN_LIGHT, PHOTOGRAPH_PIXELS, SceneStatistics, natural_power, squared_frequencies,
+};
 pub use separate::{Blend, restore_each, without_stray_light};
 pub use slope_denoiser::SlopeDenoiser;
 pub use slope_split::{ExponentialSlopes, SlopeBorder, SlopeLength, SlopeSplit};

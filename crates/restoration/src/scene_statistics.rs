@@ -38,11 +38,18 @@ pub struct SceneStatistics {
 }
 
 /// Mean of the light.
-const MEAN: f32 = 0.2;
+pub const MEAN_LIGHT: f32 = 0.2;
+/// Pixels along a side of the photographs.
+pub const PHOTOGRAPH_PIXELS: usize = 576;
 /// Power of the plane (red + green + blue) / sqrt(3).
-const POWER: f64 = 0.08;
+pub const GREY_POWER: f64 = 0.08;
 /// Deviations of the other two planes over that of the first.
 const OPPONENTS: [f32; 2] = [0.29, 0.15];
+
+/// Power of a natural scene of a strength at the squared frequency `s` that differences of neighbouring pixels count.
+pub fn natural_power(strength: f64, s: f64) -> f64 {
+    strength / (s + s * s)
+}
 
 impl SceneStatistics {
     /// Statistics of pictures of red, green and blue planes.
@@ -55,7 +62,7 @@ impl SceneStatistics {
                 vec![grey, 0.0, -2.0 * g * green],
                 vec![grey, -b * blue, g * green],
             ],
-            power: POWER,
+            power: GREY_POWER,
         }
     }
 
@@ -64,7 +71,7 @@ impl SceneStatistics {
         let unit = |i: usize| (0..planes).map(|k| f32::from(u8::from(i == k))).collect();
         Self {
             mix: (0..planes).map(unit).collect(),
-            power: POWER / 3.0,
+            power: GREY_POWER / 3.0,
         }
     }
 
@@ -78,6 +85,13 @@ impl SceneStatistics {
     pub fn picture(&self, independent: &[Array2<f32>]) -> Planes {
         let row = |weights: &Vec<f32>| weighted(weights.iter().copied(), independent);
         self.mix.iter().map(row).collect()
+    }
+
+    /// Inverse of the covariance of the planes of the picture at a frequency where grey has the power one.
+    pub fn inverse_covariance(&self) -> DMatrix<f64> {
+        let mixing = self.mixing();
+        let covariance = &mixing * mixing.transpose();
+        covariance.try_inverse().expect("planes vary independently") * (GREY_POWER / self.power)
     }
 
     /// The adjoint of [`SceneStatistics::picture`].
@@ -125,10 +139,10 @@ impl SceneStatistics {
             let s = squared[ky] + squared[kx];
             let radius = cycles(ky).hypot(cycles(kx));
             if let Some(band) = ends.iter().position(|end| radius < *end) {
-                powers[band] += self.power / (s + s * s) / (SIZE * SIZE) as f64;
+                powers[band] += natural_power(self.power, s) / (SIZE * SIZE) as f64;
             }
         }
-        let mean = vec![Array2::from_elem((1, 1), MEAN); self.mix.len()];
+        let mean = vec![Array2::from_elem((1, 1), MEAN_LIGHT); self.mix.len()];
         let of_mean = self.independent(&mean);
         let plane = |mean: &Array2<f32>| {
             let mut powers = powers;
@@ -166,7 +180,7 @@ impl SceneStatistics {
         let mut picture = self.picture(&independent);
         for (plane, weights) in picture.iter_mut().zip(&self.mix) {
             let variance: f32 = weights.iter().zip(&correlations).map(|(w, c)| w * w * c[0]).sum();
-            plane.mapv_inplace(|v| MEAN * (v - 0.5 * variance).exp());
+            plane.mapv_inplace(|v| MEAN_LIGHT * (v - 0.5 * variance).exp());
         }
         picture
     }
@@ -179,14 +193,14 @@ impl SceneStatistics {
         let mut spectrum = vec![Complex32::ZERO; fft.entries()];
         for (i, v) in spectrum.iter_mut().enumerate().skip(1) {
             let s = squared[i / size] + squared[i % size];
-            v.re = (self.power / (s + s * s)) as f32;
+            v.re = natural_power(self.power, s) as f32;
         }
         let mut light = vec![0.0; size * size];
         fft.inverse(&mut spectrum, &mut light, size, scratch);
         let n = self.mix.len();
         let together = |i: usize, k: usize| -> f32 { self.mix[i].iter().zip(&self.mix[k]).map(|(a, b)| a * b).sum() };
         let pairs: Vec<(usize, usize, f32)> = (0..n * n)
-            .map(|p| (p / n, p % n, together(p / n, p % n) / (MEAN * MEAN)))
+            .map(|p| (p / n, p % n, together(p / n, p % n) / (MEAN_LIGHT * MEAN_LIGHT)))
             .collect();
         let plane = |(k, length): (usize, f64)| {
             let part = |(i, j, share): &(usize, usize, f32)| {
@@ -243,7 +257,7 @@ mod tests {
         // The mean over the frequencies of s power / (s + s^2).
         let s = squared_frequencies(240);
         let sum: f64 = s.iter().flat_map(|a| s.iter().map(move |b| 1.0 / (1.0 + a + b))).sum();
-        let want = POWER * sum / (240.0 * 240.0);
+        let want = GREY_POWER * sum / (240.0 * 240.0);
         let mut found = [0.0; 3];
         for seed in 0..40 {
             let scene = statistics.random_scene((240, 240), seed);

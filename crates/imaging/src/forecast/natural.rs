@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
+use metalith_restoration::PHOTOGRAPH_PIXELS;
+
 use super::bands::{BANDS, Bands, ZONES};
 
-/// Pixels along the longer side of the photographs.
-const PIXELS: usize = 576;
 /// Radius (cycles a pixel) of the disc that holds as much power of a spectrum 1 / f^2 as the square of all frequencies.
 const SQUARE: f64 = 0.565;
 
@@ -20,7 +20,7 @@ pub(crate) struct NaturalZone {
 /// Pixels of a photograph, along an axis, that a pixel of a scene averages. A scene that was given with fewer pixels than the photographs
 /// have is taken for a reduced photograph.
 pub(crate) fn reduction(given_pixels: usize, simulated_pixels: usize) -> f64 {
-    given_pixels.max(PIXELS) as f64 / simulated_pixels as f64
+    given_pixels.max(PHOTOGRAPH_PIXELS) as f64 / simulated_pixels as f64
 }
 
 /// Powers of a photograph that is reduced by a factor. A band of the reduced photograph holds the power of lower frequencies of the

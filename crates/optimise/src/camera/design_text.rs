@@ -7,7 +7,7 @@ use super::element::{CameraElement, POWERS, RADIAL};
 /// Sections that the camera replaces; those below them too.
 const REPLACED: [&str; 6] = ["lens", "phase", "array", "element", "optimise", "mapping.steered"];
 
-/// Text of a design with the elements of a camera in place of its own. `wedge_um`: wavelength of wedges.
+/// Text of a design whose elements are those of a camera. `wedge_um`: wavelength of wedges.
 pub fn design_text(
     design: &str,
     name: &str,

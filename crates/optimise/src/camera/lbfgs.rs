@@ -19,7 +19,7 @@ pub(super) struct Minimum {
 /// writes its gradient; an error of it ends the descent.
 ///
 /// # Errors
-/// Those of the function.
+/// Errors of the function.
 pub(super) fn minimise<E>(
     start: Vec<f64>,
     steps: usize,

@@ -1,6 +1,6 @@
 //! Light of a camera: wavelengths of its channels, what the metasurface does to them, electrons and noise.
 
-use metalith_sensor::{Camera, Colour, ColourFilter, StatedExposure, WavelengthSteps};
+use metalith_sensor::{Camera, Colour, ColourFilter, SensorNoise, StatedExposure, WavelengthSteps};
 
 use metalith_core::Result;
 
@@ -28,8 +28,10 @@ pub struct CameraLight {
     /// Time (s), and the electrons of white that end it before.
     pub time_s: f64,
     most_e: f64,
-    read_e2: f64,
-    dark_e_s: f64,
+    noise: SensorNoise,
+    full_e: f64,
+    /// Variance of a number that is rounded to whole steps (electrons^2).
+    step_e2: f64,
 }
 
 /// One channel.
@@ -106,9 +108,6 @@ impl CameraLight {
             lattices = (0..channels.len()).map(|c| (c, [0.0; 2])).collect();
         }
         let full_e = sensor.full_scale_e();
-        let still = sensor.noise.of_exposure(0.0);
-        let second = sensor.noise.of_exposure(1.0);
-        let read_e2 = (still.read * full_e).powi(2) + sensor.gain_e.powi(2) / 12.0;
         Ok(Self {
             wavelengths_um,
             channels,
@@ -119,8 +118,9 @@ impl CameraLight {
             colours,
             time_s,
             most_e: camera.exposure.white * full_e,
-            read_e2,
-            dark_e_s: (second.read.powi(2) - still.read.powi(2)) * full_e.powi(2),
+            noise: sensor.noise,
+            full_e,
+            step_e2: sensor.gain_e.powi(2) / 12.0,
         })
     }
 
@@ -140,6 +140,6 @@ impl CameraLight {
 
     /// Variance (electrons^2) of a pixel with so many electrons of light, after a time (s).
     pub(super) fn variance_e2(&self, light_e: f64, time_s: f64) -> f64 {
-        light_e + self.read_e2 + self.dark_e_s * time_s
+        self.noise.of_exposure(time_s).variance(light_e / self.full_e) * self.full_e.powi(2) + self.step_e2
     }
 }

@@ -5,6 +5,8 @@ use std::f64::consts::PI;
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
+use metalith_restoration::MEAN_LIGHT;
+
 use super::element::{CameraElement, TERMS};
 use super::light::CameraLight;
 use super::pupil::{Transform, View};
@@ -208,7 +210,7 @@ impl CameraModel {
                     let signal = c.focused_e_s * own * time_s;
                     let foreign = c.focused_e_s * other * time_s;
                     let stray = c.stray_e_s * (own + other) * time_s;
-                    let light = (signal + foreign + stray) * scene::MEAN;
+                    let light = (signal + foreign + stray) * f64::from(MEAN_LIGHT);
                     let variance = self.light.variance_e2(light, time_s) + (foreign * scene::DEVIATION).powi(2);
                     signal / variance.sqrt() / self.light.pitch_um
                 })

@@ -31,7 +31,7 @@ pub struct Arrangement {
 pub enum CameraStart {
     /// Every element is the same hyperbola.
     Identical,
-    /// Each element focuses the light from the middle of its own part of the field.
+    /// Focus of each element on the light from the middle of its part of the field.
     Parts,
     /// The same, with focal lengths that differ by up to a tenth from element to element.
     PartsAtFoci,
