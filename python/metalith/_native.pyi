@@ -232,6 +232,7 @@ class ImagingSystem:
         prior: PathLike | None = None,
         lux: float | None = None,
         time_ms: float | None = None,
+        longest_ms: float | None = None,
         progress: Progress | None = None,
     ) -> ImagingSystem: ...
     def record(self, scene: Float64, seed: int = 1, progress: Progress | None = None) -> Frame: ...

@@ -46,7 +46,7 @@ class ImagingSystem:
     ``distance_mm``: of their plane; far if left out. ``model``: the chip as made, by the model of a calibration.
     ``prior``: weights for the method ``prior`` that ``metalith train`` wrote; those of the program if left out.
     ``lux`` and ``time_ms``: illuminance of the scenes (lux) and time of the exposure (ms), in place of what the camera file
-    states."""
+    states. ``longest_ms`` instead of ``time_ms``: the camera chooses a time up to this by its light."""
 
     def __init__(
         self,
@@ -61,6 +61,7 @@ class ImagingSystem:
         prior: PathLike | None = None,
         lux: float | None = None,
         time_ms: float | None = None,
+        longest_ms: float | None = None,
         progress: Progress | None = None,
     ) -> None:
         if len(shape) != 2:
@@ -69,7 +70,7 @@ class ImagingSystem:
         self.shape = shape
         self.field_deg = field_deg
         self._native = _native.ImagingSystem.open(
-            design._native, layout, camera, rows, columns, field_deg, distance_mm, model, prior, lux, time_ms, progress
+            design._native, layout, camera, rows, columns, field_deg, distance_mm, model, prior, lux, time_ms, longest_ms, progress
         )
 
     def record(self, scene: npt.ArrayLike, *, seed: int = 1, progress: Progress | None = None) -> Frame:

@@ -53,7 +53,7 @@ impl ImagingSystem {
     /// Kernels and stray light of a layout, made or taken from the disk. Scenes whose pixels are finer than half of one of the sensor are
     /// averaged to these; truth and pictures have the size of the averaged scene then.
     #[staticmethod]
-    #[pyo3(signature = (design, layout, camera, rows, columns, field_deg, distance_mm=None, model=None, prior=None, lux=None, time_ms=None, progress=None))]
+    #[pyo3(signature = (design, layout, camera, rows, columns, field_deg, distance_mm=None, model=None, prior=None, lux=None, time_ms=None, longest_ms=None, progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn open(
         py: Python<'_>,
@@ -68,11 +68,16 @@ impl ImagingSystem {
         prior: Option<PathBuf>,
         lux: Option<f64>,
         time_ms: Option<f64>,
+        longest_ms: Option<f64>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let design = &design.design;
         let system = work(py, progress, |p| {
-            let camera = Camera::read(&camera)?.stated(&StatedExposure { lux, time_ms })?;
+            let camera = Camera::read(&camera)?.stated(&StatedExposure {
+                lux,
+                time_ms,
+                longest_ms,
+            })?;
             let model = model.as_deref().map(CalibratedModel::read).transpose()?;
             let prior = prior.as_deref().map(LearnedDenoiser::read).transpose()?;
             let black = Array3::zeros((rows, columns, 3));

@@ -13,6 +13,10 @@ pub(crate) struct ExposureArgs {
     /// Time of the exposure (ms); what the camera file states if left out.
     #[arg(long, value_parser = time_of, value_name = "MS")]
     time_ms: Option<f64>,
+
+    /// Longest time (ms) of an exposure that ends when a white pixel is bright: each camera has its own time up to this.
+    #[arg(long, value_parser = time_of, value_name = "MS", conflicts_with = "time_ms")]
+    longest_ms: Option<f64>,
 }
 
 impl ExposureArgs {
@@ -21,6 +25,7 @@ impl ExposureArgs {
         StatedExposure {
             lux: self.lux,
             time_ms: self.time_ms,
+            longest_ms: self.longest_ms,
         }
     }
 }

@@ -307,6 +307,7 @@ fn report(
         restorations,
         budget: system.budget(),
         points: system.point_images(),
+        elements: system.element_images(),
         homographies: system.homographies(),
         contrast: Vec::new(),
         uncertainty: None,

@@ -104,8 +104,11 @@ impl BaselineCamera for ArrayCamera<'_> {
     }
 
     fn limits(&self) -> Option<String> {
-        let all = [self.system.steep_note(), self.error.note(&self.channel_names())];
-        all.into_iter().flatten().reduce(|a, b| format!("{a}; {b}"))
+        let all = self
+            .system
+            .direction_notes()
+            .chain(self.error.note(&self.channel_names()));
+        all.reduce(|a, b| format!("{a}; {b}"))
     }
 
     fn record_in(&self, scene: &SceneImage, brighter: f64, seed: u64) -> Result<Frame> {

@@ -166,7 +166,12 @@ impl LenslessBench {
         }
         let falloff = Array2::from_shape_fn((view.rows, view.columns), |(y, x)| {
             let [tx, ty] = view.tangents(y as f64, x as f64);
-            falloff([tx, ty]) as f32
+            // Light of a far scene arrives at every pixel under the angle of its place.
+            let response = camera
+                .sensor
+                .angular_response
+                .at_cosine((1.0 + tx * tx + ty * ty).sqrt().recip());
+            (falloff([tx, ty]) * response.max(LEAST_RESPONSE)) as f32
         });
         Ok(Self {
             camera: camera.clone(),
@@ -305,6 +310,9 @@ impl LenslessBench {
             .collect()
     }
 }
+
+/// Least response by angle: planes of the scene are divided by it.
+const LEAST_RESPONSE: f64 = 1e-3;
 
 /// Light of a surface of unit radiance under these tangents, for a unit of tangents and of the sensor, over that along the
 /// normal: the projected solid angle d^2 sines / d^2 tangents.

@@ -4,6 +4,7 @@ use metalith_core::{Error, Result};
 use metalith_design::Design;
 use metalith_sensor::{Camera, ChannelSampling};
 
+use crate::acceptance::Acceptance;
 use crate::chip::element_views;
 use crate::geometry::{ElementView, SceneView};
 use crate::kernel_plan::WIDEST_FIELD_DEG;
@@ -60,7 +61,8 @@ pub(crate) fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Cam
     }
     let seen = |row: f64, column: f64| {
         let tangents = view.tangents(row, column);
-        (elements.iter()).any(|e| off_axis_um(e, camera, view, tangents).is_some_and(|um| um <= spec.reach_um))
+        (0..elements.len())
+            .any(|k| off_axis_um(elements, k, camera, view, tangents).is_some_and(|um| um <= spec.reach_um))
     };
     // Places of the scene along its border and its middle.
     let (last_row, last_column) = (view.rows as f64 - 1.0, view.columns as f64 - 1.0);
@@ -91,14 +93,23 @@ pub(crate) fn check_view(elements: &[ElementView], spec: &BankSpec, camera: &Cam
     Ok(())
 }
 
-/// Distance along either axis from an element's axis to the image of a place of a scene (um); `None` if that is not on the sensor.
-pub(crate) fn off_axis_um(element: &ElementView, camera: &Camera, view: &SceneView, tangents: [f64; 2]) -> Option<f64> {
-    let sensor = &camera.sensor;
+/// Distance along either axis from the axis of one of the elements to its image of a place of a scene (um); `None` if that is not on
+/// the sensor, or behind a wall.
+pub(crate) fn off_axis_um(
+    elements: &[ElementView],
+    k: usize,
+    camera: &Camera,
+    view: &SceneView,
+    tangents: [f64; 2],
+) -> Option<f64> {
+    let (element, sensor) = (&elements[k], &camera.sensor);
     let half = [sensor.columns, sensor.rows].map(|n| 0.5 * f64::from(n) * sensor.pixel_um);
     let sines = element.sines(tangents, view.distance_um);
     let place = element.landing_um(sines, element.wedge.wavelength_um)?;
     let on = |a: usize| (place[a] + element.centre_um[a] - sensor.offset_um[a]).abs() <= half[a];
-    (on(0) && on(1)).then(|| place[0].abs().max(place[1].abs()))
+    let on_chip = [0, 1].map(|a| place[a] + element.centre_um[a]);
+    (on(0) && on(1) && Acceptance::new(elements, sensor).is_open(k, on_chip))
+        .then(|| place[0].abs().max(place[1].abs()))
 }
 
 /// Distance from the axes of elements (um) within which each place of a scene has an image that is on the sensor, if it has one
@@ -108,7 +119,8 @@ pub(crate) fn needed_reach_um(elements: &[ElementView], camera: &Camera, view: &
     const STEPS: usize = 8;
     let at = |k: usize, n: usize| k as f64 / STEPS as f64 * (n as f64 - 1.0);
     let nearest = |row: f64, column: f64| {
-        let all = (elements.iter()).filter_map(|e| off_axis_um(e, camera, view, view.tangents(row, column)));
+        let all =
+            (0..elements.len()).filter_map(|k| off_axis_um(elements, k, camera, view, view.tangents(row, column)));
         all.reduce(f64::min)
     };
     let places = (0..=STEPS).flat_map(|i| (0..=STEPS).map(move |k| (at(i, view.rows), at(k, view.columns))));

@@ -165,6 +165,16 @@ impl ElementView {
         self.axis_distance_um() + self.slope[0] * place_um[0] + self.slope[1] * place_um[1]
     }
 
+    /// Cosine of the angle between the normal of the sensor and light that arrives at a place of the chip (um) from the middle of the
+    /// element.
+    pub(crate) fn arrival_cosine(&self, place_um: [f64; 2]) -> f64 {
+        let way = [0, 1].map(|a| place_um[a] - self.centre_um[a]);
+        let z = self.distance_um(way);
+        let [sx, sy] = self.slope;
+        let along = z - sx * way[0] - sy * way[1];
+        along / ((way[0].powi(2) + way[1].powi(2) + z * z) * (1.0 + sx * sx + sy * sy)).sqrt()
+    }
+
     fn axis_distance_um(&self) -> f64 {
         self.sensor_um + self.slope[0] * self.centre_um[0] + self.slope[1] * self.centre_um[1]
     }

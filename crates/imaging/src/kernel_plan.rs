@@ -8,7 +8,7 @@ use metalith_design::{CellIncidence, Design};
 use metalith_gds::extract::Extraction;
 use metalith_optics::{CalibratedModel, SimulationCase};
 use metalith_restoration::LearnedDenoiser;
-use metalith_sensor::{Blend, Camera, ChannelSampling, Sampling};
+use metalith_sensor::{AngularResponse, Blend, Camera, ChannelSampling, Sampling, Walls};
 use serde::Serialize;
 
 use crate::approximation_set::ApproximationSet;
@@ -102,7 +102,7 @@ impl BankSpec {
 /// Plan of the kernels that scenes in a camera need.
 pub(crate) struct KernelPlan<'a> {
     design: &'a Design,
-    camera: &'a Camera,
+    pub(crate) camera: &'a Camera,
     /// Scene in the pixels that it is simulated in.
     pub(crate) scene: Cow<'a, SceneImage>,
     /// View of the scene as it was given.
@@ -212,6 +212,8 @@ impl<'a> KernelPlan<'a> {
         let mut unexposed = self.camera.clone();
         // What only acts after the light has landed, and the colour of the filter, do not decide kernels.
         unexposed.name = String::new();
+        unexposed.sensor.angular_response = AngularResponse::Unstated;
+        unexposed.sensor.walls = Walls::None;
         unexposed.exposure = Camera::three_bands(1.0).exposure.of_brightness();
         let inputs = Inputs {
             solver: metalith_cell::cache_file::solver_of(self.design.cell.shape),

@@ -6,6 +6,7 @@
 //! both, and a view             ->  FrameOperator: planes of the scene to the frame, and its adjoint
 //! ```
 
+mod acceptance;
 mod approximation_scores;
 mod approximation_set;
 mod cache_file;
@@ -13,6 +14,7 @@ mod chip;
 mod colour;
 mod dataset;
 mod directional_cells;
+mod element_images;
 mod exposure;
 mod field_of_view;
 mod files;
@@ -51,6 +53,7 @@ pub use colour::ChannelColours;
 pub use dataset::{
     DatasetManifest, DatasetOrigin, DatasetPair, PairWriter, check_pairs_apart, write_dataset, write_dataset_manifest,
 };
+pub use element_images::ElementImage;
 pub use exposure::{ChosenExposure, Frame, channel_at, counts_channel, expose};
 pub use files::{FrameFile, picture_file};
 pub use forecast::{Forecast, ScenePower};

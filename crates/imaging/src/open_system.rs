@@ -10,7 +10,7 @@ use metalith_design::{Design, cell_models};
 use metalith_gds::extract::Extraction;
 use metalith_layout::read_pillars;
 use metalith_optics::{AsBuiltChip, CalibratedModel, SimulationCase};
-use metalith_sensor::Camera;
+use metalith_sensor::{AngularResponse, Camera, Walls};
 
 use crate::cache_file;
 use crate::geometry::SceneView;
@@ -19,6 +19,15 @@ use crate::kernel_cache::KernelCache;
 use crate::kernel_plan::KernelPlan;
 use crate::layout::{PillarCount, check_elements};
 use crate::scene::SceneImage;
+
+/// What decides the stray light that pixels count, beside the kernels; nothing where they count all of it.
+fn arrival_inputs(camera: &Camera) -> String {
+    let sensor = &camera.sensor;
+    if sensor.angular_response == AngularResponse::Unstated && sensor.walls == Walls::None {
+        return String::new();
+    }
+    format!(" {:?} {:?}", sensor.angular_response, sensor.walls)
+}
 
 impl ImagingSystem {
     /// Opens a system for a layout of a design behind a camera file, as drawn or as a calibrated model says, and scenes
@@ -82,7 +91,7 @@ impl ImagingSystem {
             field_deg,
             ..
         } = plan.scene.view;
-        let field = format!("{rows}x{columns} {field_deg}");
+        let field = format!("{rows}x{columns} {field_deg}{}", arrival_inputs(plan.camera));
         let stray_light_inputs = [&inputs[..], field.as_bytes()].concat();
         let folder = cache.folder.as_deref();
         let bank = folder.and_then(|f| cache_file::cached_bank(f, &inputs));

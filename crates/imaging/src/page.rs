@@ -6,6 +6,7 @@ use metalith_sensor::{Camera, ColourFilter};
 use ndarray::{Array2, Array3};
 
 use crate::approximation_scores::AssumedScore;
+use crate::element_images;
 use crate::exposure::Frame;
 use crate::files::write_restored;
 use crate::point_image;
@@ -161,6 +162,7 @@ fn page(pages: &PicturePages<'_>) -> Page {
     scores(&mut page, report);
     point_image::section(&mut page, &report.points, pages.camera.sensor.pixel_um);
     budget(&mut page, report);
+    element_images::section(&mut page, &report.elements);
     geometry(&mut page, report);
     worth(&mut page, &report.worth);
     list_assumptions(&mut page, &report.of_frame.assumptions);

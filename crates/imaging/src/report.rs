@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use crate::approximation_scores::AssumedScore;
 use crate::chip::sensor_um;
+use crate::element_images::ElementImage;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
 use crate::imaging_system::ImagingSystem;
@@ -117,6 +118,8 @@ pub struct PictureReport {
     pub budget: Vec<ChannelBudget>,
     /// Images of a white point by each distinct element and channel.
     pub points: Vec<PointImage>,
+    /// Image of each element.
+    pub elements: Vec<ElementImage>,
     pub homographies: Vec<HomographyResidual>,
     /// Contrast of fine detail, for scenes that say it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -205,15 +208,11 @@ impl ImagingSystem {
     /// Notes on a frame, to read before its picture is viewed; `truth` is the scene in linear sRGB.
     pub fn notes(&self, frame: &Frame, truth: &Array3<f64>) -> Vec<String> {
         let layout = self.pillars.as_ref().and_then(PillarCount::note);
-        let all = [
-            self.steep_note(),
-            frame.saturation_note(truth),
-            layout,
-            averaging(&self.given, &self.view),
-        ];
+        let all = [frame.saturation_note(truth), layout, averaging(&self.given, &self.view)];
         self.light()
             .notes()
             .into_iter()
+            .chain(self.direction_notes())
             .chain(all.into_iter().flatten())
             .collect()
     }
@@ -347,6 +346,7 @@ impl ImagingSystem {
                 ),
             ),
             assumption("sensor", place_of_sensor(&self.design, &self.camera)),
+            assumption("light at an angle", self.angle_words()),
             assumption("illuminant", self.camera.illuminant.name().to_owned()),
             assumption("spectra of the scene", spectra_of(scene)),
             assumption(

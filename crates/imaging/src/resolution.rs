@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 use ndarray::{Array2, Array3};
 use serde::Serialize;
 
+use crate::acceptance::Acceptance;
 use crate::exposure::{Frame, counts_channel};
 use crate::imaging_system::ImagingSystem;
 use crate::scene::{BuiltIn, LEAN_DEG, SPOKES, STAR};
@@ -97,10 +98,12 @@ fn of_frame(system: &ImagingSystem, channel: usize, frame: &Frame, truth: &Array
         w.sin_x.hypot(w.sin_y)
     };
     let ahead = (0..system.elements.len()).min_by(|a, b| wedge(a).total_cmp(&wedge(b)));
-    let Some(element) = ahead.map(|k| system.elements[k]) else {
+    let Some(ahead) = ahead else {
         return Vec::new();
     };
+    let element = system.elements[ahead];
     let (sensor, view) = (&system.camera.sensor, &system.view);
+    let acceptance = Acceptance::new(&system.elements, sensor);
     let names = system.camera.channel_names();
     let plane = &frame.planes[channel.min(frame.planes.len() - 1)];
     let mut samples = Vec::new();
@@ -116,12 +119,13 @@ fn of_frame(system: &ImagingSystem, channel: usize, frame: &Frame, truth: &Array
         };
         let [y, x] = view.place(tangents);
         let inside = |v: f64, n: usize| v >= 0.0 && v + 1.0 < n as f64;
-        if place.iter().all(|v| v.abs() < system.bank.spec.reach_um) && inside(y, view.rows) && inside(x, view.columns)
-        {
+        let share = acceptance.share(ahead, on_chip);
+        let held = place.iter().all(|v| v.abs() < system.bank.spec.reach_um);
+        if held && share > 0.0 && inside(y, view.rows) && inside(x, view.columns) {
             samples.push(Sample {
                 x: x - 0.5 * (view.columns as f64 - 1.0),
                 y: y - 0.5 * (view.rows as f64 - 1.0),
-                seen: f64::from(*value) / frame.gain[channel] / element.flux_per_um2(place),
+                seen: f64::from(*value) / frame.gain[channel] / (share * element.flux_per_um2(place)),
                 truth: between(truth, y, x),
             });
         }

@@ -13,8 +13,13 @@ use crate::imaging_system::ImagingSystem;
 const MISLEADING: f64 = 0.45;
 
 impl ImagingSystem {
+    /// Notes on directions: light far from those that cells are solved for, and angles at which the response of pixels is not known.
+    pub fn direction_notes(&self) -> impl Iterator<Item = String> {
+        [self.steep_note(), self.angle_note()].into_iter().flatten()
+    }
+
     /// Note on light of the scene that is imaged by cells which are solved for another direction.
-    pub fn steep_note(&self) -> Option<String> {
+    fn steep_note(&self) -> Option<String> {
         if incidence(&self.design) == CellIncidence::Oblique {
             return None;
         }
@@ -26,9 +31,10 @@ impl ImagingSystem {
             .into_iter()
             .flat_map(|row| ends(last_column).map(|column| (row, column)));
         let farthest = places.flat_map(|(row, column)| {
-            self.elements.iter().filter_map(move |element| {
+            self.elements.iter().enumerate().filter_map(move |(k, element)| {
                 let tangents = view.tangents(row, column);
-                off_axis_um(element, &self.camera, view, tangents).filter(|um| *um <= self.bank.spec.reach_um)?;
+                off_axis_um(&self.elements, k, &self.camera, view, tangents)
+                    .filter(|um| *um <= self.bank.spec.reach_um)?;
                 let sines = element.sines(tangents, view.distance_um);
                 let solved = if coupled {
                     element.wedge.looks_at(element.wedge.wavelength_um).into()

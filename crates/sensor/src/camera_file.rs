@@ -7,8 +7,8 @@ use metalith_core::{Error, Result};
 use serde::Serialize;
 
 use crate::{
-    Channel, ColourFilter, Exposure, Illuminant, Led, LightLevel, Response, SceneLight, Sensor, SensorNoise, Spectrum,
-    StatedExposure,
+    AngularResponse, Channel, ColourFilter, Exposure, Illuminant, Led, LightLevel, Response, SceneLight, Sensor,
+    SensorNoise, Spectrum, StatedExposure, Walls,
 };
 
 /// Version of the format of camera files that this program reads.
@@ -78,6 +78,8 @@ impl Camera {
                 distance_um: None,
                 tilt_rad: [0.0; 2],
                 filter: ColourFilter::None,
+                angular_response: AngularResponse::Unstated,
+                walls: Walls::None,
                 bits: 12,
                 gain_e: 1.0,
                 noise: SensorNoise::FullScale {
@@ -105,6 +107,9 @@ impl Camera {
         stated.check()?;
         if let Some(time_ms) = stated.time_ms {
             (self.exposure.auto, self.exposure.time_s) = (false, 1e-3 * time_ms);
+        }
+        if let Some(longest_ms) = stated.longest_ms {
+            (self.exposure.auto, self.exposure.time_s) = (true, 1e-3 * longest_ms);
         }
         let Some(lux) = stated.lux else {
             return Ok(self);
@@ -160,6 +165,7 @@ fn flat_channel(name: &str, band_nm: [f64; 2]) -> Channel {
 struct Draft {
     name: String,
     sensor: Sensor,
+    angular_response: Option<PathBuf>,
     channels: Vec<(String, DraftResponse)>,
     illuminant: DraftIlluminant,
     exposure: Exposure,
@@ -180,7 +186,7 @@ impl Draft {
         root.integer("schema", SCHEMA..=SCHEMA, "");
         let name = root.text("name");
         let sensor_section = root.section("sensor");
-        let sensor = read_sensor(&sensor_section);
+        let (sensor, angular_response) = read_sensor(&sensor_section);
         let channels = read_channels(root, &sensor_section, &sensor);
         let illuminant = root.section("illuminant");
         Self {
@@ -189,11 +195,16 @@ impl Draft {
             exposure: Exposure::read(&root.section("exposure"), &illuminant, &sensor_section, &sensor),
             illuminant: read_illuminant(&illuminant),
             sensor,
+            angular_response,
         }
     }
 
-    fn with_files(self, path: &Path) -> Result<Camera> {
+    fn with_files(mut self, path: &Path) -> Result<Camera> {
         let mut files = vec![path.to_owned()];
+        if let Some(file) = self.angular_response {
+            self.sensor.angular_response = AngularResponse::read_csv(&file)?;
+            files.push(file);
+        }
         let mut channels = Vec::new();
         for (name, response) in self.channels {
             let response = match response {
@@ -227,7 +238,8 @@ impl Draft {
     }
 }
 
-fn read_sensor(s: &Section<'_, '_>) -> Sensor {
+/// The sensor, and the file of its response by angle, if it names one.
+fn read_sensor(s: &Section<'_, '_>) -> (Sensor, Option<PathBuf>) {
     let positive = |key: &str, least: f64, most: f64, unit: &'static str| s.float(key, Limits::new(least..=most, unit));
     let optional = |key: &str, range, unit: &'static str, default: f64| {
         s.optional_float(key, Limits::new(range, unit)).unwrap_or(default)
@@ -281,9 +293,16 @@ fn read_sensor(s: &Section<'_, '_>) -> Sensor {
         // Full scale is the whole of the well, unless the file says otherwise.
         gain_e: optional("gain_e", 1e-6..=1e6, "electrons a step", whole),
         noise,
+        angular_response: AngularResponse::Unstated,
+        walls: s.choice(
+            "walls",
+            &[("none", Walls::None), ("between_elements", Walls::BetweenElements)],
+            Some(Walls::None),
+        ),
     };
+    let angular_response = s.has("angular_response").then(|| s.file("angular_response"));
     s.finish();
-    sensor
+    (sensor, angular_response)
 }
 
 fn read_channels(

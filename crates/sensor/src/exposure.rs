@@ -34,6 +34,9 @@ pub struct StatedExposure {
     /// Time of the exposure (ms).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_ms: Option<f64>,
+    /// Longest time (ms) of exposures whose time each camera chooses by its light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub longest_ms: Option<f64>,
 }
 
 impl StatedExposure {
@@ -45,11 +48,19 @@ impl StatedExposure {
     /// Numbers must be those of a light and a time.
     ///
     /// # Errors
-    /// If one is out of its range.
+    /// If one is out of its range, or two times are stated.
     pub(crate) fn check(&self) -> Result<()> {
+        if self.time_ms.is_some() && self.longest_ms.is_some() {
+            return Err(Error::refused(
+                "camera/two-times",
+                "a time of the exposure, and a longest one",
+                "give one of them",
+            ));
+        }
         let all = [
             (self.lux, Self::LUX, "an illuminance", "lux"),
             (self.time_ms, Self::TIMES_MS, "a time", "ms"),
+            (self.longest_ms, Self::TIMES_MS, "a longest time", "ms"),
         ];
         for (value, limits, what, unit) in all {
             if let Some(value) = value.filter(|v| !limits.contains(v)) {

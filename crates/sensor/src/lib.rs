@@ -6,6 +6,7 @@
 //! | what a sensor is, and which noise it has | `sensor` |
 //! | the camera of a bench, in DN | `relay` |
 //! | colour filters over pixels | `filter` |
+//! | light at an angle, walls between elements | `arrival` |
 //! | photons and reading: one variance for all units | `noise` |
 //! | what source, blur and pixel area do to intensity; intensity read on pixels | `intensity_transfer`, `pixels` |
 //! | frames from NPY, PNG and TIFF; exposures joined | `frame` |
@@ -20,6 +21,7 @@
 //! A channel counts photons: what it sees of a wavelength is the spectral power of the illuminant times the wavelength,
 //! times its quantum efficiency.
 
+mod arrival;
 mod camera_file;
 mod channel;
 mod exposure;
@@ -36,6 +38,7 @@ mod sensor;
 mod spectrum;
 mod wavelength_sampling;
 
+pub use arrival::{AngularResponse, Walls};
 pub use camera_file::Camera;
 pub use channel::{Channel, Response};
 pub use exposure::{Exposure, StatedExposure};

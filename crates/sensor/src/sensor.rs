@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::{ColourFilter, Noise};
+use crate::{AngularResponse, ColourFilter, Noise, Walls};
 
 /// The sensor and where it stands.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -20,6 +20,12 @@ pub struct Sensor {
     /// Tilt of the sensor against the chip about the y and the x axis: the distance grows with x and with y (rad).
     pub tilt_rad: [f64; 2],
     pub filter: ColourFilter,
+    /// Response of pixels to light at an angle.
+    #[serde(skip_serializing_if = "AngularResponse::is_unstated")]
+    pub angular_response: AngularResponse,
+    /// Walls between the elements of an array before the sensor.
+    #[serde(skip_serializing_if = "Walls::are_none")]
+    pub walls: Walls,
     /// Bits of a pixel value.
     pub bits: u32,
     /// Electrons of one step of the pixel value.

@@ -198,7 +198,13 @@ fn the_light_is_stated_once_and_in_a_unit_that_it_has() {
     ] {
         assert_eq!(with(exposure, light).unwrap_err().ids(), [id]);
     }
-    let stated = |lux: Option<f64>, time_ms: Option<f64>| silent.clone().stated(&StatedExposure { lux, time_ms });
+    let stated = |lux: Option<f64>, time_ms: Option<f64>| {
+        silent.clone().stated(&StatedExposure {
+            lux,
+            time_ms,
+            longest_ms: None,
+        })
+    };
     let lit = stated(Some(20.0), Some(5.0)).unwrap();
     assert_eq!(lit.exposure.light.level, Some(LightLevel::IlluminanceLux(20.0)));
     assert_eq!((lit.exposure.time_s, lit.exposure.auto), (0.005, false));

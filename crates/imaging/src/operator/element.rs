@@ -11,6 +11,7 @@ use num_complex::Complex32;
 use super::kernel_interpolation::BetweenNodes;
 use super::low_rank_kernels::MixedKernels;
 use super::source::KernelSource;
+use super::sub_image::PixelGrid;
 use super::warp::{CellPoint, Warp};
 use crate::geometry::{ElementView, SceneSpace};
 
@@ -20,6 +21,8 @@ pub(crate) struct ElementOperator<'a> {
     view: ElementView,
     pub(super) source: KernelSource<'a>,
     sensor: Sensor,
+    /// Share of its light that each pixel of the sensor counts; none if every pixel counts all of it.
+    accepted: Option<Array2<f32>>,
     scene: SceneSpace,
     pub(super) channels: Vec<ChannelPlan>,
 }
@@ -48,7 +51,7 @@ impl<'a> ElementOperator<'a> {
         element: usize,
         view: &ElementView,
         source: &KernelSource<'a>,
-        sensor: &Sensor,
+        (sensor, accepted): (&Sensor, Option<Array2<f32>>),
         scene: &SceneSpace,
     ) -> Self {
         let mut own = Self {
@@ -56,6 +59,7 @@ impl<'a> ElementOperator<'a> {
             view: *view,
             source: source.clone(),
             sensor: sensor.clone(),
+            accepted,
             scene: scene.clone(),
             channels: Vec::new(),
         };
@@ -200,6 +204,21 @@ impl<'a> ElementOperator<'a> {
         Cow::Owned(self.spectrum(node.node, channel, at, &plan.fft, scratch))
     }
 
+    /// Light of pixels of a frame as far as they count light of this element.
+    pub(super) fn counted(&self, grid: &PixelGrid, frame: &Array2<f32>) -> Vec<f32> {
+        let mut light = grid.gather(frame);
+        self.accept(grid, &mut light);
+        light
+    }
+
+    /// Leave what pixels count of light of this element that falls on them.
+    pub(super) fn accept(&self, grid: &PixelGrid, light: &mut [f32]) {
+        if let Some(accepted) = &self.accepted {
+            let shares = grid.gather(accepted);
+            light.iter_mut().zip(shares).for_each(|(l, share)| *l *= share);
+        }
+    }
+
     /// Add the light of pixels to the places of the scene that they look at, as if nothing were blurred: a plane for each
     /// channel.
     pub(crate) fn lay_on_scene(&self, frames: &[Array2<f32>], planes: &mut [Array2<f32>]) {
@@ -209,7 +228,7 @@ impl<'a> ElementOperator<'a> {
             let grids = self.source.phases(channel).iter().map(|p| warp.pixels(cell, *p, 0));
             let mut light = vec![0.0; warp.shape[0] * warp.shape[1]];
             for grid in grids {
-                let own = grid.gather(&frames[channel]);
+                let own = self.counted(&grid, &frames[channel]);
                 light.iter_mut().zip(own).for_each(|(l, v)| *l += v);
             }
             warp.scatter(&[&light], &mut planes[channel..=channel]);

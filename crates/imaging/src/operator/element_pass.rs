@@ -75,10 +75,10 @@ impl ElementOperator<'_> {
                     spread.add(&square, size, image);
                 }
             }
-            images.extend(phases.iter().zip(own).map(|(phase, light)| SubImage {
-                channel,
-                grid: warps[0].pixels(cell, *phase, reach),
-                light,
+            images.extend(phases.iter().zip(own).map(|(phase, mut light)| {
+                let grid = warps[0].pixels(cell, *phase, reach);
+                self.accept(&grid, &mut light);
+                SubImage { channel, grid, light }
             }));
         }
         images
@@ -98,7 +98,7 @@ impl ElementOperator<'_> {
             let warps = self.warps(channel, plan);
             let (own, phases) = (self.source.inputs(channel), self.source.phases(channel));
             let (size, entries) = (plan.fft.size(), plan.fft.entries());
-            let gather = |phase: &[usize; 2]| warps[0].pixels(cell, *phase, reach).gather(&frames[channel]);
+            let gather = |phase: &[usize; 2]| self.counted(&warps[0].pixels(cell, *phase, reach), &frames[channel]);
             let images: Vec<Vec<f32>> = phases.iter().map(gather).collect();
             let [rows, columns] = warps[0].shape;
             // By point and input.

@@ -36,6 +36,7 @@ use metalith_wave::kernels::{FftScratch, box_sums};
 use ndarray::Array2;
 use rayon::prelude::*;
 
+use crate::acceptance::Acceptance;
 use crate::geometry::{ElementView, SceneSpace, SceneView};
 use crate::kernels::KernelBank;
 use crate::stray_light::{self, StrayLight};
@@ -79,10 +80,11 @@ impl<'a> FrameOperator<'a> {
             }
             _ => 0.0,
         };
+        let acceptance = Acceptance::new(elements, sensor);
         let elements = elements
             .par_iter()
             .enumerate()
-            .map(|(i, e)| ElementOperator::new(i, e, &source, sensor, space))
+            .map(|(i, e)| ElementOperator::new(i, e, &source, (sensor, acceptance.over_sensor(i)), space))
             .collect();
         Self {
             view: *view,

@@ -11,7 +11,7 @@ pub struct LightShares {
     pub in_kernels: f64,
     /// Share on the sensor, outside of kernels.
     pub stray_light: f64,
-    /// Share in the sensor's plane or beyond, but not on the sensor.
+    /// Share in the sensor's plane or beyond that no pixel counts: beside the sensor, behind walls, or lost by its angle.
     pub beyond: f64,
     /// Held in frequencies that do not travel.
     pub evanescent: f64,

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::coarse_grid::solid_angle;
 use super::{CELL_PIXELS, LightShares, SCENE_CELLS, StrayLight, sensor_cells};
+use crate::acceptance::Acceptance;
 use crate::chip::ChipInLight;
 use crate::geometry::{ElementView, SceneView};
 use crate::kernels::KernelBank;
@@ -43,6 +44,7 @@ impl StrayLight {
             bank,
             sensor,
             view,
+            acceptance: Acceptance::new(&chip.elements, sensor),
             cells,
             chosen: &chosen,
             weights: &weights,
@@ -140,6 +142,7 @@ struct Tracer<'a> {
     bank: &'a KernelBank,
     sensor: &'a Sensor,
     view: &'a SceneView,
+    acceptance: Acceptance<'a>,
     cells: [usize; 2],
     chosen: &'a [usize],
     weights: &'a [Vec<f64>],
@@ -304,9 +307,13 @@ impl Tracer<'_> {
             }
             // Corner of the sensor's first square.
             let place = [0, 1].map(|a| (here[a] - middle[a] + half[a]) / cell_um - 0.5);
+            let counted = power
+                * self
+                    .acceptance
+                    .share(element, [0, 1].map(|a| here[a] + view.centre_um[a]));
             for (cy, wy) in neighbours(place[1], self.cells[0]) {
                 for (cx, wx) in neighbours(place[0], self.cells[1]) {
-                    let value = (power * wy * wx) as f32;
+                    let value = (counted * wy * wx) as f32;
                     all[cy * self.cells[1] + cx] += value;
                     if !in_window {
                         outside[cy * self.cells[1] + cx] += value;

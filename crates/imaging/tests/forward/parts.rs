@@ -5,7 +5,7 @@ use metalith_imaging::{
     Detail, FrameOperator, KernelBank, SceneInputs, ScenePoints, SceneSpace, StrayLight, element_views,
 };
 use metalith_restoration::{FrameModel, SceneStatistics};
-use metalith_sensor::Camera;
+use metalith_sensor::{AngularResponse, Camera, Walls};
 use ndarray::Array2;
 
 use crate::setup::{ROWS, Setup, setup, spec};
@@ -125,5 +125,69 @@ fn the_operator_depends_on_no_number_of_threads() {
         for threads in [2, 4] {
             assert!(on(threads) == one, "{threads}");
         }
+    }
+}
+
+/// Walls and the response by angle act on the light of each element alone, pixel by pixel, in both directions.
+#[test]
+fn pixels_count_an_element_by_angle_and_in_front_of_its_walls() {
+    /// Products in single precision.
+    const SINGLE: f32 = 1e-6;
+    /// Sums of both signs over some ten thousand of them.
+    const ADJOINT: f64 = 1e-6;
+    let setup = setup(&[[520.0, 560.0]], 40);
+    let bank = bank(&setup);
+    let views = element_views(&setup.design, &setup.camera);
+    let space = SceneSpace::flat(&setup.scene.view);
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("angles.csv");
+    std::fs::write(&table, "deg,value\n0,1\n60,0.4\n").unwrap();
+    let mut walled = setup.camera.clone();
+    walled.sensor.walls = Walls::BetweenElements;
+    walled.sensor.angular_response = AngularResponse::read_csv(&table).unwrap();
+    let stray_light = StrayLight::none(&setup.camera.sensor, 1, 3);
+    let planes: Vec<Array2<f32>> = (0..3)
+        .map(|c| Array2::from_shape_fn((40, 40), |(y, x)| 0.5 + 0.1 * ((y * 3 + x * 5 + c) % 5) as f32))
+        .collect();
+    let away = |place: [f64; 2], k: usize| (place[0] - views[k].centre_um[0]).hypot(place[1] - views[k].centre_um[1]);
+    for detail in details() {
+        let [open, counted] = [&setup.camera, &walled]
+            .map(|c| FrameOperator::new(&bank, &stray_light, &views, c, &space, detail.clone()));
+        let mut lit = 0;
+        for k in 0..views.len() {
+            let [all, own] = [&open, &counted].map(|o| o.apply_elements(&planes, &[k], false).remove(0));
+            let most = all.iter().copied().fold(0.0, f32::max);
+            for ((at, all), own) in all.indexed_iter().zip(&own) {
+                let place = walled.sensor.place_um(at.into());
+                let own_way = away(place, k);
+                let others = (0..views.len()).filter(|j| *j != k).map(|j| away(place, j));
+                let nearest = others.fold(f64::MAX, f64::min);
+                // Pixels that a wall cuts are tested beside the rule itself.
+                if (nearest - own_way).abs() < 2.0 * walled.sensor.pixel_um {
+                    continue;
+                }
+                let angle = (own_way / views[k].sensor_um).atan().to_degrees();
+                let share = if nearest < own_way { 0.0 } else { 1.0 - 0.01 * angle };
+                assert!(
+                    (own - all * share as f32).abs() <= SINGLE * most,
+                    "{k} {at:?}: {own} {all} {share}"
+                );
+                lit += usize::from(*own > 0.0);
+            }
+        }
+        assert!(lit > 1000, "{lit} pixels are lit");
+        let light = Array2::from_shape_fn((ROWS as usize, ROWS as usize), |(y, x)| {
+            0.1 * ((y * 7 + x * 29) % 11) as f32
+        });
+        let dot = |a: &[Array2<f32>], b: &[Array2<f32>]| -> f64 {
+            let pairs = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
+            pairs.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+        };
+        let light = [light];
+        let (a, b) = (
+            dot(&counted.apply(&planes), &light),
+            dot(&planes, &counted.adjoint(&light)),
+        );
+        assert!((a / b - 1.0).abs() < ADJOINT, "{a} {b}");
     }
 }

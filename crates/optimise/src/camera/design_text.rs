@@ -7,7 +7,8 @@ use super::element::{CameraElement, POWERS, RADIAL};
 /// Sections that the camera replaces; those below them too.
 const REPLACED: [&str; 6] = ["lens", "phase", "array", "element", "optimise", "mapping.steered"];
 
-/// Text of a design whose elements are those of a camera. `wedge_um`: wavelength of wedges.
+/// Text of a design whose elements are those of a camera. `wedge_um`: wavelength of wedges; `piston_rad`: phase in the middle of every
+/// element, on which no image depends.
 pub fn design_text(
     design: &str,
     name: &str,
@@ -15,6 +16,7 @@ pub fn design_text(
     elements: &[CameraElement],
     distance_um: f64,
     wedge_um: f64,
+    piston_rad: f64,
 ) -> String {
     let mut text = String::new();
     let mut keeps = true;
@@ -46,12 +48,12 @@ pub fn design_text(
         wedge_um * 1e3,
     );
     for element in elements {
-        add_element(&mut text, element);
+        add_element(&mut text, element, piston_rad);
     }
     text
 }
 
-fn add_element(text: &mut String, element: &CameraElement) {
+fn add_element(text: &mut String, element: &CameraElement, piston_rad: f64) {
     let [x, y] = element.centre_um;
     _ = write!(
         text,
@@ -70,11 +72,11 @@ fn add_element(text: &mut String, element: &CameraElement) {
         "[element.phase]\nsource = \"hyperbola\"\nwavelength_nm = {}\nfocal_length_um = {focal}\n",
         wavelength * 1e3
     );
-    let mut terms: Vec<(u32, u32, f64)> = POWERS
+    let polynomial = POWERS
         .iter()
         .zip(&element.terms_rad)
-        .map(|((px, py), c)| (*px, *py, *c))
-        .collect();
+        .map(|((px, py), c)| (*px, *py, *c));
+    let mut terms: Vec<(u32, u32, f64)> = std::iter::once((0, 0, piston_rad)).chain(polynomial).collect();
     for (n, c) in RADIAL.iter().zip(&element.terms_rad[POWERS.len()..]) {
         terms.extend((0..=*n).map(|k| (2 * (n - k), 2 * k, c * binomial(*n, k))));
     }

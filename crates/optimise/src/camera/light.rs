@@ -1,6 +1,6 @@
 //! Light of a camera: wavelengths of its channels, what the metasurface does to them, electrons and noise.
 
-use metalith_sensor::{Camera, Colour, ColourFilter, SensorNoise, StatedExposure, WavelengthSteps};
+use metalith_sensor::{AngularResponse, Camera, Colour, ColourFilter, SensorNoise, StatedExposure, WavelengthSteps};
 
 use metalith_core::Result;
 
@@ -28,6 +28,7 @@ pub struct CameraLight {
     /// Time (s), and the electrons of white that end it before.
     pub time_s: f64,
     most_e: f64,
+    pub angular_response: AngularResponse,
     noise: SensorNoise,
     full_e: f64,
     /// Variance of a number that is rounded to whole steps (electrons^2).
@@ -61,7 +62,7 @@ impl CameraLight {
     ) -> Result<Self> {
         let camera = camera.clone().stated(&StatedExposure {
             lux: Some(lux),
-            time_ms: None,
+            ..StatedExposure::default()
         })?;
         let sampling = camera.sampling(band_nm, WavelengthSteps::from(step_nm))?;
         let wavelengths_um: Vec<f64> = sampling.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect();
@@ -118,6 +119,7 @@ impl CameraLight {
             colours,
             time_s,
             most_e: camera.exposure.white * full_e,
+            angular_response: sensor.angular_response.clone(),
             noise: sensor.noise,
             full_e,
             step_e2: sensor.gain_e.powi(2) / 12.0,

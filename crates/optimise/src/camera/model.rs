@@ -6,6 +6,7 @@ use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 
 use metalith_restoration::MEAN_LIGHT;
+use metalith_sensor::Walls;
 
 use super::element::{CameraElement, TERMS};
 use super::light::CameraLight;
@@ -34,8 +35,8 @@ pub struct ModelSettings {
     pub field_deg: f64,
     /// Wavelength of wedges (um).
     pub wedge_um: f64,
-    /// True if walls between the elements keep the light of each in its own tile: no image overlaps another.
-    pub walls: bool,
+    /// With walls between the elements no image overlaps another.
+    pub walls: Walls,
     /// Window that images of points are confined to (um).
     pub window_um: f64,
 }
@@ -49,7 +50,7 @@ pub struct CameraModel {
     edge: f64,
     distance_um: f64,
     wedge_um: f64,
-    walls: bool,
+    walls: Walls,
     perfect: bool,
 }
 
@@ -189,13 +190,13 @@ impl CameraModel {
         let mut all = Vec::new();
         for (k, element) in elements.iter().enumerate() {
             let Some(place) = landing(element) else { continue };
-            if (0..2).any(|a| place[a].abs() > 0.5 * self.light.sides_um[a]) {
+            if (0..2).any(|a| place[a].abs() > 0.5 * self.light.sides_um[a]) || self.is_walled(elements, k, place) {
                 continue;
             }
             let own = self.etendue(element, place);
             // Light of other elements at the same place.
             let mut other = 0.0;
-            if !self.walls {
+            if self.walls == Walls::None {
                 for (j, next) in elements.iter().enumerate() {
                     if j != k && self.sees(next, place) {
                         other += self.etendue(next, place);
@@ -224,12 +225,20 @@ impl CameraModel {
         all
     }
 
-    /// Area of an element times the projected solid angle of a pixel at a place on the sensor (um^2 sr).
+    /// True if a wall stands between an element and a place: another element is nearer to it.
+    fn is_walled(&self, elements: &[CameraElement], k: usize, place: [f64; 2]) -> bool {
+        let far = |e: &CameraElement| (place[0] - e.centre_um[0]).hypot(place[1] - e.centre_um[1]);
+        self.walls == Walls::BetweenElements && elements.iter().any(|e| far(e) < far(&elements[k]))
+    }
+
+    /// Area of an element times the projected solid angle of a pixel at a place on the sensor (um^2 sr), and the response of the pixel at
+    /// the angle.
     fn etendue(&self, element: &CameraElement, place: [f64; 2]) -> f64 {
         let t2 = (0..2)
             .map(|a| ((place[a] - element.centre_um[a]) / self.distance_um).powi(2))
             .sum::<f64>();
-        PI * (element.radius_um() * self.light.pixel_um / (self.distance_um * (1.0 + t2))).powi(2)
+        let response = self.light.angular_response.at_cosine((1.0 + t2).sqrt().recip());
+        PI * (element.radius_um() * self.light.pixel_um / (self.distance_um * (1.0 + t2))).powi(2) * response
     }
 
     /// True if an element images a part of the scene onto a place.

@@ -4,7 +4,7 @@ use metalith_cell::CellModel;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarRule;
 use metalith_design::{CameraSearchSpec, Design};
-use metalith_sensor::Camera;
+use metalith_sensor::{Camera, Walls};
 
 use super::design_text::design_text;
 use super::efficiency::efficiency;
@@ -55,6 +55,9 @@ pub struct CameraFindings {
     pub interrupted: bool,
 }
 
+/// Phases of a turn that a piston is chosen from.
+const PISTONS: usize = 64;
+
 impl CameraTask {
     /// The task that a design sets before a camera.
     ///
@@ -80,7 +83,7 @@ impl CameraTask {
             scene: NaturalScene::new(spec.field_deg, spec.scene_pixels),
             field_deg: spec.field_deg,
             wedge_um: design.array.wedge_wavelength_um,
-            walls: spec.walls,
+            walls: camera.sensor.walls,
             window_um: WINDOW_UM,
         };
         Ok(Self {
@@ -222,7 +225,7 @@ impl CameraTask {
                     arrangement: *arrangement,
                     start,
                     judged,
-                    overlaps: !self.spec.walls && arrangement.overlaps(light, self.edge()),
+                    overlaps: self.settings.walls == Walls::None && arrangement.overlaps(light, self.edge()),
                     elements,
                 });
             }
@@ -275,6 +278,19 @@ impl CameraTask {
             &camera.elements,
             camera.arrangement.distance_um,
             wedge_um,
+            self.piston_rad(),
         )
+    }
+
+    /// Phase whose pillar has the mean of the least and the greatest width. The phase is level in the middle of an element: pillars of
+    /// the greatest width fill more of the plane there than processes allow.
+    fn piston_rad(&self) -> f64 {
+        let width = |k: &usize| self.mapping.width_nm(*k as f64 / PISTONS as f64).0;
+        let ends = (0..PISTONS)
+            .map(|k| width(&k))
+            .fold([f64::MAX, f64::MIN], |[a, b], w| [a.min(w), b.max(w)]);
+        let off = |k: &usize| (width(k) - 0.5 * (ends[0] + ends[1])).abs();
+        let best = (0..PISTONS).min_by(|a, b| off(a).total_cmp(&off(b)));
+        std::f64::consts::TAU * best.unwrap_or(0) as f64 / PISTONS as f64
     }
 }

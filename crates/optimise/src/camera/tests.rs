@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use metalith_core::Silent;
-use metalith_sensor::Camera;
+use metalith_sensor::{Camera, Walls};
 use num_complex::{Complex32, Complex64};
 
 use super::element::{CameraElement, TERMS};
@@ -40,7 +40,7 @@ fn settings() -> ModelSettings {
         scene: NaturalScene::new(FIELD_DEG, 400),
         field_deg: FIELD_DEG,
         wedge_um: 0.55,
-        walls: false,
+        walls: Walls::None,
         window_um: WINDOW_UM,
     }
 }

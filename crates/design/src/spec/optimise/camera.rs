@@ -24,8 +24,6 @@ pub struct CameraSearchSpec {
     pub diameters_um: Vec<f64>,
     /// Shares of the wedge that steers an element to its part of the field.
     pub wedge_shares: Vec<f64>,
-    /// True if walls keep the light of each element in its own tile of the sensor.
-    pub walls: bool,
     /// Phases that each search begins with, at most.
     pub starts: usize,
     /// Steps of a descent while cameras are compared, and of the last one of the best.
@@ -88,7 +86,6 @@ impl CameraSearchSpec {
             focal_lengths_um: list("focal_lengths_um", FOCAL_LENGTH, &[]),
             diameters_um: list("diameters_um", Limits::new(10.0..=5000.0, "um"), &[]),
             wedge_shares: list("wedge_shares", Limits::new(0.0..=1.0, "of the wedge"), &[0.0]),
-            walls: s.choice("walls", &[("no", false), ("yes", true)], Some(false)),
             starts: whole("starts", 1..=4, 2),
             steps: whole("steps", 1..=1000, 15),
             final_steps: whole("final_steps", 1..=1000, 60),
