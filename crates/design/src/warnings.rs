@@ -565,6 +565,8 @@ mod tests {
             robust_3x3: design/wavelengths-differ, lattice/diffracts
             silicon_10600:
             tio2_532:
+            true_light_bright: design/wavelengths-differ, lattice/diffracts
+            true_light_sharp: design/wavelengths-differ, lattice/diffracts
             true_light_thin: design/wavelengths-differ, lattice/diffracts
             wide_5x5: design/wavelengths-differ, phase/steep, lattice/diffracts
             ");
