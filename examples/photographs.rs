@@ -6,12 +6,13 @@
 //!
 //! Takes every image of a folder; they must be of one size. PSNR is that of the mean squared error over the
 //! photographs, SSIM the mean. The row `frame` is the frame itself, its pixels laid where they look and divided by those of a
-//! white scene. The forecasts are made without any picture, for the spectra of these photographs and for those of natural scenes.
+//! white scene. The forecasts are made without any picture, for the spectra of these
+//! photographs and for those of natural scenes; a second table compares them photograph by photograph.
 
 use std::path::PathBuf;
 
 use metalith::imaging::scene::{images_in, read_far_scene};
-use metalith::imaging::{ForecastScene, ImagingSystem, ScenePower, Zone, ZoneScore, scores};
+use metalith::imaging::{ForecastScene, ImagingSystem, NaturalForecast, ScenePower, Zone, ZoneScore, scores};
 use metalith::restoration::RestorationMethod;
 use metalith::sensor::Camera;
 use metalith::{Design, Error, Result, Silent};
@@ -20,6 +21,19 @@ use metalith::{Design, Error, Result, Silent};
 struct Row {
     way: String,
     found: Vec<Vec<ZoneScore>>,
+}
+
+/// A photograph, its PSNR of linear light (dB), and the forecast of it.
+struct Compared {
+    name: String,
+    found: f64,
+    forecast: f64,
+}
+
+impl Compared {
+    fn miss(&self) -> f64 {
+        self.forecast - self.found
+    }
 }
 
 fn main() -> Result<()> {
@@ -50,7 +64,7 @@ fn main() -> Result<()> {
     let forecast = forecast_scene.forecast(&system, &operator, &Silent)?;
     let mut rows: Vec<Row> = Vec::new();
     let mut powers = Vec::new();
-    let mut misses = Vec::new();
+    let mut pairs = Vec::new();
     let mut keep = |way: String, found: Vec<ZoneScore>| match rows.iter_mut().find(|r| r.way == way) {
         Some(row) => row.found.push(found),
         None => rows.push(Row {
@@ -72,7 +86,11 @@ fn main() -> Result<()> {
                     let found = scores(&picture, &truth)?;
                     let words = if joint { "joint" } else { "each alone" };
                     if joint && *method == RestorationMethod::Tikhonov {
-                        misses.push(forecast.psnr_linear_db(&power)[0] - found[0].psnr_linear_db);
+                        pairs.push(Compared {
+                            name: scene.name.clone(),
+                            found: found[0].psnr_linear_db,
+                            forecast: forecast.psnr_linear_db(&power)[0],
+                        });
                     }
                     eprintln!("{}: {}, {words}: {:.2} dB", scene.name, method.name(), found[0].psnr_db);
                     keep(format!("{}, {words}", method.name()), found);
@@ -99,27 +117,50 @@ fn main() -> Result<()> {
         );
     }
     let theirs = ScenePower::mean(&powers).expect("there are photographs");
-    for (of, power) in [("their spectra", theirs), ("natural scenes", system.natural_power())] {
-        let db: Vec<String> = forecast
-            .psnr_linear_db(&power)
-            .iter()
-            .map(|db| format!("{db:.2}"))
-            .collect();
+    let natural: Vec<NaturalForecast> = system
+        .natural_scenes()
+        .into_iter()
+        .map(|s| forecast.natural(s))
+        .collect();
+    let mut forecasts = vec![("their spectra".to_owned(), forecast.psnr_linear_db(&theirs))];
+    forecasts.extend(natural.iter().map(|n| (n.scenes.words(), n.psnr_linear_db.clone())));
+    for (of, db) in forecasts {
+        let db: Vec<String> = db.iter().map(|db| format!("{db:.2}")).collect();
         println!("| forecast for {of}, tikhonov, joint | | | {} |", db.join(", "));
     }
-    if !misses.is_empty() {
-        let count = misses.len() as f64;
-        let mean = misses.iter().sum::<f64>() / count;
-        let absolute = misses.iter().map(|miss| miss.abs()).sum::<f64>() / count;
-        let worst = misses
-            .iter()
-            .fold(0.0, |a: f64, b| if b.abs() > a.abs() { *b } else { a });
+    compared(&pairs, &natural);
+    Ok(())
+}
+
+/// Prints PSNR of linear light of each photograph, by Tikhonov and all elements, with its forecast.
+fn compared(pairs: &[Compared], natural: &[NaturalForecast]) {
+    if pairs.is_empty() {
+        return;
+    }
+    println!("\n| photograph | found (dB) | forecast from its spectrum (dB) | less found |\n| --- | --- | --- | --- |");
+    for of in pairs {
         println!(
-            "\nForecast less found, for the spectrum of each photograph (dB): mean {mean:+.2}, mean absolute {absolute:.2}, \
-             worst {worst:+.2}."
+            "| {} | {:.2} | {:.2} | {:+.2} |",
+            of.name,
+            of.found,
+            of.forecast,
+            of.miss()
         );
     }
-    Ok(())
+    let count = pairs.len() as f64;
+    let mean = pairs.iter().map(Compared::miss).sum::<f64>() / count;
+    let absolute = pairs.iter().map(|of| of.miss().abs()).sum::<f64>() / count;
+    let worst = pairs.iter().map(|of| of.miss().abs()).fold(0.0, f64::max);
+    println!("\nForecast less found (dB): mean {mean:+.2}, mean absolute {absolute:.2}, worst {worst:.2}.");
+    for natural in natural {
+        let (low, high) = (natural.low_db[0], natural.high_db[0]);
+        let inside = pairs.iter().filter(|of| (low..=high).contains(&of.found)).count();
+        println!(
+            "Forecast for {}: {low:.1} to {high:.1} dB; {inside} of {} photographs are within it.",
+            natural.scenes.words(),
+            pairs.len()
+        );
+    }
 }
 
 impl Row {

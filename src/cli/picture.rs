@@ -7,8 +7,8 @@ use metalith::file::InputFiles;
 use metalith::imaging::scene::{BuiltIn, SceneFile, SceneImage, chart, read_depth, read_scene};
 use metalith::imaging::{
     ForecastScene, Frame, FrameFile, FrameStatement, ImagingSystem, KernelCache, PicturePages, PictureReport,
-    RestorationReport, ScenePower, Uncertainty, ZoneScore, check_scored, contrast_curves, picture_file, psnr_words,
-    scores, worth_of_assumptions, write_pages,
+    RestorationReport, ScenePower, Uncertainty, ZoneScore, check_scored, contrast_curves, no_gain, picture_file,
+    psnr_words, scores, worth_of_assumptions, write_pages,
 };
 use metalith::optics::CalibratedModel;
 use metalith::restoration::{LearnedDenoiser, RestorationMethod};
@@ -202,14 +202,17 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
                 // What is lost by other methods depends on more than the spectrum of a scene.
                 if method == RestorationMethod::Tikhonov && joint && !args.no_forecast {
                     let forecast = forecast_scene.forecast(&system, &operator, terminal)?;
-                    restoration.forecast_db = forecast.psnr_linear_db(&system.natural_power());
                     restoration.forecast_of_scene_db = forecast.psnr_linear_db(&ScenePower::of(&truth));
+                    let natural = system.natural_scenes().into_iter();
+                    restoration.forecast_natural = natural.map(|scenes| forecast.natural(scenes)).collect();
                 }
                 found.push(restoration);
                 pictures.push(picture);
             }
         }
     }
+    let no_gain = if frame.is_lost() { Vec::new() } else { no_gain(&found) };
+    no_gain.iter().for_each(|note| terminal.say(note));
     let mut report = report(args, &system, &scene, &frame, found, model.as_ref());
     report.of_frame.operator_error.clone_from(&error.overall);
     if let Ok(kind) = args.scene.parse::<BuiltIn>() {
@@ -239,7 +242,7 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
         report.worth = worth_of_assumptions(&system, &narrow, &scene, args.seed, terminal)?;
     }
     report.of_frame.notes = notes;
-    report.of_frame.notes.extend(limited);
+    report.of_frame.notes.extend(limited.into_iter().chain(no_gain));
     let pages = PicturePages {
         report: &report,
         scene: &truth,
@@ -268,6 +271,9 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
             "each element alone"
         };
         print_line!("{}, {way}: {}", restoration.method, score(&restoration.scores[0]));
+        if let Some(forecast) = restoration.forecast_words().filter(|_| !frame.is_lost()) {
+            print_line!("{}, {way}: {forecast}", restoration.method);
+        }
     }
     if let Some(uncertainty) = &report.uncertainty {
         print_line!(

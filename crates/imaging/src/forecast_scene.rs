@@ -7,7 +7,7 @@ use ndarray::Array2;
 
 use crate::colour::ChannelColours;
 use crate::exposure::{counts_channel, expose};
-use crate::forecast::{Exposed, Forecast, ScenePower, reduction};
+use crate::forecast::{Exposed, Forecast, NaturalScenes};
 use crate::imaging_system::ImagingSystem;
 use crate::operator::{Detail, FrameOperator, SceneInputs};
 use crate::operator_error::OperatorError;
@@ -23,10 +23,9 @@ pub struct ForecastScene {
 }
 
 impl ImagingSystem {
-    /// Expected power of photographs that are reduced to the pixels of the scenes of this system.
-    pub fn natural_power(&self) -> ScenePower {
-        let [given, simulated] = [self.given, self.view].map(|view| view.rows.max(view.columns));
-        ScenePower::natural(reduction(given, simulated))
+    /// Samplings that a photograph in the pixels of the scenes of this system may have, the likeliest first.
+    pub fn natural_scenes(&self) -> Vec<NaturalScenes> {
+        NaturalScenes::of(&self.given, &self.view)
     }
 }
 

@@ -56,7 +56,7 @@ pub use dataset::{
 pub use element_images::ElementImage;
 pub use exposure::{ChosenExposure, Frame, channel_at, counts_channel, expose};
 pub use files::{FrameFile, picture_file};
-pub use forecast::{Forecast, ScenePower};
+pub use forecast::{Forecast, NaturalForecast, NaturalScenes, Sampling, ScenePower};
 pub use forecast_scene::ForecastScene;
 pub use geometry::{ElementView, SceneSpace, SceneView};
 pub use image_check::check_images;
@@ -72,7 +72,9 @@ pub use page::{PicturePages, pictures_side_by_side, shown, write_pages};
 pub use png16::write_picture;
 pub use point_image::PointImage;
 pub use recorded_frame::{FrameNumbers, is_simulated, read_signals};
-pub use report::{Assumption, ChannelBudget, FrameStatement, HomographyResidual, PictureReport, RestorationReport};
+pub use report::{
+    Assumption, ChannelBudget, FrameStatement, HomographyResidual, PictureReport, RestorationReport, no_gain,
+};
 pub use resolution::{ContrastCurve, contrast_curves};
 pub use restored_page::{RestoredPicture, RestoredReport};
 pub use scene::SCORED_SIDES;

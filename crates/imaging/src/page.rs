@@ -248,18 +248,26 @@ fn scores(page: &mut Page, report: &PictureReport) {
         let mut row = vec![Cell::from(found.method.as_str()), way(found.joint)];
         row.extend(found.scores.iter().map(|s| Cell::fixed(s.psnr_linear_db, 2)));
         table.row(row);
-        let forecasts = [
-            ("forecast from the spectrum of this scene", &found.forecast_of_scene_db),
-            ("forecast for natural scenes", &found.forecast_db),
-        ];
-        for (of, db) in forecasts.into_iter().filter(|(_, db)| !db.is_empty()) {
+        let mut forecast = |of: String, cells: Vec<Cell>| {
             let mut row = vec![Cell::from(format!("{}, {of}", found.method)), way(found.joint)];
-            row.extend(db.iter().map(|db| Cell::fixed(*db, 2)));
+            row.extend(cells);
             table.row(row);
+        };
+        if !found.forecast_of_scene_db.is_empty() {
+            let cells = found.forecast_of_scene_db.iter().map(|db| Cell::fixed(*db, 2));
+            forecast("forecast from the spectrum of this scene".into(), cells.collect());
+        }
+        for natural in &found.forecast_natural {
+            let ranges = natural.low_db.iter().zip(&natural.high_db);
+            let cells = ranges.map(|(low, high)| Cell::from(format!("{} to {}", fixed(*low, 1), fixed(*high, 1))));
+            forecast(
+                format!("forecast for eight of ten {}", natural.scenes.words()),
+                cells.collect(),
+            );
         }
     }
-    let forecasts = if report.restorations.iter().any(|r| !r.forecast_db.is_empty()) {
-        "The forecasts come from a random scene. It shows the share of detail of each size that is lost in each zone. One forecast is for the mean over photographs (GB82), reduced to the pixels of this scene; the other is for the detail of this scene in each zone. Single photographs differ from the mean by some 3 dB. "
+    let forecasts = if report.restorations.iter().any(|r| !r.forecast_of_scene_db.is_empty()) {
+        "The forecasts come from a random scene. It shows the share of detail of each size that is lost in each zone, and the error that the light makes whatever the detail. The first forecast is for the detail and the light of this scene, zone by zone: it holds for this picture. The ranges are for other photographs (mean of GB82, and the spread of twelve photographs); one in ten is below, one in ten above. "
     } else {
         ""
     };

@@ -15,6 +15,7 @@ use crate::chip::sensor_um;
 use crate::element_images::ElementImage;
 use crate::exposure::Frame;
 use crate::files::{FrameFile, picture_file};
+use crate::forecast::NaturalForecast;
 use crate::imaging_system::ImagingSystem;
 use crate::kernel_plan::averaging;
 use crate::layout::PillarCount;
@@ -23,7 +24,7 @@ use crate::operator::BetweenNodes;
 use crate::point_image::PointImage;
 use crate::resolution::ContrastCurve;
 use crate::scene::SceneImage;
-use crate::score::ZoneScore;
+use crate::score::{ZoneScore, psnr_words};
 use crate::spectra::rgb_basis;
 use crate::stray_light::LightShares;
 use crate::uncertainty::UncertaintyReport;
@@ -141,10 +142,10 @@ pub struct RestorationReport {
     /// Name of the file of the picture, 16 bits in sRGB.
     pub picture: String,
     pub scores: Vec<ZoneScore>,
-    /// Expected PSNR of linear light in each zone (dB), of natural scenes, where there is a forecast.
-    pub forecast_db: Vec<f64>,
-    /// Forecast for scenes with the spectrum of this one (dB).
+    /// Expected PSNR of linear light in each zone (dB) of scenes with the spectrum of this one, where there is a forecast.
     pub forecast_of_scene_db: Vec<f64>,
+    /// Forecast for photographs, by the samplings that this scene may have.
+    pub forecast_natural: Vec<NaturalForecast>,
 }
 
 /// Budget of the light of one channel.
@@ -191,6 +192,16 @@ impl Assumption {
 }
 
 impl RestorationReport {
+    /// The forecast that holds for this picture, in words; `None` without a forecast.
+    pub fn forecast_words(&self) -> Option<String> {
+        let db = self.forecast_of_scene_db.first()?;
+        Some(format!(
+            "PSNR of linear light {}, forecast from the spectrum of this scene {}",
+            psnr_words(self.scores[0].psnr_linear_db),
+            psnr_words(*db)
+        ))
+    }
+
     /// Report of a method.
     pub fn new(method: RestorationMethod, joint: bool, scores: Vec<ZoneScore>) -> Self {
         Self {
@@ -198,10 +209,29 @@ impl RestorationReport {
             joint,
             picture: picture_file(method, joint),
             scores,
-            forecast_db: Vec::new(),
             forecast_of_scene_db: Vec::new(),
+            forecast_natural: Vec::new(),
         }
     }
+}
+
+/// Notes on pictures that have a lower PSNR than the one by Tikhonov from the same elements, with the difference: where a scene is
+/// all fine detail, a method that prefers smooth or learnt shapes removes some of it.
+pub fn no_gain(restorations: &[RestorationReport]) -> Vec<String> {
+    let tikhonov = RestorationMethod::Tikhonov.name();
+    let note = |found: &RestorationReport| {
+        let linear = restorations
+            .iter()
+            .find(|other| other.method == tikhonov && other.joint == found.joint)?;
+        let less = linear.scores[0].psnr_db - found.scores[0].psnr_db;
+        (less > 0.0).then(|| {
+            format!(
+                "`{}` does not help with this scene: its picture has {:.2} dB less than that of `{tikhonov}` ({:.2}, not {:.2} dB)",
+                found.method, less, found.scores[0].psnr_db, linear.scores[0].psnr_db
+            )
+        })
+    };
+    restorations.iter().filter_map(note).collect()
 }
 
 impl ImagingSystem {
@@ -495,6 +525,26 @@ mod tests {
         scene.left_out = 0.0123;
         let words = spectra_of(&scene);
         assert!(words.starts_with("2 principal") && words.contains("1.23 %"), "{words}");
+    }
+
+    #[test]
+    fn methods_without_a_gain_are_noted_with_their_loss() {
+        let restored = |method, joint, psnr_db| {
+            let score = |zone| crate::score::ZoneScore {
+                zone,
+                psnr_db,
+                psnr_linear_db: psnr_db,
+                ssim: 0.5,
+            };
+            RestorationReport::new(method, joint, crate::score::Zone::ALL.map(score).to_vec())
+        };
+        let (linear, learnt) = (RestorationMethod::Tikhonov, RestorationMethod::LearnedPrior);
+        let notes = |learnt_db| no_gain(&[restored(learnt, true, learnt_db), restored(linear, true, 19.35)]);
+        assert!(notes(18.93)[0].contains("0.42 dB"), "{:?}", notes(18.93));
+        assert!(notes(19.35).is_empty());
+        // Of other elements, or alone, nothing is known.
+        assert!(no_gain(&[restored(learnt, false, 18.93), restored(linear, true, 19.35)]).is_empty());
+        assert!(no_gain(&[restored(learnt, true, 18.93)]).is_empty());
     }
 
     #[test]

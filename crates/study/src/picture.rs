@@ -9,8 +9,8 @@ use metalith_design::Design;
 use metalith_gds::extract::Extraction;
 use metalith_imaging::scene::{BuiltIn, SceneImage, chart, read_far_scene};
 use metalith_imaging::{
-    ForecastScene, Frame, FrameOperator, ImagingSystem, OperatorError, SCORED_SIDES, Zone, ZoneScore, check_scored,
-    sampling_of, scores,
+    ForecastScene, Frame, FrameOperator, ImagingSystem, OperatorError, SCORED_SIDES, ScenePower, Zone, ZoneScore,
+    check_scored, sampling_of, scores,
 };
 use metalith_optics::{AsBuiltChip, SimulationCase};
 use metalith_restoration::RestorationMethod;
@@ -124,7 +124,7 @@ pub struct TakenPicture {
     pub restored: Array3<f64>,
     /// Scores by zone.
     pub scores: Vec<ZoneScore>,
-    /// Expected PSNR of linear light of natural scenes (dB), by zone; none of methods without a forecast.
+    /// Expected PSNR of linear light of scenes with the spectrum of this one (dB), by zone; none of methods without a forecast.
     pub forecast_db: Vec<f64>,
     /// Note on the restoration, if its operator limits it.
     pub note: Option<String>,
@@ -226,13 +226,13 @@ impl PictureBench {
             true,
             progress,
         )?;
+        let truth = system.truth(&self.scene);
         let forecast_db = match method {
             RestorationMethod::Tikhonov => forecast_scene
                 .forecast(&system, &operator, progress)?
-                .psnr_linear_db(&system.natural_power()),
+                .psnr_linear_db(&ScenePower::of(&truth)),
             _ => Vec::new(),
         };
-        let truth = system.truth(&self.scene);
         let channels = self.camera.channel_names();
         Ok(TakenPicture {
             scores: scores(&restored, &truth)?,

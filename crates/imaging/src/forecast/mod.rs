@@ -15,8 +15,12 @@ use ndarray::Array3;
 use bands::ZONES;
 use power::{CELLS, means_by_cell, zone_means, zone_of};
 
-pub(crate) use natural::reduction;
+pub use natural::{NaturalForecast, NaturalScenes, Sampling};
 pub use power::ScenePower;
+
+/// Power of the light that the odds of losing a frequency grow with. With all noise in proportion to the light it would be 2, with
+/// none 0. Of 0, 0.5, 1, 1.5 and 2 this one has the smallest deviation over 18 photographs of 96 x 96 pixels.
+const ODDS_OF_LIGHT: f64 = 0.5;
 
 /// Forecast of what a camera and a restoration lose of any scene, and of what they make of noise.
 #[derive(Clone, Debug)]
@@ -82,6 +86,33 @@ impl Forecast {
         }
     }
 
+    /// Forecast for the photographs of one sampling.
+    pub fn natural(&self, scenes: NaturalScenes) -> NaturalForecast {
+        let psnr_linear_db = self.psnr_linear_db(&ScenePower::natural(&scenes));
+        let shifted = |by: f64| psnr_linear_db.iter().map(|db| db + by).collect();
+        let spread_db = scenes.spread_db();
+        NaturalForecast {
+            low_db: shifted(-spread_db),
+            high_db: shifted(spread_db),
+            scenes,
+            psnr_linear_db,
+        }
+    }
+
+    /// Shares that are lost of a scene with this light by cell: the error of the kernels counts as noise in proportion to the light, so
+    /// a dark scene is regularised less.
+    fn lost_of_light(&self, light: &[f64]) -> ScenePower {
+        let mut lost = self.lost.clone();
+        for (cell, planes) in lost.cells.iter_mut().enumerate() {
+            let brighter = light[cell] / self.light[cell].max(f64::MIN_POSITIVE);
+            let odds = brighter.max(0.0).powf(ODDS_OF_LIGHT);
+            for share in planes.iter_mut().flatten().filter(|share| **share < 1.0) {
+                *share *= odds / (1.0 - *share + *share * odds);
+            }
+        }
+        lost
+    }
+
     /// Expected PSNR of linear light (dB) in all zones ([`crate::Zone::ALL`]) of scenes with this power: that of the mean squared
     /// error.
     pub fn psnr_linear_db(&self, scenes: &ScenePower) -> Vec<f64> {
@@ -89,7 +120,7 @@ impl Forecast {
             let brighter = scenes.light[cell] / self.light[cell].max(f64::MIN_POSITIVE);
             self.noise[cell] * self.exposed.against(brighter)
         };
-        let lost = scenes.squares(Some(&self.lost));
+        let lost = scenes.squares(Some(&self.lost_of_light(&scenes.light)));
         let errors = (0..CELLS * CELLS).map(|cell| self.of_bands[zone_of(cell)] * lost[cell] + noise(cell));
         let errors: Vec<f64> = errors.collect();
         let whole = errors.iter().sum::<f64>() / errors.len() as f64;
@@ -176,11 +207,15 @@ mod tests {
         let rehearsed = random(1, 160, 160);
         let none = Array3::zeros(rehearsed.dim());
         let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &none, exposed());
-        // Twice as fine, and of another contrast.
+        // Twice as fine, and of another contrast in the same light.
         let fine = random(2, 320, 320);
         let other = Array3::from_shape_fn((160, 160, 3), |(y, x, c)| 0.5 * fine[[2 * y, 2 * x, c]]);
+        let power = ScenePower {
+            light: forecast.light.clone(),
+            ..ScenePower::of(&other)
+        };
         let scores = crate::score::scores(&blurred(&other), &other).unwrap();
-        for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&other)).iter().zip(scores) {
+        for (got, want) in forecast.psnr_linear_db(&power).iter().zip(scores) {
             assert!((got - want.psnr_linear_db).abs() < DRAW_DB, "{got} {want:?}");
         }
         // Noise is the same whatever the scene: of a smooth one it is all of the error.
@@ -194,6 +229,31 @@ mod tests {
         for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&smooth)).iter().zip(scores) {
             assert!((got - want.psnr_linear_db).abs() < DRAW_DB, "{got} {want:?}");
         }
+    }
+
+    #[test]
+    fn dark_scenes_lose_less_of_their_detail() {
+        /// Decibels, of rounding.
+        const ROUNDING: f64 = 1e-9;
+        let scene = ScenePower::of(&random(3, 60, 60));
+        let half = ScenePower {
+            cells: vec![vec![[0.5; BANDS.len()]; 3]; CELLS * CELLS],
+            light: scene.light.iter().map(|light| 4.0 * light).collect(),
+        };
+        let forecast = |lost: &ScenePower| Forecast {
+            lost: lost.clone(),
+            of_bands: [1.0; ZONES.len()],
+            noise: vec![0.0; CELLS * CELLS],
+            light: lost.light.clone(),
+            exposed: exposed(),
+        };
+        let same_light = ScenePower {
+            light: scene.light.clone(),
+            ..half.clone()
+        };
+        let [dark, same] = [&half, &same_light].map(|lost| forecast(lost).psnr_linear_db(&scene)[0]);
+        // A quarter of the light has half of the odds: a third is lost, not a half.
+        assert!((dark - same - 10.0 * 1.5f64.log10()).abs() < ROUNDING, "{dark} {same}");
     }
 
     /// Photons of a brighter scene make more noise, those of reading do not.

@@ -3,8 +3,10 @@
 use std::f64::consts::PI;
 
 use metalith_restoration::PHOTOGRAPH_PIXELS;
+use serde::{Deserialize, Serialize};
 
 use super::bands::{BANDS, Bands, ZONES};
+use crate::geometry::SceneView;
 
 /// Radius (cycles a pixel) of the disc that holds as much power of a spectrum 1 / f^2 as the square of all frequencies.
 const SQUARE: f64 = 0.565;
@@ -17,10 +19,83 @@ pub(crate) struct NaturalZone {
     pub planes: [Bands; 3],
 }
 
-/// Pixels of a photograph, along an axis, that a pixel of a scene averages. A scene that was given with fewer pixels than the photographs
-/// have is taken for a reduced photograph.
-pub(crate) fn reduction(given_pixels: usize, simulated_pixels: usize) -> f64 {
-    given_pixels.max(PHOTOGRAPH_PIXELS) as f64 / simulated_pixels as f64
+/// How the pixels of a scene sample a photograph.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// A whole photograph, reduced to the pixels of the scene.
+    Whole,
+    /// A piece from the middle of a photograph, at the photograph's own pixels.
+    Piece,
+}
+
+/// Photographs of one sampling.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NaturalScenes {
+    pub sampling: Sampling,
+    /// Pixels of a photograph, along an axis, that a pixel of the simulated scene averages.
+    pub reduction: f64,
+    /// Pixels of the simulated scene over its field.
+    pub pixels_per_degree: f64,
+}
+
+/// Forecast for the photographs of one sampling: PSNR of linear light (dB) in all zones ([`crate::Zone::ALL`]).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NaturalForecast {
+    #[serde(flatten)]
+    pub scenes: NaturalScenes,
+    /// Forecast for the mean power of the photographs, which is near their median.
+    pub psnr_linear_db: Vec<f64>,
+    /// One photograph in ten has less.
+    pub low_db: Vec<f64>,
+    /// One photograph in ten has more.
+    pub high_db: Vec<f64>,
+}
+
+impl NaturalScenes {
+    /// Samplings that a scene of so many pixels along its longer side may have, the likeliest first. A scene with fewer pixels than the
+    /// photographs of the statistics is a reduced photograph or a piece of one.
+    pub(crate) fn of(given: &SceneView, simulated: &SceneView) -> Vec<Self> {
+        let [given_pixels, pixels] = [given, simulated].map(|view| view.rows.max(view.columns) as f64);
+        let of = |sampling, photograph: f64| Self {
+            sampling,
+            reduction: photograph / pixels,
+            pixels_per_degree: simulated.columns as f64 / simulated.field_deg,
+        };
+        let photograph = PHOTOGRAPH_PIXELS as f64;
+        let whole = of(Sampling::Whole, given_pixels.max(photograph));
+        if given_pixels < photograph {
+            vec![whole, of(Sampling::Piece, given_pixels)]
+        } else {
+            vec![whole]
+        }
+    }
+
+    /// Half of the range (dB) that holds eight of ten photographs.
+    pub(super) fn spread_db(&self) -> f64 {
+        /// Deviations of the forecasts of twelve photographs (of the 24 in `docs/method/restoration.md`), 96 x 96 pixels.
+        const DEVIATIONS_DB: [f64; 2] = [3.7, 4.8];
+        /// Half of the interval that holds the thirteenth of normal numbers with probability 0.8, in deviations of the twelve
+        /// (Student's t of 11 degrees of freedom, times the root of 1 + 1/12).
+        const OF_DEVIATION: f64 = 1.42;
+        OF_DEVIATION
+            * match self.sampling {
+                Sampling::Whole => DEVIATIONS_DB[0],
+                Sampling::Piece => DEVIATIONS_DB[1],
+            }
+    }
+
+    /// The sampling in words.
+    pub fn words(&self) -> String {
+        let each = format!("{:.3} pixels a degree", self.pixels_per_degree);
+        match self.sampling {
+            Sampling::Whole if self.reduction > 1.0 => {
+                format!("whole photographs reduced {:.1} times, {each}", self.reduction)
+            }
+            Sampling::Whole => format!("photographs at their own pixels, {each}"),
+            Sampling::Piece => format!("pieces of photographs at their own pixels, {each}"),
+        }
+    }
 }
 
 /// Powers of a photograph that is reduced by a factor. A band of the reduced photograph holds the power of lower frequencies of the
@@ -187,9 +262,25 @@ mod tests {
         for (a, b) in reduced(native, 1.0).iter().zip(native) {
             assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
         }
-        assert_eq!(
-            [reduction(96, 96), reduction(576, 576), reduction(2304, 768)],
-            [6.0, 1.0, 3.0]
-        );
+    }
+
+    #[test]
+    fn a_scene_of_few_pixels_is_a_reduced_photograph_or_a_piece_of_one() {
+        let view = |pixels| SceneView {
+            rows: pixels,
+            columns: pixels,
+            field_deg: 80.0,
+            distance_um: f64::INFINITY,
+        };
+        let found = |given, simulated| -> Vec<(Sampling, f64, f64)> {
+            let all = NaturalScenes::of(&view(given), &view(simulated));
+            all.iter()
+                .map(|s| (s.sampling, s.reduction, s.pixels_per_degree))
+                .collect()
+        };
+        let small = [(Sampling::Whole, 6.0, 1.2), (Sampling::Piece, 1.0, 1.2)];
+        assert_eq!(found(96, 96), small);
+        assert_eq!(found(576, 576), [(Sampling::Whole, 1.0, 7.2)]);
+        assert_eq!(found(2304, 768), [(Sampling::Whole, 3.0, 9.6)]);
     }
 }

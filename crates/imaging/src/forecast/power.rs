@@ -9,7 +9,7 @@ use num_complex::Complex32;
 use rayon::prelude::*;
 
 use super::bands::{BANDS, Bands, ZONES};
-use super::natural::{NATURAL, NaturalZone, reduced};
+use super::natural::{NATURAL, NaturalScenes, NaturalZone, Sampling, reduced};
 use crate::score::Zone;
 
 /// Cells an axis of the field that power is distinguished in, two for each third of it. Within a zone what is lost
@@ -53,13 +53,19 @@ impl ScenePower {
         }
     }
 
-    /// Expected of photographs of which a pixel averages so many along an axis (1 or more): the mean of 25, which have less detail
-    /// the farther from the middle.
-    pub fn natural(reduction: f64) -> Self {
-        let zones = (0..CELLS * CELLS).map(|cell| &NATURAL[zone_of(cell)]);
-        let reduced_planes = |zone: &NaturalZone| zone.planes.iter().map(|native| reduced(native, reduction)).collect();
+    /// Expected of photographs of one sampling: the mean of 25. Whole ones have less detail the farther from the middle; pieces have
+    /// that of the middle everywhere.
+    pub fn natural(scenes: &NaturalScenes) -> Self {
+        let zones = (0..CELLS * CELLS).map(|cell| match scenes.sampling {
+            Sampling::Whole => &NATURAL[zone_of(cell)],
+            Sampling::Piece => &NATURAL[0],
+        });
+        let planes = |zone: &NaturalZone| {
+            let planes = zone.planes.iter();
+            planes.map(|native| reduced(native, scenes.reduction)).collect()
+        };
         Self {
-            cells: zones.clone().map(reduced_planes).collect(),
+            cells: zones.clone().map(planes).collect(),
             light: zones.map(|zone| zone.light).collect(),
         }
     }
@@ -213,7 +219,12 @@ mod tests {
     fn photographs_have_the_power_of_their_statistics_where_they_are_sharp() {
         /// Twice or half: the statistics are one curve for all planes and zones.
         const OF_THE_CURVE: f64 = 2.0;
-        let natural = ScenePower::natural(1.0).by_zone();
+        let native = NaturalScenes {
+            sampling: Sampling::Whole,
+            reduction: 1.0,
+            pixels_per_degree: 7.2,
+        };
+        let natural = ScenePower::natural(&native).by_zone();
         let wanted = SceneStatistics::colours().band_powers(&BANDS);
         let (zone, _, planes) = &natural[0];
         assert_eq!(*zone, Zone::Centre);
