@@ -217,6 +217,17 @@ fn the_light_is_stated_once_and_in_a_unit_that_it_has() {
     ] {
         assert_eq!(stated(lux, time_ms).unwrap_err().id(), "camera/exposure-out-of-range");
     }
+    let up_to = |longest_ms: f64, time_ms: Option<f64>| {
+        silent.clone().stated(&StatedExposure {
+            lux: None,
+            time_ms,
+            longest_ms: Some(longest_ms),
+        })
+    };
+    let chosen = up_to(20.0, None).unwrap();
+    assert_eq!((chosen.exposure.time_s, chosen.exposure.auto), (0.02, true));
+    assert_eq!(up_to(20.0, Some(5.0)).unwrap_err().id(), "camera/two-times");
+    assert_eq!(up_to(-1.0, None).unwrap_err().id(), "camera/exposure-out-of-range");
     let infrared = PLAIN
         .replace("[450, 650]", "[1500, 1600]")
         .replace("equal_energy", "leds");
