@@ -119,7 +119,8 @@ pub(crate) fn run(args: &DatasetArgs, terminal: &Terminal) -> Result<Outcome> {
     let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
     let origin = DatasetOrigin::of(&design, &layout, &camera, args.with.model.as_deref())?;
     let system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &read(&images[0])?, terminal)?;
-    system.light().notes().iter().for_each(|note| terminal.say(note));
+    let notes = system.light().notes().into_iter().chain(system.direction_notes());
+    notes.for_each(|note| terminal.say(&note));
     let operator = system.simulation();
     let head = DatasetManifest::of(&system, origin, args.seed);
     let turn = terminal.turn_at(&args.out, paths(&inputs))?;

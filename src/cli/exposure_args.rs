@@ -7,15 +7,15 @@ use metalith::sensor::StatedExposure;
 #[derive(Args)]
 pub(crate) struct ExposureArgs {
     /// Illuminance of the scene (lux); what the camera file states if left out.
-    #[arg(long, value_parser = light_of, value_name = "LUX")]
+    #[arg(long, value_parser = light_of, value_name = "LUX", allow_negative_numbers = true)]
     lux: Option<f64>,
 
     /// Time of the exposure (ms); what the camera file states if left out.
-    #[arg(long, value_parser = time_of, value_name = "MS")]
+    #[arg(long, value_parser = time_of, value_name = "MS", allow_negative_numbers = true)]
     time_ms: Option<f64>,
 
-    /// Longest time (ms) of an exposure that ends when a white pixel is bright: each camera has its own time up to this.
-    #[arg(long, value_parser = time_of, value_name = "MS", conflicts_with = "time_ms")]
+    /// Longest time (ms) of an exposure that ends when a white pixel is bright, as `time_ms = "auto"`; not with --time-ms.
+    #[arg(long, value_parser = time_of, value_name = "MS", conflicts_with = "time_ms", allow_negative_numbers = true)]
     longest_ms: Option<f64>,
 }
 

@@ -39,8 +39,11 @@ impl AngularResponse {
         for row in csv_rows(&text, "deg,value", &refuse)? {
             let row = row?;
             let [deg, value] = row.numbers()?;
-            if !(0.0..=90.0).contains(&deg) || !(0.0..=MOST).contains(&value) {
-                return Err(row.refused(format!("{deg} degrees with {value} cannot be")));
+            if !(0.0..=90.0).contains(&deg) {
+                return Err(row.refused(format!("an angle of {deg} degrees, where 0 to 90 can be")));
+            }
+            if !(0.0..=MOST).contains(&value) {
+                return Err(row.refused(format!("a response of {value}, where 0 to {MOST} can be")));
             }
             match samples.last() {
                 None if deg != 0.0 || value != 1.0 => {

@@ -245,6 +245,7 @@ fn read_sensor(s: &Section<'_, '_>) -> (Sensor, Option<PathBuf>) {
         s.optional_float(key, Limits::new(range, unit)).unwrap_or(default)
     };
     let bits = s.integer("bits", 1..=32, "bits") as u32;
+    ["noise_photon", "noise_read"].iter().for_each(|key| s.may_have(key));
     let in_paper_terms = s.has("noise_photon") || s.has("noise_read");
     let noise = if in_paper_terms {
         for key in ["full_well_e", "read_noise_e", "dark_current_e_s"] {
@@ -300,7 +301,7 @@ fn read_sensor(s: &Section<'_, '_>) -> (Sensor, Option<PathBuf>) {
             Some(Walls::None),
         ),
     };
-    let angular_response = s.has("angular_response").then(|| s.file("angular_response"));
+    let angular_response = s.optional_file("angular_response");
     s.finish();
     (sensor, angular_response)
 }

@@ -139,7 +139,7 @@ impl Tolerance {
                 format!("give fewer draws or values: a study has {MOST_DRAWS} draws at the most"),
             );
         }
-        let file = |key: &str| root.has(key).then(|| root.file(key));
+        let file = |key: &str| root.optional_file(key);
         let design = root.file("design");
         let layout = file("layout");
         if let (Some(first), Some(_)) = (of_design.first(), &layout) {

@@ -232,7 +232,7 @@ impl MappingSpec {
         if !s.has("table") && !from_cells && !rotated && !upright {
             check_widths(s, cell, &polynomial);
         }
-        let table_file = s.has("table").then(|| s.file("table"));
+        let table_file = s.optional_file("table");
         if table_file.is_some() && s.has("coefficients") {
             s.fault(
                 "table",

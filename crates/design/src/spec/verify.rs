@@ -131,7 +131,7 @@ impl VerifySpec {
                 .unwrap_or(USUAL_PIXEL_UM),
             polarisation: read_polarisation(s, cell),
             analyser: read_analyser(s, cell),
-            camera: s.has("camera").then(|| s.file("camera")),
+            camera: s.optional_file("camera"),
             limits: LimitSpec::read(s.optional_section("limits").as_ref()),
         };
         s.finish();

@@ -125,6 +125,11 @@ impl<'d, 't> Section<'d, 't> {
         self.table.contains_key(key)
     }
 
+    /// Record that a key may be given: it is among those that are known here, whether it is there or not.
+    pub fn may_have(&self, key: &str) {
+        self.asked.borrow_mut().insert(key.to_owned());
+    }
+
     /// Record that a key is missing, if it is: one that other values of the file ask for. `expected` says what to add, and why.
     pub fn must_have(&self, key: &str, expected: &str) {
         if !self.has(key) {

@@ -235,6 +235,12 @@ impl<'t> Section<'_, 't> {
         self.file_else(key, "relative paths count from the folder of this file")
     }
 
+    /// Path of a file that may be left out, as [`Section::file`].
+    pub fn optional_file(&self, key: &str) -> Option<PathBuf> {
+        self.may_have(key);
+        self.has(key).then(|| self.file(key))
+    }
+
     /// Variant of the path of a file for a file that is made by what `hint` says.
     pub fn file_else(&self, key: &str, hint: &str) -> PathBuf {
         let text = self.text(key);
