@@ -21,6 +21,9 @@ impl<'a> Acceptance<'a> {
 
     /// Share of the light of an element that is counted at a place of the chip (um).
     pub(crate) fn share(&self, element: usize, place_um: [f64; 2]) -> f64 {
+        if self.sensor.counts_all_light() {
+            return 1.0;
+        }
         let response = self
             .sensor
             .angular_response
@@ -52,7 +55,7 @@ impl<'a> Acceptance<'a> {
 
     /// Shares of the pixels of the sensor; none if every pixel counts all light.
     pub(crate) fn over_sensor(&self, element: usize) -> Option<Array2<f32>> {
-        if self.sensor.angular_response.last_deg().is_none() && self.sensor.walls == Walls::None {
+        if self.sensor.counts_all_light() {
             return None;
         }
         let shape = (self.sensor.rows as usize, self.sensor.columns as usize);
@@ -64,24 +67,13 @@ impl<'a> Acceptance<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metalith_core::Wedge;
     use metalith_sensor::{AngularResponse, Camera};
 
     fn element(x: f64, y: f64) -> ElementView {
-        ElementView {
-            centre_um: [x, y],
-            wedge: Wedge {
-                wavelength_um: 0.55,
-                sin_x: 0.0,
-                sin_y: 0.0,
-            },
-            area: 1.0,
-            sensor_um: 100.0,
-            slope: [0.0; 2],
-        }
+        ElementView::ahead([x, y], 100.0)
     }
 
-    /// Of the nearest element alone, half of it in the pixels that a wall cuts in half.
+    /// Walls leave a pixel the light of the nearest element alone; half of it where they cut the pixel in half.
     #[test]
     fn walls_leave_the_light_of_the_nearest_element() {
         let elements = [element(-50.0, 0.0), element(50.0, 0.0), element(0.0, 200.0)];
@@ -125,9 +117,16 @@ mod tests {
         ] {
             assert!((share(&elements, place) - want).abs() < ROUNDING, "{place:?}");
         }
-        // A sensor that falls away towards +x sees light there closer to its own plane.
-        elements[0].slope = [10f64.to_radians().tan(), 0.0];
-        let steeper = share(&elements, [130.0, 0.0]);
-        assert!(steeper > share(&elements, [-70.0, 0.0]) - 1.0 && steeper != 0.55);
+        // A sensor that falls away towards +x: light there arrives by its tilt farther from its normal, on the other side closer to it.
+        const TILT_DEG: f64 = 10.0;
+        let slope = TILT_DEG.to_radians().tan();
+        elements[0].slope = [slope, 0.0];
+        for (way, tilt_deg) in [(50.0, TILT_DEG), (-50.0, -TILT_DEG)] {
+            // The middle of the element is 30 um from that of the chip, by which the sensor stands 100 um away.
+            let z = 100.0 + slope * (30.0 + way);
+            let deg = (f64::abs(way) / z).atan().to_degrees() + tilt_deg;
+            let found = share(&elements, [30.0 + way, 0.0]);
+            assert!((found - (1.0 - 0.01 * deg)).abs() < ROUNDING, "{way}: {found} {deg}");
+        }
     }
 }

@@ -341,17 +341,7 @@ mod tests {
                 level: Some(LightLevel::IlluminanceLux(lux)),
                 reflectance: 0.9,
             };
-            let lens = ElementView {
-                centre_um: [0.0; 2],
-                wedge: metalith_core::Wedge {
-                    wavelength_um: 0.55,
-                    sin_x: 0.0,
-                    sin_y: 0.0,
-                },
-                area: 1.0,
-                sensor_um: focal_um,
-                slope: [0.0; 2],
-            };
+            let lens = ElementView::ahead([0.0; 2], focal_um);
             let light = lens.flux_per_um2([0.0; 2]) * camera.sensor.pixel_um.powi(2);
             let white = [Array2::from_elem((1, 1), light as f32)];
             let area_um2 = 0.25 * std::f64::consts::PI * diameter_um * diameter_um;

@@ -119,6 +119,22 @@ pub struct ElementView {
 }
 
 impl ElementView {
+    /// Element of the area of a lens that does not steer, before a sensor that is not tilted.
+    #[cfg(test)]
+    pub(crate) fn ahead(centre_um: [f64; 2], sensor_um: f64) -> Self {
+        Self {
+            centre_um,
+            wedge: Wedge {
+                wavelength_um: 0.55,
+                sin_x: 0.0,
+                sin_y: 0.0,
+            },
+            area: 1.0,
+            sensor_um,
+            slope: [0.0; 2],
+        }
+    }
+
     /// Sines under which light arrives here that arrives at the middle of the chip under these tangents.
     pub fn sines(&self, tangents: [f64; 2], scene_distance_um: f64) -> [f64; 2] {
         let t = [0, 1].map(|a| tangents[a] + self.centre_um[a] / scene_distance_um);
@@ -299,17 +315,7 @@ mod tests {
     #[test]
     fn a_near_scene_is_seen_from_two_places() {
         // 991 / Z[mm] pixels of 5.86 um between elements 2.42 mm apart.
-        let flat = |x: f64| ElementView {
-            centre_um: [x, 0.0],
-            wedge: Wedge {
-                wavelength_um: 0.55,
-                sin_x: 0.0,
-                sin_y: 0.0,
-            },
-            area: 1.0,
-            sensor_um: 2400.0,
-            slope: [0.0; 2],
-        };
+        let flat = |x: f64| ElementView::ahead([x, 0.0], 2400.0);
         let at = |x: f64| flat(x).landing_um(flat(x).sines([0.0; 2], 100e3), 0.5).unwrap()[0];
         // The published figure has three digits.
         assert!(((at(2420.0) - at(0.0)) / 5.86 - 9.91).abs() < 5e-3);

@@ -10,7 +10,7 @@ use metalith_design::{Design, cell_models};
 use metalith_gds::extract::Extraction;
 use metalith_layout::read_pillars;
 use metalith_optics::{AsBuiltChip, CalibratedModel, SimulationCase};
-use metalith_sensor::{AngularResponse, Camera, Walls};
+use metalith_sensor::Camera;
 
 use crate::cache_file;
 use crate::geometry::SceneView;
@@ -20,10 +20,10 @@ use crate::kernel_plan::KernelPlan;
 use crate::layout::{PillarCount, check_elements};
 use crate::scene::SceneImage;
 
-/// What decides the stray light that pixels count, beside the kernels; nothing where they count all of it.
+/// Inputs of the stray light that pixels count, beside those of the kernels; none where pixels count all light.
 fn arrival_inputs(camera: &Camera) -> String {
     let sensor = &camera.sensor;
-    if sensor.angular_response == AngularResponse::Unstated && sensor.walls == Walls::None {
+    if sensor.counts_all_light() {
         return String::new();
     }
     format!(" {:?} {:?}", sensor.angular_response, sensor.walls)

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use metalith_core::file::read_at_most;
-use metalith_core::{Error, Result, csv_rows};
+use metalith_core::{Error, Result};
 use serde::Serialize;
 
-/// Longest table that is read (bytes).
-const LONGEST: u64 = 1 << 20;
+use crate::spectrum::read_samples;
+
 /// Largest response: microlenses of some sensors favour a small angle.
 const MOST: f64 = 2.0;
 
@@ -32,31 +31,24 @@ impl AngularResponse {
         let hint = format!(
             "give a header `deg,value` and lines of both, angles rising from 0 to at most 90, values from 0 to {MOST} and 1 at 0 degrees"
         );
-        let refuse = |line: Option<usize>, what: String| Error::table(path, line, what, &hint);
-        let bytes = read_at_most(path, LONGEST, "a response by angle")?;
-        let text = String::from_utf8_lossy(&bytes);
-        let mut samples: Vec<(f64, f64)> = Vec::new();
-        for row in csv_rows(&text, "deg,value", &refuse)? {
-            let row = row?;
-            let [deg, value] = row.numbers()?;
+        let mistake = |last: Option<f64>, deg: f64, value: f64| {
             if !(0.0..=90.0).contains(&deg) {
-                return Err(row.refused(format!("an angle of {deg} degrees, where 0 to 90 can be")));
+                return Some(format!("an angle of {deg} degrees, where 0 to 90 can be"));
             }
             if !(0.0..=MOST).contains(&value) {
-                return Err(row.refused(format!("a response of {value}, where 0 to {MOST} can be")));
+                return Some(format!("a response of {value}, where 0 to {MOST} can be"));
             }
-            match samples.last() {
+            match last {
                 None if deg != 0.0 || value != 1.0 => {
-                    return Err(row.refused(format!("{deg} degrees with {value}, where 0 degrees with 1 should be")));
+                    Some(format!("{deg} degrees with {value}, where 0 degrees with 1 should be"))
                 }
-                Some((last, _)) if *last >= deg => {
-                    return Err(row.refused(format!("{deg} degrees stands after an angle that is not smaller")));
-                }
-                _ => samples.push((deg, value)),
+                Some(last) if last >= deg => Some(format!("{deg} degrees stands after an angle that is not smaller")),
+                _ => None,
             }
-        }
+        };
+        let samples = read_samples(path, "a response by angle", "deg,value", &hint, mistake)?;
         if samples.len() < 2 {
-            return Err(refuse(None, "fewer than two angles".into()));
+            return Err(Error::table(path, None, "fewer than two angles", &hint));
         }
         Ok(Self::Table(samples))
     }

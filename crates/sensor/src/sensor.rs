@@ -62,6 +62,11 @@ impl Sensor {
         self.noise.full_scale_e().unwrap_or(self.gain_e * steps)
     }
 
+    /// True if every pixel counts all light of every element: no response by angle is stated, and no walls stand between elements.
+    pub fn counts_all_light(&self) -> bool {
+        self.angular_response == AngularResponse::Unstated && self.walls == Walls::None
+    }
+
     /// One step of the pixel value, of full scale.
     pub fn step(&self) -> f64 {
         self.gain_e / self.full_scale_e()

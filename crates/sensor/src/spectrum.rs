@@ -16,6 +16,32 @@ pub struct Spectrum {
     samples: Vec<(f64, f64)>,
 }
 
+/// Samples of a table of two columns, one in each row. `mistake`: what is wrong with a sample after the place of the one before it.
+///
+/// # Errors
+/// If the file cannot be read, or a row has no two numbers or a mistake.
+pub(crate) fn read_samples(
+    path: &Path,
+    what: &str,
+    columns: &str,
+    hint: &str,
+    mistake: impl Fn(Option<f64>, f64, f64) -> Option<String>,
+) -> Result<Vec<(f64, f64)>> {
+    let refuse = |line: Option<usize>, what: String| Error::table(path, line, what, hint);
+    let bytes = read_at_most(path, LONGEST, what)?;
+    let text = String::from_utf8_lossy(&bytes);
+    let mut samples: Vec<(f64, f64)> = Vec::new();
+    for row in csv_rows(&text, columns, &refuse)? {
+        let row = row?;
+        let [place, value] = row.numbers()?;
+        if let Some(what) = mistake(samples.last().map(|last| last.0), place, value) {
+            return Err(row.refused(what));
+        }
+        samples.push((place, value));
+    }
+    Ok(samples)
+}
+
 impl Spectrum {
     /// Spectrum from samples with rising wavelengths (nm) and values that are not negative; `None` if they are not.
     pub fn new(samples: Vec<(f64, f64)>) -> Option<Self> {
@@ -36,22 +62,16 @@ impl Spectrum {
         let hint = format!(
             "give a header `nm,value` and lines of both, wavelengths rising, values from 0 to {most}, not all zero"
         );
-        let refuse = |line: Option<usize>, what: String| Error::table(path, line, what, &hint);
-        let bytes = read_at_most(path, LONGEST, "a curve over wavelength")?;
-        let text = String::from_utf8_lossy(&bytes);
-        let mut samples: Vec<(f64, f64)> = Vec::new();
-        for row in csv_rows(&text, "nm,value", &refuse)? {
-            let row = row?;
-            let [nm, value] = row.numbers()?;
+        let mistake = |last: Option<f64>, nm: f64, value: f64| {
             if nm <= 0.0 || !(0.0..=most).contains(&value) {
-                return Err(row.refused(format!("{nm} nm with {value} cannot be")));
+                return Some(format!("{nm} nm with {value} cannot be"));
             }
-            if samples.last().is_some_and(|last| last.0 >= nm) {
-                return Err(row.refused(format!("{nm} nm stands after a wavelength that is not shorter")));
-            }
-            samples.push((nm, value));
-        }
-        Self::new(samples).ok_or_else(|| refuse(None, "fewer than two wavelengths, or no light at all".into()))
+            let falls = last.is_some_and(|last| last >= nm);
+            falls.then(|| format!("{nm} nm stands after a wavelength that is not shorter"))
+        };
+        let samples = read_samples(path, "a curve over wavelength", "nm,value", &hint, mistake)?;
+        Self::new(samples)
+            .ok_or_else(|| Error::table(path, None, "fewer than two wavelengths, or no light at all", &hint))
     }
 
     /// Value at a wavelength (nm).

@@ -19,7 +19,7 @@ pub(crate) struct NaturalZone {
     pub planes: [Bands; 3],
 }
 
-/// How the pixels of a scene sample a photograph.
+/// Relation between the pixels of a scene and those of a photograph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {

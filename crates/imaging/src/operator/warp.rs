@@ -266,7 +266,6 @@ fn extent(element: &ElementView, spec: &BankSpec, channel_um: f64) -> ([f64; 2],
 mod tests {
     use super::*;
     use crate::geometry::SceneView;
-    use metalith_core::Wedge;
     use metalith_sensor::Camera;
 
     /// The field of an element is cut where its light does not reach the sensor, and what is left looks where it did.
@@ -290,17 +289,7 @@ mod tests {
         let warp = |centre_um: [f64; 2], side: u32, cell: usize, reach: usize| {
             let mut sensor = Camera::three_bands(2.0).sensor;
             (sensor.columns, sensor.rows) = (side, side);
-            let element = ElementView {
-                centre_um,
-                wedge: Wedge {
-                    wavelength_um: 0.55,
-                    sin_x: 0.0,
-                    sin_y: 0.0,
-                },
-                area: 1.0,
-                sensor_um: 100.0,
-                slope: [0.0; 2],
-            };
+            let element = ElementView::ahead(centre_um, 100.0);
             let point = CellPoint {
                 cell,
                 shift: [0.0; 2],
