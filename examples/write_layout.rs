@@ -3,6 +3,7 @@
 //!
 //! The widths of all pillars are there before the clock starts, as those of the peers are. One line of JSON.
 
+use metalith::cpu_time::cpu_seconds;
 use metalith::layout::{LayoutFormat, OasisEncoding, write_pillars_as};
 use metalith::{Design, Hierarchy, PillarArray, Silent};
 
@@ -31,12 +32,4 @@ fn main() -> metalith::Result<()> {
         array.pillars()
     );
     Ok(())
-}
-
-/// User and system time of this process so far, where the system tells: fields 14 and 15, in hundredths.
-fn cpu_seconds() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    let behind_name = text.rsplit_once(')')?.1;
-    let fields = behind_name.split_whitespace().skip(11).take(2);
-    Some(fields.filter_map(|f| f.parse::<f64>().ok()).sum::<f64>() * 0.01)
 }

@@ -119,7 +119,7 @@ pub use metalith_wave as wave;
 
 pub use metalith_cell::{CellModel, Fidelity};
 pub use metalith_core::{
-    AtomicFile, Error, Fault, FaultKind, Faults, FolderLock, Progress, Result, Silent, Warning, Wedge, file,
+    AtomicFile, Error, Fault, FaultKind, Faults, FolderLock, Progress, Result, Silent, Warning, Wedge, cpu_time, file,
     numerical_aperture, text,
 };
 pub use metalith_design::{Design, Hierarchy, PillarArray, cell_models};

@@ -1,5 +1,6 @@
 //! Scores of cameras over photographs.
 
+use metalith_core::cpu_time::{cpu_seconds, since};
 use metalith_core::srgb::encoded;
 use metalith_core::{Error, Progress, Result};
 use metalith_imaging::scene::SceneImage;
@@ -9,7 +10,6 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
 use crate::baseline_camera::{BaselineCamera, Method};
-use crate::cpu_time::{cpu_seconds, since};
 
 /// Scores of one way of making pictures, in all zones.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -21,7 +21,6 @@ mod array;
 mod baseline_camera;
 mod compare;
 mod comparison;
-mod cpu_time;
 mod diffusercam;
 mod flatcam;
 mod lensless;

@@ -1,6 +1,7 @@
 //! Foundation of every part of the project: errors, progress, whole files, documents with spans, tables, NPY, PNG, TIFF and FITS.
 
 mod alignment_cross;
+pub mod cpu_time;
 mod csv;
 #[cfg(feature = "documents")]
 pub mod document;

@@ -1,7 +1,8 @@
 //! CPU time of the work.
 
 /// User and system time of this process so far (s), where the system tells it in `/proc`: fields 14 and 15, hundredths.
-pub(crate) fn cpu_seconds() -> Option<f64> {
+#[must_use]
+pub fn cpu_seconds() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
     let behind_name = text.rsplit_once(')')?.1;
     let fields = behind_name.split_whitespace().skip(11).take(2);
@@ -9,6 +10,7 @@ pub(crate) fn cpu_seconds() -> Option<f64> {
 }
 
 /// Time since a moment (s), where both are known.
-pub(crate) fn since(moment: Option<f64>) -> Option<f64> {
+#[must_use]
+pub fn since(moment: Option<f64>) -> Option<f64> {
     Some(cpu_seconds()? - moment?)
 }
