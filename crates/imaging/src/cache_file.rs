@@ -52,14 +52,24 @@ fn place(turn: Symmetry) -> usize {
     Symmetry::ALL.iter().position(|s| *s == turn).expect("all are there")
 }
 
-fn file_of(folder: &Path, kind: &str, inputs: &[u8]) -> std::path::PathBuf {
+pub(crate) fn file_of(folder: &Path, kind: &str, inputs: &[u8]) -> std::path::PathBuf {
     folder.join(format!("{kind}-{}.bin", cache_file::name_of(inputs)))
 }
 
 /// Numbers that are written or read at once: a bank of half a gigabyte is held once, not beside the bytes of its file.
 const PIECE: usize = 1 << 14;
 
-fn write(file: &Path, magic: [u8; 8], inputs: &[u8], head: &impl Serialize, numbers: &[&[f32]]) -> Result<()> {
+/// Write a kept file: what is small, and the numbers.
+///
+/// # Errors
+/// If it cannot be written.
+pub(crate) fn write(
+    file: &Path,
+    magic: [u8; 8],
+    inputs: &[u8],
+    head: &impl Serialize,
+    numbers: &[&[f32]],
+) -> Result<()> {
     let head = serde_json::to_vec(head)
         .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
     let mut kept = CacheFileWriter::create(file, magic, inputs)?;
@@ -75,7 +85,7 @@ fn write(file: &Path, magic: [u8; 8], inputs: &[u8], head: &impl Serialize, numb
 }
 
 /// Content of a kept file that is read from its beginning.
-struct Content<'a> {
+pub(crate) struct Content<'a> {
     from: &'a mut dyn Read,
     /// Bytes that are left: no length in the content is taken for more.
     left: u64,
@@ -89,13 +99,13 @@ impl Content<'_> {
         Some(bytes)
     }
 
-    fn head<H: for<'de> Deserialize<'de>>(&mut self) -> Option<H> {
+    pub(crate) fn head<H: for<'de> Deserialize<'de>>(&mut self) -> Option<H> {
         let length = self.bytes(4)?.try_into().ok()?;
         let head = self.bytes(u32::from_le_bytes(length).into())?;
         serde_json::from_slice(&head).ok()
     }
 
-    fn numbers(&mut self, count: usize) -> Option<Vec<f32>> {
+    pub(crate) fn numbers(&mut self, count: usize) -> Option<Vec<f32>> {
         let bytes = u64::try_from(count).ok()?.checked_mul(4)?;
         self.left = self.left.checked_sub(bytes)?;
         let mut numbers = Vec::with_capacity(count);
@@ -115,7 +125,7 @@ impl Content<'_> {
 
 /// Result of decoding the content of a cached file, which must be read to its end; `None` if there is none that can be
 /// used.
-fn read<T>(
+pub(crate) fn read<T>(
     file: &Path,
     magic: [u8; 8],
     inputs: &[u8],

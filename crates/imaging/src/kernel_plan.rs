@@ -18,6 +18,7 @@ use crate::exposure::ChosenExposure;
 use crate::field_of_view::{check_coverage, check_view, check_windows, needed_reach_um};
 use crate::geometry::{ElementView, SceneView};
 use crate::imaging_system::ImagingSystem;
+use crate::kernel_parts::KernelParts;
 use crate::kernels::{BankSpec, KernelBank, SMALL_UM};
 use crate::operator::BetweenNodes;
 use crate::scene::SceneImage;
@@ -268,13 +269,18 @@ impl<'a> KernelPlan<'a> {
         }
     }
 
-    /// The kernels of a chip.
-    pub(crate) fn bank(&self, chip: &ChipInLight<'_>, progress: &dyn Progress) -> Result<KernelBank> {
+    /// The kernels of a chip, with parts that are stored on the way.
+    pub(crate) fn bank(
+        &self,
+        chip: &ChipInLight<'_>,
+        parts: &KernelParts<'_>,
+        progress: &dyn Progress,
+    ) -> Result<KernelBank> {
         let mut spec = self.spec;
         if self.more_nodes && KernelBank::check_size(chip, self.basis.len(), &spec).is_err() {
             spec.nodes = self.wide_nodes;
         }
-        KernelBank::build(chip, &self.basis, spec, progress)
+        KernelBank::build_in_parts(chip, &self.basis, spec, parts, progress)
     }
 
     pub(crate) fn stray_light(

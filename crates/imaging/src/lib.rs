@@ -24,6 +24,7 @@ mod geometry;
 mod image_check;
 mod imaging_system;
 mod kernel_cache;
+mod kernel_parts;
 mod kernel_plan;
 mod kernels;
 mod layout;

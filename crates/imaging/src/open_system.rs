@@ -16,6 +16,7 @@ use crate::cache_file;
 use crate::geometry::SceneView;
 use crate::imaging_system::ImagingSystem;
 use crate::kernel_cache::KernelCache;
+use crate::kernel_parts::KernelParts;
 use crate::kernel_plan::KernelPlan;
 use crate::layout::{PillarCount, check_elements};
 use crate::scene::SceneImage;
@@ -150,8 +151,13 @@ impl ImagingSystem {
                 let bank = if let Some(bank) = bank {
                     bank
                 } else {
-                    let bank = plan.bank(&chip, progress)?;
-                    let write = |folder: &Path| cache_file::cache_bank(folder, &inputs, &bank);
+                    let parts = KernelParts::of(cache, &inputs, &plan.camera.name);
+                    let bank = plan.bank(&chip, &parts, progress)?;
+                    let write = |folder: &Path| {
+                        cache_file::cache_bank(folder, &inputs, &bank)?;
+                        parts.remove();
+                        Ok(())
+                    };
                     cache.keep("the kernels are", write, progress)?;
                     bank
                 };
@@ -189,7 +195,7 @@ impl ImagingSystem {
             plan = plan.with_nodes(nodes);
         }
         let chip = plan.chip(extraction, case, progress)?;
-        let bank = plan.bank(&chip, progress)?;
+        let bank = plan.bank(&chip, &KernelParts::none(), progress)?;
         let stray_light = plan.stray_light(&chip, &bank, progress)?;
         plan.system(bank, stray_light)
     }

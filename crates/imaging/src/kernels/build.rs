@@ -6,9 +6,11 @@ use metalith_wave::{Accuracy, Scratch, Window};
 use rayon::prelude::*;
 
 use super::bank::{BankSpec, DistinctKernels, KernelBank, SMALL_UM};
+use super::nodes::{FoundNodes, NodeKernels};
 use super::spectrum::{MovedPart, QUARTERS, SpectrumPlan};
 use crate::chip::{ChipInLight, ElementInLight};
 use crate::geometry::ElementView;
+use crate::kernel_parts::{KernelParts, NodeId};
 use crate::spectra::SceneSpectrum;
 
 impl KernelBank {
@@ -32,35 +34,71 @@ impl KernelBank {
         spec: BankSpec,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        Self::build_in_parts(chip, basis, spec, &KernelParts::none(), progress)
+    }
+
+    /// Variant of [`KernelBank::build`] that stores what is found so far, and continues from what is stored.
+    ///
+    /// # Errors
+    /// As [`KernelBank::build`]; if parts cannot be stored in a folder that was asked for.
+    pub(crate) fn build_in_parts(
+        chip: &ChipInLight<'_>,
+        basis: &[SceneSpectrum],
+        spec: BankSpec,
+        parts: &KernelParts<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let channel_um: Vec<f64> = chip.sampling.channels.iter().map(|c| c.mean_um()).collect();
         let orbits = orbits_of(chip, &spec);
         let count = count(&orbits);
         let wavelengths = chip.sampling.wavelengths_nm.len();
         spec.check_size(count, channel_um.len(), basis.len(), wavelengths)?;
-        progress.begin("simulating kernels", (count * wavelengths) as u64);
+        let side = spec.side();
+        let sizes = [channel_um.len() * basis.len() * side * side, wavelengths];
+        let counts: Vec<usize> = orbits.iter().map(|(unique, _)| unique.len()).collect();
+        let nodes = FoundNodes::new(parts, &spec, &counts, sizes);
+        progress.begin("simulating kernels", (nodes.wanted() * wavelengths) as u64);
+        if nodes.wanted() < count {
+            let there = count - nodes.wanted();
+            progress.note(&format!("{there} of {count} places are from an interrupted run"));
+        }
         let plan = SpectrumPlan::new(spec.window);
         let all: Vec<usize> = (0..wavelengths).collect();
-        let mut distinct = Vec::new();
-        // One element after the other: what its sites transmit at all wavelengths is held while it is at work.
-        for (k, (unique, nodes)) in orbits.into_iter().enumerate() {
-            let builder = Builder {
-                light: &chip.in_light(k, &all, progress)?,
-                view: chip.distinct[k].view,
-                chip,
-                basis,
-                spec: &spec,
-                plan: &plan,
-                channel_um: &channel_um,
-            };
-            let found: Vec<NodeKernels> = unique
-                .par_iter()
-                .map_init(
+        let simulate = || -> Result<()> {
+            // One element after the other: what its sites transmit at all wavelengths is held while it is at work.
+            for (element, (unique, _)) in orbits.iter().enumerate() {
+                let missing = nodes.missing(element);
+                if missing.is_empty() {
+                    continue;
+                }
+                let builder = Builder {
+                    light: &nodes.timed(|| chip.in_light(element, &all, progress))?,
+                    view: chip.distinct[element].view,
+                    chip,
+                    basis,
+                    spec: &spec,
+                    plan: &plan,
+                    channel_um: &channel_um,
+                };
+                missing.par_iter().try_for_each_init(
                     || (Scratch::default(), FftScratch::default()),
-                    |(scratch, fft), node| builder.node(*node, scratch, fft, progress),
-                )
-                .collect::<Result<_>>()?;
+                    |(scratch, fft), node| {
+                        let kernels = builder.node(unique[*node], scratch, fft, (&nodes, progress))?;
+                        nodes.add(NodeId { element, node: *node }, kernels, progress)
+                    },
+                )?;
+            }
+            Ok(())
+        };
+        let done = simulate();
+        if done.is_err() {
+            nodes.store_fresh(progress)?;
+        }
+        done?;
+        let mut distinct = Vec::new();
+        for ((_, turned), found) in orbits.into_iter().zip(nodes.into_all()) {
             let mut kernels = DistinctKernels {
-                nodes,
+                nodes: turned,
                 // At once: a list that grows has room for twice as many.
                 values: Vec::with_capacity(found.iter().map(|n| n.values.len()).sum()),
                 in_window: Vec::new(),
@@ -115,11 +153,6 @@ fn orbits(n: usize, symmetries: &[metalith_design::array::Symmetry]) -> Orbits {
     (unique, nodes.collect())
 }
 
-struct NodeKernels {
-    values: Vec<f32>,
-    in_window: Vec<f32>,
-}
-
 /// Kernels of one distinct element.
 struct Builder<'a> {
     chip: &'a ChipInLight<'a>,
@@ -137,7 +170,7 @@ impl Builder<'_> {
         node: [usize; 2],
         scratch: &mut Scratch,
         fft: &mut FftScratch,
-        progress: &dyn Progress,
+        (nodes, progress): (&FoundNodes<'_>, &dyn Progress),
     ) -> Result<NodeKernels> {
         let view = self.view;
         let place = [self.spec.node_um(node[1]), self.spec.node_um(node[0])];
@@ -148,7 +181,7 @@ impl Builder<'_> {
             let quarters = self.quarters(i, nm * 1e-3, sines, scratch)?;
             in_window.push(quarters.iter().map(|v| f64::from(*v)).sum::<f64>() as f32);
             spectra.push(self.plan.spectrum(&quarters, fft));
-            progress.advance(1);
+            nodes.advance(progress);
         }
         let mut values = Vec::new();
         for (channel, reference_um) in self.chip.sampling.channels.iter().zip(self.channel_um) {

@@ -4,11 +4,14 @@
 //! | --- | --- |
 //! | what a bank holds, and where copies by symmetry are found | `bank` |
 //! | how it is simulated | `build` |
+//! | what is found so far, and stored | `nodes` |
 //! | how single wavelengths become a channel | `spectrum` |
 
 mod bank;
 mod build;
+mod nodes;
 mod spectrum;
 
 pub use bank::{BankSpec, KernelBank};
 pub(crate) use bank::{DistinctKernels, MOST_BYTES, SMALL_UM, TurnedKernel};
+pub(crate) use nodes::NodeKernels;

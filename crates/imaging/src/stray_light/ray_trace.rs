@@ -87,6 +87,7 @@ impl StrayLight {
                 let area = chip.elements[element].area;
                 // Row by row: the light of all squares is larger than the stray light itself.
                 for row in 0..SCENE_CELLS {
+                    progress.check_stopped()?;
                     let squares = row * SCENE_CELLS..(row + 1) * SCENE_CELLS;
                     let traced: Vec<Traced> = squares
                         .clone()
