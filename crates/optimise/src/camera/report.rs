@@ -125,12 +125,12 @@ impl CameraReport {
                 warnings.push(format!("The program does not read `{file}`: {error}"));
             }
             let row = CameraRow::new(one, pitch_um, Some(file.clone()));
-            if one.judged.time_s < 0.99 * task.spec.time_s {
+            if one.judged.time_s < 0.99 * task.spec.longest_s {
                 warnings.push(format!(
                     "At {} lux white fills the pixels after {} ms, less than the {} ms that are allowed.",
                     sig(one.lux, 4),
                     sig(row.time_ms, 3),
-                    sig(task.spec.time_s * 1e3, 3)
+                    sig(task.spec.longest_s * 1e3, 3)
                 ));
             }
             if one.overlaps {

@@ -97,7 +97,7 @@ impl CameraTask {
 
     fn light(&self, lux: f64, step_nm: f64, cell: &dyn CellModel) -> Result<CameraLight> {
         let share = |um: f64| efficiency(cell, &self.mapping, um);
-        CameraLight::new(&self.camera, lux, self.spec.time_s, BAND_NM, step_nm, &share)
+        CameraLight::new(&self.camera, lux, self.spec.longest_s, BAND_NM, step_nm, &share)
     }
 
     fn edge(&self) -> f64 {

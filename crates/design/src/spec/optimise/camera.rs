@@ -14,7 +14,7 @@ pub struct CameraSearchSpec {
     /// Illuminances of the scene (lux); the best camera is found for each.
     pub illuminance_lux: Vec<f64>,
     /// Longest exposure (s).
-    pub time_s: f64,
+    pub longest_s: f64,
     /// Largest distance from the pillar tops to the sensor (um).
     pub most_track_um: f64,
     /// Elements along x and y.
@@ -72,13 +72,15 @@ impl CameraSearchSpec {
                 "take fewer: the search would take hours",
             );
         }
+        // The exact time is `time_ms` in camera files.
+        s.renamed("time_ms", "longest_ms");
         s.must_have("diameters_um", "a list of diameters");
         let spec = Self {
             field_deg: s.float("field_deg", Limits::new(1.0..=120.0, "degrees")),
             scene_pixels: whole("scene_pixels", 16..=4096, 400),
             illuminance_lux: list("illuminance_lux", Limits::new(1e-3..=1e6, "lux"), &[500.0]),
-            time_s: s
-                .optional_float("time_ms", Limits::new(1e-3..=1e6, "ms"))
+            longest_s: s
+                .optional_float("longest_ms", Limits::new(1e-3..=1e6, "ms"))
                 .unwrap_or(10.0)
                 * 1e-3,
             most_track_um: s.float("most_track_um", FOCAL_LENGTH),
