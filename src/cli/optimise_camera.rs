@@ -30,8 +30,8 @@ const STALE: [&str; 4] = ["report.html", "report.json", "front.csv", ".report.sh
 pub(super) fn run(asked: &CameraSearch<'_>, terminal: &Terminal) -> Result<Outcome> {
     let design = asked.design;
     let camera = Camera::read(asked.camera)?;
-    let task = CameraTask::of(design, camera.clone())?;
     let text = std::fs::read_to_string(&design.path).map_err(Error::io("read", &design.path))?;
+    let task = CameraTask::of(design, &text, camera.clone())?;
     let inputs = inputs_of(design, camera.files.iter().map(std::path::PathBuf::as_path));
     InputFiles::of(paths(&inputs)).check_outputs(&[&asked.folder.join("report.json")])?;
     let cells = TaskCells::of(design, false, cache_folder().as_deref(), terminal)?;

@@ -273,6 +273,29 @@ fn a_camera_is_searched_and_its_design_is_read() {
     let found = Design::read(&out.join("camera_500.toml")).unwrap();
     assert_eq!(found.array.elements().len(), 2);
     assert_eq!(found.lens.diameter_nm, 60_000);
+    // Diameters that fit no arrangement are refused before the search, each by its line, and the largest possible one is said.
+    let large = fs::read_to_string(&path).unwrap();
+    fs::write(
+        &path,
+        large.replace("diameters_um = [60]", "diameters_um = [60, 5000, 4990]\ntime_ms = 10"),
+    )
+    .unwrap();
+    let ids = |text: &str| {
+        let known = [
+            "optimise.camera.diameters_um.1/inconsistent",
+            "optimise.camera.diameters_um.2/inconsistent",
+        ];
+        known.iter().filter(|id| text.contains(*id)).count()
+    };
+    let said = || String::from_utf8(search(&path).output().unwrap().stderr).unwrap();
+    let renamed = said();
+    assert!(renamed.contains("optimise.camera.time_ms/renamed"), "{renamed}");
+    let text = fs::read_to_string(&path).unwrap().replace("time_ms", "longest_ms");
+    fs::write(&path, text.replace("columns = [2]", "columns = [3]")).unwrap();
+    let refused = said();
+    assert_eq!(ids(&refused), 2, "{refused}");
+    // A third of 1936 pixels of 5.86 um: whole lattices of 11.72 um and a third of one.
+    assert!(refused.contains("3777 um"), "{refused}");
     // A design without the section sets no task.
     let text = String::from_utf8(search(Path::new("designs/imaging_3x3.toml")).output().unwrap().stderr).unwrap();
     assert!(text.contains(&crate::refusal("optimise/no-camera-section")), "{text}");

@@ -4,6 +4,8 @@ use metalith_sensor::{AngularResponse, Camera, Colour, ColourFilter, SensorNoise
 
 use metalith_core::Result;
 
+use super::search::SensorLattice;
+
 /// Shares of the light of a wavelength that leaves a metasurface: with the phase of its design, and otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Efficiency {
@@ -109,13 +111,14 @@ impl CameraLight {
             lattices = (0..channels.len()).map(|c| (c, [0.0; 2])).collect();
         }
         let full_e = sensor.full_scale_e();
+        let lattice = SensorLattice::of(sensor);
         Ok(Self {
             wavelengths_um,
             channels,
             lattices,
-            pitch_um: sensor.pixel_um * if mosaic { 2.0 } else { 1.0 },
+            pitch_um: lattice.pitch_um,
             pixel_um: sensor.pixel_um,
-            sides_um: [sensor.columns, sensor.rows].map(|n| f64::from(n) * sensor.pixel_um),
+            sides_um: lattice.sides_um,
             colours,
             time_s,
             most_e: camera.exposure.white * full_e,

@@ -1,6 +1,7 @@
 //! A whole camera: elements before a sensor, judged by what is restored of their images together.
 
 mod design_text;
+mod diameters;
 mod efficiency;
 mod element;
 mod lbfgs;

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use metalith_core::{Progress, Result};
+use metalith_sensor::{ColourFilter, Sensor};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -65,18 +66,53 @@ const APART_UM: f64 = 20.0;
 /// Share by which foci of elements differ at most.
 const FOCI: f64 = 0.1;
 
+/// Sensor as far as it decides the places of elements.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SensorLattice {
+    /// Sides along x and y (um).
+    pub(super) sides_um: [f64; 2],
+    /// Pitch of a lattice of pixels (um).
+    pub(super) pitch_um: f64,
+}
+
+impl SensorLattice {
+    pub(super) fn of(sensor: &Sensor) -> Self {
+        let is_mosaic = sensor.filter != ColourFilter::None;
+        Self {
+            sides_um: [sensor.columns, sensor.rows].map(|n| f64::from(n) * sensor.pixel_um),
+            pitch_um: sensor.pixel_um * if is_mosaic { 2.0 } else { 1.0 },
+        }
+    }
+
+    /// Pitch of so many elements along an axis (um), as wanted or as the sensor has room.
+    fn pitch_um(&self, axis: usize, count: usize, wanted_um: f64) -> f64 {
+        let count = count as f64;
+        let own = wanted_um.min(self.sides_um[axis] / count);
+        let part = self.pitch_um / count;
+        let periods = ((own - part) / self.pitch_um).floor();
+        periods * self.pitch_um + part
+    }
+}
+
 impl Arrangement {
     /// Pitch of the elements along an axis (um): as the images are wide, or as the sensor has room. It is a whole number of periods of a
     /// lattice of pixels and a part, by which all phases of the lattice are on the images alike.
     pub fn pitch_um(&self, axis: usize, light: &CameraLight, edge: f64) -> f64 {
-        let count = self.count[axis] as f64;
         let image = 2.0 * edge * self.distance_um;
-        let own = (self.diameter_um + APART_UM)
-            .max(image)
-            .min(light.sides_um[axis] / count);
-        let part = light.pitch_um / count;
-        let periods = ((own - part) / light.pitch_um).floor();
-        periods * light.pitch_um + part
+        let sensor = SensorLattice {
+            sides_um: light.sides_um,
+            pitch_um: light.pitch_um,
+        };
+        sensor.pitch_um(axis, self.count[axis], (self.diameter_um + APART_UM).max(image))
+    }
+
+    /// Diameter (um) from which on neighbours of an arrangement overlap on a chip of the size of the sensor; infinite for one element.
+    pub(super) fn diameters_below_um(count: [usize; 2], sensor: &SensorLattice) -> f64 {
+        let largest = |axis: usize| match count[axis] {
+            1 => f64::INFINITY,
+            elements => sensor.pitch_um(axis, elements, f64::INFINITY),
+        };
+        largest(0).min(largest(1))
     }
 
     /// The largest distance (um) at which the images of a field stand beside one another on the sensor.

@@ -7,12 +7,13 @@ use metalith_design::{CameraSearchSpec, Design};
 use metalith_sensor::{Camera, Walls};
 
 use super::design_text::design_text;
+use super::diameters;
 use super::efficiency::efficiency;
 use super::element::CameraElement;
 use super::light::CameraLight;
 use super::model::{CameraModel, Judged, ModelSettings, WINDOW_UM};
 use super::scene::NaturalScene;
-use super::search::{Arrangement, CameraStart};
+use super::search::{Arrangement, CameraStart, SensorLattice};
 use crate::rings::mapping::Mapping;
 
 /// Band that lenses of glass and silicon nitride are simulated in where the camera counts (nm).
@@ -59,11 +60,11 @@ pub struct CameraFindings {
 const PISTONS: usize = 64;
 
 impl CameraTask {
-    /// The task that a design sets before a camera.
+    /// The task that a design sets before a camera. `text`: the text of the design.
     ///
     /// # Errors
-    /// If the design has no section [optimise.camera], its pillars have no width, or no camera fits its limits.
-    pub fn of(design: &Design, camera: Camera) -> Result<Self> {
+    /// If the design has no section [optimise.camera], its pillars have no width, or a diameter fits no arrangement.
+    pub fn of(design: &Design, text: &str, camera: Camera) -> Result<Self> {
         let Some(spec) = design.optimise.camera.clone() else {
             return Err(Error::refused(
                 "optimise/no-camera-section",
@@ -79,6 +80,7 @@ impl CameraTask {
                 "take a cell with round or square pillars",
             ));
         }
+        diameters::check(&spec, &SensorLattice::of(&camera.sensor), (&design.path, text))?;
         let settings = ModelSettings {
             scene: NaturalScene::new(spec.field_deg, spec.scene_pixels),
             field_deg: spec.field_deg,
@@ -104,10 +106,10 @@ impl CameraTask {
         (0.5 * self.spec.field_deg).to_radians().tan()
     }
 
-    /// Arrangements to try.
+    /// Arrangements to try: those whose elements do not overlap.
     ///
     /// # Errors
-    /// If none keeps the limits.
+    /// If there are none.
     pub fn arrangements(&self, light: &CameraLight) -> Result<Vec<Arrangement>> {
         let spec = &self.spec;
         let mut all = Vec::new();
@@ -174,6 +176,9 @@ impl CameraTask {
             .map(|lux| self.light(*lux, STEPS_NM[1], cell))
             .collect::<Result<Vec<_>>>()?;
         let arrangements = self.arrangements(&coarse[0])?;
+        if let Some(words) = diameters::left_out(&self.spec, &SensorLattice::of(&self.camera.sensor)) {
+            progress.warn(&words);
+        }
         progress.begin("cameras", (lights.len() * (arrangements.len() + 1)) as u64);
         for ((&lux, light), fine) in lights.iter().zip(&coarse).zip(&fine) {
             for arrangement in &arrangements {
