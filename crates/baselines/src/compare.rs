@@ -67,6 +67,9 @@ pub struct ShownPictures {
 /// All cameras on the same photographs.
 #[derive(Clone, Debug, Serialize)]
 pub struct ComparisonResult {
+    /// Words for exposure times that differ from camera to camera; none if they are equal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unequal_times: Option<String>,
     /// Names of the photographs.
     pub photographs: Vec<String>,
     /// Rows and columns of each, as all cameras take it.

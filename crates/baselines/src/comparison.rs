@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::compare::{ComparedCamera, ComparisonResult, compare};
 use crate::lensless::of_one_wavelength;
 use crate::post_processing::Stage;
+use crate::table::unequal_times;
 use crate::{ArrayCamera, BaselineCamera, DiffuserCam, DiffuserSpec, FlatCam, MaskSpec};
 
 /// Comparison: designs, cameras without a lens, photographs, and how.
@@ -290,6 +291,7 @@ impl OpenComparison<'_> {
     pub fn comparison(&self, cameras: Vec<ComparedCamera>) -> ComparisonResult {
         let view = self.photographs[0].view;
         ComparisonResult {
+            unequal_times: unequal_times(&cameras),
             photographs: self.photographs.iter().map(|p| p.name.clone()).collect(),
             size: self.size(),
             averaged_from: (view != self.given).then_some([self.given.rows, self.given.columns]),

@@ -29,6 +29,9 @@ fn page(comparison: &ComparisonResult) -> Page {
             comparison.camera
         ),
     );
+    if let Some(words) = &comparison.unequal_times {
+        page.note(words);
+    }
     let mut best = PhotoRow::new("Scene, and the picture of each camera", 220.0);
     if let Some(first) = comparison.cameras.iter().find_map(|c| c.shown.as_ref()) {
         best.photo("scene", &first.scene.mapv(srgb::encoded));
@@ -42,9 +45,6 @@ fn page(comparison: &ComparisonResult) -> Page {
         "The first photograph, {}, restored from the frame of each camera by the method with the best score over all photographs. The photograph fills the field of each camera.",
         comparison.photographs.first().map_or("", String::as_str)
     )));
-    if let Some(words) = comparison.unequal_times() {
-        page.note(&words);
-    }
     page.section("Scores");
     table(&mut page, comparison, "PSNR", "dB", 2, |s| s.psnr_db);
     table(&mut page, comparison, "SSIM", "", 3, |s| s.ssim);
@@ -176,6 +176,7 @@ mod tests {
             shown: None,
         };
         let comparison = |camera: ComparedCamera| ComparisonResult {
+            unequal_times: Some(TIMES.into()),
             photographs: vec!["a".into()],
             size: [64, 64],
             averaged_from: None,
@@ -188,8 +189,17 @@ mod tests {
             write_comparison(&comparison(camera), &FolderLock::of(folder.path()).unwrap()).unwrap();
             ["compare.html", "compare.json"].map(|name| std::fs::read_to_string(folder.path().join(name)).unwrap())
         };
+        const TIMES: &str = "times differ: a 10 ms, b 3 ms";
         const NOTE: &str = "the restoration is limited by its operator";
         assert!(written(camera(Some(NOTE))).iter().all(|text| text.contains(NOTE)));
+        // Unequal times stand before all scores.
+        let [html, json] = written(camera(None));
+        let table = comparison(camera(None)).markdown();
+        assert!(json.contains(TIMES));
+        for (text, later) in [(html, "The first photograph"), (table, "pixels")] {
+            let (times, scores) = text.split_once(later).unwrap();
+            assert!(times.contains(TIMES) && !scores.contains(TIMES), "{text}");
+        }
         assert!(!written(camera(None)).iter().any(|text| text.contains(NOTE)));
     }
 }

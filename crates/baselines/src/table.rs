@@ -5,7 +5,25 @@ use std::fmt::Write;
 use metalith_imaging::Zone;
 use metalith_report::sig;
 
-use crate::compare::{ComparisonResult, MethodScores};
+use crate::compare::{ComparedCamera, ComparisonResult, MethodScores};
+
+/// Words for cameras that are exposed for different times, which compares apertures less than it seems to; none for equal times.
+pub(crate) fn unequal_times(cameras: &[ComparedCamera]) -> Option<String> {
+    /// Ratio of times that count as equal.
+    const EQUAL: f64 = 1.01;
+    let lights = || cameras.iter().filter_map(|c| Some((&c.name, c.light.as_ref()?)));
+    let times = lights().map(|(_, light)| light.time_ms);
+    let [least, most] = times.fold([f64::INFINITY, 0.0], |[a, b], ms| [a.min(ms), b.max(ms)]);
+    (most > EQUAL * least).then(|| {
+        let each: Vec<String> = lights()
+            .map(|(name, light)| format!("{name} {} ms", sig(light.time_ms, 3)))
+            .collect();
+        format!(
+            "Exposure times differ: {}. Give --time-ms to compare at equal time.",
+            each.join(", ")
+        )
+    })
+}
 
 impl MethodScores {
     /// Words for what was scored.
@@ -33,21 +51,6 @@ impl ComparisonResult {
         })
     }
 
-    /// Words for cameras that are exposed for different times, which compares apertures less than it seems to.
-    pub fn unequal_times(&self) -> Option<String> {
-        /// Ratio of times that count as equal.
-        const EQUAL: f64 = 1.01;
-        let times = self.cameras.iter().filter_map(|c| Some(c.light.as_ref()?.time_ms));
-        let [least, most] = times.fold([f64::INFINITY, 0.0], |[a, b], ms| [a.min(ms), b.max(ms)]);
-        (most > EQUAL * least).then(|| {
-            format!(
-                "the cameras are exposed for different times, {} to {} ms: give --time-ms to compare them at equal time",
-                sig(least, 3),
-                sig(most, 3)
-            )
-        })
-    }
-
     /// True if CPU seconds are stated.
     pub(crate) fn is_timed(&self) -> bool {
         self.cameras.iter().any(|c| c.ways.iter().any(|w| w.cpu_s.is_some()))
@@ -68,6 +71,9 @@ impl ComparisonResult {
         let zones = Zone::ALL.map(Zone::name).join(" / ");
         let mut text = String::new();
         let mut line = |words: String| writeln!(text, "{words}").expect("strings take everything");
+        if let Some(words) = &self.unequal_times {
+            line(format!("**{words}**\n"));
+        }
         line(format!(
             "{} of {} x {} pixels{}, sensor and light `{}`, noise of seed {}. Zones: {zones}.\n",
             self.counted(),
@@ -77,9 +83,6 @@ impl ComparisonResult {
             self.camera,
             self.seed
         ));
-        if let Some(words) = self.unequal_times() {
-            line(format!("Note: {words}.\n"));
-        }
         line(
             "| camera | picture | PSNR (dB) | SSIM | 1 - LPIPS | PSNR of linear light (dB) | CPU s |\n| --- | --- | --- | --- | --- | --- | --- |"
                 .into(),
