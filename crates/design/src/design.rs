@@ -40,8 +40,8 @@ impl Design {
     /// Read the design file at `path`, and the files that it names.
     ///
     /// # Errors
-    /// [`metalith_core::Error::Text`] with every mistake of the file, each with line, column and remedy;
-    /// [`metalith_core::Error::Table`] for a phase table that cannot be used.
+    /// [`metalith_core::Error::Text`] with every mistake of the file and of the tables that it names, each with line, column and
+    /// remedy.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_with(path, &Silent)
     }
@@ -68,8 +68,7 @@ impl Design {
     /// # Errors
     /// As [`Design::parse`]; also if the user stopped it.
     pub fn parse_with(path: &Path, text: &str, progress: &dyn Progress) -> Result<Self> {
-        let mut design = Document::read(path, text, |root| Self::sections(path, root, LibraryFile::Needed))?
-            .with_files(LibraryFile::Needed)?;
+        let mut design = Self::of_text(path, text, LibraryFile::Needed)?;
         design.solve_mapping(cache_folder().as_deref(), progress)?;
         Ok(design)
     }
@@ -98,8 +97,18 @@ impl Design {
     /// # Errors
     /// As [`Design::parse`].
     pub fn parse_without_library(path: &Path, text: &str) -> Result<Self> {
-        Document::read(path, text, |root| Self::sections(path, root, LibraryFile::ToBeMade))?
-            .with_files(LibraryFile::ToBeMade)
+        Self::of_text(path, text, LibraryFile::ToBeMade)
+    }
+
+    /// The design of a text, with the files that it names.
+    fn of_text(path: &Path, text: &str, library: LibraryFile) -> Result<Self> {
+        let (design, loaded) = Document::read(path, text, |root| {
+            let mut design = Self::sections(path, root, library);
+            let loaded = design.load_files(root, library);
+            (design, loaded)
+        })?;
+        loaded?;
+        design.in_known_bands()
     }
 
     fn sections(path: &Path, root: &Section<'_, '_>, library: LibraryFile) -> Self {
@@ -151,18 +160,30 @@ impl Design {
         }
     }
 
-    /// Read the files that the design names, after all its own mistakes are known to be none.
-    fn with_files(mut self, library: LibraryFile) -> Result<Self> {
-        // A map of elements with separate lenses covers these, not the lens that the others share.
-        let indices = self.elements().into_iter().map(|e| e.index);
-        let sharing: Vec<_> = indices
-            .filter(|index| self.array.placed(*index).is_none_or(|p| p.lens.is_none()))
-            .collect();
-        self.lens.load(|term| sharing.iter().any(|index| term.is_of(*index)))?;
-        for own in self.array.placed.iter_mut().filter_map(|p| p.lens.as_mut()) {
-            own.load(|_| true)?;
+    /// Read the files that the design names. One that cannot be used is a mistake of the key that names it. What a file must hold
+    /// follows from the sections about it: where these have mistakes, it is not read.
+    fn load_files(&mut self, root: &Section<'_, '_>, library: LibraryFile) -> Result<()> {
+        let mut errors = Vec::new();
+        if root.sound_within(&["cell", "lens", "phase", "array", "element"]) {
+            // A map of elements with separate lenses covers these, not the lens that the others share.
+            let indices = self.elements().into_iter().map(|e| e.index);
+            let sharing: Vec<_> = indices
+                .filter(|index| self.array.placed(*index).is_none_or(|p| p.lens.is_none()))
+                .collect();
+            errors.extend(self.lens.load(|term| sharing.iter().any(|index| term.is_of(*index))));
+            for own in self.array.placed.iter_mut().filter_map(|p| p.lens.as_mut()) {
+                errors.extend(own.load(|_| true));
+            }
         }
-        self.mapping.load(&self.cell, library)?;
+        if root.sound_within(&["cell", "mapping"]) {
+            errors.extend(self.mapping.load(&self.cell, library).err());
+        }
+        let others: Vec<Result<()>> = errors.into_iter().map(|error| root.unusable_file(error)).collect();
+        others.into_iter().collect()
+    }
+
+    /// This design, if its materials are known at all of its wavelengths.
+    fn in_known_bands(mut self) -> Result<Self> {
         // Unknown materials and wavelengths that they are not known at are mistakes of the design, whoever asks first.
         let stack = self.cell_stack()?;
         let band_um = self.band_of(&stack);

@@ -196,7 +196,7 @@ geometric_phase_532 | rotation_sines_deg = [ | rotation_sines_deg = [0, 0, 0, 0,
 tio2_532 | [mapping]   | [mapping]\nrotation_sines_deg = [0.1]\n# | mapping.rotation_sines_deg/inconsistent
 hologram | x_um = 60 | x_um = -20 | element#1.x_um/inconsistent
 hologram | [array]\n | [array]\nelements = [1, 1]\n | array.elements/inconsistent
-hologram | pitch_um = 0.35 | pitch_um = 0.2 | table/malformed
+hologram | pitch_um = 0.35 | pitch_um = 0.2 | phase.term#0.file/unusable-file
 hologram | source = "map" | source = "maps" | phase.term#0.wavelength_nm/missing phase.term#0.source/unknown-choice phase.term#0.source/unknown-choice phase.term#0.file/unknown phase.term#0.pitch_um/unknown phase.term#0.interpolation/unknown phase.term#0.wrapped/unknown
 array_2x4 | [array] | [[phase.term]]\nsource = "polynomial"\npowers_x = [1]\npowers_y = [0, 1]\ncoefficients_rad = [1.0]\n\n[array] | phase.term#0.powers_y/inconsistent
 array_2x4 | [array] | [[phase.term]]\nsource = "zernike"\norder = "noll"\ncoefficients_waves = [1.0]\n\n[array] | phase.term#0.order/unknown-choice

@@ -165,7 +165,7 @@ const MISTAKES: &str = r#"
 library = "phases/birefringent_532.csv" |  | mapping.library/missing
 birefringent_532.csv | nowhere.csv | mapping.library/no-file
 width_step_nm = 10 | width_step_nm = 2 | cell.width_step_nm/inconsistent
-width_max_nm = 280 | width_max_nm = 270 | table/malformed
+width_max_nm = 280 | width_max_nm = 270 | mapping.library/unusable-file
 width_max_nm = 280 | width_max_nm = 400 | cell.width_max_nm/out-of-range
 [mapping]  | [mapping]\ncoefficients = [0.2, 0.5]\n# | mapping.coefficients/inconsistent
 fidelity = "rigorous" | fidelity = "published" | verify.fidelity/inconsistent

@@ -79,7 +79,11 @@ fn a_map_covers_the_box_about_its_aperture() {
 fn a_map_that_ends_within_its_aperture_is_refused() {
     // The words are the lengths that decide.
     let said = |size, changes: &[(&str, &str)]| match hologram(size, changes).unwrap_err() {
-        Error::Table { what, .. } => what,
+        Error::Text(faults) => {
+            let fault = &faults.faults()[0];
+            assert_eq!(fault.id(), "phase.term#0.file/unusable-file");
+            fault.what.split_once("map.npy: ").unwrap().1.to_owned()
+        }
         other => panic!("{other:?}"),
     };
     let short = said([116, 54], &[RECTANGLE]);
@@ -88,6 +92,18 @@ fn a_map_that_ends_within_its_aperture_is_refused() {
     let low = said([144, 54], &[RECTANGLE, shifted]);
     insta::assert_snapshot!(low, @"144 by 54 places of 0.5 um reach to 36 and 13.5 um, the lens to 30 and 14 um");
     assert!(hologram([144, 56], &[RECTANGLE, shifted]).is_ok());
+    // It is a mistake of its key, among the others of the design.
+    let others = [
+        ("[cell]\n", "[cell]\npillar_material = \"film.csv\"\n"),
+        ("[verify]", "[verify]\nwrong = 1"),
+    ];
+    let all = hologram([116, 54], &[&[RECTANGLE], &others[..]].concat()).unwrap_err();
+    let wanted = [
+        "cell.pillar_material/no-file",
+        "phase.term#0.file/unusable-file",
+        "verify.wrong/unknown",
+    ];
+    assert_eq!(all.ids(), wanted, "{all}");
     // A polygon beside its middle needs more to one side.
     let beside = "aperture = \"polygon\"\ncorners_x_um = [-5, 30, 30, -5]\ncorners_y_um = [-8, -8, 8, 8]";
     assert!(hologram([120, 32], &[("diameter_um = 60", beside)]).is_ok());

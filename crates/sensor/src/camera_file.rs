@@ -40,11 +40,33 @@ impl Camera {
     /// Read the camera file at `path`, and the curves that it names.
     ///
     /// # Errors
-    /// [`Error::Text`] with every mistake of the file, each with line, column and remedy; [`Error::Table`] for a
-    /// curve that cannot be used; if a channel counts none of the light.
+    /// [`Error::Text`] with every mistake of the file and of the curves that it names, each with line, column and remedy; if a channel
+    /// counts none of the light.
     pub fn read(path: &Path) -> Result<Self> {
         let text = load(path)?;
-        Document::read(path, &text, Draft::read)?.with_files(path)
+        Document::read(path, &text, |root| Self::of_sections(root, path))?.check_light(path)
+    }
+
+    /// The camera that the sections of the file at `path` describe, with the curves that they name.
+    fn of_sections(root: &Section<'_, '_>, path: &Path) -> Self {
+        root.integer("schema", SCHEMA..=SCHEMA, "");
+        let mut files = vec![path.to_owned()];
+        let name = root.text("name");
+        let sensor_section = root.section("sensor");
+        let sensor = read_sensor(&sensor_section, &mut files);
+        let channels = read_channels(root, &sensor_section, &sensor, &mut files);
+        let illuminant = root.section("illuminant");
+        let exposure = Exposure::read(&root.section("exposure"), &illuminant, &sensor_section, &sensor);
+        let illuminant = read_illuminant(&illuminant, &mut files);
+        files.dedup();
+        Self {
+            name,
+            sensor,
+            channels,
+            illuminant,
+            exposure,
+            files,
+        }
     }
 
     /// The camera that is assumed of a design for this band (nm) where none is named: three flat bands if it holds the
@@ -161,85 +183,20 @@ fn flat_channel(name: &str, band_nm: [f64; 2]) -> Channel {
     }
 }
 
-/// Contents of the file before the curves that it names are read.
-struct Draft {
-    name: String,
-    sensor: Sensor,
-    angular_response: Option<PathBuf>,
-    channels: Vec<(String, DraftResponse)>,
-    illuminant: DraftIlluminant,
-    exposure: Exposure,
+/// What `read` reads in the file that a key names, which is added to the files of the camera.
+fn curve<T>(
+    s: &Section<'_, '_>,
+    key: &str,
+    files: &mut Vec<PathBuf>,
+    read: impl FnOnce(&Path) -> Result<T>,
+) -> Option<T> {
+    let (file, curve) = s.contents(key, read)?;
+    files.push(file);
+    Some(curve)
 }
 
-enum DraftResponse {
-    Known(Response),
-    File(PathBuf),
-}
-
-enum DraftIlluminant {
-    Known(Illuminant),
-    File(PathBuf),
-}
-
-impl Draft {
-    fn read(root: &Section<'_, '_>) -> Self {
-        root.integer("schema", SCHEMA..=SCHEMA, "");
-        let name = root.text("name");
-        let sensor_section = root.section("sensor");
-        let (sensor, angular_response) = read_sensor(&sensor_section);
-        let channels = read_channels(root, &sensor_section, &sensor);
-        let illuminant = root.section("illuminant");
-        Self {
-            name,
-            channels,
-            exposure: Exposure::read(&root.section("exposure"), &illuminant, &sensor_section, &sensor),
-            illuminant: read_illuminant(&illuminant),
-            sensor,
-            angular_response,
-        }
-    }
-
-    fn with_files(mut self, path: &Path) -> Result<Camera> {
-        let mut files = vec![path.to_owned()];
-        if let Some(file) = self.angular_response {
-            self.sensor.angular_response = AngularResponse::read_csv(&file)?;
-            files.push(file);
-        }
-        let mut channels = Vec::new();
-        for (name, response) in self.channels {
-            let response = match response {
-                DraftResponse::Known(response) => response,
-                DraftResponse::File(file) => {
-                    let curve = Spectrum::read_csv(&file, 1.0)?;
-                    files.push(file);
-                    Response::Curve(curve)
-                }
-            };
-            channels.push(Channel { name, response });
-        }
-        let illuminant = match self.illuminant {
-            DraftIlluminant::Known(illuminant) => illuminant,
-            DraftIlluminant::File(file) => {
-                let curve = Spectrum::read_csv(&file, f64::MAX)?;
-                files.push(file);
-                Illuminant::File(curve)
-            }
-        };
-        files.dedup();
-        let camera = Camera {
-            name: self.name,
-            sensor: self.sensor,
-            channels,
-            illuminant,
-            exposure: self.exposure,
-            files,
-        };
-        camera.check_light(path)
-    }
-}
-
-/// The sensor, and the file of its response by angle, if it names one.
-fn read_sensor(s: &Section<'_, '_>) -> (Sensor, Option<PathBuf>) {
+/// The sensor, with the curve that it names.
+fn read_sensor(s: &Section<'_, '_>, files: &mut Vec<PathBuf>) -> Sensor {
     let positive = |key: &str, least: f64, most: f64, unit: &'static str| s.float(key, Limits::new(least..=most, unit));
     let optional = |key: &str, range, unit: &'static str, default: f64| {
         s.optional_float(key, Limits::new(range, unit)).unwrap_or(default)
@@ -294,35 +251,41 @@ fn read_sensor(s: &Section<'_, '_>) -> (Sensor, Option<PathBuf>) {
         // Full scale is the whole of the well, unless the file says otherwise.
         gain_e: optional("gain_e", 1e-6..=1e6, "electrons a step", whole),
         noise,
-        angular_response: AngularResponse::Unstated,
+        angular_response: if s.has("angular_response") {
+            curve(s, "angular_response", files, AngularResponse::read_csv).unwrap_or_default()
+        } else {
+            s.may_have("angular_response");
+            AngularResponse::Unstated
+        },
         walls: s.choice(
             "walls",
             &[("none", Walls::None), ("between_elements", Walls::BetweenElements)],
             Some(Walls::None),
         ),
     };
-    let angular_response = s.optional_file("angular_response");
     s.finish();
-    (sensor, angular_response)
+    sensor
 }
 
 fn read_channels(
     root: &Section<'_, '_>,
     sensor_section: &Section<'_, '_>,
     sensor: &Sensor,
-) -> Vec<(String, DraftResponse)> {
+    files: &mut Vec<PathBuf>,
+) -> Vec<Channel> {
     let sections = root.sections("channel");
-    let mut channels: Vec<(String, DraftResponse)> = Vec::new();
+    let mut channels: Vec<Channel> = Vec::new();
     for s in sections.iter().take(MOST) {
         let name = s.text("name");
-        if channels.iter().any(|(known, _)| *known == name) {
+        if channels.iter().any(|known| known.name == name) {
             s.fault(
                 "name",
                 format!("a second channel `{name}`"),
                 "give each channel its own name",
             );
         }
-        channels.push((name, read_response(s)));
+        let response = read_response(s, files);
+        channels.push(Channel { name, response });
         s.finish();
     }
     if sections.is_empty() && !root.has("channel") {
@@ -336,7 +299,7 @@ fn read_channels(
         sections[MOST].fault("name", format!("more than {MOST} channels"), "leave some out");
     }
     let wanted = sensor.filter.channels();
-    let has = |name: &str| channels.iter().any(|(known, _)| known == name);
+    let has = |name: &str| channels.iter().any(|known| known.name == name);
     if let Some(wanted) = wanted
         && !(channels.len() == wanted.len() && wanted.iter().all(|w| has(w)))
         && sections.iter().all(|s| s.sound(&["channel.name"]))
@@ -350,9 +313,9 @@ fn read_channels(
     channels
 }
 
-fn read_response(s: &Section<'_, '_>) -> DraftResponse {
+fn read_response(s: &Section<'_, '_>, files: &mut Vec<PathBuf>) -> Response {
     if s.has("quantum_efficiency") {
-        let file = s.file("quantum_efficiency");
+        let found = curve(s, "quantum_efficiency", files, |path| Spectrum::read_csv(path, 1.0));
         for key in ["band_nm", "efficiency"] {
             if s.has(key) {
                 s.floats("band_nm", WAVELENGTH);
@@ -364,7 +327,8 @@ fn read_response(s: &Section<'_, '_>) -> DraftResponse {
                 );
             }
         }
-        return DraftResponse::File(file);
+        // A flat one stands in for one that cannot be used.
+        return found.map_or_else(|| flat_channel("", VISIBLE_NM).response, Response::Curve);
     }
     let band_nm: [f64; 2] = s.array("band_nm", WAVELENGTH);
     if band_nm[0] >= band_nm[1] {
@@ -374,15 +338,15 @@ fn read_response(s: &Section<'_, '_>) -> DraftResponse {
             "give its shortest and its longest wavelength",
         );
     }
-    DraftResponse::Known(Response::Band {
+    Response::Band {
         band_nm,
         efficiency: s
             .optional_float("efficiency", Limits::new(1e-6..=1.0, "electrons a photon"))
             .unwrap_or(1.0),
-    })
+    }
 }
 
-fn read_illuminant(s: &Section<'_, '_>) -> DraftIlluminant {
+fn read_illuminant(s: &Section<'_, '_>, files: &mut Vec<PathBuf>) -> Illuminant {
     #[derive(Clone, Copy, PartialEq)]
     enum Source {
         D65,
@@ -403,11 +367,12 @@ fn read_illuminant(s: &Section<'_, '_>) -> DraftIlluminant {
         None,
     );
     let illuminant = match source {
-        Source::D65 => DraftIlluminant::Known(Illuminant::D65),
-        Source::A => DraftIlluminant::Known(Illuminant::A),
-        Source::EqualEnergy => DraftIlluminant::Known(Illuminant::EqualEnergy),
-        Source::File => DraftIlluminant::File(s.file("file")),
-        Source::Leds => DraftIlluminant::Known(Illuminant::Leds(read_leds(s))),
+        Source::D65 => Illuminant::D65,
+        Source::A => Illuminant::A,
+        Source::EqualEnergy => Illuminant::EqualEnergy,
+        Source::File => curve(s, "file", files, |path| Spectrum::read_csv(path, f64::MAX))
+            .map_or(Illuminant::EqualEnergy, Illuminant::File),
+        Source::Leds => Illuminant::Leds(read_leds(s)),
     };
     for (key, of) in [("file", Source::File), ("led", Source::Leds)] {
         if s.has(key) && source != of {

@@ -59,9 +59,13 @@ impl Spectrum {
     /// # Errors
     /// If the file cannot be read, or a line is not such a sample.
     pub fn read_csv(path: &Path, most: f64) -> Result<Self> {
-        let hint = format!(
-            "give a header `nm,value` and lines of both, wavelengths rising, values from 0 to {most}, not all zero"
-        );
+        let range = if most < f64::MAX {
+            format!("from 0 to {most}")
+        } else {
+            "of 0 or more".to_owned()
+        };
+        let hint =
+            format!("give a header `nm,value` and lines of both, wavelengths rising, values {range}, not all zero");
         let mistake = |last: Option<f64>, nm: f64, value: f64| {
             if nm <= 0.0 || !(0.0..=most).contains(&value) {
                 return Some(format!("{nm} nm with {value} cannot be"));

@@ -106,6 +106,48 @@ fn all_mistakes_are_found_at_once() {
     }
 }
 
+/// Tables that cannot be used are mistakes of the keys that name them, with the lines of both, among the others of the file.
+#[test]
+fn mistakes_of_tables_are_those_of_their_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("camera.toml");
+    for (name, table) in [
+        ("qe.csv", "nm,value\n500,0.5\n510,1.5\n"),
+        ("angles.csv", "deg,value\n5,1\n"),
+        ("light.csv", "nm,value\n500,x\n"),
+    ] {
+        std::fs::write(folder.path().join(name), table).unwrap();
+    }
+    let wrong = PLAIN
+        .replace("bits = 12", "bits = 12\nangular_response = \"angles.csv\"")
+        .replace("band_nm = [450, 650]", "quantum_efficiency = \"qe.csv\"")
+        .replace("time_ms = 10", "time_ms = 0")
+        .replace("source = \"equal_energy\"", "source = \"file\"\nfile = \"light.csv\"");
+    std::fs::write(&path, wrong).unwrap();
+    let Err(Error::Text(faults)) = Camera::read(&path) else {
+        panic!("tables are wrong")
+    };
+    let place = |fault: &Fault| (faults.line_column(fault.span.start).0, fault.id());
+    let found: Vec<_> = faults.faults().iter().map(place).collect();
+    let wanted = [
+        (9, "sensor.angular_response/unusable-file"),
+        (14, "channel#0.quantum_efficiency/unusable-file"),
+        (16, "exposure.time_ms/out-of-range"),
+        (19, "illuminant.file/unusable-file"),
+    ];
+    assert_eq!(found, wanted.map(|(line, id)| (line, id.to_owned())), "{faults}");
+    insta::assert_snapshot!(words(&Error::Text(faults)), @r"
+    camera.toml:9:20: `angular_response`: angles.csv, line 2: 5 degrees with 1, where 0 degrees with 1 should be
+      help: give a header `deg,value` and lines of both, angles rising from 0 to at most 90, values from 0 to 2 and 1 at 0 degrees
+    camera.toml:14:22: `quantum_efficiency`: qe.csv, line 3: 510 nm with 1.5 cannot be
+      help: give a header `nm,value` and lines of both, wavelengths rising, values from 0 to 1, not all zero
+    camera.toml:16:11: `time_ms` cannot be 0
+      help: it must be a number from 0.001 to 1000000 ms
+    camera.toml:19:8: `file`: light.csv, line 2: `x` in column `value` is not a finite number
+      help: give a header `nm,value` and lines of both, wavelengths rising, values of 0 or more, not all zero
+    ");
+}
+
 #[test]
 fn what_does_not_fit_together_is_said() {
     let cases = [

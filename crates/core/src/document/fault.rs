@@ -33,6 +33,8 @@ pub enum FaultKind {
     Unprintable,
     /// A file that is named and is not there.
     NoFile,
+    /// A file that is named and cannot be read, or does not hold what it should.
+    UnusableFile,
     /// A value that is possible alone and not together with other values, or with what it describes.
     Inconsistent,
 }
@@ -51,6 +53,7 @@ impl FaultKind {
             Self::WrongLength => "wrong-length",
             Self::Unprintable => "unprintable",
             Self::NoFile => "no-file",
+            Self::UnusableFile => "unusable-file",
             Self::Inconsistent => "inconsistent",
         }
     }

@@ -18,6 +18,7 @@ pub use section::{Limits, Section};
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashSet;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
@@ -38,6 +39,8 @@ pub struct Document<'t> {
     /// Paths of values with a fault, and of those among them that another value stands in for.
     doubted: RefCell<HashSet<String>>,
     replaced: RefCell<HashSet<String>>,
+    /// Files that keys name: path of the key, its place in the text, and the file.
+    named: RefCell<Vec<(String, Range<usize>, PathBuf)>>,
 }
 
 /// Longest text file that is read: a design is a few kilobytes.
@@ -90,6 +93,7 @@ impl<'t> Document<'t> {
             more: Cell::default(),
             doubted: RefCell::default(),
             replaced: RefCell::default(),
+            named: RefCell::default(),
         };
         let table = match DeTable::parse(text) {
             Ok(table) => table,
@@ -120,7 +124,7 @@ impl<'t> Document<'t> {
         &self,
         kind: FaultKind,
         key: String,
-        span: std::ops::Range<usize>,
+        span: Range<usize>,
         what: impl Into<String>,
         hint: impl Into<String>,
     ) -> Option<usize> {
@@ -143,6 +147,41 @@ impl<'t> Document<'t> {
     /// The folder of the file: relative paths in it count from here.
     pub fn folder(&self) -> PathBuf {
         self.path.parent().map_or_else(PathBuf::new, Path::to_owned)
+    }
+
+    /// Record at a key, whose path this is, that the file that it names cannot be used; once for each key. The key names a file
+    /// nevertheless: it is in no doubt.
+    fn unusable_file(&self, key: &str, span: Range<usize>, error: &Error) {
+        let faults = self.faults.borrow();
+        let mut there = faults.iter().flatten();
+        let is_known = there.any(|fault| fault.kind == FaultKind::UnusableFile && fault.key == key);
+        drop(faults);
+        if is_known || !self.is_sound(key) {
+            return;
+        }
+        let words = error.to_string();
+        let (what, hint) = words
+            .split_once("\n  help: ")
+            .unwrap_or((&words, "mend the file, or name another"));
+        let name = key.rsplit('.').next().unwrap_or_default();
+        self.fault(
+            FaultKind::UnusableFile,
+            key.to_owned(),
+            span,
+            format!("`{name}`: {what}"),
+            hint,
+        );
+    }
+
+    /// True if no value in a section has a fault, other than names of files.
+    fn is_sound_within(&self, section: &str) -> bool {
+        let (doubted, named) = (self.doubted.borrow(), self.named.borrow());
+        let is_within = |path: &str| {
+            let rest = path.strip_prefix(section);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '#']))
+        };
+        let is_file = |path: &str| named.iter().any(|(key, ..)| key == path);
+        !doubted.iter().any(|path| is_within(path) && !is_file(path))
     }
 
     /// True if further faults are only counted.

@@ -192,3 +192,37 @@ fn a_file_of_another_kind_is_said_to_be_one() {
           help: save the file as UTF-8
         ");
 }
+
+/// A file that cannot be used is a mistake at each key that names it, among the others, and sections are told apart by whole names.
+#[test]
+fn an_unusable_file_is_a_mistake_of_its_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("curve.csv"), "nm,value\n").unwrap();
+    let text = "[cell]\ncurve = \"curve.csv\"\nlater = \"curve.csv\"\nwidth = \"wide\"\n[cells]\n";
+    let path = folder.path().join("test.toml");
+    let refused = |path: &Path| Error::table(path, Some(1), "no curve", "give one");
+    let error = Document::read(&path, text, |root| {
+        let s = root.section("cell");
+        root.section("cells").finish();
+        assert!(root.sound_within(&["cell", "cells"]));
+        assert!(s.contents("curve", |path| Err::<(), _>(refused(path))).is_none());
+        assert!(s.contents("none", |_| Ok::<_, Error>(())).is_none());
+        let later = s.file("later");
+        s.unusable_file(refused(&later)).unwrap();
+        let other = s.unusable_file(refused("other.csv".as_ref())).unwrap_err();
+        assert_eq!(other.id(), "table/malformed");
+        s.float("width", Limits::new(1.0..=2.0, "nm"));
+        assert!(!root.sound_within(&["cell"]) && root.sound_within(&["cells", "cel"]));
+        s.finish();
+    })
+    .unwrap_err();
+    assert_eq!(
+        error.ids(),
+        [
+            "cell.none/missing",
+            "cell.curve/unusable-file",
+            "cell.later/unusable-file",
+            "cell.width/wrong-type"
+        ]
+    );
+}

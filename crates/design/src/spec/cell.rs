@@ -395,10 +395,11 @@ fn read_rectangles(s: &Section<'_, '_>, widest: u32) -> RotatedRectangles {
     }
 }
 
-/// The material at a key, if it is there. Those that have a name are known here; tables are read with the files of the design.
+/// The material at a key, if it is there; a table is read, so that a mistake of it is one of the key.
 fn read_material(s: &Section<'_, '_>, key: &str) -> Option<String> {
     let text = s.optional_text(key)?;
     if Material::is_table(&text) {
+        s.contents(key, Material::read_file);
         return Some(text);
     }
     match Material::named(&text) {

@@ -8,7 +8,7 @@ use super::array::whole_nm;
 use super::outline::{self, DIAMETER, LensOutline};
 use super::{CellSpec, phase_term};
 use crate::phase::{Interpolation, PhaseTerm, RadialPhase, TableReading, TermForm};
-use metalith_core::Result;
+use metalith_core::Error;
 use metalith_core::document::{Limits, Section};
 use metalith_pillars::PolarisationBasis;
 
@@ -149,22 +149,22 @@ impl LensSpec {
         seen
     }
 
-    /// Read the files that its phase names, of the phases over the plane those that elements of this lens have.
-    ///
-    /// # Errors
-    /// [`metalith_core::Error::Table`] for one that cannot be used.
-    pub(crate) fn load(&mut self, is_had: impl Fn(&PhaseTerm) -> bool) -> Result<()> {
+    /// Read the files that its phase names, of the phases over the plane those that elements of this lens have. The errors are of
+    /// those that cannot be used.
+    pub(crate) fn load(&mut self, is_had: impl Fn(&PhaseTerm) -> bool) -> Vec<Error> {
         let (radius_um, ends_um) = (self.radius_um(), self.ends_um());
         let load = |phase: &mut RadialPhase, terms: &mut Vec<PhaseTerm>| {
-            phase.load(radius_um)?;
-            let mut had = terms.iter_mut().filter(|term| is_had(term));
-            had.try_for_each(|term| term.load(radius_um, ends_um))
+            let radial = phase.load(radius_um);
+            let had = terms.iter_mut().filter(|term| is_had(term));
+            let terms = had.map(|term| term.load(radius_um, ends_um));
+            let all = std::iter::once(radial).chain(terms);
+            all.filter_map(Result::err).collect::<Vec<_>>()
         };
-        load(&mut self.phase, &mut self.terms)?;
-        match &mut self.along_y {
-            Some(y) => load(&mut y.phase, &mut y.terms),
-            None => Ok(()),
+        let mut errors = load(&mut self.phase, &mut self.terms);
+        if let Some(y) = &mut self.along_y {
+            errors.extend(load(&mut y.phase, &mut y.terms));
         }
+        errors
     }
 
     /// The files that its phases name, each with what it holds.

@@ -1,7 +1,7 @@
 //! The values of a section: numbers, texts, choices, lists, paths.
 
 use std::ops::{Range, RangeInclusive};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use toml::Spanned;
 use toml::de::DeValue;
@@ -9,6 +9,7 @@ use toml::de::DeValue;
 use super::words::{describe, did_you_mean};
 use super::{Limits, Section};
 use crate::document::{FaultKind, Scalar, renamed};
+use crate::error::{Error, Result};
 use crate::text::{first_unprintable, quoted};
 
 impl<'t> Section<'_, 't> {
@@ -253,7 +254,60 @@ impl<'t> Section<'_, 't> {
                 hint,
             );
         }
+        self.names(key, &path);
         path
+    }
+
+    /// Record that a key names a file.
+    fn names(&self, key: &str, path: &Path) {
+        let named = (self.place_of(key), self.span_of(key), path.to_owned());
+        self.document.named.borrow_mut().push(named);
+    }
+
+    /// File that a key names, as [`Section::file`], and what `read` reads in it; `None` if it is not there or cannot be used, which is
+    /// then a fault of the key.
+    pub fn contents<T, E: Into<Error>>(
+        &self,
+        key: &str,
+        read: impl FnOnce(&Path) -> Result<T, E>,
+    ) -> Option<(PathBuf, T)> {
+        let path = self.file(key);
+        if !path.is_file() {
+            return None;
+        }
+        match read(&path) {
+            Ok(contents) => Some((path, contents)),
+            Err(error) => {
+                let (place, span) = (self.place_of(key), self.span_of(key));
+                self.document.unusable_file(&place, span, &error.into());
+                None
+            }
+        }
+    }
+
+    /// Record a fault at each key of the document that names the file that an error is about.
+    ///
+    /// # Errors
+    /// The error itself, if it is about something else.
+    pub fn unusable_file(&self, error: Error) -> Result<()> {
+        let (Error::Table { path: file, .. } | Error::Io { path: file, .. }) = &error else {
+            return Err(error);
+        };
+        let named = self.document.named.borrow();
+        let mut keys = named.iter().filter(|(.., path)| path == file).peekable();
+        if keys.peek().is_none() {
+            return Err(error);
+        }
+        for (key, span, _) in keys {
+            self.document.unusable_file(key, span.clone(), &error);
+        }
+        Ok(())
+    }
+
+    /// True if no value in these sections of the document has a fault so far, by their paths from the top of the file. Names of files do
+    /// not count: what other values must be does not depend on them.
+    pub fn sound_within(&self, sections: &[&str]) -> bool {
+        sections.iter().all(|section| self.document.is_sound_within(section))
     }
 
     /// A path, relative ones counted from the folder of this file. Nothing need be there.
