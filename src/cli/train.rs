@@ -3,16 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::baselines::{Comparison, StageKind};
-use metalith::file::InputFiles;
+use metalith::baselines::{Comparison, StageKind, TrainedStage, TrainingStacks};
+use metalith::file::{InputFiles, file_digest};
 use metalith::imaging::KernelCache;
 use metalith::imaging::scene::images_in;
 use metalith::imaging::scene::read_picture;
-use metalith::training::{Photographs, Stacks, TrainingReport, TrainingSpec, train, train_post_processor};
+use metalith::prior::parts::read_stage;
+use metalith::prior::{MOST_REFITS, Provenance};
+use metalith::text::hex;
+use metalith::training::{
+    FittedStacks, Photographs, Stacks, TrainingReport, TrainingSpec, train, train_post_processor, train_through_fits,
+};
 use metalith::{Error, Result};
 
 use super::compare::{BaselineKind, ComparedDesign, LenslessArgs};
 use super::paths::{paths, writable};
+use super::picture::Assume;
 use super::{Outcome, Terminal, print_json, print_line};
 
 /// Train a network on the photographs of a folder: the denoiser of the learnt prior, or the last stage of a camera.
@@ -54,8 +60,8 @@ pub(crate) struct TrainArgs {
     seed: u64,
 
     /// Train the last stage of a camera instead: `flatnet` for the mask of flatcam, `unrolled-diffuser` for the surface
-    /// of diffusercam, `multi-wiener` for the array of --design, or `blending` for the same array from the pictures of
-    /// its single elements.
+    /// of diffusercam, `multi-wiener` for the array of --design, `blending` for the same array from the pictures of
+    /// its single elements, or `refined-prior` for the same array from the pictures of the learnt prior.
     #[arg(long, value_name = "KIND", requires = "camera")]
     stage: Option<StageKind>,
 
@@ -74,6 +80,19 @@ pub(crate) struct TrainArgs {
     /// Crop the central square of each photograph to this number of pixels: a last stage is for pictures of one size.
     #[arg(long, value_name = "N", requires = "stage", value_parser = clap::value_parser!(u16).range(32..=4096))]
     pixels: Option<u16>,
+
+    /// Train for the array as the paper assumes it (needs --design), as `compare --assume paper` simulates it.
+    #[arg(long, value_enum, requires = "design")]
+    assume: Option<Assume>,
+
+    /// Fits of the picture to its frame between passes of the network, for `refined-prior`: the gradient goes through
+    /// them. Then a step takes --batch whole photographs in place of pieces.
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "stage")]
+    refits: usize,
+
+    /// Begin with the weights of this file instead of random ones: a last stage with as many pictures of a frame.
+    #[arg(long, value_name = "WEIGHTS", requires = "stage")]
+    begin: Option<PathBuf>,
 
     #[command(flatten)]
     bare: LenslessArgs,
@@ -107,7 +126,7 @@ impl TrainArgs {
             lensless,
             methods: Vec::new(),
             separate: false,
-            paper: false,
+            paper: self.assume.is_some(),
             field_deg: self.field_deg,
             seed: self.seed,
             photographs,
@@ -132,9 +151,56 @@ impl TrainArgs {
         let open = comparison.open(terminal)?;
         Stacks::check(comparison.photographs.len(), open.size(), spec.piece)?;
         let cache = KernelCache::of_user();
-        let (stacks, trained) = open.training_stacks(0, kind, &beside(out, ".pictures"), &cache, terminal)?;
-        let stacks = Stacks::new(stacks, trained, spec.piece)?;
-        train_post_processor(&stacks, spec, out, state, terminal)
+        let begun = self.begin.as_deref().map(read_stage).transpose()?;
+        let spec = TrainingSpec {
+            begun_with: self.begin.as_deref().map(file_digest).transpose()?.map(|d| hex(&d)),
+            ..spec.clone()
+        };
+        let stage = TrainedStage {
+            kind,
+            assumed: self.assume.is_some(),
+            refits: self.refits,
+        };
+        let mut report = None;
+        let mut learn = |made: TrainingStacks<'_>| {
+            let TrainingStacks {
+                stacks,
+                fits,
+                provenance,
+            } = made;
+            let first = begun
+                .clone()
+                .map(|(of, weights)| self.continued(&of, &provenance, weights))
+                .transpose()?;
+            let stacks = Stacks::new(stacks, provenance, spec.piece)?;
+            report = Some(if fits.is_empty() {
+                train_post_processor(&stacks, &spec, first, [out, state], terminal)?
+            } else {
+                train_through_fits(&FittedStacks::new(stacks, fits), &spec, first, [out, state], terminal)?
+            });
+            Ok(())
+        };
+        open.with_training_stacks(0, stage, &beside(out, ".pictures"), &cache, terminal, &mut learn)?;
+        Ok(report.expect("a camera that is ready is used"))
+    }
+
+    /// Weights to begin with, if they are of a network of this size.
+    fn continued(&self, of: &Provenance, trained: &Provenance, weights: Vec<f32>) -> Result<Vec<f32>> {
+        if of.kind == trained.kind && of.pictures == trained.pictures {
+            return Ok(weights);
+        }
+        Err(Error::refused(
+            "train/begin-of-other-stage",
+            format!(
+                "{}: weights of a last stage `{}` of {} pictures, not `{}` of {}",
+                self.begin.as_deref().unwrap_or(Path::new("")).display(),
+                of.kind,
+                of.pictures,
+                trained.kind,
+                trained.pictures
+            ),
+            "give weights of the stage that is trained",
+        ))
     }
 }
 
@@ -152,12 +218,22 @@ pub(crate) fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         batch: args.batch,
         piece: args.piece,
         seed: args.seed,
+        begun_with: None,
     };
     spec.check()?;
     let files = images_in(&args.folder)?;
     let out = args.out();
     let state = beside(&out, ".state");
-    InputFiles::of(paths(&files).chain(args.camera.as_deref())).check_outputs(&[&out, &state])?;
+    let named = args.camera.iter().chain(&args.begin).map(PathBuf::as_path);
+    InputFiles::of(paths(&files).chain(named)).check_outputs(&[&out, &state])?;
+    let through = args.stage == Some(StageKind::RefinedPrior);
+    if args.refits > if through { MOST_REFITS } else { 0 } {
+        return Err(Error::refused(
+            "train/refits-out-of-range",
+            format!("{} fits to the frame are not possible for this last stage", args.refits),
+            format!("give at most {MOST_REFITS}, and `--stage refined-prior`; other stages have none"),
+        ));
+    }
     writable(&[&out, &state])?;
     let report = match args.stage {
         Some(kind) => args.stage(kind, files, &spec, [&out, &state], terminal)?,

@@ -3,6 +3,7 @@
 use metalith_core::{Progress, Result};
 use metalith_imaging::scene::SceneImage;
 use metalith_imaging::{Frame, LightStatement};
+use metalith_prior::PictureFit;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
@@ -75,6 +76,14 @@ pub trait BaselineCamera {
     /// # Errors
     /// If there is no such stage for this camera, the frame is of another one, or the user stopped it.
     fn pictures(&self, frame: &Frame, kind: StageKind, progress: &dyn Progress) -> Result<Vec<Array3<f64>>>;
+
+    /// Fit of pictures to a frame, for stages that are trained through it.
+    ///
+    /// # Errors
+    /// If no stage of this camera needs one, or the frame is of another one.
+    fn fit(&self, _frame: &Frame) -> Result<Box<dyn PictureFit + '_>> {
+        no_stage(StageKind::RefinedPrior, "this camera")
+    }
 }
 
 /// Error that a camera has no such last stage.
@@ -82,6 +91,6 @@ pub(crate) fn no_stage<T>(kind: StageKind, camera: &str) -> Result<T> {
     Err(metalith_core::Error::refused(
         "compare/stage-not-for-camera",
         format!("the last stage `{}` cannot be used with {camera}", kind.name()),
-        "flatnet is for FlatCam, unrolled-diffuser for DiffuserCam, multi-wiener and blending for arrays",
+        "flatnet is for FlatCam, unrolled-diffuser for DiffuserCam, multi-wiener, blending and refined-prior for arrays in colour",
     ))
 }

@@ -343,7 +343,8 @@ impl OpenComparison<'_> {
                 "the layout of `{}` behind `{}`, {elements}, pillars by the cell `{}`, stray light and dispersion included.{noted}",
                 design.name, camera.name, design.verify.fidelity
             );
-            let ready = ArrayCamera::new(&system, &self.methods, self.of.separate).with_stages(self.stages_of(k)?);
+            let ready =
+                ArrayCamera::new(&system, &self.methods, self.of.separate).with_stages(self.stages_of(k, false)?);
             return then(&ready, (name, &words), &photographs);
         }
         let narrow = system.open_without_dispersion(design, &listed.layout, None, first, cache, progress)?;
@@ -353,7 +354,7 @@ impl OpenComparison<'_> {
             "`{}` as the paper assumes such cameras to be: one kernel for each element and colour, brightness by a Butterworth filter, one wavelength a colour, no stray light, patches of 420 x 420 pixels.{noted}",
             design.name
         );
-        let ready = ArrayCamera::new(&system, &self.methods, self.of.separate);
+        let ready = ArrayCamera::new(&system, &self.methods, self.of.separate).with_stages(self.stages_of(k, true)?);
         then(&ready, (&format!("{name}, paper's assumptions"), &words), &photographs)
     }
 
@@ -375,7 +376,7 @@ impl OpenComparison<'_> {
         } else {
             (
                 self.camera.clone(),
-                self.stages_of(self.designs.len() + k)?.pop(),
+                self.stages_of(self.designs.len() + k, false)?.pop(),
                 [""; 2],
             )
         };

@@ -89,7 +89,7 @@ impl<T: Lensless> BaselineCamera for T {
     fn restore(&self, frame: &Frame, way: usize, progress: &dyn Progress) -> Result<Array3<f64>> {
         let bench = self.bench();
         if let Some(stage) = self.stage().filter(|_| way > 0) {
-            stage.finish(&self.pictures(frame, stage.kind, progress)?)
+            stage.finish(&self.pictures(frame, stage.kind, progress)?, None)
         } else {
             frame.is_of(bench.frame(), bench.channels())?;
             Ok(bench.picture(&self.sent(frame, progress)?))

@@ -40,3 +40,5 @@ pub use diffusercam::{DiffuserCam, DiffuserSpec};
 pub use flatcam::{FlatCam, MaskSpec};
 pub use page::write_comparison;
 pub use post_processing::{Stage, StageKind};
+#[cfg(feature = "training")]
+pub use training_stacks::{TrainedStage, TrainingStacks};

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use metalith_core::text::hex;
 use metalith_core::{Error, Result, srgb};
 use metalith_imaging::SceneView;
-use metalith_prior::{PostProcessor, Provenance};
+use metalith_prior::{PictureFit, PostProcessor, Provenance};
 use metalith_sensor::Camera;
 use ndarray::Array3;
 use serde::Serialize;
@@ -28,6 +28,9 @@ pub enum StageKind {
     MultiWiener,
     /// The picture of each element alone, and their blend by the errors that are expected (Chakravarthula et al. 2023).
     Blending,
+    /// Pictures of the learnt prior's splitting: the clean one, the one that was fitted to the frame, and the first, by Tikhonov. The
+    /// network may be trained through further fits to the frame.
+    RefinedPrior,
 }
 
 /// Pictures of a frame that the last stage of each baseline camera sees.
@@ -35,7 +38,13 @@ pub(crate) const PICTURES: usize = 5;
 
 impl StageKind {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::FlatNet, Self::UnrolledDiffuser, Self::MultiWiener, Self::Blending];
+    pub const ALL: [Self; 5] = [
+        Self::FlatNet,
+        Self::UnrolledDiffuser,
+        Self::MultiWiener,
+        Self::Blending,
+        Self::RefinedPrior,
+    ];
 
     /// Name in options and files.
     pub fn name(self) -> &'static str {
@@ -44,6 +53,7 @@ impl StageKind {
             Self::UnrolledDiffuser => "unrolled-diffuser",
             Self::MultiWiener => "multi-wiener",
             Self::Blending => "blending",
+            Self::RefinedPrior => "refined-prior",
         }
     }
 
@@ -54,12 +64,13 @@ impl StageKind {
             Self::UnrolledDiffuser => "unrolled ADMM, Kingshott-like",
             Self::MultiWiener => "Multi-Wiener-Net-like",
             Self::Blending => "blending network",
+            Self::RefinedPrior => "prior, refined",
         }
     }
 
     /// True if it is of the chip of a design.
     pub fn is_of_design(self) -> bool {
-        matches!(self, Self::MultiWiener | Self::Blending)
+        matches!(self, Self::MultiWiener | Self::Blending | Self::RefinedPrior)
     }
 }
 
@@ -71,7 +82,7 @@ impl FromStr for StageKind {
             Error::refused(
                 "compare/unknown-stage",
                 format!("there is no last stage `{text}`"),
-                "use flatnet, unrolled-diffuser, multi-wiener or blending",
+                "use flatnet, unrolled-diffuser, multi-wiener, blending or refined-prior",
             )
         })
     }
@@ -102,13 +113,17 @@ impl Stage {
         self.post_processor.provenance()
     }
 
-    /// One picture of those that were restored from a frame, all linear sRGB `[row, column, colour]`.
+    /// One picture of those that were restored from a frame, all linear sRGB `[row, column, colour]`; `fit` is the fit to the frame of
+    /// stages that were trained through it.
     ///
     /// # Errors
     /// If there are more or fewer than it was trained by.
-    pub fn finish(&self, pictures: &[Array3<f64>]) -> Result<Array3<f64>> {
+    pub fn finish(&self, pictures: &[Array3<f64>], fit: Option<&dyn PictureFit>) -> Result<Array3<f64>> {
         let shown: Vec<Array3<f32>> = pictures.iter().map(encoded).collect();
-        let found = self.post_processor.finish(&shown)?;
+        let found = match fit {
+            Some(fit) => self.post_processor.finish_fitted(&shown, fit)?,
+            None => self.post_processor.finish(&shown)?,
+        };
         Ok(found.mapv(|v| srgb::linear(f64::from(v).clamp(0.0, 1.0))))
     }
 }

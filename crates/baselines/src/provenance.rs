@@ -34,9 +34,9 @@ impl PrecedingCamera {
 }
 
 impl OpenComparison<'_> {
-    /// Requirement on the training of a last stage to follow camera `k` of the table, counted without cameras that have
-    /// the assumptions of others: no stage follows these.
-    pub(crate) fn followed(&self, k: usize) -> Result<PrecedingCamera> {
+    /// Requirement on the training of a last stage to follow camera `k` of the table, counted without cameras that have the assumptions
+    /// of the paper; `assumed` is the same design with these. No stage follows a camera without a lens that has them.
+    pub(crate) fn followed(&self, k: usize, assumed: bool) -> Result<PrecedingCamera> {
         let first = self.photographs[0].view;
         if let Some(k) = k.checked_sub(self.designs.len()) {
             let spec = &self.of.lensless[k];
@@ -47,16 +47,21 @@ impl OpenComparison<'_> {
             return Ok(PrecedingCamera {
                 camera: camera_digest(spec, &self.camera, &first)?,
                 optics: None,
-                kinds: vec![kind],
+                kinds: if assumed { Vec::new() } else { vec![kind] },
             });
         }
         let (listed, (design, camera)) = (&self.of.designs[k], &self.designs[k]);
         let field_deg = listed.field_deg.unwrap_or(first.field_deg);
+        let view = SceneView { field_deg, ..first };
         let optics = (design.digest(), hex(&file_digest(&listed.layout)?));
         Ok(PrecedingCamera {
-            camera: camera_digest(&optics, camera, &SceneView { field_deg, ..first })?,
+            camera: if assumed {
+                camera_digest(&("assumptions of the paper", optics), camera, &view)?
+            } else {
+                camera_digest(&optics, camera, &view)?
+            },
             optics: Some(design.simulation_digest()?),
-            kinds: vec![StageKind::MultiWiener, StageKind::Blending],
+            kinds: StageKind::ALL.into_iter().filter(|k| k.is_of_design()).collect(),
         })
     }
 
@@ -65,8 +70,15 @@ impl OpenComparison<'_> {
         if self.stages.is_empty() {
             return Ok(());
         }
+        let assumptions = if self.of.paper {
+            [false, true].as_slice()
+        } else {
+            &[false]
+        };
         let cameras = 0..self.designs.len() + self.of.lensless.len();
-        let followed: Vec<PrecedingCamera> = cameras.map(|k| self.followed(k)).collect::<Result<_>>()?;
+        let followed: Vec<PrecedingCamera> = cameras
+            .flat_map(|k| assumptions.iter().map(move |assumed| self.followed(k, *assumed)))
+            .collect::<Result<_>>()?;
         let mut seen = HashSet::new();
         for (stage, path) in self.stages.iter().zip(&self.of.learnt) {
             let refused = |what: String, hint: &str| {
@@ -114,12 +126,12 @@ impl OpenComparison<'_> {
             .collect()
     }
 
-    /// The stages that were trained for camera `k`, of those without assumptions.
-    pub(crate) fn stages_of(&self, k: usize) -> Result<Vec<Stage>> {
+    /// The stages that were trained for camera `k`, with the assumptions of the paper or without.
+    pub(crate) fn stages_of(&self, k: usize, assumed: bool) -> Result<Vec<Stage>> {
         if self.stages.is_empty() {
             return Ok(Vec::new());
         }
-        let followed = self.followed(k)?;
+        let followed = self.followed(k, assumed)?;
         let fits = |stage: &&Stage| followed.is_of(stage.kind, stage.provenance());
         Ok(self.stages.iter().filter(fits).cloned().collect())
     }

@@ -4,6 +4,7 @@
 //! noisy picture, map of its noise    -> expected picture             (`NetworkDenoiser::denoise`)
 //! the same, and a seed               -> one of the pictures it may be of  (`NetworkDenoiser::sample`)
 //! pictures restored from one frame   -> one picture                  (`PostProcessor::finish`)
+//! the same, and a fit to the frame   -> one picture                  (`PostProcessor::finish_fitted`)
 //! two pictures, weights of others    -> how different they look      (`PerceptualDistance`)
 //! ```
 //!
@@ -29,14 +30,14 @@ pub use diffusion_sampling::SAMPLING_STEPS;
 pub use network::COLOURS;
 pub use noise::with_noise;
 pub use perceptual::PerceptualDistance;
-pub use post_processor::{PostProcessor, Provenance};
+pub use post_processor::{MOST_REFITS, PictureFit, PostProcessor, Provenance};
 
 /// The parts of the networks that a training needs: layers, gradients, files of weights.
 pub mod parts {
     pub use crate::denoiser::{input, over_squares};
     pub use crate::features::Features;
     pub use crate::network::{Layer, Network, Plan, Size, Trace};
-    pub use crate::network_input::{cut, piled, seen};
-    pub use crate::post_processor::STAGE;
+    pub use crate::network_input::{SIDE, cut, folded, mirrored, piled, refitted, seen};
+    pub use crate::post_processor::{STAGE, read_stage};
     pub use crate::weights::write_weights;
 }

@@ -230,6 +230,15 @@ impl Network {
 
     /// Gradient of the weights from that of the answer.
     pub fn gradient(&self, trace: &Trace, answer: Features) -> Vec<f32> {
+        self.gradients(trace, answer, false).0
+    }
+
+    /// Gradients of the weights and of the input from that of the answer. Channels of the input behind the last whole four have none.
+    pub fn gradient_and_input(&self, trace: &Trace, answer: Features) -> (Vec<f32>, Features) {
+        self.gradients(trace, answer, true)
+    }
+
+    fn gradients(&self, trace: &Trace, answer: Features, of_input: bool) -> (Vec<f32>, Features) {
         let mut gradient = vec![0.0; self.plan.weights()];
         let mut kept: Vec<Features> = Vec::new();
         let mut learn = |k: usize, input: &Features, output: &Features| {
@@ -243,8 +252,7 @@ impl Network {
             d = match *step {
                 Step::Convolution(k) => {
                     learn(k, input, &d);
-                    if i == 0 {
-                        // Nobody asks for the gradient of the picture.
+                    if i == 0 && !of_input {
                         break;
                     }
                     self.backward[k].apply(&d, false)
@@ -279,6 +287,6 @@ impl Network {
                 }
             };
         }
-        gradient
+        (gradient, d)
     }
 }

@@ -1,13 +1,13 @@
 //! Pictures as a network sees them, and what it makes of them.
 
 use metalith_core::{Error, Result};
-use ndarray::{Array2, Array3, Axis, concatenate};
+use ndarray::{Array2, Array3, Axis, Slice, concatenate};
 
 use crate::features::Features;
 use crate::network::{COLOURS, MULTIPLE, Network};
 
 /// Sides of a network's input in the picture: two pixels a square, and halves of them.
-pub(crate) const SIDE: usize = 2 * MULTIPLE;
+pub const SIDE: usize = 2 * MULTIPLE;
 
 /// Planes `[row, column, plane]` of pictures, four pixels of a square as channels, and maps of half as many rows and columns.
 pub(crate) fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features {
@@ -38,10 +38,31 @@ pub(crate) fn corrected(network: &Network, input: Features, mut picture: Array3<
 }
 
 /// Larger by its mirror image at the far sides.
-pub(crate) fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
+pub fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
     let (h, w, n) = picture.dim();
     let back = |i: usize, n: usize| if i < n { i } else { (2 * n - 1).saturating_sub(i) };
     Array3::from_shape_fn((rows, columns, n), |(y, x, c)| picture[[back(y, h), back(x, w), c]])
+}
+
+/// The adjoint of [`mirrored`]: sums of a gradient over a pixel and its mirror images.
+pub fn folded(gradient: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
+    let back = |i: usize, n: usize| if i < n { i } else { (2 * n - 1).saturating_sub(i) };
+    let mut sums = Array3::zeros((rows, columns, gradient.dim().2));
+    for ((y, x, c), g) in gradient.indexed_iter() {
+        sums[[back(y, rows), back(x, columns), c]] += g;
+    }
+    sums
+}
+
+/// Pile after a pass of the network and a fit to the frame: the corrected picture in place of the first, the fitted one in place of the
+/// second.
+pub fn refitted(pile: &Array3<f32>, corrected: &Array3<f32>, fitted: &Array3<f32>) -> Array3<f32> {
+    let mut pile = pile.clone();
+    for (k, picture) in [corrected, fitted].into_iter().enumerate() {
+        pile.slice_axis_mut(Axis(2), Slice::from(k * COLOURS..(k + 1) * COLOURS))
+            .assign(picture);
+    }
+    pile
 }
 
 /// A piece of so many rows, columns and planes from a place on; the first planes alone.

@@ -10,13 +10,15 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
 use crate::network::{COLOURS, Network, Plan, Size};
-use crate::network_input::{SIDE, corrected, cut, mirrored, piled, seen};
+use crate::network_input::{SIDE, corrected, cut, mirrored, piled, refitted, seen};
 use crate::weights::read_described;
 
 /// Key under which files of weights say what they were trained for.
 pub const STAGE: &str = "stage";
 /// Most pictures of a frame.
 const MOST: usize = 64;
+/// Most fits to the frame.
+pub const MOST_REFITS: usize = 4;
 
 /// Provenance of a last stage: what it was trained for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,6 +34,35 @@ pub struct Provenance {
     /// were trained before it was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub optics: Option<String>,
+    /// Number of times that the picture is fitted to the frame again, each between two passes of the network.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub refits: usize,
+}
+
+fn is_zero(n: &usize) -> bool {
+    *n == 0
+}
+
+/// Fit of pictures to one frame, in sRGB values `[row, column, colour]`.
+pub trait PictureFit: Sync {
+    /// The picture near another that explains the frame.
+    fn fitted(&self, picture: &Array3<f32>) -> Array3<f32>;
+
+    /// Gradient over a picture from that over the fitted one.
+    fn adjoint(&self, picture: &Array3<f32>, fitted: &Array3<f32>, gradient: &Array3<f32>) -> Array3<f32>;
+}
+
+/// Provenance of a last stage and its weights, from a file that `metalith train --stage` wrote.
+///
+/// # Errors
+/// If the file cannot be read, is damaged, or is of a denoiser.
+pub fn read_stage(path: &Path) -> Result<(Provenance, Vec<f32>)> {
+    read_described(path, |training| {
+        let provenance = Provenance::deserialize(training.get(STAGE)?).ok()?;
+        let size = Size::post_processor(provenance.pictures);
+        let known = (1..=MOST).contains(&provenance.pictures) && provenance.refits <= MOST_REFITS;
+        known.then_some((provenance, size))
+    })
 }
 
 /// A network that was trained for one camera and one kind of pictures.
@@ -47,11 +78,7 @@ impl PostProcessor {
     /// # Errors
     /// If the file cannot be read, is damaged, or is of a denoiser.
     pub fn read(path: &Path) -> Result<Self> {
-        let (provenance, weights) = read_described(path, |training| {
-            let provenance = Provenance::deserialize(training.get(STAGE)?).ok()?;
-            let size = Size::post_processor(provenance.pictures);
-            (1..=MOST).contains(&provenance.pictures).then_some((provenance, size))
-        })?;
+        let (provenance, weights) = read_stage(path)?;
         let plan = Plan::new(Size::post_processor(provenance.pictures));
         Ok(Self::of_network(Network::new(&plan, &weights), provenance))
     }
@@ -72,6 +99,19 @@ impl PostProcessor {
     /// # Errors
     /// If there are more or fewer of them, or they differ in size.
     pub fn finish(&self, pictures: &[Array3<f32>]) -> Result<Array3<f32>> {
+        Ok(self.corrected(&self.pile(pictures)?))
+    }
+
+    /// Variant of [`PostProcessor::finish`] for a network that was trained through fits to the frame. The first two pictures are the one
+    /// that is corrected and the one that explains the frame.
+    ///
+    /// # Errors
+    /// As [`PostProcessor::finish`].
+    pub fn finish_fitted(&self, pictures: &[Array3<f32>], fit: &dyn PictureFit) -> Result<Array3<f32>> {
+        Ok(self.corrected_fitted(self.pile(pictures)?, fit))
+    }
+
+    fn pile(&self, pictures: &[Array3<f32>]) -> Result<Array3<f32>> {
         if pictures.len() != self.provenance.pictures {
             return Err(metalith_core::Error::refused(
                 "stage/picture-count-differs",
@@ -83,7 +123,17 @@ impl PostProcessor {
                 "give the weights that were trained for this camera",
             ));
         }
-        Ok(self.corrected(&piled(pictures, pictures[0].dim())?))
+        piled(pictures, pictures[0].dim())
+    }
+
+    /// Corrected picture from pictures behind one another, by all passes and the fits between them.
+    pub fn corrected_fitted(&self, mut pile: Array3<f32>, fit: &dyn PictureFit) -> Array3<f32> {
+        let mut found = self.corrected(&pile);
+        for _ in 0..self.provenance.refits {
+            pile = refitted(&pile, &found, &fit.fitted(&found));
+            found = self.corrected(&pile);
+        }
+        found
     }
 
     /// Corrected picture from pictures behind one another.

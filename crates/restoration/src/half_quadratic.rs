@@ -46,23 +46,20 @@ impl SplittingState {
         let statistics = system.statistics();
         let deviation = schedule.deviation(self.rounds);
         let near = z(&statistics.picture(&self.x), self.near.as_deref(), deviation)?;
-        let terms = Terms {
-            slopes: 0.0,
-            bends: 0.0,
-            identity: schedule.weight / (deviation * deviation * system.scale),
-        };
-        let mut right = system.data.clone();
-        for (r, z) in right.iter_mut().zip(statistics.adjoint(&near)) {
-            r.scaled_add(terms.identity as f32, &z);
-        }
-        self.x = system.solve(statistics.independent(&near), &right, terms, schedule.steps, progress)?;
+        let terms = nearness(system, schedule, deviation);
+        self.x = fitted(system, &near, terms, schedule.steps, progress)?;
         self.near = Some(near);
         self.rounds += 1;
         Ok(())
     }
 
-    /// All rounds that are left, and a last look of the denoiser.
-    fn finish(mut self, system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
+    /// All rounds that are left, and a last look of the denoiser: the fitted picture, and the clean one.
+    fn finish(
+        mut self,
+        system: &NormalSystem<'_>,
+        denoiser: &dyn Denoiser,
+        progress: &dyn Progress,
+    ) -> Result<[Planes; 2]> {
         let schedule = denoiser.schedule();
         while self.rounds < schedule.rounds {
             self.round(system, &schedule, progress, |p, near, d| denoiser.denoise(p, near, d))?;
@@ -70,16 +67,48 @@ impl SplittingState {
         let statistics = system.statistics();
         let picture = statistics.picture(&self.x);
         let last = denoiser.denoise(&picture, self.near.as_deref(), schedule.deviation(self.rounds))?;
-        Ok(statistics.independent(&last))
+        Ok([self.x, statistics.independent(&last)])
     }
 }
 
-/// Restores by rounds of both steps.
-pub(crate) fn restore(system: &NormalSystem<'_>, denoiser: &dyn Denoiser, progress: &dyn Progress) -> Result<Planes> {
+/// Weight of the picture that a fitted one stays near, whose noise has a deviation.
+pub(crate) fn nearness(system: &NormalSystem<'_>, schedule: &Schedule, deviation: f64) -> Terms {
+    Terms {
+        slopes: 0.0,
+        bends: 0.0,
+        identity: schedule.weight / (deviation * deviation * system.scale),
+    }
+}
+
+/// Planes of the system that explain the frame and stay near a picture.
+pub(crate) fn fitted(
+    system: &NormalSystem<'_>,
+    near: &[Array2<f32>],
+    terms: Terms,
+    steps: usize,
+    progress: &dyn Progress,
+) -> Result<Planes> {
+    let statistics = system.statistics();
+    let mut right = system.data.clone();
+    for (r, z) in right.iter_mut().zip(statistics.adjoint(near)) {
+        r.scaled_add(terms.identity as f32, &z);
+    }
+    system.solve(statistics.independent(near), &right, terms, steps, progress)
+}
+
+/// Restores by rounds of both steps: planes of the system by Tikhonov, with which it begins, of the last picture that was fitted to the
+/// frame, and of the last clean one.
+pub(crate) fn restore(
+    system: &NormalSystem<'_>,
+    denoiser: &dyn Denoiser,
+    progress: &dyn Progress,
+) -> Result<[Planes; 3]> {
     let schedule = denoiser.schedule();
     let standing = SplittingState::begin(system, progress)?;
+    let first = standing.x.clone();
     progress.begin("restoring by splitting", (schedule.rounds * schedule.steps) as u64);
-    standing.finish(system, denoiser, progress)
+    let [explaining, clean] = standing.finish(system, denoiser, progress)?;
+    Ok([first, explaining, clean])
 }
 
 /// Pictures that the frame may be of, one for each seed: after some rounds of the splitting one clean picture is drawn in
@@ -107,7 +136,8 @@ pub(crate) fn samples(
             own.round(system, &schedule, progress, |p, near, d| {
                 denoiser.draw(p, near, d, seed)
             })?;
-            own.finish(system, denoiser, progress)
+            let [_, clean] = own.finish(system, denoiser, progress)?;
+            Ok(clean)
         })
         .collect()
 }

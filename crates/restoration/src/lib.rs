@@ -14,6 +14,7 @@
 //! | total variation, by the alternating direction method of multipliers | `total_variation`, `slope_split` |
 //! | Richardson and Lucy | `richardson_lucy` |
 //! | half-quadratic splitting with any denoiser | `half_quadratic`, `denoiser` |
+//! | its half that fits a picture to a frame, with its adjoint | `frame_fit` |
 //! | denoisers for it: least total variation, and the learnt prior | `slope_denoiser`, `learned` |
 //! | each element alone, blended | `separate` |
 //! | how near one picture is to another | `quality` |
@@ -22,6 +23,7 @@
 //! `normal_system`, and `precondition` makes them easier.
 
 mod denoiser;
+mod frame_fit;
 mod frame_model;
 mod half_quadratic;
 mod learned;
@@ -41,9 +43,9 @@ mod total_variation;
 use metalith_core::{Progress, Result};
 
 use method::restore_elements;
-use normal_system::NormalSystem;
 
 pub use denoiser::{Denoiser, Schedule};
+pub use frame_fit::FrameFit;
 pub use frame_model::{FrameModel, Planes};
 pub use learned::LearnedDenoiser;
 pub use method::RestorationMethod;
@@ -74,6 +76,28 @@ pub fn restore_separate(recorded: &Recorded<'_>, method: RestorationMethod, prog
     separate::restore(recorded, method, progress)
 }
 
+/// Pictures of a splitting with the learnt prior by all elements at once.
+#[derive(Clone, Debug)]
+pub struct SplittingPictures {
+    /// By Tikhonov: what the splitting begins with.
+    pub first: Planes,
+    /// Fitted to the frame in the last round.
+    pub fitted: Planes,
+    /// Result: what the denoiser makes of the fitted one.
+    pub clean: Planes,
+}
+
+/// Restore by the learnt prior and all elements at once, with the pictures on the way.
+///
+/// # Errors
+/// If the user stopped it.
+pub fn restore_by_prior(recorded: &Recorded<'_>, progress: &dyn Progress) -> Result<SplittingPictures> {
+    let system = recorded.system(&recorded.operator.all_elements(), true);
+    let pictures = half_quadratic::restore(&system, recorded.prior, progress)?;
+    let [first, fitted, clean] = pictures.map(|planes| system.statistics().picture(&planes));
+    Ok(SplittingPictures { first, fitted, clean })
+}
+
 /// Pictures that a frame may be of, one for each seed, by the learnt prior and all elements at once.
 ///
 /// # Errors
@@ -84,7 +108,7 @@ pub fn restore_samples(
     progress: &dyn Progress,
 ) -> Result<Vec<Planes>> {
     let all = recorded.operator.all_elements();
-    let system = NormalSystem::new(recorded, &all, true);
+    let system = recorded.system(&all, true);
     let drawn = half_quadratic::samples(&system, recorded.prior, seeds, progress)?;
     Ok(drawn.iter().map(|planes| system.statistics().picture(planes)).collect())
 }

@@ -5,7 +5,6 @@ use std::str::FromStr;
 use metalith_core::{Error, Progress, Result};
 
 use crate::frame_model::Planes;
-use crate::normal_system::NormalSystem;
 use crate::recorded::Recorded;
 use crate::slope_denoiser::SlopeDenoiser;
 use crate::{half_quadratic, richardson_lucy, tikhonov, total_variation};
@@ -87,12 +86,17 @@ pub(crate) fn restore_elements(
     if method == RestorationMethod::RichardsonLucy {
         richardson_lucy::restore(recorded, elements, stray_light, progress)
     } else {
-        let system = NormalSystem::new(recorded, elements, stray_light);
+        let system = recorded.system(elements, stray_light);
+        let clean = |pictures: Result<[Planes; 3]>| pictures.map(|[_, _, clean]| clean);
         let independent = match method {
             RestorationMethod::Tikhonov => tikhonov::restore(&system, progress),
             RestorationMethod::TotalVariation => total_variation::restore(&system, progress),
-            RestorationMethod::LearnedPrior => half_quadratic::restore(&system, recorded.prior, progress),
-            _ => half_quadratic::restore(&system, &SlopeDenoiser::new(system.statistics()), progress),
+            RestorationMethod::LearnedPrior => clean(half_quadratic::restore(&system, recorded.prior, progress)),
+            _ => clean(half_quadratic::restore(
+                &system,
+                &SlopeDenoiser::new(system.statistics()),
+                progress,
+            )),
         };
         Ok(system.statistics().picture(&independent?))
     }

@@ -10,7 +10,6 @@ use rayon::prelude::*;
 
 use crate::frame_model::{FrameModel, Planes};
 use crate::precondition::Preconditioner;
-use crate::recorded::Recorded;
 use crate::scene_statistics::{SceneStatistics, Terms};
 use crate::slope_split::bends;
 
@@ -48,15 +47,19 @@ pub(crate) struct NormalSystem<'a> {
 const LEAST_SHARE: f32 = 0.02;
 
 impl<'a> NormalSystem<'a> {
-    /// System of some of the elements, with or without the stray light.
-    pub(crate) fn new(recorded: &Recorded<'a>, elements: &[usize], stray_light: bool) -> Self {
-        let operator = recorded.operator;
-        let sums = operator.row_sums(recorded.inverse_variance, elements, stray_light);
+    /// System of light and inverse variance of each pixel, for some of the elements, with or without the stray light.
+    pub(crate) fn new(
+        operator: &'a dyn FrameModel,
+        [light_seen, inverse_variance]: [&[Array2<f32>]; 2],
+        elements: &[usize],
+        stray_light: bool,
+    ) -> Self {
+        let sums = operator.row_sums(inverse_variance, elements, stray_light);
         let mut light = Array2::<f32>::zeros(operator.picture_shape());
         sums.iter().for_each(|p| light.scaled_add(1.0 / sums.len() as f32, p));
         let most = light.iter().copied().fold(0.0f32, f32::max).max(f32::MIN_POSITIVE);
-        let weight: Planes = recorded.inverse_variance.iter().map(|t| t.mapv(|v| v / most)).collect();
-        let products: Planes = weight.iter().zip(recorded.light).map(|(w, s)| w * s).collect();
+        let weight: Planes = inverse_variance.iter().map(|t| t.mapv(|v| v / most)).collect();
+        let products: Planes = weight.iter().zip(light_seen).map(|(w, s)| w * s).collect();
         let statistics = if operator.sees_colours() {
             SceneStatistics::colours()
         } else {

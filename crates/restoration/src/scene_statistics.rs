@@ -21,6 +21,17 @@ pub struct Terms {
     pub identity: f64,
 }
 
+impl Terms {
+    /// The data term alone.
+    pub fn none() -> Self {
+        Self {
+            slopes: 0.0,
+            bends: 0.0,
+            identity: 0.0,
+        }
+    }
+}
+
 /// Statistics of natural scenes in linear light.
 ///
 /// Colours are sums of three planes that vary independently: grey, red against blue, and green against both (Ruderman,

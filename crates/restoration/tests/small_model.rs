@@ -2,7 +2,8 @@
 
 use metalith_core::Silent;
 use metalith_restoration::{
-    FrameModel, LearnedDenoiser, Planes, Recorded, RestorationMethod, psnr_db, restore_joint, restore_separate,
+    FrameFit, FrameModel, LearnedDenoiser, Planes, Recorded, RestorationMethod, psnr_db, restore_joint,
+    restore_separate,
 };
 use ndarray::Array2;
 
@@ -136,4 +137,35 @@ fn each_method_restores_what_a_frame_tells() {
         assert!(joint > JOINT_DB, "{}: {joint}", method.name());
         assert!(alone > ALONE_DB, "{}, each alone: {alone}", method.name());
     }
+}
+
+/// The gradient of a sum over the fitted picture is that of differences.
+#[test]
+fn the_fit_to_a_frame_has_its_adjoint() {
+    /// The steps of the solver change a little with the picture, which the adjoint leaves out.
+    const QUOTIENT: f32 = 0.02;
+    /// Share of the gradient that the frame takes away at least, or the test would hold without a fit.
+    const TAKEN: f32 = 0.1;
+    let light = TwoBlurs.apply(&[scene()]);
+    let inverse_variance = vec![Array2::from_elem((SIDE, SIDE), 1e4)];
+    let prior = LearnedDenoiser::shipped().unwrap();
+    let fit = FrameFit::new(&TwoBlurs, &light, &inverse_variance, &prior);
+    let wave = |k: f32| {
+        Array2::from_shape_fn((SIDE, SIDE), |(y, x)| {
+            0.4 + 0.3 * (k * (y as f32 + 0.7 * x as f32)).sin()
+        })
+    };
+    let [z, gradient, change] = [wave(0.21), wave(0.35), wave(0.5) - 0.4];
+    let moved = |share: f32| {
+        let fitted = fit.fitted(&[&z + &(&change * share)], &Silent).unwrap();
+        (&gradient * &fitted[0]).sum()
+    };
+    let quotient = (moved(0.1) - moved(-0.1)) / 0.2;
+    let found = (&fit.adjoint(std::slice::from_ref(&gradient))[0] * &change).sum();
+    let whole = (&gradient * &change).sum();
+    assert!(
+        (found - quotient).abs() < QUOTIENT * whole.abs(),
+        "{found} {quotient} {whole}"
+    );
+    assert!((found - whole).abs() > TAKEN * whole.abs(), "{found} {whole}");
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use metalith_core::{Progress, Result};
 
 use crate::examples::Photographs;
-use crate::learning::{Sample, TrainingReport, TrainingSet, TrainingSpec, learn, psnr_db};
+use crate::learning::{Sample, TrainingReport, TrainingSet, TrainingSpec, learn, loss, psnr_db};
 use metalith_prior::NetworkDenoiser;
 use metalith_prior::parts::{Network, Size, input};
 
@@ -28,7 +28,7 @@ pub fn train(
     state: &Path,
     progress: &dyn Progress,
 ) -> Result<TrainingReport> {
-    learn(photographs, spec, out, state, progress)
+    learn(photographs, spec, None, [out, state], progress)
 }
 
 impl TrainingSet for Photographs {
@@ -40,15 +40,8 @@ impl TrainingSet for Photographs {
         serde_json::json!({ "spec": spec, "photographs": self.digest() })
     }
 
-    fn sample(&self, spec: &TrainingSpec, k: u64) -> Sample {
-        let example = self.example(spec.piece, spec.seed, k);
-        let mean = example.deviation.mean().unwrap_or(EQUAL);
-        Sample {
-            input: input(&example.noisy, &example.deviation),
-            picture: example.noisy,
-            clean: example.clean,
-            weight: EQUAL / (mean + LEAST),
-        }
+    fn loss(&self, network: &Network, spec: &TrainingSpec, k: u64) -> (f64, Vec<f32>) {
+        loss(network, self.sample(spec, k))
     }
 
     fn held_out(&self, network: Network) -> f64 {
@@ -63,6 +56,19 @@ impl TrainingSet for Photographs {
             })
             .collect();
         all.iter().sum::<f64>() / all.len() as f64
+    }
+}
+
+impl Photographs {
+    fn sample(&self, spec: &TrainingSpec, k: u64) -> Sample {
+        let example = self.example(spec.piece, spec.seed, k);
+        let mean = example.deviation.mean().unwrap_or(EQUAL);
+        Sample {
+            input: input(&example.noisy, &example.deviation),
+            picture: example.noisy,
+            clean: example.clean,
+            weight: EQUAL / (mean + LEAST),
+        }
     }
 }
 
@@ -83,7 +89,7 @@ mod tests {
             seed: 5,
             ..TrainingSpec::default()
         };
-        gradients_hold(Size::DENOISER, || photographs().sample(&spec, 9));
+        gradients_hold(Size::DENOISER, |network| photographs().loss(network, &spec, 9));
     }
 
     #[test]
@@ -94,6 +100,7 @@ mod tests {
             batch: 3,
             piece: 32,
             seed: 7,
+            ..TrainingSpec::default()
         };
         let folder = tempfile::tempdir().unwrap();
         let learn = |name: &str, threads: usize, progress: &dyn Progress| {

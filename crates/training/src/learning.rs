@@ -26,6 +26,9 @@ pub struct TrainingSpec {
     pub piece: usize,
     /// Seed of weights, pieces and noise.
     pub seed: u64,
+    /// SHA-256 of the weights that it begins with; random ones if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub begun_with: Option<String>,
 }
 
 impl Default for TrainingSpec {
@@ -35,6 +38,7 @@ impl Default for TrainingSpec {
             batch: 8,
             piece: 96,
             seed: 1,
+            begun_with: None,
         }
     }
 }
@@ -52,6 +56,9 @@ pub struct TrainingReport {
 /// Longest step, after the first ones, which grow to it; it falls as a cosine to nothing.
 const RATE: f64 = 1e-3;
 const GROWING: f64 = 300.0;
+/// The same for a training that begins with trained weights, which long steps would undo.
+const RATE_BEGUN: f64 = 3e-4;
+const GROWING_BEGUN: f64 = 20.0;
 /// Steps between two looks at what is held out, and between two states on the disk.
 const LOOK: u64 = 500;
 const KEEP: u64 = 250;
@@ -76,8 +83,9 @@ pub(crate) trait TrainingSet: Sync {
     /// All that decides the weights but the numbers of [`TrainingSpec`], as JSON: a state goes on with the same alone.
     fn origin(&self, spec: &TrainingSpec) -> serde_json::Value;
 
-    /// Example number `k`, with pieces and seed of a specification: the same whatever was drawn before.
-    fn sample(&self, spec: &TrainingSpec, k: u64) -> Sample;
+    /// Loss of example number `k`, with pieces and seed of a specification, and its gradient over the weights: the same whatever was drawn
+    /// before.
+    fn loss(&self, network: &Network, spec: &TrainingSpec, k: u64) -> (f64, Vec<f32>);
 
     /// Mean peak signal to noise ratio of what is held out (dB).
     fn held_out(&self, network: Network) -> f64;
@@ -111,20 +119,24 @@ impl TrainingSpec {
     fn rate(&self, step: u64) -> f32 {
         let (step, steps) = (step as f64, self.steps as f64);
         let falling = 0.5 * (1.0 + (std::f64::consts::PI * (step - 1.0) / steps).cos());
-        (RATE * (step / GROWING).min(1.0) * falling) as f32
+        let (rate, growing) = match self.begun_with {
+            None => (RATE, GROWING),
+            Some(_) => (RATE_BEGUN, GROWING_BEGUN),
+        };
+        (rate * (step / growing).min(1.0) * falling) as f32
     }
 }
 
 /// Learn, go on where a state on the disk stands, and write the weights in the end, in place of the state. A user who stops it
-/// loses nothing: the state is written first.
+/// loses nothing: the state is written first. `first`: weights to begin with, random if there are none.
 ///
 /// # Errors
 /// If the state is of another training, files cannot be written, or the user stopped it.
 pub(crate) fn learn(
     lessons: &dyn TrainingSet,
     spec: &TrainingSpec,
-    out: &Path,
-    state: &Path,
+    first: Option<Vec<f32>>,
+    [out, state]: [&Path; 2],
     progress: &dyn Progress,
 ) -> Result<TrainingReport> {
     spec.check()?;
@@ -132,7 +144,7 @@ pub(crate) fn learn(
     let origin = lessons.origin(spec).to_string();
     let mut at = match Checkpoint::read(state, &origin, plan.weights())? {
         Some(found) => found,
-        None => Checkpoint::begin(begun(&plan, spec.seed)),
+        None => Checkpoint::begin(first.unwrap_or_else(|| begun(&plan, spec.seed))),
     };
     progress.begin("learning", spec.steps);
     progress.advance(at.step);
@@ -206,7 +218,7 @@ fn step(lessons: &dyn TrainingSet, spec: &TrainingSpec, plan: &Plan, at: &Checkp
     let first = at.step * spec.batch as u64;
     let pieces: Vec<(f64, Vec<f32>)> = (0..spec.batch as u64)
         .into_par_iter()
-        .map(|k| loss(&network, lessons.sample(spec, first + k)))
+        .map(|k| lessons.loss(&network, spec, first + k))
         .collect();
     let share = 1.0 / spec.batch as f32;
     let mut sum = vec![0.0; plan.weights()];
@@ -217,7 +229,7 @@ fn step(lessons: &dyn TrainingSet, spec: &TrainingSpec, plan: &Plan, at: &Checkp
 }
 
 /// Mean squared error of an example by its weight, and its gradient.
-fn loss(network: &Network, sample: Sample) -> (f64, Vec<f32>) {
+pub(crate) fn loss(network: &Network, sample: Sample) -> (f64, Vec<f32>) {
     let (answer, trace) = network.traced(sample.input);
     let found = answer.shuffled();
     let share = sample.weight / sample.clean.len() as f32;
@@ -253,12 +265,12 @@ pub(crate) mod tests {
     use super::*;
 
     /// Checks that the gradient of every layer is what difference quotients say, on one example.
-    pub(crate) fn gradients_hold(size: Size, sample: impl Fn() -> Sample) {
+    pub(crate) fn gradients_hold(size: Size, loss: impl Fn(&Network) -> (f64, Vec<f32>)) {
         /// A difference quotient in single precision of a loss of some thousand terms.
         const QUOTIENT: f64 = 0.02;
         let plan = Plan::new(size);
         let weights: Vec<f32> = begun(&plan, 3).iter().map(|w| 1.5 * w).collect();
-        let (_, gradient) = loss(&Network::for_learning(&plan, &weights), sample());
+        let (_, gradient) = loss(&Network::for_learning(&plan, &weights));
         // Along a direction in every layer: each must have its share of the gradient.
         for layer in &plan.layers {
             let range = layer.start..layer.start + layer.shape.weights();
@@ -271,7 +283,7 @@ pub(crate) mod tests {
                 for k in range.clone() {
                     weights[k] += sign * step * gradient[k] / norm;
                 }
-                loss(&Network::for_learning(&plan, &weights), sample()).0
+                loss(&Network::for_learning(&plan, &weights)).0
             };
             let quotient = (moved(1.0) - moved(-1.0)) / f64::from(2.0 * step);
             let found = f64::from(norm);

@@ -8,18 +8,18 @@ use crate::learning::{TrainingReport, TrainingSpec, learn};
 use crate::stacks::Stacks;
 
 /// Teach a last stage, go on where a state on the disk stands, and write the weights in the end. A user who stops it loses
-/// nothing: the state is written first.
+/// nothing: the state is written first. `first`: weights to begin with, random if there are none; `files`: weights, state.
 ///
 /// # Errors
 /// If the state is of another training, files cannot be written, or the user stopped it.
 pub fn train_post_processor(
     stacks: &Stacks,
     spec: &TrainingSpec,
-    out: &Path,
-    state: &Path,
+    first: Option<Vec<f32>>,
+    files: [&Path; 2],
     progress: &dyn Progress,
 ) -> Result<TrainingReport> {
-    learn(stacks, spec, out, state, progress)
+    learn(stacks, spec, first, files, progress)
 }
 
 #[cfg(test)]
@@ -47,6 +47,7 @@ mod tests {
             camera: "none".into(),
             pictures: 2,
             optics: Some("light".into()),
+            refits: 0,
         };
         Stacks::new((0..count).map(stack).collect(), provenance, PIECE).unwrap()
     }
@@ -57,13 +58,14 @@ mod tests {
             batch: 2,
             piece: PIECE,
             seed: 4,
+            ..TrainingSpec::default()
         }
     }
 
     #[test]
     fn gradients_are_those_of_differences() {
         let stacks = stacks(3);
-        gradients_hold(stacks.size(), || stacks.sample(&spec(1), 7));
+        gradients_hold(stacks.size(), |network| stacks.loss(network, &spec(1), 7));
     }
 
     #[test]
@@ -77,7 +79,7 @@ mod tests {
             let state = folder.path().join(format!("{name}.state"));
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let report = pool
-                .install(|| train_post_processor(&stacks, &spec(steps), &out, &state, &Silent))
+                .install(|| train_post_processor(&stacks, &spec(steps), None, [&out, &state], &Silent))
                 .unwrap();
             (report.held_out_psnr_db, std::fs::read(out).unwrap())
         };
@@ -105,7 +107,7 @@ mod tests {
         let stacks = stacks(2);
         let folder = tempfile::tempdir().unwrap();
         let (out, state) = (folder.path().join("w"), folder.path().join("w.state"));
-        train_post_processor(&stacks, &spec(1), &out, &state, &Silent).unwrap();
+        train_post_processor(&stacks, &spec(1), None, [&out, &state], &Silent).unwrap();
         let whole = std::fs::read(&out).unwrap();
         let refused = |bytes: &[u8]| {
             std::fs::write(&out, bytes).unwrap();

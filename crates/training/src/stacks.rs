@@ -16,7 +16,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 
 use crate::examples::is_held_out;
-use crate::learning::{Sample, TrainingSet, TrainingSpec, psnr_db};
+use crate::learning::{Sample, TrainingSet, TrainingSpec, loss, psnr_db};
 
 /// Longest file of the pictures of a frame (bytes).
 const LONGEST: u64 = 4 << 30;
@@ -100,6 +100,16 @@ impl Stack {
         self.pictures.iter().chain(&self.clean).copied()
     }
 
+    /// Pictures behind one another.
+    pub(crate) fn pile(&self) -> Array3<f32> {
+        self.pictures.mapv(f16::to_f32)
+    }
+
+    /// The clean picture.
+    pub(crate) fn truth(&self) -> Array3<f32> {
+        self.clean.mapv(f16::to_f32)
+    }
+
     /// Number of pictures of the frame.
     pub fn pictures(&self) -> usize {
         self.pictures.dim().2 / COLOURS
@@ -123,8 +133,8 @@ fn digest(bytes: &[Vec<u8>; 2], of: &str) -> String {
 /// Stacks of one camera to learn from, and others to be judged by.
 #[derive(Clone, Debug)]
 pub struct Stacks {
-    learnt: Vec<Stack>,
-    held_out: Vec<Stack>,
+    pub(crate) learnt: Vec<Stack>,
+    pub(crate) held_out: Vec<Stack>,
     provenance: Provenance,
 }
 
@@ -184,7 +194,7 @@ impl Stacks {
     }
 
     /// SHA-256 of all pixels.
-    fn digest(&self) -> String {
+    pub(crate) fn digest(&self) -> String {
         let mut hasher = Sha256::new();
         for stack in self.learnt.iter().chain(&self.held_out) {
             hasher.update(stack.size().map(|n| (n as u64).to_le_bytes()).concat());
@@ -203,7 +213,23 @@ impl TrainingSet for Stacks {
         serde_json::json!({ "spec": spec, STAGE: self.provenance, "pictures": self.digest() })
     }
 
-    fn sample(&self, spec: &TrainingSpec, k: u64) -> Sample {
+    fn loss(&self, network: &Network, spec: &TrainingSpec, k: u64) -> (f64, Vec<f32>) {
+        loss(network, self.sample(spec, k))
+    }
+
+    fn held_out(&self, network: Network) -> f64 {
+        let post_processor = PostProcessor::of_network(network, self.provenance.clone());
+        let all = self.held_out.iter().map(|stack| {
+            let found = post_processor.corrected(&stack.pile());
+            psnr_db(&found, &stack.truth())
+        });
+        all.sum::<f64>() / self.held_out.len() as f64
+    }
+}
+
+impl Stacks {
+    /// Piece number `k` of a seed.
+    pub(crate) fn sample(&self, spec: &TrainingSpec, k: u64) -> Sample {
         let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
         random.set_stream(k);
         let stack = &self.learnt[random.random_range(0..self.learnt.len())];
@@ -221,15 +247,6 @@ impl TrainingSet for Stacks {
             clean: of(&stack.clean),
             weight: 1.0,
         }
-    }
-
-    fn held_out(&self, network: Network) -> f64 {
-        let post_processor = PostProcessor::of_network(network, self.provenance.clone());
-        let all = self.held_out.iter().map(|stack| {
-            let found = post_processor.corrected(&stack.pictures.mapv(f16::to_f32));
-            psnr_db(&found, &stack.clean.mapv(f16::to_f32))
-        });
-        all.sum::<f64>() / self.held_out.len() as f64
     }
 }
 
