@@ -235,26 +235,22 @@ impl ImagingSystem {
         Ok(self.picture(operator, &planes))
     }
 
-    /// Pictures by Tikhonov's method and all elements: of a frame, and of other light on the same pixels, each trusted as far as that of
-    /// the frame.
+    /// Picture by Tikhonov's method and all elements of other light on the pixels of a frame, each trusted as far as that of the frame.
     ///
     /// # Errors
     /// As [`ImagingSystem::restore`].
-    pub(crate) fn restore_alike(
+    pub(crate) fn restore_light(
         &self,
         operator: &FrameOperator<'_>,
         error: &OperatorError,
         frame: &Frame,
         light: &[Array2<f32>],
         progress: &dyn Progress,
-    ) -> Result<[Array3<f64>; 2]> {
-        let [recorded, inverse_variance] = self.known(operator, &error.times(TOGETHER), frame)?;
-        let restored = |light: &[Array2<f32>]| -> Result<Array3<f64>> {
-            let recorded = self.recorded(operator, light, &inverse_variance);
-            let planes = restore_joint(&recorded, RestorationMethod::Tikhonov, progress)?;
-            Ok(self.picture(operator, &planes))
-        };
-        Ok([restored(&recorded)?, restored(light)?])
+    ) -> Result<Array3<f64>> {
+        let [_, inverse_variance] = self.known(operator, &error.times(TOGETHER), frame)?;
+        let recorded = self.recorded(operator, light, &inverse_variance);
+        let planes = restore_joint(&recorded, RestorationMethod::Tikhonov, progress)?;
+        Ok(self.picture(operator, &planes))
     }
 
     /// Pictures that a frame may be of, one for each seed, linear sRGB `[row, column, colour]`.

@@ -9,6 +9,7 @@
 //! | --- | --- |
 //! | what a restoration knows of a camera | `frame_model` |
 //! | what is known of pictures beforehand | `scene_statistics` |
+//! | random scenes of objects that hide one another | `leaf_scene` |
 //! | which methods there are | `method` |
 //! | Tikhonov: the most likely picture where light is normal, as a Wiener filter has it | `tikhonov` |
 //! | total variation, by the alternating direction method of multipliers | `total_variation`, `slope_split` |
@@ -26,6 +27,7 @@ mod denoiser;
 mod frame_fit;
 mod frame_model;
 mod half_quadratic;
+mod leaf_scene;
 mod learned;
 mod method;
 mod normal_system;

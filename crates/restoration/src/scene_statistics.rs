@@ -86,6 +86,17 @@ impl SceneStatistics {
         }
     }
 
+    /// Number of planes of a picture.
+    pub(crate) fn planes(&self) -> usize {
+        self.mix.len()
+    }
+
+    /// Planes of the picture from independent planes, grey ones of as large a deviation as they have here.
+    pub(crate) fn of_unit_grey(&self, independent: &[Array2<f32>]) -> Planes {
+        let unit = self.mix[0][0].recip();
+        self.picture(independent).into_iter().map(|p| p * unit).collect()
+    }
+
     /// Planes of the picture (rows) from independent planes (columns).
     pub fn mixing(&self) -> DMatrix<f64> {
         let n = self.mix.len();

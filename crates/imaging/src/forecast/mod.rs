@@ -1,8 +1,8 @@
 //! The error of a restored picture, expected from the spectrum of its scene.
 //!
 //! A restoration by Tikhonov's method is linear. Of each frequency of a scene, in each cell of the field and each plane of colour,
-//! it loses a share of the power; what it makes of noise comes to that, whatever power the scene has. Both are found on one random
-//! scene ([`crate::ForecastScene`]). The shares times the power that scenes have, and the noise of as much light as they have, are the
+//! it loses a share of the power; what it makes of noise comes to that, whatever power the scene has. Both are found on random
+//! scenes ([`crate::ForecastScene`]). The shares times the power that scenes have, and the noise of as much light as they have, are the
 //! expected error.
 
 mod bands;
@@ -32,7 +32,7 @@ pub struct Forecast {
     of_bands: [f64; ZONES.len()],
     /// Power that noise has in the picture, by cell of the field.
     noise: Vec<f64>,
-    /// Mean light of the random scene by cell of the field.
+    /// Mean light of the random scenes by cell of the field.
     light: Vec<f64>,
     exposed: Exposed,
 }
@@ -63,14 +63,26 @@ impl Exposed {
 }
 
 impl Forecast {
-    /// Forecast from a scene, the picture that was restored of it without noise, and what noise adds to that, all
-    /// linear sRGB `[row, column, colour]`.
-    pub(crate) fn between(truth: &Array3<f64>, picture: &Array3<f64>, noise: &Array3<f64>, exposed: Exposed) -> Self {
-        let error = picture - truth;
-        let mut lost = ScenePower::of(&error);
-        let found = zone_means(&means_by_cell(&error, |v| v * v));
+    /// Forecast from scenes and the pictures that were restored of them without noise, and what noise adds to the first, all linear sRGB
+    /// `[row, column, colour]`.
+    pub(crate) fn between(pairs: &[[&Array3<f64>; 2]], noise: &Array3<f64>, exposed: Exposed) -> Self {
+        let errors: Vec<Array3<f64>> = pairs.iter().map(|[truth, picture]| *picture - *truth).collect();
+        let mean = |of: Vec<ScenePower>| ScenePower::mean(&of).expect("a camera is tried on a scene");
+        let mut lost = mean(errors.iter().map(ScenePower::of).collect());
+        let squares = errors.iter().map(|e| zone_means(&means_by_cell(e, |v| v * v)));
+        let mut found = [0.0; ZONES.len()];
+        for own in squares {
+            for (f, v) in found.iter_mut().zip(own) {
+                *f += v / pairs.len() as f64;
+            }
+        }
         let bands = zone_means(&lost.squares(None));
-        let scene = ScenePower::of(truth);
+        let scene = mean(pairs.iter().map(|[truth, _]| ScenePower::of(truth)).collect());
+        let first = means_by_cell(pairs[0][0], |v| v);
+        let noise = means_by_cell(noise, |v| v * v);
+        let as_bright = |(cell, noise): (usize, f64)| {
+            noise * exposed.against(scene.light[cell] / first[cell].max(f64::MIN_POSITIVE))
+        };
         lost.values_mut()
             .zip(scene.values())
             .for_each(|(lost, scene)| *lost /= scene.max(f64::MIN_POSITIVE));
@@ -80,7 +92,7 @@ impl Forecast {
                 0.0 => 1.0,
                 all => found[zone] / all,
             }),
-            noise: means_by_cell(noise, |v| v * v),
+            noise: noise.into_iter().enumerate().map(as_bright).collect(),
             light: scene.light,
             exposed,
         }
@@ -206,7 +218,7 @@ mod tests {
         };
         let rehearsed = random(1, 160, 160);
         let none = Array3::zeros(rehearsed.dim());
-        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &none, exposed());
+        let forecast = Forecast::between(&[[&rehearsed, &blurred(&rehearsed)]], &none, exposed());
         // Twice as fine, and of another contrast in the same light.
         let fine = random(2, 320, 320);
         let other = Array3::from_shape_fn((160, 160, 3), |(y, x, c)| 0.5 * fine[[2 * y, 2 * x, c]]);
@@ -223,7 +235,7 @@ mod tests {
         let noise = Array3::from_shape_fn(rehearsed.dim(), |(y, x, c)| {
             if (y + x + c) % 2 == 0 { deviation } else { -deviation }
         });
-        let forecast = Forecast::between(&rehearsed, &blurred(&rehearsed), &noise, exposed());
+        let forecast = Forecast::between(&[[&rehearsed, &blurred(&rehearsed)]], &noise, exposed());
         let smooth = Array3::from_shape_fn(rehearsed.dim(), |(y, x, _)| 0.3 + 1e-3 * (0.02 * (y + x) as f64).sin());
         let scores = crate::score::scores(&(&blurred(&smooth) + &noise), &smooth).unwrap();
         for (got, want) in forecast.psnr_linear_db(&ScenePower::of(&smooth)).iter().zip(scores) {
@@ -266,7 +278,7 @@ mod tests {
         let noise = none.mapv(|v: f64| v + 0.02);
         let db = |photon: f64, read: f64, light: f64| {
             let exposed = Exposed::of(Noise { photon, read }, 0.05);
-            let forecast = Forecast::between(&dark, &dark, &noise, exposed);
+            let forecast = Forecast::between(&[[&dark, &dark]], &noise, exposed);
             forecast.psnr_linear_db(&ScenePower::of(&(&dark * (light / 0.1))))
         };
         for (photon, read, lost) in [(1e-4, 0.0, 6.0206), (0.0, 1e-3, 0.0), (0.0, 0.0, 0.0)] {
