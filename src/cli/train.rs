@@ -259,10 +259,11 @@ pub(crate) fn run(args: &TrainArgs, terminal: &Terminal) -> Result<Outcome> {
         print_json(&report);
     } else {
         print_line!(
-            "{}: {} weights, {:.2} dB for photographs that were held out{}",
+            "{}: {} weights, {:.2} dB for photographs that were held out ({:.2} dB before the network){}",
             out.display(),
             report.weights,
             report.held_out_psnr_db,
+            report.held_out_uncorrected_psnr_db,
             if args.stage.is_some() {
                 ""
             } else {

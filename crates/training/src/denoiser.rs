@@ -57,6 +57,14 @@ impl TrainingSet for Photographs {
             .collect();
         all.iter().sum::<f64>() / all.len() as f64
     }
+
+    fn held_out_uncorrected(&self) -> f64 {
+        let all: Vec<f64> = self
+            .judged(JUDGED)
+            .map(|(clean, noisy)| psnr_db(&noisy, clean))
+            .collect();
+        all.iter().sum::<f64>() / all.len() as f64
+    }
 }
 
 impl Photographs {

@@ -160,6 +160,10 @@ impl TrainingSet for FittedStacks<'_> {
         });
         all.sum::<f64>() / self.held_out.len() as f64
     }
+
+    fn held_out_uncorrected(&self) -> f64 {
+        self.stacks.held_out_uncorrected()
+    }
 }
 
 /// Teach a last stage through its fits to frames; else as [`crate::train_post_processor`].

@@ -51,6 +51,8 @@ pub struct TrainingReport {
     /// Peak signal-to-noise ratio on examples that nothing was learnt from (dB): photographs with noise of 25 / 255, or
     /// the pictures of a camera.
     pub held_out_psnr_db: f64,
+    /// The same of the pictures that the network corrects (dB).
+    pub held_out_uncorrected_psnr_db: f64,
 }
 
 /// Longest step, after the first ones, which grow to it; it falls as a cosine to nothing.
@@ -89,6 +91,9 @@ pub(crate) trait TrainingSet: Sync {
 
     /// Mean peak signal to noise ratio of what is held out (dB).
     fn held_out(&self, network: Network) -> f64;
+
+    /// The same of the pictures that the network corrects (dB).
+    fn held_out_uncorrected(&self) -> f64;
 }
 
 impl TrainingSpec {
@@ -187,6 +192,7 @@ pub(crate) fn learn(
         steps: at.step,
         weights: plan.weights(),
         held_out_psnr_db: lessons.held_out(Network::new(&plan, &written)),
+        held_out_uncorrected_psnr_db: lessons.held_out_uncorrected(),
     })
 }
 

@@ -225,6 +225,15 @@ impl TrainingSet for Stacks {
         });
         all.sum::<f64>() / self.held_out.len() as f64
     }
+
+    fn held_out_uncorrected(&self) -> f64 {
+        let all = self.held_out.iter().map(|stack| {
+            let pile = stack.pile();
+            let (rows, columns, _) = pile.dim();
+            psnr_db(&cut(&pile, [0; 2], [rows, columns, COLOURS]), &stack.truth())
+        });
+        all.sum::<f64>() / self.held_out.len() as f64
+    }
 }
 
 impl Stacks {

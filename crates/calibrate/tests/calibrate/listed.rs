@@ -207,6 +207,7 @@ fn a_displaced_part_is_found_where_nobody_says_where_fields_meet() {
 /// A bias and another index change the phase of blue and green differently: a fit of either alone fails on measurements
 /// left out.
 #[test]
+#[ignore = "second tier: a search of pairs takes 84 CPU seconds"]
 fn a_pair_is_found_where_neither_of_the_two_helps() {
     /// Relative: two colours of a coarse spectrum, and synthetic sets have another sampling.
     const TOLERANCE: f64 = 0.08;
