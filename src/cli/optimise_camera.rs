@@ -5,8 +5,9 @@ use std::path::Path;
 use metalith::cell::cache_folder;
 use metalith::file::InputFiles;
 use metalith::optimise::TaskCells;
-use metalith::optimise::camera::{CameraReport, CameraTask};
+use metalith::optimise::camera::{CameraReport, CameraTask, TriedCameras};
 use metalith::sensor::Camera;
+use metalith::text::counted;
 use metalith::{Design, Error, Result};
 
 use super::out_folder::OutFolder;
@@ -24,6 +25,8 @@ pub(super) struct CameraSearch<'a> {
     pub json: bool,
 }
 
+/// File of the cameras that were tried, until the search is at its end.
+const KEPT: &str = ".cameras.json";
 /// Files of a search that may be there already, and their list.
 const STALE: [&str; 4] = ["report.html", "report.json", "front.csv", ".report.sha256"];
 
@@ -37,9 +40,20 @@ pub(super) fn run(asked: &CameraSearch<'_>, terminal: &Terminal) -> Result<Outco
     let cells = TaskCells::of(design, false, cache_folder().as_deref(), terminal)?;
     let turn = terminal.turn_at(asked.folder, paths(&inputs))?;
     asked.out.note()?;
-    let found = task.search(cells.own(), terminal)?;
+    let mut kept = TriedCameras::open(&asked.folder.join(KEPT), &task.decides(&text)?);
+    if kept.count() > 0 {
+        terminal.say(&format!(
+            "{} of an earlier search are taken from `{}`",
+            counted(kept.count(), "camera"),
+            asked.folder.join(KEPT).display()
+        ));
+    }
+    let found = task.search(cells.own(), &mut kept, terminal)?;
     let report = CameraReport::new(design, &text, &task, &camera.name, &found, asked.command.clone())?;
     turn.publish("report", &STALE, |folder| report.write(folder))?;
+    if !found.interrupted {
+        kept.discard()?;
+    }
     terminal.clear();
     if asked.json {
         print_json(&report);

@@ -22,7 +22,9 @@ pub use lens::{LensSpec, PhaseAlongY};
 pub(crate) use mapping::LibraryFile;
 pub use mapping::{MappingComparison, MappingSpec};
 pub use mapping_cell::MappingIdentity;
-pub use optimise::{CameraSearchSpec, MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec};
+pub use optimise::{
+    CameraSearchSpec, CameraSizes, MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec,
+};
 pub use outline::LensOutline;
 pub(crate) use outline::OutlineRows;
 pub use steered_mapping::{SteeredMapping, SteeringSteps};

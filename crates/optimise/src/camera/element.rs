@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use serde::{Deserialize, Serialize};
+
 /// Powers of x and y of the terms of a phase, but for the radial ones: all of degree 2, 3 and 4.
 pub const POWERS: [(u32, u32); 12] = [
     (2, 0),
@@ -25,7 +27,7 @@ pub const RADIAL: [u32; 2] = [3, 4];
 pub const TERMS: usize = POWERS.len() + RADIAL.len();
 
 /// An element before the sensor. Its phase is that of a hyperbola, terms of x / R and y / R, with R half its diameter, and a wedge.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CameraElement {
     /// Middle on the chip (um).
     pub centre_um: [f64; 2],

@@ -14,6 +14,7 @@ mod search;
 mod task;
 #[cfg(test)]
 mod tests;
+mod tried_cameras;
 mod wiener;
 
 pub use design_text::design_text;
@@ -25,3 +26,4 @@ pub use report::{CameraReport, CameraRow};
 pub use scene::NaturalScene;
 pub use search::{Arrangement, CameraStart};
 pub use task::{CameraFindings, CameraTask, TriedCamera};
+pub use tried_cameras::TriedCameras;

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use metalith_restoration::MEAN_LIGHT;
 use metalith_sensor::Walls;
@@ -55,7 +56,7 @@ pub struct CameraModel {
 }
 
 /// What the model finds.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Judged {
     /// Mean square error of linear light, white being one.
     pub error: f64,

@@ -6,6 +6,7 @@ use metalith_core::{Progress, Result};
 use metalith_sensor::{ColourFilter, Sensor};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use super::element::{CameraElement, TERMS, fitted, mirrored_signs};
 use super::lbfgs;
@@ -14,7 +15,7 @@ use super::model::{CameraModel, Judged};
 use super::pupil::landing_um;
 
 /// Elements of one diameter on a grid before a sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Arrangement {
     /// Elements along x and y.
     pub count: [usize; 2],
@@ -28,7 +29,7 @@ pub struct Arrangement {
 }
 
 /// Phases that a descent begins with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CameraStart {
     /// Every element is the same hyperbola.
     Identical,

@@ -3,8 +3,9 @@
 use metalith_cell::CellModel;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarRule;
-use metalith_design::{CameraSearchSpec, Design};
+use metalith_design::{CameraSearchSpec, CameraSizes, Design};
 use metalith_sensor::{Camera, Walls};
+use serde::{Deserialize, Serialize};
 
 use super::design_text::design_text;
 use super::diameters;
@@ -14,6 +15,7 @@ use super::light::CameraLight;
 use super::model::{CameraModel, Judged, ModelSettings, WINDOW_UM};
 use super::scene::NaturalScene;
 use super::search::{Arrangement, CameraStart, SensorLattice};
+use super::tried_cameras::TriedCameras;
 use crate::rings::mapping::Mapping;
 
 /// Band that lenses of glass and silicon nitride are simulated in where the camera counts (nm).
@@ -26,7 +28,7 @@ const NODES: [usize; 2] = [3, 4];
 const WIDTH: f64 = 0.2;
 
 /// One camera that was tried.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TriedCamera {
     pub lux: f64,
     pub arrangement: Arrangement,
@@ -58,6 +60,10 @@ pub struct CameraFindings {
 
 /// Phases of a turn that a piston is chosen from.
 const PISTONS: usize = 64;
+/// Share by which a refinement first changes a distance or a diameter, and the smallest one: below it the error is flat.
+const REFINED: [f64; 2] = [0.2, 0.04];
+/// Most cameras of a refinement.
+const MOST_REFINED: usize = 16;
 
 impl CameraTask {
     /// The task that a design sets before a camera. `text`: the text of the design.
@@ -95,6 +101,16 @@ impl CameraTask {
             seed: design.optimise.seed,
             spec,
         })
+    }
+
+    /// Text that decides the cameras of the search: the design's own, the camera file, the version of the program.
+    ///
+    /// # Errors
+    /// If the camera cannot be written as text.
+    pub fn decides(&self, text: &str) -> Result<String> {
+        let camera = serde_json::to_string(&self.camera)
+            .map_err(|e| Error::refused("internal/serialisation-failed", e.to_string(), "report this"))?;
+        Ok(format!("{} {camera} {text}", env!("CARGO_PKG_VERSION")))
     }
 
     fn light(&self, lux: f64, step_nm: f64, cell: &dyn CellModel) -> Result<CameraLight> {
@@ -136,7 +152,7 @@ impl CameraTask {
                 }
             }
         }
-        all.retain(|a| (0..2).all(|axis| a.count[axis] == 1 || a.pitch_um(axis, light, self.edge()) > a.diameter_um));
+        all.retain(|a| self.has_room(a, light));
         if all.is_empty() {
             return Err(Error::refused(
                 "optimise/no-camera-fits",
@@ -145,6 +161,11 @@ impl CameraTask {
             ));
         }
         Ok(all)
+    }
+
+    /// True if neighbours of an arrangement do not overlap on the chip.
+    fn has_room(&self, a: &Arrangement, light: &CameraLight) -> bool {
+        (0..2).all(|axis| a.count[axis] == 1 || a.pitch_um(axis, light, self.edge()) > a.diameter_um)
     }
 
     fn settings_of(&self, arrangement: &Arrangement) -> ModelSettings {
@@ -156,11 +177,17 @@ impl CameraTask {
         }
     }
 
-    /// Try all cameras, and improve the best for each light. The same task gives the same cameras on any number of threads.
+    /// Try all cameras, and improve the best for each light. The same task gives the same cameras on any number of threads. Cameras that
+    /// `kept` holds are not tried again; each that is tried is kept there.
     ///
     /// # Errors
-    /// If the cell is not known at a wavelength of the camera, the light is not visible, or no camera fits.
-    pub fn search(&self, cell: &dyn CellModel, progress: &dyn Progress) -> Result<CameraFindings> {
+    /// If the cell is not known at a wavelength of the camera, the light is not visible, no camera fits, or a camera cannot be kept.
+    pub fn search(
+        &self,
+        cell: &dyn CellModel,
+        kept: &mut TriedCameras,
+        progress: &dyn Progress,
+    ) -> Result<CameraFindings> {
         let mut findings = CameraFindings {
             tried: Vec::new(),
             best: Vec::new(),
@@ -179,10 +206,14 @@ impl CameraTask {
         if let Some(words) = diameters::left_out(&self.spec, &SensorLattice::of(&self.camera.sensor)) {
             progress.warn(&words);
         }
-        progress.begin("cameras", (lights.len() * (arrangements.len() + 1)) as u64);
+        let refined = match self.spec.sizes {
+            CameraSizes::Listed => 0,
+            CameraSizes::Refined => MOST_REFINED,
+        };
+        progress.begin("cameras", (lights.len() * (arrangements.len() + refined + 1)) as u64);
         for ((&lux, light), fine) in lights.iter().zip(&coarse).zip(&fine) {
             for arrangement in &arrangements {
-                match self.first(lux, light, arrangement, progress) {
+                match self.tried(lux, light, arrangement, kept, progress) {
                     Ok(camera) => findings.tried.push(camera),
                     Err(_) if progress.check_stopped().is_err() => {
                         findings.interrupted = true;
@@ -193,9 +224,12 @@ impl CameraTask {
                 progress.advance(1);
             }
             let own = findings.tried.iter().filter(|c| c.lux == lux);
-            let Some(best) = own.min_by(|a, b| a.judged.error.total_cmp(&b.judged.error)).cloned() else {
+            let Some(mut best) = own.min_by(|a, b| a.judged.error.total_cmp(&b.judged.error)).cloned() else {
                 break;
             };
+            if self.spec.sizes == CameraSizes::Refined && !findings.interrupted {
+                best = self.refined(best, light, kept, &mut findings, progress)?;
+            }
             findings
                 .best
                 .push(self.last(best, fine, &mut findings.interrupted, progress)?);
@@ -208,6 +242,78 @@ impl CameraTask {
             progress.check_stopped()?;
         }
         Ok(findings)
+    }
+
+    /// A camera after short descents, as it is kept or tried now.
+    fn tried(
+        &self,
+        lux: f64,
+        light: &CameraLight,
+        arrangement: &Arrangement,
+        kept: &mut TriedCameras,
+        progress: &dyn Progress,
+    ) -> Result<TriedCamera> {
+        if let Some(found) = kept.find(lux, arrangement) {
+            return Ok(found.clone());
+        }
+        let camera = self.first(lux, light, arrangement, progress)?;
+        kept.add(camera.clone())?;
+        Ok(camera)
+    }
+
+    /// The best camera after its distance and its diameter are changed one after the other, by shares that fall by half where no change
+    /// is better. The best so far if the user stopped.
+    fn refined(
+        &self,
+        mut best: TriedCamera,
+        light: &CameraLight,
+        kept: &mut TriedCameras,
+        findings: &mut CameraFindings,
+        progress: &dyn Progress,
+    ) -> Result<TriedCamera> {
+        let [mut share, least] = REFINED;
+        let mut left = MOST_REFINED;
+        while share >= least && left > 0 {
+            let mut moved = false;
+            for [distance, diameter] in [[0.0, share], [0.0, -share], [share, 0.0], [-share, 0.0]] {
+                // Whole micrometres, so that a camera is not tried twice.
+                let scaled = |um: f64, by: f64| (um * (1.0 + by)).round();
+                let distance_um = scaled(best.arrangement.distance_um, distance);
+                let arrangement = Arrangement {
+                    distance_um: distance_um.min(self.spec.most_track_um.floor()),
+                    diameter_um: scaled(best.arrangement.diameter_um, diameter),
+                    ..best.arrangement
+                };
+                let overlaps = |a: &Arrangement| self.settings.walls == Walls::None && a.overlaps(light, self.edge());
+                let known = findings
+                    .tried
+                    .iter()
+                    .any(|c| c.lux == best.lux && c.arrangement == arrangement);
+                let worse = overlaps(&arrangement) && !overlaps(&best.arrangement);
+                if left == 0 || known || worse || !self.has_room(&arrangement, light) {
+                    continue;
+                }
+                let camera = match self.tried(best.lux, light, &arrangement, kept, progress) {
+                    Ok(camera) => camera,
+                    Err(_) if progress.check_stopped().is_err() => {
+                        findings.interrupted = true;
+                        return Ok(best);
+                    }
+                    Err(other) => return Err(other),
+                };
+                left -= 1;
+                progress.advance(1);
+                findings.tried.push(camera.clone());
+                if camera.judged.error < best.judged.error {
+                    (best, moved) = (camera, true);
+                }
+            }
+            if !moved {
+                share *= 0.5;
+            }
+        }
+        progress.advance(left as u64);
+        Ok(best)
     }
 
     /// A camera after short descents from each start.

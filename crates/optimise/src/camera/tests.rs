@@ -13,6 +13,8 @@ use super::model::{CameraModel, ModelSettings, WINDOW_UM};
 use super::pupil::{Transform, View};
 use super::scene::NaturalScene;
 use super::search::{Arrangement, CameraStart};
+use super::task::{CameraFindings, CameraTask};
+use super::tried_cameras::TriedCameras;
 
 const FIELD_DEG: f64 = 80.0;
 
@@ -324,4 +326,86 @@ fn the_table_of_the_issue() {
             "{name}"
         );
     }
+}
+
+/// Stops a search after a camera.
+struct StopAfterOne(std::sync::atomic::AtomicU64);
+
+impl metalith_core::Progress for StopAfterOne {
+    fn begin(&self, _: &str, _: u64) {}
+    fn advance(&self, n: u64) {
+        self.0.fetch_add(n, std::sync::atomic::Ordering::Relaxed);
+    }
+    fn stopped(&self) -> bool {
+        self.0.load(std::sync::atomic::Ordering::Relaxed) >= 1
+    }
+}
+
+/// A search that was stopped goes on with the same cameras, and refined sizes are no worse than listed ones.
+#[test]
+fn a_stopped_search_goes_on_with_the_same_cameras() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/imaging_3x3.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (head, _) = text.split_once("\n[optimise]").unwrap();
+    let table = path.with_file_name("phases/imaging.csv").canonicalize().unwrap();
+    let head = head.replace("\"phases/imaging.csv\"", &format!("\"{}\"", table.display()));
+    let folder = tempfile::tempdir().unwrap();
+    let camera = Camera::read(&path.with_file_name("../cameras/gt1930.toml")).unwrap();
+    let task = |sizes: &str| {
+        let text = format!(
+            "{head}\n[optimise]\ncell = \"published\"\n\n[optimise.camera]\nfield_deg = 80\nscene_pixels = 64\nmost_track_um = 600\n\
+             columns = [2]\nrows = [1]\ndiameters_um = [60, 90]\nstarts = 1\nsteps = 1\nfinal_steps = 1\nsizes = \"{sizes}\"\n"
+        );
+        let path = folder.path().join(format!("{sizes}.toml"));
+        std::fs::write(&path, &text).unwrap();
+        let design = metalith_design::Design::read(&path).unwrap();
+        let task = CameraTask::of(&design, &text, camera.clone()).unwrap();
+        (design, task.decides(&text).unwrap(), task)
+    };
+    let (design, decides, refined) = task("refined");
+    let cell = metalith_design::cell_models(&design, &[metalith_cell::Fidelity::Published])
+        .unwrap()
+        .remove(0);
+    let file = folder.path().join("kept.json");
+    let search = |progress: &dyn metalith_core::Progress| {
+        let mut kept = TriedCameras::open(&file, &decides);
+        let before = kept.count();
+        (refined.search(&*cell, &mut kept, progress).unwrap(), before)
+    };
+    let (stopped, _) = search(&StopAfterOne(0.into()));
+    assert!(stopped.interrupted && stopped.tried.len() == 1);
+    let (whole, before) = search(&Silent);
+    assert_eq!((before, whole.interrupted), (1, false));
+    std::fs::remove_file(&file).unwrap();
+    let (again, before) = search(&Silent);
+    assert_eq!(before, 0);
+    let of = |found: &CameraFindings| {
+        let all = found.tried.iter().chain(&found.best);
+        all.map(|c| (c.arrangement, c.judged.clone(), c.elements.clone()))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(of(&whole), of(&again));
+    // Damage and another task begin again.
+    assert_eq!(TriedCameras::open(&file, "another").count(), 0);
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replacen("\"diameter_um\":60", "\"diameter_um\":61", 1)).unwrap();
+    assert_eq!(TriedCameras::open(&file, &decides).count(), 0);
+    let (_, decides, listed) = task("listed");
+    let plain = listed
+        .search(
+            &*cell,
+            &mut TriedCameras::open(&folder.path().join("listed.json"), &decides),
+            &Silent,
+        )
+        .unwrap();
+    let least = |found: &CameraFindings| found.tried.iter().map(|c| c.judged.error).fold(f64::MAX, f64::min);
+    println!(
+        "listed {} of {}, refined {} of {}",
+        least(&plain),
+        plain.tried.len(),
+        least(&whole),
+        whole.tried.len()
+    );
+    assert!(plain.tried.len() == 2 && whole.tried.len() > 2);
+    assert!(least(&whole) < least(&plain));
 }

@@ -24,11 +24,22 @@ pub struct CameraSearchSpec {
     pub diameters_um: Vec<f64>,
     /// Shares of the wedge that steers an element to its part of the field.
     pub wedge_shares: Vec<f64>,
+    pub sizes: CameraSizes,
     /// Phases that each search begins with, at most.
     pub starts: usize,
     /// Steps of a descent while cameras are compared, and of the last one of the best.
     pub steps: usize,
     pub final_steps: usize,
+}
+
+/// Distances and diameters that a search tries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CameraSizes {
+    /// Those that are listed.
+    Listed,
+    /// Also those about the best one, between the listed ones and beyond.
+    Refined,
 }
 
 /// Most elements of a camera: the cost grows with their number times that of the frequencies.
@@ -88,6 +99,11 @@ impl CameraSearchSpec {
             focal_lengths_um: list("focal_lengths_um", FOCAL_LENGTH, &[]),
             diameters_um: list("diameters_um", Limits::new(10.0..=5000.0, "um"), &[]),
             wedge_shares: list("wedge_shares", Limits::new(0.0..=1.0, "of the wedge"), &[0.0]),
+            sizes: s.choice(
+                "sizes",
+                &[("listed", CameraSizes::Listed), ("refined", CameraSizes::Refined)],
+                Some(CameraSizes::Listed),
+            ),
             starts: whole("starts", 1..=4, 2),
             steps: whole("steps", 1..=1000, 15),
             final_steps: whole("final_steps", 1..=1000, 60),

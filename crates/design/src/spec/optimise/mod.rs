@@ -3,7 +3,7 @@
 mod camera;
 mod refusals;
 
-pub use camera::CameraSearchSpec;
+pub use camera::{CameraSearchSpec, CameraSizes};
 
 use serde::Serialize;
 
