@@ -219,9 +219,13 @@ impl CameraReport {
              pupils, one efficiency for all directions and the same pillars everywhere. `metalith compare` simulates a camera with all physics.",
         );
         page.section("Thickness against PSNR");
+        let distances = self.tried.iter().map(|r| r.distance_um);
+        let [near, far] = distances.fold([f64::MAX, 0.0], |[a, b]: [f64; 2], um| [a.min(um), b.max(um)]);
+        // The best camera is often at the largest distance: its mark is not cut by the frame.
+        let room = (0.03 * (far - near)).max(0.01 * far);
         let mut chart = Chart::new(
             "Expected PSNR over the distance of the sensor",
-            Axis::linear("distance of the sensor", "um"),
+            Axis::linear("distance of the sensor", "um").range(near - room, far + room),
             Axis::linear("PSNR of linear light", "dB"),
         );
         for best in &self.best {
