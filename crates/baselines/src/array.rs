@@ -135,10 +135,8 @@ impl BaselineCamera for ArrayCamera<'_> {
         if let Some(k) = way.checked_sub(self.ways.len()) {
             let stage = &self.stages[k];
             let pictures = self.pictures(frame, stage.kind, progress)?;
-            let fit = match stage.kind {
-                StageKind::RefinedPrior => Some(self.fit(frame)?),
-                _ => None,
-            };
+            let is_fitted = stage.provenance().refits > 0;
+            let fit = is_fitted.then(|| self.fit(frame)).transpose()?;
             stage.finish(&pictures, fit.as_deref())
         } else {
             let (method, joint) = self.ways[way];

@@ -19,7 +19,7 @@ pub struct TrainingStacks<'a> {
     pub stacks: Vec<Stack>,
     /// Fit to the frame of each; empty for stages that are trained without.
     pub fits: Vec<Box<dyn PictureFit + 'a>>,
-    /// What is trained by them.
+    /// Provenance of the network that is trained by them.
     pub provenance: Provenance,
 }
 

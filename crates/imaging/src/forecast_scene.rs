@@ -14,7 +14,7 @@ use crate::operator_error::OperatorError;
 use crate::scene::SceneImage;
 use crate::spectra::rgb_basis;
 
-/// A random scene of the statistics of natural ones, and what a restoration may know of its own errors by it.
+/// Error of the operator of a restoration, found on a random scene with the statistics of photographs.
 pub struct ForecastScene {
     /// Error of the operator of the restoration against the simulation.
     pub operator_error: OperatorError,

@@ -37,7 +37,7 @@ pub mod parts {
     pub use crate::denoiser::{input, over_squares};
     pub use crate::features::Features;
     pub use crate::network::{Layer, Network, Plan, Size, Trace};
-    pub use crate::network_input::{SIDE, cut, folded, mirrored, piled, refitted, seen};
+    pub use crate::network_input::{SIDE, cut, folded, mirrored, piled, refitted, seen, with_answer};
     pub use crate::post_processor::{STAGE, read_stage};
     pub use crate::weights::write_weights;
 }

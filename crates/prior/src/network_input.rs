@@ -26,8 +26,13 @@ pub(crate) fn squares(pictures: &Array3<f32>, maps: &[Array2<f32>]) -> Features 
 }
 
 /// A picture with what the network answers added to it.
-pub(crate) fn corrected(network: &Network, input: Features, mut picture: Array3<f32>) -> Array3<f32> {
-    let answer = network.apply(input).shuffled();
+pub(crate) fn corrected(network: &Network, input: Features, picture: Array3<f32>) -> Array3<f32> {
+    with_answer(picture, &network.apply(input))
+}
+
+/// A picture with an answer of the network added to it; what the answer has beyond the picture is left out.
+pub fn with_answer(mut picture: Array3<f32>, answer: &Features) -> Array3<f32> {
+    let answer = answer.shuffled();
     for c in 0..COLOURS {
         let mut plane = picture.index_axis_mut(Axis(2), c);
         for (y, mut to) in plane.rows_mut().into_iter().enumerate() {
@@ -40,16 +45,19 @@ pub(crate) fn corrected(network: &Network, input: Features, mut picture: Array3<
 /// Larger by its mirror image at the far sides.
 pub fn mirrored(picture: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
     let (h, w, n) = picture.dim();
-    let back = |i: usize, n: usize| if i < n { i } else { (2 * n - 1).saturating_sub(i) };
-    Array3::from_shape_fn((rows, columns, n), |(y, x, c)| picture[[back(y, h), back(x, w), c]])
+    Array3::from_shape_fn((rows, columns, n), |(y, x, c)| picture[[source(y, h), source(x, w), c]])
+}
+
+/// Place among `n` of which a place is the mirror image, or itself.
+fn source(i: usize, n: usize) -> usize {
+    if i < n { i } else { (2 * n - 1).saturating_sub(i) }
 }
 
 /// The adjoint of [`mirrored`]: sums of a gradient over a pixel and its mirror images.
 pub fn folded(gradient: &Array3<f32>, rows: usize, columns: usize) -> Array3<f32> {
-    let back = |i: usize, n: usize| if i < n { i } else { (2 * n - 1).saturating_sub(i) };
     let mut sums = Array3::zeros((rows, columns, gradient.dim().2));
     for ((y, x, c), g) in gradient.indexed_iter() {
-        sums[[back(y, rows), back(x, columns), c]] += g;
+        sums[[source(y, rows), source(x, columns), c]] += g;
     }
     sums
 }

@@ -74,9 +74,8 @@ impl SplittingState {
 /// Weight of the picture that a fitted one stays near, whose noise has a deviation.
 pub(crate) fn nearness(system: &NormalSystem<'_>, schedule: &Schedule, deviation: f64) -> Terms {
     Terms {
-        slopes: 0.0,
-        bends: 0.0,
         identity: schedule.weight / (deviation * deviation * system.scale),
+        ..Terms::none()
     }
 }
 

@@ -1,9 +1,9 @@
 //! Training of a last stage through the restoration: whole pictures, and fits to their frames between passes of the network.
 
 use metalith_core::{Progress, Result};
-use metalith_prior::parts::{Features, Network, SIDE, STAGE, Size, cut, folded, mirrored, refitted, seen};
+use metalith_prior::parts::{Features, Network, SIDE, STAGE, Size, cut, folded, mirrored, refitted, seen, with_answer};
 use metalith_prior::{COLOURS, PictureFit, PostProcessor};
-use ndarray::{Array3, Axis};
+use ndarray::Array3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -51,13 +51,7 @@ impl Pass {
         let (rows, columns, _) = pile.dim();
         let [high, wide] = [rows, columns].map(|n| n.next_multiple_of(SIDE));
         let (answer, trace) = network.traced(seen(&mirrored(pile, high, wide), [0; 2], [rows, columns]));
-        let answer = answer.shuffled();
-        let mut found = cut(pile, [0; 2], [rows, columns, COLOURS]);
-        for c in 0..COLOURS {
-            for (y, mut row) in found.index_axis_mut(Axis(2), c).rows_mut().into_iter().enumerate() {
-                row.iter_mut().zip(answer.row(c, y)).for_each(|(to, v)| *to += v);
-            }
-        }
+        let found = with_answer(cut(pile, [0; 2], [rows, columns, COLOURS]), &answer);
         Self { trace, found }
     }
 

@@ -14,7 +14,7 @@ use crate::kernel_parts::{KernelParts, NodeId};
 const BETWEEN_PARTS: Duration = Duration::from_secs(30);
 /// CPU time of the first share of the work (s), from which the time of the whole is estimated: hundredths of a second are counted.
 const FIRST_SHARE_S: f64 = 3.0;
-/// CPU time of a whole that is told before (s).
+/// Least CPU time of all kernels that is stated before (s).
 const LONG_S: f64 = 60.0;
 
 /// Kernels of one unique node of a distinct element.
@@ -35,7 +35,7 @@ pub(super) struct FoundNodes<'a> {
 }
 
 struct State {
-    /// By distinct element and unique node.
+    /// Kernels by distinct element and unique node.
     found: Vec<Vec<Option<NodeKernels>>>,
     /// Nodes that no part holds yet.
     fresh: Vec<NodeId>,

@@ -24,6 +24,7 @@ pub struct CameraSearchSpec {
     pub diameters_um: Vec<f64>,
     /// Shares of the wedge that steers an element to its part of the field.
     pub wedge_shares: Vec<f64>,
+    /// Distances and diameters that are tried.
     pub sizes: CameraSizes,
     /// Phases that each search begins with, at most.
     pub starts: usize,
@@ -36,9 +37,9 @@ pub struct CameraSearchSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CameraSizes {
-    /// Those that are listed.
+    /// Listed sizes alone.
     Listed,
-    /// Also those about the best one, between the listed ones and beyond.
+    /// Sizes about the best one too, between the listed ones and beyond.
     Refined,
 }
 
