@@ -13,6 +13,7 @@ use super::lens_figures::{focus_cells, focus_columns};
 use super::lens_outline::outline_warnings;
 use super::polychromatic::CameraStatement;
 use super::single_memory::FocusRequest;
+use super::single_stack::write_stacks;
 use super::single_white::SingleWhite;
 use super::{model_page, polychromatic_page, through_focus};
 use metalith_cell::{Fidelity, Illumination, PolarisedLight};
@@ -240,7 +241,8 @@ pub struct SinglePsfReport<'a> {
 pub const STREHL_AGAINST: &str = "Strehl ratios are against the sites that hold a pillar and the holes among them: a hole lowers the \
      Strehl ratio. `run` and `verify` divide by the aperture of the design.";
 
-/// Write `report.html`, `report.json` and each PSF as an NPY array (float64, rows along +y) into a folder.
+/// Write `report.html`, `report.json` and each PSF as an NPY array (float64, rows along +y) into a folder, and all
+/// of them as NetCDF.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -312,6 +314,7 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         images.image(format!("{}, {nm} nm", found.element), found.psf.values.clone());
         write_npy(&folder.join(format!("psf_{k}_{nm}nm.npy")), &found.psf.values)?;
     }
+    write_stacks(psfs, assumptions, folder)?;
     page.section("Pillars");
     let zooms = elements.iter().take(4).map(|(site, widths)| {
         PillarZoom::new(format!("Middle of {}", site.name), widths, (0.0, 0.0), 10.0)
