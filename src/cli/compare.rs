@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use metalith::baselines::{Comparison, DiffuserSpec, Lensless, ListedDesign, MaskSpec, write_comparison};
+use metalith::baselines::{
+    Comparison, DiffuserSpec, ExposureTimes, Lensless, ListedDesign, MaskSpec, write_comparison,
+};
 use metalith::file::InputFiles;
 use metalith::imaging::KernelCache;
 use metalith::report::counted;
@@ -78,6 +80,11 @@ pub(crate) struct CompareArgs {
 
     #[command(flatten)]
     exposure: ExposureArgs,
+
+    /// Expose each camera until a white pixel is bright. Without it, cameras whose files say `time_ms = "auto"` are exposed for one
+    /// time, the shortest of their own.
+    #[arg(long)]
+    own_times: bool,
 
     /// Also take the first photograph in light of these illuminances (lux), separated by commas, for a curve of PSNR over light.
     #[arg(long, value_parser = exposure_args::light_of, value_delimiter = ',', value_name = "LUX,...")]
@@ -262,6 +269,11 @@ impl CompareArgs {
             lpips: self.lpips.clone(),
             exposure: self.exposure.stated(),
             curve_lux: self.lux_curve.clone(),
+            times: if self.own_times {
+                ExposureTimes::Own
+            } else {
+                ExposureTimes::Equal
+            },
         })
     }
 }
@@ -282,9 +294,11 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
         );
         return Ok(Outcome::Fine);
     }
+    let cache = KernelCache::of_user();
+    let time_ms = comparison.equal_time_ms(&cache, terminal)?;
+    let comparison = comparison.exposed_for(time_ms);
     let open = comparison.open(terminal)?;
     open.notes().iter().for_each(|note| terminal.say(note));
-    let cache = KernelCache::of_user();
     let take = |k| open.take(k, &cache, terminal);
     let comparison = open.comparison((0..comparison.count()).map(take).collect::<Result<_>>()?);
     terminal.clear();

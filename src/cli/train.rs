@@ -135,6 +135,7 @@ impl TrainArgs {
             lpips: None,
             exposure: metalith::sensor::StatedExposure::default(),
             curve_lux: Vec::new(),
+            times: metalith::baselines::ExposureTimes::Own,
         })
     }
 

@@ -141,7 +141,7 @@ pub fn compare(
             let scores = &found[k].scores;
             let whole = &scores[scores.len() - 1][0];
             progress.note(&format!(
-                "{}, {}: {:.2} dB",
+                "{name}, {}, {}: {:.2} dB of sRGB",
                 photograph.name,
                 way.words(),
                 whole.psnr_db

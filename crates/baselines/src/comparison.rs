@@ -52,6 +52,20 @@ pub struct Comparison {
     /// Illuminances in which the first photograph is also taken (lux).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub curve_lux: Vec<f64>,
+    /// Times of the exposures that no one states.
+    #[serde(default)]
+    pub times: ExposureTimes,
+}
+
+/// Times of exposures that a camera file leaves to the program (`auto`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ExposureTimes {
+    /// One time for all cameras: the shortest of their own, so that no pixel of a white scene is saturated.
+    #[default]
+    Equal,
+    /// Each camera is exposed until a white pixel is bright.
+    Own,
 }
 
 impl Comparison {
@@ -174,6 +188,13 @@ impl Comparison {
             perceptual: self.lpips.as_deref().map(PerceptualDistance::read).transpose()?,
         };
         open.stages_have_cameras()?;
+        if view != first {
+            progress.warn(&format!(
+                "all photographs are averaged from {} x {} to {} x {} pixels, as finely as the coarsest camera is simulated: scores of finer \
+                 cameras differ from those that they have alone",
+                first.columns, first.rows, view.columns, view.rows
+            ));
+        }
         Ok(open)
     }
 
@@ -202,6 +223,48 @@ impl Comparison {
         }
     }
 
+    /// Time (ms) that all cameras are exposed for, where it is for the program to choose: the shortest of their own. None, and times
+    /// stay those of the camera files, if own times are asked for, a time or a longest one is stated, no camera leaves its time to
+    /// the program, or a learnt stage was trained for the exposure of its camera.
+    ///
+    /// # Errors
+    /// As [`OpenComparison::take`].
+    pub fn equal_time_ms(&self, cache: &KernelCache, progress: &dyn Progress) -> Result<Option<f64>> {
+        let stated = self.exposure.time_ms.or(self.exposure.longest_ms).is_some();
+        if self.times == ExposureTimes::Own || stated || !self.learnt.is_empty() || self.count() < 2 {
+            return Ok(None);
+        }
+        let open = self.open(progress)?;
+        let own = open.designs.iter().map(|(_, camera)| camera);
+        let lensless = self.lensless.iter().map(|_| &open.camera);
+        if !own.chain(lensless).any(|camera| camera.exposure.auto) {
+            return Ok(None);
+        }
+        let mut shortest = (f64::INFINITY, String::new());
+        for k in 0..self.count() {
+            open.ready(k, cache, progress, &mut |camera, (name, _), _| {
+                let time_ms = camera.light().time_ms;
+                if time_ms < shortest.0 {
+                    shortest = (time_ms, name.to_owned());
+                }
+                Ok(())
+            })?;
+        }
+        let time_ms = as_printed(shortest.0);
+        progress.warn(&format!(
+            "all cameras are exposed for {time_ms} ms, the time of {}; --own-times exposes each until a white pixel is bright",
+            shortest.1
+        ));
+        Ok(Some(time_ms))
+    }
+
+    /// This comparison with all cameras exposed for a time (ms); as it is if there is none.
+    #[must_use]
+    pub fn exposed_for(mut self, time_ms: Option<f64>) -> Self {
+        self.exposure.time_ms = time_ms.or(self.exposure.time_ms);
+        self
+    }
+
     /// Cameras of the table: designs, then those without a lens, each once, or twice with the assumptions of the paper.
     pub fn count(&self) -> usize {
         (self.designs.len() + self.lensless.len()) * self.kinds()
@@ -211,6 +274,18 @@ impl Comparison {
     pub(crate) fn kinds(&self) -> usize {
         1 + usize::from(self.paper)
     }
+}
+
+/// A time (ms), rounded down to three digits: what is printed is what holds, and no pixel is brighter for it.
+fn as_printed(time_ms: f64) -> f64 {
+    let digits = 10f64.powi(2 - time_ms.log10().floor() as i32);
+    // The quotient of two integers prints as a short number; a step of slack keeps times that are short numbers.
+    let steps = (time_ms * digits * (1.0 + 1e-9)).floor();
+    let shown = format!("{:e}", steps / digits);
+    shown
+        .parse::<f64>()
+        .unwrap_or(time_ms)
+        .max(*StatedExposure::TIMES_MS.start())
 }
 
 /// The square of so many pixels in the middle of a scene.
@@ -407,6 +482,19 @@ mod tests {
     use metalith_core::Silent;
     use ndarray::Array3;
 
+    #[test]
+    fn times_are_rounded_down_to_what_is_printed() {
+        for (time_ms, printed) in [
+            (3.9486, 3.94),
+            (19.0, 19.0),
+            (240.77, 240.0),
+            (0.394_99, 0.394),
+            (1e-5, 1e-3),
+        ] {
+            assert!((as_printed(time_ms) - printed).abs() < 1e-12, "{time_ms}");
+        }
+    }
+
     /// Photographs that are finer than a design is simulated with are averaged, for all cameras alike, and the table says so.
     #[test]
     fn fine_photographs_are_averaged_for_all_cameras() {
@@ -434,6 +522,7 @@ mod tests {
             lpips: None,
             exposure: StatedExposure::default(),
             curve_lux: Vec::new(),
+            times: ExposureTimes::Equal,
         };
         let open = comparison.open(&Silent).unwrap();
         let found = open.comparison(Vec::new());

@@ -35,7 +35,7 @@ mod wiener;
 pub use array::ArrayCamera;
 pub use baseline_camera::{BaselineCamera, Method};
 pub use compare::{ComparedCamera, ComparisonResult, MethodScores, compare};
-pub use comparison::{Comparison, Lensless, ListedDesign, OpenComparison};
+pub use comparison::{Comparison, ExposureTimes, Lensless, ListedDesign, OpenComparison};
 pub use diffusercam::{DiffuserCam, DiffuserSpec};
 pub use flatcam::{FlatCam, MaskSpec};
 pub use page::write_comparison;

@@ -80,7 +80,12 @@ fn curves(page: &mut Page, comparison: &ComparisonResult) {
         Axis::linear("PSNR", "dB"),
     );
     for camera in &comparison.cameras {
-        chart.line(camera.name.as_str(), camera.curve.iter().map(|[lux, db]| (*lux, *db)));
+        let points = camera.curve.iter().map(|[lux, db]| (*lux, *db));
+        // A line through one point would not be seen.
+        match camera.curve.len() {
+            1 => chart.points(camera.name.as_str(), points),
+            _ => chart.line(camera.name.as_str(), points),
+        };
     }
     page.figure(chart.caption(
         "The first photograph by the first method of each camera, noise and full scale included. With `auto` the time follows the light, up to the longest.",

@@ -27,6 +27,9 @@ pub struct ComparisonPlan {
     /// SHA-256 of all that decides the answers, in hexadecimal.
     pub key: String,
     pub comparison: Comparison,
+    /// Time that all cameras are exposed for (ms), if the program chose one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    equal_time_ms: Option<f64>,
     /// Folder of the plan.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -50,6 +53,11 @@ impl ComparisonPlan {
         }
     }
 
+    /// The comparison with the time that was chosen for it.
+    fn timed(&self) -> Comparison {
+        self.comparison.clone().exposed_for(self.equal_time_ms)
+    }
+
     /// Let the cameras of some shards take all photographs. Kernels are those of the plan: none are made here.
     ///
     /// # Errors
@@ -58,7 +66,8 @@ impl ComparisonPlan {
         if key(&self.comparison, progress)? != self.key {
             return Err(another_plan(&self.folder));
         }
-        let open = self.comparison.open(progress)?;
+        let comparison = self.timed();
+        let open = comparison.open(progress)?;
         let cache = KernelCache::only(&self.folder);
         let camera = |k: u64| open.take(k as usize, &cache, progress);
         self.cut().make_all(shards, &camera, progress)
@@ -73,7 +82,8 @@ impl ComparisonPlan {
         if key(&self.comparison, progress)? != self.key {
             return Err(another_plan(&self.folder));
         }
-        let open = self.comparison.open(progress)?;
+        let comparison = self.timed();
+        let open = comparison.open(progress)?;
         let cache = KernelCache::only(&self.folder);
         for (k, camera) in cameras.iter_mut().enumerate() {
             camera.shown = open.take_first(k, 1, &cache, progress)?.shown;
@@ -129,14 +139,17 @@ pub fn plan_comparison(comparison: &Comparison, folder: &Path, progress: &dyn Pr
     if let Some(known) = ComparisonPlan::known_in(folder, &key)? {
         return Ok(known);
     }
+    let cache = KernelCache::made(folder);
     for k in 0..comparison.count() {
-        open.prepare(k, &KernelCache::made(folder), progress)?;
+        open.prepare(k, &cache, progress)?;
     }
+    let equal_time_ms = comparison.equal_time_ms(&cache, progress)?;
     let plan = ComparisonPlan {
         schema: SCHEMA,
         work: ComparisonPlan::WORK.into(),
         key,
         comparison: comparison.clone(),
+        equal_time_ms,
         folder: folder.to_owned(),
     };
     plan.write_in(folder)?;

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use common::{SMALL_CAMERA, tolerance};
-use metalith_baselines::{Comparison, ComparisonResult, Lensless, ListedDesign, MaskSpec};
+use metalith_baselines::{Comparison, ComparisonResult, ExposureTimes, Lensless, ListedDesign, MaskSpec};
 use metalith_core::{FolderLock, Silent};
 use metalith_design::Design;
 use metalith_imaging::scene::read_far_scene;
@@ -249,6 +249,7 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         lpips: None,
         exposure: metalith_sensor::StatedExposure::default(),
         curve_lux: Vec::new(),
+        times: ExposureTimes::Equal,
     };
     let planned = plan_comparison(&comparison, &at("parts"), &Silent).unwrap();
     assert_eq!(planned.cut().shards(), 4);
@@ -262,8 +263,22 @@ fn cameras_of_shards_are_those_of_one_comparison() {
     ");
     work.run(&[0], &Silent).unwrap();
     let merged = planned.merge(&Silent).unwrap();
-    let open = comparison.open(&Silent).unwrap();
     let kept = metalith_imaging::KernelCache::only(&at("parts"));
+    let own = comparison.open(&Silent).unwrap();
+    let own_ms = (0..4).map(|k| {
+        let taken = own.take_first(k, 1, &kept, &Silent).unwrap();
+        taken.light.unwrap().time_ms
+    });
+    let [least, most] = own_ms.fold([f64::INFINITY, 0.0f64], |[a, b], ms| [a.min(ms), b.max(ms)]);
+    let equal_ms = comparison.equal_time_ms(&kept, &Silent).unwrap().unwrap();
+    assert!(most > 1.1 * least, "own times differ: {least} to {most} ms");
+    assert!(
+        (0.99 * least..=least).contains(&equal_ms),
+        "three digits of {least} ms: {equal_ms}"
+    );
+    assert_eq!(merged.unequal_times, None);
+    let equal = comparison.clone().exposed_for(Some(equal_ms));
+    let open = equal.open(&Silent).unwrap();
     let cameras = (0..4).map(|k| open.take(k, &kept, &Silent).unwrap()).collect();
     let direct = open.comparison(cameras);
     // Numbers of a line of JSON come back to rounding.
