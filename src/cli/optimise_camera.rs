@@ -71,6 +71,9 @@ pub(super) fn run(asked: &CameraSearch<'_>, terminal: &Terminal) -> Result<Outco
             );
         }
         print_line!("report: {}", asked.folder.join("report.html").display());
+        if let Some(best) = report.best.first().and_then(|b| b.file.as_deref()) {
+            print_line!("next: metalith layout {}", asked.folder.join(best).display());
+        }
     }
     for warning in &report.warnings {
         terminal.say(warning);
@@ -78,6 +81,6 @@ pub(super) fn run(asked: &CameraSearch<'_>, terminal: &Terminal) -> Result<Outco
     Ok(if found.interrupted {
         Outcome::NotDone
     } else {
-        Outcome::Fine
+        Outcome::of(report.readable)
     })
 }

@@ -303,7 +303,8 @@ impl ChipSpec {
             y = y.max(twice(element.centre_nm.1, reach_y));
         }
         if s.has("size_um") && (size_nm.0 < x || size_nm.1 < y) {
-            let um = |nm: i64| nm as f64 * 1e-3;
+            // A quotient prints as a short number, a product with a thousandth does not.
+            let um = |nm: i64| nm as f64 / 1e3;
             s.fault_given(
                 &[
                     "lens.diameter_um",

@@ -7,23 +7,42 @@ use super::element::{CameraElement, POWERS, RADIAL};
 /// Sections that the camera replaces; those below them too.
 const REPLACED: [&str; 6] = ["lens", "phase", "array", "element", "optimise", "mapping.steered"];
 
-/// Text of a design whose elements are those of a camera. `wedge_um`: wavelength of wedges; `piston_rad`: phase in the middle of every
-/// element, on which no image depends.
-pub fn design_text(
-    design: &str,
-    name: &str,
-    title: &str,
-    elements: &[CameraElement],
-    distance_um: f64,
-    wedge_um: f64,
-    piston_rad: f64,
-) -> String {
+/// Elements of a camera, and what a design file says of them.
+pub(super) struct DesignText<'a> {
+    /// Text of the design that the camera was searched for.
+    pub design: &'a str,
+    pub name: &'a str,
+    pub title: &'a str,
+    pub elements: &'a [CameraElement],
+    pub distance_um: f64,
+    /// Wavelength of wedges (um).
+    pub wedge_um: f64,
+    /// Phase in the middle of every element, on which no image depends.
+    pub piston_rad: f64,
+    /// True if cells are solved for the directions of the light, whatever the design says.
+    pub oblique: bool,
+}
+
+/// Text of a design whose elements are those of a camera.
+pub(super) fn design_text(of: &DesignText<'_>) -> String {
+    let DesignText {
+        design,
+        name,
+        title,
+        elements,
+        distance_um,
+        wedge_um,
+        piston_rad,
+        oblique,
+    } = *of;
     let mut text = String::new();
     let mut keeps = true;
     let mut head = true;
+    let mut in_verify = false;
     for line in design.lines() {
         if let Some(section) = section_name(line) {
             head = false;
+            in_verify = section == "verify";
             keeps = !REPLACED
                 .iter()
                 .any(|r| section == *r || section.strip_prefix(r).is_some_and(|rest| rest.starts_with('.')));
@@ -33,7 +52,15 @@ pub fn design_text(
             "name" if head => _ = writeln!(text, "name = \"{name}\""),
             "title" if head => _ = writeln!(text, "title = \"{title}\""),
             _ if head && line.starts_with('#') => {}
-            _ if keeps => _ = writeln!(text, "{line}"),
+            "incidence" if oblique && in_verify => {}
+            _ if keeps => {
+                _ = writeln!(text, "{line}");
+                if oblique && section_name(line) == Some("verify") {
+                    text.push_str(
+                        "incidence = \"oblique\"         # cells are solved for the directions of the light\n",
+                    );
+                }
+            }
             _ => {}
         }
     }

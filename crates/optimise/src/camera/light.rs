@@ -129,6 +129,14 @@ impl CameraLight {
         })
     }
 
+    /// Lattice of the sensor.
+    pub fn lattice(&self) -> SensorLattice {
+        SensorLattice {
+            sides_um: self.sides_um,
+            pitch_um: self.pitch_um,
+        }
+    }
+
     /// Plane of the scene that a channel sees: red, green, blue in this order if there are these.
     pub(super) fn plane(&self, channel: usize) -> usize {
         let name = &self.channels[channel].name;

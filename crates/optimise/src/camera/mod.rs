@@ -8,6 +8,7 @@ mod lbfgs;
 mod light;
 mod model;
 mod pupil;
+mod readable;
 mod report;
 mod scene;
 mod search;
@@ -17,7 +18,6 @@ mod tests;
 mod tried_cameras;
 mod wiener;
 
-pub use design_text::design_text;
 pub use efficiency::efficiency;
 pub use element::{CameraElement, POWERS, RADIAL, TERMS};
 pub use light::{CameraLight, ChannelLight, Efficiency};

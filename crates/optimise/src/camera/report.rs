@@ -5,7 +5,7 @@ use std::path::Path;
 
 use metalith_core::{AtomicFile, Result};
 use metalith_design::Design;
-use metalith_report::{Axis, Cell, Chart, Column, Page, Table, Verdict, sig, write_json};
+use metalith_report::{Axis, Cell, Chart, Column, Page, Table, Verdict, counted, exact, sig, write_json};
 use serde::Serialize;
 
 use super::task::{CameraFindings, CameraTask, TriedCamera};
@@ -27,6 +27,15 @@ pub struct CameraReport {
     pub narrowest_line_nm: f64,
     #[serde(skip)]
     texts: Vec<(String, String)>,
+    /// True if the designs of all best cameras can be read.
+    #[serde(skip)]
+    pub readable: bool,
+    /// True if the search came to its end.
+    #[serde(skip)]
+    whole: bool,
+    /// Pixels between the edges of a scene.
+    #[serde(skip)]
+    scene_pixels: usize,
 }
 
 /// One camera in figures.
@@ -110,10 +119,24 @@ impl CameraReport {
         let mut texts = Vec::new();
         let mut best = Vec::new();
         let mut warnings = Vec::new();
+        let mut readable = true;
         if found.interrupted {
+            let begun = |lux: &f64| found.tried.iter().any(|c| c.lux == *lux);
+            let left: Vec<String> = task
+                .spec
+                .illuminance_lux
+                .iter()
+                .filter(|l| !begun(l))
+                .map(f64::to_string)
+                .collect();
+            let not_begun = if left.is_empty() {
+                String::new()
+            } else {
+                format!(" No camera was tried at {} lux.", left.join(", "))
+            };
             warnings.push(format!(
-                "The search was interrupted after {} cameras.",
-                found.tried.len()
+                "The search was interrupted after {}. The last descent did not come to its end.{not_begun} The same command continues.",
+                counted(found.tried.len(), "camera")
             ));
         }
         for one in &found.best {
@@ -123,20 +146,21 @@ impl CameraReport {
             // Hours of search are not lost to marks in the way.
             if let Err(error) = Design::parse(&design.path, &own) {
                 warnings.push(format!("The program does not read `{file}`: {error}"));
+                readable = false;
             }
             let row = CameraRow::new(one, pitch_um, Some(file.clone()));
             if one.judged.time_s < 0.99 * task.spec.longest_s {
                 warnings.push(format!(
                     "At {} lux white fills the pixels after {} ms, less than the {} ms that are allowed.",
-                    sig(one.lux, 4),
+                    exact(one.lux),
                     sig(row.time_ms, 3),
-                    sig(task.spec.longest_s * 1e3, 3)
+                    exact(task.spec.longest_s * 1e3)
                 ));
             }
             if one.overlaps {
                 warnings.push(format!(
                     "At {} lux images of neighbouring elements overlap. The foreign light counts as noise.",
-                    sig(one.lux, 4)
+                    exact(one.lux)
                 ));
             }
             texts.push((file, own));
@@ -151,6 +175,9 @@ impl CameraReport {
             tried: found.tried.iter().map(|c| CameraRow::new(c, pitch_um, None)).collect(),
             narrowest_line_nm: f64::from(design.cell.width_range_nm.0),
             texts,
+            readable,
+            whole: !found.interrupted,
+            scene_pixels: task.spec.scene_pixels,
         })
     }
 
@@ -203,21 +230,29 @@ impl CameraReport {
                 "{} by {} elements of {} um promise {:.2} dB at {} lux.",
                 best.columns,
                 best.rows,
-                sig(best.diameter_um, 4),
+                exact(best.diameter_um),
                 best.psnr_linear_db,
-                sig(best.illuminance_lux, 4)
+                exact(best.illuminance_lux)
             ),
             None => "No camera was tried to the end.".to_owned(),
         };
-        page.finding(Verdict::of(!self.best.is_empty()), "Found:", words);
+        let verdict = match (self.best.is_empty() || !self.readable, self.whole) {
+            (true, _) => Verdict::Fail,
+            (false, true) => Verdict::Pass,
+            (false, false) => Verdict::NotRun,
+        };
+        page.finding(verdict, if self.whole { "Found:" } else { "So far:" }, words);
         for warning in &self.warnings {
             page.note(warning);
         }
         page.code(&self.command);
-        page.note(
-            "The PSNR is that of linear light after the joint linear restoration, expected for photographs: of a model with scalar \
-             pupils, one efficiency for all directions and the same pillars everywhere. `metalith compare` simulates a camera with all physics.",
-        );
+        page.note(format!(
+            "The PSNR is that of linear light after the joint linear restoration, expected of scenes with the spectrum of photographs at \
+             {} pixels from edge to edge: of a model with scalar pupils, one efficiency for all directions and the same pillars everywhere. \
+             It serves to compare cameras, and a photograph can be 5 dB below it. `metalith layout` of a design below, then \
+             `metalith compare`, take pictures with all physics.",
+            self.scene_pixels
+        ));
         page.section("Thickness against PSNR");
         let distances = self.tried.iter().map(|r| r.distance_um);
         let [near, far] = distances.fold([f64::MAX, 0.0], |[a, b]: [f64; 2], um| [a.min(um), b.max(um)]);
@@ -235,7 +270,12 @@ impl CameraReport {
                 .map(|r| (r.distance_um, r.psnr_linear_db))
                 .collect();
             front.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let lux = sig(best.illuminance_lux, 4);
+            let lux = exact(best.illuminance_lux);
+            let own = self.tried.iter().filter(|r| r.illuminance_lux == best.illuminance_lux);
+            chart.points(
+                format!("{lux} lux, cameras"),
+                own.map(|r| (r.distance_um, r.psnr_linear_db)),
+            );
             chart.line(format!("{lux} lux, front"), front);
             chart.points(
                 format!("{lux} lux, best after the last descent"),
@@ -250,7 +290,7 @@ impl CameraReport {
         page.section("Limits");
         page.paragraph(format!(
             "The narrowest pillar has {} nm. The time of writing depends on the process: `metalith handoff` states it.",
-            sig(self.narrowest_line_nm, 4)
+            exact(self.narrowest_line_nm)
         ));
         page.section("All cameras");
         page.details("Every camera after its first descents", |page| {

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 
 use super::element::{CameraElement, TERMS, fitted, mirrored_signs};
 use super::lbfgs;
-use super::light::CameraLight;
 use super::model::{CameraModel, Judged};
 use super::pupil::landing_um;
 
@@ -69,15 +68,16 @@ const FOCI: f64 = 0.1;
 
 /// Sensor as far as it decides the places of elements.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SensorLattice {
+pub struct SensorLattice {
     /// Sides along x and y (um).
-    pub(super) sides_um: [f64; 2],
+    pub sides_um: [f64; 2],
     /// Pitch of a lattice of pixels (um).
-    pub(super) pitch_um: f64,
+    pub pitch_um: f64,
 }
 
 impl SensorLattice {
-    pub(super) fn of(sensor: &Sensor) -> Self {
+    /// Lattice of a sensor.
+    pub fn of(sensor: &Sensor) -> Self {
         let is_mosaic = sensor.filter != ColourFilter::None;
         Self {
             sides_um: [sensor.columns, sensor.rows].map(|n| f64::from(n) * sensor.pixel_um),
@@ -98,12 +98,8 @@ impl SensorLattice {
 impl Arrangement {
     /// Pitch of the elements along an axis (um): as the images are wide, or as the sensor has room. It is a whole number of periods of a
     /// lattice of pixels and a part, by which all phases of the lattice are on the images alike.
-    pub fn pitch_um(&self, axis: usize, light: &CameraLight, edge: f64) -> f64 {
+    pub fn pitch_um(&self, axis: usize, sensor: &SensorLattice, edge: f64) -> f64 {
         let image = 2.0 * edge * self.distance_um;
-        let sensor = SensorLattice {
-            sides_um: light.sides_um,
-            pitch_um: light.pitch_um,
-        };
         sensor.pitch_um(axis, self.count[axis], (self.diameter_um + APART_UM).max(image))
     }
 
@@ -117,15 +113,15 @@ impl Arrangement {
     }
 
     /// The largest distance (um) at which the images of a field stand beside one another on the sensor.
-    pub fn largest_um(count: [usize; 2], light: &CameraLight, edge: f64) -> f64 {
-        let each = [0, 1].map(|a| light.sides_um[a] / count[a] as f64);
+    pub fn largest_um(count: [usize; 2], sensor: &SensorLattice, edge: f64) -> f64 {
+        let each = [0, 1].map(|a| sensor.sides_um[a] / count[a] as f64);
         each[0].min(each[1]) / (2.0 * edge)
     }
 
     /// True if the images of neighbours overlap on the sensor.
-    pub fn overlaps(&self, light: &CameraLight, edge: f64) -> bool {
+    pub fn overlaps(&self, sensor: &SensorLattice, edge: f64) -> bool {
         (0..2).any(|a| {
-            self.count[a] > 1 && 2.0 * edge * self.distance_um > self.pitch_um(a, light, edge) + light.pitch_um
+            self.count[a] > 1 && 2.0 * edge * self.distance_um > self.pitch_um(a, sensor, edge) + sensor.pitch_um
         })
     }
 
@@ -139,14 +135,14 @@ impl Arrangement {
     }
 
     /// The elements, row by row from the lowest, with the phases of a start.
-    pub fn elements(&self, light: &CameraLight, edge: f64, start: CameraStart, seed: u64) -> Vec<CameraElement> {
+    pub fn elements(&self, sensor: &SensorLattice, edge: f64, start: CameraStart, seed: u64) -> Vec<CameraElement> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let foci: Vec<f64> = self
             .masters()
             .iter()
             .map(|_| random.random_range(-FOCI..FOCI))
             .collect();
-        let pitch = [0, 1].map(|a| self.pitch_um(a, light, edge));
+        let pitch = [0, 1].map(|a| self.pitch_um(a, sensor, edge));
         let mut all = Vec::new();
         for n in 0..self.count[1] {
             for m in 0..self.count[0] {

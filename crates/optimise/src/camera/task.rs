@@ -1,18 +1,21 @@
 //! The cameras that a design asks for, tried one after the other, and the best of them for each light.
 
-use metalith_cell::CellModel;
+use metalith_cell::{CellModel, Fidelity};
+use metalith_core::document::Faults;
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarRule;
 use metalith_design::{CameraSearchSpec, CameraSizes, Design};
-use metalith_sensor::{Camera, Walls};
+use metalith_report::sig;
+use metalith_sensor::{Camera, Walls, WavelengthSteps};
 use serde::{Deserialize, Serialize};
 
-use super::design_text::design_text;
+use super::design_text::{DesignText, design_text};
 use super::diameters;
 use super::efficiency::efficiency;
 use super::element::CameraElement;
 use super::light::CameraLight;
 use super::model::{CameraModel, Judged, ModelSettings, WINDOW_UM};
+use super::readable;
 use super::scene::NaturalScene;
 use super::search::{Arrangement, CameraStart, SensorLattice};
 use super::tried_cameras::TriedCameras;
@@ -43,9 +46,12 @@ pub struct TriedCamera {
 pub struct CameraTask {
     pub spec: CameraSearchSpec,
     camera: Camera,
+    sensor: SensorLattice,
     settings: ModelSettings,
     mapping: Mapping,
     seed: u64,
+    /// True if designs of cameras have cells at oblique incidence, whatever the design says.
+    oblique: bool,
 }
 
 /// Cameras that were tried.
@@ -65,11 +71,52 @@ const REFINED: [f64; 2] = [0.2, 0.04];
 /// Most cameras of a refinement.
 const MOST_REFINED: usize = 16;
 
+/// Field from which on designs of cameras have cells at oblique incidence (degrees): light arrives at half of it from the normal.
+const LEAST_OBLIQUE_DEG: f64 = 20.0;
+
+/// The cell of the design must be known where the camera counts light, which is found before the cell is solved.
+fn check_band(design: &Design, text: &str, camera: &Camera) -> Result<()> {
+    // The published and the fitted cell are formulas.
+    if !matches!(design.optimise.fidelity, Fidelity::Rigorous | Fidelity::Neighbours) {
+        return Ok(());
+    }
+    let counted = camera
+        .sampling(BAND_NM, WavelengthSteps::from(STEPS_NM[1]))?
+        .wavelengths_nm;
+    let [least, most] = counted
+        .iter()
+        .fold([f64::MAX, 0.0], |[a, b]: [f64; 2], nm| [a.min(*nm), b.max(*nm)]);
+    let (short, long) = design.band_um()?;
+    let (short, long) = (short * 1e3, long * 1e3);
+    // Limits of files are decimal numbers.
+    const ROUNDING_NM: f64 = 1e-6;
+    if least >= short - ROUNDING_NM && most <= long + ROUNDING_NM {
+        return Ok(());
+    }
+    let fault = (
+        "cell.band_nm".to_owned(),
+        format!(
+            "the cell is solved from {} to {} nm, and the camera counts light from {} to {} nm",
+            sig(short, 6),
+            sig(long, 6),
+            sig(least, 6),
+            sig(most, 6)
+        ),
+        format!(
+            "give `band_nm = [{}, {}]` in [cell], or a camera that counts less",
+            least.floor(),
+            most.ceil()
+        ),
+    );
+    Err(Error::Text(Box::new(Faults::at_keys(&design.path, text, vec![fault]))))
+}
+
 impl CameraTask {
     /// The task that a design sets before a camera. `text`: the text of the design.
     ///
     /// # Errors
-    /// If the design has no section [optimise.camera], its pillars have no width, or a diameter fits no arrangement.
+    /// If the design has no section [optimise.camera], its pillars have no width, a diameter fits no arrangement, the cell is not solved
+    /// where the camera counts light, or a camera of the search would be no design that can be read.
     pub fn of(design: &Design, text: &str, camera: Camera) -> Result<Self> {
         let Some(spec) = design.optimise.camera.clone() else {
             return Err(Error::refused(
@@ -86,7 +133,9 @@ impl CameraTask {
                 "take a cell with round or square pillars",
             ));
         }
-        diameters::check(&spec, &SensorLattice::of(&camera.sensor), (&design.path, text))?;
+        let sensor = SensorLattice::of(&camera.sensor);
+        diameters::check(&spec, &sensor, (&design.path, text))?;
+        check_band(design, text, &camera)?;
         let settings = ModelSettings {
             scene: NaturalScene::new(spec.field_deg, spec.scene_pixels),
             field_deg: spec.field_deg,
@@ -94,13 +143,17 @@ impl CameraTask {
             walls: camera.sensor.walls,
             window_um: WINDOW_UM,
         };
-        Ok(Self {
+        let task = Self {
+            oblique: design.verify.fidelity == Fidelity::Rigorous && spec.field_deg > LEAST_OBLIQUE_DEG,
             settings,
+            sensor,
             camera,
             mapping: Mapping::new(&PillarRule::new(&design.cell, &design.mapping)),
             seed: design.optimise.seed,
             spec,
-        })
+        };
+        readable::check(&task, &design.path, text)?;
+        Ok(task)
     }
 
     /// Text that decides the cameras of the search: the design's own, the camera file, the version of the program.
@@ -126,11 +179,12 @@ impl CameraTask {
     ///
     /// # Errors
     /// If there are none.
-    pub fn arrangements(&self, light: &CameraLight) -> Result<Vec<Arrangement>> {
+    pub fn arrangements(&self) -> Result<Vec<Arrangement>> {
         let spec = &self.spec;
+        let sensor = &self.sensor;
         let mut all = Vec::new();
         for &count in &spec.arrangements {
-            let largest = Arrangement::largest_um(count, light, self.edge()).min(spec.most_track_um);
+            let largest = Arrangement::largest_um(count, sensor, self.edge()).min(spec.most_track_um);
             // Whole micrometres.
             let own = [largest.floor()];
             let distances = if spec.focal_lengths_um.is_empty() {
@@ -152,7 +206,7 @@ impl CameraTask {
                 }
             }
         }
-        all.retain(|a| self.has_room(a, light));
+        all.retain(|a| self.has_room(a));
         if all.is_empty() {
             return Err(Error::refused(
                 "optimise/no-camera-fits",
@@ -164,8 +218,13 @@ impl CameraTask {
     }
 
     /// True if neighbours of an arrangement do not overlap on the chip.
-    fn has_room(&self, a: &Arrangement, light: &CameraLight) -> bool {
-        (0..2).all(|axis| a.count[axis] == 1 || a.pitch_um(axis, light, self.edge()) > a.diameter_um)
+    fn has_room(&self, a: &Arrangement) -> bool {
+        (0..2).all(|axis| a.count[axis] == 1 || a.pitch_um(axis, &self.sensor, self.edge()) > a.diameter_um)
+    }
+
+    /// True if images of neighbours overlap on the sensor.
+    fn overlaps(&self, a: &Arrangement) -> bool {
+        self.settings.walls == Walls::None && a.overlaps(&self.sensor, self.edge())
     }
 
     fn settings_of(&self, arrangement: &Arrangement) -> ModelSettings {
@@ -202,8 +261,8 @@ impl CameraTask {
             .iter()
             .map(|lux| self.light(*lux, STEPS_NM[1], cell))
             .collect::<Result<Vec<_>>>()?;
-        let arrangements = self.arrangements(&coarse[0])?;
-        if let Some(words) = diameters::left_out(&self.spec, &SensorLattice::of(&self.camera.sensor)) {
+        let arrangements = self.arrangements()?;
+        if let Some(words) = diameters::left_out(&self.spec, &self.sensor) {
             progress.warn(&words);
         }
         let refined = match self.spec.sizes {
@@ -284,13 +343,12 @@ impl CameraTask {
                     diameter_um: scaled(best.arrangement.diameter_um, diameter),
                     ..best.arrangement
                 };
-                let overlaps = |a: &Arrangement| self.settings.walls == Walls::None && a.overlaps(light, self.edge());
                 let known = findings
                     .tried
                     .iter()
                     .any(|c| c.lux == best.lux && c.arrangement == arrangement);
-                let worse = overlaps(&arrangement) && !overlaps(&best.arrangement);
-                if left == 0 || known || worse || !self.has_room(&arrangement, light) {
+                let worse = self.overlaps(&arrangement) && !self.overlaps(&best.arrangement);
+                if left == 0 || known || worse || !self.has_room(&arrangement) {
                     continue;
                 }
                 let camera = match self.tried(best.lux, light, &arrangement, kept, progress) {
@@ -328,7 +386,7 @@ impl CameraTask {
         let model = CameraModel::new(light.clone(), &settings, arrangement.distance_um, NODES[0]);
         let mut best: Option<TriedCamera> = None;
         for start in CameraStart::ALL.into_iter().take(self.spec.starts) {
-            let elements = arrangement.elements(light, self.edge(), start, self.seed);
+            let elements = arrangement.elements(&self.sensor, self.edge(), start, self.seed);
             let (elements, judged) = arrangement.descend(&model, &elements, self.spec.steps, progress)?;
             if best.as_ref().is_none_or(|b| judged.error < b.judged.error) {
                 best = Some(TriedCamera {
@@ -336,7 +394,7 @@ impl CameraTask {
                     arrangement: *arrangement,
                     start,
                     judged,
-                    overlaps: self.settings.walls == Walls::None && arrangement.overlaps(light, self.edge()),
+                    overlaps: self.overlaps(arrangement),
                     elements,
                 });
             }
@@ -372,6 +430,30 @@ impl CameraTask {
         }
     }
 
+    /// Design text with the elements of an arrangement, before anything is searched.
+    pub(super) fn first_text(&self, text: &str, arrangement: &Arrangement) -> String {
+        let elements = arrangement.elements(&self.sensor, self.edge(), CameraStart::Identical, self.seed);
+        self.text_with(text, "camera", "", &elements, arrangement.distance_um)
+    }
+
+    fn text_with(&self, design: &str, name: &str, title: &str, elements: &[CameraElement], distance_um: f64) -> String {
+        design_text(&DesignText {
+            design,
+            name,
+            title,
+            elements,
+            distance_um,
+            wedge_um: self.settings.wedge_um,
+            piston_rad: self.piston_rad(),
+            oblique: self.oblique,
+        })
+    }
+
+    /// Sides of the rectangle about the elements of an arrangement (um).
+    pub(super) fn extent_um(&self, a: &Arrangement) -> [f64; 2] {
+        [0, 1].map(|axis| (a.count[axis] - 1) as f64 * a.pitch_um(axis, &self.sensor, self.edge()) + a.diameter_um)
+    }
+
     /// A camera as a design: the text of the design that it was searched for, with the camera's elements.
     pub fn design_text(&self, text: &str, name: &str, camera: &TriedCamera) -> String {
         let [x, y] = camera.arrangement.count;
@@ -381,16 +463,7 @@ impl CameraTask {
             camera.lux,
             camera.judged.psnr_db()
         );
-        let wedge_um = self.settings.wedge_um;
-        design_text(
-            text,
-            name,
-            &title,
-            &camera.elements,
-            camera.arrangement.distance_um,
-            wedge_um,
-            self.piston_rad(),
-        )
+        self.text_with(text, name, &title, &camera.elements, camera.arrangement.distance_um)
     }
 
     /// Phase whose pillar has the mean of the least and the greatest width. The phase is level in the middle of an element: pillars of

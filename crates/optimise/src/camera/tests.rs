@@ -177,7 +177,7 @@ fn slopes_are_difference_quotients() {
     let arrangement = grid([2, 1], 1440.0, 150.0, 0.0);
     let light = light(500.0, 0.01, 50.0);
     let model = CameraModel::new(light.clone(), &settings(), 1440.0, 1);
-    let mut elements = arrangement.elements(&light, edge(), CameraStart::Parts, 1);
+    let mut elements = arrangement.elements(&light.lattice(), edge(), CameraStart::Parts, 1);
     for (i, element) in elements.iter_mut().enumerate() {
         for (k, term) in element.terms_rad.iter_mut().enumerate() {
             *term += ((i * 7 + k * 3) % 5) as f64 * 0.4 - 0.8;
@@ -206,7 +206,7 @@ fn white_has_the_electrons_of_the_camera_equation() {
     const ROUNDING: f64 = 1e-9;
     let light = light(500.0, 0.01, 25.0);
     let arrangement = grid([1, 1], 4000.0, 200.0, 0.0);
-    let elements = arrangement.elements(&light, edge(), CameraStart::Identical, 1);
+    let elements = arrangement.elements(&light.lattice(), edge(), CameraStart::Identical, 1);
     let found = CameraModel::new(light.clone(), &settings(), 4000.0, 1).judge(&elements, false);
     for (white, channel) in found.white_e.iter().zip(&light.channels) {
         let f_number = 4000.0 / 200.0;
@@ -221,7 +221,7 @@ fn elements_at_other_phases_of_the_lattice_resolve_more() {
     let light = light(5e4, 0.01, 50.0);
     let arrangement = grid([2, 2], 1000.0, 150.0, 0.0);
     let model = CameraModel::new(light.clone(), &settings(), 1000.0, 1).perfect();
-    let apart = arrangement.elements(&light, edge(), CameraStart::Identical, 1);
+    let apart = arrangement.elements(&light.lattice(), edge(), CameraStart::Identical, 1);
     let mut same = apart.clone();
     for element in &mut same {
         element.centre_um = element.centre_um.map(|c| (c / light.pitch_um).round() * light.pitch_um);
@@ -236,7 +236,7 @@ fn a_descent_is_the_same_on_any_number_of_threads() {
     let arrangement = grid([2, 2], 2120.0, 100.0, 0.0);
     let light = light(500.0, 0.01, 60.0);
     let model = CameraModel::new(light.clone(), &settings(), 2120.0, 2);
-    let start = arrangement.elements(&light, edge(), CameraStart::Parts, 1);
+    let start = arrangement.elements(&light.lattice(), edge(), CameraStart::Parts, 1);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| arrangement.descend(&model, &start, 4, &Silent).unwrap())
@@ -268,7 +268,7 @@ fn the_table_of_the_issue() {
         let model = CameraModel::new(light.clone(), &settings, distance, 4);
         let model = if perfect { model.perfect() } else { model };
         model
-            .judge(&arrangement.elements(&light, edge(), start, 1), false)
+            .judge(&arrangement.elements(&light.lattice(), edge(), start, 1), false)
             .psnr_db()
     };
     let identical = CameraStart::Identical;
@@ -341,21 +341,60 @@ impl metalith_core::Progress for StopAfterOne {
     }
 }
 
-/// A search that was stopped goes on with the same cameras, and refined sizes are no worse than listed ones.
-#[test]
-fn a_stopped_search_goes_on_with_the_same_cameras() {
+/// Text of a design with a search of cameras, and its path: sections of the design `imaging_3x3`, without files that it names by
+/// relative paths.
+fn text_with(sections: &str) -> (String, std::path::PathBuf) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../designs/imaging_3x3.toml");
     let text = std::fs::read_to_string(&path).unwrap();
     let (head, _) = text.split_once("\n[optimise]").unwrap();
     let table = path.with_file_name("phases/imaging.csv").canonicalize().unwrap();
     let head = head.replace("\"phases/imaging.csv\"", &format!("\"{}\"", table.display()));
-    let folder = tempfile::tempdir().unwrap();
+    (format!("{head}\n{sections}"), path)
+}
+
+/// What would be found wrong after minutes of search is refused before: light beyond the band of the cell, and cameras that the chip of
+/// the design does not hold, the largest of them by name.
+#[test]
+fn a_search_in_vain_is_refused_before() {
+    let search = "[optimise.camera]\nfield_deg = 80\nmost_track_um = 2400\ncolumns = [2, 10]\nrows = [1, 1]\ndiameters_um = [60, 90]\n";
+    let (text, path) = text_with(&format!("[optimise]\ncell = \"published\"\n\n{search}"));
     let camera = Camera::read(&path.with_file_name("../cameras/gt1930.toml")).unwrap();
+    let refused = |text: &str| {
+        let design = metalith_design::Design::parse(&path, text).unwrap();
+        match CameraTask::of(&design, text, camera.clone()) {
+            Err(metalith_core::Error::Text(faults)) => {
+                let all = faults.faults().iter();
+                all.map(|f| (f.id(), f.what.matches("10 by 1 elements of 90").count() == 1))
+                    .collect::<Vec<_>>()
+            }
+            Err(other) => panic!("{other}"),
+            Ok(_) => Vec::new(),
+        }
+    };
+    assert_eq!(refused(&text), [("chip.size_um/inconsistent".to_owned(), true)]);
+    let fits = text.replace("columns = [2, 10]", "columns = [2, 4]");
+    assert_eq!(refused(&fits), []);
+    let narrow = text_with(search)
+        .0
+        .replacen("[cell]\n", "[cell]\nband_nm = [455, 660]\n", 1);
+    assert_eq!(refused(&narrow), [("cell.band_nm/inconsistent".to_owned(), false)]);
+}
+
+/// A search that was stopped goes on with the same cameras, and refined sizes are no worse than listed ones.
+#[test]
+fn a_stopped_search_goes_on_with_the_same_cameras() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = Camera::read(Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../cameras/gt1930.toml"
+    )))
+    .unwrap();
     let task = |sizes: &str| {
-        let text = format!(
-            "{head}\n[optimise]\ncell = \"published\"\n\n[optimise.camera]\nfield_deg = 80\nscene_pixels = 64\nmost_track_um = 600\n\
+        let sections = format!(
+            "[optimise]\ncell = \"published\"\n\n[optimise.camera]\nfield_deg = 80\nscene_pixels = 64\nmost_track_um = 600\n\
              columns = [2]\nrows = [1]\ndiameters_um = [60, 90]\nstarts = 1\nsteps = 1\nfinal_steps = 1\nsizes = \"{sizes}\"\n"
         );
+        let (text, _) = text_with(&sections);
         let path = folder.path().join(format!("{sizes}.toml"));
         std::fs::write(&path, &text).unwrap();
         let design = metalith_design::Design::read(&path).unwrap();
