@@ -75,23 +75,32 @@ class Served(http.server.SimpleHTTPRequestHandler):
         """Nothing: requests are no news."""
 
 
+def drawn(address: str, chromium: str, options: list[str]) -> str:
+    """What Chromium makes of a page; nothing if it does not start."""
+    with tempfile.TemporaryDirectory() as profile:
+        quiet = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"]
+        try:
+            command = [chromium, *quiet, f"--user-data-dir={profile}", *options, "--dump-dom", address]
+            return subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
+        except (OSError, subprocess.TimeoutExpired):
+            return ""
+
+
 def faults(address: str, chromium: str, width: int, colours: str) -> list[str]:
     """What is wrong with a page in a window."""
-    with tempfile.TemporaryDirectory() as profile:
-        options = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"]
-        options += [f"--user-data-dir={profile}", f"--window-size={width},1200", "--virtual-time-budget=20000", "--dump-dom"]
-        if colours == "dark":
-            options.append("--blink-settings=preferredColorScheme=0")
-        drawn = subprocess.run([chromium, *options, address], capture_output=True, text=True, timeout=180)
-    found = re.search(r'<script type="application/json" id="metalith-faults">(.*?)</script>', drawn.stdout, re.S)
+    options = [f"--window-size={width},1200", "--virtual-time-budget=20000"]
+    if colours == "dark":
+        options.append("--blink-settings=preferredColorScheme=0")
+    text = drawn(address, chromium, options)
+    found = re.search(r'<script type="application/json" id="metalith-faults">(.*?)</script>', text, re.S)
     return json.loads(html.unescape(found[1])) if found else ["the page was not drawn"]
 
 
 def main(folder: Path, site: Path, pages: list[str]) -> int:
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     axe = chromium and axe_in(folder)
-    if not axe:
-        print(f"{len(pages)} pages are NOT checked: Chromium and npm are needed")
+    if not axe or "<html" not in drawn("data:text/html,<p>", chromium, []):
+        print(f"{len(pages)} pages are NOT checked: Chromium that starts, and npm, are needed")
         return 0
     Served.scripts = f"<script>{axe}</script><script>{ASK}</script>"
     handler = functools.partial(Served, directory=str(site))
