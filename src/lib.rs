@@ -84,6 +84,7 @@ extern crate self as metalith;
 pub mod cli;
 mod frame_names;
 mod new_set;
+pub mod schema;
 mod session;
 
 pub use metalith_attribution as attribution;

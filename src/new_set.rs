@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use crate::schema::FileKind;
 use metalith_core::{AtomicFile, Error, FolderLock, LayerNumber, Progress, Result};
 use metalith_gds::Layout;
 use metalith_gds::extract::{ExtractedElement, ExtractionPlan, extract};
@@ -90,6 +91,7 @@ pub fn new_set(
         write_page(&folder.join(name(&page)), &frames, &open)?;
         AtomicFile::write(&folder.join(name(out)), text.as_bytes())
     })?;
+    FileKind::Set.write_beside(out)?;
     Ok(NewSet {
         frames,
         open,
@@ -204,9 +206,8 @@ fn text(
     open: &mut Vec<String>,
 ) -> String {
     let mut lines = Lines {
-        text: String::from(
-            "# Keys are explained in docs/measured-sets.md. Lines with `state this` are for you: remove the first #.\n",
-        ),
+        text: FileKind::Set.reference()
+            + "# Keys are explained in docs/measured-sets.md. Lines with `state this` are for you: remove the first #.\n",
         section: "the file".into(),
         open,
     };

@@ -7,6 +7,7 @@ use metalith::drc::{self, CheckInput, Date, Deck, DrcReport, Waivers};
 use metalith::file::InputFiles;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::report::counted;
+use metalith::schema::FileKind;
 use metalith::text::printable_json;
 use metalith::{AtomicFile, Error, Layout, Result};
 
@@ -237,7 +238,9 @@ fn write_rules(layout: &Layout, layer: Option<LayerNumber>, path: &Path, termina
         ));
     }
     let rules = drc::new_rules(layout, layer, terminal)?;
-    AtomicFile::write(path, rules.text.as_bytes())?;
+    let text = FileKind::Rules.reference() + &rules.text;
+    AtomicFile::write(path, text.as_bytes())?;
+    FileKind::Rules.write_beside(path)?;
     terminal.clear();
     let left_out = match rules.left_out {
         0 => String::new(),

@@ -31,6 +31,7 @@ mod reading;
 mod renamed;
 mod restore;
 mod run;
+mod schema;
 mod section_text;
 mod shipped_designs;
 mod standard_input;
@@ -120,6 +121,7 @@ enum Command {
     NewSet(new_set::NewSetArgs),
     Calibrate(calibrate::CalibrateArgs),
     Study(study::StudyArgs),
+    Schema(schema::SchemaArgs),
     Completions(completions::CompletionsArgs),
     #[command(hide = true)]
     Manual(completions::ManualArgs),
@@ -234,6 +236,7 @@ fn dispatch(command: &Command, terminal: &Terminal) -> metalith::Result<Outcome>
         Command::NewSet(args) => new_set::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
         Command::Study(args) => study::run(args, terminal),
+        Command::Schema(args) => schema::run(args, terminal),
         Command::Completions(args) => completions::run(args, terminal),
         Command::Manual(args) => completions::manual(args, terminal),
     }

@@ -1,6 +1,7 @@
 //! Damage to files.
 
-use rand::Rng;
+use metalith::text::hex;
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use sha2::{Digest, Sha256};
 
@@ -36,7 +37,7 @@ impl Ending {
     /// A text with its digest.
     pub(crate) fn sealed(&self, text: &[u8]) -> Vec<u8> {
         let text = text.strip_suffix(self.plain.as_bytes()).unwrap_or(text);
-        let digest = format!("{}{:x}{}", self.before, Sha256::digest(text), self.after);
+        let digest = format!("{}{}{}", self.before, hex(&Sha256::digest(text)), self.after);
         [text, digest.as_bytes()].concat()
     }
 

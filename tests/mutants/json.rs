@@ -1,6 +1,6 @@
 //! Damage to JSON after which it is JSON still.
 
-use rand::Rng;
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 

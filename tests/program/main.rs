@@ -19,6 +19,7 @@ mod plan;
 mod polarisation;
 mod predict;
 mod run;
+mod schema;
 mod sinks;
 mod strangers;
 mod study;

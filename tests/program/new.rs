@@ -154,6 +154,8 @@ fn a_new_design_may_be_like_one_that_comes_with_the_program() {
         let mine = format!("my_{like}");
         new(&[&format!("{mine}.toml"), "--like", like]).success();
         let written = fs::read_to_string(folder.path().join(format!("{mine}.toml"))).unwrap();
+        // The first line is for editors.
+        let written = written.strip_prefix("#:schema ./design.schema.json\n").unwrap();
         let renamed = written.replacen(&format!("name = \"{mine}\""), &format!("name = \"{like}\""), 1);
         assert!(
             renamed != written && renamed == fs::read_to_string(&path).unwrap(),

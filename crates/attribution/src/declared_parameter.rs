@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use metalith_core::Result;
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 use metalith_core::file::check_unaltered;
 
 /// Most parameters of one effect: a step of the search fits all of them at once.
@@ -41,23 +41,37 @@ pub fn read_declared_effects<E>(
 ) -> Result<Vec<E>> {
     check_unaltered(path)?;
     let text = load(path)?;
-    Document::read(path, &text, |root| {
-        let sections = root.sections("effect");
-        if sections.is_empty() {
-            root.fault("effect", "no effect is declared", "add one [[effect]] for each");
+    Document::read(path, &text, |root| sections(root, &read, &name))
+}
+
+/// The keys of a file of effects whose sections `read` reads.
+pub fn keys_of_declared_effects<E>(
+    read: impl Fn(&Section<'_, '_>) -> Option<E>,
+    name: impl Fn(&E) -> &str,
+) -> KeyTable {
+    explore(&[], |root, _| sections(root, &read, &name))
+}
+
+fn sections<E>(
+    root: &Section<'_, '_>,
+    read: impl Fn(&Section<'_, '_>) -> Option<E>,
+    name: impl Fn(&E) -> &str,
+) -> Vec<E> {
+    let sections = root.sections("effect");
+    if sections.is_empty() {
+        root.fault("effect", "no effect is declared", "add one [[effect]] for each");
+    }
+    let mut effects: Vec<E> = Vec::new();
+    for section in &sections {
+        let Some(effect) = read(section) else {
+            continue;
+        };
+        if effects.iter().any(|e| name(e) == name(&effect)) {
+            section.fault("name", format!("`{}` is declared twice", name(&effect)), "rename one");
         }
-        let mut effects: Vec<E> = Vec::new();
-        for section in &sections {
-            let Some(effect) = read(section) else {
-                continue;
-            };
-            if effects.iter().any(|e| name(e) == name(&effect)) {
-                section.fault("name", format!("`{}` is declared twice", name(&effect)), "rename one");
-            }
-            effects.push(effect);
-        }
-        effects
-    })
+        effects.push(effect);
+    }
+    effects
 }
 
 impl DeclaredParameter {
@@ -109,7 +123,7 @@ impl DeclaredParameter {
         let any = || Limits::new(-LARGEST..=LARGEST, "");
         let [low, high] = s.array("range", any());
         let prior = s.float("prior", Limits::new(1e-9..=LARGEST, ""));
-        let start = s.optional_float("start", any()).unwrap_or(0.0);
+        let start = s.float_or("start", any(), 0.0);
         if !(low <= start && start <= high && low < high) {
             s.fault(
                 "range",

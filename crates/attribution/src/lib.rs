@@ -36,7 +36,7 @@ mod surrogate;
 mod test_model;
 mod verdict;
 
-pub use declared_parameter::{DeclaredParameter, MOST_PARAMETERS, read_declared_effects};
+pub use declared_parameter::{DeclaredParameter, MOST_PARAMETERS, keys_of_declared_effects, read_declared_effects};
 pub use effect::{Parameter, Slot, ValueError};
 pub use extent::Extent;
 pub use fit::{

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use metalith_core::Result;
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 
 use metalith_calibrate::set_format as read;
 use metalith_calibrate::{BenchLed, PerLed};
@@ -91,6 +91,11 @@ impl BenchFile {
         let text = load(path)?;
         Document::read(path, &text, sections)
     }
+
+    /// The keys of a bench file.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, _| sections(root))
+    }
 }
 
 fn sections(root: &Section<'_, '_>) -> BenchFile {
@@ -142,10 +147,8 @@ fn sections(root: &Section<'_, '_>) -> BenchFile {
     }
     frames.sort_unstable();
     frames.dedup();
-    let peak = s.optional_float("peak", Limits::new(0.05..=0.9, "")).unwrap_or(PEAK);
-    let most = s
-        .optional_integer("most", 1..=1000, "measurements")
-        .unwrap_or(MOST_CAPTURES);
+    let peak = s.float_or("peak", Limits::new(0.05..=0.9, ""), PEAK);
+    let most = s.integer_or("most", 1..=1000, "measurements", MOST_CAPTURES);
     s.finish();
     BenchFile {
         divergence_rad,

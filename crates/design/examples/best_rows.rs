@@ -11,7 +11,7 @@
 use metalith_cell::{Blaze, CoarseCell};
 use metalith_design::{Design, PillarRule};
 use metalith_rcwa::SiteLattice;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 

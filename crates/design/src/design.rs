@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use metalith_cell::{CellStack, FocusedLight, PolarisationAxis, cache_folder};
-use metalith_core::document::{Document, Section, load};
+use metalith_core::document::{Document, KeyTable, Section, explore, load};
 use metalith_core::text::quoted;
 use metalith_core::{Error, Progress, Result, Silent};
 use metalith_pillars::{ElementSite, Lattice};
@@ -98,6 +98,11 @@ impl Design {
     /// As [`Design::parse`].
     pub fn parse_without_library(path: &Path, text: &str) -> Result<Self> {
         Self::of_text(path, text, LibraryFile::ToBeMade)
+    }
+
+    /// The keys of a design file; `seeds` are texts of designs that have uncommon ones.
+    pub fn keys(seeds: &[&str]) -> KeyTable {
+        explore(seeds, |root, path| Self::sections(path, root, LibraryFile::Needed))
     }
 
     /// The design of a text, with the files that it names.

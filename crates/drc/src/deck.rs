@@ -10,14 +10,14 @@ use super::context::Context;
 use super::rule::{DeckRule, Rule, Severity};
 use super::{aperture, budget, density, design, grids, layers, marks, outline, spacing, tree, width, write_fields};
 use metalith_core::Result;
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 use metalith_core::text::quoted;
 use metalith_design::Design;
 use metalith_gds::LayerNumber;
 use metalith_pillars::{DatabaseUnit, PillarShape};
 
 /// The decks that ship with the program.
-static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../rules");
+static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/rules");
 
 const STANDARD: &str = "sin_pillars.toml";
 
@@ -192,6 +192,11 @@ impl Deck {
         (&self.path, &self.text)
     }
 
+    /// The keys of a file of rules.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, _| read(root, &Known::default()))
+    }
+
     fn parse(path: &Path, text: String) -> Result<Self> {
         Self::read_text(path, text, &Known::default())
     }
@@ -249,6 +254,60 @@ struct Known<'a> {
     of_a_design: &'a [&'a str],
 }
 
+/// The checks of all families.
+const CHECKS: [&str; 50] = [
+    "width_min",
+    "width_max",
+    "aspect_max",
+    "width_library",
+    "square",
+    "circle",
+    "rectangle",
+    "manhattan",
+    "acute_angle",
+    "self_crossing",
+    "doubled_vertex",
+    "collinear_vertex",
+    "zero_area",
+    "winding",
+    "vertices_max",
+    "closed",
+    "on_lattice",
+    "grid",
+    "exposure_grid",
+    "gap_min",
+    "gap_aspect_max",
+    "overlap",
+    "duplicate",
+    "fill",
+    "fill_gradient",
+    "field_cut",
+    "field_in_lens",
+    "aperture_margin",
+    "metal_on_pillars",
+    "aperture_each",
+    "mark_keep_out",
+    "marks_complete",
+    "layers_known",
+    "active_area",
+    "no_text_exposed",
+    "cell_names",
+    "depth_max",
+    "references_max",
+    "one_top",
+    "dangling",
+    "recursive",
+    "cell_twice",
+    "bytes_behind_end",
+    "file_size",
+    "shape_count",
+    "write_time",
+    "pillar_count",
+    "width_map",
+    "phase_step",
+    "lattice_orders",
+];
+
 /// Content of a deck file.
 struct DeckContents {
     name: String,
@@ -302,7 +361,10 @@ fn read(root: &Section<'_, '_>, known: &Known<'_>) -> DeckContents {
     };
     context.covered = sections
         .iter()
-        .map(|s| (s.text("check"), context.some_layers(s)))
+        .map(|s| {
+            let check = CHECKS.into_iter().find(|check| s.is_one_of("check", &[check]));
+            (check.unwrap_or_default().to_owned(), context.some_layers(s))
+        })
         .collect();
     if sections.len() > MOST_RULES {
         root.fault(
@@ -327,7 +389,10 @@ fn read(root: &Section<'_, '_>, known: &Known<'_>) -> DeckContents {
 }
 
 fn read_rule(s: &Section<'_, '_>, context: &Context, ids: &mut BTreeSet<String>) -> Option<DeckRule> {
-    let (id, check) = (s.text("id"), s.text("check"));
+    let (id, check) = (
+        s.text("id"),
+        s.choice("check", &CHECKS.map(|check| (check, check)), None),
+    );
     if s.has("id") && !legal_id(&id) {
         s.fault(
             "id",
@@ -359,20 +424,14 @@ fn read_rule(s: &Section<'_, '_>, context: &Context, ids: &mut BTreeSet<String>)
         budget::read,
         design::read,
     ];
-    let rule = families.iter().find_map(|read| read(&check, s, context));
-    let Some(rule) = rule else {
-        if s.has("check") {
-            s.fault(
-                "check",
-                format!("there is no check `{check}`"),
-                "docs/guide/check.md lists all checks",
-            );
-        }
+    // The check that stands in for an unknown one has other keys.
+    if !s.sound(&["rule.check"]) {
         return None;
-    };
+    }
+    let rule = families.iter().find_map(|read| read(check, s, context))?;
     Some(DeckRule {
         id,
-        check,
+        check: check.to_owned(),
         severity,
         always,
         rule,

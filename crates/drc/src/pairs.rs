@@ -209,7 +209,7 @@ fn sweep(
 
 #[cfg(test)]
 mod tests {
-    use rand::{Rng, SeedableRng};
+    use rand::{RngExt, SeedableRng};
 
     use super::super::body::between;
     use super::super::work::Allowance;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use metalith_core::Result;
-use metalith_core::document::{Document, Section, load};
+use metalith_core::document::{Document, KeyTable, Section, explore, load};
 
 /// A day of the calendar, ordered by time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -92,10 +92,7 @@ impl Waivers {
     /// With every mistake of the file, each with its place.
     pub fn read(path: &Path) -> Result<Self> {
         let text = load(path)?;
-        let list = Document::read(path, &text, |root| {
-            let sections = root.sections("waiver");
-            sections.iter().enumerate().map(|(k, s)| Waiver::read(s, k)).collect()
-        })?;
+        let list = Document::read(path, &text, sections)?;
         Ok(Self {
             path: path.to_owned(),
             text,
@@ -103,11 +100,21 @@ impl Waivers {
         })
     }
 
+    /// The keys of a file of waivers.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, _| sections(root))
+    }
+
     /// Waivers for a rule that have not expired.
     pub(super) fn valid(&self, rule: &str, today: Date) -> Vec<Waiver> {
         let holds = |w: &&Waiver| w.rule == rule && w.expires >= today;
         self.list.iter().filter(holds).cloned().collect()
     }
+}
+
+fn sections(root: &Section<'_, '_>) -> Vec<Waiver> {
+    let sections = root.sections("waiver");
+    sections.iter().enumerate().map(|(k, s)| Waiver::read(s, k)).collect()
 }
 
 impl Waivers {

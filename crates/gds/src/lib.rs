@@ -13,6 +13,7 @@ mod input;
 pub mod inventory;
 mod items;
 mod layout;
+pub mod library;
 mod limits;
 mod names;
 mod notes;

@@ -1,18 +1,15 @@
-//! Cells of polygons, references and labels in whole nanometres, pillars in database units, written through gds21.
+//! Cells of polygons, references and labels in whole nanometres, pillars in database units, written as GDSII.
 
 use std::path::Path;
 
 use chrono::NaiveDateTime;
-use gds21::{
-    GdsArrayRef, GdsBoundary, GdsDateTimes, GdsElement, GdsLibrary, GdsPoint, GdsStrans, GdsStruct, GdsStructRef,
-    GdsTextElem,
-};
 
-use metalith_core::{AtomicFile, Error, Result, Silent};
+use metalith_core::{AtomicFile, Error, LayerNumber, Result, Silent};
 use metalith_design::array::{Class, Symmetry};
 use metalith_design::{Design, LayoutLayer};
 use metalith_gds::Layout;
-use metalith_layout::{LayoutFormat, PillarForm, convert, gds_units};
+use metalith_gds::library::{GdsCell, GdsElement, GdsLibrary};
+use metalith_layout::{LayoutFormat, PillarForm, convert, gds_date, gds_units, orientation};
 use metalith_pillars::{DatabaseUnit, PillarRows};
 
 /// Layer and datatype.
@@ -83,55 +80,40 @@ impl Sheet {
     /// A polygon with these corners about a place, the first not repeated.
     pub(crate) fn polygon(&mut self, layer: LayerPair, (x, y): (i64, i64), corners: &[(i64, i64)]) {
         let closed = corners.iter().chain(corners.first());
-        let boundary = GdsBoundary {
-            layer: layer.0,
-            datatype: layer.1,
-            xy: closed.map(|&(dx, dy)| point(x + dx, y + dy)).collect(),
-            ..Default::default()
-        };
-        self.elements.push(boundary.into());
+        self.elements.push(GdsElement::Polygon {
+            layer: layer_number(layer),
+            corners: closed.map(|&(dx, dy)| point(x + dx, y + dy)).collect(),
+        });
     }
 
     pub(crate) fn text(&mut self, layer: LayerPair, (x, y): (i64, i64), words: impl Into<String>) {
-        let text = GdsTextElem {
-            string: words.into(),
-            layer: layer.0,
-            texttype: layer.1,
-            xy: point(x, y),
-            ..Default::default()
-        };
-        self.elements.push(text.into());
+        self.elements.push(GdsElement::Text {
+            layer: layer_number(layer),
+            text: words.into(),
+            at: point(x, y),
+        });
     }
 
     pub(crate) fn place(&mut self, cell: &str, (x, y): (i64, i64), symmetry: Symmetry) {
-        let strans = (symmetry != Symmetry::IDENTITY).then(|| GdsStrans {
-            reflected: symmetry.mirrored,
-            angle: (symmetry.quarter_turns > 0).then(|| 90.0 * f64::from(symmetry.quarter_turns)),
-            ..Default::default()
+        self.elements.push(GdsElement::Reference {
+            cell: cell.to_owned(),
+            orientation: orientation(symmetry),
+            at: point(x, y),
         });
-        let reference = GdsStructRef {
-            name: cell.to_owned(),
-            xy: point(x, y),
-            strans,
-            ..Default::default()
-        };
-        self.elements.push(reference.into());
     }
 
     /// An array of copies along x and y with these steps, the first at a given position.
     pub(crate) fn array(&mut self, cell: &str, (x, y): (i64, i64), (columns, rows): (i16, i16), steps: [i64; 2]) {
-        let reference = GdsArrayRef {
-            name: cell.to_owned(),
-            xy: [
+        self.elements.push(GdsElement::Array {
+            cell: cell.to_owned(),
+            columns,
+            rows,
+            places: [
                 point(x, y),
                 point(x + i64::from(columns) * steps[0], y),
                 point(x, y + i64::from(rows) * steps[1]),
             ],
-            cols: columns,
-            rows,
-            ..Default::default()
-        };
-        self.elements.push(reference.into());
+        });
     }
 
     /// A number or word in blocks, its lower left corner at a place. Characters: digits and a few capitals.
@@ -202,26 +184,19 @@ impl Drawing {
 
     /// An empty drawing with this database unit and date.
     pub(crate) fn new(name: &str, unit: DatabaseUnit, date: NaiveDateTime) -> Self {
-        let mut library = GdsLibrary::new(name);
-        library.units = gds_units(unit);
-        library.dates = GdsDateTimes {
-            modified: date,
-            accessed: date,
-        };
-        Self { tree: library, unit }
+        let tree = GdsLibrary::new(name, gds_units(unit), gds_date(date));
+        Self { tree, unit }
     }
 
     /// Add a cell in nanometres; cells come before those that refer to them.
     pub(crate) fn add(&mut self, mut sheet: Sheet) {
         let per_nm = self.unit.per_nm() as i32;
-        let scale = |p: &mut GdsPoint| (p.x, p.y) = (p.x * per_nm, p.y * per_nm);
+        let scale = |place: &mut [i32; 2]| *place = place.map(|nm| nm * per_nm);
         for element in &mut sheet.elements {
             match element {
-                GdsElement::GdsBoundary(boundary) => boundary.xy.iter_mut().for_each(scale),
-                GdsElement::GdsTextElem(text) => scale(&mut text.xy),
-                GdsElement::GdsStructRef(reference) => scale(&mut reference.xy),
-                GdsElement::GdsArrayRef(array) => array.xy.iter_mut().for_each(scale),
-                _ => {}
+                GdsElement::Polygon { corners, .. } => corners.iter_mut().for_each(scale),
+                GdsElement::Text { at, .. } | GdsElement::Reference { at, .. } => scale(at),
+                GdsElement::Array { places, .. } => places.iter_mut().for_each(scale),
             }
         }
         self.add_drawn(sheet);
@@ -229,10 +204,9 @@ impl Drawing {
 
     /// Add a cell in database units.
     fn add_drawn(&mut self, sheet: Sheet) {
-        self.tree.structs.push(GdsStruct {
+        self.tree.cells.push(GdsCell {
             name: sheet.name,
-            dates: self.tree.dates.clone(),
-            elems: sheet.elements,
+            elements: sheet.elements,
         });
     }
 
@@ -305,8 +279,7 @@ impl Drawing {
     }
 
     fn write_gds(&self, path: &Path) -> Result<()> {
-        let mut bytes = Vec::new();
-        self.tree.write(&mut bytes).map_err(|e| {
+        let bytes = self.tree.encode().map_err(|e| {
             Error::refused(
                 "layout/encoding-failed",
                 format!("{} cannot be encoded: {e:?}", path.display()),
@@ -318,9 +291,13 @@ impl Drawing {
 }
 
 /// A point of the layout; sizes in process and design files keep far below 2.1 m.
-fn point(x_nm: i64, y_nm: i64) -> GdsPoint {
-    let coordinate = |nm: i64| i32::try_from(nm).expect("sizes are limited when they are read");
-    GdsPoint::new(coordinate(x_nm), coordinate(y_nm))
+fn point(x_nm: i64, y_nm: i64) -> [i32; 2] {
+    [x_nm, y_nm].map(|nm| i32::try_from(nm).expect("sizes are limited when they are read"))
+}
+
+/// Layer and datatype as records have them.
+fn layer_number((layer, datatype): LayerPair) -> LayerNumber {
+    LayerNumber::new(layer as u16, datatype as u16)
 }
 
 /// Whole nanometres.

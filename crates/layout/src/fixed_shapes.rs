@@ -1,7 +1,7 @@
 //! Shapes of a layout other than its pillars: polygons and a label, in no format yet.
 
-use gds21::GdsElement;
 use metalith_design::{Design, LayoutLayer};
+use metalith_gds::library::GdsElement;
 
 use super::{mark, point};
 
@@ -66,15 +66,10 @@ impl<'a> FixedShapes<'a> {
             .polygons
             .iter()
             .map(|(layer, corners)| super::polygon(layer, corners));
-        let texts = self.texts.iter().map(|(layer, text, at)| {
-            gds21::GdsTextElem {
-                string: text.clone(),
-                layer: layer.layer,
-                texttype: layer.datatype,
-                xy: point(at.0, at.1),
-                ..Default::default()
-            }
-            .into()
+        let texts = self.texts.iter().map(|(layer, text, at)| GdsElement::Text {
+            layer: layer.number(),
+            text: text.clone(),
+            at: point(at.0, at.1),
         });
         polygons.chain(texts).collect()
     }

@@ -1,7 +1,7 @@
-//! The bytes of a GDSII library around its pillars, encoded by gds21.
+//! The bytes of a GDSII library around its pillars.
 
-use chrono::NaiveDateTime;
-use gds21::{GdsDateTimes, GdsElement, GdsLibrary, GdsStruct, GdsUnits};
+use chrono::{Datelike, NaiveDateTime, Timelike};
+use metalith_gds::library::{GdsCell, GdsElement, GdsLibrary};
 
 use super::encoding;
 use metalith_core::Result;
@@ -20,12 +20,7 @@ pub(super) struct LibraryFrame {
 impl LibraryFrame {
     /// An empty library of this name with a database unit: user unit 1 um, one date for everything.
     pub(crate) fn new(name: String, unit: DatabaseUnit, date: NaiveDateTime) -> Result<Self> {
-        let mut library = GdsLibrary::new(name);
-        library.units = gds_units(unit);
-        library.dates = GdsDateTimes {
-            modified: date,
-            accessed: date,
-        };
+        let library = GdsLibrary::new(name, gds_units(unit), gds_date(date));
         let bytes = encode(&library)?;
         Ok(Self { empty: library, bytes })
     }
@@ -43,10 +38,9 @@ impl LibraryFrame {
     /// A cell with these elements, cut before its end.
     pub(crate) fn cell(&self, name: &str, elements: Vec<GdsElement>) -> Result<(Vec<u8>, Vec<u8>)> {
         let mut library = self.empty.clone();
-        library.structs.push(GdsStruct {
+        library.cells.push(GdsCell {
             name: name.to_owned(),
-            dates: self.empty.dates.clone(),
-            elems: elements,
+            elements,
         });
         let bytes = encode(&library)?;
         let cell = &bytes[self.head().len()..bytes.len() - END];
@@ -56,13 +50,20 @@ impl LibraryFrame {
 }
 
 /// Database unit in user units of 1 um, and in metres.
-pub fn gds_units(unit: DatabaseUnit) -> GdsUnits {
+pub fn gds_units(unit: DatabaseUnit) -> [f64; 2] {
     match unit {
-        DatabaseUnit::Nanometre => GdsUnits::new(1e-3, 1e-9),
-        DatabaseUnit::Half => GdsUnits::new(0.5e-3, 0.5e-9),
-        DatabaseUnit::Quarter => GdsUnits::new(0.25e-3, 0.25e-9),
-        DatabaseUnit::Tenth => GdsUnits::new(1e-4, 1e-10),
+        DatabaseUnit::Nanometre => [1e-3, 1e-9],
+        DatabaseUnit::Half => [0.5e-3, 0.5e-9],
+        DatabaseUnit::Quarter => [0.25e-3, 0.25e-9],
+        DatabaseUnit::Tenth => [1e-4, 1e-10],
     }
+}
+
+/// A date as the format has it.
+pub fn gds_date(date: NaiveDateTime) -> [i16; 6] {
+    let [month, day, hour, minute, second] =
+        [date.month(), date.day(), date.hour(), date.minute(), date.second()].map(|number| number as i16);
+    [date.year() as i16, month, day, hour, minute, second]
 }
 
 /// The date that the files of a design bear: its own, so that its bytes depend on nothing else.
@@ -72,7 +73,5 @@ pub(super) fn date(design: &Design) -> NaiveDateTime {
 }
 
 pub(super) fn encode(library: &GdsLibrary) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    library.write(&mut bytes).map_err(encoding)?;
-    Ok(bytes)
+    library.encode().map_err(encoding)
 }

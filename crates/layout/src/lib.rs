@@ -1,8 +1,8 @@
 //! Layouts: pillars written as the bytes that a cleanroom takes, GDSII or OASIS, streamed, and read back as the pillars
 //! of a design.
 //!
-//! In GDSII gds21 builds and encodes the library, the cells, references, marks and labels; the pillars, of which
-//! there are millions, are records of our own between the bytes that it made. In OASIS all is written by
+//! In GDSII [`metalith_gds::library`] encodes the library, the cells, references, marks and labels; the pillars, of which
+//! there are millions, are records of templates between the bytes that it made. In OASIS all is written by
 //! [`metalith_oasis`].
 
 mod aperture;
@@ -21,21 +21,22 @@ mod read;
 use std::path::{Path, PathBuf};
 
 use chrono::NaiveDateTime;
-use gds21::GdsElement;
 
 use fixed_shapes::FixedShapes;
 use gds_frame::LibraryFrame;
 use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Hierarchy, LayoutLayer};
+use metalith_gds::library::GdsElement;
 use pillars::PillarWriter;
 
 pub use convert::convert;
 pub use format::{LayoutFormat, OasisEncoding};
 pub use free_layout::{FreeLayout, write_free};
-pub use gds_frame::gds_units;
+pub use gds_frame::{gds_date, gds_units};
 pub use layer_properties::write_layer_properties;
 pub use pillar_form::PillarForm;
+pub use pillars::orientation;
 pub use read::{extraction_plan, read_pillars};
 
 /// A file that was written.
@@ -220,8 +221,8 @@ fn is_of_a_part(name: &str) -> bool {
 
 /// A point of the layout in database units. Designs are limited to 300 mm about the origin, inside the 429 mm of 32 bits of
 /// 0.1 nm.
-fn point(x: i64, y: i64) -> gds21::GdsPoint {
-    gds21::GdsPoint::new(coordinate(x), coordinate(y))
+fn point(x: i64, y: i64) -> [i32; 2] {
+    [coordinate(x), coordinate(y)]
 }
 
 fn coordinate(units: i64) -> i32 {
@@ -230,16 +231,13 @@ fn coordinate(units: i64) -> i32 {
 
 /// A polygon; the first point is repeated at the end, as the format asks.
 fn polygon(layer: &LayoutLayer, corners: &[(i64, i64)]) -> GdsElement {
-    gds21::GdsBoundary {
-        layer: layer.layer,
-        datatype: layer.datatype,
-        xy: corners.iter().chain(&corners[..1]).map(|&(x, y)| point(x, y)).collect(),
-        ..Default::default()
+    GdsElement::Polygon {
+        layer: layer.number(),
+        corners: corners.iter().chain(&corners[..1]).map(|&(x, y)| point(x, y)).collect(),
     }
-    .into()
 }
 
-/// Error for what gds21 refuses to encode: a mistake of this program, which is reported, not hidden.
+/// Error for what has no record: a mistake of this program, which is reported, not hidden.
 fn encoding(error: impl std::fmt::Debug) -> Error {
     Error::refused(
         "layout/encoding-failed",

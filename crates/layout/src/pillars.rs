@@ -5,7 +5,7 @@ use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
 
-use gds21::{GdsElement, GdsStrans, GdsStructRef};
+use metalith_gds::library::{GdsElement, Orientation};
 use rayon::prelude::*;
 
 use super::gds_frame::LibraryFrame;
@@ -312,16 +312,17 @@ fn lens_name(class: usize) -> String {
 
 /// A reference with one of the symmetries of the square; a plain one has no STRANS record.
 fn reference(cell: &str, symmetry: Symmetry, at: (i64, i64)) -> GdsElement {
-    let strans = (symmetry != Symmetry::IDENTITY).then(|| GdsStrans {
-        reflected: symmetry.mirrored,
-        angle: (symmetry.quarter_turns > 0).then(|| 90.0 * f64::from(symmetry.quarter_turns)),
-        ..Default::default()
-    });
-    GdsStructRef {
-        name: cell.to_owned(),
-        xy: point(at.0, at.1),
-        strans,
-        ..Default::default()
+    GdsElement::Reference {
+        cell: cell.to_owned(),
+        orientation: orientation(symmetry),
+        at: point(at.0, at.1),
     }
-    .into()
+}
+
+/// Mirror and rotation of a copy with a symmetry of the square; none of a plain one.
+pub fn orientation(symmetry: Symmetry) -> Option<Orientation> {
+    (symmetry != Symmetry::IDENTITY).then(|| Orientation {
+        mirrored: symmetry.mirrored,
+        angle_deg: (symmetry.quarter_turns > 0).then(|| 90.0 * f64::from(symmetry.quarter_turns)),
+    })
 }

@@ -14,7 +14,6 @@ use metalith_pillars::PillarRows;
 use metalith_testing::gds::Gds;
 use metalith_testing::{design, golden};
 use serde_json::json;
-use sha2::{Digest, Sha256};
 
 const HIERARCHIES: [(&str, Hierarchy); 3] = [
     ("folded", Hierarchy::Folded),
@@ -51,8 +50,7 @@ fn record(name: &str, folder: &Path) -> serde_json::Value {
     let array = PillarArray::build(&design, &Silent).unwrap();
     let path = folder.join(name);
     let written = write_pillars(&design, &array, Hierarchy::Folded, &path, &Silent).unwrap();
-    let mut sha = Sha256::new();
-    std::io::copy(&mut fs::File::open(&path).unwrap(), &mut sha).unwrap();
+    let digest = metalith_core::file::file_digest(&path).unwrap();
     fs::remove_file(path).unwrap();
     let mut widths: BTreeMap<usize, u64> = BTreeMap::new();
     for placed in &array.placed {
@@ -67,7 +65,7 @@ fn record(name: &str, folder: &Path) -> serde_json::Value {
         "elements": array.placed.len(),
         "distinct_elements": array.classes.len(),
         "bytes": written.bytes,
-        "sha256": format!("{:x}", sha.finalize()),
+        "sha256": metalith_core::text::hex(&digest),
         "widths_nm": widths,
     })
 }

@@ -14,9 +14,11 @@
 
 use std::path::Path;
 
-use metalith_attribution::{DeclaredParameter, RefitEffect, RefitParameter, read_declared_effects};
+use metalith_attribution::{
+    DeclaredParameter, RefitEffect, RefitParameter, keys_of_declared_effects, read_declared_effects,
+};
 use metalith_core::Result;
-use metalith_core::document::Section;
+use metalith_core::document::{KeyTable, Section};
 use metalith_core::expression::Expression;
 
 /// Where an expression acts.
@@ -108,6 +110,11 @@ impl DeclaredEffect {
     /// All faults of the file at once, each with its line and column.
     pub(crate) fn read(path: &Path, stages: &Stages) -> Result<Vec<Self>> {
         read_declared_effects(path, |section| declared(section, stages), |effect| &effect.name)
+    }
+
+    /// The keys of a file of effects for a kind of set.
+    pub(crate) fn keys(stages: &Stages) -> KeyTable {
+        keys_of_declared_effects(|section| declared(section, stages), |effect| &effect.name)
     }
 
     /// An effect of one parameter `a` of a typical size and a largest one, as a file would declare it; none if the expression has a

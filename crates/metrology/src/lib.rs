@@ -39,6 +39,6 @@ pub use metalith_attribution::SetVerdict;
 pub use pattern::NamePattern;
 pub use proposal::Proposal;
 pub use psf_stack::{ApertureShape, StackBench, StackModel, StackObject, StackPlane, StackSet, ThinLens, Transmission};
-pub use run::{Answer, SetKind, calibrate, kind_of};
+pub use run::{Answer, SetKind, calibrate, keys_of_effects, kind_of};
 pub use spectra::{ForecastEffect, Spectrum, SpectrumForecast, SpectrumModel, SpectrumSet, StatedLayer, StatedPads};
 pub use widths::{WidthModel, WidthSet, WidthSite};

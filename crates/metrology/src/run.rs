@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use metalith_attribution::{
     ConditionalEffect, RefitEffect, RefitFinding, RefitModel, RefitPlan, SetVerdict, check_names, select,
 };
-use metalith_core::document::{Document, Section, load};
+use metalith_core::document::{Document, KeyTable, Section, load};
 use metalith_core::{AtomicFile, Error, FolderLock, Progress, Result};
 use metalith_optics::CalibratedModel;
 use metalith_report::Page;
@@ -46,6 +46,15 @@ fn file_of(set: &Path) -> PathBuf {
         set.join("measurement.toml")
     } else {
         set.to_owned()
+    }
+}
+
+/// The keys of a file of effects for a kind of set; none of a kind that has none.
+pub fn keys_of_effects(kind: SetKind) -> Option<KeyTable> {
+    match kind {
+        SetKind::Heights => Some(DeclaredEffect::keys(&OF_HEIGHTS)),
+        SetKind::Spectra => Some(DeclaredEffect::keys(&OF_SPECTRA)),
+        SetKind::Widths | SetKind::PsfStack => None,
     }
 }
 

@@ -7,7 +7,7 @@ use metalith_core::Silent;
 use metalith_metrology::{SetKind, SetVerdict, calibrate, kind_of};
 use metalith_rcwa::{CellLattice, Incidence, Layer, LayerStack, Material, Orders, Outline, Side, solve};
 use num_complex::Complex64;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// What is made otherwise than stated.

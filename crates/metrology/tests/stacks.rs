@@ -8,7 +8,7 @@ use metalith_core::Silent;
 use metalith_metrology::{Diagnosis, FoundEffect, SetKind, SetVerdict, calibrate, kind_of};
 use npyz::WriterBuilder;
 use num_complex::Complex64;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const WAVELENGTH_UM: f64 = 0.633;

@@ -5,7 +5,7 @@ use std::path::Path;
 use metalith_core::Silent;
 use metalith_metrology::{Diagnosis, FoundEffect, SetKind, SetVerdict, calibrate, kind_of};
 use npyz::WriterBuilder;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const SIDE: usize = 48;

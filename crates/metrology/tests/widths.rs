@@ -10,7 +10,7 @@ use metalith_layout::write_pillars;
 use metalith_metrology::{Diagnosis, FoundEffect, SetKind, SetVerdict, WidthSet, calibrate, kind_of};
 use metalith_optics::{CalibratedModel, fill};
 use metalith_pillars::PillarShape;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Standard deviations of a single measurement, and of a place from what drew it (nm).

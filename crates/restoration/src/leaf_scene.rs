@@ -1,7 +1,7 @@
 //! Random scenes of objects that hide one another, as in photographs.
 
 use ndarray::Array2;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 use metalith_core::{Error, Result};
 use serde::Serialize;
 
@@ -45,6 +45,11 @@ impl Camera {
     pub fn read(path: &Path) -> Result<Self> {
         let text = load(path)?;
         Document::read(path, &text, |root| Self::of_sections(root, path))?.check_light(path)
+    }
+
+    /// The keys of a camera file.
+    pub fn keys() -> KeyTable {
+        explore(&[], Self::of_sections)
     }
 
     /// The camera that the sections of the file at `path` describe, with the curves that they name.
@@ -198,9 +203,8 @@ fn curve<T>(
 /// The sensor, with the curve that it names.
 fn read_sensor(s: &Section<'_, '_>, files: &mut Vec<PathBuf>) -> Sensor {
     let positive = |key: &str, least: f64, most: f64, unit: &'static str| s.float(key, Limits::new(least..=most, unit));
-    let optional = |key: &str, range, unit: &'static str, default: f64| {
-        s.optional_float(key, Limits::new(range, unit)).unwrap_or(default)
-    };
+    let optional =
+        |key: &str, range, unit: &'static str, default: f64| s.float_or(key, Limits::new(range, unit), default);
     let bits = s.integer("bits", 1..=32, "bits") as u32;
     ["noise_photon", "noise_read"].iter().for_each(|key| s.may_have(key));
     let in_paper_terms = s.has("noise_photon") || s.has("noise_read");
@@ -340,9 +344,7 @@ fn read_response(s: &Section<'_, '_>, files: &mut Vec<PathBuf>) -> Response {
     }
     Response::Band {
         band_nm,
-        efficiency: s
-            .optional_float("efficiency", Limits::new(1e-6..=1.0, "electrons a photon"))
-            .unwrap_or(1.0),
+        efficiency: s.float_or("efficiency", Limits::new(1e-6..=1.0, "electrons a photon"), 1.0),
     }
 }
 
@@ -405,7 +407,7 @@ fn read_leds(s: &Section<'_, '_>) -> Vec<Led> {
         let led = Led {
             centre_nm: s.float("centre_nm", WAVELENGTH),
             width_nm: s.float("width_nm", Limits::new(0.1..=500.0, "nm")),
-            power: s.optional_float("power", Limits::new(1e-6..=1e6, "")).unwrap_or(1.0),
+            power: s.float_or("power", Limits::new(1e-6..=1e6, ""), 1.0),
         };
         s.finish();
         led

@@ -138,9 +138,7 @@ impl Exposure {
             time_s: time_ms * 1e-3,
             auto,
             light: SceneLight::read(illuminant),
-            white: s
-                .optional_float("white", Limits::new(1e-6..=1.0, "of full scale"))
-                .unwrap_or(0.9),
+            white: s.float_or("white", Limits::new(1e-6..=1.0, "of full scale"), 0.9),
         };
         s.finish();
         let (white, full_e, largest) = (exposure.white, sensor.full_scale_e(), sensor.largest_signal());

@@ -1,7 +1,7 @@
 //! Noise of a sensor.
 
 use ndarray::Array2;
-use rand::Rng;
+use rand::RngExt;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
 /// Noise of a sensor: photons counted in units of `photon`, and what reading adds. Signals are of full scale, or in another
@@ -49,7 +49,7 @@ impl Noise {
 
     /// One exposure: Poisson numbers of photons, and a normal number from reading, pixel by pixel in reading order.
     /// The same generator in the same state gives the same noise.
-    pub fn expose(&self, image: &Array2<f64>, random: &mut impl Rng) -> Array2<f64> {
+    pub fn expose(&self, image: &Array2<f64>, random: &mut impl RngExt) -> Array2<f64> {
         image.map(|&signal| {
             let read: f64 = StandardNormal.sample(random);
             self.photons(signal, random) + self.read * read
@@ -57,7 +57,7 @@ impl Noise {
     }
 
     /// Counted photons of a signal. Where no photon is to be expected, or photons have no size, the signal itself.
-    fn photons(&self, signal: f64, random: &mut impl Rng) -> f64 {
+    fn photons(&self, signal: f64, random: &mut impl RngExt) -> f64 {
         let mean = signal.max(0.0) / self.photon;
         match Poisson::new(mean) {
             Ok(poisson) => poisson.sample(random) * self.photon,

@@ -86,9 +86,7 @@ pub(crate) fn picture_spec(s: &Section<'_, '_>) -> PictureSpec {
     PictureSpec {
         camera: s.file("camera"),
         scene,
-        field_deg: s
-            .optional_float("field_deg", Limits::new(1.0..=174.0, "degrees"))
-            .unwrap_or(FIELD_DEG),
+        field_deg: s.float_or("field_deg", Limits::new(1.0..=174.0, "degrees"), FIELD_DEG),
         method: s.choice("method", &methods, Some(RestorationMethod::Tikhonov)),
         kernels: s.choice(
             "kernels",
@@ -96,9 +94,7 @@ pub(crate) fn picture_spec(s: &Section<'_, '_>) -> PictureSpec {
             Some(KnownKernels::Draw),
         ),
         nodes: nodes.map(|n| n as usize),
-        seed: s
-            .optional_integer("seed", 0..=i64::MAX, "")
-            .map_or(1, |seed| seed as u64),
+        seed: s.integer_or("seed", 0..=i64::MAX, "", 1) as u64,
     }
 }
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use metalith_core::document::{Document, Section, load};
+use metalith_core::document::{Document, KeyTable, Section, explore, load};
 use metalith_core::file::read_at_most;
 use metalith_core::text::hex;
 use metalith_core::{AtomicFile, Error, Result};
@@ -96,8 +96,14 @@ impl Slurm {
         Document::read(path, &text, Self::section)
     }
 
+    /// The keys of such a file.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, _| Self::section(root))
+    }
+
     fn section(s: &Section<'_, '_>) -> Self {
         let whole = |key: &str, most: i64, unit| s.optional_integer(key, 1..=most, unit).map(|v| v as u64);
+        let whole_or = |key, most, unit, default: u64| s.integer_or(key, 1..=most, unit, default as i64) as u64;
         // A line break would begin a line of shell.
         let line = |key: &str, text: &str| {
             if text.contains(char::is_control) {
@@ -109,6 +115,11 @@ impl Slurm {
             found.iter().for_each(|text| line(key, text));
             found
         };
+        let text_or = |key: &str, default: &str| {
+            let found = s.text_or(key, default);
+            line(key, &found);
+            found
+        };
         let texts = |key: &str| {
             let found = s.texts(key);
             found.iter().for_each(|text| line(key, text));
@@ -116,13 +127,13 @@ impl Slurm {
         };
         let default = Self::default();
         Self {
-            program: text("program").unwrap_or(default.program),
+            program: text_or("program", &default.program),
             partition: text("partition"),
             account: text("account"),
-            time: text("time").unwrap_or(default.time),
-            cpus_per_task: whole("cpus_per_task", 1024, "threads").unwrap_or(default.cpus_per_task),
+            time: text_or("time", &default.time),
+            cpus_per_task: whole_or("cpus_per_task", 1024, "threads", default.cpus_per_task),
             memory_mb: whole("memory_mb", 1 << 24, "MB"),
-            max_array_size: whole("max_array_size", 1 << 24, "").unwrap_or(default.max_array_size),
+            max_array_size: whole_or("max_array_size", 1 << 24, "", default.max_array_size),
             throttle: whole("throttle", 1 << 24, "tasks"),
             preamble: texts("preamble"),
             options: texts("options"),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use metalith_calibrate::{Effect, RENAMED_EFFECTS, Stage, of_any_chip};
 use metalith_core::Result;
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 use metalith_verify::Sense;
 use metalith_wave::Accuracy;
 
@@ -94,6 +94,11 @@ impl Tolerance {
     pub fn read(path: &Path) -> Result<Self> {
         let text = load(path)?;
         Document::read(path, &text, |root| Self::sections(path, root))
+    }
+
+    /// The keys of a study file.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, path| Self::sections(path, root))
     }
 
     fn sections(path: &Path, root: &Section<'_, '_>) -> Self {
@@ -200,7 +205,7 @@ fn vary(s: &Section<'_, '_>, known: &[Box<dyn Effect>], once: &mut dyn FnMut(&Se
     }
     let normal = s.choice("distribution", &[("normal", true), ("uniform", false)], None);
     let distribution = if normal {
-        let mean = s.optional_float("mean", AMOUNT).unwrap_or(0.0);
+        let mean = s.float_or("mean", AMOUNT, 0.0);
         let sd = s.float("sd", Limits::new(1e-9..=1e6, ""));
         physical(s, "mean", effect, mean);
         Distribution::Normal { mean, sd }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use metalith_core::Silent;
 use metalith_gds::extract::ExtractionPlan;
 use metalith_gds::{Error, LayerNumber, Layout, ReadLimits, Selection, Shape, Text, Transform, Visitor};
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Limits small enough that the worst a mutant can ask for is done in milliseconds.
@@ -26,7 +26,7 @@ pub const LIMITS: ReadLimits = ReadLimits {
 };
 
 /// Change a few bytes, cut, repeat or move a piece, or splice in a piece of another file.
-pub fn mutate<R: Rng>(rng: &mut R, corpus: &[Vec<u8>]) -> Vec<u8> {
+pub fn mutate<R: RngExt>(rng: &mut R, corpus: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = corpus[rng.random_range(0..corpus.len())].clone();
     for _ in 0..rng.random_range(1..=4) {
         if bytes.is_empty() {

@@ -1,7 +1,7 @@
 //! OASIS files made record by record.
 
 use metalith_oasis::{CompressedBlock, MAGIC, OasisItem, OasisLimits, OasisReader, Placing, RecordBuffer, Repetition};
-use rand::Rng;
+use rand::RngExt;
 
 /// Limits small enough that the worst a mutant can ask for is done in milliseconds.
 pub const LIMITS: OasisLimits = OasisLimits {
@@ -113,7 +113,7 @@ pub fn corpus() -> Vec<Vec<u8>> {
 }
 
 /// A damaged file: records changed, and then in a CBLOCK or not; or a file changed as it is.
-pub fn mutant<R: Rng>(rng: &mut R, corpus: &[Vec<u8>]) -> Vec<u8> {
+pub fn mutant<R: RngExt>(rng: &mut R, corpus: &[Vec<u8>]) -> Vec<u8> {
     let compressed = rng.random_range(0..4) == 0;
     let file = |records: &[u8]| {
         if compressed {

@@ -3,7 +3,7 @@
 use metalith_core::text::hex;
 use metalith_core::{Error, Result};
 use ndarray::{Array3, Axis};
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use sha2::{Digest, Sha256};

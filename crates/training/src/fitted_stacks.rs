@@ -4,7 +4,7 @@ use metalith_core::{Progress, Result};
 use metalith_prior::parts::{Features, Network, SIDE, STAGE, Size, cut, folded, mirrored, refitted, seen, with_answer};
 use metalith_prior::{COLOURS, PictureFit, PostProcessor};
 use ndarray::Array3;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::examples::is_held_out;

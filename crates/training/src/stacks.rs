@@ -10,7 +10,7 @@ use metalith_core::{AtomicFile, Error, Result};
 use metalith_prior::parts::{Network, STAGE, Size, cut, piled, seen};
 use metalith_prior::{COLOURS, PostProcessor, Provenance};
 use ndarray::Array3;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};

@@ -12,6 +12,7 @@ use metalith::{AtomicFile, Design, Error, LatticeKind, PillarShape, Pitch, Resul
 
 use super::shipped_designs::ShippedDesign;
 use super::{Outcome, Terminal, print_line};
+use metalith::schema::FileKind;
 use start_cell::{Materials, StartCell};
 
 /// The design, with braces around what is filled in.
@@ -332,18 +333,20 @@ pub(crate) fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let name = args.design.file_stem().unwrap_or_default().to_string_lossy();
     if let Some(like) = &args.like {
-        let rescaled = |text| args.rescaled(text, &args.design, terminal);
+        let rescaled = |text| Ok(FileKind::Design.reference() + &args.rescaled(text, &args.design, terminal)?);
         for file in ShippedDesign::of(like).write(&args.design, &name, rescaled)? {
             print_line!("{}", file.display());
         }
+        FileKind::Design.write_beside(&args.design)?;
         print_line!("next: metalith run {}", args.design.display());
         return Ok(Outcome::Fine);
     }
-    let text = args.text(&name, &args.cell(terminal)?);
+    let text = FileKind::Design.reference() + &args.text(&name, &args.cell(terminal)?);
     // What cannot be is said before a file stands there.
     let design = Design::parse_without_library(&args.design, &text)?;
     terminal.warnings(&design.warnings()?);
     AtomicFile::write(&args.design, text.as_bytes())?;
+    FileKind::Design.write_beside(&args.design)?;
     print_line!("{}", args.design.display());
     print_line!("next: metalith run {}", args.design.display());
     Ok(Outcome::Fine)

@@ -9,6 +9,7 @@ use metalith::imaging::scene::{SceneFile, read_depth, read_picture, read_scene};
 use metalith::imaging::{FrameNumbers, read_signals};
 
 use metalith::sensor::Camera;
+use metalith::text::hex;
 use metalith_testing::root;
 use sha2::{Digest, Sha256};
 use tiff::encoder::{Compression, compression::DeflateLevel};
@@ -55,7 +56,7 @@ fn levels(folder: &Path) -> Format {
         // Texts of PNG end before a zero.
         let words = words.replace('\0', " ");
         let bytes: Vec<u8> = words.chars().map(|c| c as u8).collect();
-        let digest = format!("{:x}", Sha256::digest([&data[..], words.as_bytes()].concat()));
+        let digest = hex(&Sha256::digest([&data[..], words.as_bytes()].concat()));
         let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
         let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
         file.extend(chunk(b"IHDR", &[&size[..], &[16, 0, 0, 0, 0]].concat()));

@@ -12,6 +12,7 @@ use metalith::handoff::Process;
 use metalith::optics::Perturbation;
 use metalith::sensor::{Camera, Spectrum};
 use metalith::study::{Slurm, Tolerance};
+use metalith::text::hex;
 use metalith_testing::design;
 use sha2::{Digest, Sha256};
 
@@ -41,7 +42,7 @@ pub(super) fn all(folder: &Path) -> Vec<Format> {
     fs::create_dir_all(&session).unwrap();
     let filled_in = "title = \"session\"\n";
     fs::write(session.join("measurement.toml"), filled_in).unwrap();
-    let digest = format!("{:x}", Sha256::digest(filled_in));
+    let digest = hex(&Sha256::digest(filled_in));
     let plan = serde_json::json!({ "written": { "measurement.toml": digest }, "effects": [], "captures": 3 });
     vec![
         Format::new(

@@ -4,7 +4,7 @@
 //! its own nuisances and the shared ones adjusted.
 
 use nalgebra::{DMatrix, DVector};
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::normal_equations::{NormalEquations, hold, minimise, projected};

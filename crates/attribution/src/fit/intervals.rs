@@ -1,7 +1,7 @@
 //! 95 % intervals of what a fit finds: noise, clusters of measurements that do not agree, and the error of the model.
 
 use nalgebra::DMatrix;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cross_validation::{DRAWS, SEED, cluster_groups, ends_95};

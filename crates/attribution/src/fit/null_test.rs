@@ -1,7 +1,7 @@
 //! Null test: what random smooth terms, which stand for no effect, gain on measurements left out.
 
 use nalgebra::DMatrix;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cross_validation::{HeldOutErrors, SEED, held_out, mean_error};

@@ -1,7 +1,7 @@
 use super::*;
 use metalith_core::Silent;
 use nalgebra::DMatrix;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const POINTS: usize = 40;

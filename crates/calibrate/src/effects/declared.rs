@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::{Effect, Parameter, Stage};
 use crate::set::MeasuredSet;
-use metalith_attribution::{DeclaredParameter, read_declared_effects};
+use metalith_attribution::{DeclaredParameter, keys_of_declared_effects, read_declared_effects};
 use metalith_core::Result;
-use metalith_core::document::Section;
+use metalith_core::document::{KeyTable, Section};
 use metalith_optics::{CompiledTerm, DeclaredQuantity, DeclaredTerm, Perturbation};
 use metalith_report::sig;
 
@@ -51,6 +51,11 @@ impl DeclaredEffect {
     /// All faults of the file at once, each with its line and column.
     pub fn read(path: &Path) -> Result<Vec<Self>> {
         read_declared_effects(path, |section| Some(declared(section)), |effect| &effect.name)
+    }
+
+    /// The keys of a file of effects.
+    pub fn keys() -> KeyTable {
+        keys_of_declared_effects(|section| Some(declared(section)), |effect| &effect.name)
     }
 
     /// The effects as a file that [`DeclaredEffect::read`] reads.

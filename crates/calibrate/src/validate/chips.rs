@@ -1,6 +1,6 @@
 //! The chips and benches that synthetic sets are made of.
 
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::effects::{Effect, Parameter, Stage};

@@ -9,7 +9,7 @@ use metalith_gds::extract::PillarsAt;
 use metalith_sensor::ColourFilter;
 use metalith_testing::session::{PIXELS, small_set, write_npy};
 use ndarray::Array2;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::set::{LIKE, SIMULATIONS, SYNTHESIZER, diagnosis_of, names, settings};

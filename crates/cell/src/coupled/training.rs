@@ -1,7 +1,7 @@
 //! Neighbourhoods that responses are fitted to: supercells whose widths are drawn by chance, blazed gratings such as a lens
 //! is made of, and lattices of equal pillars.
 
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use metalith_core::Result;

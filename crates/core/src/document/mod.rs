@@ -7,11 +7,13 @@
 
 mod binary_kind;
 mod fault;
+mod keys;
 mod renamed;
 mod scalar;
 mod section;
 
 pub use fault::{Fault, FaultKind, Faults};
+pub use keys::{Forms, Key, KeyTable, ListForm, OtherKeys, explore};
 pub use renamed::renamed;
 pub use scalar::{NoPlace, Scalar, with_values};
 pub use section::{Limits, Section};
@@ -41,6 +43,8 @@ pub struct Document<'t> {
     replaced: RefCell<HashSet<String>>,
     /// Files that keys name: path of the key, its place in the text, and the file.
     named: RefCell<Vec<(String, Range<usize>, PathBuf)>>,
+    /// Keys that the reader asks for, where they are noted.
+    noted: Option<RefCell<KeyTable>>,
 }
 
 /// Longest text file that is read: a design is a few kilobytes.
@@ -86,7 +90,17 @@ impl<'t> Document<'t> {
     /// If the syntax is wrong, the first place where it is: what follows may be read in another sense than it was
     /// written in. Else all faults of content, at once.
     pub fn read<T>(path: &Path, text: &'t str, read: impl FnOnce(&Section<'_, '_>) -> T) -> Result<T> {
-        let document = Document {
+        let (value, _) = Self::new(path, text, None).read_by(read);
+        value
+    }
+
+    /// Variant of [`Document::read`] that notes the keys that the reader asks for.
+    fn read_noting<T>(path: &Path, text: &'t str, read: impl FnOnce(&Section<'_, '_>) -> T) -> (Result<T>, KeyTable) {
+        Self::new(path, text, Some(RefCell::default())).read_by(read)
+    }
+
+    fn new(path: &Path, text: &'t str, noted: Option<RefCell<KeyTable>>) -> Self {
+        Document {
             path: path.to_owned(),
             text,
             faults: RefCell::default(),
@@ -94,29 +108,41 @@ impl<'t> Document<'t> {
             doubted: RefCell::default(),
             replaced: RefCell::default(),
             named: RefCell::default(),
+            noted,
+        }
+    }
+
+    /// Hand the root section to `read`, and give what it returns or all faults, and the keys that it asked for if they are noted.
+    fn read_by<T>(mut self, read: impl FnOnce(&Section<'_, '_>) -> T) -> (Result<T>, KeyTable) {
+        let value = self.value(read);
+        let noted = self.noted.take().map(RefCell::into_inner).unwrap_or_default();
+        let result = match value {
+            Some(value) if self.is_faultless() => Ok(value),
+            _ => Err(self.into_error()),
         };
-        let table = match DeTable::parse(text) {
+        (result, noted)
+    }
+
+    /// What `read` makes of the root section; nothing where the syntax is wrong.
+    fn value<T>(&self, read: impl FnOnce(&Section<'_, '_>) -> T) -> Option<T> {
+        let table = match DeTable::parse(self.text) {
             Ok(table) => table,
             Err(error) => {
                 let span = error.span().unwrap_or(0..0);
-                document.fault(
+                self.fault(
                     FaultKind::Syntax,
                     String::new(),
                     span,
                     error.message().trim(),
                     "mend the TOML syntax here or just before",
                 );
-                return Err(document.into_error());
+                return None;
             }
         };
-        let root = Section::root(&document, &table);
+        let root = Section::root(self, &table);
         let value = read(&root);
         root.finish();
-        if document.is_faultless() {
-            Ok(value)
-        } else {
-            Err(document.into_error())
-        }
+        Some(value)
     }
 
     /// Record a fault of the value at a key, at a byte range of the text. Its number, if it is held and not only counted.

@@ -1,12 +1,15 @@
 //! Digests of files.
 
 use std::fs;
-use std::io;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
+
+/// Bytes that are read at a time.
+const PIECE: usize = 1 << 16;
 
 /// SHA-256 of a file, read piece by piece.
 ///
@@ -20,8 +23,15 @@ pub fn file_digest(path: &Path) -> Result<[u8; 32]> {
     }
     let mut file = fs::File::open(path).map_err(Error::io("read", path))?;
     let mut hash = Sha256::new();
-    io::copy(&mut file, &mut hash).map_err(Error::io("read", path))?;
-    Ok(hash.finalize().into())
+    let mut piece = vec![0; PIECE];
+    loop {
+        match file.read(&mut piece) {
+            Ok(0) => return Ok(hash.finalize().into()),
+            Ok(length) => hash.update(&piece[..length]),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(Error::io("read", path)(error)),
+        }
+    }
 }
 
 #[cfg(test)]

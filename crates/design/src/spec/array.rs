@@ -132,9 +132,7 @@ impl ArraySpec {
             count: (count[0] as u32, count[1] as u32),
             spacing_nm: spacing_nm[0],
             spacing_y_nm: (spacing_nm[1] != spacing_nm[0]).then_some(spacing_nm[1]),
-            steering_deg: s
-                .optional_float("steering_deg", Limits::new(0.0..=89.0, "degrees"))
-                .unwrap_or(0.0),
+            steering_deg: s.float_or("steering_deg", Limits::new(0.0..=89.0, "degrees"), 0.0),
             wedge_wavelength_um,
             placed: Vec::new(),
         };
@@ -191,13 +189,11 @@ impl ArraySpec {
                 let place = Limits::new(-150_000.0..=150_000.0, "um");
                 let [x, y] = ["x_um", "y_um"].map(|key| whole_nm(s, key, s.float(key, place.clone())));
                 let [steer_x, steer_y] =
-                    ["steering_x_deg", "steering_y_deg"].map(|key| s.optional_float(key, angle.clone()).unwrap_or(0.0));
+                    ["steering_x_deg", "steering_y_deg"].map(|key| s.float_or(key, angle.clone(), 0.0));
                 let spec = PlacedSpec {
                     centre_nm: (x, y),
                     steering_deg: (steer_x, steer_y),
-                    rotation_deg: s
-                        .optional_float("rotation_deg", Limits::new(-360.0..=360.0, "degrees"))
-                        .unwrap_or(0.0),
+                    rotation_deg: s.float_or("rotation_deg", Limits::new(-360.0..=360.0, "degrees"), 0.0),
                     lens: LensSpec::read_own(s, lens, phase, (k, 0), cell),
                 };
                 s.finish();

@@ -134,9 +134,7 @@ impl CellSpec {
             band_um: read_band(s),
             pillar_material,
             substrate_material: read_material(s, "substrate_material").unwrap_or_else(|| DEFAULT_SUBSTRATE.into()),
-            ambient_index: s
-                .optional_float("ambient_index", Limits::new(1.0..=3.0, ""))
-                .unwrap_or(1.0),
+            ambient_index: s.float_or("ambient_index", Limits::new(1.0..=3.0, ""), 1.0),
             ambient_material,
         };
         s.finish();
@@ -217,7 +215,7 @@ impl CellSpec {
 }
 
 /// The shapes as the key has them.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Square,
     Circle,
@@ -277,7 +275,7 @@ fn with_widths(
 ) -> (PillarShape, (u16, u16), u16) {
     let even = unit.is_nanometre();
     let least = if even { 2 } else { 1 };
-    let step = s.optional_integer("width_step_nm", least..=100, "nm").unwrap_or(2) as u16;
+    let step = s.integer_or("width_step_nm", least..=100, "nm", 2) as u16;
     if even && !step.is_multiple_of(2) {
         s.fault(
             "width_step_nm",
@@ -366,9 +364,11 @@ fn read_rectangles(s: &Section<'_, '_>, widest: u32) -> RotatedRectangles {
             format!("use shorter edges or a wider pitch: the diagonal is to be at most {widest} nm"),
         );
     }
-    let step_deg = s
-        .optional_float("rotation_step_deg", Limits::new(180.0 / MOST_STEPS..=15.0, "degrees"))
-        .unwrap_or(1.0);
+    let step_deg = s.float_or(
+        "rotation_step_deg",
+        Limits::new(180.0 / MOST_STEPS..=15.0, "degrees"),
+        1.0,
+    );
     let steps = (180.0 / step_deg).round().clamp(1.0, MOST_STEPS);
     if (steps * step_deg - 180.0).abs() > WHOLE || steps % 2.0 != 0.0 {
         s.fault(
@@ -413,10 +413,7 @@ fn read_material(s: &Section<'_, '_>, key: &str) -> Option<String> {
 
 /// A spacer on the substrate, then what the etch left of the film.
 fn read_under(s: &Section<'_, '_>, pillar_material: &str) -> Vec<UnderSpec> {
-    let height = |key: &str| {
-        s.optional_float(key, Limits::new(0.0..=TALLEST_NM, "nm"))
-            .unwrap_or(0.0)
-    };
+    let height = |key: &str| s.float_or(key, Limits::new(0.0..=TALLEST_NM, "nm"), 0.0);
     let spacer_nm = height("spacer_nm");
     let spacer = read_material(s, "spacer_material");
     if spacer.is_some() && !s.has("spacer_nm") {

@@ -216,7 +216,7 @@ impl ApertureSpec {
         let spec = Self {
             margin_nm: whole_nm(s, "margin_um", s.float("margin_um", Limits::new(0.2..=1000.0, "um"))),
             chord_error_nm: s.float("chord_error_nm", Limits::new(0.5..=10_000.0, "nm")),
-            max_vertices: s.optional_integer("max_vertices", 16..=8191, "vertices").unwrap_or(200) as usize,
+            max_vertices: s.integer_or("max_vertices", 16..=8191, "vertices", 200) as usize,
         };
         let round = array.lenses(lens).filter(|lens| lens.outline.is_none());
         let largest_nm = round.map(|lens| lens.diameter_nm).max().unwrap_or(0);

@@ -81,9 +81,7 @@ impl LensSpec {
         let mut own = Self {
             diameter_nm,
             outline,
-            focal_length_um: s
-                .optional_float("focal_length_um", FOCAL_LENGTH)
-                .unwrap_or(shared.focal_length_um),
+            focal_length_um: s.float_or("focal_length_um", FOCAL_LENGTH, shared.focal_length_um),
             ..shared.clone()
         };
         if let Some(phase) = phase {
@@ -255,13 +253,12 @@ pub(super) fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {
 
 /// The radius that powers are of (um): that of the lens, if a section says no other.
 pub(super) fn read_normalisation(s: &Section<'_, '_>, radius_um: f64) -> f64 {
-    s.optional_float("normalisation_radius_um", Limits::new(1e-3..=1e6, "um"))
-        .unwrap_or(radius_um)
+    s.float_or("normalisation_radius_um", Limits::new(1e-3..=1e6, "um"), radius_um)
 }
 
 /// The phase over the radius that a section says.
 pub(super) fn read_radial(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f64) -> RadialPhase {
-    #[derive(Clone, Copy)]
+    #[derive(Clone, Copy, PartialEq)]
     enum PhaseSource {
         Hyperbola,
         EvenPowers,
@@ -282,9 +279,7 @@ pub(super) fn read_radial(s: &Section<'_, '_>, focal_length_um: f64, radius_um: 
     match s.choice("source", &sources, None) {
         PhaseSource::Hyperbola => RadialPhase::Hyperbola {
             wavelength_um: s.float("wavelength_nm", WAVELENGTH) * 1e-3,
-            focal_length_um: s
-                .optional_float("focal_length_um", FOCAL_LENGTH)
-                .unwrap_or(focal_length_um),
+            focal_length_um: s.float_or("focal_length_um", FOCAL_LENGTH, focal_length_um),
         },
         PhaseSource::EvenPowers => {
             let coefficients_rad = s.floats("coefficients_rad", COEFFICIENT);

@@ -26,7 +26,7 @@ pub struct LensOutline {
     corners_nm: Vec<(i64, i64)>,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Circle,
     Rectangle,

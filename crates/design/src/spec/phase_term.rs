@@ -14,7 +14,7 @@ const MOST_TERMS: usize = 231;
 /// Highest power of a coordinate.
 const HIGHEST_POWER: f64 = 30.0;
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum TermSource {
     Radial,
     Map,
@@ -92,7 +92,7 @@ pub(super) fn read_keys(s: &Section<'_, '_>, focal_length_um: f64, radius_um: f6
     let term = PhaseTerm {
         form,
         file,
-        scale: s.optional_float("scale", Limits::new(-1e6..=1e6, "")).unwrap_or(1.0),
+        scale: s.float_or("scale", Limits::new(-1e6..=1e6, ""), 1.0),
         centre_um: s
             .optional_array::<2>("centre_um", Limits::new(-1e5..=1e5, "um"))
             .unwrap_or([0.0; 2]),

@@ -123,12 +123,8 @@ impl VerifySpec {
             field_angles,
             fidelity: read_fidelity(s, cell),
             incidence: read_incidence(s, cell),
-            window_samples: s
-                .optional_integer("window_samples", 16..=2048, "samples")
-                .unwrap_or(256) as usize,
-            pixel_um: s
-                .optional_float("pixel_um", Limits::new(0.1..=100.0, "um"))
-                .unwrap_or(USUAL_PIXEL_UM),
+            window_samples: s.integer_or("window_samples", 16..=2048, "samples", 256) as usize,
+            pixel_um: s.float_or("pixel_um", Limits::new(0.1..=100.0, "um"), USUAL_PIXEL_UM),
             polarisation: read_polarisation(s, cell),
             analyser: read_analyser(s, cell),
             camera: s.optional_file("camera"),
@@ -246,14 +242,11 @@ impl LimitSpec {
         for name in ["mtf_min", "mtf_lp_mm", "energy_2_pixels_min"] {
             s.renamed(&format!("white_{name}"), &format!("polychromatic_{name}"));
         }
-        let count = |key, default: u64| s.optional_integer(key, 0..=i64::MAX, "").map_or(default, |v| v as u64);
-        let real = |key, unit, default: f64| {
-            s.optional_float(key, Limits::new(0.0..=f64::MAX, unit))
-                .unwrap_or(default)
-        };
+        let count = |key, default: u64| s.integer_or(key, 0..=i64::MAX, "", default as i64) as u64;
+        let real = |key, unit, default: f64| s.float_or(key, Limits::new(0.0..=f64::MAX, unit), default);
         limits.wrong_widths_max = count("wrong_widths_max", limits.wrong_widths_max);
         limits.foreign_shapes_max = count("foreign_shapes_max", limits.foreign_shapes_max);
-        let within = |key, most, unit, default| s.optional_float(key, Limits::new(0.0..=most, unit)).unwrap_or(default);
+        let within = |key, most, unit, default| s.float_or(key, Limits::new(0.0..=most, unit), default);
         limits.mapping_phase_rms_max_rad = within(
             "mapping_phase_rms_max_rad",
             RANDOM_RMS_RAD,
@@ -271,7 +264,7 @@ impl LimitSpec {
         limits.centroid_shift_max_um = real("centroid_shift_max_um", "um", limits.centroid_shift_max_um);
         limits.mtf_difference_max = within("mtf_difference_max", 1.0, "", limits.mtf_difference_max);
         limits.psf_difference_max = real("psf_difference_max", "", limits.psf_difference_max);
-        let share = |key| s.optional_float(key, Limits::new(0.0..=1.0, "")).unwrap_or(0.0);
+        let share = |key| s.float_or(key, Limits::new(0.0..=1.0, ""), 0.0);
         limits.polychromatic_mtf_min = share("polychromatic_mtf_min");
         limits.polychromatic_energy_2_pixels_min = share("polychromatic_energy_2_pixels_min");
         limits.polychromatic_mtf_lp_mm = s.optional_float(

@@ -1,6 +1,6 @@
 use std::time::Instant;
 
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 
 use super::super::polygon::on_segment;
 use super::*;

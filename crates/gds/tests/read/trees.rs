@@ -180,7 +180,7 @@ proptest! {
         gds.cell("TOP");
         for iy in 0..2 * half {
             for ix in 0..2 * half {
-                let w = 2 * rand::Rng::random_range(&mut rng, 20..pitch as u16);
+                let w = 2 * rand::RngExt::random_range(&mut rng, 20..pitch as u16);
                 if lattice.half_radius2(ix, iy) <= (2 * half as i64).pow(2) {
                     widths.number[[iy, ix]] = w;
                     let (px, py) = (x + lattice.whole_nm(0, ix), y + lattice.whole_nm(0, iy));

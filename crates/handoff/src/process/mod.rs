@@ -8,14 +8,14 @@ use include_dir::{Dir, File, include_dir};
 use serde::Serialize;
 
 use metalith_core::Result;
-use metalith_core::document::load;
+use metalith_core::document::{KeyTable, load};
 use metalith_core::text::printable;
 use metalith_design::Design;
 use metalith_drc::Deck;
 use metalith_pillars::{DatabaseUnit, OutlineForm, PillarShape, Rectangles, UprightRectangles};
 
 /// The processes that ship with the program.
-static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../processes");
+static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/processes");
 
 const STANDARD: &str = "jbx6300_zep520a.toml";
 
@@ -370,6 +370,11 @@ impl Process {
         self.tests
             .reference_wavelength_nm
             .unwrap_or(design.mapping.wavelength_um * 1e3)
+    }
+
+    /// The keys of a process file.
+    pub fn keys() -> KeyTable {
+        read::keys()
     }
 
     pub(super) fn parse(path: &Path, text: String) -> Result<Self> {

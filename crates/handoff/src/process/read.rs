@@ -7,36 +7,42 @@ use super::{
     PatternTransfer, Process, Proximity, RaithJob, Resist, ShapeRules, TestSpec, Tone, Writer,
 };
 use metalith_core::Result;
-use metalith_core::document::{Document, Limits, Section};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore};
 
 /// Version of the format of process files that this program reads.
 const SCHEMA: i64 = 1;
 
 /// Read a process; the decks of the program's own need no files.
 pub(super) fn process(path: &Path, text: String, standard: bool) -> Result<Process> {
-    let read = |root: &Section<'_, '_>| {
-        root.integer("schema", SCHEMA..=SCHEMA, "");
-        let name = root.text("name");
-        Process {
-            title: root.optional_text("title").unwrap_or_else(|| name.clone()),
-            name,
-            writer: table(root, "writer", writer),
-            resist: table(root, "resist", resist),
-            transfer: table(root, "transfer", transfer),
-            proximity: table(root, "proximity", proximity),
-            apertures: table(root, "apertures", apertures),
-            dose_matrix: table(root, "dose_matrix", dose_matrix),
-            tests: table(root, "tests", tests),
-            metrology: table(root, "metrology", metrology),
-            checks: table(root, "checks", |s| checks(s, standard)),
-            job: table(root, "job", job),
-            path: path.to_owned(),
-            text: String::new(),
-            standard,
-        }
-    };
-    let process = Document::read(path, &text, read)?;
+    let process = Document::read(path, &text, |root| sections(root, path, standard))?;
     Ok(Process { text, ..process })
+}
+
+/// The keys of a process file.
+pub(super) fn keys() -> KeyTable {
+    explore(&[], |root, path| sections(root, path, false))
+}
+
+fn sections(root: &Section<'_, '_>, path: &Path, standard: bool) -> Process {
+    root.integer("schema", SCHEMA..=SCHEMA, "");
+    let name = root.text("name");
+    Process {
+        title: root.optional_text("title").unwrap_or_else(|| name.clone()),
+        name,
+        writer: table(root, "writer", writer),
+        resist: table(root, "resist", resist),
+        transfer: table(root, "transfer", transfer),
+        proximity: table(root, "proximity", proximity),
+        apertures: table(root, "apertures", apertures),
+        dose_matrix: table(root, "dose_matrix", dose_matrix),
+        tests: table(root, "tests", tests),
+        metrology: table(root, "metrology", metrology),
+        checks: table(root, "checks", |s| checks(s, standard)),
+        job: table(root, "job", job),
+        path: path.to_owned(),
+        text: String::new(),
+        standard,
+    }
 }
 
 /// One table of the file; keys that `read` does not ask for are mistakes.

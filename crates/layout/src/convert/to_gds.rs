@@ -3,9 +3,9 @@
 use std::io::Write;
 use std::path::Path;
 
-use gds21::{GdsDateTimes, GdsLibrary, GdsUnits};
 use metalith_core::text::printable_bytes;
 use metalith_core::{Error, LayerNumber, Progress, Result};
+use metalith_gds::library::GdsLibrary;
 use metalith_gds::write::real8;
 use metalith_gds::{CellConsumer, CellItem, Layout, LayoutCell, Point};
 use metalith_oasis::Repetition;
@@ -13,7 +13,7 @@ use metalith_oasis::Repetition;
 use super::cut::cut;
 use super::output::Output;
 use super::{Changes, does_not_fit};
-use crate::gds_frame::encode;
+use crate::gds_frame::{encode, gds_date};
 
 /// Bytes that are written at a time.
 const AT_A_TIME: usize = 1 << 18;
@@ -68,15 +68,10 @@ pub(super) fn write(layout: &Layout, path: &Path, changes: &mut Changes, progres
         changes,
     };
     let name = Some(layout.library()).filter(|name| !name.is_empty() && name.is_ascii());
-    let mut library = GdsLibrary::new(name.unwrap_or("LIB"));
-    library.units = GdsUnits::new(layout.user_unit(), layout.unit_nm() * 1e-9);
     // The date of everything: a file must not depend on when it was written.
-    let date = chrono::DateTime::UNIX_EPOCH.naive_utc();
-    library.dates = GdsDateTimes {
-        modified: date,
-        accessed: date,
-    };
-    let head = encode(&library)?;
+    let date = gds_date(chrono::DateTime::UNIX_EPOCH.naive_utc());
+    let units = [layout.user_unit(), layout.unit_nm() * 1e-9];
+    let head = encode(&GdsLibrary::new(name.unwrap_or("LIB"), units, date))?;
     // The body of BGNLIB, behind HEADER.
     target.dates = head[10..34].to_vec();
     target.buffer.extend(&head[..head.len() - END]);

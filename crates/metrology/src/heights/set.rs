@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 use metalith_core::text::quoted;
 use metalith_core::{Result, csv_rows};
 use ndarray::Array2;
@@ -73,6 +73,11 @@ impl HeightSet {
         let text = load(path)?;
         Document::read(path, &text, |root| sections(path, root))
     }
+
+    /// The keys of the `measurement.toml` of such a set.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, path| sections(path, root))
+    }
 }
 
 fn sections(path: &Path, root: &Section<'_, '_>) -> HeightSet {
@@ -82,7 +87,7 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> HeightSet {
     let folder = crate::run::folder_of(path, root);
     let grid = root.section("grid");
     let sample_um = grid.float("sample_um", Limits::new(1e-4..=1e3, "um"));
-    let rim = grid.optional_integer("rim", 0..=1000, "samples").unwrap_or(0) as usize;
+    let rim = grid.integer_or("rim", 0..=1000, "samples", 0) as usize;
     grid.finish();
     let nuisances = field_nuisances(root);
     let groups = root.section("groups");

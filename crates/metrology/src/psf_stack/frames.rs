@@ -42,7 +42,7 @@ impl Frames {
             let broken = |what| sensor.fault("background", format!("{}: {what}", path.display()), "check this file");
             mean.map_err(broken).ok()
         });
-        let black = sensor.optional_float("black_level_dn", dn()).unwrap_or(0.0) as f32;
+        let black = sensor.float_or("black_level_dn", dn(), 0.0) as f32;
         if background.is_some() && black > 0.0 {
             sensor.fault(
                 "black_level_dn",

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use metalith_core::Result;
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 use metalith_core::text::quoted;
 use metalith_rcwa::Material;
 use ndarray::Array2;
@@ -69,6 +69,11 @@ impl StackSet {
     pub fn read(path: &Path) -> Result<Self> {
         let text = load(path)?;
         Document::read(path, &text, |root| sections(path, root))
+    }
+
+    /// The keys of the `measurement.toml` of such a set.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, path| sections(path, root))
     }
 }
 
@@ -158,11 +163,9 @@ fn transmission(s: &Section<'_, '_>, folder: &Path, wavelengths: &[[f64; 2]]) ->
         return Some(out);
     }
     let scale = if kind == 0 {
-        s.optional_float("nm_per_level", Limits::new(-1e9..=1e9, "nm"))
-            .unwrap_or(1.0)
+        s.float_or("nm_per_level", Limits::new(-1e9..=1e9, "nm"), 1.0)
     } else {
-        s.optional_float("rad_per_level", Limits::new(-1e6..=1e6, "rad"))
-            .unwrap_or(1.0)
+        s.float_or("rad_per_level", Limits::new(-1e6..=1e6, "rad"), 1.0)
     };
     match files::map(&file) {
         Ok(map) => out.phase = map.mapv(|v| v * scale as f32),

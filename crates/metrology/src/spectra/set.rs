@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 use metalith_core::text::{quoted, without_mark};
 use metalith_rcwa::{CellLattice, Material};
 
@@ -89,6 +89,11 @@ impl SpectrumSet {
         Document::read(path, &text, |root| sections(path, root))
     }
 
+    /// The keys of the `measurement.toml` of such a set.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, path| sections(path, root))
+    }
+
     /// Root mean square by which repeats of one object differ from their mean; none without repeats.
     pub fn repeat_rms(&self) -> Option<f64> {
         let (mut squares, mut degrees) = (0.0, 0.0);
@@ -142,15 +147,11 @@ fn sections(path: &Path, root: &Section<'_, '_>) -> SpectrumSet {
         .map(|k| from + k as f64 * step)
         .collect();
     let stack = root.section("stack");
-    let ambient_index = stack
-        .optional_float("ambient_index", Limits::new(1.0..=3.0, ""))
-        .unwrap_or(1.0);
+    let ambient_index = stack.float_or("ambient_index", Limits::new(1.0..=3.0, ""), 1.0);
     let measured = [("reflectance", false), ("transmission", true)];
     let is_transmission = stack.choice("measured", &measured, Some(false));
     let substrate = material(&stack, "substrate", &folder, &wavelengths_nm);
-    let numerical_aperture = stack
-        .optional_float("numerical_aperture", Limits::new(0.0..=0.98, ""))
-        .unwrap_or(0.0);
+    let numerical_aperture = stack.float_or("numerical_aperture", Limits::new(0.0..=0.98, ""), 0.0);
     stack.finish();
     let (layers, pads) = layers(root, &folder, &wavelengths_nm);
     let largest = pads.as_ref().map_or(0.98, |_| LARGEST_APERTURE);
@@ -273,12 +274,8 @@ fn pillars(s: &Section<'_, '_>, layer: usize) -> StatedPads {
         },
         is_round,
         height_nm: s.float("height_nm", Limits::new(10.0..=50_000.0, "nm")),
-        residual_nm: s
-            .optional_float("residual_nm", Limits::new(0.0..=50_000.0, "nm"))
-            .unwrap_or(0.0),
-        taper_deg: s
-            .optional_float("taper_deg", Limits::new(-10.0..=10.0, "degrees"))
-            .unwrap_or(0.0),
+        residual_nm: s.float_or("residual_nm", Limits::new(0.0..=50_000.0, "nm"), 0.0),
+        taper_deg: s.float_or("taper_deg", Limits::new(-10.0..=10.0, "degrees"), 0.0),
     };
     let [_, (low, high), _] = PadBank::ranges(&pads);
     if !(low..=high).contains(&pads.taper_deg) {
@@ -301,7 +298,7 @@ fn captures(
     root.must_have("captures", "one or more sections [[captures]]");
     for s in root.sections("captures") {
         let text = s.text("files");
-        let header = s.optional_integer("header_lines", 0..=1000, "").unwrap_or(0) as usize;
+        let header = s.integer_or("header_lines", 0..=1000, "", 0) as usize;
         let name = s.text("medium_name");
         let medium = material(&s, "medium", folder, wavelengths_nm);
         let all_fitted = s.choice("fitted", &[("yes", true), ("no", false)], Some(true));

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use metalith_core::document::{Document, Limits, Section, load};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
 use metalith_core::text::quoted;
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, Silent};
 
 use super::fill::Surroundings;
 use super::regions::{Regions, fill, layout_fill};
@@ -64,9 +64,16 @@ impl WidthSet {
     /// All mistakes of the text and of the tables that it names; if the user stopped it.
     pub fn read(path: &Path, progress: &dyn Progress) -> Result<Self> {
         let text = load(path)?;
-        let read = Document::read(path, &text, |root| sections(path, root, progress))?;
+        let read = Document::read(path, &text, |root| sections(path, root, Table::read, progress))?;
         progress.check_stopped()?;
         Ok(read)
+    }
+
+    /// The keys of the `measurement.toml` of such a set.
+    pub fn keys() -> KeyTable {
+        explore(&[], |root, path| {
+            sections(path, root, |_, _, _| Some(Table::without_rows()), &Silent)
+        })
     }
 
     /// Root mean square by which repeats differ from their mean, for single measurements (nm); none without repeats.
@@ -93,7 +100,10 @@ impl WidthSite {
     }
 }
 
-fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> WidthSet {
+/// Reads the table that a key names.
+type TableReader = fn(&Path, &Section<'_, '_>, &str) -> Option<Table>;
+
+fn sections(path: &Path, root: &Section<'_, '_>, read: TableReader, progress: &dyn Progress) -> WidthSet {
     root.integer("schema", 1..=1, "");
     root.choice("kind", &[("widths", ())], None);
     let mut set = WidthSet {
@@ -118,11 +128,11 @@ fn sections(path: &Path, root: &Section<'_, '_>, progress: &dyn Progress) -> Wid
     });
     let s = root.section("table");
     let file = folder.join(s.text("file"));
-    let table = s.has("file").then(|| Table::read(&file, &s, "file")).flatten();
+    let table = s.has("file").then(|| read(&file, &s, "file")).flatten();
     s.finish();
     let Some(table) = table else {
         // What else is wrong is found as soon as there is a table.
-        root.accept_others();
+        root.accept_unread();
         return set;
     };
     let columns = Columns::of(root, &table);

@@ -72,6 +72,15 @@ impl Table {
         sound.then_some(table)
     }
 
+    /// A table with the columns that a set must have and no rows: it lets the sections be read without a file.
+    pub(super) fn without_rows() -> Self {
+        Self {
+            names: ["drawn_nm", "measured_nm"].map(str::to_owned).to_vec(),
+            rows: Vec::new(),
+            file: String::new(),
+        }
+    }
+
     /// Place of a column.
     pub(super) fn column(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|n| n == name)

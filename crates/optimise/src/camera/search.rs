@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use metalith_core::{Progress, Result};
 use metalith_sensor::{ColourFilter, Sensor};
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 

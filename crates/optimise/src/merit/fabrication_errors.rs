@@ -1,6 +1,6 @@
 //! Errors of fabrication, drawn.
 
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::merit::focus::FabricationError;

@@ -7,7 +7,7 @@
 //! another. It grows with their number, and so only some of all rings may move at a time, drawn at random;
 //! the true merit decides whether they stay moved, and how many may move next time.
 
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::merit::objective::Objective;
@@ -160,7 +160,7 @@ impl<'p> BlockExchange<'p> {
 }
 
 /// Runs of `length` rings that begin anywhere, also before the first ring, `share` of all rings together.
-fn draw_runs(rings: usize, length: usize, share: f64, random: &mut impl Rng) -> Vec<bool> {
+fn draw_runs(rings: usize, length: usize, share: f64, random: &mut impl RngExt) -> Vec<bool> {
     let chance = (share / length as f64).min(1.0);
     let mut free = vec![false; rings + length - 1];
     for begin in 0..free.len() {

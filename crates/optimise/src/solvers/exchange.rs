@@ -1,7 +1,7 @@
 //! Exchange: one ring after the other takes the best of all its candidates, given all others.
 
 use rand::seq::SliceRandom;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::merit::field::{FLOOR, FieldProblem};
@@ -177,7 +177,7 @@ fn add(part: &Planes, sign: f32, fields: &mut Planes) {
 }
 
 /// The best at zero temperature, the first of equals; else one at random by exp(score / temperature).
-fn pick(scores: &[f64], temperature: f64, random: &mut impl Rng) -> usize {
+fn pick(scores: &[f64], temperature: f64, random: &mut impl RngExt) -> usize {
     let best = (0..scores.len())
         .max_by(|&a, &b| scores[a].total_cmp(&scores[b]).then(b.cmp(&a)))
         .unwrap_or(0);

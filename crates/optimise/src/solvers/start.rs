@@ -1,6 +1,6 @@
 //! Phases to begin from.
 
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::merit::focus::Lens;

@@ -331,7 +331,7 @@ pub(super) mod tests {
     /// A pixel that is recorded and corrected many times, with a dark and a flat frame of its own each time, scatters as stated.
     #[test]
     fn the_scatter_of_a_corrected_pixel_is_its_variance() {
-        use rand::{Rng, SeedableRng};
+        use rand::{RngExt, SeedableRng};
         const DRAWS: usize = 20_000;
         /// Relative: four standard deviations of a variance from so many draws, and that a pixel is part of the mean response.
         const TOLERANCE: f64 = 0.05;

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::propagation::aperture::sites_inside;
     use crate::{Accuracy, FoldedPropagator, PhaseFunction, Propagator, Scratch, Window};
-    use rand::{Rng, SeedableRng};
+    use rand::{RngExt, SeedableRng};
     use std::f64::consts::{PI, TAU};
 
     /// Powers of a few hundred thousand single-precision amplitudes, added in double precision.

@@ -201,7 +201,7 @@ fn exposure(
     let path = s.file("file");
     let scale = Limits::new(f64::MIN_POSITIVE..=1e12, "DN");
     let scale_dn = if darks.free_scale && !is_joined {
-        s.optional_float("scale_dn", scale).unwrap_or(1.0)
+        s.float_or("scale_dn", scale, 1.0)
     } else {
         s.float("scale_dn", scale)
     };

@@ -9,8 +9,8 @@ use super::{BenchLed, MeasuredSet, PerElement, PerLed, Stack};
 use elements::{LayoutPillars, elements};
 use measurements::{measurements, widths};
 use metalith_cell::{CellStack, Material, UniformLayer};
-use metalith_core::document::{Document, Limits, Section, load};
-use metalith_core::{LayerNumber, Progress, Result};
+use metalith_core::document::{Document, KeyTable, Limits, Section, explore, load};
+use metalith_core::{LayerNumber, Progress, Result, Silent};
 use metalith_pillars::{DatabaseUnit, LatticeKind, PillarReader, PillarShape};
 use metalith_rcwa::CellLattice;
 use metalith_sensor::frame::{self, Orientation, Recorded, SensorFrame, SensorFrames};
@@ -48,6 +48,11 @@ impl MeasuredSet {
         };
         let text = load(&path)?;
         Document::read(&path, &text, |root| sections(&path, root, layouts, progress))
+    }
+
+    /// The keys of the `measurement.toml` of such a set; `layouts` need read no layout.
+    pub fn keys(layouts: &dyn PillarReader) -> KeyTable {
+        explore(&[], |root, path| sections(path, root, layouts, &Silent))
     }
 }
 
@@ -168,9 +173,7 @@ fn stack(s: &Section<'_, '_>, folder: &Path) -> (Stack, bool) {
     let spacer = s.optional_text("spacer_material");
     let spacer = spacer.map(|name| found("spacer_material", resolved(&name, folder)).unwrap_or_else(vacuum));
     let layer = |key: &str, material: Option<Material>| {
-        let height = s
-            .optional_float(key, Limits::new(0.0..=TALLEST_NM, "nm"))
-            .unwrap_or(0.0);
+        let height = s.float_or(key, Limits::new(0.0..=TALLEST_NM, "nm"), 0.0);
         if height > 0.0 && material.is_none() {
             s.fault(key, "a layer of no known material", "say its material");
         }
@@ -363,9 +366,7 @@ pub fn camera(s: &Section<'_, '_>) -> (RelayCamera, SensorFrames) {
         saturation_dn: positive("saturation_dn", 1e9, "DN"),
         registration_sigma_px: positive("registration_sigma_px", 8.0, "pixels"),
         flux_sigma: positive("flux_sigma", 1.0, ""),
-        relay_blur_um: s
-            .optional_float("relay_blur_um", Limits::new(0.0..=100.0, "um"))
-            .unwrap_or(0.0),
+        relay_blur_um: s.float_or("relay_blur_um", Limits::new(0.0..=100.0, "um"), 0.0),
         filter: s.choice("bayer", &ColourFilter::BAYER, Some(ColourFilter::None)),
     };
     let orientation = s.choice("orientation", &Orientation::ALL, Some(Orientation::Upright));

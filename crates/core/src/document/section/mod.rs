@@ -10,6 +10,7 @@ use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::keys::{Forms, Key, KeyTable, OtherKeys};
 use super::{Document, FaultKind, renamed};
 use crate::text::quoted;
 pub(super) use values::number as float_of;
@@ -53,7 +54,9 @@ pub struct Section<'d, 't> {
 
 impl<'d, 't> Section<'d, 't> {
     pub(super) fn root(document: &'d Document<'t>, table: &'d Spanned<DeTable<'t>>) -> Self {
-        Self::new(document, table.get_ref(), String::new(), 0..0)
+        let root = Self::new(document, table.get_ref(), String::new(), 0..0);
+        root.note_section(KeyTable::visit);
+        root
     }
 
     fn new(document: &'d Document<'t>, table: &'d DeTable<'t>, name: String, span: Range<usize>) -> Self {
@@ -67,6 +70,32 @@ impl<'d, 't> Section<'d, 't> {
             missing: RefCell::default(),
             renamed: RefCell::default(),
             vacant: false,
+        }
+    }
+
+    /// Note something of this section, where the keys that a reader asks for are noted.
+    fn note_section(&self, note: impl FnOnce(&mut KeyTable)) {
+        if let Some(noted) = &self.document.noted {
+            note(noted.borrow_mut().section_mut(&self.name));
+        }
+    }
+
+    /// Note something of a key of this section.
+    fn note(&self, key: &str, note: impl FnOnce(&mut Key)) {
+        self.note_section(|table| note(table.key_mut(key)));
+    }
+
+    /// Note a form of the value of a key.
+    fn note_form(&self, key: &str, form: impl FnOnce() -> Forms) {
+        self.note(key, |key| {
+            key.forms.merge(form());
+        });
+    }
+
+    /// Note that a key must be there.
+    fn note_required(&self, key: &str) {
+        if !self.vacant {
+            self.note(key, Key::require);
         }
     }
 
@@ -122,16 +151,19 @@ impl<'d, 't> Section<'d, 't> {
 
     /// True if the key is there.
     pub fn has(&self, key: &str) -> bool {
+        self.note(key, |_| ());
         self.table.contains_key(key)
     }
 
     /// Record that a key may be given: it is among those that are known here, whether it is there or not.
     pub fn may_have(&self, key: &str) {
+        self.note(key, Key::know);
         self.asked.borrow_mut().insert(key.to_owned());
     }
 
     /// Record that a key is missing, if it is: one that other values of the file ask for. `expected` says what to add, and why.
     pub fn must_have(&self, key: &str, expected: &str) {
+        self.note_required(key);
         if !self.has(key) {
             self.asked.borrow_mut().insert(key.to_owned());
             self.missing_unless_present(key, expected);
@@ -148,18 +180,21 @@ impl<'d, 't> Section<'d, 't> {
 
     /// True if the key is one of these texts. Says nothing of whether it may be, and does not count as asking for it.
     pub fn is_one_of(&self, key: &str, words: &[&str]) -> bool {
+        self.note_form(key, || Forms::of_words(words.iter().copied()));
         let value = self.table.get(key).map(Spanned::get_ref);
         matches!(value, Some(DeValue::String(word)) if words.contains(&word.as_ref()))
     }
 
     /// True if the key holds a list.
     pub fn is_list(&self, key: &str) -> bool {
+        self.note_form(key, || Forms::of_list(Forms::of_text(), None));
         matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Array(_)))
     }
 
     /// A table that must be there.
     #[must_use]
     pub fn section(&self, key: &str) -> Section<'d, 't> {
+        self.note_required(key);
         self.optional_section(key).unwrap_or_else(|| {
             self.missing_unless_present(key, &format!("a section [{}]", self.path_of(key)));
             self.vacant(key)
@@ -174,10 +209,12 @@ impl<'d, 't> Section<'d, 't> {
 
     /// A table that may be left out.
     pub fn optional_section(&self, key: &str) -> Option<Section<'d, 't>> {
+        self.note_form(key, Forms::of_section);
         let value = self.get(key)?;
         if let DeValue::Table(table) = value.get_ref() {
             let mut section = Self::new(self.document, table, self.path_of(key), self.span_of(key));
             section.path = self.place_of(key);
+            section.note_section(KeyTable::visit);
             Some(section)
         } else {
             self.wrong_type(key, value, &format!("a section [{}]", self.path_of(key)));
@@ -187,6 +224,7 @@ impl<'d, 't> Section<'d, 't> {
 
     /// The tables of `[[key]]`, none where the key is left out.
     pub fn sections(&self, key: &str) -> Vec<Section<'d, 't>> {
+        self.note_form(key, Forms::of_sections);
         let Some(value) = self.get(key) else { return Vec::new() };
         let DeValue::Array(items) = value.get_ref() else {
             self.wrong_type(key, value, &format!("one or more sections [[{}]]", self.path_of(key)));
@@ -199,6 +237,7 @@ impl<'d, 't> Section<'d, 't> {
                 if let DeValue::Table(table) = item.get_ref() {
                     let mut section = Self::new(self.document, table, self.path_of(key), item.span());
                     section.path = format!("{}#{k}", self.place_of(key));
+                    section.note_section(KeyTable::visit);
                     Some(section)
                 } else {
                     self.wrong_type(key, item, &format!("a section [[{}]]", self.path_of(key)));
@@ -210,6 +249,7 @@ impl<'d, 't> Section<'d, 't> {
 
     /// All keys of this section, for maps whose keys the user names.
     pub fn keys(&self) -> Vec<String> {
+        self.note_section(|table| table.open(OtherKeys::Named));
         self.table.keys().map(|k| k.get_ref().to_string()).collect()
     }
 
@@ -269,10 +309,18 @@ impl<'d, 't> Section<'d, 't> {
 
     /// Accept all keys that nobody asked for: they are for other readers of the file.
     pub fn accept_others(&self) {
-        self.asked.borrow_mut().extend(self.keys());
+        self.note_section(|table| table.open(OtherKeys::Ignored));
+        self.accept_unread();
+    }
+
+    /// Accept all keys that nobody asked for, since a mistake kept their reader from asking.
+    pub fn accept_unread(&self) {
+        let names = self.table.keys().map(|key| key.get_ref().to_string());
+        self.asked.borrow_mut().extend(names);
     }
 
     fn get(&self, key: &str) -> Option<&'d Spanned<DeValue<'t>>> {
+        self.note(key, Key::know);
         self.asked.borrow_mut().insert(key.to_owned());
         self.table.get(key)
     }

@@ -8,13 +8,17 @@ use toml::de::DeValue;
 
 use super::words::{describe, did_you_mean};
 use super::{Limits, Section};
-use crate::document::{FaultKind, Scalar, renamed};
+use crate::document::{FaultKind, Forms, Scalar, renamed};
 use crate::error::{Error, Result};
 use crate::text::{first_unprintable, quoted};
+
+/// What to do where a file is not there.
+const RELATIVE: &str = "relative paths count from the folder of this file";
 
 impl<'t> Section<'_, 't> {
     /// A number that must be there.
     pub fn float(&self, key: &str, limits: Limits) -> f64 {
+        self.note_required(key);
         if let Some(value) = self.optional_float(key, limits.clone()) {
             value
         } else {
@@ -25,6 +29,7 @@ impl<'t> Section<'_, 't> {
 
     /// A number that may be left out.
     pub fn optional_float(&self, key: &str, limits: Limits) -> Option<f64> {
+        self.note_form(key, || Forms::of_number(&limits));
         let value = self.get(key)?;
         let Some(number) = number(value.get_ref()) else {
             self.wrong_type(key, value, &format!("a number{}", describe(&limits)));
@@ -33,8 +38,15 @@ impl<'t> Section<'_, 't> {
         Some(self.limited(value.span(), key, number, &limits))
     }
 
+    /// A number, or this one where the key is left out.
+    pub fn float_or(&self, key: &str, limits: Limits, default: f64) -> f64 {
+        self.note_default(key, || Scalar::Number(default));
+        self.optional_float(key, limits).unwrap_or(default)
+    }
+
     /// A whole number that must be there.
     pub fn integer(&self, key: &str, range: RangeInclusive<i64>, unit: &'static str) -> i64 {
+        self.note_required(key);
         if let Some(value) = self.optional_integer(key, range.clone(), unit) {
             value
         } else {
@@ -45,6 +57,7 @@ impl<'t> Section<'_, 't> {
 
     /// A whole number that may be left out.
     pub fn optional_integer(&self, key: &str, range: RangeInclusive<i64>, unit: &'static str) -> Option<i64> {
+        self.note_form(key, || Forms::of_integer(&range, unit));
         let value = self.get(key)?;
         let limits = Limits::new(*range.start() as f64..=*range.end() as f64, unit);
         let DeValue::Integer(integer) = value.get_ref() else {
@@ -61,8 +74,24 @@ impl<'t> Section<'_, 't> {
         }
     }
 
+    /// A whole number, or this one where the key is left out.
+    pub fn integer_or(&self, key: &str, range: RangeInclusive<i64>, unit: &'static str, default: i64) -> i64 {
+        self.note_default(key, || Scalar::Whole(default));
+        self.optional_integer(key, range, unit).unwrap_or(default)
+    }
+
+    /// Note the value that stands for a key that is left out.
+    fn note_default(&self, key: &str, value: impl FnOnce() -> Scalar) {
+        self.note(key, |key| key.left_out_is(value()));
+    }
+
     /// A text that must be there.
     pub fn text(&self, key: &str) -> String {
+        self.note_required(key);
+        self.present_text(key)
+    }
+
+    fn present_text(&self, key: &str) -> String {
         if let Some(text) = self.optional_text(key) {
             text
         } else {
@@ -73,6 +102,7 @@ impl<'t> Section<'_, 't> {
 
     /// A text that may be left out.
     pub fn optional_text(&self, key: &str) -> Option<String> {
+        self.note_form(key, Forms::of_text);
         let value = self.get(key)?;
         if let DeValue::String(s) = value.get_ref() {
             Some(self.one_line(key, value.span(), s))
@@ -80,6 +110,12 @@ impl<'t> Section<'_, 't> {
             self.wrong_type(key, value, "a text in quotes");
             Some(String::new())
         }
+    }
+
+    /// A text, or this one where the key is left out.
+    pub fn text_or(&self, key: &str, default: &str) -> String {
+        self.note_default(key, || Scalar::Text(default.to_owned()));
+        self.optional_text(key).unwrap_or_else(|| default.to_owned())
     }
 
     /// A text that may go where one line is expected: layouts, job files and pages are written from it.
@@ -117,6 +153,7 @@ impl<'t> Section<'_, 't> {
 
     /// A list of texts; an empty one where the key is left out.
     pub fn texts(&self, key: &str) -> Vec<String> {
+        self.note_form(key, || Forms::of_list(Forms::of_text(), None));
         self.list(key, "a list of texts in quotes", |item| match item.get_ref() {
             DeValue::String(s) => Some(self.one_line(key, item.span(), s)),
             _ => None,
@@ -124,7 +161,16 @@ impl<'t> Section<'_, 't> {
     }
 
     /// One of a few words; the first choice takes the place of a wrong one.
-    pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)], default: Option<T>) -> T {
+    pub fn choice<T: Copy + PartialEq>(&self, key: &str, choices: &[(&str, T)], default: Option<T>) -> T {
+        self.note_form(key, || Forms::of_words(choices.iter().map(|(word, _)| *word)));
+        match default {
+            None => self.note_required(key),
+            Some(default) => {
+                if let Some((word, _)) = choices.iter().find(|(_, value)| *value == default) {
+                    self.note_default(key, || Scalar::Text((*word).to_owned()));
+                }
+            }
+        }
         let Some(value) = self.get(key) else {
             return default.unwrap_or_else(|| {
                 let words = choices.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ");
@@ -175,6 +221,8 @@ impl<'t> Section<'_, 't> {
         limits: Limits,
         of_number: impl Fn(f64) -> T,
     ) -> Option<T> {
+        self.note_form(key, || Forms::of_words(choices.iter().map(|(word, _)| *word)));
+        self.note_form(key, || Forms::of_number(&limits));
         let value = self.get(key)?;
         match value.get_ref() {
             DeValue::Integer(_) | DeValue::Float(_) => self.optional_float(key, limits).map(of_number),
@@ -184,10 +232,15 @@ impl<'t> Section<'_, 't> {
 
     /// A list of numbers, each within the limits; an empty one where the key is left out.
     pub fn floats(&self, key: &str, limits: Limits) -> Vec<f64> {
-        let expected = format!("a list of numbers{}", describe(&limits));
+        self.note_form(key, || Forms::of_list(Forms::of_number(&limits), None));
+        self.floats_within(key, &limits)
+    }
+
+    fn floats_within(&self, key: &str, limits: &Limits) -> Vec<f64> {
+        let expected = format!("a list of numbers{}", describe(limits));
         self.list(key, &expected, |item| {
             if let Some(v) = number(item.get_ref()) {
-                Some(self.limited(item.span(), key, v, &limits))
+                Some(self.limited(item.span(), key, v, limits))
             } else {
                 self.wrong_type(key, item, &expected);
                 Some(*limits.range.start())
@@ -198,6 +251,7 @@ impl<'t> Section<'_, 't> {
     /// A list of numbers, texts or switches; an empty one where the key is left out.
     pub fn scalars(&self, key: &str) -> Vec<Scalar> {
         const EXPECTED: &str = "a list of numbers, texts in quotes, or true and false";
+        self.note_form(key, || Forms::of_list(Forms::of_scalar(), None));
         self.list(key, EXPECTED, |item| match Scalar::of(item.get_ref())? {
             Scalar::Text(text) => Some(Scalar::Text(self.one_line(key, item.span(), &text))),
             other => Some(other),
@@ -206,6 +260,7 @@ impl<'t> Section<'_, 't> {
 
     /// Exactly `N` numbers that must be there, each within the limits.
     pub fn array<const N: usize>(&self, key: &str, limits: Limits) -> [f64; N] {
+        self.note_required(key);
         if let Some(values) = self.optional_array(key, limits.clone()) {
             values
         } else {
@@ -216,8 +271,9 @@ impl<'t> Section<'_, 't> {
 
     /// Exactly `N` numbers, each within the limits, or nothing where the key is left out.
     pub fn optional_array<const N: usize>(&self, key: &str, limits: Limits) -> Option<[f64; N]> {
+        self.note_form(key, || Forms::of_list(Forms::of_number(&limits), Some(N)));
         self.get(key)?;
-        let values = self.floats(key, limits.clone());
+        let values = self.floats_within(key, &limits);
         let count = values.len();
         Some(values.try_into().unwrap_or_else(|_| {
             self.fault_of(
@@ -233,18 +289,24 @@ impl<'t> Section<'_, 't> {
 
     /// A path, relative ones counted from the folder of this file. The file must exist.
     pub fn file(&self, key: &str) -> PathBuf {
-        self.file_else(key, "relative paths count from the folder of this file")
+        self.file_else(key, RELATIVE)
     }
 
     /// Path of a file that may be left out, as [`Section::file`].
     pub fn optional_file(&self, key: &str) -> Option<PathBuf> {
         self.may_have(key);
-        self.has(key).then(|| self.file(key))
+        self.note_form(key, Forms::of_text);
+        self.has(key).then(|| self.path_of_file(key, RELATIVE))
     }
 
     /// Variant of the path of a file for a file that is made by what `hint` says.
     pub fn file_else(&self, key: &str, hint: &str) -> PathBuf {
-        let text = self.text(key);
+        self.note_required(key);
+        self.path_of_file(key, hint)
+    }
+
+    fn path_of_file(&self, key: &str, hint: &str) -> PathBuf {
+        let text = self.present_text(key);
         let path = self.document.folder().join(&text);
         if !text.is_empty() && !path.is_file() {
             self.fault_of(

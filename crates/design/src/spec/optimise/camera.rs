@@ -57,8 +57,7 @@ impl CameraSearchSpec {
             }
             if values.is_empty() { default.to_vec() } else { values }
         };
-        let whole =
-            |key: &str, range, default: usize| s.optional_integer(key, range, "").map_or(default, |v| v as usize);
+        let whole = |key: &str, range, default: usize| s.integer_or(key, range, "", default as i64) as usize;
         let count = Limits::new(1.0..=20.0, "elements");
         let [columns, rows] = ["columns", "rows"].map(|key| {
             s.must_have(key, "a list of numbers of elements");
@@ -91,10 +90,7 @@ impl CameraSearchSpec {
             field_deg: s.float("field_deg", Limits::new(1.0..=120.0, "degrees")),
             scene_pixels: whole("scene_pixels", 16..=4096, 400),
             illuminance_lux: list("illuminance_lux", Limits::new(1e-3..=1e6, "lux"), &[500.0]),
-            longest_s: s
-                .optional_float("longest_ms", Limits::new(1e-3..=1e6, "ms"))
-                .unwrap_or(10.0)
-                * 1e-3,
+            longest_s: s.float_or("longest_ms", Limits::new(1e-3..=1e6, "ms"), 10.0) * 1e-3,
             most_track_um: s.float("most_track_um", FOCAL_LENGTH),
             arrangements,
             focal_lengths_um: list("focal_lengths_um", FOCAL_LENGTH, &[]),

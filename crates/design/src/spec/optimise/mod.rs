@@ -162,13 +162,12 @@ impl OptimiseSpec {
             solver,
             band_um: (short, long),
             said: [s.has("band_nm"), says_step(s), views.as_ref().is_some_and(says_step)],
-            step_um: s
-                .optional_float("step_nm", Limits::new(0.1..=50.0, "nm"))
-                .unwrap_or(1.0)
-                * 1e-3,
-            step_limit_waves: s
-                .optional_float("step_limit_waves", Limits::new(0.01..=0.5, "waves; 0.5 is no limit"))
-                .unwrap_or(default.step_limit_waves),
+            step_um: s.float_or("step_nm", Limits::new(0.1..=50.0, "nm"), 1.0) * 1e-3,
+            step_limit_waves: s.float_or(
+                "step_limit_waves",
+                Limits::new(0.01..=0.5, "waves; 0.5 is no limit"),
+                default.step_limit_waves,
+            ),
             start: s.choice(
                 "start",
                 &[
@@ -184,14 +183,17 @@ impl OptimiseSpec {
                     _ => default.start,
                 }),
             ),
-            seed: s.optional_integer("seed", 0..=i64::MAX, "").unwrap_or(1) as u64,
+            seed: s.integer_or("seed", 0..=i64::MAX, "", 1) as u64,
             merit,
             robust: s.optional_section("robust").map(|r| RobustSpec::read(&r)),
             views: views.map_or_else(|| default.views.clone(), |v| ViewSpec::read(&v)),
             camera: s.optional_section("camera").map(|c| CameraSearchSpec::read(&c)),
-            memory_mb: s
-                .optional_integer("memory_mb", 16..=1 << 20, "MB")
-                .map_or(if images { 8192 } else { default.memory_mb }, |m| m as u64),
+            memory_mb: s.integer_or(
+                "memory_mb",
+                16..=1 << 20,
+                "MB",
+                (if images { 8192 } else { default.memory_mb }) as i64,
+            ) as u64,
         };
         spec.check_neighbours(s, cell);
         spec.check_rotations(s, cell);
@@ -277,24 +279,23 @@ impl SolverSpec {
         let (chains, hot_sweeps, temperature) = Self::ANNEALED;
         if s.choice("solver", &words, Some(false)) {
             Self::Adam {
-                steps: s.optional_integer("steps", 1..=1_000_000, "").unwrap_or(400) as u32,
-                rate_waves: s
-                    .optional_float("rate_waves", Limits::new(1e-6..=0.5, "waves"))
-                    .unwrap_or(0.01),
+                steps: s.integer_or("steps", 1..=1_000_000, "", 400) as u32,
+                rate_waves: s.float_or("rate_waves", Limits::new(1e-6..=0.5, "waves"), 0.01),
             }
         } else {
             let temperature = s
                 .optional_array::<2>("temperature", Limits::new(1e-12..=1e3, ""))
                 .map_or(temperature, |t| (t[0], t[1]));
             Self::Exchange {
-                chains: s.optional_integer("chains", 1..=1024, "").map_or(chains, |c| c as u32),
-                hot_sweeps: s
-                    .optional_integer("hot_sweeps", 0..=100_000, "")
-                    .map_or(hot_sweeps, |n| n as u32),
+                chains: s.integer_or("chains", 1..=1024, "", chains.into()) as u32,
+                hot_sweeps: s.integer_or("hot_sweeps", 0..=100_000, "", hot_sweeps.into()) as u32,
                 temperature,
-                blocks: s
-                    .optional_integer("blocks", 0..=1_000_000, "")
-                    .map_or(if images { Self::BLOCKS.1 } else { Self::BLOCKS.0 }, |n| n as u32),
+                blocks: s.integer_or(
+                    "blocks",
+                    0..=1_000_000,
+                    "",
+                    (if images { Self::BLOCKS.1 } else { Self::BLOCKS.0 }).into(),
+                ) as u32,
             }
         }
     }
@@ -311,15 +312,17 @@ impl MeritSpec {
     };
 
     fn read(s: &Section<'_, '_>) -> Self {
-        let weight = |key| s.optional_float(key, Limits::new(0.0..=1e9, "")).unwrap_or(0.0);
+        let weight = |key| s.float_or(key, Limits::new(0.0..=1e9, ""), 0.0);
         let merit = Self {
             sum: weight("sum"),
             log: weight("log"),
             deconvolution: weight("deconvolution"),
             side_lobes: weight("side_lobes"),
-            side_lobe_radius_um: s
-                .optional_float("side_lobe_radius_um", Limits::new(0.5..=80.0, "um"))
-                .unwrap_or(Self::LOG.side_lobe_radius_um),
+            side_lobe_radius_um: s.float_or(
+                "side_lobe_radius_um",
+                Limits::new(0.5..=80.0, "um"),
+                Self::LOG.side_lobe_radius_um,
+            ),
         };
         if merit.sum + merit.log + merit.deconvolution + merit.side_lobes == 0.0 {
             s.fault_given(
@@ -341,12 +344,12 @@ impl MeritSpec {
 impl RobustSpec {
     fn read(s: &Section<'_, '_>) -> Self {
         s.renamed("gap_um", "defocus_um");
-        let float = |key, most, unit, default| s.optional_float(key, Limits::new(0.0..=most, unit)).unwrap_or(default);
+        let float = |key, most, unit, default| s.float_or(key, Limits::new(0.0..=most, unit), default);
         let spec = Self {
             width_bias_nm: float("width_bias_nm", 50.0, "nm", 6.0),
             height: float("height_percent", 20.0, "%", 2.0) * 1e-2,
             defocus_um: float("defocus_um", 1000.0, "um", 10.0),
-            draws: s.optional_integer("draws", 1..=256, "").unwrap_or(16) as u32,
+            draws: s.integer_or("draws", 1..=256, "", 16) as u32,
         };
         s.finish();
         spec
@@ -359,21 +362,11 @@ impl ViewSpec {
         let angles = s.floats("angles_deg", Limits::new(-60.0..=60.0, "degrees"));
         let spec = Self {
             angles_deg: if angles.is_empty() { default.angles_deg } else { angles },
-            step_um: s
-                .optional_float("step_nm", Limits::new(1.0..=50.0, "nm"))
-                .map_or(default.step_um, |v| v * 1e-3),
-            pixels: s
-                .optional_integer("pixels", 8..=1024, "")
-                .map_or(default.pixels, |v| v as usize & !1),
-            pixel_um: s
-                .optional_float("pixel_um", Limits::new(0.5..=50.0, "um"))
-                .unwrap_or(default.pixel_um),
-            shared_filter: s
-                .optional_float("shared_filter", Limits::new(0.0..=1.0, ""))
-                .unwrap_or(default.shared_filter),
-            drawn: s
-                .optional_integer("drawn", 1..=100, "")
-                .map_or(default.drawn, |v| v as usize),
+            step_um: s.float_or("step_nm", Limits::new(1.0..=50.0, "nm"), default.step_um * 1e3) * 1e-3,
+            pixels: s.integer_or("pixels", 8..=1024, "", default.pixels as i64) as usize & !1,
+            pixel_um: s.float_or("pixel_um", Limits::new(0.5..=50.0, "um"), default.pixel_um),
+            shared_filter: s.float_or("shared_filter", Limits::new(0.0..=1.0, ""), default.shared_filter),
+            drawn: s.integer_or("drawn", 1..=100, "", default.drawn as i64) as usize,
         };
         s.finish();
         spec
