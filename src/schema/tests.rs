@@ -20,6 +20,8 @@ fn schemas_are_those_of_the_readers() {
         FileKind::Study,
         FileKind::WidthSet,
     ] {
-        assert!(kind.schema() == kind.schema_of_readers(), "{}", kind.name());
+        // The order of keys depends on the features that serde_json is built with.
+        let shipped: Value = serde_json::from_str(kind.schema()).unwrap();
+        assert!(shipped == kind.schema_value(), "{}", kind.name());
     }
 }

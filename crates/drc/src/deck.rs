@@ -530,8 +530,8 @@ mod tests {
               help: add `nm`: a number from 0 to 1000000 nm
             deck.toml:10:6: a second rule `a`
               help: give every rule its own id
-            deck.toml:11:9: there is no check `wings`
-              help: docs/guide/check.md lists all checks
+            deck.toml:11:9: `check` cannot be "wings"
+              help: use one of: width_min, width_max, aspect_max, width_library, square, circle, rectangle, manhattan, acute_angle, self_crossing, doubled_vertex, collinear_vertex, zero_area, winding, vertices_max, closed, on_lattice, grid, exposure_grid, gap_min, gap_aspect_max, overlap, duplicate, fill, fill_gradient, field_cut, field_in_lens, aperture_margin, metal_on_pillars, aperture_each, mark_keep_out, marks_complete, layers_known, active_area, no_text_exposed, cell_names, depth_max, references_max, one_top, dangling, recursive, cell_twice, bytes_behind_end, file_size, shape_count, write_time, pillar_count, width_map, phase_step, lattice_orders
             deck.toml:15:8: `from` cannot be "layout"
               help: use one of: design
             "#);
@@ -541,7 +541,7 @@ mod tests {
                 "layers.pillars/inconsistent",
                 "rule#0.nm/missing",
                 "rule#1.id/inconsistent",
-                "rule#1.check/inconsistent",
+                "rule#1.check/unknown-choice",
                 "rule#2.from/unknown-choice"
             ]
         );
