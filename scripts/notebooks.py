@@ -16,7 +16,7 @@ from pathlib import Path
 from cpu_time import children
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "python/examples"
-NOTEBOOKS = ["lens_in_ten_lines", "foreign_layout", "calibration"]
+NOTEBOOKS = ["lens_in_ten_lines", "foreign_layout", "calibration", "gradient"]
 
 # All of them together (s of CPU): what a person waits for, and what every run of the checks costs.
 MOST_CPU_S = 60.0

@@ -9,6 +9,7 @@ that are done, and all of them. They work in forked children and in several thre
 
 from __future__ import annotations
 
+from ._gradient import PsfGradient, PsfModel, phases_of, widths_of
 from ._layouts import (
     Array,
     Design,
@@ -43,6 +44,8 @@ __all__ = [
     "MetalithError",
     "Places",
     "Psf",
+    "PsfGradient",
+    "PsfModel",
     "PsfSet",
     "RankedEffect",
     "Rectangles",
@@ -60,11 +63,13 @@ __all__ = [
     "check",
     "denoise",
     "index",
+    "phases_of",
     "places",
     "plan",
     "propagate",
     "psf",
     "read_layout",
     "verify",
+    "widths_of",
     "write_layout",
 ]

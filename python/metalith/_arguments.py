@@ -33,6 +33,9 @@ MOST_LIGHT = 1e6
 # Largest rotation (degrees): a double resolves a millionth of a degree there.
 MOST_DEG = 1e9
 
+# Largest phase (rad): a double resolves a millionth of a radian there.
+MOST_RAD = 1e9
+
 # Most of a frame, full scale being 1: what is larger are counts.
 MOST_SIGNAL = 10.0
 
@@ -165,6 +168,13 @@ def several(name: str, given: Iterable[npt.ArrayLike]) -> list[npt.ArrayLike]:
         return list(given)
     except TypeError:
         raise TypeError(f"`{name}` is a {type(given).__name__}\n  help: give a list of arrays") from None
+
+
+def phases(name: str, given: npt.ArrayLike) -> Float64:
+    """Phases (rad), NaN where there is no pillar."""
+    rad: Float64 = numbers(name, given, np.float64, nan=True, remedy="give finite phases, or NaN where there is no pillar")
+    refuse(name, rad, abs(rad) > MOST_RAD, f"give phases up to {MOST_RAD:g}, in radians")
+    return rad
 
 
 def widths(name: str, given: npt.ArrayLike) -> Widths:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import html
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal, TypeAlias, Union
 
 import numpy as np
@@ -139,21 +141,35 @@ def _shape(told: tuple[str, int, int, int]) -> Shape:
 
 
 class Design:
-    """What is built, how it is written, and what must hold of it: a design file."""
+    """What is built, how it is written, and what must hold of it: a design file.
 
-    def __init__(self, native: _native.Design) -> None:
+    It can be copied and pickled: as its text and its path. The files that it names are read again where it is unpickled, which is
+    refused if the design is another by them."""
+
+    def __init__(self, native: _native.Design, text: str) -> None:
         self._native = native
+        self._text = text
 
     @classmethod
     def read(cls, path: PathLike) -> Design:
         """Read a design file; all its mistakes are reported at once."""
-        return cls(_native.Design.read(path))
+        native = _native.Design.read(path)
+        return cls(native, Path(path).read_text(encoding="utf-8"))
 
     @classmethod
     def parse(cls, text: str, path: PathLike = "design.toml") -> Design:
         """The design of a text, such as one that was made in Python. Files that it names count from the folder of
         ``path``, which need not be there."""
-        return cls(_native.Design.parse(text, path))
+        return cls(_native.Design.parse(text, path), text)
+
+    def __copy__(self) -> Design:
+        return Design(self._native, self._text)
+
+    def __deepcopy__(self, _: object) -> Design:
+        return self.__copy__()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled, (self._text, os.path.abspath(self._native.path), self.digest)
 
     @property
     def name(self) -> str:
@@ -235,8 +251,21 @@ class Design:
         return f'<svg width="120" height="120" viewBox="{box}" fill="#4a7ab5">{circles}</svg>'
 
 
+def _unpickled(text: str, path: str, digest: str) -> Design:
+    """A design that was pickled, with the digest that it had."""
+    design = Design.parse(text, path)
+    if design.digest != digest:
+        raise _native.MetalithError(
+            f"the pickled design {design.name!r} is another here: a file that it names has changed, {path}\n"
+            "  help: read the design anew, or bring back the files that it was read with"
+        )
+    return design
+
+
 class Array:
-    """The pillars of all elements of a chip."""
+    """The pillars of all elements of a chip.
+
+    It can be copied and pickled: as its design, of which it is built again, or as its maps."""
 
     def __init__(self, native: _native.Array, design: Design | None = None) -> None:
         self._native = native
@@ -299,8 +328,25 @@ class Array:
         is for arrays without a design."""
         return self._native.write(path, hierarchy, _arguments.layer(layer), progress)
 
+    def __copy__(self) -> Array:
+        return Array(self._native, self.design)
+
+    def __deepcopy__(self, _: object) -> Array:
+        return self.__copy__()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.design is not None:
+            return Design.array, (self.design,)
+        maps = [self.widths(k) for k in range(len(self))]
+        return _of_maps, (maps, self.pitch_nm, self.lattice, self.centres_nm, _told(self.shape))
+
     def __repr__(self) -> str:
         return f"Array({len(self)} elements, {self.pillars:,} pillars)"
+
+
+def _of_maps(*told: Any) -> Array:
+    """The array of maps that the native module is told."""
+    return Array(_native.array_of_widths(*told))
 
 
 @dataclass(frozen=True)

@@ -334,6 +334,23 @@ class Transmission(np.ndarray[Any, np.dtype[np.complex128]]):
         self.width_nm = None
         self.wavelength_nm = None
 
+    def __reduce__(self) -> Any:
+        reduced: Any = super().__reduce__()
+        make, arguments, state = reduced
+        return make, arguments, (state, self.width_nm, self.wavelength_nm)
+
+    def __setstate__(self, state: Any) -> None:
+        values, self.width_nm, self.wavelength_nm = state
+        super().__setstate__(values)
+
+    def __copy__(self) -> Transmission:
+        copied = super().__copy__().view(Transmission)
+        copied.width_nm, copied.wavelength_nm = self.width_nm, self.wavelength_nm
+        return copied
+
+    def __deepcopy__(self, _: Any) -> Transmission:
+        return self.__copy__()
+
     def _coordinates(self) -> tuple[Float64, Float64]:
         """Widths and wavelengths, both as lists."""
         if self.width_nm is None or self.wavelength_nm is None:

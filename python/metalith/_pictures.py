@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +20,20 @@ METHODS = ("tikhonov", "tv", "richardson-lucy", "hqs", "prior")
 
 
 class Frame:
-    """A frame that was recorded."""
+    """A frame that was recorded. It can be copied; it is pickled with the system that recorded it."""
 
-    def __init__(self, native: _native.Frame) -> None:
+    def __init__(self, native: _native.Frame, system: ImagingSystem) -> None:
         self._native = native
+        self._system = system
+
+    def __copy__(self) -> Frame:
+        return Frame(self._native, self._system)
+
+    def __deepcopy__(self, _: object) -> Frame:
+        return self.__copy__()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ImagingSystem.frame, (self._system, self.planes)
 
     @property
     def planes(self) -> list[npt.NDArray[np.float32]]:
@@ -46,7 +58,9 @@ class ImagingSystem:
     ``distance_mm``: of their plane; far if left out. ``model``: the chip as made, by the model of a calibration.
     ``prior``: weights for the method ``prior`` that ``metalith train`` wrote; those of the program if left out.
     ``lux`` and ``time_ms``: illuminance of the scenes (lux) and time of the exposure (ms), in place of what the camera file
-    states. ``longest_ms`` instead of ``time_ms``: the camera chooses a time up to this by its light."""
+    states. ``longest_ms`` instead of ``time_ms``: the camera chooses a time up to this by its light.
+
+    It can be copied and pickled: as its design and its files, from which it is opened again."""
 
     def __init__(
         self,
@@ -72,12 +86,25 @@ class ImagingSystem:
         self._native = _native.ImagingSystem.open(
             design._native, layout, camera, rows, columns, field_deg, distance_mm, model, prior, lux, time_ms, longest_ms, progress
         )
+        files = (None if path is None else os.path.abspath(path) for path in (layout, camera, model, prior))
+        self._opened = (design, *files, shape, field_deg, distance_mm, lux, time_ms, longest_ms)
+
+    def __copy__(self) -> ImagingSystem:
+        copied = ImagingSystem.__new__(ImagingSystem)
+        vars(copied).update(vars(self))
+        return copied
+
+    def __deepcopy__(self, _: object) -> ImagingSystem:
+        return self.__copy__()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _opened, self._opened
 
     def record(self, scene: npt.ArrayLike, *, seed: int = 1, progress: Progress | None = None) -> Frame:
         """The frame of a scene ``[row, column, colour]`` in linear sRGB, white being 1, or of a grey one ``[row, column]``; noise
         is drawn from ``seed``."""
         drawn = _arguments.whole("seed", seed, 0, _arguments.MOST_64)
-        return Frame(self._native.record(_scene(scene), drawn, progress))
+        return Frame(self._native.record(_scene(scene), drawn, progress), self)
 
     def frame(self, planes: Sequence[npt.ArrayLike]) -> Frame:
         """The frame that a camera recorded, to be restored: ``planes`` as those of :attr:`Frame.planes`, full scale being 1 and no
@@ -87,7 +114,7 @@ class ImagingSystem:
         for plane in signals:
             _arguments.square("planes", plane)
             _arguments.refuse("planes", plane, abs(plane) > most, f"divide by full scale: signals reach {most:g} at most")
-        return Frame(self._native.frame(signals))
+        return Frame(self._native.frame(signals), self)
 
     def truth(self, scene: npt.ArrayLike) -> Float64:
         """What an ideal camera with the same channels gives of a scene, as :meth:`record` takes it, linear sRGB: what pictures
@@ -106,6 +133,17 @@ class ImagingSystem:
         it is."""
         wanted = _arguments.whole("count", count, 1, _arguments.MOST_32)
         return self._native.samples(frame._native, wanted, progress)
+
+
+def _opened(
+    design: Design, layout: str, camera: str, model: str | None, prior: str | None, shape: tuple[int, int], field_deg: float,
+    distance_mm: float | None, lux: float | None, time_ms: float | None, longest_ms: float | None,
+) -> ImagingSystem:
+    """A system that was pickled."""
+    return ImagingSystem(
+        design, layout, camera, shape=shape, field_deg=field_deg, distance_mm=distance_mm, model=model, prior=prior, lux=lux,
+        time_ms=time_ms, longest_ms=longest_ms,
+    )
 
 
 def _scene(given: npt.ArrayLike) -> Float64:

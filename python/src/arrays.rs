@@ -71,6 +71,12 @@ impl Design {
         self.design.cell.lattice.to_string()
     }
 
+    /// Places along an axis of the map of one element.
+    #[getter]
+    fn sites(&self) -> usize {
+        self.design.lattice().sites()
+    }
+
     #[getter]
     fn pillar_height_nm(&self) -> f64 {
         self.design.cell.pillar_height_nm

@@ -6,6 +6,7 @@
 
 mod arrays;
 mod checks;
+mod gradient;
 mod lattices;
 mod light;
 mod pictures;
@@ -68,6 +69,11 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<pictures::ImagingSystem>()?;
     m.add_class::<pictures::Frame>()?;
     m.add_function(wrap_pyfunction!(pictures::denoise, m)?)?;
+    m.add_class::<gradient::PsfModel>()?;
+    m.add_class::<gradient::PsfPullback>()?;
+    m.add_function(wrap_pyfunction!(gradient::curve_of, m)?)?;
+    m.add_function(wrap_pyfunction!(gradient::widths_of, m)?)?;
+    m.add_function(wrap_pyfunction!(gradient::phases_of, m)?)?;
     m.add_function(wrap_pyfunction!(checks::check, m)?)?;
     m.add_function(wrap_pyfunction!(checks::verify, m)?)?;
     m.add_function(wrap_pyfunction!(checks::calibrate, m)?)?;

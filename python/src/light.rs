@@ -4,8 +4,8 @@ use std::path::Path;
 
 use metalith::cell::CellStack;
 use metalith::rcwa::{Material, Orders};
-use metalith::wave::{Aperture, Direct, FoldedPropagator, PlaneWave, Propagator, Scratch, Window};
-use metalith::{Accuracy, Error, Lattice, LatticeKind, Result};
+use metalith::wave::{Aperture, Direct, FoldedPropagator, PlaneWave, Propagator, Scratch, TransmissionMap, Window};
+use metalith::{Accuracy, Error, Lattice, Result};
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
@@ -26,48 +26,20 @@ pub(crate) fn stack(pitch_nm: f64, height_nm: f64, pillar: &str, substrate: &str
     })
 }
 
-/// A complex transmission on a lattice.
-struct Given {
-    lattice: Lattice,
-    values: Array2<Complex32>,
-    radius_um: f64,
-}
-
-impl Aperture for Given {
-    fn lattice(&self) -> Lattice {
-        self.lattice
+/// An aperture of such transmissions on a lattice.
+///
+/// # Errors
+/// If one is no number, or stands where there is no site.
+fn aperture_of(values: Array2<Complex32>, lattice: Lattice) -> Result<TransmissionMap> {
+    if values.iter().any(|v| !v.re.is_finite() || !v.im.is_finite()) {
+        return Err(Error::refused(
+            "aperture/not-numbers",
+            "an aperture with values that are no numbers",
+            "give finite values",
+        ));
     }
-
-    fn radius_um(&self) -> f64 {
-        self.radius_um
-    }
-
-    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
-        for (to, from) in row.iter_mut().zip(self.values.row(iy)) {
-            *to = *from;
-        }
-    }
-}
-
-impl Given {
-    fn new(values: Array2<Complex32>, pitch_nm: u32, kind: LatticeKind) -> Result<Self> {
-        let lattice = lattice_of(kind, pitch_nm, values.dim(), "aperture")?;
-        if values.iter().any(|v| !v.re.is_finite() || !v.im.is_finite()) {
-            return Err(Error::refused(
-                "aperture/not-numbers",
-                "an aperture with values that are no numbers",
-                "give finite values",
-            ));
-        }
-        check_places(lattice, &values, |v| *v != Complex32::ZERO)?;
-        let open = values.indexed_iter().filter(|(_, v)| **v != Complex32::ZERO);
-        let farthest2 = open.map(|((iy, ix), _)| lattice.units2(ix, iy)).max().unwrap_or(0);
-        Ok(Self {
-            lattice,
-            values,
-            radius_um: (farthest2 as f64).sqrt() * lattice.unit_um(),
-        })
-    }
+    check_places(lattice, &values, |v| *v != Complex32::ZERO)?;
+    Ok(TransmissionMap::new(lattice, values)?)
 }
 
 /// A field, and the places of its columns and rows (um).
@@ -99,9 +71,11 @@ pub fn propagate<'py>(
 ) -> PyResult<FieldOnGrid<'py>> {
     let single = aperture.as_array().mapv(|v| Complex32::new(v.re as f32, v.im as f32));
     drop(aperture);
-    let given = Given::new(single, pitch_nm, kind_of(lattice).map_err(error)?).map_err(error)?;
+    let kind = kind_of(lattice).map_err(error)?;
+    let lattice = lattice_of(kind, pitch_nm, single.dim(), "aperture").map_err(error)?;
+    let given = aperture_of(single, lattice).map_err(error)?;
     let um = wavelength_nm * 1e-3;
-    let window = Window::about(at_um, step_um.unwrap_or(given.lattice.pitch_um()), samples, distance_um);
+    let window = Window::about(at_um, step_um.unwrap_or(lattice.pitch_um()), samples, distance_um);
     let [sin_x, sin_y] = incidence_deg.map(|deg| deg.to_radians().sin());
     let wave = PlaneWave {
         wavelength_um: um,
@@ -112,10 +86,10 @@ pub fn propagate<'py>(
         let accuracy = if fast { Accuracy::Fast } else { Accuracy::Accurate };
         let mut scratch = Scratch::default();
         if direct {
-            let sum = Direct::plan(given.lattice, um, window)?;
+            let sum = Direct::plan(lattice, um, window)?;
             return Ok(sum.field(&given, &wave, &mut scratch)?);
         }
-        let fold = FoldedPropagator::plan(given.lattice, given.radius_um, um, window, accuracy)?;
+        let fold = FoldedPropagator::plan(lattice, given.radius_um(), um, window, accuracy)?;
         Ok(fold.field(&given, &wave, &mut scratch)?)
     })?;
     let along = |axis: usize| (0..window.samples).map(move |i| window.coordinate_um(axis, i));

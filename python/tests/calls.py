@@ -21,6 +21,7 @@ MINI = ROOT / "designs/mini_3x3.toml"
 SHAPE = (24, 24)
 PILLARS = np.full((8, 8), 200, dtype=np.uint16)
 MAP: dict[str, Any] = dict(pitch_nm=350, distance_um=20.0, samples=16, fast=True)
+LIT: dict[str, Any] = dict(pitch_nm=350, wavelength_nm=660, distance_um=20)
 RECTANGLES = ml.Rectangles(100, 250, 90)
 UPRIGHT = ml.UprightRectangles(90, 10, 4)
 
@@ -93,6 +94,7 @@ class Calls:
         self.system = self.open()
         self.frame = self.system.record(self.scene)
         self._numbers = itertools.count()
+        self.model = ml.PsfModel(8, samples=16, **LIT)
 
     def open(self) -> ml.ImagingSystem:
         return ml.ImagingSystem(self.design, self.chip, self.folder / "small.toml", shape=SHAPE, field_deg=20.0)
@@ -130,6 +132,13 @@ class Calls:
             )[0],
             "cell": lambda: np.asarray(ml.cell([150.0, 200.0], [600.0, 660.0], orders=5)),
             "index": lambda: ml.index("fused_silica_malitson_1965", [600.0]),
+            "PsfModel.plan": lambda: ml.PsfModel(8, samples=8, **LIT)(PILLARS),
+            "PsfModel.places": lambda: self.model.x_um,
+            "PsfModel.psf": lambda: self.model(PILLARS),
+            "PsfModel.pull": lambda: self.model.vjp(PILLARS)[1](np.ones((16, 16))).map,
+            "curve_of": lambda: _native.curve_of(self.design._native, 660.0, "published")[1],
+            "widths_of": lambda: ml.widths_of(turns, self.design),
+            "phases_of": lambda: ml.phases_of(self.array.widths(0), self.design),
             "check": lambda: ml.check(self.chip, design=self.design).numbers,
             "verify": lambda: ml.verify(self.design, self.chip, fast=True).checks,
             # These take minutes: their refusals come from the same threads.

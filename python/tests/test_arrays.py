@@ -78,6 +78,12 @@ TAKEN = {
     "cell at wavelengths": Taken("wavelength_nm", NM, lambda _, v: np.asarray(ml.cell(200.0, v, orders=3))),
     "index": Taken("wavelength_nm", NM, lambda _, v: ml.index("fused_silica_malitson_1965", v)),
     "propagate": Taken("aperture", square([1, 0.5, -1, 0, 2]), lambda _, v: ml.propagate(v, **LIT)[0]),
+    "widths_of": Taken("phase_rad", TURNS, lambda c, v: ml.widths_of(v, c.design), nan=True),
+    "phases_of": Taken("width_nm", WIDTHS, lambda c, v: ml.phases_of(v, c.design)),
+    "PsfModel": Taken("x", square([1, 7, 0.5, 0]), lambda _, v: ml.PsfModel(6, **LIT)(v), nan=True),
+    "PsfModel of amplitudes": Taken(
+        "amplitude", square([1, 0.5, 0]), lambda _, v: ml.PsfModel(6, amplitude=v, **LIT)(np.ones((6, 6)))
+    ),
     "record": Taken("scene", LIGHT, lambda c, v: c.system.record(v).planes[0]),
     "truth": Taken("scene", LIGHT, lambda c, v: c.system.truth(v)),
     "frame": Taken("planes", np.linspace(0, 1, 1600).reshape(40, 40), lambda c, v: c.system.frame([v]).planes[0]),

@@ -13,6 +13,7 @@ import pytest
 import metalith as ml
 
 ROOT = Path(__file__).resolve().parents[2]
+OPTIONAL = ("xarray", "matplotlib", "torch", "jax", "scipy")
 
 
 @pytest.fixture(scope="module")
@@ -68,20 +69,29 @@ def test_figures_are_drawn_of_what_was_computed(psfs: ml.PsfSet) -> None:
 
 @pytest.mark.parametrize(
     ("call", "package"),
-    [("t.to_xarray()", "xarray"), ("t.plot()", "matplotlib"), ("p.to_xarray()", "xarray"), ("p.plot()", "matplotlib")],
+    [
+        ("t.to_xarray()", "xarray"),
+        ("t.plot()", "matplotlib"),
+        ("p.to_xarray()", "xarray"),
+        ("p.plot()", "matplotlib"),
+        ("metalith.torch.psf(model, np.ones((8, 8)))", "torch"),
+        ("metalith.jax.psf(model)", "jax"),
+        ("metalith.scipy.minimize(model, np.ones((8, 8)), np.ones((8, 8)))", "scipy"),
+    ],
 )
 def test_a_package_that_is_missing_is_named_with_the_remedy(call: str, package: str) -> None:
     code = (
-        "import sys, numpy as np, metalith as ml\n"
-        "assert not {'xarray', 'matplotlib'} & set(sys.modules), 'imported before they are asked for'\n"
+        "import sys, numpy as np, metalith as ml, metalith.jax, metalith.scipy, metalith.torch\n"
+        f"assert not {set(OPTIONAL)} & set(sys.modules), 'imported before they are asked for'\n"
         # What Python's own search gives where a package is not installed.
         "class Nothing:\n"
         "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name.partition('.')[0] in ('xarray', 'matplotlib'):\n"
+        f"        if name.partition('.')[0] in {OPTIONAL}:\n"
         "            raise ModuleNotFoundError(f'No module named {name!r}', name=name.partition('.')[0])\n"
         "sys.meta_path.insert(0, Nothing())\n"
         "t = ml.cell([200.0], [530.0], orders=3)\n"
         "p = ml.psf(np.full((8, 8), 200, dtype=np.uint16), [530], pitch_nm=350, distance_um=20.0, samples=8, fast=True)\n"
+        "model = ml.PsfModel(8, pitch_nm=350, wavelength_nm=530, distance_um=20.0, samples=8)\n"
         f"try:\n    {call}\n"
         "except ml.MetalithError as error:\n    print(error)\n"
     )

@@ -61,6 +61,7 @@ mod drawn_optics;
 mod element_optics;
 mod etched_stack;
 mod fields;
+mod lens_psf;
 mod light;
 mod model;
 mod neighbour_pillars;
@@ -72,6 +73,7 @@ mod realised_cells;
 mod shifted_aperture;
 mod simulation_case;
 mod stitching;
+mod transmission_curve;
 pub mod zernike;
 
 pub use metalith_core::expression;
@@ -89,6 +91,7 @@ pub use density::{RANGE_UM, fill};
 pub use element_optics::{ElementOptics, FocusedSites, Placement};
 pub use etched_stack::{off_cutoff, perturbed, possible_width_nm, to_middle_tops};
 pub use fields::{Field, IncoherentFields, spread};
+pub use lens_psf::{LensGradient, LensPsf, LensPullback, PillarVariable};
 pub use light::{ArrivingLight, cell_direction};
 pub use model::{CalibratedModel, DoseResponse};
 pub use neighbour_pillars::NeighbourPillars;
@@ -97,3 +100,4 @@ pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, Pa
 pub use realised_cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
 pub use simulation_case::{CaseOptics, SimulationCase};
 pub use stitching::Stitching;
+pub use transmission_curve::TransmissionCurve;

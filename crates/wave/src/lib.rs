@@ -8,6 +8,6 @@ pub mod psf;
 pub use error::{Result, WaveError};
 pub use propagation::{
     Accuracy, Aperture, Direct, Fade, Field, FoldedPropagator, Hankel, PhaseFunction, PhaseMap, PhaseSites,
-    PillarFunction, Pillars, PlaneWave, Propagator, Scratch, Window,
+    PillarFunction, Pillars, PlaneWave, Propagator, Scratch, TransmissionMap, Window,
 };
-pub use psf::{IdealPsf, Psf, PsfMetrics};
+pub use psf::{DifferentiablePsf, IdealPsf, Psf, PsfCotangents, PsfMetrics, PsfPullback};

@@ -104,6 +104,15 @@ pub(crate) fn multiply_to(out: &mut [Complex32], a: &[Complex32], b: &[Complex32
     });
 }
 
+/// `out[i] = a[i] * conj(b[i]) * c`.
+pub(crate) fn multiply_conj_to(out: &mut [Complex32], a: &[Complex32], b: &[Complex32], c: Complex32) {
+    pulp::Arch::new().dispatch(|| {
+        for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
+            *o = product(product(*a, b.conj()), c);
+        }
+    });
+}
+
 /// `sum[i] += a[i] * b[i] * c`.
 pub(crate) fn accumulate(sum: &mut [Complex32], a: &[Complex32], b: &[Complex32], c: Complex32) {
     pulp::Arch::new().dispatch(|| {

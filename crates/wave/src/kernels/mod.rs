@@ -29,6 +29,8 @@ pub use products::sum_of_products;
 pub use square_fft::{FftScratch, SquareFft};
 pub use taper::{fade, sinc};
 
-pub(crate) use cis::{accumulate, cis_where, multiply, multiply_by, multiply_conj, multiply_to, product_sum};
+pub(crate) use cis::{
+    accumulate, cis_where, multiply, multiply_by, multiply_conj, multiply_conj_to, multiply_to, product_sum,
+};
 pub(crate) use fft::{gather, process, scatter};
 pub(crate) use fourier::Fourier;

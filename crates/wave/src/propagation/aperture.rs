@@ -1,6 +1,7 @@
 //! The transmission of an element, row by row.
 
 use metalith_pillars::{Lattice, PillarRows};
+use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 
 use crate::error::{Result, WaveError};
@@ -29,6 +30,68 @@ pub trait Aperture: Sync {
     /// # Panics
     /// May panic if `row` has not one entry a site, or `iy` is no row.
     fn fill_row(&self, iy: usize, row: &mut [Complex32]);
+}
+
+/// A complex transmission that is known at each site.
+#[derive(Clone, Debug)]
+pub struct TransmissionMap {
+    lattice: Lattice,
+    radius_um: f64,
+    values: Array2<Complex32>,
+}
+
+impl TransmissionMap {
+    /// Transmissions on a lattice, zero where nothing passes, of shape `[sites, sites]`, row index along +y.
+    ///
+    /// # Errors
+    /// If they have another shape.
+    pub fn new(lattice: Lattice, values: Array2<Complex32>) -> Result<Self> {
+        let open = values.indexed_iter().filter(|(_, t)| **t != Complex32::ZERO);
+        let farthest2 = open.map(|((iy, ix), _)| lattice.units2(ix, iy)).max().unwrap_or(0);
+        Self::within(lattice, (farthest2 as f64).sqrt() * lattice.unit_um(), values)
+    }
+
+    /// Variant of [`TransmissionMap::new`] for transmissions of which none that passes light is farther from the centre than
+    /// `radius_um`, which are not searched for the farthest.
+    ///
+    /// # Errors
+    /// As [`TransmissionMap::new`].
+    pub fn within(lattice: Lattice, radius_um: f64, values: Array2<Complex32>) -> Result<Self> {
+        let n = lattice.sites();
+        if values.dim() != (n, n) {
+            return Err(WaveError::Shape {
+                what: "transmissions",
+                given: values.dim().into(),
+                wanted: [n; 2],
+            });
+        }
+        Ok(Self {
+            lattice,
+            radius_um,
+            values,
+        })
+    }
+
+    /// Transmission of each site.
+    pub fn values(&self) -> &Array2<Complex32> {
+        &self.values
+    }
+}
+
+impl Aperture for TransmissionMap {
+    fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        for (to, from) in row.iter_mut().zip(self.values.row(iy)) {
+            *to = *from;
+        }
+    }
 }
 
 /// Pillars as they stand in a layout, through a table of what each width transmits.

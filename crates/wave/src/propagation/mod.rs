@@ -27,7 +27,7 @@ mod tiles;
 mod transfer;
 mod window;
 
-pub use aperture::{Aperture, PillarFunction, Pillars};
+pub use aperture::{Aperture, PillarFunction, Pillars, TransmissionMap};
 pub use band::{Accuracy, Fade};
 pub use direct_sum::Direct;
 pub use distances::{Distances, DistancesPlan, DistancesScratch};
@@ -37,6 +37,7 @@ pub use local_angular_spectrum::LocalAngularSpectrum;
 pub use metalith_pillars::Steepness;
 pub use phase::{PhaseFunction, PhaseMap, PhaseSites};
 pub use plane_wave::{PlaneWave, incident, landing_um, leaving};
+pub(crate) use propagator::check_shape;
 pub use propagator::{Field, Propagator, Scratch};
 pub use sensor_irradiance::{LandingGrid, SensorIrradiance};
 pub use window::Window;

@@ -90,7 +90,7 @@ pub(super) fn check_wave(wave: &PlaneWave, wavelength_um: f64) -> Result<()> {
     Ok(())
 }
 
-pub(super) fn check_shape(values: &Array2<Complex32>, window: &Window) -> Result<()> {
+pub(crate) fn check_shape<T>(values: &Array2<T>, window: &Window) -> Result<()> {
     if values.dim() == (window.samples, window.samples) {
         return Ok(());
     }

@@ -76,6 +76,16 @@ impl Transfer<'_> {
         });
     }
 
+    /// Multiplies factors of [`Transfer::to_distance`] so that they give the derivative along z of the field over exp(i k z).
+    /// The weights of the fade are constants.
+    pub(crate) fn slope(&self, faded: &FadedColumn, out: &mut [Complex32]) {
+        let along = 1.0 / self.wavelength_um;
+        for (out, fz) in out.iter_mut().zip(&faded.axial) {
+            let rate = (std::f64::consts::TAU * (fz - along)) as f32;
+            *out = Complex32::new(-out.im * rate, out.re * rate);
+        }
+    }
+
     /// `out[i]` is what multiplies frequency `i` of a column on its way to `distance_um`.
     pub(crate) fn to_distance(
         &self,

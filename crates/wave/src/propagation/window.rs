@@ -50,6 +50,12 @@ impl Window {
         Self::about(point_um, pitch_um / parts, pitches * parts as usize, distance_um)
     }
 
+    /// This window on a plane at another distance (um), about the same point.
+    #[must_use]
+    pub fn at_distance(self, distance_um: f64) -> Self {
+        Self { distance_um, ..self }
+    }
+
     /// Place of sample `i` of an axis (0 for x, 1 for y) from the element's centre (um).
     pub fn coordinate_um(&self, axis: usize, i: usize) -> f64 {
         self.centre_um[axis] + (i as f64 - 0.5 * (self.samples as f64 - 1.0)) * self.step_um

@@ -12,8 +12,10 @@
 //! | how much two differ | `difference` |
 //! | a band of wavelengths from one direction | `polychromatic` |
 //! | shares of light in diffraction orders of a mapping | `orders` |
+//! | its derivatives by transmissions, wedge and distance | `differentiable` |
 
 mod difference;
+mod differentiable;
 mod energy;
 mod ideal_psf;
 mod metrics;
@@ -29,6 +31,7 @@ use ndarray::{Array2, Axis};
 use crate::error::Result;
 use crate::propagation::{Aperture, Field, Otf, PlaneWave, Propagator, Scratch, Window};
 
+pub use differentiable::{DifferentiablePsf, PsfCotangents, PsfPullback, phase_cotangent};
 pub use ideal_psf::IdealPsf;
 pub use metrics::{FocusMetrics, PsfMetrics};
 pub use mtf::{PixelFrequencies, pixel_mtf};

@@ -3,8 +3,9 @@
 use ndarray::Array2;
 use num_complex::Complex32;
 
+use super::planes::Plane;
 use super::{FoldedPropagator, LANES};
-use crate::kernels::{multiply_conj, process, scatter};
+use crate::kernels::{multiply_conj, multiply_conj_to, process, scatter};
 use crate::propagation::{PlaneWave, Scratch};
 
 impl FoldedPropagator {
@@ -28,8 +29,8 @@ impl FoldedPropagator {
         }
     }
 
-    /// The adjoint of `columns_forward`.
-    pub(super) fn columns_adjoint(&self, scratch: &mut Scratch) {
+    /// The adjoint of `columns_forward` to one plane.
+    pub(super) fn columns_adjoint(&self, plane: &Plane, scratch: &mut Scratch) {
         let (m, residues, samples) = (self.band.bins[1], self.residues(), self.window.samples);
         let [kx, ky] = self.band.count;
         let Scratch {
@@ -59,7 +60,7 @@ impl FoldedPropagator {
             let rows = self.band.rows[k].clone();
             let kept = &mut spectrum[rows.clone()];
             let transfer = &mut transfer[..rows.len()];
-            self.transfer(&self.window, k, faded, transfer);
+            self.transfer(plane, k, faded, transfer);
             multiply_conj(kept, transfer);
             column.fill(Complex32::ZERO);
             scatter(column, kept, self.band.first[1] + rows.start as i64);
@@ -97,10 +98,13 @@ impl FoldedPropagator {
             for iy in self.rows_of(r) {
                 let wy = wave_y[iy].conj();
                 let mut line = sites.row_mut(iy);
-                for (ix, (site, wx)) in line.iter_mut().zip(wave_x.iter()).enumerate() {
-                    if self.lattice.has(ix, iy) {
-                        *site = folded[ix % m] * wx.conj() * wy;
-                    }
+                let line = line.as_slice_mut().expect("rows are contiguous");
+                for (part, wave) in line.chunks_mut(m).zip(wave_x.chunks(m)) {
+                    multiply_conj_to(part, &folded[..part.len()], wave, wy);
+                }
+                if !self.lattice.is_square() {
+                    let between = line.iter_mut().enumerate().filter(|(ix, _)| !self.lattice.has(*ix, iy));
+                    between.for_each(|(_, site)| *site = Complex32::ZERO);
                 }
             }
         }

@@ -5,9 +5,10 @@ use std::ops::Range;
 use ndarray::ArrayViewMut2;
 use num_complex::Complex32;
 
+use super::planes::Plane;
 use super::{FoldedPropagator, LANES};
 use crate::kernels::{accumulate, gather, multiply_to, process, product_sum};
-use crate::propagation::{Aperture, PlaneWave, Scratch, Window};
+use crate::propagation::{Aperture, PlaneWave, Scratch};
 
 impl FoldedPropagator {
     /// Folds and transforms along x; leaves the kept columns of these blocks in tiles of `LANES` columns by all rows. Gives
@@ -69,7 +70,7 @@ impl FoldedPropagator {
     pub(super) fn columns_forward(
         &self,
         blocks: Range<usize>,
-        planes: &[Window],
+        planes: &[Plane],
         scratch: &mut Scratch,
         observe: &mut dyn FnMut(&[Complex32]),
     ) {

@@ -12,6 +12,7 @@
 mod adjoint;
 mod forward;
 mod otf;
+mod planes;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -23,11 +24,12 @@ use rustfft::{Fft, FftPlanner};
 
 use super::band::FrequencyBand;
 use super::chirp_transform::Zoom;
-use super::propagator::{check_shape, check_wave};
+use super::propagator::check_wave;
 use super::transfer::{FadedColumn, FrequencyColumn, Transfer};
 use super::{Accuracy, Aperture, Fade, Field, PlaneWave, Propagator, Scratch, Window};
 use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
+use planes::Plane;
 
 pub use otf::Otf;
 
@@ -174,42 +176,9 @@ impl FoldedPropagator {
                 wanted: [samples; 2],
             });
         }
-        let power_um2 = self.spectra(aperture, wave, &[self.window], scratch, observe)?;
+        let power_um2 = self.spectra(aperture, wave, &[Plane::field(self.window)], scratch, observe)?;
         self.window_rows(0, scratch, &mut values);
         Ok(power_um2)
-    }
-
-    /// Fields in planes along z by one transform of the aperture: at each of `distances_um` in a window of the size of the
-    /// planned one, about the ray from the centre of the element through the middle of that window.
-    ///
-    /// Frequencies are those whose rays reach the planned window: a plan is for the nearest of the planes.
-    ///
-    /// # Errors
-    /// As [`Propagator::field`], and if a distance is not positive.
-    pub fn fields_at(
-        &self,
-        aperture: &dyn Aperture,
-        wave: &PlaneWave,
-        distances_um: &[f64],
-        scratch: &mut Scratch,
-    ) -> Result<Vec<Field>> {
-        let plane = |z: &f64| Window {
-            distance_um: *z,
-            centre_um: self.window.centre_um.map(|c| c * z / self.window.distance_um),
-            ..self.window
-        };
-        let planes: Vec<Window> = distances_um.iter().map(plane).collect();
-        planes.iter().try_for_each(|plane| plane.check(self.wavelength_um))?;
-        self.spectra(aperture, wave, &planes, scratch, &mut |_| {})?;
-        let field = |(k, window): (usize, &Window)| {
-            let mut values = Array2::zeros([window.samples; 2]);
-            self.window_rows(k, scratch, &mut values.view_mut());
-            Field {
-                window: *window,
-                ..self.finished(values, wave)
-            }
-        };
-        Ok(planes.iter().enumerate().map(field).collect())
     }
 
     /// Transforms an aperture to the columns of windows in planes along z; see [`Self::field_observed`].
@@ -217,7 +186,7 @@ impl FoldedPropagator {
         &self,
         aperture: &dyn Aperture,
         wave: &PlaneWave,
-        planes: &[Window],
+        planes: &[Plane],
         scratch: &mut Scratch,
         observe: &mut dyn FnMut(&[Complex32]),
     ) -> Result<f64> {
@@ -269,13 +238,14 @@ impl FoldedPropagator {
     }
 
     /// Factors of the retained frequencies of column `k` of the band on their way to a plane.
-    fn transfer(&self, plane: &Window, k: usize, faded: &mut FadedColumn, out: &mut [Complex32]) {
-        let z = plane.distance_um;
+    fn transfer(&self, plane: &Plane, k: usize, faded: &mut FadedColumn, out: &mut [Complex32]) {
+        let Plane { window, slope, .. } = plane;
+        let z = window.distance_um;
         let first = [0, self.rows().start];
         let transfer = Transfer {
             wavelength_um: self.wavelength_um,
-            centre_um: plane.centre_um,
-            shift_um: [0, 1].map(|a| plane.centre_um[a] - self.lattice.place_um(a, first[a])),
+            centre_um: window.centre_um,
+            shift_um: [0, 1].map(|a| window.centre_um[a] - self.lattice.place_um(a, first[a])),
             fade: &self.band.fade,
             cell_um: self.lattice.cell_um(),
         };
@@ -286,8 +256,11 @@ impl FoldedPropagator {
             ],
             count: out.len(),
         };
-        transfer.fade(z, column, faded);
+        transfer.fade(plane.faded_at_um, column, faded);
         transfer.to_distance(z, column, faded, out);
+        if *slope {
+            transfer.slope(faded, out);
+        }
     }
 
     /// The incident wave along both axes of the lattice.
@@ -332,12 +305,6 @@ impl Propagator for FoldedPropagator {
         wave: &PlaneWave,
         scratch: &mut Scratch,
     ) -> Result<Array2<Complex32>> {
-        check_wave(wave, self.wavelength_um)?;
-        check_shape(values, &self.window)?;
-        self.window_rows_adjoint(values, scratch);
-        self.columns_adjoint(scratch);
-        let mut sites = Array2::zeros([self.lattice.sites(); 2]);
-        self.rows_adjoint(wave, scratch, &mut sites);
-        Ok(sites)
+        self.adjoint_at(values, wave, self.window.distance_um, scratch)
     }
 }
