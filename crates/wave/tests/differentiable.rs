@@ -9,7 +9,7 @@ use metalith_wave::{
 };
 use ndarray::Array2;
 use num_complex::Complex32;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Agreement of derivatives with difference quotients, over the size of the derivative.
