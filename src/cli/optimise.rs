@@ -23,8 +23,8 @@ use super::{Outcome, Terminal, print_json, print_line, standard_input};
 #[derive(Args)]
 #[command(
     after_help = "The section [optimise] of the design sets merit, time and simulation model.\n\
-    Ctrl-C stores the best phase so far; the same command continues from there. The table of the cell, which comes first, is stored\n\
-    when it is whole: two to four CPU minutes for a new cell.\n\n\
+    Ctrl-C stores the best phase so far; the same command continues from there.\n\
+    The table of the cell comes first and is stored when it is whole: two to four CPU minutes for a new cell.\n\n\
     Example:\n  metalith optimise designs/broadband_3x3.toml --out out/optimised"
 )]
 pub(crate) struct OptimiseArgs {

@@ -123,7 +123,12 @@ impl<R: Fn(&Section<'_, '_>)> Explorer<R> {
             .filter(|part| !part.is_empty())
             .try_fold(&self.known, |table, part| table.keys.get(part).map(|key| &key.table));
         let key = table.and_then(|table| table.keys.get(name));
-        key.map_or_else(Vec::new, |key| key.forms.examples())
+        match key {
+            Some(key) => key.forms.examples(),
+            // A name that a user could give: its reader says more once it is there.
+            None if name == KeyTable::OF_THE_USER => vec![1.into()],
+            None => Vec::new(),
+        }
     }
 }
 
