@@ -35,7 +35,7 @@ impl FoldedPropagator {
     /// Frequencies are those whose rays reach the planned window: a plan is for the nearest of the planes.
     ///
     /// # Errors
-    /// As [`Propagator::field`], and if a distance is not positive.
+    /// As [`Propagator::field`](crate::propagation::Propagator::field), and if a distance is not positive.
     pub fn fields_at(
         &self,
         aperture: &dyn Aperture,
@@ -90,7 +90,7 @@ impl FoldedPropagator {
     /// The adjoint of [`FoldedPropagator::field_and_slope`] without the slope.
     ///
     /// # Errors
-    /// As [`Propagator::adjoint`], and if the distance is not positive.
+    /// As [`Propagator::adjoint`](crate::propagation::Propagator::adjoint), and if the distance is not positive.
     pub fn adjoint_at(
         &self,
         values: &Array2<Complex32>,
