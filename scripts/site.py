@@ -135,11 +135,11 @@ def libraries(source: Path, html_folder: Path, doc: Path) -> None:
         names = sorted(p.parent.name for p in doc.glob("metalith*/index.html"))
         alone = ["metalith_oasis", "metalith_gds", "metalith_rcwa", "metalith_wave"]
         for name in [n for n in alone if n in names] + [n for n in names if n not in alone]:
-            lines.append(f"- <a href=\"../rust/{name}/index.html\">{name}</a>")
+            lines.append(f"- <a href=\"rust/{name}/index.html\">{name}</a>")
         lines.append("")
     if importlib.util.find_spec("metalith"):
         subprocess.run([sys.executable, "-m", "pdoc", "metalith", "-o", html_folder / "python"], check=True)
-        lines += ["## Python", "", '- <a href="../python/metalith.html">metalith</a>', ""]
+        lines += ["## Python", "", '- <a href="python/metalith.html">metalith</a>', ""]
     if len(lines) == 2:
         lines.append("They were not made when this site was built: see `scripts/site.py`.")
     (source / "libraries.md").write_text("\n".join(lines) + "\n")
