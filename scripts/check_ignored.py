@@ -29,7 +29,6 @@ FULL = {
     # Studies and other work in shards.
     "pairs_of_shards_are_those_of_one_run",
     "starts_of_the_optimiser_are_runs_with_their_seeds",
-    "cameras_of_shards_are_those_of_one_comparison",
     "the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads",
     "a_design_of_a_grid_is_the_design_of_its_own_file",
     "designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables",

@@ -247,7 +247,11 @@ fn cameras_of_shards_are_those_of_one_comparison() {
         pixels: None,
         learnt: Vec::new(),
         lpips: None,
-        exposure: metalith_sensor::StatedExposure::default(),
+        // Less light would leave all of them at the longest time.
+        exposure: metalith_sensor::StatedExposure {
+            lux: Some(1e7),
+            ..Default::default()
+        },
         curve_lux: Vec::new(),
         times: ExposureTimes::Equal,
     };
