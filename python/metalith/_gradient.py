@@ -270,6 +270,11 @@ def _lens(x: npt.ArrayLike) -> Float64:
     return values
 
 
+def pair_of(values: Any) -> tuple[float, float]:
+    """Two numbers of an array of any package."""
+    return float(values[0]), float(values[1])
+
+
 def _length(name: str, um: float) -> float:
     value = float(um)
     if not (np.isfinite(value) and value > 0):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ._figures import imported
-from ._gradient import PsfModel
+from ._gradient import PsfModel, pair_of
 
 
 def psf(model: PsfModel) -> Any:
@@ -24,11 +24,11 @@ def psf(model: PsfModel) -> Any:
     jnp = imported("jax.numpy")
 
     def values(x: Any, distance_um: Any, wedge_deg: Any) -> Any:
-        found = model(x, distance_um=float(distance_um), wedge_deg=_pair(wedge_deg))
+        found = model(x, distance_um=float(distance_um), wedge_deg=pair_of(wedge_deg))
         return found.astype(x.dtype)
 
     def derivatives(x: Any, distance_um: Any, wedge_deg: Any, cotangents: Any) -> Any:
-        _, pull = model.vjp(x, distance_um=float(distance_um), wedge_deg=_pair(wedge_deg))
+        _, pull = model.vjp(x, distance_um=float(distance_um), wedge_deg=pair_of(wedge_deg))
         found = pull(cotangents)
         distance = np.asarray(found.distance_um, distance_um.dtype).reshape(distance_um.shape)
         return found.map.astype(x.dtype), distance, np.asarray(found.wedge_deg, wedge_deg.dtype)
@@ -61,7 +61,3 @@ def psf(model: PsfModel) -> Any:
 def _on_host(function: Any) -> Any:
     """A function of numpy arrays, whatever kind of array it is called back with."""
     return lambda *arguments: function(*map(np.asarray, arguments))
-
-
-def _pair(values: Any) -> tuple[float, float]:
-    return float(values[0]), float(values[1])

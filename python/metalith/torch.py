@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ._figures import imported
-from ._gradient import PsfModel
+from ._gradient import PsfModel, pair_of
 
 
 def psf(model: PsfModel, x: Any, distance_um: Any = None, wedge_deg: Any = None) -> Any:
@@ -32,7 +32,7 @@ def _function() -> Any:
         def forward(ctx: Any, x: Any, distance_um: Any, wedge_deg: Any, model: PsfModel) -> Any:
             ctx.like = [_like(given) for given in (x, distance_um, wedge_deg)]
             distance = None if distance_um is None else float(_array(distance_um))
-            wedge = (0.0, 0.0) if wedge_deg is None else _pair(_array(wedge_deg))
+            wedge = (0.0, 0.0) if wedge_deg is None else pair_of(_array(wedge_deg))
             # The derivative by the distance costs time: it is computed where it is required.
             found, ctx.pull = model._vjp(_array(x), distance, wedge, ctx.needs_input_grad[1])
             return torch.as_tensor(found, dtype=x.dtype, device=x.device)
@@ -61,7 +61,3 @@ def _function() -> Any:
         return value.detach().cpu().numpy() if isinstance(value, torch.Tensor) else np.asarray(value)
 
     return Psf
-
-
-def _pair(values: Any) -> tuple[float, float]:
-    return float(values[0]), float(values[1])

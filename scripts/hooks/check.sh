@@ -7,13 +7,7 @@
 # 1 violations, 2 bad input, 3 a rule did not run.
 set -uo pipefail
 
-options=()
-while [ $# -gt 0 ] && [ "$1" != -- ]; do
-    options+=("$1")
-    shift
-done
-[ $# -gt 0 ] || { echo "check.sh: give -- before the layouts" >&2; exit 2; }
-shift
+. "$(dirname "$0")/arguments.sh"
 
 worst=0
 for layout in "$@"; do

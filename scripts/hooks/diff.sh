@@ -7,13 +7,7 @@
 # names a folder for a page of each difference. The exit code is the largest of all layouts: 0 same geometry, 1 different, 2 bad input.
 set -uo pipefail
 
-options=()
-while [ $# -gt 0 ] && [ "$1" != -- ]; do
-    options+=("$1")
-    shift
-done
-[ $# -gt 0 ] || { echo "diff.sh: give -- before the layouts" >&2; exit 2; }
-shift
+. "$(dirname "$0")/arguments.sh"
 
 base=${METALITH_BASE:-HEAD}
 git rev-parse --quiet --verify "$base^{commit}" >/dev/null || { echo "diff.sh: there is no commit $base" >&2; exit 2; }

@@ -295,10 +295,10 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
         return Ok(Outcome::Fine);
     }
     let cache = KernelCache::of_user();
-    let time_ms = comparison.equal_time_ms(&cache, terminal)?;
-    let comparison = comparison.exposed_for(time_ms);
     let open = comparison.open(terminal)?;
     open.notes().iter().for_each(|note| terminal.say(note));
+    let time_ms = open.equal_time_ms(&cache, terminal)?;
+    let open = open.exposed_for(time_ms)?;
     let take = |k| open.take(k, &cache, terminal);
     let comparison = open.comparison((0..comparison.count()).map(take).collect::<Result<_>>()?);
     terminal.clear();

@@ -128,6 +128,17 @@ impl FileKind {
         format!("{:#}\n", self.schema_value())
     }
 
+    /// Write the schema beside a file that refers to it, if there is no other file of its name.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write_beside(self, file: &Path) -> metalith_core::Result<()> {
+        match write_schema(self, &file.with_file_name(self.file_name())) {
+            Err(error) if error.id() == "schema/not-replaced" => Ok(()),
+            written => written,
+        }
+    }
+
     fn schema_value(self) -> Value {
         let (_, _, what) = Self::ALL[self as usize];
         let mut schema = json::of_table(&self.keys(), "", &Guide::of(self));
@@ -151,20 +162,6 @@ impl FileKind {
     }
 }
 
-impl FileKind {
-    /// Write the schema beside a file that refers to it, if there is no other file of its name.
-    ///
-    /// # Errors
-    /// If it cannot be written.
-    pub fn write_beside(self, file: &Path) -> metalith_core::Result<()> {
-        let path = file.with_file_name(self.file_name());
-        match write_schema(self, &path) {
-            Err(error) if error.id() == NOT_REPLACED => Ok(()),
-            written => written,
-        }
-    }
-}
-
 /// The schemas that come with the program, in the order of [`FileKind::ALL`]: those of the readers, kept since design files take
 /// seconds to explore. `scripts/make_schemas.sh` renews them.
 static SHIPPED: [&str; 16] = [
@@ -185,9 +182,6 @@ static SHIPPED: [&str; 16] = [
     include_str!("../../schemas/effects-heights.schema.json"),
     include_str!("../../schemas/effects-spectra.schema.json"),
 ];
-
-/// Identity of the refusal to replace a file that is no schema.
-const NOT_REPLACED: &str = "schema/not-replaced";
 
 /// Beginning of the addresses of all schemas.
 const ID: &str = "urn:metalith:schema:";

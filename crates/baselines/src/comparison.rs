@@ -61,7 +61,7 @@ pub struct Comparison {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ExposureTimes {
-    /// One time for all cameras: the shortest of their own, so that no pixel of a white scene is saturated.
+    /// One time for all cameras: the shortest after which a white pixel of one of them is bright. No pixel of a white scene is saturated.
     #[default]
     Equal,
     /// Each camera is exposed until a white pixel is bright.
@@ -223,48 +223,6 @@ impl Comparison {
         }
     }
 
-    /// Time (ms) that all cameras are exposed for, where it is for the program to choose: the shortest of their own. None, and times
-    /// stay those of the camera files, if own times are asked for, a time or a longest one is stated, no camera leaves its time to
-    /// the program, or a learnt stage was trained for the exposure of its camera.
-    ///
-    /// # Errors
-    /// As [`OpenComparison::take`].
-    pub fn equal_time_ms(&self, cache: &KernelCache, progress: &dyn Progress) -> Result<Option<f64>> {
-        let stated = self.exposure.time_ms.or(self.exposure.longest_ms).is_some();
-        if self.times == ExposureTimes::Own || stated || !self.learnt.is_empty() || self.count() < 2 {
-            return Ok(None);
-        }
-        let open = self.open(progress)?;
-        let own = open.designs.iter().map(|(_, camera)| camera);
-        let lensless = self.lensless.iter().map(|_| &open.camera);
-        if !own.chain(lensless).any(|camera| camera.exposure.auto) {
-            return Ok(None);
-        }
-        let mut shortest = (f64::INFINITY, String::new());
-        for k in 0..self.count() {
-            open.ready(k, cache, progress, &mut |camera, (name, _), _| {
-                let time_ms = camera.light().time_ms;
-                if time_ms < shortest.0 {
-                    shortest = (time_ms, name.to_owned());
-                }
-                Ok(())
-            })?;
-        }
-        let time_ms = as_printed(shortest.0);
-        progress.warn(&format!(
-            "all cameras are exposed for {time_ms} ms, the time of {}; --own-times exposes each until a white pixel is bright",
-            shortest.1
-        ));
-        Ok(Some(time_ms))
-    }
-
-    /// This comparison with all cameras exposed for a time (ms); as it is if there is none.
-    #[must_use]
-    pub fn exposed_for(mut self, time_ms: Option<f64>) -> Self {
-        self.exposure.time_ms = time_ms.or(self.exposure.time_ms);
-        self
-    }
-
     /// Cameras of the table: designs, then those without a lens, each once, or twice with the assumptions of the paper.
     pub fn count(&self) -> usize {
         (self.designs.len() + self.lensless.len()) * self.kinds()
@@ -276,16 +234,16 @@ impl Comparison {
     }
 }
 
-/// A time (ms), rounded down to three digits: what is printed is what holds, and no pixel is brighter for it.
+/// Time (ms) rounded down to three digits: what is printed is what holds, and no pixel is brighter for it.
 fn as_printed(time_ms: f64) -> f64 {
-    let digits = 10f64.powi(2 - time_ms.log10().floor() as i32);
-    // The quotient of two integers prints as a short number; a step of slack keeps times that are short numbers.
-    let steps = (time_ms * digits * (1.0 + 1e-9)).floor();
-    let shown = format!("{:e}", steps / digits);
-    shown
-        .parse::<f64>()
-        .unwrap_or(time_ms)
-        .max(*StatedExposure::TIMES_MS.start())
+    // Quotients and products of whole numbers print as short numbers.
+    let [divided, times] = match 2 - time_ms.log10().floor() as i32 {
+        places if places < 0 => [10f64.powi(-places), 1.0],
+        places => [1.0, 10f64.powi(places)],
+    };
+    // A step of slack keeps times that are short numbers.
+    let steps = (time_ms / divided * times * (1.0 + 1e-9)).floor();
+    (steps * divided / times).max(*StatedExposure::TIMES_MS.start())
 }
 
 /// The square of so many pixels in the middle of a scene.
@@ -307,6 +265,55 @@ fn middle(mut scene: SceneImage, pixels: usize) -> Result<SceneImage> {
 }
 
 impl OpenComparison<'_> {
+    /// One time (ms) for all cameras, where it is for the program to choose: the shortest of the times after which a white pixel is bright.
+    /// None, and times stay those of the camera files, if [`ExposureTimes::Own`] is asked for, a time or a longest one is stated, no
+    /// camera leaves its time to the program, or a learnt stage was trained for the exposure of its camera.
+    ///
+    /// # Errors
+    /// If a camera cannot be made ready, or the user stopped it.
+    pub fn equal_time_ms(&self, cache: &KernelCache, progress: &dyn Progress) -> Result<Option<f64>> {
+        let stated = self.of.exposure.time_ms.or(self.of.exposure.longest_ms).is_some();
+        let own = self.of.times == ExposureTimes::Own || !self.of.learnt.is_empty();
+        let cameras = self.designs.iter().map(|(_, camera)| camera);
+        let lensless = self.of.lensless.iter().map(|_| &self.camera);
+        let is_chosen = cameras.chain(lensless).any(|camera| camera.exposure.auto);
+        if own || stated || !is_chosen || self.of.count() < 2 {
+            return Ok(None);
+        }
+        let mut shortest = (f64::INFINITY, String::new());
+        for k in 0..self.of.count() {
+            self.ready(k, cache, progress, &mut |camera, (name, _), _| {
+                let time_ms = camera.light().time_ms;
+                if time_ms < shortest.0 {
+                    shortest = (time_ms, name.to_owned());
+                }
+                Ok(())
+            })?;
+        }
+        let time_ms = as_printed(shortest.0);
+        progress.warn(&format!(
+            "all cameras are exposed for {time_ms} ms, the time of {}; --own-times exposes each until a white pixel is bright",
+            shortest.1
+        ));
+        Ok(Some(time_ms))
+    }
+
+    /// This comparison with all cameras exposed for a time (ms); as it is if there is none.
+    ///
+    /// # Errors
+    /// If the time is out of its range.
+    pub fn exposed_for(mut self, time_ms: Option<f64>) -> Result<Self> {
+        let stated = StatedExposure {
+            time_ms,
+            ..StatedExposure::default()
+        };
+        self.camera = self.camera.stated(&stated)?;
+        for (_, camera) in &mut self.designs {
+            *camera = camera.clone().stated(&stated)?;
+        }
+        Ok(self)
+    }
+
     /// Let camera `k` take all photographs.
     ///
     /// # Errors
@@ -490,6 +497,7 @@ mod tests {
             (240.77, 240.0),
             (0.394_99, 0.394),
             (1e-5, 1e-3),
+            (240_770.0, 240_000.0),
         ] {
             assert!((as_printed(time_ms) - printed).abs() < 1e-12, "{time_ms}");
         }

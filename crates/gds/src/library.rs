@@ -199,7 +199,7 @@ mod tests {
 
     const DATE: [i16; 6] = [2027, 1, 31, 12, 34, 56];
 
-    /// The same library through gds21.
+    /// Bytes of the same library as gds21 writes it.
     fn by_gds21(library: &GdsLibrary) -> Vec<u8> {
         let [year, month, day, hour, minute, second] = library.date;
         let mut bytes = Vec::new();

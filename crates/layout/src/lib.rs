@@ -1,7 +1,7 @@
 //! Layouts: pillars written as the bytes that a cleanroom takes, GDSII or OASIS, streamed, and read back as the pillars
 //! of a design.
 //!
-//! In GDSII [`metalith_gds::library`] encodes the library, the cells, references, marks and labels; the pillars, of which
+//! [`metalith_gds::library`] encodes for GDSII the library, the cells, references, marks and labels; the pillars, of which
 //! there are millions, are records of templates between the bytes that it made. In OASIS all is written by
 //! [`metalith_oasis`].
 

@@ -41,11 +41,11 @@ pub struct LensPullback {
 /// Derivatives of a merit of a PSF.
 #[derive(Clone, Debug)]
 pub struct LensGradient {
-    /// By the phases (1/rad) or the widths (1/nm); zero where nothing passes. Shape `[sites, sites]`.
+    /// Derivatives by the phases (1/rad) or the widths (1/nm); zero where nothing passes. Shape `[sites, sites]`.
     pub map: Array2<f64>,
-    /// By the sines of the wedge along x and along y.
+    /// Derivatives by the sines of the wedge along x and along y.
     pub wedge_sin: [f64; 2],
-    /// By the distance (1/um), if it was asked for.
+    /// Derivative by the distance (1/um), if it was asked for.
     pub distance_um: Option<f64>,
 }
 

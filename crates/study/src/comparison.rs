@@ -53,11 +53,6 @@ impl ComparisonPlan {
         }
     }
 
-    /// The comparison with the time that was chosen for it.
-    fn timed(&self) -> Comparison {
-        self.comparison.clone().exposed_for(self.equal_time_ms)
-    }
-
     /// Let the cameras of some shards take all photographs. Kernels are those of the plan: none are made here.
     ///
     /// # Errors
@@ -66,8 +61,7 @@ impl ComparisonPlan {
         if key(&self.comparison, progress)? != self.key {
             return Err(another_plan(&self.folder));
         }
-        let comparison = self.timed();
-        let open = comparison.open(progress)?;
+        let open = self.comparison.open(progress)?.exposed_for(self.equal_time_ms)?;
         let cache = KernelCache::only(&self.folder);
         let camera = |k: u64| open.take(k as usize, &cache, progress);
         self.cut().make_all(shards, &camera, progress)
@@ -82,8 +76,7 @@ impl ComparisonPlan {
         if key(&self.comparison, progress)? != self.key {
             return Err(another_plan(&self.folder));
         }
-        let comparison = self.timed();
-        let open = comparison.open(progress)?;
+        let open = self.comparison.open(progress)?.exposed_for(self.equal_time_ms)?;
         let cache = KernelCache::only(&self.folder);
         for (k, camera) in cameras.iter_mut().enumerate() {
             camera.shown = open.take_first(k, 1, &cache, progress)?.shown;
@@ -140,10 +133,13 @@ pub fn plan_comparison(comparison: &Comparison, folder: &Path, progress: &dyn Pr
         return Ok(known);
     }
     let cache = KernelCache::made(folder);
-    for k in 0..comparison.count() {
-        open.prepare(k, &cache, progress)?;
+    let equal_time_ms = open.equal_time_ms(&cache, progress)?;
+    // Cameras that were asked for their time have their kernels.
+    if equal_time_ms.is_none() {
+        for k in 0..comparison.count() {
+            open.prepare(k, &cache, progress)?;
+        }
     }
-    let equal_time_ms = comparison.equal_time_ms(&cache, progress)?;
     let plan = ComparisonPlan {
         schema: SCHEMA,
         work: ComparisonPlan::WORK.into(),

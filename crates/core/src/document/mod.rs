@@ -123,7 +123,7 @@ impl<'t> Document<'t> {
         (result, noted)
     }
 
-    /// What `read` makes of the root section; nothing where the syntax is wrong.
+    /// Value that `read` makes of the root section; `None` where the syntax is wrong.
     fn value<T>(&self, read: impl FnOnce(&Section<'_, '_>) -> T) -> Option<T> {
         let table = match DeTable::parse(self.text) {
             Ok(table) => table,

@@ -48,11 +48,11 @@ pub struct PsfPullback {
 /// Derivatives of a merit of a PSF.
 #[derive(Clone, Debug)]
 pub struct PsfCotangents {
-    /// By the transmissions: a change dt changes the merit by Re(conj(this) dt), summed over sites. Shape `[sites, sites]`.
+    /// Derivatives by the transmissions: a change dt changes the merit by Re(conj(this) dt), summed over sites. Shape `[sites, sites]`.
     pub transmission: Array2<Complex32>,
-    /// By the sines of the wedge along x and along y.
+    /// Derivatives by the sines of the wedge along x and along y.
     pub wedge_sin: [f64; 2],
-    /// By the distance (1/um), if it was asked for.
+    /// Derivative by the distance (1/um), if it was asked for.
     pub distance_um: Option<f64>,
 }
 

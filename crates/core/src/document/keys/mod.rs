@@ -24,7 +24,7 @@ pub struct KeyTable {
     visits: usize,
 }
 
-/// Keys of a section that have no names of their own.
+/// Rule for keys of a section whose names the reader does not state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OtherKeys {
     /// Mistakes.
@@ -64,7 +64,7 @@ impl KeyTable {
     /// Name that stands for any name in a section whose keys the user names.
     pub const OF_THE_USER: &str = "any_name";
 
-    /// The keys that a file may have here, in the order of the alphabet; those without names of their own are not among them.
+    /// The keys that a file may have here, in the order of the alphabet; those that the user names are not among them.
     pub fn keys(&self) -> impl Iterator<Item = (&str, &Key)> {
         let is_named = |name: &str| self.others != OtherKeys::Named || name != Self::OF_THE_USER;
         let known = self
@@ -79,7 +79,7 @@ impl KeyTable {
         self.keys.get(name).filter(|key| key.is_known)
     }
 
-    /// Fate of keys that have no names of their own.
+    /// Rule for keys whose names the reader does not state.
     pub fn others(&self) -> OtherKeys {
         self.others
     }

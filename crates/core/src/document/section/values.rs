@@ -12,7 +12,7 @@ use crate::document::{FaultKind, Forms, Scalar, renamed};
 use crate::error::{Error, Result};
 use crate::text::{first_unprintable, quoted};
 
-/// What to do where a file is not there.
+/// Remedy where a file is not there.
 const RELATIVE: &str = "relative paths count from the folder of this file";
 
 impl<'t> Section<'_, 't> {
