@@ -10,7 +10,8 @@ rm -rf "$folder/venv"
 python3 -m venv "$folder/venv"
 pip() { "$folder/venv/bin/pip" --disable-pip-version-check --quiet "$@"; }
 
-pip install ./python
+# The tests of the workspace have compiled most of the wheel.
+MATURIN_PEP517_ARGS="--features as-tested" pip install ./python
 pip install -r scripts/requirements-python.txt
 "$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples python/tests
 "$folder/venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
