@@ -147,6 +147,14 @@ impl Fitted {
         }
     }
 
+    /// Width of the label of the last tick, if it is at the end of the axis.
+    pub(super) fn last_label_width(&self) -> f64 {
+        let ticks = self.ticks();
+        let last = ticks.labelled.last();
+        let at_end = last.filter(|(value, _)| self.place(*value).is_some_and(|p| (p - self.end).abs() < 1.0));
+        at_end.map_or(0.0, |(_, label)| text_width(label))
+    }
+
     fn decades(&self) -> Ticks {
         let first = (self.low.log10() - 1e-9).ceil() as i32;
         let last = (self.high.log10() + 1e-9).floor() as i32;

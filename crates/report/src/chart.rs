@@ -216,7 +216,10 @@ impl From<Chart> for Figure {
         };
         // Legends begin where charts with usual labels do.
         let legend = frame.left;
-        frame.left = chart.fit(&frame).1.left();
+        let (x, y) = chart.fit(&frame);
+        frame.left = y.left();
+        // The last label has its middle at its tick.
+        frame.right = frame.right.min(width - x.last_label_width() / 2.0);
         let (x, y) = chart.fit(&frame);
         let mut data = clipped(frame.left, frame.top, frame.width(), frame.height());
         // Areas lie below lines, lines below points.
@@ -267,7 +270,10 @@ fn draw(series: &Series, colour: usize, x: &Fitted, y: &Fitted) -> Group {
     match series.kind {
         SeriesKind::Line => {
             let points: Vec<_> = series.points.iter().map(|p| place(p[0], p[1])).collect();
-            group.add(strokes(thinned(&points), &format!("line c{colour}")))
+            let lonely = points.split(Option::is_none).filter(|run| run.len() == 1);
+            let dots = lonely.flatten().flatten().map(|&(px, py)| dot(px, py, size, colour));
+            dots.fold(group, Group::add)
+                .add(strokes(thinned(&points), &format!("line c{colour}")))
         }
         SeriesKind::Points => series.points.iter().fold(group, |group, &[a, b, error]| {
             let Some((px, py)) = place(a, b) else { return group };
@@ -441,6 +447,40 @@ mod tests {
         assert!(svg.len() < LARGEST_SVG, "{}", svg.len());
         // The peak reaches the top of the frame.
         assert!(svg.contains(" 12L"), "the peak is lost");
+    }
+
+    #[test]
+    fn a_line_shows_points_without_neighbours() {
+        let dots = |points: &[(f64, f64)]| {
+            let mut chart = Chart::new("front", Axis::linear("x", ""), Axis::linear("y", ""));
+            chart.line("best", points.iter().copied());
+            Figure::from(chart).to_svg().matches("dot f0").count()
+        };
+        assert_eq!(dots(&[(1.0, 2.0)]), 1);
+        assert_eq!(dots(&[(1.0, 2.0), (2.0, f64::NAN), (3.0, 4.0), (4.0, 4.0)]), 1);
+        assert_eq!(dots(&[(1.0, 2.0), (2.0, 3.0)]), 0);
+    }
+
+    #[test]
+    fn the_label_of_the_last_tick_is_inside_the_drawing() {
+        let width = 560.0;
+        let frame = |last: f64| {
+            let mut chart = Chart::new("wide", Axis::linear("x", "").range(0.0, last), Axis::linear("y", ""));
+            chart.line("line", [(0.0, 0.0), (last, 1.0)]);
+            let svg = Figure::from(chart).to_svg();
+            let label = svg
+                .rfind(&format!(">{last}<"))
+                .or_else(|| svg.rfind(&format!("\n{last}\n")))
+                .expect("a label");
+            let tag = &svg[svg[..label].rfind("<text").expect("a text")..label];
+            let x = tag
+                .split(" x=\"")
+                .nth(1)
+                .and_then(|rest| rest.split('"').next())
+                .expect("a place");
+            x.parse::<f64>().expect("a number") + text_width(&last.to_string()) / 2.0
+        };
+        assert!(frame(5.0) <= width && frame(50_000.0) <= width);
     }
 
     #[test]
