@@ -33,7 +33,9 @@ pub struct CameraReport {
     /// True if the search came to its end.
     #[serde(skip)]
     whole: bool,
-    /// Pixels between the edges of a scene.
+    /// Angle between the edges of a scene (degrees).
+    pub field_deg: f64,
+    /// Pixels between them.
     #[serde(skip)]
     scene_pixels: usize,
 }
@@ -49,6 +51,8 @@ pub struct CameraRow {
     pub rows: usize,
     pub distance_um: f64,
     pub diameter_um: f64,
+    /// Distance over diameter.
+    pub f_number: f64,
     pub wedge_share: f64,
     pub start: &'static str,
     /// Expected PSNR of linear light (dB): of the mean error of the field, and of its worst part.
@@ -88,6 +92,7 @@ impl CameraRow {
             rows: a.count[1],
             distance_um: a.distance_um,
             diameter_um: a.diameter_um,
+            f_number: a.distance_um / a.diameter_um,
             wedge_share: a.wedge_share,
             start: camera.start.name(),
             psnr_linear_db: camera.judged.psnr_db(),
@@ -177,6 +182,7 @@ impl CameraReport {
             texts,
             readable,
             whole: !found.interrupted,
+            field_deg: task.spec.field_deg,
             scene_pixels: task.spec.scene_pixels,
         })
     }
@@ -247,10 +253,11 @@ impl CameraReport {
         }
         page.code(&self.command);
         page.note(format!(
-            "The PSNR is that of linear light after the joint linear restoration, expected of scenes with the spectrum of photographs at \
-             {} pixels from edge to edge: of a model with scalar pupils, one efficiency for all directions and the same pillars everywhere. \
+            "The PSNR is that of linear light after the joint linear restoration, expected of scenes with the spectrum of photographs, \
+             {} degrees and {} pixels from edge to edge: of a model with scalar pupils, one efficiency for all directions and the same pillars everywhere. \
              It serves to compare cameras, and a photograph can be 5 dB below it. `metalith layout` of a design below, then \
              `metalith compare`, take pictures with all physics.",
+            exact(self.field_deg),
             self.scene_pixels
         ));
         page.section("Thickness against PSNR");
@@ -306,6 +313,7 @@ impl CameraReport {
             Column::text("Elements"),
             Column::number("Distance of the sensor", "um"),
             Column::number("Diameter", "um"),
+            Column::number("f-number", ""),
             Column::number("Share of the wedge", ""),
             Column::number("PSNR", "dB"),
             Column::number("PSNR of the worst part", "dB"),
@@ -322,6 +330,7 @@ impl CameraReport {
                 format!("{} x {}", row.columns, row.rows).into(),
                 Cell::sig(row.distance_um, 4),
                 Cell::sig(row.diameter_um, 4),
+                Cell::sig(row.f_number, 3),
                 Cell::fixed(row.wedge_share, 2),
                 Cell::fixed(row.psnr_linear_db, 2),
                 Cell::fixed(row.worst_psnr_linear_db, 2),
