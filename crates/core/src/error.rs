@@ -149,7 +149,9 @@ fn at_line(line: Option<usize>) -> String {
 
 fn io_hint(source: &std::io::Error) -> &'static str {
     match source.kind() {
-        std::io::ErrorKind::NotFound => "\n  help: check the path; relative paths count from the file that names them",
+        std::io::ErrorKind::NotFound => {
+            "\n  help: check the path; a relative path in a file counts from the folder of that file, another one from the folder where you are"
+        }
         std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem => {
             "\n  help: choose a folder that you may write to with --out"
         }

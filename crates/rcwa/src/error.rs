@@ -218,7 +218,7 @@ impl Error {
             }
             Self::MaterialIndex { .. } => "use n > 0 and k >= 0".into(),
             Self::OutOfRange { .. } => "choose wavelengths in that range, or another material".into(),
-            Self::Io { .. } => "check the path; relative paths count from the file that names them".into(),
+            Self::Io { .. } => "check the path; a relative path in a file counts from the folder of that file, another one from the folder where you are".into(),
             Self::Table { path, .. } if crate::material::is_yaml(path) => {
                 "give a file as refractiveindex.info has it: `DATA` with tabulated nk, n or k of rising wavelengths, or formulas 1 to 9"
                     .into()
