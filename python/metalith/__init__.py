@@ -10,6 +10,7 @@ that are done, and all of them. They work in forked children and in several thre
 from __future__ import annotations
 
 from ._gradient import PsfGradient, PsfModel, phases_of, widths_of
+from ._kernels import Kernels
 from ._layouts import (
     Array,
     Design,
@@ -38,6 +39,7 @@ __all__ = [
     "Diagnosis",
     "FoundEffect",
     "Frame",
+    "Kernels",
     "Lattice",
     "Layout",
     "Marker",

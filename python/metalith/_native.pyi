@@ -273,6 +273,9 @@ class ImagingSystem:
         self, frame: Frame, method: str = "tikhonov", joint: bool = True, progress: Progress | None = None
     ) -> Float64: ...
     def samples(self, frame: Frame, count: int, progress: Progress | None = None) -> list[Float64]: ...
+    def kernels(
+        self, element: int, step: int
+    ) -> tuple[npt.NDArray[np.float32], list[float], list[float], list[tuple[str, float]]]: ...
 
 def denoise(
     values: npt.NDArray[np.float32], deviation: npt.NDArray[np.float32], weights: PathLike | None = None

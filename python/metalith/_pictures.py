@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arguments, _native
+from ._kernels import Kernels
 from ._layouts import Design
 from ._types import Float64, PathLike, Progress
 
@@ -133,6 +134,11 @@ class ImagingSystem:
         it is."""
         wanted = _arguments.whole("count", count, 1, _arguments.MOST_32)
         return self._native.samples(frame._native, wanted, progress)
+
+    def kernels(self, element: int = 0, *, step: int = 1) -> Kernels:
+        """Images of points through one element, counted from zero, at every ``step``-th place of its field along both axes."""
+        chosen = _arguments.whole("element", element, 0, _arguments.MOST_32)
+        return Kernels(chosen, *self._native.kernels(chosen, _arguments.whole("step", step, 1, _arguments.MOST_32)))
 
 
 def _opened(

@@ -9,8 +9,8 @@ use metalith::prior::NetworkDenoiser;
 use metalith::restoration::{LearnedDenoiser, RestorationMethod};
 use metalith::sensor::{Camera, StatedExposure};
 use metalith::{CalibratedModel, Error, Result};
-use ndarray::Array3;
-use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
+use ndarray::{Array, Array3, ArrayD, IxDyn};
+use numpy::{PyArray2, PyArray3, PyArrayDyn, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 use crate::arrays::{Design, given};
@@ -160,7 +160,50 @@ impl ImagingSystem {
         })?;
         Ok(drawn.into_iter().map(|d| PyArray3::from_owned_array(py, d)).collect())
     }
+
+    /// Kernels of an element `[row, column, channel, colour, y, x]` at every `step`-th place of its field along both axes, these
+    /// places and the places of the values (um), and each channel with the wavelength that its kernels are about (nm).
+    fn kernels<'py>(&self, py: Python<'py>, element: usize, step: usize) -> PyResult<KernelArrays<'py>> {
+        let bank = &self.system.bank;
+        let (side, channels, colours) = (bank.spec.side(), bank.channel_um.len(), self.system.primaries());
+        let nodes: Vec<usize> = (0..bank.spec.nodes).step_by(step).collect();
+        let shape = IxDyn(&[nodes.len(), nodes.len(), channels, colours.len(), side, side]);
+        let values = work(py, None, |_| {
+            if element >= bank.elements.len() {
+                return Err(Error::refused(
+                    "kernels/no-such-element",
+                    format!("there is no element {element}"),
+                    format!("elements count from 0 to {}", bank.elements.len() - 1),
+                ));
+            }
+            let mut values = Vec::with_capacity(nodes.len().pow(2) * channels * colours.len() * side * side);
+            for (row, column) in nodes
+                .iter()
+                .flat_map(|row| nodes.iter().map(move |column| (*row, *column)))
+            {
+                for channel in 0..channels {
+                    for colour in colours.clone() {
+                        values.extend_from_slice(&bank.kernel(element, [row, column], channel, colour).turned());
+                    }
+                }
+            }
+            Ok(values)
+        })?;
+        let values: ArrayD<f32> = Array::from_shape_vec(shape, values).expect("as many values as the shape has");
+        // Values stand at every half of a pixel.
+        let samples = (0..side).map(|i| 0.25 * bank.spec.pixel_um * (2.0 * i as f64 - (side as f64 - 1.0)));
+        let channels = self.system.channels.iter().zip(&bank.channel_um);
+        Ok((
+            PyArrayDyn::from_owned_array(py, values),
+            nodes.iter().map(|i| bank.spec.node_um(*i)).collect(),
+            samples.collect(),
+            channels.map(|(channel, um)| (channel.name.clone(), um * 1e3)).collect(),
+        ))
+    }
 }
+
+/// Kernels, places of the field and of the values (um), and channels with their wavelengths (nm).
+type KernelArrays<'py> = (Bound<'py, PyArrayDyn<f32>>, Vec<f64>, Vec<f64>, Vec<(String, f64)>);
 
 impl ImagingSystem {
     fn scene(&self, rgb: &Array3<f64>) -> Result<SceneImage> {
