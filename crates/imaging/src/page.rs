@@ -92,6 +92,15 @@ pub fn shown(frame: &Frame, names: &[String]) -> Array3<f64> {
     Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| at(y, x, c))
 }
 
+/// What [`shown`] does with the channels of a frame.
+pub(crate) fn shown_words(frame: &Frame, names: &[String]) -> &'static str {
+    match frame.filter {
+        ColourFilter::None if names.len() == 1 => "It has one channel and is shown in grey.",
+        ColourFilter::None => "Its channels are shown as colours.",
+        _ => "Its mosaic is shown as colours.",
+    }
+}
+
 fn page(pages: &PicturePages<'_>) -> Page {
     let report = pages.report;
     let mut page = Page::new(
@@ -106,9 +115,10 @@ fn page(pages: &PicturePages<'_>) -> Page {
     }
     let names = pages.camera.channel_names();
     let head = pictures_side_by_side(pages.scene, pages.frame, &pages.restored[0], &names);
-    page.figure(head.caption(
-        "The frame is the recorded signal of the sensor. It includes stray light and the overlapping light of other elements. Its mosaic is shown as colours. The picture is restored from this frame alone.",
-    ));
+    page.figure(head.caption(format!(
+        "The frame is the recorded signal of the sensor. It includes stray light and the overlapping light of other elements. {} The picture is restored from this frame alone.",
+        shown_words(pages.frame, &names)
+    )));
     let first = &report.restorations[0];
     let whole = &first.scores[0];
     // Of a frame that is all white the picture is white, as the scene seems to be.

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::exposure::Frame;
 use crate::files::{picture_file, write_restored};
-use crate::page::{list_assumptions, shown};
+use crate::page::{list_assumptions, shown, shown_words};
 use crate::report::FrameStatement;
 
 /// Numbers of the page of a restored frame.
@@ -77,9 +77,10 @@ impl RestoredReport {
             let way = if restored.joint { "" } else { ", each element alone" };
             row.photo(format!("{}{way}", restored.method), &picture.mapv(srgb::encoded));
         }
-        page.figure(row.caption(
-            "The mosaic of the frame is shown as colours. Pictures are restored from this frame alone. Their brightness is that of the light on the page; in a frame from a bench `white` in [exposure] of the camera sets it.",
-        ));
+        page.figure(row.caption(format!(
+            "The frame is the recorded signal of the sensor. {} Pictures are restored from this frame alone. Their brightness is that of the light on the page; in a frame from a bench `white` in [exposure] of the camera sets it.",
+            shown_words(frame, &names)
+        )));
         page.facts(&[
             ("Pixels at full scale", of.saturated_words()),
             ("Mean signal, of full scale", fixed(frame.mean_signal(), 3)),
