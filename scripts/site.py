@@ -17,6 +17,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 import urllib.parse
 from pathlib import Path
 
@@ -44,11 +45,74 @@ GALLERY = [
         "report.html",
     ),
     (
+        "Lenses of different kinds",
+        "Round, square and hexagonal apertures and a cubic phase on one chip.",
+        ["run", "designs/mixed_lenses.toml"],
+        "report.html",
+    ),
+    (
+        "Near infrared",
+        "Round pillars of amorphous silicon on a hexagonal lattice, 1550 nm.",
+        ["run", "designs/hexagonal_1550.toml"],
+        "report.html",
+    ),
+    (
+        "Long-wave infrared",
+        "Round pillars of silicon on silicon, 10.6 um.",
+        ["run", "designs/silicon_10600.toml"],
+        "report.html",
+    ),
+    (
+        "A lens of two polarisations",
+        "Upright rectangles of titanium dioxide focus light of two polarisations at two places, 532 nm.",
+        ["run", "designs/birefringent_532.toml"],
+        "report.html",
+    ),
+    (
+        "Rotated rectangles",
+        "The geometric phase for circularly polarised light, 532 nm.",
+        ["run", "designs/geometric_phase_532.toml"],
+        "report.html",
+    ),
+    (
+        "A lens of titanium dioxide",
+        "Round pillars, 532 nm.",
+        ["run", "designs/tio2_532.toml"],
+        "report.html",
+    ),
+    (
+        "An array of unequal spacing",
+        "Two columns and four rows.",
+        ["run", "designs/array_2x4.toml"],
+        "report.html",
+    ),
+    (
+        "A chip for a cleanroom",
+        "The hand-off of a lens: dose matrix, test structures, rules, jobs.",
+        ["handoff", "designs/hexagonal_1550.toml"],
+        "index.html",
+    ),
+    (
         "A measured set",
         "A synthetic set in which pillars are 8 nm too narrow and the sensor is 5 um too far: which effects explain it.",
         ["calibrate", "golden/session", "--effects", "cd_bias,defocus,pixel_blur,zero_order"],
         "report.html",
     ),
+]
+
+# A picture takes ten CPU minutes to simulate, the first time.
+PICTURE = (
+    "A picture",
+    "What the camera `true_light_sharp` records of a chart, and what is restored from it.",
+    ["picture", "{out}/designs_true_light_sharp/true_light_sharp_pillars.gds", "chart", "--design", "designs/true_light_sharp.toml"]
+    + ["--camera", "cameras/gt1930.toml", "--field-deg", "80", "--method", "tikhonov,prior"],
+    "picture.html",
+)
+
+# Real measurements, which are not part of the repository: title, what it shows, description in `examples/measured`.
+MEASURED = [
+    ("A printed relief", "Heights by AFM beside the drawn ones (Zheng, Zhao, So, 2023): which effects explain them.", "relief"),
+    ("A diamond film", "Reflectance over channels of known height (Stoffel and Janssens, 2026): thickness, index, roughness.", "spectra"),
 ]
 
 
@@ -92,16 +156,43 @@ def as_page(path: Path) -> str:
     return "".join(part if k % 2 else LINK.sub(link, part) for k, part in enumerate(parts))
 
 
+def picture(metalith: Path, out: Path) -> tuple:
+    """The picture of the gallery, whose layout is written before."""
+    title, words, command, page = PICTURE
+    design = command[command.index("--design") + 1]
+    folder = out / design.replace("/", "_").removesuffix(".toml")
+    subprocess.run([metalith, "layout", design, "--out", folder, "--quiet"], cwd=ROOT, check=True)
+    return title, words, [part.format(out=out) for part in command], page
+
+
+def measured(data: Path, out: Path) -> list:
+    """Measured sets of the gallery: each with its description from `examples/measured` and its folder below `data`."""
+    results = []
+    for title, words, name in MEASURED:
+        text = (ROOT / f"examples/measured/{name}.toml").read_text()
+        # Keys of the top level stand before the first section.
+        head, section, rest = text.partition("\n[")
+        out.mkdir(parents=True, exist_ok=True)
+        file = out / f"{name}.toml"
+        file.write_text(f'{head}\nfolder = "{data.resolve() / name}"\n{section}{rest}')
+        results.append((title, words, ["calibrate", str(file)], "report.html"))
+    return results
+
+
 def gallery(results: list, metalith: Path, out: Path, source: Path) -> None:
     """Pages of results, made by the program, and a page that leads to them."""
     lines = ["# Gallery", "", "Each page was written by the command above it. It holds its pictures and needs no other file.", ""]
     for title, words, command, page in results:
-        folder = out / command[1].replace("/", "_").removesuffix(".toml")
+        # Files that were written before are in the folder of this machine.
+        said = ["out/" + Path(part).name if part.startswith(str(out)) else part for part in command]
+        folder = out / "_".join([command[0], Path(command[1]).stem])
+        began = time.monotonic()
         subprocess.run([metalith, *command, "--out", folder, "--quiet"], cwd=ROOT, check=True)
+        print(f"{title}: {time.monotonic() - began:.0f} s", flush=True)
         name = f"{folder.name}.html"
         (source / "gallery").mkdir(exist_ok=True)
         shutil.copy(folder / page, source / "gallery" / name)
-        lines += [f"## {title}", "", words, "", "```", " ".join(["metalith", *command]), "```", ""]
+        lines += [f"## {title}", "", words, "", "```", " ".join(["metalith", *said]), "```", ""]
         lines += [f"[Open the page](gallery/{name})", ""]
     (source / "gallery.md").write_text("\n".join(lines))
 
@@ -194,7 +285,8 @@ def main() -> int:
     parser.add_argument("out", type=Path, help="folder of the site")
     parser.add_argument("--metalith", type=Path, default=ROOT / "target/release/metalith", help="the program, for the gallery")
     parser.add_argument("--doc", type=Path, default=ROOT / "target/doc", help="output of `cargo doc`")
-    parser.add_argument("--no-gallery", action="store_true", help="leave the gallery out, which takes two CPU minutes")
+    parser.add_argument("--no-gallery", action="store_true", help="leave the gallery out, which takes half an hour of CPU time")
+    parser.add_argument("--measured", type=Path, help="folder with `relief` and `spectra`: data of the sources that `examples/measured` names")
     given = parser.parse_args()
     out = given.out.resolve()
     source, site = out / "source", out / "html"
@@ -210,8 +302,11 @@ def main() -> int:
         else:
             shutil.copy(path, to)
     shutil.copy(ROOT / "scripts/site.css", source)
-    results = [] if given.no_gallery else GALLERY
-    gallery(results, given.metalith.resolve(), out / "gallery", source)
+    metalith, made = given.metalith.resolve(), out / "gallery"
+    results = [] if given.no_gallery else [*GALLERY, picture(metalith, made)]
+    if given.measured:
+        results += measured(given.measured, made)
+    gallery(results, metalith, made, source)
     libraries(source, site, given.doc)
     pages = {str(p.relative_to(ROOT)) for p in files if p.suffix == ".md"}
     settings = {
