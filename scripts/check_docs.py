@@ -3,7 +3,7 @@
 
     python3 scripts/check_docs.py [--list]
 
-Looks at README.md, CONTRIBUTING.md, docs/ and the READMEs of the crates: targets of links, headings that links point to,
+Looks at README.md, CONTRIBUTING.md, docs/, the READMEs of the crates and of packaging: targets of links, headings that links point to,
 and paths in backticks that begin with a folder of the project. Words in capitals such as NAME stand for any name and are
 not looked up. docs/history is left out: it names what was there.
 
@@ -21,7 +21,7 @@ LONGEST_CELL = 200
 # Pages with longer cells, and how many of them: to become fewer.
 LONGER_CELLS: dict[str, int] = {}
 LONGEST_README = 150
-FOLDERS = "benches|crates|designs|docs|examples|golden|processes|python|rules|scripts|src|tests"
+FOLDERS = "benches|crates|designs|docs|examples|golden|packaging|processes|python|rules|scripts|src|tests"
 LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]*)?\)")
 PATH = re.compile(rf"`((?:{FOLDERS})/[\w./-]*)")
 
@@ -84,7 +84,7 @@ def too_long(pages: list[Path], listed: bool) -> list[str]:
 
 def main() -> int:
     readme, docs = ROOT / "README.md", [p for p in (ROOT / "docs").rglob("*.md") if HISTORY not in p.parents]
-    pages = sorted([readme, ROOT / "CONTRIBUTING.md", *docs, *ROOT.glob("crates/*/README.md")])
+    pages = sorted([readme, ROOT / "CONTRIBUTING.md", *docs, *ROOT.glob("crates/*/README.md"), *ROOT.glob("packaging/*.md")])
     wrong = [fault for page in pages for fault in faults(page)]
     wrong += too_long(sorted([readme, *docs]), "--list" in sys.argv[1:])
     print("\n".join(wrong) if wrong else f"{len(pages)} pages name only files that are there")
