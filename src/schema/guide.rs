@@ -1,6 +1,6 @@
 //! The tables of keys in the guide: the meaning of each key, in words.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use super::FileKind;
 
@@ -27,7 +27,7 @@ impl Row {
 /// The tables of keys of a chapter, by section and key.
 #[derive(Debug, Default)]
 pub(super) struct Guide {
-    rows: HashMap<(String, String), Row>,
+    rows: BTreeMap<(String, String), Row>,
 }
 
 const DESIGN: &str = include_str!("../../docs/guide/design.md");
@@ -59,7 +59,9 @@ impl Guide {
             FileKind::WidthSet => &[(SETS, "Widths")],
             FileKind::StackSet => &[(SETS, "Stacks of objects")],
             FileKind::Effects => &[(CALIBRATE, "Effects of your own")],
-            FileKind::HeightEffects | FileKind::SpectrumEffects => &[(MEASURE, "Effects of your own")],
+            FileKind::HeightEffects | FileKind::SpectrumEffects => {
+                &[(MEASURE, "Effects of your own"), (CALIBRATE, "Effects of your own")]
+            }
         };
         let mut guide = Self::default();
         for (text, chapter) in texts {
@@ -72,11 +74,23 @@ impl Guide {
     pub(super) fn row(&self, section: &str, key: &str) -> Option<&Row> {
         let of = |section: &str| self.rows.get(&(section.to_owned(), key.to_owned()));
         // A section in another one may have a table of its own: `element.phase` has the keys of `phase`.
-        let ends = section.match_indices('.').map(|(dot, _)| &section[dot + 1..]);
-        let found = std::iter::once(section).chain(ends).find_map(of);
-        // Or the keys of the outer one; tables of several sections have no section in their head.
-        let outer = section.split('.').next().unwrap_or_default();
-        found.or_else(|| of(outer)).or_else(|| of(ANY))
+        let ends = |of: &str| -> Vec<String> {
+            let after = of.match_indices('.').map(|(dot, _)| of[dot + 1..].to_owned());
+            std::iter::once(of.to_owned()).chain(after).collect()
+        };
+        // Or the keys of one that it is in: `element.phase.y` has those of `phase`.
+        let outer = section.rmatch_indices('.').map(|(dot, _)| &section[..dot]);
+        let names: Vec<String> = std::iter::once(section).chain(outer).flat_map(ends).collect();
+        // Or those of a section in it: the forms of `phase` are in the table of `phase.term`.
+        let inside = |name: &String| {
+            let is_inside =
+                |row: &&(String, String)| row.0.strip_prefix(name).is_some_and(|rest| rest.starts_with('.'));
+            let found = self.rows.keys().find(|row| row.1 == key && is_inside(row))?;
+            self.rows.get(found)
+        };
+        let found = names.iter().find_map(|name| of(name));
+        // Tables of several sections have no section in their head.
+        found.or_else(|| names.iter().find_map(inside)).or_else(|| of(ANY))
     }
 
     /// Read the tables of keys below the heading of a chapter; of the whole text if the heading is empty.
@@ -130,12 +144,12 @@ impl Guide {
 }
 
 impl Guide {
-    /// The meaning of a section in a title, as "`[cell]`: the pillar".
+    /// The meaning of sections in a title, as "`[cell]`: the pillar".
     fn read_title(&mut self, title: &str, is_here: bool) {
-        let (Some(section), Some((_, meaning))) = (only_section(title), title.split_once(": ")) else {
+        let Some((sections, meaning)) = title.split_once(": ").filter(|_| is_here) else {
             return;
         };
-        if is_here {
+        for (section, _) in quoted(sections).filter_map(split_section) {
             let (outer, inner) = section.rsplit_once('.').unwrap_or(("", &section));
             let row = Row {
                 meaning: plain(meaning),
