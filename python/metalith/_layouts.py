@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,7 +11,9 @@ from typing import Any, Literal, TypeAlias, Union
 import numpy as np
 import numpy.typing as npt
 
-from . import _arguments, _native
+from . import _arguments, _html, _native
+from ._layout_figures import Quantity, has_two_phases, map_figure
+from ._lens_text import lens_text
 from ._types import Bools, Float64, Int64, PathLike, Progress, Widths
 
 
@@ -162,6 +163,29 @@ class Design:
         ``path``, which need not be there."""
         return cls(_native.Design.parse(text, path), text)
 
+    @classmethod
+    def lens(
+        cls,
+        *,
+        wavelength_nm: float,
+        focal_length_um: float,
+        diameter_um: float,
+        pitch_nm: int = 350,
+        pillar_height_nm: float = 700.0,
+        width_nm: tuple[int, int] = (100, 300),
+        shape: Literal["square", "circle"] = "square",
+        lattice: Lattice = "square",
+        pillar: str = "sin_luke_2015",
+        substrate: str = "fused_silica_malitson_1965",
+        name: str = "lens",
+    ) -> Design:
+        """The design of one lens for one wavelength, with a hyperbolic phase and the mapping that the cells give: every width from
+        the first to the second of ``width_nm`` is solved when it is first needed, which takes seconds, and cached. The pillars are
+        on layer 1/0. The defaults are the cell for visible light; ``metalith new`` finds one for any wavelength and
+        material. :attr:`text` is its design file. :class:`MetalithError` for values that a design file cannot have."""
+        told = (wavelength_nm, focal_length_um, diameter_um, pitch_nm, pillar_height_nm, *width_nm)
+        return cls.parse(lens_text(name, shape, lattice, pillar, substrate, *told))
+
     def __copy__(self) -> Design:
         return Design(self._native, self._text)
 
@@ -180,6 +204,11 @@ class Design:
     def title(self) -> str:
         """One line for people."""
         return self._native.title
+
+    @property
+    def text(self) -> str:
+        """The design file, as it was read or parsed."""
+        return self._text
 
     @property
     def digest(self) -> str:
@@ -225,6 +254,11 @@ class Design:
         """The pillars of all elements."""
         return Array(self._native.array(progress), self)
 
+    def plot(self, quantity: Quantity | None = None) -> Any:
+        """As :meth:`Array.plot`, of the pillars of this design: the phase if left out, of upright rectangles the width."""
+        array = self.array()
+        return array.plot(quantity or ("width" if has_two_phases(array.shape) else "phase"))
+
     def __repr__(self) -> str:
         return f"Design({self.name!r}, {len(self.elements)} elements of {self.diameter_um:g} um)"
 
@@ -237,9 +271,7 @@ class Design:
             ("pillar height", f"{self.pillar_height_nm:g} nm"),
             ("wavelengths", ", ".join(f"{nm:g}" for nm in self.wavelengths_nm) + " nm"),
         ]
-        body = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in rows)
-        title = html.escape(f"{self.name}: {self.title}")
-        return f"<table><caption>{title}</caption>{body}</table>{self._thumbnail()}"
+        return _html.table(rows, caption=f"{self.name}: {self.title}") + self._thumbnail()
 
     def _thumbnail(self) -> str:
         """The elements from above, to scale."""
@@ -327,6 +359,44 @@ class Array:
         ``hierarchy`` is ``folded``, ``sref`` or ``flat``, the same geometry; that of the design if left out. ``layer``
         is for arrays without a design."""
         return self._native.write(path, hierarchy, _arguments.layer(layer), progress)
+
+    @classmethod
+    def of_maps(
+        cls,
+        maps: Sequence[npt.ArrayLike] | npt.NDArray[Any],
+        *,
+        pitch_nm: int,
+        shape: Shape = "square",
+        lattice: Lattice = "square",
+        centres_nm: Sequence[tuple[int, int]] | None = None,
+        progress: Progress | None = None,
+    ) -> Array:
+        """The array of maps of widths (nm), diameters (nm) or rotations (degrees), which are as :func:`write_layout` takes them;
+        nothing is written. :class:`MetalithError` if a width is odd or wider than the pitch, or maps differ in size or
+        overlap."""
+        found = [_map("widths", one, shape) for one in _arguments.several("widths", maps)]
+        alone = [(0, 0)] if len(found) == 1 else []
+        centres = alone if centres_nm is None else _arguments.centres(centres_nm)
+        pitch_nm = _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32)
+        return cls(_native.array_of_widths(found, pitch_nm, lattice, centres, _told(shape), progress))
+
+    def plot(self, quantity: Quantity = "width") -> Any:
+        """A matplotlib figure of all elements from above, places in um: a colour for each pillar by its ``width`` (nm; of
+        rotated rectangles the rotation in degrees, of upright ones the width along x), or by the ``phase`` (rad) that
+        the mapping of the design has for it. Large elements are drawn by every n-th pillar.
+        :class:`MetalithError` for phases of an array without a design, and if matplotlib is not installed."""
+        return map_figure(self, quantity)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("elements", len(self)),
+            ("pillars", self.pillars),
+            ("pitch", f"{self.pitch_nm} nm, {self.lattice} lattice"),
+            ("shape", self.shape),
+            ("sites of an element", f"{self._native.sites} x {self._native.sites}"),
+        ]
+        of = "maps" if self.design is None else self.design.name
+        return _html.table(rows, caption=f"array of {of}")
 
     def __copy__(self) -> Array:
         return Array(self._native, self.design)
@@ -455,10 +525,8 @@ def write_layout(
     stand: :func:`places` has the places of a map, and on a hexagonal lattice, of circles alone, those that are sites.
     ``centres_nm`` are the places of the maps; one map alone stands at the origin. Maps that are copies of one another, or
     symmetric, are stored once. Returns the array that was written."""
-    maps = [_map("widths", one, shape) for one in _arguments.several("widths", widths)]
-    alone = [(0, 0)] if len(maps) == 1 else []
-    centres = alone if centres_nm is None else _arguments.centres(centres_nm)
-    pitch_nm = _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32)
-    array = Array(_native.array_of_widths(maps, pitch_nm, lattice, centres, _told(shape), progress))
+    array = Array.of_maps(
+        widths, pitch_nm=pitch_nm, shape=shape, lattice=lattice, centres_nm=centres_nm, progress=progress
+    )
     array.write(path, hierarchy=hierarchy, layer=layer, progress=progress)
     return array

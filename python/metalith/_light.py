@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from . import _arguments, _native
+from . import _arguments, _html, _native
 from ._figures import imported
 from ._layouts import Array, Lattice, Layout, Shape, _map, _told
 from ._types import Complex64, Complex128, Float64, Json, PathLike, Progress, Widths
@@ -99,6 +99,9 @@ class Psf:
     def plot(self) -> Any:
         """As :meth:`PsfSet.plot`, of this one."""
         return PsfSet([self]).plot(columns=1)
+
+    def _repr_html_(self) -> str:
+        return PsfSet([self])._repr_html_()
 
 
 class PsfSet(Sequence[Psf]):
@@ -191,6 +194,14 @@ class PsfSet(Sequence[Psf]):
 
     def __repr__(self) -> str:
         return f"PsfSet({len(self)} PSFs)"
+
+    def _repr_html_(self) -> str:
+        columns = ("element", "wavelength (nm)", "field x, y (deg)", "Strehl ratio", "FWHM x (um)", "FWHM y (um)", "focusing efficiency")
+        rows = (
+            (p.element, p.wavelength_nm, f"{p.field_deg[0]:g}, {p.field_deg[1]:g}", p.strehl, *p.fwhm_um, p.focusing_efficiency)
+            for p in self
+        )
+        return _html.table(rows, columns=columns, caption=repr(self))
 
 
 def psf(
