@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _arguments, _html, _native
-from ._figures import imported
+from ._figures import subplots
 from ._types import Json, PathLike, Progress
 
 
@@ -95,8 +95,7 @@ class Diagnosis:
     def plot(self) -> Any:
         """A matplotlib figure of the ranking: the share of the residual that each candidate alone explains (0 to 1), the best
         at the top, the effects that were found darker. :class:`MetalithError` if matplotlib is not installed."""
-        pyplot = imported("matplotlib.pyplot")
-        figure, axis = pyplot.subplots(figsize=(6, 1 + 0.25 * len(self.ranking)))
+        figure, axis = subplots(figsize=(6, 1 + 0.25 * len(self.ranking)))
         colours = ["#4a7ab5" if self.effect(e.name) else "#c3d2e6" for e in self.ranking]
         axis.barh([e.name for e in self.ranking], [e.score for e in self.ranking], color=colours)
         axis.invert_yaxis()

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from ._figures import imported
+from ._figures import subplots
 from ._native import MetalithError
+from ._shapes import Rectangles, Shape, UprightRectangles
 from ._types import Float64, Widths
 
 if TYPE_CHECKING:
-    from ._layouts import Array, Shape
+    from ._layouts import Array
 
 Quantity: TypeAlias = Literal["width", "phase"]
 """What a figure shows of pillars."""
@@ -32,12 +33,11 @@ def map_figure(array: Array, quantity: Quantity) -> Any:
         raise MetalithError("an array of maps has no phases\n  help: plot its widths, or give a design")
     if quantity == "phase" and has_two_phases(array.shape):
         raise MetalithError("upright rectangles have one phase for each polarisation\n  help: plot their widths")
-    pyplot = imported("matplotlib.pyplot")
     at = array.places()
     x_um, y_um = at.x_nm * 1e-3, at.y_nm * 1e-3
     dx, dy = (float(np.ptp(places)) / max(len(places) - 1, 1) for places in (x_um, y_um))
     stride = -(-len(x_um) // MOST_SAMPLES)
-    figure, axis = pyplot.subplots(figsize=(6, 5))
+    figure, axis = subplots(figsize=(6, 5))
     images, extents, values = [], np.empty((len(array), 4)), []
     for k, (cx, cy) in enumerate(array.centres_nm):
         widths = array.widths(k)
@@ -65,15 +65,12 @@ def map_figure(array: Array, quantity: Quantity) -> Any:
 
 def has_two_phases(shape: Shape) -> bool:
     """Whether pillars of this shape have a phase for each polarisation."""
-    from ._layouts import UprightRectangles
-
     return isinstance(shape, UprightRectangles)
 
 
 def _values(array: Array, element: int, widths: Widths, quantity: Quantity) -> Float64:
     """What is drawn of each pillar, NaN where there is none."""
     from ._gradient import phases_of
-    from ._layouts import Rectangles, UprightRectangles
 
     if quantity == "phase" and array.design is not None:
         return phases_of(widths, array.design, element=element)
@@ -88,8 +85,6 @@ def _values(array: Array, element: int, widths: Widths, quantity: Quantity) -> F
 
 
 def _label(shape: Shape, quantity: Quantity) -> str:
-    from ._layouts import Rectangles, UprightRectangles
-
     if quantity == "phase":
         return "phase of the mapping [rad]"
     if isinstance(shape, Rectangles):

@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arguments, _html, _native
-from ._figures import imported
-from ._layouts import Array, Lattice, Layout, Shape, _map, _told
+from ._figures import imported, subplots
+from ._layouts import Array, Layout, _map
+from ._shapes import Lattice, Shape, told_of
 from ._types import Complex64, Complex128, Float64, Json, PathLike, Progress, Widths
 
 if TYPE_CHECKING:
@@ -172,10 +173,10 @@ class PsfSet(Sequence[Psf]):
 
     def plot(self, columns: int = 4) -> Any:
         """A matplotlib figure of all PSFs on one logarithmic scale of four decades."""
-        pyplot, colors = imported("matplotlib.pyplot"), imported("matplotlib.colors")
+        colors = imported("matplotlib.colors")
         self._some()
         rows = -(-len(self) // columns)
-        figure, axes = pyplot.subplots(rows, columns, squeeze=False, figsize=(3 * columns, 3 * rows))
+        figure, axes = subplots(rows, columns, squeeze=False, figsize=(3 * columns, 3 * rows))
         most = max(float(p.values.max()) for p in self)
         for axis in axes.flat[len(self) :]:
             axis.set_axis_off()
@@ -298,7 +299,7 @@ def psf(
         fast,
         128 if samples is None else samples,
         pixel_um,
-        _told(shape),
+        told_of(shape),
         None if arriving is None else str(arriving),
         None if analyser is None else str(analyser),
         pillar_height_nm,
@@ -390,12 +391,11 @@ class Transmission(np.ndarray[Any, np.dtype[np.complex128]]):
         """A matplotlib figure of modulus and phase: over the wavelength, a line for each width; over the width where
         there is one wavelength."""
         widths, wavelengths = self._coordinates()
-        pyplot = imported("matplotlib.pyplot")
         t = np.asarray(self).reshape(len(widths), len(wavelengths))
         over_width = len(wavelengths) == 1
         x, lines = (widths, t.T) if over_width else (wavelengths, t)
         names = [f"{v:g} nm" for v in (wavelengths if over_width else widths)]
-        figure, axes = pyplot.subplots(2, 1, sharex=True, figsize=(6, 6))
+        figure, axes = subplots(2, 1, sharex=True, figsize=(6, 6))
         for line, name in zip(lines, names):
             axes[0].plot(x, np.abs(line), label=name)
             axes[1].plot(x, np.angle(line) / (2 * np.pi), label=name)
@@ -436,7 +436,7 @@ def cell(
         wavelengths.ravel(),
         pitch_nm,
         lattice,
-        _told(shape),
+        told_of(shape),
         pillar_height_nm,
         pillar,
         substrate,

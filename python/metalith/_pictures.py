@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arguments, _html, _native
-from ._figures import imported
+from ._figures import imported, subplots
 from ._layouts import Design
 from ._types import Float64, PathLike, Progress
 
@@ -211,8 +211,7 @@ def _srgb(linear: Float64) -> Float64:
 
 def _pictures_figure(pictures: dict[str, Any]) -> Any:
     """Values from 0 to 1 side by side, the first row at the top."""
-    pyplot = imported("matplotlib.pyplot")
-    figure, axes = pyplot.subplots(1, len(pictures), squeeze=False, figsize=(4 * len(pictures), 4))
+    figure, axes = subplots(1, len(pictures), squeeze=False, figsize=(4 * len(pictures), 4))
     for axis, (name, picture) in zip(axes.flat, pictures.items()):
         axis.imshow(picture, cmap="gray", vmin=0, vmax=1)
         axis.set_title(name, fontsize=8)

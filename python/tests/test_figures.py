@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -90,6 +91,20 @@ def test_designs_are_drawn_in_place() -> None:
         turned.plot("colour")  # type: ignore[arg-type]
     with pytest.raises(ml.MetalithError, match="one phase for each polarisation"):
         ml.Design.read(ROOT / "designs/birefringent_532.toml").plot("phase")
+
+
+def test_a_notebook_shows_a_figure_once() -> None:
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    before = "import metalith as ml, numpy as np\na = ml.Array.of_maps(np.full((8, 8), 200), pitch_nm=350)\n"
+    # The value of a cell, one in the middle of a cell, and one that is shown again.
+    cells = [before + "f = a.plot()\nf", "f = a.plot()\nprint()", "f"]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    environment = {key: value for key, value in os.environ.items() if key != "MPLBACKEND"}
+    client = nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3", extra_arguments=["--log-level=ERROR"])
+    client.execute(env=environment)
+    images = [sum("image/png" in output.get("data", {}) for output in cell.outputs) for cell in notebook.cells]
+    assert images == [1, 1, 1]
 
 
 def test_results_are_tables_in_a_notebook(psfs: ml.PsfSet) -> None:
