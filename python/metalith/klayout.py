@@ -63,7 +63,7 @@ def _database() -> Any:
 def register(name: str = LIBRARY) -> Any:
     """Register the library of parametrised cells with KLayout: a ``klayout.db.Library`` with ``Array``, of a design file, and
     ``Metalens``, of a wavelength, a focal length and a diameter. A second call replaces the library, as KLayout does with equal
-    names. :class:`MetalithError` if klayout is not installed."""
+    names, and reads changed design files, also for cells of open layouts. :class:`MetalithError` if klayout is not installed."""
     library: Any = _classes()(name)
     return library
 

@@ -83,9 +83,15 @@ def test_parametrised_cells_are_what_their_designs_are(design: ml.Design, tmp_pa
     layout.write(str(tmp_path / "chip.gds"))
     found = ml.read_layout(tmp_path / "chip.gds")
     assert found.centres_nm == [(-100_000, 0), (100_000, 0)] and found.other_shapes == 0
-    wanted = ml.Design.lens(wavelength_nm=660, focal_length_um=40, diameter_um=20, width_nm=(100, 280)).array()
-    for widths, array in zip(found.widths, (design.array(), wanted), strict=True):
-        assert np.array_equal(widths, array.widths(0))
+    wanted = ml.Design.lens(wavelength_nm=660, focal_length_um=40, diameter_um=20, width_nm=(100, 280))
+    for widths, one in zip(found.widths, (design, wanted), strict=True):
+        assert np.array_equal(widths, one.array().widths(0))
+    # A library that is registered again reads changed files, also for cells that are there.
+    file.write_text(wanted.text)
+    metalith.klayout.register()
+    layout.write(str(tmp_path / "chip.gds"))
+    for widths in ml.read_layout(tmp_path / "chip.gds").widths:
+        assert np.array_equal(widths, wanted.array().widths(0))
 
 
 def test_the_program_has_classes_of_its_own(design: ml.Design, monkeypatch: pytest.MonkeyPatch) -> None:
