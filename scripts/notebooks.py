@@ -16,10 +16,10 @@ from pathlib import Path
 from cpu_time import children
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "python/examples"
-NOTEBOOKS = ["lens_in_ten_lines", "foreign_layout", "calibration", "gradient"]
+NOTEBOOKS = ["lens_in_ten_lines", "foreign_layout", "calibration", "gradient", "picture"]
 
 # All of them together (s of CPU): what a person waits for, and what every run of the checks costs.
-MOST_CPU_S = 60.0
+MOST_CPU_S = 80.0
 
 
 def cells(text: str) -> list[dict]:

@@ -14,8 +14,11 @@ pip() { "$folder/venv/bin/pip" --disable-pip-version-check --quiet "$@"; }
 MATURIN_PEP517_ARGS="--features as-tested" pip install ./python
 pip install -r scripts/requirements-python.txt
 "$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples python/tests
+"$folder/venv/bin/pyright" --project python --pythonpath "$folder/venv/bin/python"
 "$folder/venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
 python3 scripts/notebooks.py check
 "$folder/venv/bin/python" scripts/notebooks.py run
-echo "== tolerances"
-"$folder/venv/bin/python" python/examples/tolerances.py
+for example in tolerances gdsfactory_chip; do
+    echo "== $example"
+    "$folder/venv/bin/python" "python/examples/$example.py"
+done

@@ -11,24 +11,13 @@ from __future__ import annotations
 
 from ._gradient import PsfGradient, PsfModel, phases_of, widths_of
 from ._kernels import Kernels
-from ._layouts import (
-    Array,
-    Design,
-    Lattice,
-    Layout,
-    Places,
-    Rectangles,
-    Shape,
-    UprightRectangles,
-    places,
-    read_layout,
-    write_layout,
-)
+from ._layouts import Array, Design, Layout, read_layout, write_layout
 from ._light import Psf, PsfSet, ThroughFocus, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
 from ._pictures import Frame, ImagingSystem, denoise
 from ._checks import MeasurementPlan, CheckReport, Marker, Verification, check, plan, verify
 from ._diagnosis import Diagnosis, FoundEffect, RankedEffect, calibrate
+from ._shapes import Lattice, Places, Rectangles, Shape, UprightRectangles, places
 from ._studies import Study, StudyResult
 
 __all__ = [

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import _arguments, _native
+from . import _arguments, _html, _native
 from ._layouts import Design
 from ._types import Json, PathLike, Progress
 
@@ -38,6 +38,13 @@ class CheckReport:
     def table(self) -> list[dict[str, Any]]:
         """Markers as rows, for ``pandas.DataFrame`` or a loop."""
         return [{"rule": m.rule, **m.numbers} for m in self.markers]
+
+    def _repr_html_(self) -> str:
+        # Rules with places first; an order that is stable keeps that of the deck.
+        rules = sorted(self.rules, key=lambda rule: not rule["violations"])
+        columns = ("rule", "what must hold", "status", "violations", "waived")
+        rows = ((r["id"], r["words"], r["status"], r["violations"], r["waived"]) for r in rules)
+        return _html.table(rows, columns=columns, caption="clean" if self.clean else "not clean")
 
 
 def check(
@@ -74,6 +81,11 @@ class Verification:
     """Each limit: ``key``, ``what``, ``reached``, ``limit``, ``sense``."""
     numbers: Json = field(repr=False)
     """All figures, as in ``report.json`` of ``metalith verify``."""
+
+    def _repr_html_(self) -> str:
+        columns = ("figure", "reached", "sense", "limit")
+        rows = ((c["what"], c["reached"], c["sense"].replace("_", " "), c["limit"]) for c in self.checks)
+        return _html.table(rows, columns=columns, caption="passed" if self.passed else "not passed")
 
 
 def verify(
@@ -118,6 +130,10 @@ class MeasurementPlan:
     """Pairs of effects that the measurements cannot distinguish, with the measurement that would."""
     numbers: Json = field(repr=False)
     """All of it, as in ``plan.json`` of ``metalith plan``."""
+
+    def _repr_html_(self) -> str:
+        rows = ((e["name"], e["detected"]) for e in self.effects)
+        return _html.table(rows, columns=("effect", "is detected"), caption=self.sentence)
 
 
 def plan(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from . import _arguments, _native
+from . import _arguments, _html, _native
+from ._figures import subplots
 from ._types import Json, PathLike, Progress
 
 
@@ -87,13 +88,21 @@ class Diagnosis:
         return "\n".join(lines + [f"  {e}" for e in self.effects])
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><td>{html.escape(e.name)}</td><td>{html.escape(str(e).partition(' = ')[2])}</td>"
-            f"<td>{html.escape(', '.join(e.confounded_with))}</td></tr>"
-            for e in self.effects
-        )
-        head = html.escape(str(self).partition("\n")[0])
-        return f"<p>{head}</p><table><tr><th>effect</th><th>95 % interval</th><th>or</th></tr>{rows}</table>"
+        rows = ((e.name, str(e).partition(" = ")[2], ", ".join(e.confounded_with)) for e in self.effects)
+        columns = ("effect", "value (95 % interval)", "not distinguished from")
+        return _html.table(rows, columns=columns, caption=str(self).partition("\n")[0])
+
+    def plot(self) -> Any:
+        """A matplotlib figure of the ranking: the share of the residual that each candidate alone explains (0 to 1), the best
+        at the top, the effects that were found darker. :class:`MetalithError` if matplotlib is not installed."""
+        figure, axis = subplots(figsize=(6, 1 + 0.25 * len(self.ranking)))
+        colours = ["#4a7ab5" if self.effect(e.name) else "#c3d2e6" for e in self.ranking]
+        axis.barh([e.name for e in self.ranking], [e.score for e in self.ranking], color=colours)
+        axis.invert_yaxis()
+        axis.set_xlabel("share of the residual that is explained")
+        axis.set_title(str(self).partition("\n")[0], fontsize=8)
+        figure.tight_layout()
+        return figure
 
 
 def _found(told: Json) -> FoundEffect:

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arguments, _native
-from ._layouts import Design, Lattice, places
+from ._layouts import Design
 from ._light import MOST_SAMPLES
+from ._shapes import Lattice, places
 from ._types import Float64, Progress, Widths
 
 Merit: TypeAlias = Union[Callable[[Float64], "tuple[float, npt.ArrayLike]"], npt.NDArray[Any]]

@@ -2,142 +2,31 @@
 
 from __future__ import annotations
 
-import html
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, Union
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _arguments, _native
-from ._types import Bools, Float64, Int64, PathLike, Progress, Widths
-
-
-ROTATIONS = "give degrees, NaN where there is no pillar"
-
-
-@dataclass(frozen=True)
-class Rectangles:
-    """Rectangular pillars of one size, which differ by their rotation."""
-
-    width_nm: int
-    """The shorter edge (nm), even, along the direction of the rotation."""
-    length_nm: int
-    """The longer edge (nm), even, across it."""
-    steps: int = 180
-    """Rotations in half a turn, which leaves a rectangle as it is."""
-
-    def numbers(self, rotations_deg: npt.ArrayLike) -> Widths:
-        """The numbers that stand in maps for rotations (degrees, from x towards y), each for the nearest step: 1 to
-        ``steps``, zero where a rotation is NaN."""
-        return self._numbers("rotations_deg", rotations_deg)
-
-    def _numbers(self, name: str, rotations_deg: npt.ArrayLike) -> Widths:
-        values = _arguments.numbers(name, rotations_deg, np.float64, nan=True, remedy=ROTATIONS)
-        _arguments.refuse(name, values, abs(values) > _arguments.MOST_DEG, ROTATIONS)
-        numbers = _native.rotation_numbers(values.ravel(), *_told(self)[1:])
-        return numbers.reshape(values.shape)
-
-    def rotations_deg(self, numbers: npt.ArrayLike) -> Float64:
-        """Rotations (degrees) from 0 up to 180; NaN where there is no pillar."""
-        values = _arguments.pillars("numbers", numbers)
-        rotations = _native.rotations_deg(values.ravel(), *_told(self)[1:])
-        return rotations.reshape(values.shape)
-
-
-@dataclass(frozen=True)
-class UprightRectangles:
-    """Rectangular pillars with edges along x and y, which differ by both widths: light polarised along each axis has a phase
-    of its own."""
-
-    shortest_nm: int
-    """The shortest width (nm), even."""
-    step_nm: int
-    """From one width to the next (nm), even."""
-    lengths: int
-    """How many widths there are, at most 64."""
-
-    def numbers(self, widths_x_nm: npt.ArrayLike, widths_y_nm: npt.ArrayLike) -> Widths:
-        """The numbers that stand in maps for widths along x and y (nm): 1 to ``lengths`` squared, first along x; zero where
-        both widths are."""
-        x, y = _arguments.widths("widths_x_nm", widths_x_nm), _arguments.widths("widths_y_nm", widths_y_nm)
-        if x.shape != y.shape:
-            raise _native.MetalithError(
-                f"`widths_x_nm` of shape {x.shape}, `widths_y_nm` of {y.shape}\n  help: give both for each pillar"
-            )
-        return _native.upright_numbers(x.ravel(), y.ravel(), *_told(self)[1:]).reshape(x.shape)
-
-    def widths_nm(self, numbers: npt.ArrayLike) -> tuple[Widths, Widths]:
-        """Widths along x and along y (nm); zero where there is no pillar."""
-        values = _arguments.pillars("numbers", numbers)
-        x, y = _native.upright_widths(values.ravel(), *_told(self)[1:])
-        return x.reshape(values.shape), y.reshape(values.shape)
-
-
-Shape: TypeAlias = Union[Literal["square", "circle", "mixed"], Rectangles, UprightRectangles]
-"""What pillars are."""
-
-
-Lattice: TypeAlias = Literal["square", "hexagonal"]
-"""How pillars stand: on a hexagonal lattice in rows along x, each shifted by half a pitch against the next."""
-
-
-@dataclass(frozen=True)
-class Places:
-    """Where the columns and rows of a map are, from the middle of its element."""
-
-    x_nm: Int64
-    """Of each column (nm), rising: a pitch apart on a square lattice, half a pitch on a hexagonal one."""
-    y_nm: Int64
-    """Of each row (nm), rising: a pitch apart on a square lattice, on a hexagonal one half the root of three of it, rounded to
-    whole nanometres."""
-    is_site: Bools
-    """Whether a pillar can stand there, shape ``[rows, columns]``: everywhere on a square lattice. On a hexagonal one where
-    the sum of row and column is even, in the rows that reach no farther than the columns; elsewhere maps are zero."""
-
-
-def places(sites: int, *, pitch_nm: int, lattice: Lattice = "square") -> Places:
-    """Where the columns and rows of a map of ``sites`` x ``sites`` are. A hexagonal lattice has an odd number of them, one
-    in the middle; ``2 * ceil(diameter / pitch) + 1`` hold a round lens."""
-    most = _arguments.MOST_32
-    numbers = (_arguments.whole("sites", sites, 1, most), _arguments.whole("pitch_nm", pitch_nm, 1, most))
-    return Places(*_native.places(*numbers, lattice))
-
-
-def _lattice(told: str) -> Lattice:
-    return "hexagonal" if told == "hexagonal" else "square"
-
-
-def _told(shape: Shape) -> tuple[str, int, int, int]:
-    """A shape as the native module has it: a word and three numbers."""
-    if isinstance(shape, Rectangles):
-        return ("rectangle", *_numbers(width_nm=shape.width_nm, length_nm=shape.length_nm, steps=shape.steps))
-    if isinstance(shape, UprightRectangles):
-        return (
-            "upright_rectangle",
-            *_numbers(shortest_nm=shape.shortest_nm, step_nm=shape.step_nm, lengths=shape.lengths),
-        )
-    return (shape, 0, 0, 0)
-
-
-def _numbers(**named: int) -> tuple[int, int, int]:
-    """Three numbers of rectangles, by their names."""
-    first, second, third = (_arguments.whole(name, value, 1, _arguments.MOST_16) for name, value in named.items())
-    return first, second, third
-
-
-def _shape(told: tuple[str, int, int, int]) -> Shape:
-    word, width, length, steps = told
-    if word == "rectangle":
-        return Rectangles(width, length, steps)
-    if word == "upright_rectangle":
-        return UprightRectangles(width, length, steps)
-    if word == "mixed":
-        return "mixed"
-    return "circle" if word == "circle" else "square"
+from . import _arguments, _html, _native
+from ._layout_figures import Quantity, has_two_phases, map_figure
+from ._lens_text import lens_text
+from ._shapes import (
+    Lattice,
+    Places,
+    Rectangles,
+    Shape,
+    UprightRectangles,
+    lattice_of,
+    places,
+    rectangles_of,
+    shape_of,
+    told_of,
+)
+from ._types import Float64, PathLike, Progress, Widths
 
 
 class Design:
@@ -162,6 +51,29 @@ class Design:
         ``path``, which need not be there."""
         return cls(_native.Design.parse(text, path), text)
 
+    @classmethod
+    def lens(
+        cls,
+        *,
+        wavelength_nm: float,
+        focal_length_um: float,
+        diameter_um: float,
+        pitch_nm: int = 350,
+        pillar_height_nm: float = 700.0,
+        width_nm: tuple[int, int] = (100, 300),
+        shape: Literal["square", "circle"] = "square",
+        lattice: Lattice = "square",
+        pillar: str = "sin_luke_2015",
+        substrate: str = "fused_silica_malitson_1965",
+        name: str = "lens",
+    ) -> Design:
+        """The design of one lens for one wavelength, with a hyperbolic phase and the mapping that the cells give: every width from
+        the first to the second of ``width_nm`` is solved when it is first needed, which takes seconds, and cached. The pillars are
+        on layer 1/0. The defaults are the cell for visible light; ``metalith new`` finds one for any wavelength and
+        material. :attr:`text` is its design file. :class:`MetalithError` for values that a design file cannot have."""
+        told = (wavelength_nm, focal_length_um, diameter_um, pitch_nm, pillar_height_nm, *width_nm)
+        return cls.parse(lens_text(name, shape, lattice, pillar, substrate, *told))
+
     def __copy__(self) -> Design:
         return Design(self._native, self._text)
 
@@ -182,6 +94,11 @@ class Design:
         return self._native.title
 
     @property
+    def text(self) -> str:
+        """The design file, as it was read or parsed."""
+        return self._text
+
+    @property
     def digest(self) -> str:
         """SHA-256 of all that decides the layout, in hexadecimal."""
         return self._native.digest
@@ -194,7 +111,7 @@ class Design:
     @property
     def lattice(self) -> Lattice:
         """How the pillars stand."""
-        return _lattice(self._native.lattice)
+        return lattice_of(self._native.lattice)
 
     @property
     def pillar_height_nm(self) -> float:
@@ -225,6 +142,11 @@ class Design:
         """The pillars of all elements."""
         return Array(self._native.array(progress), self)
 
+    def plot(self, quantity: Quantity | None = None) -> Any:
+        """As :meth:`Array.plot`, of the pillars of this design: the phase if left out, of upright rectangles the width."""
+        array = self.array()
+        return array.plot(quantity or ("width" if has_two_phases(array.shape) else "phase"))
+
     def __repr__(self) -> str:
         return f"Design({self.name!r}, {len(self.elements)} elements of {self.diameter_um:g} um)"
 
@@ -237,9 +159,7 @@ class Design:
             ("pillar height", f"{self.pillar_height_nm:g} nm"),
             ("wavelengths", ", ".join(f"{nm:g}" for nm in self.wavelengths_nm) + " nm"),
         ]
-        body = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in rows)
-        title = html.escape(f"{self.name}: {self.title}")
-        return f"<table><caption>{title}</caption>{body}</table>{self._thumbnail()}"
+        return _html.table(rows, caption=f"{self.name}: {self.title}") + self._thumbnail()
 
     def _thumbnail(self) -> str:
         """The elements from above, to scale."""
@@ -285,12 +205,12 @@ class Array:
     @property
     def lattice(self) -> Lattice:
         """How the pillars stand."""
-        return _lattice(self._native.lattice)
+        return lattice_of(self._native.lattice)
 
     @property
     def shape(self) -> Shape:
         """What the pillars are."""
-        return _shape(self._native.shape)
+        return shape_of(self._native.shape)
 
     def places(self) -> Places:
         """Where the columns and rows of each map of widths are, from the centre of its element."""
@@ -312,7 +232,7 @@ class Array:
 
     def rotations_deg(self, element: int) -> Float64:
         """Rotations of the rectangles of one element (degrees), NaN where there is none."""
-        return _rectangles(self.shape).rotations_deg(self.widths(element))
+        return rectangles_of(self.shape).rotations_deg(self.widths(element))
 
     def write(
         self,
@@ -328,6 +248,44 @@ class Array:
         is for arrays without a design."""
         return self._native.write(path, hierarchy, _arguments.layer(layer), progress)
 
+    @classmethod
+    def of_maps(
+        cls,
+        widths: Sequence[npt.ArrayLike] | npt.NDArray[Any],
+        *,
+        pitch_nm: int,
+        shape: Shape = "square",
+        lattice: Lattice = "square",
+        centres_nm: Sequence[tuple[int, int]] | None = None,
+        progress: Progress | None = None,
+    ) -> Array:
+        """The array of maps of widths (nm), diameters (nm) or rotations (degrees), which are as :func:`write_layout` takes them;
+        nothing is written. :class:`MetalithError` if a width is odd or wider than the pitch, if maps differ in
+        size, or if several have no centres."""
+        found = [_map("widths", one, shape) for one in _arguments.several("widths", widths)]
+        alone = [(0, 0)] if len(found) == 1 else []
+        centres = alone if centres_nm is None else _arguments.centres(centres_nm)
+        pitch_nm = _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32)
+        return cls(_native.array_of_widths(found, pitch_nm, lattice, centres, told_of(shape), progress))
+
+    def plot(self, quantity: Quantity = "width") -> Any:
+        """A matplotlib figure of all elements from above, places in um: a colour for each pillar by its ``width`` (nm; of
+        rotated rectangles the rotation in degrees, of upright ones the width along x), or by the ``phase`` (rad) that
+        the mapping of the design has for it. Large elements are drawn by every n-th pillar.
+        :class:`MetalithError` for phases of an array without a design, and if matplotlib is not installed."""
+        return map_figure(self, quantity)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("elements", len(self)),
+            ("pillars", self.pillars),
+            ("pitch", f"{self.pitch_nm} nm, {self.lattice} lattice"),
+            ("shape", self.shape),
+            ("sites of an element", f"{self._native.sites} x {self._native.sites}"),
+        ]
+        of = "maps" if self.design is None else self.design.name
+        return _html.table(rows, caption=f"array of {of}")
+
     def __copy__(self) -> Array:
         return Array(self._native, self.design)
 
@@ -338,7 +296,7 @@ class Array:
         if self.design is not None:
             return Design.array, (self.design,)
         maps = [self.widths(k) for k in range(len(self))]
-        return _of_maps, (maps, self.pitch_nm, self.lattice, self.centres_nm, _told(self.shape))
+        return _of_maps, (maps, self.pitch_nm, self.lattice, self.centres_nm, told_of(self.shape))
 
     def __repr__(self) -> str:
         return f"Array({len(self)} elements, {self.pillars:,} pillars)"
@@ -381,7 +339,7 @@ class Layout:
     def rotations_deg(self, element: int) -> Float64:
         """Rotations of the rectangles of one element (degrees), NaN where there is none."""
         k = _arguments.element(element, len(self.widths))
-        return _rectangles(self.shape).rotations_deg(self.widths[k])
+        return rectangles_of(self.shape).rotations_deg(self.widths[k])
 
 
 def _map(name: str, given: npt.ArrayLike, shape: Shape) -> Widths:
@@ -394,13 +352,6 @@ def _map(name: str, given: npt.ArrayLike, shape: Shape) -> Widths:
         found = _arguments.widths(name, given)
     _arguments.square(name, found)
     return found
-
-
-def _rectangles(shape: Shape) -> Rectangles:
-    if isinstance(shape, Rectangles):
-        return shape
-    what = "upright rectangles" if isinstance(shape, UprightRectangles) else f"{shape}s"
-    raise _native.MetalithError(f"{what} have no rotation\n  help: ask for their widths")
 
 
 def read_layout(
@@ -429,8 +380,8 @@ def read_layout(
         pillars=pillars,
         other_shapes=others,
         top=found,
-        shape=_shape(shape),
-        lattice=_lattice(lattice),
+        shape=shape_of(shape),
+        lattice=lattice_of(lattice),
     )
 
 
@@ -455,10 +406,8 @@ def write_layout(
     stand: :func:`places` has the places of a map, and on a hexagonal lattice, of circles alone, those that are sites.
     ``centres_nm`` are the places of the maps; one map alone stands at the origin. Maps that are copies of one another, or
     symmetric, are stored once. Returns the array that was written."""
-    maps = [_map("widths", one, shape) for one in _arguments.several("widths", widths)]
-    alone = [(0, 0)] if len(maps) == 1 else []
-    centres = alone if centres_nm is None else _arguments.centres(centres_nm)
-    pitch_nm = _arguments.whole("pitch_nm", pitch_nm, 1, _arguments.MOST_32)
-    array = Array(_native.array_of_widths(maps, pitch_nm, lattice, centres, _told(shape), progress))
+    array = Array.of_maps(
+        widths, pitch_nm=pitch_nm, shape=shape, lattice=lattice, centres_nm=centres_nm, progress=progress
+    )
     array.write(path, hierarchy=hierarchy, layer=layer, progress=progress)
     return array

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from . import _arguments, _native
-from ._figures import imported
-from ._layouts import Array, Lattice, Layout, Shape, _map, _told
+from . import _arguments, _html, _native
+from ._figures import imported, subplots
+from ._layouts import Array, Layout, _map
+from ._shapes import Lattice, Shape, told_of
 from ._types import Complex64, Complex128, Float64, Json, PathLike, Progress, Widths
 
 if TYPE_CHECKING:
@@ -100,6 +101,9 @@ class Psf:
         """As :meth:`PsfSet.plot`, of this one."""
         return PsfSet([self]).plot(columns=1)
 
+    def _repr_html_(self) -> str:
+        return PsfSet([self])._repr_html_()
+
 
 class PsfSet(Sequence[Psf]):
     """PSFs of elements, wavelengths and fields, in this order."""
@@ -169,10 +173,10 @@ class PsfSet(Sequence[Psf]):
 
     def plot(self, columns: int = 4) -> Any:
         """A matplotlib figure of all PSFs on one logarithmic scale of four decades."""
-        pyplot, colors = imported("matplotlib.pyplot"), imported("matplotlib.colors")
+        colors = imported("matplotlib.colors")
         self._some()
         rows = -(-len(self) // columns)
-        figure, axes = pyplot.subplots(rows, columns, squeeze=False, figsize=(3 * columns, 3 * rows))
+        figure, axes = subplots(rows, columns, squeeze=False, figsize=(3 * columns, 3 * rows))
         most = max(float(p.values.max()) for p in self)
         for axis in axes.flat[len(self) :]:
             axis.set_axis_off()
@@ -191,6 +195,14 @@ class PsfSet(Sequence[Psf]):
 
     def __repr__(self) -> str:
         return f"PsfSet({len(self)} PSFs)"
+
+    def _repr_html_(self) -> str:
+        columns = ("element", "wavelength (nm)", "field x, y (deg)", "Strehl ratio", "FWHM x (um)", "FWHM y (um)", "focusing efficiency")
+        rows = (
+            (p.element, p.wavelength_nm, f"{p.field_deg[0]:g}, {p.field_deg[1]:g}", p.strehl, *p.fwhm_um, p.focusing_efficiency)
+            for p in self
+        )
+        return _html.table(rows, columns=columns, caption=repr(self))
 
 
 def psf(
@@ -287,7 +299,7 @@ def psf(
         fast,
         128 if samples is None else samples,
         pixel_um,
-        _told(shape),
+        told_of(shape),
         None if arriving is None else str(arriving),
         None if analyser is None else str(analyser),
         pillar_height_nm,
@@ -379,12 +391,11 @@ class Transmission(np.ndarray[Any, np.dtype[np.complex128]]):
         """A matplotlib figure of modulus and phase: over the wavelength, a line for each width; over the width where
         there is one wavelength."""
         widths, wavelengths = self._coordinates()
-        pyplot = imported("matplotlib.pyplot")
         t = np.asarray(self).reshape(len(widths), len(wavelengths))
         over_width = len(wavelengths) == 1
         x, lines = (widths, t.T) if over_width else (wavelengths, t)
         names = [f"{v:g} nm" for v in (wavelengths if over_width else widths)]
-        figure, axes = pyplot.subplots(2, 1, sharex=True, figsize=(6, 6))
+        figure, axes = subplots(2, 1, sharex=True, figsize=(6, 6))
         for line, name in zip(lines, names):
             axes[0].plot(x, np.abs(line), label=name)
             axes[1].plot(x, np.angle(line) / (2 * np.pi), label=name)
@@ -425,7 +436,7 @@ def cell(
         wavelengths.ravel(),
         pitch_nm,
         lattice,
-        _told(shape),
+        told_of(shape),
         pillar_height_nm,
         pillar,
         substrate,

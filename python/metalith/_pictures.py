@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _arguments, _native
+from . import _arguments, _html, _native
+from ._figures import imported, subplots
 from ._kernels import Kernels
 from ._layouts import Design
 from ._types import Float64, PathLike, Progress
@@ -46,6 +47,35 @@ class Frame:
     def saturated(self) -> int:
         """Pixels at full scale."""
         return self._native.saturated
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.DataArray`` of float32 with dimensions plane, y and x: signals over full scale. Coordinates are numbers of
+        planes and of pixels, from zero. :class:`MetalithError` if xarray is not installed."""
+        xarray = imported("xarray")
+        planes = np.stack(self.planes)
+        return xarray.DataArray(
+            planes,
+            dims=("plane", "y", "x"),
+            coords={name: np.arange(n) for name, n in zip(("plane", "y", "x"), planes.shape)},
+            name="frame",
+            attrs={"long_name": "signal over full scale", "units": "1", "saturated": self.saturated},
+        )
+
+    def plot(self) -> Any:
+        """A matplotlib figure of the planes, from no signal to full scale. :class:`MetalithError` if matplotlib is not
+        installed."""
+        planes = self.planes
+        return _pictures_figure({f"plane {k}" if len(planes) > 1 else "frame": plane for k, plane in enumerate(planes)})
+
+    def _repr_html_(self) -> str:
+        planes = self.planes
+        rows = [
+            ("planes", len(planes)),
+            ("rows x columns (pixels)", " x ".join(map(str, planes[0].shape))),
+            ("largest signal (of full scale)", float(max(plane.max() for plane in planes))),
+            ("pixels at full scale", self.saturated),
+        ]
+        return _html.table(rows, caption="frame")
 
 
 class ImagingSystem:
@@ -139,6 +169,61 @@ class ImagingSystem:
         """Images of points through one element, counted from zero, at every ``step``-th place of its field along both axes."""
         chosen = _arguments.whole("element", element, 0, _arguments.MOST_32)
         return Kernels(chosen, *self._native.kernels(chosen, _arguments.whole("step", step, 1, _arguments.MOST_32)))
+
+
+    def to_xarray(self, picture: npt.ArrayLike) -> Any:
+        """A scene, a truth or a restored picture of this system, ``[row, column, colour]`` or grey ``[row, column]``, as an
+        ``xarray.DataArray`` of float64 with dimensions y, x and, in colours, colour (red, green, blue). Values are linear sRGB,
+        white being 1. The coordinates x and y are tangents of the angles under which the chip sees the middles of pixels, x_deg and
+        y_deg these angles (degrees). :class:`MetalithError` for other dimensions, and if xarray is not
+        installed."""
+        values = _arguments.numbers("picture", picture, np.float64)
+        if values.ndim not in (2, 3) or values.shape[2:] not in ((), (3,)) or values.size == 0:
+            raise _native.MetalithError(
+                f"`picture` of shape {values.shape}\n  help: give one of shape (rows, columns, 3), or a grey one of (rows, columns)"
+            )
+        # The field is from edge to edge, and pixels are square. Pictures of fine scenes have fewer pixels than these.
+        rows, columns = values.shape[:2]
+        step = 2 * np.tan(np.radians(self.field_deg) / 2) / columns
+        y, x = ((np.arange(n) - (n - 1) / 2) * step for n in (rows, columns))
+        tangent, degrees = {"units": "1", "long_name": "tangent of the angle"}, {"units": "degree"}
+        coords: dict[str, Any] = {
+            "y": ("y", y, tangent),
+            "x": ("x", x, tangent),
+            "y_deg": ("y", np.degrees(np.arctan(y)), degrees),
+            "x_deg": ("x", np.degrees(np.arctan(x)), degrees),
+        }
+        dims = ("y", "x", "colour")[: values.ndim]
+        if values.ndim == 3:
+            coords["colour"] = ["red", "green", "blue"]
+        attrs = {"long_name": "linear sRGB, white is 1", "units": "1"}
+        return imported("xarray").DataArray(values, dims=dims, coords=coords, name="picture", attrs=attrs)
+
+    def plot(self, **pictures: npt.ArrayLike) -> Any:
+        """A matplotlib figure of pictures in linear sRGB side by side, such as ``plot(truth=truth, restored=picture)``, drawn in
+        sRGB. :class:`MetalithError` if there is none, and if matplotlib is not installed."""
+        if not pictures:
+            raise _native.MetalithError("no picture to plot\n  help: give them by name, such as `plot(restored=picture)`")
+        shown = {name: _srgb(_arguments.numbers(name, given, np.float64)) for name, given in pictures.items()}
+        return _pictures_figure(shown)
+
+
+def _srgb(linear: Float64) -> Float64:
+    """Linear sRGB as sRGB values from 0 to 1 (IEC 61966-2-1)."""
+    light = np.clip(linear, 0.0, 1.0)
+    values: Float64 = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return values
+
+
+def _pictures_figure(pictures: dict[str, Any]) -> Any:
+    """Values from 0 to 1 side by side, the first row at the top."""
+    figure, axes = subplots(1, len(pictures), squeeze=False, figsize=(4 * len(pictures), 4))
+    for axis, (name, picture) in zip(axes.flat, pictures.items()):
+        axis.imshow(picture, cmap="gray", vmin=0, vmax=1)
+        axis.set_title(name, fontsize=8)
+        axis.set_axis_off()
+    figure.tight_layout()
+    return figure
 
 
 def _opened(

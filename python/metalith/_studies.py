@@ -8,7 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import _arguments, _native
+import numpy as np
+
+from . import _arguments, _html, _native
+from ._figures import imported
 from ._types import Json, PathLike, Progress
 
 
@@ -44,6 +47,49 @@ class StudyResult:
             }
             for d in self.draws
         ]
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.Dataset``. Of a study over a grid, its dimensions are the quantities of the grid: ``yield`` (0 to 1), and mean
+        and ``NAME_sd`` of each figure NAME over the draws at each place. Without a grid, or where it has too many
+        combinations to be merged, the dimension is ``draw``: each figure, the amounts (with ``units``) and ``passed`` as
+        coordinates. NaN where a figure is no number. :class:`MetalithError` if xarray is not installed."""
+        xarray = imported("xarray")
+        units = dict(self.quantities)
+        points = self.combinations or self.grid
+        names = list(dict.fromkeys(name for point in points for name, _ in point["at"]))
+        if not points or any(len(point["at"]) != len(names) for point in points):
+            return self._draws_to_xarray(xarray, units)
+        axes = {name: list(dict.fromkeys(dict(point["at"])[name] for point in points)) for name in names}
+        shape = tuple(len(axis) for axis in axes.values())
+        figures = list(dict.fromkeys(key for point in points for key in point["figures"]))
+        keys = ["yield", *(key + ending for key in figures for ending in ("", "_sd"))]
+        values = {key: np.full(shape, np.nan) for key in keys}
+        for point in points:
+            at = tuple(axes[name].index(value) for name, value in point["at"])
+            values["yield"][at] = point["held"] / point["draws"]
+            for key, found in point["figures"].items():
+                values[key][at], values[key + "_sd"][at] = found["mean"], found["sd"]
+        return xarray.Dataset(
+            {key: (names, array) for key, array in values.items()},
+            coords={name: (name, axis, {"units": units.get(name, "")}) for name, axis in axes.items()},
+        )
+
+    def _draws_to_xarray(self, xarray: Any, units: dict[str, str]) -> Any:
+        figures = list(dict.fromkeys(key for d in self.draws for key in d["figures"]))
+        held = list(dict.fromkeys(key for d in self.draws for key in d.get("design", {})))
+        coords: dict[str, Any] = {"draw": [d["draw"] for d in self.draws]}
+        for k, (name, unit) in enumerate(units.items()):
+            coords[name] = ("draw", [d["amounts"][k] for d in self.draws], {"units": unit})
+        for name in held:
+            coords[name] = ("draw", [d["design"].get(name) for d in self.draws])
+        coords["passed"] = ("draw", [d["passed"] for d in self.draws])
+        values = {key: np.array([d["figures"].get(key) for d in self.draws], dtype=np.float64) for key in figures}
+        return xarray.Dataset({key: ("draw", array) for key, array in values.items()}, coords=coords)
+
+    def _repr_html_(self) -> str:
+        rows = ((y["key"], y["share"], "{:.3g} to {:.3g}".format(*y["interval"]), y["of"]) for y in self.yields)
+        columns = ("limit", "yield", "95 % interval", "draws")
+        return _html.table(rows, columns=columns, caption=f"study of {len(self.draws)} draws")
 
 
 class Study:

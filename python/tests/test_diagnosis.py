@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from metalith._diagnosis import Diagnosis, _found, _ranked
 
 
@@ -33,3 +35,8 @@ def test_a_diagnosis_shows_itself() -> None:
     assert "a&lt;b" in diagnosis._repr_html_() and "a<b" not in diagnosis._repr_html_()
     assert diagnosis.effect("a<b") is diagnosis.effects[0] and diagnosis.effect("defocus") is None
     assert diagnosis.ranking[0].gain is None
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    (axis,) = diagnosis.plot().axes
+    assert [bar.get_width() for bar in axis.patches] == [0.5]
+    assert [label.get_text() for label in axis.get_yticklabels()] == ["defocus"]

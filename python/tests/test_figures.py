@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 import metalith as ml
 
 ROOT = Path(__file__).resolve().parents[2]
-OPTIONAL = ("xarray", "matplotlib", "torch", "jax", "scipy")
+OPTIONAL = ("xarray", "matplotlib", "torch", "jax", "scipy", "klayout", "gdsfactory")
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +68,60 @@ def test_figures_are_drawn_of_what_was_computed(psfs: ml.PsfSet) -> None:
     assert np.allclose(over_width.lines[0].get_xdata(), [150, 200, 250])
 
 
+def test_designs_are_drawn_in_place() -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    design = ml.Design.read(ROOT / "designs/mini_3x3.toml")
+    images = design.plot().axes[0].images
+    assert len(images) == 9
+    # The element in the middle, its 172 sites about the origin.
+    array = design.array()
+    middle = images[array.centres_nm.index((0, 0))]
+    assert middle.get_extent() == pytest.approx((-30.1, 30.1, -30.1, 30.1))
+    phases = ml.phases_of(array.widths(4), design)
+    assert np.array_equal(middle.get_array().filled(np.nan), phases, equal_nan=True)
+    widths = array.plot("width").axes[0].images[4].get_array()
+    assert np.array_equal(widths.filled(0), array.widths(4))
+    rectangles = ml.Rectangles(100, 250)
+    turned = ml.Array.of_maps(np.full((8, 8), 30.0), pitch_nm=350, shape=rectangles)
+    assert turned.plot().axes[0].images[0].get_array().max() == pytest.approx(30.0)
+    with pytest.raises(ml.MetalithError, match="no phases\n  help: "):
+        turned.plot("phase")
+    with pytest.raises(ml.MetalithError, match="`quantity` = 'colour'"):
+        turned.plot("colour")  # type: ignore[arg-type]
+    with pytest.raises(ml.MetalithError, match="one phase for each polarisation"):
+        ml.Design.read(ROOT / "designs/birefringent_532.toml").plot("phase")
+
+
+def test_a_notebook_shows_a_figure_once() -> None:
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    before = "import metalith as ml, numpy as np\na = ml.Array.of_maps(np.full((8, 8), 200), pitch_nm=350)\n"
+    # The value of a cell, one in the middle of a cell, and one that is shown again.
+    cells = [before + "f = a.plot()\nf", "f = a.plot()\nprint()", "f"]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    environment = {key: value for key, value in os.environ.items() if key != "MPLBACKEND"}
+    client = nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3", extra_arguments=["--log-level=ERROR"])
+    client.execute(env=environment)
+    images = [sum("image/png" in output.get("data", {}) for output in cell.outputs) for cell in notebook.cells]
+    assert images == [1, 1, 1]
+
+
+def test_results_are_tables_in_a_notebook(psfs: ml.PsfSet) -> None:
+    cells = psfs._repr_html_().count("<td>")
+    assert cells == 7 * len(psfs), "a row for each PSF"
+    array = ml.Design.read(ROOT / "designs/mini_3x3.toml").array()
+    assert f"{array.pillars:,}" in array._repr_html_()
+    rule: dict[str, Any] = dict(id="a<b", words="a & b", status="run", violations=2, waived=0)
+    report = ml.CheckReport(False, [{**rule, "id": "clean", "violations": 0}, rule], [], {})
+    shown = report._repr_html_()
+    assert "a&lt;b" in shown and "a &amp; b" in shown and shown.index("a&lt;b") < shown.index("<td>clean</td>")
+    many = ml.CheckReport(True, [rule] * 50, [], {})._repr_html_()
+    assert many.count("<tr>") == 41 and "10 more rows" in many
+    check = dict(key="k", what="rms [rad]", reached=0.56266, limit=0.6, sense="at_most")
+    assert "<td>0.5627</td><td>at most</td><td>0.6</td>" in ml.Verification(True, [check], {})._repr_html_()
+
+
 @pytest.mark.parametrize(
     ("call", "package"),
     [
@@ -77,14 +132,20 @@ def test_figures_are_drawn_of_what_was_computed(psfs: ml.PsfSet) -> None:
         ("metalith.torch.psf(model, np.ones((8, 8)))", "torch"),
         ("metalith.jax.psf(model)", "jax"),
         ("metalith.scipy.minimize(model, np.ones((8, 8)), np.ones((8, 8)))", "scipy"),
+        ("a.plot()", "matplotlib"),
+        ("metalith.klayout.insert(Nothing(), a)", "klayout"),
+        ("metalith.klayout.register()", "klayout"),
+        ("metalith.gdsfactory.component(a)", "gdsfactory"),
     ],
 )
 def test_a_package_that_is_missing_is_named_with_the_remedy(call: str, package: str) -> None:
     code = (
-        "import sys, numpy as np, metalith as ml, metalith.jax, metalith.scipy, metalith.torch\n"
+        "import sys, numpy as np, metalith as ml, metalith.gdsfactory, metalith.jax, metalith.klayout\n"
+        "import metalith.scipy, metalith.torch\n"
         f"assert not {set(OPTIONAL)} & set(sys.modules), 'imported before they are asked for'\n"
         # What Python's own search gives where a package is not installed.
         "class Nothing:\n"
+        "    dbu = 0.001\n"
         "    def find_spec(self, name, path=None, target=None):\n"
         f"        if name.partition('.')[0] in {OPTIONAL}:\n"
         "            raise ModuleNotFoundError(f'No module named {name!r}', name=name.partition('.')[0])\n"
@@ -92,6 +153,7 @@ def test_a_package_that_is_missing_is_named_with_the_remedy(call: str, package: 
         "t = ml.cell([200.0], [530.0], orders=3)\n"
         "p = ml.psf(np.full((8, 8), 200, dtype=np.uint16), [530], pitch_nm=350, distance_um=20.0, samples=8, fast=True)\n"
         "model = ml.PsfModel(8, pitch_nm=350, wavelength_nm=530, distance_um=20.0, samples=8)\n"
+        "a = ml.Array.of_maps(np.full((8, 8), 200), pitch_nm=350)\n"
         f"try:\n    {call}\n"
         "except ml.MetalithError as error:\n    print(error)\n"
     )

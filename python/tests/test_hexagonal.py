@@ -110,8 +110,8 @@ def test_the_pillars_of_a_design_are_where_its_file_has_them(tmp_path: Path) -> 
 def test_what_is_written_is_read_with_and_without_a_design(array: ml.Array, tmp_path: Path, name: str) -> None:
     array.write(tmp_path / name)
     expected = pillars(array.widths(0), array.places())
-    for given in ({"design": array.design}, {"array": array}, {}):
-        layout = ml.read_layout(tmp_path / name, **given)
+    file = tmp_path / name
+    for layout in (ml.read_layout(file, design=array.design), ml.read_layout(file, array=array), ml.read_layout(file)):
         assert (layout.lattice, layout.pitch_nm, layout.shape) == ("hexagonal", PITCH_NM, "circle")
         assert (layout.pillars, layout.other_shapes) == (array.pillars, 0)
         assert pillars(layout.widths[0], layout.places(0), layout.centres_nm[0]) == expected

@@ -55,8 +55,12 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> ml.ImagingSystem:
     return ml.ImagingSystem(design, folder / "chip.oas", folder / "small.toml", shape=SHAPE, field_deg=60.0)
 
 
-def test_a_frame_is_what_the_sensor_records(system: ml.ImagingSystem) -> None:
-    frame = system.record(scene())
+@pytest.fixture(scope="module")
+def frame(system: ml.ImagingSystem) -> ml.Frame:
+    return system.record(scene())
+
+
+def test_a_frame_is_what_the_sensor_records(system: ml.ImagingSystem, frame: ml.Frame) -> None:
     (plane,) = frame.planes
     assert plane.shape == (240, 240) and plane.dtype == np.float32
     assert 0 <= plane.min() and plane.max() <= 1 and frame.saturated == 0
@@ -71,18 +75,17 @@ def test_a_frame_is_what_the_sensor_records(system: ml.ImagingSystem) -> None:
     assert np.std((other - plane)[lit]) == pytest.approx(expected, rel=0.2)
 
 
-def test_a_grey_scene_is_one_of_three_equal_colours(system: ml.ImagingSystem) -> None:
+def test_a_grey_scene_is_one_of_three_equal_colours(system: ml.ImagingSystem, frame: ml.Frame) -> None:
+    # The scene has the same value in each colour.
     grey = scene()[:, :, 0]
-    colours = np.repeat(grey[:, :, None], 3, axis=2)
+    assert np.array_equal(system.record(grey).planes[0], frame.planes[0])
     for given in (grey, grey[:, :, None]):
-        assert np.array_equal(system.record(given).planes[0], system.record(colours).planes[0])
-        assert np.array_equal(system.truth(given), system.truth(colours))
+        assert np.array_equal(system.truth(given), system.truth(scene()))
 
 
-def test_a_picture_is_restored(system: ml.ImagingSystem) -> None:
+def test_a_picture_is_restored(system: ml.ImagingSystem, frame: ml.Frame) -> None:
     truth = system.truth(scene())
     assert truth.shape == (*SHAPE, 3)
-    frame = system.record(scene())
     found = {method: system.restore(frame, method) for method in ("tikhonov", "tv")}
     inside = (slice(6, -6), slice(6, -6))
     spread = float(np.std(truth[inside]))
@@ -97,8 +100,38 @@ def test_a_picture_is_restored(system: ml.ImagingSystem) -> None:
     assert np.array_equal(system.restore(frame), found["tikhonov"])
 
 
-def test_a_frame_from_elsewhere_is_restored_as_one_that_was_simulated(system: ml.ImagingSystem) -> None:
-    frame = system.record(scene())
+def test_pictures_are_labelled_arrays(system: ml.ImagingSystem) -> None:
+    picture = scene()
+    labelled = system.to_xarray(picture)
+    assert dict(labelled.sizes) == {"y": 48, "x": 48, "colour": 3} and np.array_equal(labelled.values, picture)
+    # The field is from edge to edge: half a pixel beyond the outermost middles.
+    step = float(labelled.x[1] - labelled.x[0])
+    assert float(labelled.x[-1]) + step / 2 == pytest.approx(np.tan(np.radians(30.0)))
+    assert float(labelled.y[0]) == -float(labelled.x[-1])
+    assert float(labelled.x_deg[24]) == pytest.approx(np.degrees(np.arctan(step / 2)))
+    assert system.to_xarray(picture[:, :, 0]).dims == ("y", "x")
+    with pytest.raises(ml.MetalithError, match=r"`picture` of shape \(48,\)"):
+        system.to_xarray(picture[0, :, 0])
+
+
+def test_frames_and_pictures_are_shown(system: ml.ImagingSystem, frame: ml.Frame) -> None:
+    labelled = frame.to_xarray()
+    assert dict(labelled.sizes) == {"plane": 1, "y": 240, "x": 240}
+    assert np.array_equal(labelled.values[0], frame.planes[0])
+    assert "240 x 240" in frame._repr_html_()
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    assert np.array_equal(frame.plot().axes[0].images[0].get_array(), frame.planes[0])
+    # Half of white is 0.735 in sRGB (IEC 61966-2-1), and what is above white is white.
+    grey = np.full((48, 48), 0.5)
+    half, over = system.plot(half=grey, over=4 * grey).axes
+    assert half.get_title() == "half" and half.images[0].get_array()[0, 0] == pytest.approx(0.7354, abs=1e-4)
+    assert over.images[0].get_array().max() == pytest.approx(1.0)
+    with pytest.raises(ml.MetalithError, match="no picture to plot"):
+        system.plot()
+
+
+def test_a_frame_from_elsewhere_is_restored_as_one_that_was_simulated(system: ml.ImagingSystem, frame: ml.Frame) -> None:
     again = system.frame(frame.planes)
     assert again.saturated == frame.saturated
     assert np.array_equal(system.restore(again), system.restore(frame))
@@ -113,7 +146,7 @@ def test_a_frame_from_elsewhere_is_restored_as_one_that_was_simulated(system: ml
         system.frame([plane * np.nan])
 
 
-def test_what_cannot_be_recorded_or_restored_is_told(system: ml.ImagingSystem) -> None:
+def test_what_cannot_be_recorded_or_restored_is_told(system: ml.ImagingSystem, frame: ml.Frame) -> None:
     with pytest.raises(ml.MetalithError, match=r"give one of shape \(48, 48, 3\)"):
         system.record(np.zeros((20, 48, 3)))
     with pytest.raises(ml.MetalithError, match=r"of shape \(48, 48, 2\)\n  help: give three colours.*or a grey picture"):
@@ -121,6 +154,6 @@ def test_what_cannot_be_recorded_or_restored_is_told(system: ml.ImagingSystem) -
     with pytest.raises(ml.MetalithError, match="`seed` = -1"):
         system.record(scene(), seed=-1)
     with pytest.raises(ml.MetalithError, match="`count` = -1"):
-        system.samples(system.record(scene()), -1)
+        system.samples(frame, -1)
     with pytest.raises(ml.MetalithError, match="magic"):
-        system.restore(system.record(scene()), "magic")
+        system.restore(frame, "magic")

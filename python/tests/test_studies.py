@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,13 @@ def test_designs_of_a_grid_are_told_by_their_values(tmp_path: Path) -> None:
     mean = result.grid[1]["figures"]["strehl_660nm_0deg"]["mean"]
     assert mean == pytest.approx(sum(row["strehl_660nm_0deg"] for row in rows[2:]) / 2)
     assert result.combinations == []
+    labelled = result.to_xarray()
+    assert dict(labelled.sizes) == {"lens.focal_length_um": 2} and list(labelled["lens.focal_length_um"].values) == [48, 40]
+    assert float(labelled["strehl_660nm_0deg"].sel({"lens.focal_length_um": 40})) == mean
+    draws = dataclasses.replace(result, grid=[]).to_xarray()
+    assert list(draws["strehl_660nm_0deg"].values) == [row["strehl_660nm_0deg"] for row in rows]
+    assert draws["defocus"].attrs["units"] == dict(result.quantities)["defocus"] == "um"
+    assert "strehl_660nm_0deg" in result._repr_html_()
 
 
 def test_a_grid_over_what_is_not_there_is_told_at_its_place(tmp_path: Path) -> None:
