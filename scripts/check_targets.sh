@@ -5,7 +5,7 @@
 #
 # `cargo check` links nothing: no linker and no libraries of the other systems are needed. The build script of `psm`, which `npyz`
 # brings, assembles a file; it gets a compiler that writes an empty object. Takes some 3 CPU minutes a target and 2 GB of disk,
-# which are given back. Exit code 1 if a target does not compile, 2 if none of them is installed.
+# which are given back. A target that is not installed is named and left out. Fails if one does not compile.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_INCREMENTAL=0
@@ -26,7 +26,6 @@ SCRIPT
 chmod +x "$work/no_compiler"
 
 installed=$(rustup target list --installed)
-checked=0
 for target; do
     if ! grep -qx "$target" <<<"$installed"; then
         echo "$target is NOT checked: rustup target add $target"
@@ -36,6 +35,4 @@ for target; do
     env "CC_$variable=$PWD/$work/no_compiler" "AR_$variable=ar" \
         cargo check --quiet --locked --workspace --target "$target" --target-dir "$work"
     echo "$target compiles"
-    checked=$((checked + 1))
 done
-[ $checked -gt 0 ] || { echo "none of these targets is installed" >&2 && exit 2; }

@@ -1,7 +1,7 @@
 //! Shapes and area on each layer of a layout: `cargo run --release -p metalith-gds --example count_shapes -- FILE`
 //!
 //! FILE is GDSII, OASIS or DXF, gzip or not; its first bytes tell which. Without FILE a small chip in memory is counted. The file
-//! is streamed: each shape is decoded once and comes with all places of its cell, so that 10^9 copies cost no more than one.
+//! is streamed: each shape is decoded once and comes with all places of its cell.
 
 use std::collections::BTreeMap;
 use std::error::Error;
