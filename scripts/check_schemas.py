@@ -3,7 +3,7 @@
 
     scripts/check_schemas.py PROGRAM
 
-Every shipped file is valid. A file with an unknown key, and one with a number beyond its limit, are not. Every number has limits or a
+Every key has a meaning. Every shipped file is valid. A file with an unknown key, and one with a number beyond its limit, are not. Every number has limits or a
 reason not to have any, and every literal key that a reader asks for is in a schema.
 """
 
@@ -57,6 +57,24 @@ def keys(schema, found):
     return found
 
 
+# Asked for by a reader that refuses it, so that no guide has it.
+NO_MEANING = {"set-psf-stack: layout"}
+
+
+def without_meaning(schema, path, found):
+    """Paths of the keys that have no words for people."""
+    for name, inner in schema.get("properties", {}).items():
+        if not inner.get("description"):
+            found.append(".".join((*path, name)))
+        without_meaning(inner, (*path, name), found)
+    for inner in schema.get("anyOf", []):
+        without_meaning(inner, path, found)
+    for below in ("items", "additionalProperties"):
+        if isinstance(schema.get(below), dict):
+            without_meaning(schema[below], path, found)
+    return found
+
+
 def limits(schema, path, found):
     """The first number with a largest value below each path."""
     for name, inner in schema.get("properties", {}).items():
@@ -76,6 +94,8 @@ def main():
     for kind, schema in schemas.items():
         jsonschema.Draft7Validator.check_schema(schema)
         keys(schema, known)
+        silent = {f"{kind}: {path}" for path in without_meaning(schema, (), [])} - NO_MEANING
+        faults += [f"{key} has no meaning: add it to a table of keys in the guide" for key in sorted(silent)]
         validator = jsonschema.Draft7Validator(schema)
         for pattern in FILES.get(kind, []):
             paths = sorted(ROOT.glob(pattern))
