@@ -13,7 +13,7 @@ Tools come from PyPI and npm into FOLDER, where all that is made stays. PROGRAM 
   check-wheel-contents, and the example of its README in a fresh environment;
 - `cargo publish --dry-run` of all crates, each built from its own archive.
 
-Takes some 15 CPU minutes for the two builds. Exit code 0 if all of it holds, 1 if not; what was not checked is said.
+Takes some 45 CPU minutes, most of them for the crates, which are built for several sets of features. Exit code 0 if all of it holds, 1 if not; what was not checked is said.
 """
 
 import json
