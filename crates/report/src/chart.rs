@@ -7,6 +7,12 @@ use super::colour::SERIES;
 use super::figure::{Anchor, Figure, Frame, clipped, line, rectangle, strokes, text, text_width};
 use super::number::short;
 
+/// Left edge of a frame with usual labels, where legends begin too.
+const LEFT: f64 = 66.0;
+
+/// Room at the right of a frame.
+const RIGHT: f64 = 14.0;
+
 /// Series drawn over two axes.
 #[derive(Clone, Debug)]
 pub struct Chart {
@@ -143,6 +149,28 @@ impl Chart {
         self.into()
     }
 
+    /// Frame below a legend of so many rows, with room for the labels of both axes.
+    fn frame(&self, legend_rows: usize) -> Frame {
+        let (width, height) = self.size;
+        let right = if self.direct {
+            let longest = self.series.iter().map(|s| text_width(&s.name)).fold(0.0, f64::max);
+            (longest + RIGHT).min(width / 3.0)
+        } else {
+            RIGHT
+        };
+        let mut frame = Frame {
+            left: LEFT,
+            top: 12.0 + 19.0 * legend_rows as f64,
+            right: width - right,
+            bottom: height - 44.0,
+        };
+        let (x, y) = self.fit(&frame);
+        frame.left = y.left();
+        // The last label has its middle at its tick.
+        frame.right = frame.right.min(width - x.last_label_width() / 2.0);
+        frame
+    }
+
     fn fit(&self, frame: &Frame) -> (Fitted, Fitted) {
         let all = || {
             self.series
@@ -202,24 +230,7 @@ impl From<Chart> for Figure {
     fn from(chart: Chart) -> Self {
         let (width, height) = chart.size;
         let rows = chart.legend_rows(width - 80.0);
-        let right = if chart.direct {
-            let longest = chart.series.iter().map(|s| text_width(&s.name)).fold(0.0, f64::max);
-            (longest + 14.0).min(width / 3.0)
-        } else {
-            14.0
-        };
-        let mut frame = Frame {
-            left: 66.0,
-            top: 12.0 + 19.0 * rows.len() as f64,
-            right: width - right,
-            bottom: height - 44.0,
-        };
-        // Legends begin where charts with usual labels do.
-        let legend = frame.left;
-        let (x, y) = chart.fit(&frame);
-        frame.left = y.left();
-        // The last label has its middle at its tick.
-        frame.right = frame.right.min(width - x.last_label_width() / 2.0);
+        let frame = chart.frame(rows.len());
         let (x, y) = chart.fit(&frame);
         let mut data = clipped(frame.left, frame.top, frame.width(), frame.height());
         // Areas lie below lines, lines below points.
@@ -230,7 +241,7 @@ impl From<Chart> for Figure {
         }
         let mut drawing = Group::new().add(frame.axes(&x, &y, true)).add(data);
         for (row, series) in rows.iter().enumerate() {
-            let mut left = legend;
+            let mut left = LEFT;
             for &i in series {
                 let at = 12.0 + 19.0 * row as f64;
                 drawing = drawing.add(swatch(chart.series[i].kind, i % SERIES, left, at));
@@ -463,24 +474,17 @@ mod tests {
 
     #[test]
     fn the_label_of_the_last_tick_is_inside_the_drawing() {
-        let width = 560.0;
-        let frame = |last: f64| {
-            let mut chart = Chart::new("wide", Axis::linear("x", "").range(0.0, last), Axis::linear("y", ""));
+        let end = |last: f64, label: &str| {
+            let x = Axis::linear("x", "").range(0.0, last);
+            let mut chart = Chart::new("wide", x, Axis::linear("y", ""));
             chart.line("line", [(0.0, 0.0), (last, 1.0)]);
-            let svg = Figure::from(chart).to_svg();
-            let label = svg
-                .rfind(&format!(">{last}<"))
-                .or_else(|| svg.rfind(&format!("\n{last}\n")))
-                .expect("a label");
-            let tag = &svg[svg[..label].rfind("<text").expect("a text")..label];
-            let x = tag
-                .split(" x=\"")
-                .nth(1)
-                .and_then(|rest| rest.split('"').next())
-                .expect("a place");
-            x.parse::<f64>().expect("a number") + text_width(&last.to_string()) / 2.0
+            (chart.frame(0).right, text_width(label) / 2.0, chart.size.0)
         };
-        assert!(frame(5.0) <= width && frame(50_000.0) <= width);
+        let (right, half, width) = end(50_000.0, "50 000");
+        assert!(right + half <= width);
+        // Short labels leave the frame as wide as it was.
+        let (right, _, width) = end(5.0, "5");
+        assert_eq!(right, width - RIGHT);
     }
 
     #[test]
