@@ -27,9 +27,9 @@ class Kernels:
     ) -> None:
         self.element = element
         self.values = values
-        """``[row, column, channel, colour, y, x]``: energy in a pixel, as a share of the light of its channel and colour that
-        arrives at the element. Pixels stand at every half of one, so that all values of a kernel sum to four times its
-        energy. Row and column are places of the field, colours the primaries of linear sRGB."""
+        """``[row, column, channel, colour, y, x]``: energy in a pixel, as a share of the light of white in its channel that
+        arrives at the element. Colours are the primaries of linear sRGB, and their sum is the kernel of white. Pixels stand at
+        every half of one, so that all values of a kernel sum to four times its energy. Row and column are places of the field."""
         self.places_um = np.array(places_um)
         """Where light of the wavelength of the wedge lands, from the axis of the element (um), along both axes."""
         self.offsets_um = np.array(offsets_um)
@@ -55,10 +55,10 @@ class Kernels:
             name="energy",
             attrs={
                 "units": "1",
-                "long_name": "energy in a pixel over the light of the channel and colour at the element",
+                "long_name": "energy in a pixel over the light of white in the channel at the element",
                 "element": self.element,
                 "source": f"metalith {_native.__version__}",
-                "convention": "pixels at every half of one along both axes; colours are primaries of linear sRGB",
+                "convention": "pixels at every half of one along both axes; colours are primaries of linear sRGB and add up to white",
             },
         )
 

@@ -161,7 +161,7 @@ impl ImagingSystem {
         Ok(drawn.into_iter().map(|d| PyArray3::from_owned_array(py, d)).collect())
     }
 
-    /// Kernels of an element `[row, column, channel, colour, y, x]` at every `step`-th place of its field along both axes, these
+    /// Kernels of an element `[row, column, channel, colour, y, x]`, whose colours add up to white, at every `step`-th place of its field along both axes, these
     /// places and the places of the values (um), and each channel with the wavelength that its kernels are about (nm).
     fn kernels<'py>(&self, py: Python<'py>, element: usize, step: usize) -> PyResult<KernelArrays<'py>> {
         let bank = &self.system.bank;

@@ -154,6 +154,7 @@ class Calls:
             "ImagingSystem.truth": lambda: self.system.truth(self.scene),
             "ImagingSystem.restore": lambda: self.system.restore(self.frame),
             "ImagingSystem.samples": lambda: self.system.samples(self.frame, 1)[0],
+            "ImagingSystem.kernels": lambda: self.system.kernels(step=8).values,
             "denoise": lambda: ml.denoise(noise, 0.1),
         }
 
