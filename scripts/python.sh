@@ -15,9 +15,14 @@ MATURIN_PEP517_ARGS="--features as-tested" pip install ./python
 pip install -r scripts/requirements-python.txt
 "$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples python/tests
 "$folder/venv/bin/pyright" --project python --pythonpath "$folder/venv/bin/python"
-"$folder/venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
 python3 scripts/notebooks.py check
-"$folder/venv/bin/python" scripts/notebooks.py run
+# The tests leave half of two cores idle; what notebooks may cost is CPU time.
+"$folder/venv/bin/python" scripts/notebooks.py run >"$folder/notebooks.txt" 2>&1 &
+notebooks=$!
+trap 'kill "$notebooks" 2>/dev/null || true' EXIT
+"$folder/venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
+wait "$notebooks" || { cat "$folder/notebooks.txt"; exit 1; }
+cat "$folder/notebooks.txt"
 for example in tolerances gdsfactory_chip; do
     echo "== $example"
     "$folder/venv/bin/python" "python/examples/$example.py"

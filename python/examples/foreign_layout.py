@@ -81,7 +81,7 @@ for row in report.table()[:3]:
     print(row)
 
 # %%
-for psf in ml.psf(layout, [530, 550, 570], distance_um=FOCUS_UM, fast=True):
+for psf in ml.psf(layout, [530, 550, 570], distance_um=FOCUS_UM, pillar="sin_luke_2015", fast=True):
     print(f"{psf.wavelength_nm:g} nm: Strehl {psf.strehl:.3f}, peak at {psf.peak_um}")
 
 # %% [markdown]

@@ -27,7 +27,7 @@ phases = metalith.scipy.minimize(model, merit, start, options={"maxiter": 30}).x
 widths = ml.widths_of(np.where(model.amplitude > 0, phases, np.nan), design)
 
 gf.gpdk.PDK.activate()
-array = ml.Array.of_maps(widths, pitch_nm=design.pitch_nm)
+array = ml.Array.of_maps(widths, design=design)
 component = metalith.gdsfactory.component(array, name="two_spots")
 chip = gf.Component(name="chip")
 chip.add_ref(component).move((200, 100))
@@ -35,6 +35,6 @@ chip.add_ref(gf.components.rectangle(size=(800, 600), layer=(10, 0), centered=Tr
 path = chip.write_gds(Path(tempfile.mkdtemp()) / "chip.gds")
 clean = ml.check(path).clean
 read = ml.read_layout(path, top=component.name, array=array)
-psf = ml.psf(read, [633], distance_um=100, pillar_height_nm=900, samples=48)[0]
+psf = ml.psf(read, [633], distance_um=100, pillar="sin_luke_2015", pillar_height_nm=900, samples=48)[0]
 print("light in the spots:", [f"{psf.values[spot].sum() / psf.values.sum():.2f}" for spot in spots])
 assert clean and np.array_equal(read.widths[0], widths)

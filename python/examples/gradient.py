@@ -56,5 +56,5 @@ phases = np.where(model.amplitude > 0, found.x, np.nan)
 widths = ml.widths_of(phases, design)
 folder = Path(tempfile.mkdtemp())
 array = ml.write_layout(folder / "lens.oas", widths, pitch_nm=design.pitch_nm)
-psf = ml.psf(array, [wavelength_nm], distance_um=model.distance_um, fast=True)[0]
+psf = ml.psf(array, [wavelength_nm], distance_um=model.distance_um, pillar="sin_luke_2015", fast=True)[0]
 print(f"{array.pillars} pillars, Strehl {psf.strehl:.3f}")

@@ -221,10 +221,16 @@ class PsfModel:
         wedge_deg: tuple[float, float] = (0.0, 0.0),
     ) -> tuple[float, PsfGradient]:
         """A merit of the PSF, and its derivatives. ``merit``: a function that takes the PSF and gives the merit and its
-        derivatives by the values of the PSF, or an array of weights of the values, whose sum is the merit."""
+        derivatives by the values of the PSF, or an array of weights of the values, whose sum is the merit.
+        :class:`MetalithError` if merit or derivatives are no finite numbers."""
         psf, pull = self.vjp(x, distance_um=distance_um, wedge_deg=wedge_deg)
         if callable(merit):
             value, cotangents = merit(psf)
+            if not (np.isfinite(value) and np.all(np.isfinite(cotangents))):
+                raise _native.MetalithError(
+                    f"a merit of {float(value):g} with derivatives that are {'' if np.all(np.isfinite(cotangents)) else 'not '}finite\n"
+                    "  help: keep logarithms and quotients of the merit away from zero"
+                )
             return float(value), pull(cotangents)
         weights = _arguments.numbers("merit", merit, np.float64)
         if weights.shape != psf.shape:

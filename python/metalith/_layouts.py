@@ -71,6 +71,8 @@ class Design:
         the first to the second of ``width_nm`` is solved when it is first needed, which takes seconds, and cached. The pillars are
         on layer 1/0. The defaults are the cell for visible light; ``metalith new`` finds one for any wavelength and
         material. :attr:`text` is its design file. :class:`MetalithError` for values that a design file cannot have."""
+        if pitch_nm % 1 != 0:
+            raise _native.MetalithError(f"`pitch_nm` = {pitch_nm!r}\n  help: give whole nanometres; a design file takes others with `database_unit_nm`")
         told = (wavelength_nm, focal_length_um, diameter_um, pitch_nm, pillar_height_nm, *width_nm)
         return cls.parse(lens_text(name, shape, lattice, pillar, substrate, *told))
 
@@ -253,15 +255,25 @@ class Array:
         cls,
         widths: Sequence[npt.ArrayLike] | npt.NDArray[Any],
         *,
-        pitch_nm: int,
+        pitch_nm: int | None = None,
         shape: Shape = "square",
         lattice: Lattice = "square",
         centres_nm: Sequence[tuple[int, int]] | None = None,
+        design: Design | None = None,
         progress: Progress | None = None,
     ) -> Array:
         """The array of maps of widths (nm), diameters (nm) or rotations (degrees), which are as :func:`write_layout` takes them;
-        nothing is written. :class:`MetalithError` if a width is odd or wider than the pitch, if maps differ in
+        nothing is written. ``design``: pitch, shape and lattice are those of its cell, in place of ``pitch_nm``, ``shape`` and
+        ``lattice``. :class:`MetalithError` if a width is odd or wider than the pitch, if maps differ in
         size, or if several have no centres."""
+        wrong = _native.MetalithError("maps of no cell, or of two\n  help: give `design`, or `pitch_nm` with `shape` and `lattice`")
+        if design is not None:
+            if pitch_nm is not None or (shape, lattice) != ("square", "square"):
+                raise wrong
+            cell = design.array()
+            pitch_nm, shape, lattice = cell.pitch_nm, cell.shape, cell.lattice
+        if pitch_nm is None:
+            raise wrong
         found = [_map("widths", one, shape) for one in _arguments.several("widths", widths)]
         alone = [(0, 0)] if len(found) == 1 else []
         centres = alone if centres_nm is None else _arguments.centres(centres_nm)

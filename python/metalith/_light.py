@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -24,6 +25,9 @@ MOST_SAMPLES = 8192
 
 SILICON_NITRIDE = "sin_luke_2015"
 FUSED_SILICA = "fused_silica_malitson_1965"
+
+# Height of the pillars of the published cell (nm), where a call says none.
+HEIGHT_NM = 700.0
 
 
 # Planes of a through-focus series where no number is asked for, and the most.
@@ -223,9 +227,9 @@ def psf(
     lattice: Lattice = "square",
     arriving: str | float | None = None,
     analyser: str | float | None = None,
-    pillar_height_nm: float = 700.0,
-    pillar: str = SILICON_NITRIDE,
-    substrate: str = FUSED_SILICA,
+    pillar_height_nm: float | None = None,
+    pillar: str | None = None,
+    substrate: str | None = None,
     through_focus: bool | float = False,
     planes: int = PLANES,
     progress: Progress | None = None,
@@ -244,6 +248,8 @@ def psf(
     that of the design for an array of a design, and 5.86 um for all else: a layout says nothing of the sensor, also of one
     that was read at the elements of a design. ``samples`` along an axis of the window, one pitch apart, are those of the design
     or 128. ``fast`` allows errors of 1e-3 instead of 1e-5 of the peak.
+
+    ``pillar`` and ``substrate`` are materials, 700 nm of silicon nitride on fused silica if left out, which a warning says.
 
     An array of a design knows its sensor and its pillars; else ``distance_um`` and, for a map of widths, ``pitch_nm`` are needed, ``shape`` where pillars are no
     squares, and ``lattice`` where they stand on a hexagonal one, which ``rigorous`` and ``fitted`` alone know.
@@ -267,7 +273,7 @@ def psf(
         series = (range_um, _arguments.whole("planes", planes, 3, MOST_PLANES))
     if isinstance(of, Array) and of.design is not None:
         own = (distance_um, aperture_um, pitch_nm, shape, lattice, arriving, analyser, pillar_height_nm, pillar, substrate)
-        if own != (None, None, None, "square", "square", None, None, 700.0, SILICON_NITRIDE, FUSED_SILICA):
+        if own != (None, None, None, "square", "square", None, None, None, None, None):
             raise _native.MetalithError(
                 "an array of a design knows its sensor, its pillars and its light\n"
                 "  help: leave out `distance_um`, `aperture_um`, `pitch_nm`, `shape`, `lattice`, `arriving`, `analyser` and what pillars are made of,"
@@ -278,6 +284,13 @@ def psf(
             of._native, wavelengths, fields, fidelity, model, fast, samples, pixel_um, chosen, series, progress
         )
         return _set(found, said)
+    if pillar is None and model is None:
+        height = HEIGHT_NM if pillar_height_nm is None else pillar_height_nm
+        warnings.warn(
+            f"pillars are taken to be {height:g} nm of {SILICON_NITRIDE} on {substrate or FUSED_SILICA}: give `pillar`, `pillar_height_nm` and"
+            " `substrate` of the chip",
+            stacklevel=2,
+        )
     maps, centres, pitch, lattice, shape = _maps(of, pitch_nm, lattice, shape)
     numbers = list(range(len(maps))) if elements is None else _arguments.elements(elements, len(maps))
     if distance_um is None:
@@ -302,9 +315,9 @@ def psf(
         told_of(shape),
         None if arriving is None else str(arriving),
         None if analyser is None else str(analyser),
-        pillar_height_nm,
-        pillar,
-        substrate,
+        HEIGHT_NM if pillar_height_nm is None else pillar_height_nm,
+        pillar or SILICON_NITRIDE,
+        substrate or FUSED_SILICA,
         series,
         progress,
     )

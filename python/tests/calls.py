@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MINI = ROOT / "designs/mini_3x3.toml"
 SHAPE = (24, 24)
 PILLARS = np.full((8, 8), 200, dtype=np.uint16)
-MAP: dict[str, Any] = dict(pitch_nm=350, distance_um=20.0, samples=16, fast=True)
+MAP: dict[str, Any] = dict(pitch_nm=350, distance_um=20.0, samples=16, fast=True, pillar="sin_luke_2015")
 LIT: dict[str, Any] = dict(pitch_nm=350, wavelength_nm=660, distance_um=20)
 RECTANGLES = ml.Rectangles(100, 250, 90)
 UPRIGHT = ml.UprightRectangles(90, 10, 4)

@@ -16,7 +16,7 @@ import metalith as ml
 
 ROOT = Path(__file__).resolve().parents[2]
 MINI = ROOT / "designs/mini_3x3.toml"
-MAP: dict[str, Any] = dict(pitch_nm=350, distance_um=20.0, samples=16)
+MAP: dict[str, Any] = dict(pitch_nm=350, distance_um=20.0, samples=16, pillar="sin_luke_2015")
 PILLARS = np.full((8, 8), 200, dtype=np.uint16)
 
 # Pillars 20 nm narrower than drawn: more than enough to be seen.

@@ -17,6 +17,8 @@ from calls import MAP, RECTANGLES, SHAPE, UPRIGHT, Calls, told
 
 Array = npt.NDArray[Any]
 
+ROOT = Path(__file__).resolve().parents[2]
+
 
 @pytest.fixture(scope="module")
 def calls(tmp_path_factory: pytest.TempPathFactory) -> Calls:
@@ -225,8 +227,31 @@ def test_numbers_of_rectangles_that_are_not_there_are_refused(least: int) -> Non
 @pytest.mark.parametrize("um", [np.nan, np.inf, 0.0, -1.0, 1e300])
 def test_a_distance_that_is_none_is_refused(um: float, tmp_path: Path) -> None:
     with pytest.raises(ml.MetalithError, match="distance_um"):
-        ml.psf(WIDTHS, [660], pitch_nm=350, distance_um=um, samples=8)
+        ml.psf(WIDTHS, [660], pitch_nm=350, distance_um=um, samples=8, pillar="sin_luke_2015")
     for name in ("incidence_deg", "at_um"):
         if not np.isfinite(um):
             with pytest.raises(ml.MetalithError, match=f"`{name}`"):
                 ml.propagate(WIDTHS, **{**LIT, name: (um, 0.0)})
+
+
+def test_maps_of_a_design_have_its_cell() -> None:
+    design = ml.Design.read(ROOT / "designs/hexagonal_1550.toml")
+    own = design.array()
+    same = ml.Array.of_maps(own.widths(0), design=design)
+    assert (same.pitch_nm, same.shape, same.lattice, same.pillars) == (own.pitch_nm, own.shape, own.lattice, own.pillars)
+    either: list[dict[str, Any]] = [{"pitch_nm": 350, "design": design}, {}, {"shape": "circle", "design": design}]
+    for both in either:
+        with pytest.raises(ml.MetalithError, match="design"):
+            ml.Array.of_maps(own.widths(0), **both)
+
+
+def test_a_guessed_cell_is_said() -> None:
+    widths = np.full((8, 8), 200)
+    asked: dict[str, Any] = {"pitch_nm": 350, "distance_um": 5.0, "samples": 16, "fast": True}
+    with pytest.warns(UserWarning, match="pillar"):
+        ml.psf(widths, [530], **asked)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ml.psf(widths, [530], pillar="sin_luke_2015", **asked)
+    with pytest.raises(ml.MetalithError, match="472.5"):
+        ml.Design.lens(wavelength_nm=780, focal_length_um=50, diameter_um=20, pitch_nm=472.5)  # type: ignore[arg-type]

@@ -217,3 +217,12 @@ def test_phases_and_widths_are_mapped_to_one_another() -> None:
         ml.widths_of([np.inf], design)
     with pytest.raises(ml.MetalithError, match="no element 9"):
         ml.widths_of([0.0], design, element=9)
+
+
+def test_a_merit_that_is_no_number_is_refused() -> None:
+    model = ml.PsfModel(SITES, **ARGUMENTS)
+    phases = np.zeros((SITES, SITES))
+    merits: list[Any] = [lambda psf: (np.nan, psf), lambda psf: (0.0, np.full_like(psf, np.inf))]
+    for merit in merits:
+        with pytest.raises(ml.MetalithError, match="finite"):
+            model.value_and_gradient(merit, phases)
