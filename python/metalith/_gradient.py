@@ -228,7 +228,7 @@ class PsfModel:
             value, cotangents = merit(psf)
             if not (np.isfinite(value) and np.all(np.isfinite(cotangents))):
                 raise _native.MetalithError(
-                    f"a merit of {float(value):g} with derivatives that are {'' if np.all(np.isfinite(cotangents)) else 'not '}finite\n"
+                    f"a merit of {float(value):g}: it or one of its derivatives is not finite\n"
                     "  help: keep logarithms and quotients of the merit away from zero"
                 )
             return float(value), pull(cotangents)

@@ -37,13 +37,15 @@ SMALL = {
     "width_step_nm = 2 ": "width_step_nm = 10 ",
 }
 
-CAMERA = """
+def camera(pixels: int, band_nm: tuple[int, int]) -> str:
+    """A camera file: a square sensor of pixels of 2 um without filters, in one band."""
+    return f"""
 schema = 1
 name = "small"
 [sensor]
 pixel_um = 2.0
-columns = 40
-rows = 40
+columns = {pixels}
+rows = {pixels}
 filter = "none"
 bits = 12
 full_well_e = 10000
@@ -51,7 +53,7 @@ read_noise_e = 2
 gain_e = 2.5
 [[channel]]
 name = "green"
-band_nm = [655, 665]
+band_nm = {list(band_nm)}
 [exposure]
 time_ms = "auto"
 white = 0.8
@@ -89,7 +91,7 @@ class Calls:
         self.array = self.design.array()
         self.chip = folder / "chip.oas"
         self.array.write(self.chip)
-        (folder / "small.toml").write_text(CAMERA)
+        (folder / "small.toml").write_text(camera(40, (655, 665)))
         self.scene: npt.NDArray[np.float64] = np.random.default_rng(3).random((*SHAPE, 3))
         self.system = self.open()
         self.frame = self.system.record(self.scene)

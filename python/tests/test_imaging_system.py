@@ -9,33 +9,14 @@ import numpy.typing as npt
 import pytest
 
 import metalith as ml
+from calls import camera
 
 ROOT = Path(__file__).resolve().parents[2]
 MINI = ROOT / "designs/mini_3x3.toml"
 SHAPE = (48, 48)
 
 # A sensor that sees the nine lenses of 60 um, 150 um apart, in one narrow band.
-CAMERA = """
-schema = 1
-name = "small"
-[sensor]
-pixel_um = 2.0
-columns = 240
-rows = 240
-filter = "none"
-bits = 12
-full_well_e = 10000
-read_noise_e = 2
-gain_e = 2.5
-[[channel]]
-name = "green"
-band_nm = [525, 535]
-[exposure]
-time_ms = "auto"
-white = 0.8
-[illuminant]
-source = "equal_energy"
-"""
+CAMERA = camera(240, (525, 535))
 
 
 def scene() -> npt.NDArray[np.float64]:
@@ -46,13 +27,17 @@ def scene() -> npt.NDArray[np.float64]:
     return values
 
 
-@pytest.fixture(scope="module")
-def system(tmp_path_factory: pytest.TempPathFactory) -> ml.ImagingSystem:
-    folder = tmp_path_factory.mktemp("system")
+def nine_lenses(folder: Path) -> ml.ImagingSystem:
+    """The nine lenses behind this camera."""
     (folder / "small.toml").write_text(CAMERA)
     design = ml.Design.read(MINI)
     design.array().write(folder / "chip.oas")
     return ml.ImagingSystem(design, folder / "chip.oas", folder / "small.toml", shape=SHAPE, field_deg=60.0)
+
+
+@pytest.fixture(scope="module")
+def system(tmp_path_factory: pytest.TempPathFactory) -> ml.ImagingSystem:
+    return nine_lenses(tmp_path_factory.mktemp("system"))
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 
 import metalith as ml
 
-from test_imaging_system import CAMERA, MINI, SHAPE
+from test_imaging_system import MINI, nine_lenses
 
 # The kernels are of a band of 10 nm and of cells without neighbours, the PSF is of 530 nm: the light in a pixel differs by 1 % of
 # what arrives. Found: 0.4 %.
@@ -20,11 +20,7 @@ PIXEL_UM = 2.0
 
 @pytest.fixture(scope="module")
 def system(tmp_path_factory: pytest.TempPathFactory) -> ml.ImagingSystem:
-    folder = tmp_path_factory.mktemp("kernels")
-    (folder / "small.toml").write_text(CAMERA)
-    design = ml.Design.read(MINI)
-    design.array().write(folder / "chip.oas")
-    return ml.ImagingSystem(design, folder / "chip.oas", folder / "small.toml", shape=SHAPE, field_deg=60.0)
+    return nine_lenses(tmp_path_factory.mktemp("kernels"))
 
 
 def test_a_kernel_is_the_psf_over_pixels(system: ml.ImagingSystem) -> None:

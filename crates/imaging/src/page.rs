@@ -92,7 +92,7 @@ pub fn shown(frame: &Frame, names: &[String]) -> Array3<f64> {
     Array3::from_shape_fn((rows, columns, 3), |(y, x, c)| at(y, x, c))
 }
 
-/// What [`shown`] does with the channels of a frame.
+/// Sentence on how [`shown`] presents the channels of a frame.
 pub(crate) fn shown_words(frame: &Frame, names: &[String]) -> &'static str {
     match frame.filter {
         ColourFilter::None if names.len() == 1 => "It has one channel and is shown in grey.",

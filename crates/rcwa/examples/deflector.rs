@@ -2,7 +2,7 @@
 //! `cargo run --release -p metalith-rcwa --example deflector`
 //!
 //! Light of 452 nm comes along the normal from fused silica through pillars of silicon nitride into air. The phase of each width
-//! is that of its own periodic cell. Eight widths with phases an eighth of a wave apart are one period of a blazed grating.
+//! is that of a lattice of equal pillars. Eight widths with phases an eighth of a wave apart are one period of a blazed grating.
 //! The phase rises along +x: with the time factor exp(-i w t) the light then goes towards +x, into the order [1, 0].
 
 use std::f64::consts::TAU;
