@@ -193,6 +193,45 @@ fn no_command_replaces_its_inputs() {
     }
 }
 
+/// Each command that writes several files, a second time into its folder after the design has changed, and `run` among results of others.
+#[test]
+fn a_command_run_again_replaces_its_own_result() {
+    let bench = Bench::new();
+    let light = ["--layer", "1/0", "--wavelength-nm", "660", "--distance-um", "48"];
+    let psf = [&["psf", "lens_pillars.gds", "--fast", "--out", "p"], &light[..]].concat();
+    let layout = "lens_pillars.gds";
+    let commands: [&[&str]; 8] = [
+        &["run", "lens.toml", "--fast", "--fidelity", "published", "--out", "r"],
+        &["run", "lens.toml", "--fast", "--fidelity", "published", "--out", "."],
+        &["layout", "lens.toml", "--out", "l"],
+        &[
+            "verify",
+            "lens.toml",
+            layout,
+            "--fast",
+            "--fidelity",
+            "published",
+            "--out",
+            "v",
+        ],
+        &["handoff", "lens.toml", "--out", "h"],
+        &["check", layout, "--design", "lens.toml", "--sarif", "c.sarif"],
+        &["optimise", "lens.toml", "--out", "o"],
+        &psf,
+    ];
+    let text = fs::read_to_string(bench.at("lens.toml")).unwrap();
+    let another = replaced(&text, &[("focal_length_um = 48", "focal_length_um = 60")]);
+    for design in [&text, &another, &another, &text] {
+        fs::write(bench.at("lens.toml"), design).unwrap();
+        bench.said(&["layout", "lens.toml", "--out", "."], 0);
+        for words in commands {
+            let done = bench.run(words).get_output().clone();
+            let is_refused = done.status.code() != Some(0) && done.status.code() != Some(1);
+            assert!(!is_refused, "{words:?}: {}", String::from_utf8_lossy(&done.stderr));
+        }
+    }
+}
+
 /// Commands of pictures, whose images may be those of an earlier result.
 #[test]
 #[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]

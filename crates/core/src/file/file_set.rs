@@ -377,9 +377,11 @@ impl FileSet {
     }
 
     /// Refuse to replace or remove files that the list of another result names, unless they stay the same: that result would be mixed.
+    /// A result whose list goes too goes as a whole.
     fn check_not_of_others(&self, replaced: &[String], unfinished: &Path) -> Result<()> {
         let lists = lists_in(&self.folder)?.into_iter();
-        for (list, other) in lists.filter(|(list, _)| self.folder.join(list) != self.manifest) {
+        let stays = |list: &str| self.folder.join(list) != self.manifest && !replaced.iter().any(|name| name == list);
+        for (list, other) in lists.filter(|(list, _)| stays(list)) {
             let is_mixed = |name: &&String| {
                 other.names().any(|listed| listed == *name)
                     && self.folder.join(name).exists()

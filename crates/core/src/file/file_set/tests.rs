@@ -197,6 +197,28 @@ fn no_file_of_another_result_is_replaced() {
 }
 
 #[test]
+fn a_result_on_replaced_files_goes_with_its_list() {
+    let (place, turn) = begun();
+    let stale = ["page.html", ".page.sha256"];
+    for version in ["1", "2"] {
+        turn.publish("made", &stale, |folder| {
+            AtomicFile::write(&folder.join("made.gds"), version.as_bytes())
+        })
+        .unwrap();
+        assert!(stale.iter().all(|name| !place.path().join(name).exists()));
+        turn.publish("page", &[], |folder| {
+            AtomicFile::write(&folder.join("page.html"), version.as_bytes())
+        })
+        .unwrap();
+    }
+    // Without its list the page is of another result.
+    let refused = turn.publish("made", &stale[..1], |folder| {
+        AtomicFile::write(&folder.join("made.gds"), b"3")
+    });
+    assert_eq!(refused.unwrap_err().id(), "file/of-another-result");
+}
+
+#[test]
 fn no_input_is_replaced_or_removed() {
     let (place, turn) = begun();
     let before = names(place.path());
