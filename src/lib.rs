@@ -83,6 +83,7 @@ extern crate self as metalith;
 #[doc(hidden)]
 pub mod cli;
 mod frame_names;
+mod new_design;
 mod new_set;
 pub mod schema;
 mod session;
@@ -134,5 +135,6 @@ pub use metalith_pillars::{
 };
 pub use metalith_verify::{SimulationCase, SimulationCases, Verification, verify, write_report};
 pub use metalith_wave::Accuracy;
+pub use new_design::{NewDesign, NewDesignText, pitch_of_nm};
 pub use new_set::{NewSet, new_set};
 pub use session::plan_session;

@@ -11,7 +11,7 @@ import metalith as ml
 import metalith.gdsfactory
 import metalith.scipy
 
-design = ml.Design.lens(wavelength_nm=633, focal_length_um=100, diameter_um=40, pillar_height_nm=900)
+design = ml.Design.lens(wavelength_nm=633, focal_length_um=100, diameter_um=40)
 model = ml.PsfModel.of_design(design, samples=48)
 spots = [np.hypot.outer(model.y_um, model.x_um - x) <= 1.5 for x in (-4.0, 4.0)]
 
@@ -35,6 +35,6 @@ chip.add_ref(gf.components.rectangle(size=(800, 600), layer=(10, 0), centered=Tr
 path = chip.write_gds(Path(tempfile.mkdtemp()) / "chip.gds")
 clean = ml.check(path).clean
 read = ml.read_layout(path, top=component.name, array=array)
-psf = ml.psf(read, [633], distance_um=100, pillar="sin_luke_2015", pillar_height_nm=900, samples=48)[0]
+psf = ml.psf(read, [633], distance_um=100, pillar="sin_luke_2015", pillar_height_nm=design.pillar_height_nm, samples=48)[0]
 print("light in the spots:", [f"{psf.values[spot].sum() / psf.values.sum():.2f}" for spot in spots])
 assert clean and np.array_equal(read.widths[0], widths)

@@ -3,7 +3,7 @@
 Lengths carry their unit in their names; angles are degrees; arrays have their rows along +y and their columns along +x.
 Everything that cannot be done raises :class:`MetalithError` with the words and the remedy that the program prints.
 Long calls release the interpreter's lock, stop at Ctrl-C, and take ``progress``, a callable of what is done, the steps
-that are done, and all of them. They work in forked children and in several threads at once; each has as many threads as
+that are done, and all of them: :class:`ProgressLine` prints them. They work in forked children and in several threads at once; each has as many threads as
 ``RAYON_NUM_THREADS`` says, or one for each core.
 """
 
@@ -15,6 +15,7 @@ from ._layouts import Array, Design, Layout, read_layout, write_layout
 from ._light import Psf, PsfSet, ThroughFocus, Transmission, cell, index, propagate, psf
 from ._native import MetalithError, __version__
 from ._pictures import Frame, ImagingSystem, denoise
+from ._progress import ProgressLine
 from ._checks import MeasurementPlan, CheckReport, Marker, Verification, check, plan, verify
 from ._diagnosis import Diagnosis, FoundEffect, RankedEffect, calibrate
 from ._shapes import Lattice, Places, Rectangles, Shape, UprightRectangles, places
@@ -34,6 +35,7 @@ __all__ = [
     "Marker",
     "MetalithError",
     "Places",
+    "ProgressLine",
     "Psf",
     "PsfGradient",
     "PsfModel",

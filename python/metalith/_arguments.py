@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers as numbers_
 import operator
 from collections.abc import Iterable, Sequence
 from typing import Any, SupportsIndex
@@ -75,6 +76,13 @@ def refuse(name: str, values: npt.NDArray[Any], wrong: npt.NDArray[np.bool_], re
         raise MetalithError(f"`{name}` of shape {values.shape}: {values[at]} at {at}\n  help: {remedy}")
 
 
+def real(name: str, value: object) -> float:
+    """A positive finite number."""
+    if isinstance(value, bool) or not isinstance(value, numbers_.Real) or not 0 < value < float("inf"):
+        raise MetalithError(f"`{name}` = {value!r}\n  help: give a positive number")
+    return float(value)
+
+
 def pair(name: str, given: npt.ArrayLike) -> tuple[float, float]:
     """Two finite numbers."""
     values = numbers(name, given, np.float64)
@@ -118,8 +126,8 @@ def elements(numbers: Sequence[SupportsIndex], count: int) -> list[int]:
 
 def layer(given: tuple[int, int]) -> tuple[int, int]:
     """Layer and datatype."""
-    if len(given) != 2:
-        raise MetalithError(f"a layer of {len(given)} numbers\n  help: give layer and datatype, such as (1, 0)")
+    if not isinstance(given, Sequence) or len(given) != 2:
+        raise MetalithError(f"`layer` = {given!r}\n  help: give layer and datatype, such as (1, 0)")
     return whole("layer", given[0], 0, MOST_16), whole("layer", given[1], 0, MOST_16)
 
 

@@ -50,10 +50,12 @@ def phases_of(width_nm: npt.ArrayLike, design: Design, *, element: SupportsIndex
 
 
 def _element(design: Design, element: SupportsIndex | None) -> int | None:
+    if not isinstance(design, Design):
+        raise TypeError(f"`design` is a {type(design).__name__}\n  help: give phases or widths first, then a metalith.Design")
     return None if element is None else _arguments.element(element, len(design.elements))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PsfGradient:
     """Derivatives of a merit of a PSF."""
 

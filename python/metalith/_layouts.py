@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from . import _arguments, _html, _native
 from ._layout_figures import Quantity, has_two_phases, map_figure
-from ._lens_text import lens_text
 from ._shapes import (
     Lattice,
     Places,
@@ -58,23 +57,29 @@ class Design:
         wavelength_nm: float,
         focal_length_um: float,
         diameter_um: float,
-        pitch_nm: int = 350,
-        pillar_height_nm: float = 700.0,
-        width_nm: tuple[int, int] = (100, 300),
-        shape: Literal["square", "circle"] = "square",
-        lattice: Lattice = "square",
-        pillar: str = "sin_luke_2015",
-        substrate: str = "fused_silica_malitson_1965",
+        pillar: str | None = None,
+        substrate: str | None = None,
+        shape: Literal["square", "circle"] | None = None,
+        lattice: Lattice | None = None,
+        pitch_nm: float | None = None,
+        pillar_height_nm: float | None = None,
+        width_nm: tuple[int, int] | None = None,
         name: str = "lens",
+        progress: Progress | None = None,
     ) -> Design:
-        """The design of one lens for one wavelength, with a hyperbolic phase and the mapping that the cells give: every width from
-        the first to the second of ``width_nm`` is solved when it is first needed, which takes seconds, and cached. The pillars are
-        on layer 1/0. The defaults are the cell for visible light; ``metalith new`` finds one for any wavelength and
-        material. :attr:`text` is its design file. :class:`MetalithError` for values that a design file cannot have."""
-        if pitch_nm % 1 != 0:
-            raise _native.MetalithError(f"`pitch_nm` = {pitch_nm!r}\n  help: give whole nanometres; a design file takes others with `database_unit_nm`")
-        told = (wavelength_nm, focal_length_um, diameter_um, pitch_nm, pillar_height_nm, *width_nm)
-        return cls.parse(lens_text(name, shape, lattice, pillar, substrate, *told))
+        """The design of one lens for one wavelength, with a hyperbolic phase: what ``metalith new`` makes. What is left out is
+        chosen for the wavelength and the aperture: the materials by name, formula or table, the pitch and the height (nm), the
+        narrowest and the widest pillar (nm); pillars are circles on a square lattice. Cells are solved for it, which takes
+        seconds, and cached. :attr:`text` is the design file, each choice with its reason; the pillars are on layer 1/0.
+        :class:`MetalithError` if no pillars make the lens, with the nearest values that do."""
+        positive = {"wavelength_nm": wavelength_nm, "focal_length_um": focal_length_um, "diameter_um": diameter_um}
+        optional = {"pitch_nm": pitch_nm, "pillar_height_nm": pillar_height_nm}
+        lens = tuple(_arguments.real(key, value) for key, value in positive.items())
+        cell = tuple(None if value is None else _arguments.real(key, value) for key, value in optional.items())
+        least, most = (None, None) if width_nm is None else (_arguments.whole("width_nm", nm, 1, _arguments.MOST_16) for nm in width_nm)
+        words = [pillar, substrate, shape, lattice]
+        native, text = _native.Design.lens(name, lens, words, (*cell, least, most), progress)
+        return cls(native, text)
 
     def __copy__(self) -> Design:
         return Design(self._native, self._text)
@@ -319,7 +324,7 @@ def _of_maps(*told: Any) -> Array:
     return Array(_native.array_of_widths(*told))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Layout:
     """The pillars that a layout file holds."""
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from . import _arguments, _html, _native
 from ._figures import imported, subplots
-from ._layouts import Array, Layout, _map
+from ._layouts import Array, Design, Layout, _map
 from ._shapes import Lattice, Shape, told_of
 from ._types import Complex64, Complex128, Float64, Json, PathLike, Progress, Widths
 
@@ -35,7 +35,7 @@ PLANES = 9
 MOST_PLANES = 101
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ThroughFocus:
     """PSFs of one element in planes along z; arrays have an entry for each plane, NaN where there is no number."""
 
@@ -59,7 +59,7 @@ class ThroughFocus:
     """Intensity over that of the light that arrives, shape ``[planes, samples, samples]``."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Psf:
     """The PSF of one element in one light."""
 
@@ -340,6 +340,8 @@ def _maps(
         return maps, of.centres_nm, of.pitch_nm, of.lattice, of.shape
     if isinstance(of, Array):
         return [of.widths(k) for k in range(len(of))], of.centres_nm, of.pitch_nm, of.lattice, of.shape
+    if isinstance(of, Design):
+        raise TypeError("PSFs of a design\n  help: give its array: `design.array()`")
     if pitch_nm is None:
         raise _native.MetalithError("a map of widths has no pitch\n  help: give `pitch_nm`")
     one = _map("of", of, shape)

@@ -21,6 +21,14 @@ class Design:
     def read(path: PathLike) -> Design: ...
     @staticmethod
     def parse(text: str, path: PathLike) -> Design: ...
+    @staticmethod
+    def lens(
+        name: str,
+        lens: tuple[float, float, float],
+        words: list[str | None],
+        cell: tuple[float | None, float | None, int | None, int | None],
+        progress: Progress | None = None,
+    ) -> tuple[Design, str]: ...
     @property
     def name(self) -> str: ...
     @property

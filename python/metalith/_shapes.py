@@ -80,7 +80,7 @@ Lattice: TypeAlias = Literal["square", "hexagonal"]
 """How pillars stand: on a hexagonal lattice in rows along x, each shifted by half a pitch against the next."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Places:
     """Where the columns and rows of a map are, from the middle of its element."""
 

@@ -15,7 +15,7 @@ from ._figures import imported
 from ._types import Json, PathLike, Progress
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StudyResult:
     """All draws of a study, and what they say."""
 

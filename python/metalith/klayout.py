@@ -27,6 +27,8 @@ def insert(
     out; where it is taken, ``$1`` and so on is added, as KLayout does. ``hierarchy`` and ``layer``: as for
     :meth:`metalith.Array.write`. :class:`MetalithError` if coordinates of the array are no multiples of the database unit of
     the layout, or klayout is not installed; nothing is added then."""
+    if not hasattr(layout, "dbu"):
+        raise TypeError(f"`layout` is a {type(layout).__name__}\n  help: give a klayout.db.Layout")
     source = read(of, layout.dbu, hierarchy, layer)
     cell = layout.create_cell(name or source.top_cell().name)
     cell.copy_tree(source.top_cell())
@@ -112,24 +114,25 @@ def _classes() -> Any:
             self.param("wavelength_nm", self.TypeDouble, "Wavelength", unit="nm", default=550.0)
             self.param("focal_length_um", self.TypeDouble, "Focal length", unit="um", default=100.0)
             self.param("diameter_um", self.TypeDouble, "Diameter", unit="um", default=50.0)
-            self.param("pitch_nm", self.TypeInt, "Pitch", unit="nm", default=350)
-            self.param("pillar_height_nm", self.TypeDouble, "Height of the pillars", unit="nm", default=700.0)
-            self.param("width_min_nm", self.TypeInt, "Least width", unit="nm", default=100)
-            self.param("width_max_nm", self.TypeInt, "Largest width", unit="nm", default=300)
-            self.param("pillar", self.TypeString, "Material of the pillars", default="sin_luke_2015")
+            self.param("pillar", self.TypeString, "Material of the pillars; by the wavelength if empty", default="")
+            self.param("pitch_nm", self.TypeDouble, "Pitch; 0: chosen", unit="nm", default=0.0)
+            self.param("pillar_height_nm", self.TypeDouble, "Height of the pillars; 0: chosen", unit="nm", default=0.0)
+            self.param("width_min_nm", self.TypeInt, "Narrowest pillar; 0: chosen", unit="nm", default=0)
+            self.param("width_max_nm", self.TypeInt, "Widest pillar; 0: chosen", unit="nm", default=0)
 
         def display_text_impl(self) -> str:
             return f"Metalens({self.diameter_um:g} um, f = {self.focal_length_um:g} um, {self.wavelength_nm:g} nm)"
 
         def array(self) -> Array:
+            widths = (self.width_min_nm, self.width_max_nm)
             return _lens(
                 wavelength_nm=self.wavelength_nm,
                 focal_length_um=self.focal_length_um,
                 diameter_um=self.diameter_um,
-                pitch_nm=self.pitch_nm,
-                pillar_height_nm=self.pillar_height_nm,
-                width_nm=(self.width_min_nm, self.width_max_nm),
-                pillar=self.pillar,
+                pillar=self.pillar or None,
+                pitch_nm=self.pitch_nm or None,
+                pillar_height_nm=self.pillar_height_nm or None,
+                width_nm=widths if any(widths) else None,
             )
 
     class Library(kdb.Library):  # type: ignore[name-defined, misc]

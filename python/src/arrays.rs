@@ -1,13 +1,13 @@
 //! Designs, arrays and layouts.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
 use metalith::{
-    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, PillarArray, PillarMap, PillarShape, Pitch,
-    Wedge, extract,
+    ElementSite, Error, ExtractionPlan, Hierarchy, LatticeKind, Layout, NewDesign, PillarArray, PillarMap, PillarShape,
+    Pitch, Wedge, extract, pitch_of_nm,
 };
 use numpy::ndarray::Array2;
 use numpy::{Element, PyArray2, PyReadonlyArray2};
@@ -17,6 +17,16 @@ use crate::lattices::{PitchNm, check_places, check_shape, kind_of, lattice_of};
 use crate::reading::Reading;
 use crate::shapes::{ToldShape, check_numbers, shape_of, told};
 use crate::work::{error, work};
+
+/// Wavelength (nm), focal length and diameter (um) of a lens.
+type LensNumbers = (f64, f64, f64);
+
+/// Pitch and height of the pillars, narrowest and widest of them (nm), where they are given.
+type CellNumbers = (Option<f64>, Option<f64>, Option<u16>, Option<u16>);
+
+fn asked_pitch(nm: f64) -> metalith::Result<Pitch> {
+    pitch_of_nm(nm).map_err(|remedy| Error::refused("new/pitch", format!("`pitch_nm` = {nm}"), remedy))
+}
 
 /// A design: what is built, how it is written, and what must hold of it.
 #[pyclass(frozen, module = "metalith._native")]
@@ -38,6 +48,46 @@ impl Design {
     fn parse(py: Python<'_>, text: &str, path: PathBuf) -> PyResult<Self> {
         let design = work(py, None, |_| metalith::Design::parse(&path, text))?;
         Ok(Self { design })
+    }
+
+    /// A lens for one wavelength with the pillars that `metalith new` chooses, and its text. Lengths are in nanometres where a name
+    /// says no other unit.
+    #[staticmethod]
+    #[pyo3(signature = (name, lens, words, cell, progress=None))]
+    fn lens(
+        py: Python<'_>,
+        name: &str,
+        lens: LensNumbers,
+        words: [Option<String>; 4],
+        cell: CellNumbers,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Self, String)> {
+        let (wavelength_nm, focal_length_um, diameter_um) = lens;
+        let [material, substrate, shape, lattice] = words;
+        let (pitch_nm, pillar_height_nm, width_min_nm, width_max_nm) = cell;
+        let shape = shape.map(|word| shape_of((word, 0, 0, 0))).transpose().map_err(error)?;
+        let asked = NewDesign {
+            elements: Some((1, 1)),
+            diameter_um: Some(diameter_um),
+            focal_length_um: Some(focal_length_um),
+            wavelength_nm: Some(wavelength_nm),
+            steering_deg: None,
+            material,
+            substrate,
+            shape,
+            lattice: lattice.as_deref().map(kind_of).transpose().map_err(error)?,
+            pillar_height_nm,
+            pitch_nm: pitch_nm.map(|nm| asked_pitch(nm).map_err(error)).transpose()?,
+            width_min_nm,
+            width_max_nm,
+        };
+        let path = PathBuf::from(format!("{name}.toml"));
+        let (design, text) = work(py, progress, |p| {
+            let made = asked.text(name, Path::new(""), p)?;
+            let design = metalith::Design::parse(&path, &made.text)?;
+            Ok((design, made.text))
+        })?;
+        Ok((Self { design }, text))
     }
 
     #[getter]

@@ -253,5 +253,5 @@ def test_a_guessed_cell_is_said() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         ml.psf(widths, [530], pillar="sin_luke_2015", **asked)
-    with pytest.raises(ml.MetalithError, match="472.5"):
-        ml.Design.lens(wavelength_nm=780, focal_length_um=50, diameter_um=20, pitch_nm=472.5)  # type: ignore[arg-type]
+    with pytest.raises(ml.MetalithError, match="multiple of 0.05 nm, such as 430.05"):
+        ml.Design.lens(wavelength_nm=780, focal_length_um=50, diameter_um=20, pitch_nm=430.04)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import types
 from pathlib import Path
@@ -77,13 +78,13 @@ def test_parametrised_cells_are_what_their_designs_are(design: ml.Design, tmp_pa
         return top.insert(kdb.DCellInstArray(made.cell_index(), kdb.DTrans(kdb.DVector(x_um, 0))))
 
     placed("Array", -100, design=str(file))
-    lens = dict(wavelength_nm=660.0, focal_length_um=40.0, diameter_um=15.0, width_min_nm=100, width_max_nm=280)
+    lens = dict(wavelength_nm=660.0, focal_length_um=40.0, diameter_um=15.0, pitch_nm=380.0, width_min_nm=100, width_max_nm=300)
     instance = placed("Metalens", 100, **lens)
     instance.change_pcell_parameter("diameter_um", 20.0)
     layout.write(str(tmp_path / "chip.gds"))
     found = ml.read_layout(tmp_path / "chip.gds")
     assert found.centres_nm == [(-100_000, 0), (100_000, 0)] and found.other_shapes == 0
-    wanted = ml.Design.lens(wavelength_nm=660, focal_length_um=40, diameter_um=20, width_nm=(100, 280))
+    wanted = ml.Design.lens(wavelength_nm=660, focal_length_um=40, diameter_um=20, pitch_nm=380, width_nm=(100, 300))
     for widths, one in zip(found.widths, (design, wanted), strict=True):
         assert np.array_equal(widths, one.array().widths(0))
     # A library that is registered again reads changed files, also for cells that are there.
@@ -107,14 +108,26 @@ def test_the_program_has_classes_of_its_own(design: ml.Design, monkeypatch: pyte
 
 def test_a_lens_is_designed_from_its_numbers() -> None:
     lens = dict(focal_length_um=40, diameter_um=20, name="green", pitch_nm=np.int64(320))
-    design = ml.Design.lens(wavelength_nm=532.0, shape="circle", width_nm=(100, 250), **lens)  # type: ignore[arg-type]
+    design = ml.Design.lens(wavelength_nm=532.0, width_nm=(100, 250), **lens)  # type: ignore[arg-type]
     assert (design.name, design.wavelengths_nm, design.pitch_nm) == ("green", [532.0], 320)
     assert (design.focal_length_um, design.diameter_um, design.array().shape) == (40, 20, "circle")
     assert ml.Design.parse(design.text).digest == design.digest
     with pytest.raises(ml.MetalithError, match="`diameter_um` = 'wide'\n  help: "):
         ml.Design.lens(wavelength_nm=532, focal_length_um=40, diameter_um="wide")  # type: ignore[arg-type]
-    with pytest.raises(ml.MetalithError, match="`wavelength_nm` cannot be 5"):
-        ml.Design.lens(wavelength_nm=5, focal_length_um=40, diameter_um=20)
+    with pytest.raises(ml.MetalithError, match="nanometres are meant: 532"):
+        ml.Design.lens(wavelength_nm=0.532, focal_length_um=40, diameter_um=20)
+    with pytest.raises(ml.MetalithError, match="take a pitch of 364 nm or less"):
+        ml.Design.lens(wavelength_nm=532, focal_length_um=40, diameter_um=20, pitch_nm=500)
+    with pytest.raises(ml.MetalithError, match="no lattice `triangular`"):
+        ml.Design.lens(wavelength_nm=532, focal_length_um=40, diameter_um=20, lattice="triangular")  # type: ignore[arg-type]
+
+
+def test_a_lens_is_that_of_the_program(tmp_path: Path) -> None:
+    file = tmp_path / "far.toml"
+    told = ["--wavelength-nm", "1550", "--diameter-um", "60", "--focal-length-um", "100", "--material", "a-si"]
+    subprocess.run([sys.executable, "-m", "metalith._program", "new", str(file), *told], check=True, capture_output=True)
+    chosen = ml.Design.lens(wavelength_nm=1550, diameter_um=60, focal_length_um=100, pillar="a-si", name="far")
+    assert chosen.digest == ml.Design.read(file).digest
 
 
 def test_a_chip_of_gdsfactory_is_read_as_it_was_meant(design: ml.Design, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
 import sys
@@ -144,6 +145,17 @@ def test_ctrl_c_stops_a_long_call_soon() -> None:
     process.send_signal(2)
     _, err = process.communicate(timeout=30)
     assert "KeyboardInterrupt" in err
+
+
+def test_a_line_of_progress_has_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+    monkeypatch.setattr("time.monotonic", lambda: now)
+    log = io.StringIO()
+    line = ml.ProgressLine(log)
+    for now, done in [(100.0, 0), (100.5, 1), (110.0, 20), (135.0, 25), (140.0, 50)]:  # noqa: B020
+        line("making kernels", done, 100)
+    # A log hears of it once in half a minute; what is short is not told.
+    assert log.getvalue() == "making kernels: 25%, about 105 s left\n"
 
 
 def test_the_lock_is_released_and_progress_is_told() -> None:

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use metalith::cell_study::{CellRequest, ChosenCell};
-use metalith::design::MOST_NORMAL_DEG;
-use metalith::rcwa::Material;
-use metalith::text::printable;
-use metalith::{LatticeKind, PillarShape, Result};
+use crate::cell_study::{CellRequest, ChosenCell};
+use crate::design::MOST_NORMAL_DEG;
+use crate::rcwa::Material;
+use crate::text::printable;
+use crate::{LatticeKind, PillarShape, Result};
 
 /// Materials that are taken where none is named, each up to a wavelength (um), and the word for it.
 const FILMS: [(f64, &str); 4] = [
@@ -240,9 +240,16 @@ impl StartCell {
             line(
                 "width_min_nm",
                 cell.widths_nm.0,
-                "the narrowest pillar, and below the narrowest gap: ask your cleanroom",
+                &given(
+                    request.width_min_nm.is_some(),
+                    "the narrowest pillar, and below the narrowest gap: ask your cleanroom".into(),
+                ),
             ),
-            line("width_max_nm", cell.widths_nm.1, ""),
+            line(
+                "width_max_nm",
+                cell.widths_nm.1,
+                if request.width_max_nm.is_some() { "as asked" } else { "" },
+            ),
             line(
                 "width_step_nm",
                 cell.step_nm,

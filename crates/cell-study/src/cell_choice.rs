@@ -26,6 +26,9 @@ const NARROWEST: f64 = 0.25;
 const GAP: f64 = 0.15;
 const LEAST_NM: f64 = 50.0;
 
+/// Fewest steps from the narrowest to the widest pillar: with fewer the phases of a mapping are too far apart.
+const LEAST_STEPS: f64 = 10.0;
+
 /// Light in the first order that is given up for an aspect ratio (height over narrowest width) less by one.
 const PER_ASPECT: f64 = 0.005;
 
@@ -59,6 +62,9 @@ pub struct CellRequest {
     /// Pitch and height (nm), where they are given.
     pub pitch_nm: Option<Pitch>,
     pub height_nm: Option<f64>,
+    /// Narrowest and widest pillar (nm), where they are given.
+    pub width_min_nm: Option<u16>,
+    pub width_max_nm: Option<u16>,
 }
 
 /// A cell that was chosen.
@@ -177,7 +183,7 @@ impl CellRequest {
                      nm on"
                 ),
                 format!(
-                    "take --pitch-nm {} or less, or a longer wavelength",
+                    "take a pitch of {} nm or less, or a longer wavelength",
                     even_below(diffracts_nm)
                 ),
             ));
@@ -191,7 +197,7 @@ impl CellRequest {
                     self.sine()
                 ),
                 format!(
-                    "take --pitch-nm {}, or a numerical aperture of {:.3} or less",
+                    "take a pitch of {} nm, or a numerical aperture of {:.3} or less",
                     even_below(nyquist_nm),
                     0.5 * nm / pitch_nm
                 ),
@@ -293,7 +299,7 @@ impl CellRequest {
                 .map(|t| t.height_nm)
         };
         let hint = match self.height_nm.and_then(near) {
-            Some(height) => format!("take --pillar-height-nm {height}, the nearest that works"),
+            Some(height) => format!("take a pillar height of {height} nm, the nearest that works"),
             None if k > 0.01 => format!(
                 "{} absorbs there (k = {k:.3}): take another material or a longer wavelength",
                 self.film
@@ -319,15 +325,23 @@ impl CellRequest {
     fn widths(&self, pitch_nm: Pitch) -> Result<((u16, u16), u16)> {
         let widest = f64::from(self.lattice.widest_nm(pitch_nm, DatabaseUnit::Nanometre));
         let step = 2.0 * (f64::from(pitch_nm) / 500.0).round().max(1.0);
-        let low = step * ((NARROWEST * widest).max(LEAST_NM) / step).ceil();
-        let high = step * ((widest - (GAP * widest).max(LEAST_NM)) / step).floor();
-        if high < low + 10.0 * step {
+        let narrowest = self.width_min_nm.map_or((NARROWEST * widest).max(LEAST_NM), f64::from);
+        let gapped = self
+            .width_max_nm
+            .map_or(widest - (GAP * widest).max(LEAST_NM), f64::from);
+        let low = step * (narrowest / step).ceil();
+        let high = step * (gapped.min(widest) / step).floor();
+        if high < low + LEAST_STEPS * step {
+            let (gaps, remedy) = match (self.width_min_nm, self.width_max_nm) {
+                (None, None) => (format!(", with pillars and gaps of {LEAST_NM} nm at least"), ""),
+                _ => (String::new(), ", or a wider range of widths"),
+            };
             return Err(Error::refused(
                 "new/pitch-too-small",
                 format!(
-                    "a pitch of {pitch_nm} nm leaves widths from {low} to {high} nm, with pillars and gaps of {LEAST_NM} nm at least"
+                    "a pitch of {pitch_nm} nm leaves widths from {low} to {high} nm{gaps}: too few steps of {step} nm"
                 ),
-                "take a longer pitch, or a longer wavelength",
+                format!("take a longer pitch, or a longer wavelength{remedy}"),
             ));
         }
         Ok(((low as u16, high as u16), step as u16))
@@ -421,6 +435,8 @@ mod tests {
             steering_sine: 0.0,
             pitch_nm: None,
             height_nm: None,
+            width_min_nm: None,
+            width_max_nm: None,
         }
     }
 
@@ -438,7 +454,10 @@ mod tests {
             pitch_nm: Some(500.into()),
             ..request()
         });
-        assert!(coarse.contains("434.") && coarse.contains("--pitch-nm 434"), "{coarse}");
+        assert!(
+            coarse.contains("434.") && coarse.contains("a pitch of 434 nm"),
+            "{coarse}"
+        );
         let steep = said(&CellRequest {
             pitch_nm: Some(400.into()),
             numerical_aperture: 0.9,
@@ -474,7 +493,7 @@ mod tests {
         };
         let error = low.choose(None, &Silent).unwrap_err();
         assert_eq!(error.id(), "new/no-usable-height");
-        assert!(error.to_string().contains("--pillar-height-nm "), "{error}");
+        assert!(error.to_string().contains("take a pillar height of "), "{error}");
         assert!(request().choose(None, &Silent).unwrap().mapping.light.first > 0.7);
     }
 }

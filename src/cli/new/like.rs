@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use metalith::phase::RadialPhase;
-use metalith::{Design, Error, Result};
+use metalith::{Design, Error, NewDesign, Result};
 
-use super::start_cell::Materials;
-use super::{NewArgs, chord_nm};
 use crate::cli::Terminal;
 use crate::cli::section_text::{with_keys, without_section};
+use crate::new_design::{Materials, chord_nm};
 
 fn refused(like: &str, what: &str) -> Error {
     Error::refused(
@@ -23,35 +22,41 @@ fn extent_um(elements: u32, spacing_um: f64, diameter_um: f64) -> f64 {
     0.5 * (f64::from(elements.saturating_sub(1)) * spacing_um + diameter_um)
 }
 
-impl NewArgs {
-    /// True if anything is asked of a design that is begun with.
+/// A shipped design to begin with, and what is asked of it.
+pub(super) struct Like<'a> {
+    pub shipped: &'a str,
+    /// The new file, beside which those stand that the design reads.
+    pub path: &'a Path,
+    pub asked: NewDesign,
+}
+
+impl Like<'_> {
+    /// True if anything is asked of the design.
     fn changes(&self) -> bool {
-        self.changes_pillars()
-            || self.diameter_um.is_some()
-            || self.focal_length_um.is_some()
-            || self.array.is_some()
-            || self.elements.is_some()
-            || self.steering_deg.is_some()
+        let asked = &self.asked;
+        let is_of_lens = asked.diameter_um.is_some() || asked.focal_length_um.is_some();
+        let is_of_array = asked.elements.is_some() || asked.steering_deg.is_some();
+        asked.changes_pillars() || is_of_lens || is_of_array
     }
 
-    /// The text of a shipped design, whose files are at `path`, with what is asked for.
-    pub(super) fn rescaled(&self, text: String, path: &Path, terminal: &Terminal) -> Result<String> {
+    /// The text of the design with what is asked for.
+    pub(super) fn rescaled(&self, text: String, terminal: &Terminal) -> Result<String> {
         if !self.changes() {
             return Ok(text);
         }
-        let like = Design::parse_without_library(path, &text)?;
-        let name = self.like.as_deref().unwrap_or(&like.name);
+        let like = Design::parse_without_library(self.path, &text)?;
+        let (asked, name) = (&self.asked, self.shipped);
         if !like.array.placed.is_empty() || like.lens.outline.is_some() {
             return Err(refused(name, "its elements are placed or shaped one by one"));
         }
         let old_um = f64::from(like.lens.diameter_nm) * 1e-3;
-        let diameter_um = self.diameter_um.unwrap_or(old_um);
+        let diameter_um = asked.diameter_um.unwrap_or(old_um);
         // A lens of another size has the same aperture.
         let scale = diameter_um / old_um;
-        let focal_length_um = self.focal_length_um.unwrap_or(like.lens.focal_length_um * scale);
+        let focal_length_um = asked.focal_length_um.unwrap_or(like.lens.focal_length_um * scale);
         let is_hyperbola = matches!(like.lens.phase, RadialPhase::Hyperbola { .. }) && like.lens.terms.is_empty();
         let is_lens_new = diameter_um != old_um || focal_length_um != like.lens.focal_length_um;
-        if !is_hyperbola && (is_lens_new || self.wavelength_nm.is_some()) {
+        if !is_hyperbola && (is_lens_new || asked.wavelength_nm.is_some()) {
             return Err(refused(
                 name,
                 "its phase is no hyperbola, which alone is known for another lens",
@@ -62,8 +67,8 @@ impl NewArgs {
             let keys: Vec<_> = keys.iter().map(|(key, value)| (*key, value.as_deref())).collect();
             text = with_keys(&text, head, nth, &keys);
         };
-        let (x, y) = self.array.or(self.elements.map(|n| (n, n))).unwrap_or(like.array.count);
-        let steering_deg = self.steering_deg.unwrap_or(like.array.steering_deg);
+        let (x, y) = asked.elements.unwrap_or(like.array.count);
+        let steering_deg = asked.steering_deg.unwrap_or(like.array.steering_deg);
         let spacing_um = [
             like.array.spacing_nm,
             like.array.spacing_y_nm.unwrap_or(like.array.spacing_nm),
@@ -123,7 +128,7 @@ impl NewArgs {
             };
             set("[[mark]]", nth, &[("x_um", list(0)), ("y_um", list(1))]);
         }
-        if self.changes_pillars() {
+        if asked.changes_pillars() {
             self.set_pillars(
                 &like,
                 [diameter_um, focal_length_um],
@@ -148,7 +153,7 @@ impl NewArgs {
         set: &mut impl FnMut(&str, usize, &[(&str, Option<String>)]),
         terminal: &Terminal,
     ) -> Result<()> {
-        let (cell, name) = (&like.cell, self.like.as_deref().unwrap_or(&like.name));
+        let (asked, cell, name) = (&self.asked, &like.cell, self.shipped);
         if cell.shape.basis().is_some() || !cell.under.is_empty() || !like.mapping.steered.is_empty() {
             return Err(refused(
                 name,
@@ -156,13 +161,13 @@ impl NewArgs {
             ));
         }
         let focused_um = like.lens.focused_um().unwrap_or(like.mapping.wavelength_um);
-        let wavelength_um = self.wavelength_nm.map_or(focused_um, |nm| nm * 1e-3);
+        let wavelength_um = asked.wavelength_nm.map_or(focused_um, |nm| nm * 1e-3);
         let is_same = wavelength_um == focused_um;
         let material = |said: &Option<String>, own: &str| said.clone().or_else(|| is_same.then(|| own.to_owned()));
-        let film = self.material.clone().unwrap_or_else(|| cell.pillar_material.clone());
-        let substrate = material(&self.substrate, &cell.substrate_material);
+        let film = asked.material.clone().unwrap_or_else(|| cell.pillar_material.clone());
+        let substrate = material(&asked.substrate, &cell.substrate_material);
         let materials = Materials::new(Some(&film), substrate.as_deref(), wavelength_um, like.folder())?;
-        let (request, chosen) = self.choose_cell(
+        let (request, chosen) = asked.choose_cell(
             &materials,
             wavelength_um,
             [diameter_um, focal_length_um],
@@ -170,6 +175,8 @@ impl NewArgs {
             (cell.shape, cell.lattice),
             terminal,
         )?;
+        terminal.clear();
+        terminal.say(&chosen.mapping.words());
         let some = |value: &dyn std::fmt::Display| Some(value.to_string());
         let quoted = |text: &str| Some(format!("\"{}\"", text.replace('\\', "/")));
         let is_square = request.shape.is_square();
