@@ -121,7 +121,7 @@ impl ArraySpec {
                 "use whole numbers",
             );
         }
-        let range = Limits::new(1.0..=100_000.0, "um");
+        let range = Limits::new(1.0..=1_000_000.0, "um");
         let spacing_um = if s.is_list("spacing_um") {
             s.array::<2>("spacing_um", range)
         } else {

@@ -230,11 +230,8 @@ impl LensSpec {
     }
 }
 
-/// Focal lengths of lenses, and distances of sensors.
-pub(crate) const FOCAL_LENGTH: Limits = Limits {
-    range: 1.0..=100_000.0,
-    unit: "um",
-};
+/// Focal lengths of lenses, and distances of sensors: up to those of a lens of a whole wafer.
+pub const FOCAL_LENGTH: Limits = Limits::new(1.0..=1_000_000.0, "um");
 
 /// The diameter that a section says (nm).
 pub(super) fn read_diameter(s: &Section<'_, '_>, cell: &CellSpec) -> u32 {

@@ -17,7 +17,8 @@ pub use array::{ArraySpec, Element, PlacedSpec};
 pub use cell::{CellSpec, TALLEST_NM, UnderSpec};
 pub(crate) use footprint::Footprint;
 pub use layout::{ApertureSpec, ChipSpec, Hierarchy, Layers, LayoutLayer, LayoutSpec, MarkSpec};
-pub(crate) use lens::{FOCAL_LENGTH, WAVELENGTH};
+pub use lens::FOCAL_LENGTH;
+pub(crate) use lens::WAVELENGTH;
 pub use lens::{LensSpec, PhaseAlongY};
 pub(crate) use mapping::LibraryFile;
 pub use mapping::{MappingComparison, MappingSpec};
@@ -25,7 +26,7 @@ pub use mapping_cell::MappingIdentity;
 pub use optimise::{
     CameraSearchSpec, CameraSizes, MeritSpec, OptimiseSpec, RobustSpec, SolverSpec, StartSpec, ViewSpec,
 };
-pub use outline::LensOutline;
 pub(crate) use outline::OutlineRows;
+pub use outline::{DIAMETER, LensOutline};
 pub use steered_mapping::{SteeredMapping, SteeringSteps};
 pub use verify::{CellIncidence, FieldAngle, LimitSpec, USUAL_PIXEL_UM, VerifySpec};

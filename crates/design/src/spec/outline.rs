@@ -8,10 +8,7 @@ use metalith_core::document::{Limits, Section};
 use metalith_pillars::Lattice;
 
 /// Smallest and largest diameter of a lens (um).
-pub(super) const DIAMETER: Limits = Limits {
-    range: 5.0..=100_000.0,
-    unit: "um",
-};
+pub const DIAMETER: Limits = Limits::new(5.0..=100_000.0, "um");
 
 /// Most corners of an outline.
 const MOST_CORNERS: usize = 1000;

@@ -25,7 +25,7 @@ pub const PITCH_NM: Limits = Limits::new(50.0..=20_000.0, "nm");
 pub const HEIGHT_NM: Limits = Limits::new(10.0..=TALLEST_NM, "nm");
 pub const AMBIENT_INDEX: Limits = Limits::new(1.0..=3.0, "");
 pub const LENS_DIAMETER_UM: Limits = Limits::new(5.0..=2000.0, "um");
-pub const FOCAL_LENGTH_UM: Limits = Limits::new(1.0..=100_000.0, "um");
+pub const FOCAL_LENGTH_UM: Limits = Limits::new(1.0..=1_000_000.0, "um");
 pub const APERTURE_DIAMETER_UM: Limits = Limits::new(1.0..=2000.0, "um");
 pub const DISTANCE_UM: Limits = Limits::new(1.0..=100_000.0, "um");
 pub const WINDOW_CENTRE_UM: Limits = Limits::new(-10_000.0..=10_000.0, "um");
