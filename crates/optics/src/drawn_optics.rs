@@ -1,14 +1,15 @@
 //! Pillars as drawn, by a cell model.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::light::wave_of;
 use super::{
-    ArrivingLight, CameraChange, ElementOptics, Field, FocusedSites, IncoherentFields, PathChange, cell_direction,
+    ArrivingLight, CameraChange, ElementOptics, Field, FocusedSites, IncoherentFields, NeighbourSites, PathChange,
+    cell_direction,
 };
 use metalith_cell::{CellModel, CellResponse, Illumination, NeighbourTables, Spectral};
 use metalith_core::{Error, Memo, Progress, Result};
-use metalith_pillars::{LatticeKind, PillarMap, PillarRows};
+use metalith_pillars::{LatticeKind, PillarRows};
 
 /// Wavelength, direction of equal and of coupled pillars, bit by bit; how closely it is looked at, and whether neighbours are equal.
 type Key = ([u64; 5], Spectral, bool);
@@ -76,6 +77,8 @@ pub(crate) struct DrawnOptics<'e> {
     /// Radius of the circle that light passes (um).
     pub radius_um: f64,
     pub part_bytes: Option<usize>,
+    /// Sites with their neighbours, once they are asked for.
+    pub sites: OnceLock<NeighbourSites>,
 }
 
 impl ElementOptics for DrawnOptics<'_> {
@@ -93,7 +96,8 @@ impl ElementOptics for DrawnOptics<'_> {
             }
             CellResponse::Neighbours(tables) => {
                 let pillars = self.pillars.held().ok_or_else(not_held)?;
-                coupled(pillars, &response, tables, light)
+                let sites = self.sites.get_or_init(|| NeighbourSites::of(pillars));
+                coupled(sites, &response, tables, light)
             }
         };
         Ok(IncoherentFields {
@@ -128,7 +132,7 @@ impl ElementOptics for DrawnOptics<'_> {
 
 /// The fields of pillars among their neighbours, and the share of the light for each: for s and p, or one for both.
 pub(crate) fn coupled<'e>(
-    pillars: &'e PillarMap,
+    sites: &'e NeighbourSites,
     response: &Arc<CellResponse>,
     tables: &NeighbourTables,
     light: &Illumination<'_>,
@@ -138,7 +142,7 @@ pub(crate) fn coupled<'e>(
         NeighbourTables::Band(_) => 1,
     };
     let field = |polarisation| Field::Coupled {
-        pillars,
+        sites,
         response: Arc::clone(response),
         sines: light.coupled_sines(light.wavelength_um),
         polarisation,

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::{ArrivingLight, AsBuiltElement, CameraChange, ClassTable, Perturbation, SolvedWidths};
-use crate::NeighbourPillars;
-use metalith_cell::{CellResponse, NeighbourTables};
+use crate::{NeighbourPillars, NeighbourSites};
+use metalith_cell::{CellResponse, NeighbourTables, Orientation};
 use metalith_core::Result;
-use metalith_pillars::{Lattice, PillarMap, PillarRows};
+use metalith_pillars::{Lattice, PillarRows};
 use metalith_wave::{Accuracy, Aperture, FoldedPropagator, Pillars, Propagator, Psf, Scratch, Window};
 
 /// Fields of an element in light that arrives: the sum of the intensities of its fields, each times the weight.
@@ -36,7 +36,7 @@ pub enum Field<'e> {
     },
     /// Sites transmit by their pillar and its neighbours, from the direction with these sines; `polarisation` is 0 for s and 1 for p.
     Coupled {
-        pillars: &'e PillarMap,
+        sites: &'e NeighbourSites,
         response: Arc<CellResponse>,
         sines: [f64; 2],
         polarisation: usize,
@@ -52,20 +52,21 @@ impl Field<'_> {
     /// The field behind the element, without the plane wave that arrives. Rows are formed when they are asked for.
     ///
     /// # Errors
-    /// If a pillar is in no table, or pillars among neighbours have too many widths.
+    /// If a pillar is in no table.
     pub fn aperture(&self, light: &ArrivingLight) -> Result<Box<dyn Aperture + '_>> {
         Ok(match self {
             Self::Drawn { pillars, table } => Box::new(Pillars::new(*pillars, table)?),
             Self::Coupled {
-                pillars,
+                sites,
                 response,
                 sines,
                 polarisation,
             } => Box::new(match response.as_ref() {
                 CellResponse::Neighbours(NeighbourTables::Fitted(fitted)) => {
-                    NeighbourPillars::polarised(pillars, &fitted.responses, *sines, *polarisation)?
+                    let turned = Orientation::of(*sines, [0.0; 2]).polarisation(*polarisation);
+                    NeighbourPillars::new(sites, [&fitted.responses[turned]], *sines)
                 }
-                CellResponse::Neighbours(NeighbourTables::Band(band)) => NeighbourPillars::new(pillars, band, *sines)?,
+                CellResponse::Neighbours(NeighbourTables::Band(band)) => NeighbourPillars::new(sites, [band], *sines),
                 CellResponse::Scalar(_) | CellResponse::Jones(_) => unreachable!("made of neighbours alone"),
             }),
             Self::AsBuilt { element, table } => Box::new(element.lit_aperture(table, light)),
@@ -119,6 +120,23 @@ impl<'e> IncoherentFields<'e> {
             radius_um: element.radius_um(),
             part_bytes: None,
         }
+    }
+
+    /// The fields of both polarisations as a set whose rows are formed together; none where they are formed one by one.
+    fn together(&self) -> Option<NeighbourPillars<'_, 2>> {
+        let [
+            Field::Coupled {
+                sites, response, sines, ..
+            },
+            Field::Coupled { .. },
+        ] = &self.fields[..]
+        else {
+            return None;
+        };
+        let CellResponse::Neighbours(NeighbourTables::Fitted(fitted)) = response.as_ref() else {
+            return None;
+        };
+        Some(NeighbourPillars::polarised(sites, &fitted.responses, *sines))
     }
 
     /// Radius of the circle that light passes (um).
@@ -203,13 +221,17 @@ impl<'e> IncoherentFields<'e> {
     /// # Errors
     /// As [`Propagator::field`].
     pub fn psf_by(&self, propagator: &dyn Propagator, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
-        let of = |field: &Field<'_>| {
-            let aperture = field.aperture(&self.light)?;
-            let mut psf = Psf::formed(propagator, aperture.as_ref(), &self.light.plane, lp_mm, scratch)?;
-            self.add_scattered(field, &mut psf);
-            Ok(psf)
+        let psfs = if let Some(set) = self.together() {
+            Psf::formed_of_set(propagator, &set, &self.light.plane, lp_mm, scratch)?
+        } else {
+            let of = |field: &Field<'_>| {
+                let aperture = field.aperture(&self.light)?;
+                let mut psf = Psf::formed(propagator, aperture.as_ref(), &self.light.plane, lp_mm, scratch)?;
+                self.add_scattered(field, &mut psf);
+                Ok(psf)
+            };
+            self.fields.iter().map(of).collect::<Result<Vec<_>>>()?
         };
-        let psfs = self.fields.iter().map(of).collect::<Result<Vec<_>>>()?;
         let mut psf = Psf::sum(psfs, self.weight);
         self.camera.apply(&mut psf);
         Ok(psf)

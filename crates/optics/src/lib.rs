@@ -94,7 +94,7 @@ pub use fields::{Field, IncoherentFields, spread};
 pub use lens_psf::{LensGradient, LensPsf, LensPullback, PillarVariable};
 pub use light::{ArrivingLight, cell_direction};
 pub use model::{CalibratedModel, DoseResponse};
-pub use neighbour_pillars::NeighbourPillars;
+pub use neighbour_pillars::{NeighbourPillars, NeighbourSites};
 pub use not_applied::{Applied, NotApplied};
 pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
 pub use realised_cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};

@@ -1,138 +1,226 @@
 //! The pillars of an element, each among its own neighbours.
 
-use num_complex::{Complex32, Complex64};
+use std::ops::Range;
 
-use metalith_cell::{NEIGHBOURS, NeighbourResponse, Orientation, SiteResponse};
-use metalith_core::{Error, Result};
+use ndarray::{Array2, ArrayView1};
+use num_complex::{Complex32, Complex64};
+use pulp::{Arch, Simd, WithSimd};
+
+use metalith_cell::{NEIGHBOUR_DEGREE, NEIGHBOURS, NeighbourResponse, Orientation, SiteResponse};
 use metalith_pillars::{Lattice, PillarMap};
-use metalith_wave::Aperture;
+use metalith_wave::{Aperture, ApertureSet};
 
 /// Rows and columns around a site that hold its neighbours.
 const REACH: usize = 2;
 
-/// Most widths of an element: tables of their pairs take 100 MB.
-const MOST_WIDTHS: usize = 1000;
+/// Factors of the term of a pair, for its real and its imaginary part.
+const FACTORS: usize = 2 * NEIGHBOUR_DEGREE;
 
-/// Pillars as they stand in a layout, which transmit by their own width and those around them. Where there is no
-/// pillar nothing passes, and a missing neighbour counts with the mean over all widths.
+/// The widths of an element in the form that sums over neighbours take them: once for light of all wavelengths and directions.
 #[derive(Clone, Debug)]
-pub struct NeighbourPillars<'a> {
-    widths: &'a PillarMap,
+pub struct NeighbourSites {
+    lattice: Lattice,
     radius_um: f64,
-    /// Column of each drawn width (nm); that after the last stands for no pillar.
-    columns: Vec<u16>,
-    count: usize,
-    /// Terms by own column.
-    own: Vec<Complex32>,
-    /// Terms by offset, own column and neighbour's.
-    pairs: Vec<Complex32>,
+    /// Widths that are drawn (nm), rising.
+    drawn: Vec<u16>,
+    /// Number of each site's width among those drawn, and their count where there is no pillar; with `REACH` places more on each
+    /// side.
+    columns: Array2<u16>,
+    /// Places of each row between which all its pillars stand.
+    filled: Vec<Range<usize>>,
 }
 
-impl<'a> NeighbourPillars<'a> {
-    /// Pillars in light of one polarisation, 0 for s and 1 for p: as [`NeighbourPillars::new`], with responses for s
-    /// and p.
-    ///
-    /// # Errors
-    /// As [`NeighbourPillars::new`].
-    pub fn polarised(
-        widths: &'a PillarMap,
-        responses: &[NeighbourResponse; 2],
-        sines: [f64; 2],
-        polarisation: usize,
-    ) -> Result<Self> {
-        let orientation = Orientation::of(sines, [0.0; 2]);
-        Self::new(widths, &responses[orientation.polarisation(polarisation)], sines)
-    }
-
-    /// `sines` is the direction of arrival at the element; the response is that of the direction that [`Orientation`] turns
-    /// it to.
-    ///
-    /// # Errors
-    /// If there are too many widths to make a table of their pairs.
-    pub fn new(widths: &'a PillarMap, response: &impl SiteResponse, sines: [f64; 2]) -> Result<Self> {
-        let orientation = Orientation::of(sines, [0.0; 2]);
+impl NeighbourSites {
+    /// Sites of an element with pillars of these widths.
+    pub fn of(widths: &PillarMap) -> Self {
         let counts = widths.histogram().into_iter().enumerate().skip(1);
         let drawn: Vec<u16> = counts.filter(|(_, n)| *n > 0).map(|(w, _)| w as u16).collect();
-        let count = drawn.len();
-        if count > MOST_WIDTHS {
-            return Err(Error::refused(
-                "neighbours/too-many-widths",
-                format!("the element has pillars of {count} widths, more than {MOST_WIDTHS}"),
-                format!("simulate it with another `fidelity`: the coupled model supports {MOST_WIDTHS} widths"),
-            ));
-        }
-        let last = drawn.last().copied().unwrap_or(0);
-        let mut columns = vec![count as u16; usize::from(last) + 1];
+        let none = drawn.len() as u16;
+        let mut column_of = vec![none; usize::from(drawn.last().copied().unwrap_or(0)) + 1];
         for (column, width) in drawn.iter().enumerate() {
-            columns[usize::from(*width)] = column as u16;
+            column_of[usize::from(*width)] = column as u16;
         }
+        let n = widths.lattice.sites();
+        let mut columns = Array2::from_elem([n + 2 * REACH; 2], none);
+        let inner = columns.rows_mut().into_iter().skip(REACH);
+        for (mut to, widths) in inner.zip(widths.number.rows()) {
+            for (to, width) in to.iter_mut().skip(REACH).zip(widths) {
+                *to = column_of[usize::from(*width)];
+            }
+        }
+        let filled = |row: ArrayView1<'_, u16>| {
+            let first = row.iter().position(|width| *width > 0).unwrap_or(0);
+            let end = row.iter().rposition(|width| *width > 0).map_or(0, |last| last + 1);
+            first..end
+        };
+        Self {
+            lattice: widths.lattice,
+            radius_um: widths.circle_um(),
+            filled: widths.number.rows().into_iter().map(filled).collect(),
+            drawn,
+            columns,
+        }
+    }
+
+    /// Places of a row of sites that is `y` rows above row `iy`, with `REACH` more on either side.
+    fn row(&self, iy: usize, y: i32) -> &[u16] {
+        let row = self.columns.row((iy as i32 + y) as usize + REACH);
+        row.to_slice().expect("rows are contiguous")
+    }
+}
+
+/// Pillars as they stand in a layout, which transmit by their own width and those around them, in each of `P` polarisations. Where
+/// there is no pillar nothing passes, and a missing neighbour counts with the mean over all widths.
+#[derive(Clone, Debug)]
+pub struct NeighbourPillars<'a, const P: usize> {
+    sites: &'a NeighbourSites,
+    /// Terms by own column; zero for no pillar.
+    own: Vec<[Complex32; P]>,
+    /// Factors of the terms of pairs by own column and offset, those of the real before those of the imaginary part; zero for no
+    /// pillar. All pairs of widths would be a table larger than a processor's own memory.
+    factors: Vec<[[[f32; FACTORS]; P]; NEIGHBOURS.len()]>,
+    /// The other factors, by the neighbour's column, for both parts; zero for no pillar.
+    neighbours: Vec<[f32; FACTORS]>,
+}
+
+impl<'a> NeighbourPillars<'a, 2> {
+    /// Pillars in light of both polarisations, s and p: as [`NeighbourPillars::new`], with responses for s and p.
+    pub fn polarised(sites: &'a NeighbourSites, responses: &[NeighbourResponse; 2], sines: [f64; 2]) -> Self {
+        let orientation = Orientation::of(sines, [0.0; 2]);
+        Self::new(sites, [0, 1].map(|p| &responses[orientation.polarisation(p)]), sines)
+    }
+}
+
+impl<'a, const P: usize> NeighbourPillars<'a, P> {
+    /// `sines` is the direction of arrival at the element; the responses are those of the direction that [`Orientation`] turns
+    /// it to.
+    pub fn new(sites: &'a NeighbourSites, responses: [&impl SiteResponse; P], sines: [f64; 2]) -> Self {
+        let orientation = Orientation::of(sines, [0.0; 2]);
         let numbers = NEIGHBOURS.map(|offset| {
             let turned = orientation.turned(offset.map(f64::from)).map(|v| v as i32);
             let found = NEIGHBOURS.iter().position(|other| *other == turned);
             found.expect("the neighbours are symmetric")
         });
-        let width = |column: &u16| f64::from(*column);
-        let mut pairs = Vec::with_capacity(NEIGHBOURS.len() * count * (count + 1));
-        for number in numbers {
-            for own in &drawn {
-                let with = |other: &u16| single(response.pair(number, width(own), width(other)));
-                pairs.extend(drawn.iter().map(with).chain([Complex32::ZERO]));
-            }
+        let widths = || sites.drawn.iter().map(|width| f64::from(*width));
+        let of_pair = |number: usize, own: f64| {
+            responses.map(|response| {
+                let factors = response.pair_factors(number, own);
+                std::array::from_fn(|k| {
+                    let factor = factors[k % NEIGHBOUR_DEGREE];
+                    (if k < NEIGHBOUR_DEGREE { factor.re } else { factor.im }) as f32
+                })
+            })
+        };
+        let of_pairs = widths().map(|own| numbers.map(|number| of_pair(number, own)));
+        let of_neighbour = |width: f64| {
+            let factors = responses[0].neighbour_factors(width);
+            std::array::from_fn(|k| factors[k % NEIGHBOUR_DEGREE] as f32)
+        };
+        let own = widths().map(|own| responses.map(|response| single(response.own(own))));
+        Self {
+            own: own.chain([[Complex32::ZERO; P]]).collect(),
+            factors: of_pairs.chain([[[[0.0; FACTORS]; P]; NEIGHBOURS.len()]]).collect(),
+            neighbours: widths().map(of_neighbour).chain([[0.0; FACTORS]]).collect(),
+            sites,
         }
-        Ok(Self {
-            widths,
-            radius_um: widths.circle_um(),
-            columns,
-            count,
-            own: drawn.iter().map(|w| single(response.own(width(w)))).collect(),
-            pairs,
-        })
     }
 
-    /// Columns of a row of sites with `REACH` more on either side; of none if there is no such row.
-    fn columns_of(&self, iy: Option<usize>) -> Vec<u16> {
-        let n = self.widths.lattice.sites();
-        let mut all = vec![self.count as u16; n + 2 * REACH];
-        if let Some(iy) = iy.filter(|iy| *iy < n) {
-            for (to, width) in all[REACH..].iter_mut().zip(self.widths.number.row(iy)) {
-                *to = self.columns[usize::from(*width)];
-            }
-        }
-        all
+    /// Transmissions of the sites of a row between which its pillars stand.
+    fn sums(&self, iy: usize, filled: Range<usize>) -> Vec<[Complex32; P]> {
+        let mut sums = vec![[Complex32::ZERO; P]; filled.len()];
+        let places = |[x, y]: [i32; 2]| {
+            let first = filled.start + (REACH as i32 + x) as usize;
+            &self.sites.row(iy, y)[first..first + filled.len()]
+        };
+        Arch::new().dispatch(RowSums {
+            pillars: self,
+            own: places([0, 0]),
+            around: NEIGHBOURS.map(places),
+            sums: &mut sums,
+        });
+        sums
     }
 }
 
-impl Aperture for NeighbourPillars<'_> {
+/// Sums over the neighbours of each site of a row.
+struct RowSums<'a, const P: usize> {
+    pillars: &'a NeighbourPillars<'a, P>,
+    /// Columns of the sites, and of the neighbour of each at each offset.
+    own: &'a [u16],
+    around: [&'a [u16]; NEIGHBOURS.len()],
+    sums: &'a mut [[Complex32; P]],
+}
+
+impl<const P: usize> WithSimd for RowSums<'_, P> {
+    type Output = ();
+
+    // Products and sums are rounded one by one, and added in the same order with vectors of any length: all machines get the same bits.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let around = self.around.map(|columns| &columns[..self.sums.len()]);
+        for (ix, (column, out)) in self.own.iter().zip(self.sums).enumerate() {
+            let column = usize::from(*column);
+            let factors = &self.pillars.factors[column];
+            let mut sums = [[simd.splat_f32s(0.0); FACTORS]; P];
+            let mut rests = [[0.0; FACTORS]; P];
+            for (factors, columns) in factors.iter().zip(around) {
+                let (neighbour, rest) = S::as_simd_f32s(&self.pillars.neighbours[usize::from(columns[ix])]);
+                for p in 0..P {
+                    let (own, own_rest) = S::as_simd_f32s(&factors[p]);
+                    for k in 0..own.len() {
+                        sums[p][k] = simd.add_f32s(sums[p][k], simd.mul_f32s(own[k], neighbour[k]));
+                    }
+                    // Of vectors that are longer than all factors.
+                    for k in 0..own_rest.len() {
+                        rests[p][k] += own_rest[k] * rest[k];
+                    }
+                }
+            }
+            for p in 0..P {
+                let mut all = rests[p];
+                let (to, _) = S::as_mut_simd_f32s(&mut all);
+                for (to, sum) in to.iter_mut().zip(sums[p]) {
+                    *to = sum;
+                }
+                let [re, im] = [0, NEIGHBOUR_DEGREE].map(|k| all[k..k + NEIGHBOUR_DEGREE].iter().sum::<f32>());
+                out[p] = self.pillars.own[column][p] + Complex32::new(re, im);
+            }
+        }
+    }
+}
+
+impl<const P: usize> ApertureSet for NeighbourPillars<'_, P> {
     fn lattice(&self) -> Lattice {
-        self.widths.lattice
+        self.sites.lattice
+    }
+
+    fn count(&self) -> usize {
+        P
+    }
+
+    fn fill_rows(&self, iy: usize, rows: &mut [Complex32]) {
+        let filled = self.sites.filled[iy].clone();
+        let sums = self.sums(iy, filled.clone());
+        rows.fill(Complex32::ZERO);
+        for (p, row) in rows.chunks_exact_mut(self.sites.lattice.sites()).enumerate() {
+            for (t, sum) in row[filled.clone()].iter_mut().zip(&sums) {
+                *t = sum[p];
+            }
+        }
+    }
+}
+
+impl Aperture for NeighbourPillars<'_, 1> {
+    fn lattice(&self) -> Lattice {
+        self.sites.lattice
     }
 
     fn radius_um(&self) -> f64 {
-        self.radius_um
+        self.sites.radius_um
     }
 
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
-        let rows: Vec<Vec<u16>> = (0..=2 * REACH)
-            .map(|step| self.columns_of((iy + step).checked_sub(REACH)))
-            .collect();
-        let (own, none) = (&rows[REACH], self.count);
-        for (t, column) in row.iter_mut().zip(&own[REACH..]) {
-            let column = usize::from(*column);
-            *t = if column < none {
-                self.own[column]
-            } else {
-                Complex32::ZERO
-            };
-        }
-        for (pairs, offset) in self.pairs.chunks_exact((none * (none + 1)).max(1)).zip(NEIGHBOURS) {
-            let [x, y] = offset.map(|v| (v + REACH as i32) as usize);
-            for ((t, column), neighbour) in row.iter_mut().zip(&own[REACH..]).zip(&rows[y][x..]) {
-                let column = usize::from(*column);
-                if column < none {
-                    *t += pairs[column * (none + 1) + usize::from(*neighbour)];
-                }
-            }
-        }
+        self.fill_rows(iy, row);
     }
 }
 
@@ -172,22 +260,24 @@ mod tests {
     fn sites_transmit_the_sum_over_their_neighbours() {
         let (widths, responses) = (widths(), [response(3), response(5)]);
         // Arriving from -y: the table is for light along +x, so that (0, -1) there is (1, 0).
-        let pillars = NeighbourPillars::polarised(&widths, &responses, [0.0, -0.3], 1).unwrap();
-        let mut row = vec![Complex32::ZERO; 9];
+        let sites = NeighbourSites::of(&widths);
+        let pillars = NeighbourPillars::polarised(&sites, &responses, [0.0, -0.3]);
+        let mut rows = vec![Complex32::ZERO; 2 * 9];
         for iy in 0..9_usize {
-            pillars.fill_row(iy, &mut row);
-            for (ix, t) in row.iter().enumerate() {
+            pillars.fill_rows(iy, &mut rows);
+            for (k, t) in rows.iter().enumerate() {
+                let (response, ix) = (&responses[k / 9], k % 9);
                 let own = widths.number[(iy, ix)];
                 let mut wanted = Complex64::ZERO;
                 if own > 0 {
-                    wanted = responses[1].own(f64::from(own));
+                    wanted = response.own(f64::from(own));
                     for (number, [dx, dy]) in NEIGHBOURS.into_iter().enumerate() {
                         // In the table's frame x is -y of the element.
                         let (x, y) = (ix as i32 + dy, iy as i32 - dx);
                         if (0..9).contains(&x) && (0..9).contains(&y) {
                             let other = widths.number[(y as usize, x as usize)];
                             if other > 0 {
-                                wanted += responses[1].pair(number, f64::from(own), f64::from(other));
+                                wanted += response.pair(number, f64::from(own), f64::from(other));
                             }
                         }
                     }
@@ -200,7 +290,8 @@ mod tests {
     #[test]
     fn nothing_passes_without_pillars() {
         let widths = PillarMap::empty(Lattice::new(350, 4).unwrap());
-        let pillars = NeighbourPillars::new(&widths, &response(3), [0.0; 2]).unwrap();
+        let sites = NeighbourSites::of(&widths);
+        let pillars = NeighbourPillars::new(&sites, [&response(3)], [0.0; 2]);
         let mut row = vec![Complex32::ONE; 4];
         pillars.fill_row(2, &mut row);
         assert_eq!(row, vec![Complex32::ZERO; 4]);

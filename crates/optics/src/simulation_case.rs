@@ -1,6 +1,6 @@
 //! Simulation case of elements: as drawn, or as fabricated.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use super::drawn_optics::{DrawnCells, DrawnOptics, coupled, not_held};
 use super::light::wave_of;
 use super::{
     ArrivingLight, AsBuiltChip, AsBuiltElement, ClassFields, ClassTable, DrawnElement, ElementOptics, Field,
-    ModelStatement, Perturbation, Placement,
+    ModelStatement, NeighbourSites, Perturbation, Placement,
 };
 use metalith_cell::{CellModel, CellResponse, Fidelity, Illumination};
 use metalith_core::{Progress, Result};
@@ -175,6 +175,7 @@ impl<'a> CaseOptics<'a> {
                 pillars,
                 radius_um: placement.radius_um,
                 part_bytes: self.part_bytes,
+                sites: OnceLock::new(),
             }),
             Source::AsBuilt(chip) => {
                 let map = pillars.held().ok_or_else(not_held)?;
@@ -224,7 +225,8 @@ impl CaseOptics<'_> {
                 let response = cells.response(light, progress)?;
                 match response.as_ref() {
                     CellResponse::Neighbours(tables) => {
-                        let (fields, weight) = coupled(pillars, &response, tables, light);
+                        let sites = NeighbourSites::of(pillars);
+                        let (fields, weight) = coupled(&sites, &response, tables, light);
                         let arriving = ArrivingLight::new(&wave_of(light), &perturbation.path);
                         let sites = |field: &Field<'_>| Ok(ClassTable::of_sites(field.aperture(&arriving)?.as_ref()));
                         (fields.iter().map(sites).collect::<Result<_>>()?, weight, None)

@@ -32,6 +32,57 @@ pub trait Aperture: Sync {
     fn fill_row(&self, iy: usize, row: &mut [Complex32]);
 }
 
+/// Apertures on one lattice whose rows are cheaper to form together than each on its own, such as one element in light of
+/// two polarisations.
+pub trait ApertureSet: Sync {
+    /// Lattice of the samples.
+    fn lattice(&self) -> Lattice;
+
+    /// Number of apertures.
+    fn count(&self) -> usize;
+
+    /// Transmissions of the sites of row `iy` along +x, a row of each aperture one after the other; zero where nothing passes.
+    ///
+    /// # Panics
+    /// May panic if `rows` has not one entry a site and aperture, or `iy` is no row.
+    fn fill_rows(&self, iy: usize, rows: &mut [Complex32]);
+}
+
+/// A set of one aperture.
+pub(crate) struct Single<'a>(pub &'a dyn Aperture);
+
+impl ApertureSet for Single<'_> {
+    fn lattice(&self) -> Lattice {
+        self.0.lattice()
+    }
+
+    fn count(&self) -> usize {
+        1
+    }
+
+    fn fill_rows(&self, iy: usize, rows: &mut [Complex32]) {
+        self.0.fill_row(iy, rows);
+    }
+}
+
+/// An aperture of a set, by its number.
+pub(super) struct Member<'a> {
+    pub set: &'a dyn ApertureSet,
+    pub number: usize,
+}
+
+impl Aperture for Member<'_> {
+    fn lattice(&self) -> Lattice {
+        self.set.lattice()
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        let mut rows = vec![Complex32::ZERO; self.set.count() * row.len()];
+        self.set.fill_rows(iy, &mut rows);
+        row.copy_from_slice(&rows[self.number * row.len()..][..row.len()]);
+    }
+}
+
 /// A complex transmission that is known at each site.
 #[derive(Clone, Debug)]
 pub struct TransmissionMap {

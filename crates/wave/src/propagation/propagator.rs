@@ -3,8 +3,9 @@
 use ndarray::Array2;
 use num_complex::Complex32;
 
+use super::aperture::Member;
 use super::transfer::FadedColumn;
-use super::{Accuracy, Aperture, Fade, Otf, PlaneWave, Window};
+use super::{Accuracy, Aperture, ApertureSet, Fade, Otf, PlaneWave, Window};
 use crate::error::{Result, WaveError};
 
 /// The field on a window, and how it was come by.
@@ -69,6 +70,21 @@ pub trait Propagator {
     ) -> Result<(Field, Option<Otf>)> {
         let _ = lp_mm;
         Ok((self.field(aperture, wave, scratch)?, None))
+    }
+
+    /// [`Propagator::field_and_otf`] of each aperture of a set.
+    ///
+    /// # Errors
+    /// As [`Propagator::field`].
+    fn fields_and_otfs(
+        &self,
+        set: &dyn ApertureSet,
+        wave: &PlaneWave,
+        lp_mm: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<Vec<(Field, Option<Otf>)>> {
+        let of = |number| self.field_and_otf(&Member { set, number }, wave, lp_mm, scratch);
+        (0..set.count()).map(of).collect()
     }
 
     /// The adjoint of [`Propagator::field`]: from values on the window to values on the lattice, shape

@@ -29,7 +29,7 @@ use metalith_core::part;
 use ndarray::{Array2, Axis};
 
 use crate::error::Result;
-use crate::propagation::{Aperture, Field, Otf, PlaneWave, Propagator, Scratch, Window};
+use crate::propagation::{Aperture, ApertureSet, Field, Otf, PlaneWave, Propagator, Scratch, Window};
 
 pub use differentiable::{DifferentiablePsf, PsfCotangents, PsfPullback, phase_cotangent};
 pub use ideal_psf::IdealPsf;
@@ -82,6 +82,25 @@ impl Psf {
             otf,
             ..Self::of(&field)
         })
+    }
+
+    /// [`Psf::formed`] of each aperture of a set.
+    ///
+    /// # Errors
+    /// As [`Propagator::field`].
+    pub fn formed_of_set(
+        propagator: &dyn Propagator,
+        set: &dyn ApertureSet,
+        wave: &PlaneWave,
+        lp_mm: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<Vec<Self>> {
+        let fields = propagator.fields_and_otfs(set, wave, lp_mm, scratch)?;
+        let psf = |(field, otf)| Self {
+            otf,
+            ..Self::of(&field)
+        };
+        Ok(fields.into_iter().map(psf).collect())
     }
 
     /// Sum of PSFs on the same window that do not interfere, times a share: as of light that is not polarised.

@@ -8,18 +8,18 @@ use num_complex::Complex32;
 use super::planes::Plane;
 use super::{FoldedPropagator, LANES};
 use crate::kernels::{accumulate, gather, multiply_to, process, product_sum};
-use crate::propagation::{Aperture, PlaneWave, Scratch};
+use crate::propagation::{ApertureSet, PlaneWave, Scratch};
 
 impl FoldedPropagator {
-    /// Folds and transforms along x; leaves the kept columns of these blocks in tiles of `LANES` columns by all rows. Gives
-    /// the power that the aperture passes of a wave of unit amplitude (um^2).
+    /// Folds and transforms along x; leaves the kept columns of these blocks in tiles of `LANES` columns by all rows, the
+    /// tiles of each aperture one after the other. Gives the power that each passes of a wave of unit amplitude (um^2).
     pub(super) fn rows_forward(
         &self,
-        aperture: &dyn Aperture,
+        set: &dyn ApertureSet,
         wave: &PlaneWave,
         blocks: Range<usize>,
         scratch: &mut Scratch,
-    ) -> f64 {
+    ) -> Vec<f64> {
         let (n, m, residues) = (self.lattice.sites(), self.band.bins[0], self.residues());
         self.fill_wave(wave, scratch);
         let Scratch {
@@ -31,48 +31,54 @@ impl FoldedPropagator {
             fft,
             ..
         } = scratch;
-        row.resize(n, Complex32::ZERO);
-        columns.resize(m.max(columns.len()), Complex32::ZERO);
+        row.resize(set.count() * n, Complex32::ZERO);
+        columns.resize((set.count() * m).max(columns.len()), Complex32::ZERO);
         let first = blocks.start * LANES;
         let kept = (blocks.end * LANES).min(self.band.count[0]) - first;
         spectrum.clear();
         spectrum.resize(blocks.len() * LANES, Complex32::ZERO);
-        let held = blocks.len() * residues * LANES;
+        let of_each = blocks.len() * residues * LANES;
+        let held = set.count() * of_each;
         if tiles.capacity() < held {
             // What grows by itself may take twice the memory that was counted with.
             tiles.clear();
             tiles.reserve_exact(held);
         }
         tiles.resize(held, Complex32::ZERO);
-        let folded = &mut columns[..m];
-        let mut power = 0.0;
+        let folded = &mut columns[..set.count() * m];
+        let mut powers = vec![0.0; set.count()];
         for r in 0..residues {
             folded.fill(Complex32::ZERO);
             for iy in self.rows_of(r) {
-                aperture.fill_row(iy, row);
-                power += product_sum(row, row).re;
-                for (part, wave) in row.chunks(m).zip(wave_x.chunks(m)) {
-                    accumulate(&mut folded[..part.len()], part, wave, wave_y[iy]);
+                set.fill_rows(iy, row);
+                let each = row.chunks_exact(n).zip(folded.chunks_exact_mut(m)).zip(&mut powers);
+                for ((row, folded), power) in each {
+                    *power += product_sum(row, row).re;
+                    for (part, wave) in row.chunks(m).zip(wave_x.chunks(m)) {
+                        accumulate(&mut folded[..part.len()], part, wave, wave_y[iy]);
+                    }
                 }
             }
-            process(&*self.forward[0], folded, fft);
-            gather(&mut spectrum[..kept], folded, self.band.first[0] + first as i64);
-            for (block, lanes) in spectrum.chunks_exact(LANES).enumerate() {
-                let at = (block * residues + r) * LANES;
-                tiles[at..at + LANES].copy_from_slice(lanes);
+            for (folded, tiles) in folded.chunks_exact_mut(m).zip(tiles.chunks_exact_mut(of_each)) {
+                process(&*self.forward[0], folded, fft);
+                gather(&mut spectrum[..kept], folded, self.band.first[0] + first as i64);
+                for (block, lanes) in spectrum.chunks_exact(LANES).enumerate() {
+                    let at = (block * residues + r) * LANES;
+                    tiles[at..at + LANES].copy_from_slice(lanes);
+                }
             }
         }
-        power * self.lattice.cell_um2()
+        powers.iter().map(|power| power * self.lattice.cell_um2()).collect()
     }
 
-    /// Transforms these blocks along y, sends each frequency to each plane, shows it to `observe`, and forms the rows of the
-    /// planes' windows of each column.
+    /// Transforms these blocks of so many apertures along y, sends each frequency to each plane, shows it to `observe`, and forms
+    /// the rows of the planes' windows of each column. What sends a frequency to a plane is worked out once for all apertures.
     pub(super) fn columns_forward(
         &self,
         blocks: Range<usize>,
-        planes: &[Plane],
+        (count, planes): (usize, &[Plane]),
         scratch: &mut Scratch,
-        observe: &mut dyn FnMut(&[Complex32]),
+        observe: &mut dyn FnMut(usize, &[Complex32]),
     ) {
         let (m, residues, samples) = (self.band.bins[1], self.residues(), self.window.samples);
         let [kx, ky] = self.band.count;
@@ -89,42 +95,57 @@ impl FoldedPropagator {
             row,
             ..
         } = scratch;
-        columns.resize(LANES * m, Complex32::ZERO);
-        spectrum.resize(ky, Complex32::ZERO);
+        columns.resize(count * LANES * m, Complex32::ZERO);
+        spectrum.resize(count * ky, Complex32::ZERO);
         sent.resize(ky, Complex32::ZERO);
         transfer.resize(ky, Complex32::ZERO);
-        middle.resize(planes.len() * samples * kx, Complex32::ZERO);
+        let of_plane = samples * kx;
+        middle.resize(count * planes.len() * of_plane, Complex32::ZERO);
         row.resize(samples.max(row.len()), Complex32::ZERO);
-        for (block, tile) in blocks.zip(tiles.chunks_exact(residues * LANES)) {
+        let (of_each, of_tile) = (blocks.len() * residues * LANES, residues * LANES);
+        let first = blocks.start;
+        for block in blocks {
             let lanes = LANES.min(kx - block * LANES);
-            for (lane, column) in columns.chunks_exact_mut(m).enumerate() {
-                for (value, line) in column.iter_mut().zip(tile.chunks_exact(LANES)) {
-                    *value = line[lane];
+            for (columns, tiles) in columns.chunks_exact_mut(LANES * m).zip(tiles.chunks_exact(of_each)) {
+                let tile = &tiles[(block - first) * of_tile..][..of_tile];
+                for (lane, column) in columns.chunks_exact_mut(m).enumerate() {
+                    for (value, line) in column.iter_mut().zip(tile.chunks_exact(LANES)) {
+                        *value = line[lane];
+                    }
+                    column[residues..].fill(Complex32::ZERO);
                 }
-                column[residues..].fill(Complex32::ZERO);
             }
-            for (lane, column) in columns.chunks_exact_mut(m).enumerate().take(lanes) {
+            for lane in 0..lanes {
                 let k = block * LANES + lane;
                 let rows = self.band.rows[k].clone();
-                process(&*self.forward[1], column, fft);
-                let kept = &mut spectrum[rows.clone()];
-                gather(kept, column, self.band.first[1] + rows.start as i64);
+                for (spectrum, columns) in spectrum.chunks_exact_mut(ky).zip(columns.chunks_exact_mut(LANES * m)) {
+                    let column = &mut columns[lane * m..][..m];
+                    process(&*self.forward[1], column, fft);
+                    gather(
+                        &mut spectrum[rows.clone()],
+                        column,
+                        self.band.first[1] + rows.start as i64,
+                    );
+                }
                 let transfer = &mut transfer[..rows.len()];
-                sent.fill(Complex32::ZERO);
-                for (plane, middle) in planes.iter().zip(middle.chunks_exact_mut(samples * kx)) {
+                for (number, plane) in planes.iter().enumerate() {
                     self.transfer(plane, k, faded, transfer);
-                    multiply_to(&mut sent[rows.clone()], kept, transfer);
-                    observe(sent);
-                    self.zoom[1].run(sent, &mut row[..samples], padded, fft);
-                    for (value, line) in row.iter().zip(middle.chunks_exact_mut(kx)) {
-                        line[k] = *value;
+                    for (aperture, spectrum) in spectrum.chunks_exact(ky).enumerate() {
+                        sent.fill(Complex32::ZERO);
+                        multiply_to(&mut sent[rows.clone()], &spectrum[rows.clone()], transfer);
+                        observe(aperture, sent);
+                        self.zoom[1].run(sent, &mut row[..samples], padded, fft);
+                        let middle = &mut middle[(aperture * planes.len() + number) * of_plane..][..of_plane];
+                        for (value, line) in row.iter().zip(middle.chunks_exact_mut(kx)) {
+                            line[k] = *value;
+                        }
                     }
                 }
             }
         }
     }
 
-    /// Forms the samples of each row of the window of a plane, by its number.
+    /// Forms the samples of each row of the window of a plane, by its number among those of all apertures.
     pub(super) fn window_rows(&self, plane: usize, scratch: &mut Scratch, values: &mut ArrayViewMut2<Complex32>) {
         let (kx, samples) = (self.band.count[0], self.window.samples);
         let Scratch {

@@ -22,11 +22,12 @@ use ndarray::{Array2, ArrayViewMut2};
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
+use super::aperture::Single;
 use super::band::FrequencyBand;
 use super::chirp_transform::Zoom;
 use super::propagator::check_wave;
 use super::transfer::{FadedColumn, FrequencyColumn, Transfer};
-use super::{Accuracy, Aperture, Fade, Field, PlaneWave, Propagator, Scratch, Window};
+use super::{Accuracy, Aperture, ApertureSet, Fade, Field, PlaneWave, Propagator, Scratch, Window};
 use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
 use planes::Plane;
@@ -152,22 +153,8 @@ impl FoldedPropagator {
         aperture: &dyn Aperture,
         wave: &PlaneWave,
         scratch: &mut Scratch,
-        values: ArrayViewMut2<Complex32>,
-    ) -> Result<()> {
-        self.field_observed(aperture, wave, scratch, values, &mut |_| {})?;
-        Ok(())
-    }
-
-    /// Variant of the field in which `observe` sees the spectrum of the field at the sensor, column by column: all rows
-    /// of the band, the phase counted from the window's middle. Gives the power that the aperture passes (um^2).
-    fn field_observed(
-        &self,
-        aperture: &dyn Aperture,
-        wave: &PlaneWave,
-        scratch: &mut Scratch,
         mut values: ArrayViewMut2<Complex32>,
-        observe: &mut dyn FnMut(&[Complex32]),
-    ) -> Result<f64> {
+    ) -> Result<()> {
         let samples = self.window.samples;
         if values.dim() != (samples, samples) || !values.is_standard_layout() {
             return Err(WaveError::Shape {
@@ -176,32 +163,36 @@ impl FoldedPropagator {
                 wanted: [samples; 2],
             });
         }
-        let power_um2 = self.spectra(aperture, wave, &[Plane::field(self.window)], scratch, observe)?;
+        let planes = [Plane::field(self.window)];
+        self.spectra(&Single(aperture), wave, &planes, scratch, &mut |_, _| {})?;
         self.window_rows(0, scratch, &mut values);
-        Ok(power_um2)
+        Ok(())
     }
 
-    /// Transforms an aperture to the columns of windows in planes along z; see [`Self::field_observed`].
+    /// Transforms the apertures of a set to the columns of windows in planes along z, the planes of each aperture one after the
+    /// other. `observe` sees the number of an aperture and the spectrum of its field in a plane, column by column: all
+    /// rows of the band, the phase counted from the window's middle. Gives the power that each aperture passes (um^2).
     fn spectra(
         &self,
-        aperture: &dyn Aperture,
+        set: &dyn ApertureSet,
         wave: &PlaneWave,
         planes: &[Plane],
         scratch: &mut Scratch,
-        observe: &mut dyn FnMut(&[Complex32]),
-    ) -> Result<f64> {
+        observe: &mut dyn FnMut(usize, &[Complex32]),
+    ) -> Result<Vec<f64>> {
         check_wave(wave, self.wavelength_um)?;
-        if aperture.lattice() != self.lattice {
+        if set.lattice() != self.lattice {
             return Err(WaveError::Lattice {
-                given: aperture.lattice(),
+                given: set.lattice(),
                 planned: self.lattice,
             });
         }
-        let mut power_um2 = 0.0;
-        for first in (0..self.blocks()).step_by(self.blocks_at_once) {
-            let part = first..(first + self.blocks_at_once).min(self.blocks());
-            power_um2 = self.rows_forward(aperture, wave, part.clone(), scratch);
-            self.columns_forward(part, planes, scratch, observe);
+        let mut power_um2 = Vec::new();
+        let at_once = (self.blocks_at_once / set.count()).max(1);
+        for first in (0..self.blocks()).step_by(at_once) {
+            let part = first..(first + at_once).min(self.blocks());
+            power_um2 = self.rows_forward(set, wave, part.clone(), scratch);
+            self.columns_forward(part, (set.count(), planes), scratch, observe);
         }
         Ok(power_um2)
     }
@@ -295,8 +286,18 @@ impl Propagator for FoldedPropagator {
         lp_mm: &[f64],
         scratch: &mut Scratch,
     ) -> Result<(Field, Option<Otf>)> {
-        self.with_otf(aperture, wave, lp_mm, scratch)
-            .map(|(field, otf)| (field, Some(otf)))
+        let one = self.fields_and_otfs(&Single(aperture), wave, lp_mm, scratch)?;
+        Ok(one.into_iter().next().expect("a set of one"))
+    }
+
+    fn fields_and_otfs(
+        &self,
+        set: &dyn ApertureSet,
+        wave: &PlaneWave,
+        lp_mm: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<Vec<(Field, Option<Otf>)>> {
+        self.with_otfs(set, wave, lp_mm, scratch)
     }
 
     fn adjoint(

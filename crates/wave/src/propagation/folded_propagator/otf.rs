@@ -9,9 +9,10 @@ use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 
 use super::FoldedPropagator;
+use super::planes::Plane;
 use crate::error::Result;
 use crate::kernels::product_sum;
-use crate::propagation::{Aperture, Field, PlaneWave, Scratch};
+use crate::propagation::{ApertureSet, Field, PlaneWave, Scratch};
 
 /// Transfer of all the light that an element passes, at some frequencies.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,20 +58,21 @@ impl Otf {
 }
 
 impl FoldedPropagator {
-    /// The field in the window, and the transfer function of all light at `lp_mm` (line pairs a millimetre).
+    /// The field of each aperture of a set in the window, and the transfer function of all its light at `lp_mm` (line pairs a
+    /// millimetre).
     ///
     /// Between two bins of the transform the transfer function is interpolated: right for light that lands within a
     /// tenth of the period of the window's middle, less for what is farther and has no contrast there.
     ///
     /// # Errors
     /// As `Propagator::field`.
-    pub(super) fn with_otf(
+    pub(super) fn with_otfs(
         &self,
-        aperture: &dyn Aperture,
+        set: &dyn ApertureSet,
         wave: &PlaneWave,
         lp_mm: &[f64],
         scratch: &mut Scratch,
-    ) -> Result<(Field, Otf)> {
+    ) -> Result<Vec<(Field, Option<Otf>)>> {
         let period_um = self.band.fade.period_um;
         let at = |axis: usize, f: &f64| f * 1e-3 * period_um[axis];
         let shifts = [0, 1].map(|axis| {
@@ -80,29 +82,35 @@ impl FoldedPropagator {
             shifts.dedup();
             shifts
         });
-        let mut correlation = Correlation::new(shifts, self.band.count[1]);
-        let mut values = Array2::zeros([self.window.samples; 2]);
-        let power_um2 = self.field_observed(aperture, wave, scratch, values.view_mut(), &mut |column| {
-            correlation.add(column);
+        let mut correlations = vec![Correlation::new(shifts, self.band.count[1]); set.count()];
+        let planes = [Plane::field(self.window)];
+        let powers_um2 = self.spectra(set, wave, &planes, scratch, &mut |number, column| {
+            correlations[number].add(column);
         })?;
-        let transform_um2 = [0, 1].map(|axis| {
-            let of = |shift: usize| correlation.sum(axis, shift) * period_um[0] * period_um[1];
-            let between = |f: &f64| {
-                let (bin, share) = (at(axis, f) as usize, at(axis, f).fract());
-                of(bin) * (1.0 - share) + of(bin + 1) * share
+        let finished = |(number, (correlation, power_um2)): (usize, (&Correlation, f64))| {
+            let transform_um2 = [0, 1].map(|axis| {
+                let of = |shift: usize| correlation.sum(axis, shift) * period_um[0] * period_um[1];
+                let between = |f: &f64| {
+                    let (bin, share) = (at(axis, f) as usize, at(axis, f).fract());
+                    of(bin) * (1.0 - share) + of(bin + 1) * share
+                };
+                lp_mm.iter().map(between).collect()
+            });
+            let otf = Otf {
+                lp_mm: lp_mm.to_vec(),
+                transform_um2,
+                power_um2,
             };
-            lp_mm.iter().map(between).collect()
-        });
-        let otf = Otf {
-            lp_mm: lp_mm.to_vec(),
-            transform_um2,
-            power_um2,
+            let mut values = Array2::zeros([self.window.samples; 2]);
+            self.window_rows(number, scratch, &mut values.view_mut());
+            (self.finished(values, wave), Some(otf))
         };
-        Ok((self.finished(values, wave), otf))
+        Ok(correlations.iter().zip(powers_um2).enumerate().map(finished).collect())
     }
 }
 
 /// Autocorrelation of a spectrum that comes column by column, at some shifts along x and along y.
+#[derive(Clone)]
 struct Correlation {
     /// Bins along x and along y, ascending.
     shifts: [Vec<usize>; 2],
