@@ -39,7 +39,8 @@ pub(crate) struct CellsArgs {
     #[arg(long, value_name = "N", default_value_t = 13)]
     orders: usize,
 
-    /// Largest error of the transmission between samples of the table.
+    /// Largest error of the transmission between wavelengths of the table, where it has cubics; rational functions aim at a
+    /// twentieth.
     #[arg(long, value_name = "T", default_value_t = 0.01)]
     tolerance: f64,
 
@@ -112,6 +113,7 @@ pub(crate) fn run(args: &CellsArgs, terminal: &Terminal) -> Result<Outcome> {
         Origin::Computed(Some(file)) => print_line!("library: {} ({} cells solved)", file.display(), study.points),
         Origin::Computed(None) => print_line!("library: {} cells solved, not kept", study.points),
     }
+    print_line!("between their wavelengths: {}", study.interpolation.words());
     print_line!(
         "at {} nm the widths span {} waves; {} errs by {} rad rms",
         sig(study.mapping_um * 1e3, 4),

@@ -109,6 +109,7 @@ fn page(study: &CellStudy) -> Page {
         ("Substrate", study.substrate.clone()),
         ("Diffraction orders", format!("{0} x {0}", study.orders)),
         ("Cells solved", count(study.points as u64)),
+        ("Between their wavelengths", study.interpolation.words()),
         (
             "Wavelength of the mapping",
             format!("{} nm", sig(study.mapping_um * 1e3, 4)),

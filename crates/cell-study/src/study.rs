@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use metalith_cell::{
     AVOIDED_BELOW, BadCell, Basis, CellModel, ForwardFit, ForwardPolynomial, InverseFit, InversePolynomial, MappedCell,
-    MappingError, MappingTable, PhaseCurve, RampOrders, RigorousCell, bad_cells, curves_over, fit_forward, fit_inverse,
-    forward_errors, round_trip,
+    MappingError, MappingTable, PhaseCurve, RampOrders, RigorousCell, TableInterpolation, bad_cells, curves_over,
+    fit_forward, fit_inverse, forward_errors, round_trip,
 };
 use metalith_core::{Error, Result};
 use metalith_design::Design;
@@ -114,6 +114,8 @@ pub struct CellStudy {
     pub tolerance: f64,
     /// Cells solved for the library.
     pub points: usize,
+    /// Transmission between their wavelengths, and its error.
+    pub interpolation: TableInterpolation,
     /// Wavelength of the mapping (um).
     pub mapping_um: f64,
     /// The cell that the mappings are for.
@@ -191,6 +193,7 @@ impl CellStudy {
             orders: spec.orders,
             tolerance: spec.tolerance,
             points: cell.table().points(),
+            interpolation: cell.table().interpolation(),
             mapping_um,
             mapped_cell: design.cell.mapped(mapping_um),
             compared_um: design.compared_um().to_vec(),

@@ -35,7 +35,7 @@ pub use illumination::{Illumination, Incidence, Spectral};
 pub use library::{LibraryErrors, LibraryPillar, PillarLibrary};
 pub use local_periodic::{
     BAND_ORDERS, CellTable, MixedCell, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, Origin, PointwiseCell,
-    RigorousCell, TableSpec,
+    RigorousCell, TableInterpolation, TableSpec,
 };
 pub use mapped_cell::{MappedCell, MappedDifference, MappedValue};
 pub use mapping_table::{AVOIDED_BELOW, MappingTable, RampOrders, SolvedMapping, simplex};

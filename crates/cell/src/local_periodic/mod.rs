@@ -6,8 +6,11 @@
 //! Rectangles have the same approximation by [`crate::RotatedCell`] and [`crate::UprightCell`]. The coupled model
 //! ([`crate::NeighbourCell`]) does without it.
 
+mod barycentric;
+mod column;
 mod mixed;
 mod pointwise;
+mod rational_spectrum;
 mod table;
 mod table_file;
 mod tabulated;
@@ -15,5 +18,5 @@ mod width_spectrum;
 
 pub use mixed::MixedCell;
 pub use pointwise::{BAND_ORDERS, OBLIQUE_BAND_ORDERS, OBLIQUE_ORDERS, ORDERS, PointwiseCell};
-pub use table::{CellTable, Origin, TableSpec};
+pub use table::{CellTable, Origin, TableInterpolation, TableSpec};
 pub use tabulated::RigorousCell;

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
-use rayon::prelude::*;
 use serde::Serialize;
 
+use super::column::{Between, Column, columns};
 use super::table_file;
-use super::width_spectrum::{WidthSpectrum, lagrange};
+use super::width_spectrum::lagrange;
 use crate::CellStack;
 use crate::cache_file;
 use metalith_core::{Error, Progress, Result};
@@ -23,7 +23,7 @@ pub struct TableSpec {
     /// Narrowest and widest pillar tabulated at every nanometre; other widths up to the pitch stand at
     /// every five.
     pub widths_nm: (u16, u16),
-    /// Largest error of t in the middle of an interval of wavelengths, before that middle is added.
+    /// Largest error of t in the middle of an interval of wavelengths, before that middle is added; rational functions are nearer.
     pub tolerance: f64,
     /// Diffraction orders along an axis.
     pub orders: usize,
@@ -107,7 +107,35 @@ pub struct CellTable {
     spec: TableSpec,
     /// Tabulated widths (nm), rising from 0.
     widths_nm: Vec<f64>,
-    columns: Vec<WidthSpectrum>,
+    columns: Vec<Column>,
+}
+
+/// Transmission of a table between the wavelengths that were solved for it, and its error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TableInterpolation {
+    /// Widths that have a rational function of wavelength.
+    pub rational: usize,
+    /// Widths that have cubics, because a rational function did not converge.
+    pub cubic: usize,
+    /// Wavelengths, one for each width, that were solved to compare with what was found without them.
+    pub held_out: usize,
+    /// Error of t there: root of the mean square, and largest.
+    pub rms: f64,
+    pub largest: f64,
+}
+
+impl TableInterpolation {
+    /// One line of what is interpolated and how well.
+    pub fn words(&self) -> String {
+        let cubic = match self.cubic {
+            0 => String::new(),
+            cubic => format!(", cubics at {cubic}"),
+        };
+        format!(
+            "rational functions at {} widths{cubic}; error of t {:.4} rms, {:.4} at most, at {} wavelengths that were held out",
+            self.rational, self.rms, self.largest, self.held_out
+        )
+    }
 }
 
 /// Origin of a table.
@@ -120,7 +148,7 @@ pub enum Origin {
 }
 
 impl CellTable {
-    /// Compute a table, one width a thread.
+    /// Compute a table, one width a thread; the same on any number of threads.
     ///
     /// # Errors
     /// If the inputs are not physical or out of a material's range, or the user interrupts.
@@ -132,21 +160,19 @@ impl CellTable {
         }
         let widths = spec.columns_nm();
         progress.begin("cell library", widths.len() as u64);
-        let columns = widths
-            .par_iter()
-            .map(|&width_nm| {
-                let column = WidthSpectrum::sample(spec.band_um, spec.tolerance, |wavelength_um| {
-                    progress.check_stopped()?;
-                    spec.stack.transmission(spec.reachable(width_nm), wavelength_um, orders)
-                })?;
-                progress.advance(1);
-                Ok(column)
-            })
-            .collect::<Result<Vec<_>>>()?;
+        let solve = |column: usize, wavelength_um| {
+            progress.check_stopped()?;
+            spec.stack
+                .transmission(spec.reachable(widths[column]), wavelength_um, orders)
+        };
+        let widths_nm: Vec<f64> = widths.iter().map(|w| spec.reachable(*w)).collect();
+        let pitch_nm = spec.stack.pitch_nm;
+        let done = || progress.advance(1);
+        let columns = columns(&widths_nm, pitch_nm, spec.band_um, spec.tolerance, &solve, &done)?;
         Ok(Self::assemble(spec, &widths, columns))
     }
 
-    fn assemble(spec: &TableSpec, widths: &[u16], columns: Vec<WidthSpectrum>) -> Self {
+    fn assemble(spec: &TableSpec, widths: &[u16], columns: Vec<Column>) -> Self {
         Self {
             spec: spec.clone(),
             widths_nm: widths.iter().map(|&w| f64::from(w)).collect(),
@@ -189,7 +215,21 @@ impl CellTable {
 
     /// Number of cells solved for it.
     pub fn points(&self) -> usize {
-        self.columns.iter().map(|c| c.t.len()).sum()
+        self.columns.iter().map(|c| c.solved as usize).sum()
+    }
+
+    /// Transmission between the wavelengths that were solved, and its error.
+    pub fn interpolation(&self) -> TableInterpolation {
+        let is_rational = |c: &&Column| matches!(c.between, Between::Rational(_));
+        let rational = self.columns.iter().filter(is_rational).count();
+        let squares: f64 = self.columns.iter().map(|c| c.held_out.powi(2)).sum();
+        TableInterpolation {
+            rational,
+            cubic: self.columns.len() - rational,
+            held_out: self.columns.len(),
+            rms: (squares / self.columns.len() as f64).sqrt(),
+            largest: self.columns.iter().map(|c| c.held_out).fold(0.0, f64::max),
+        }
     }
 
     /// Transmission of a pillar of any width up to the pitch (nm) at a wavelength of the band (um); a
@@ -271,15 +311,23 @@ impl TableSpec {
     }
 }
 
+/// Raised whenever wavelengths of tables are chosen otherwise, or what is between them is: 2 has rational functions, 1 had cubics.
+const SAMPLING: u32 = 2;
+
 /// The inputs as text: equal if and only if the table is the same.
 fn inputs(spec: &TableSpec) -> Vec<u8> {
     #[derive(Serialize)]
     struct Inputs<'a> {
         solver: u32,
+        sampling: u32,
         spec: &'a TableSpec,
     }
-    let solver = cache_file::solver_of(spec.stack.shape);
-    serde_json::to_vec(&Inputs { solver, spec }).expect("plain data serialises")
+    let inputs = Inputs {
+        solver: cache_file::solver_of(spec.stack.shape),
+        sampling: SAMPLING,
+        spec,
+    };
+    serde_json::to_vec(&inputs).expect("plain data serialises")
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
 //! Fits and tables of the cell.
 
 mod fit;
+mod interpolation;
 mod table;
