@@ -15,7 +15,7 @@ use crate::kernels::{BankSpec, DistinctKernels, KernelBank, MOST_BYTES};
 use crate::layout::PillarCount;
 use crate::stray_light::{LightShares, SCENE_CELLS, StrayLight};
 
-const BANK_MAGIC: [u8; 8] = *b"MLKERN\0\x02";
+const BANK_MAGIC: [u8; 8] = *b"MLKERN\0\x03";
 const STRAY_LIGHT_MAGIC: [u8; 8] = *b"MLVEIL\0\x06";
 const PILLARS_MAGIC: [u8; 8] = *b"MLPILL\0\x01";
 /// Longest kept file (bytes): the numbers, and some megabytes for what is said of them, a few bytes for each place and element.

@@ -218,6 +218,30 @@ impl ElementInLight<'_> {
     /// # Panics
     /// If it was not made for this wavelength.
     pub fn lit(&self, wavelength: usize, sines: [f64; 2]) -> IncoherentFields<'_> {
+        let made = &self.chip.distinct[self.distinct].made;
+        self.classes_at(wavelength)
+            .from(sines)
+            .lit(made, self.arriving(wavelength, sines))
+    }
+
+    /// Fields of one wavelength, by its index, that do not depend on the direction of arrival but for the wave itself; none where
+    /// cells are solved along several directions.
+    ///
+    /// # Panics
+    /// As [`ElementInLight::lit`].
+    pub fn lit_from_all(&self, wavelength: usize) -> Option<IncoherentFields<'_>> {
+        let made = &self.chip.distinct[self.distinct].made;
+        let fields = self.classes_at(wavelength).from_all()?;
+        Some(fields.lit(made, self.arriving(wavelength, [0.0; 2])))
+    }
+
+    /// Radius of the circle that light passes (um).
+    pub fn radius_um(&self) -> f64 {
+        self.chip.distinct[self.distinct].made.radius_um()
+    }
+
+    /// Light of one wavelength, by its index, as it arrives at the element from a direction.
+    pub fn arriving(&self, wavelength: usize, sines: [f64; 2]) -> ArrivingLight {
         let chip = self.chip;
         let stated = PlaneWave {
             wavelength_um: chip.sampling.wavelengths_nm[wavelength] * 1e-3,
@@ -228,9 +252,7 @@ impl ElementInLight<'_> {
             source_per_m: chip.path.source_per_m + chip.source_per_m,
             ..chip.path.clone()
         };
-        let light = ArrivingLight::new(&stated, &path);
-        let made = &chip.distinct[self.distinct].made;
-        self.classes_at(wavelength).from(sines).lit(made, light)
+        ArrivingLight::new(&stated, &path)
     }
 
     /// Tables of light whose direction is asked for, each with how often it has the phase of the element: see

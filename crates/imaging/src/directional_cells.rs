@@ -65,6 +65,11 @@ impl<T> DirectionalCells<T> {
 }
 
 impl DirectionalCells {
+    /// Fields in light that arrives from anywhere, where cells are solved along the normal alone.
+    pub(crate) fn from_all(&self) -> Option<&ClassFields> {
+        self.oblique.is_empty().then_some(&self.normal)
+    }
+
     /// Fields in light that arrives under these sines, in air: between two angles of arrival straight, between both planes by the
     /// first harmonic that the symmetry of the lattice allows.
     pub(crate) fn from(&self, sines: [f64; 2]) -> std::borrow::Cow<'_, ClassFields> {

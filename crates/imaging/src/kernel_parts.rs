@@ -12,7 +12,7 @@ use crate::cache_file::{file_of, read, write};
 use crate::kernel_cache::KernelCache;
 use crate::kernels::{BankSpec, NodeKernels};
 
-const PART_MAGIC: [u8; 8] = *b"MLKPRT\0\x01";
+const PART_MAGIC: [u8; 8] = *b"MLKPRT\0\x02";
 /// Kind of the files, which begins their names.
 const KIND: &str = "kernels-part";
 

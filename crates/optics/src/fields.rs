@@ -9,7 +9,8 @@ use crate::{NeighbourPillars, NeighbourSites};
 use metalith_cell::{CellResponse, NeighbourTables, Orientation};
 use metalith_core::Result;
 use metalith_pillars::{Lattice, PillarRows};
-use metalith_wave::{Accuracy, Aperture, FoldedPropagator, Pillars, Propagator, Psf, Scratch, Window};
+use metalith_wave::propagation::Direction;
+use metalith_wave::{Accuracy, Aperture, FoldedPropagator, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
 
 /// Fields of an element in light that arrives: the sum of the intensities of its fields, each times the weight.
 pub struct IncoherentFields<'e> {
@@ -123,7 +124,7 @@ impl<'e> IncoherentFields<'e> {
     }
 
     /// The fields of both polarisations as a set whose rows are formed together; none where they are formed one by one.
-    fn together(&self) -> Option<NeighbourPillars<'_, 2>> {
+    fn both_polarised(&self) -> Option<NeighbourPillars<'_, 2>> {
         let [
             Field::Coupled {
                 sites, response, sines, ..
@@ -183,20 +184,34 @@ impl<'e> IncoherentFields<'e> {
         let mut fields = self.fields.iter().map(of).collect::<Result<Vec<_>>>()?;
         let plane = |distance_um: &f64| {
             let psfs = fields.iter_mut().filter_map(Iterator::next).collect();
-            let mut psf = Psf::sum(psfs, self.weight);
-            self.camera.apply(&mut psf);
+            let mut psf = self.together(psfs);
             psf.window.distance_um = *distance_um;
             psf
         };
         Ok(distances_um.iter().map(plane).collect())
     }
 
+    /// A window at the stated distance of the sensor where the sensor is.
+    fn moved(&self, stated: Window) -> Window {
+        stated.at_distance(stated.distance_um + self.defocus_um)
+    }
+
+    /// A direction of arrival and the window of it that is stated.
+    pub(crate) fn direction(&self, wave: PlaneWave, stated: Window) -> Direction {
+        let window = self.moved(stated);
+        Direction { wave, window }
+    }
+
+    /// The PSF of all fields behind the camera, from those of each.
+    pub(crate) fn together(&self, psfs: Vec<Psf>) -> Psf {
+        let mut psf = Psf::sum(psfs, self.weight);
+        self.camera.apply(&mut psf);
+        psf
+    }
+
     /// The propagator to a window at the stated distance of the sensor.
     fn folded(&self, stated: Window, accuracy: Accuracy) -> Result<FoldedPropagator> {
-        let window = Window {
-            distance_um: stated.distance_um + self.defocus_um,
-            ..stated
-        };
+        let window = self.moved(stated);
         let wavelength_um = self.light.plane.wavelength_um;
         let fold = FoldedPropagator::plan(self.lattice, self.radius_um, wavelength_um, window, accuracy)?;
         Ok(match self.part_bytes {
@@ -206,7 +221,7 @@ impl<'e> IncoherentFields<'e> {
     }
 
     /// Light that missing pillars of a field scatter evenly over the window.
-    fn add_scattered(&self, field: &Field<'_>, psf: &mut Psf) {
+    pub(crate) fn add_scattered(&self, field: &Field<'_>, psf: &mut Psf) {
         let (scattered, window) = (field.scattered(), psf.window);
         let cell_um2 = self.lattice.cell_um2();
         let wavelength_um = self.light.plane.wavelength_um;
@@ -221,7 +236,7 @@ impl<'e> IncoherentFields<'e> {
     /// # Errors
     /// As [`Propagator::field`].
     pub fn psf_by(&self, propagator: &dyn Propagator, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
-        let psfs = if let Some(set) = self.together() {
+        let psfs = if let Some(set) = self.both_polarised() {
             Psf::formed_of_set(propagator, &set, &self.light.plane, lp_mm, scratch)?
         } else {
             let of = |field: &Field<'_>| {
@@ -232,9 +247,7 @@ impl<'e> IncoherentFields<'e> {
             };
             self.fields.iter().map(of).collect::<Result<Vec<_>>>()?
         };
-        let mut psf = Psf::sum(psfs, self.weight);
-        self.camera.apply(&mut psf);
-        Ok(psf)
+        Ok(self.together(psfs))
     }
 }
 

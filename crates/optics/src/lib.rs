@@ -24,7 +24,8 @@
 //!
 //! As drawn, rows are read when light passes them, so that elements of any size work, also those whose pillars are computed or held
 //! folded. As fabricated, and among neighbours, elements are held as a map. Pictures ask for many directions of one element: they take
-//! [`CaseOptics::classes`], for which pillars as drawn are those of a chip without a perturbation.
+//! [`CaseOptics::classes`], for which pillars as drawn are those of a chip without a perturbation, and [`SharedFields`] where cells are
+//! the same for all directions.
 //!
 //! # The chip as fabricated
 //!
@@ -70,6 +71,7 @@ mod perturbation;
 mod pupil;
 mod rational_interpolation;
 mod realised_cells;
+mod shared_fields;
 mod shifted_aperture;
 mod simulation_case;
 mod stitching;
@@ -98,6 +100,7 @@ pub use neighbour_pillars::{NeighbourPillars, NeighbourSites};
 pub use not_applied::{Applied, NotApplied};
 pub use perturbation::{CameraChange, CellChange, GeometryChange, LightChange, PathChange, Perturbation, legendre};
 pub use realised_cells::{NODE_STEP_NM, RealisedCells, SolvedWidths, lagrange};
+pub use shared_fields::SharedFields;
 pub use simulation_case::{CaseOptics, SimulationCase};
 pub use stitching::Stitching;
 pub use transmission_curve::TransmissionCurve;

@@ -1,17 +1,25 @@
 //! Kernels from the field behind each element.
 
+use std::time::Instant;
+
 use metalith_core::{Progress, Result, numerical_aperture};
+use metalith_optics::SharedFields;
 use metalith_wave::kernels::FftScratch;
-use metalith_wave::{Accuracy, Scratch, Window};
+use metalith_wave::{Accuracy, PlaneWave, Psf, Scratch, Window};
 use rayon::prelude::*;
 
 use super::bank::{BankSpec, DistinctKernels, KernelBank, SMALL_UM};
-use super::nodes::{FoundNodes, NodeKernels};
+use super::nodes::{BETWEEN_PARTS, FoundNodes, NodeKernels};
 use super::spectrum::{MovedPart, QUARTERS, SpectrumPlan};
 use crate::chip::{ChipInLight, ElementInLight};
 use crate::geometry::ElementView;
 use crate::kernel_parts::{KernelParts, NodeId};
 use crate::spectra::SceneSpectrum;
+
+/// Nodes that are found together at first; twice as many while these take less than a third of the time between two parts.
+const FEWEST_NODES: usize = 16;
+/// Most quarters of pixels of nodes that are found together: 256 MB.
+const MOST_QUARTERS: usize = 1 << 26;
 
 impl KernelBank {
     /// Checks that the kernels of a chip can be held, for so many spectra of a scene.
@@ -72,6 +80,7 @@ impl KernelBank {
                     continue;
                 }
                 let builder = Builder {
+                    element,
                     light: &nodes.timed(|| chip.in_light(element, &all, progress))?,
                     view: chip.distinct[element].view,
                     chip,
@@ -80,13 +89,7 @@ impl KernelBank {
                     plan: &plan,
                     channel_um: &channel_um,
                 };
-                missing.par_iter().try_for_each_init(
-                    || (Scratch::default(), FftScratch::default()),
-                    |(scratch, fft), node| {
-                        let kernels = builder.node(unique[*node], scratch, fft, (&nodes, progress))?;
-                        nodes.add(NodeId { element, node: *node }, kernels, progress)
-                    },
-                )?;
+                builder.find(&missing, unique, &nodes, progress)?;
             }
             Ok(())
         };
@@ -155,6 +158,7 @@ fn orbits(n: usize, symmetries: &[metalith_design::array::Symmetry]) -> Orbits {
 
 /// Kernels of one distinct element.
 struct Builder<'a> {
+    element: usize,
     chip: &'a ChipInLight<'a>,
     light: &'a ElementInLight<'a>,
     view: ElementView,
@@ -165,31 +169,116 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn node(
+    /// Find the kernels of missing nodes, of the unique ones of the element. One wavelength after the other is simulated for some nodes
+    /// at a time: the spectrum of the element is that of all directions, and not all wavelengths' are held.
+    fn find(
         &self,
-        node: [usize; 2],
-        scratch: &mut Scratch,
-        fft: &mut FftScratch,
-        (nodes, progress): (&FoundNodes<'_>, &dyn Progress),
-    ) -> Result<NodeKernels> {
-        let view = self.view;
-        let place = [self.spec.node_um(node[1]), self.spec.node_um(node[0])];
-        let sines = view.sines_of_landing(place, view.wedge.wavelength_um);
-        let (mut spectra, mut in_window) = (Vec::new(), Vec::new());
-        for (i, nm) in self.chip.sampling.wavelengths_nm.iter().enumerate() {
-            progress.check_stopped()?;
-            let quarters = self.quarters(i, nm * 1e-3, sines, scratch)?;
-            in_window.push(quarters.iter().map(|v| f64::from(*v)).sum::<f64>() as f32);
-            spectra.push(self.plan.spectrum(&quarters, fft));
-            nodes.advance(progress);
+        missing: &[usize],
+        unique: &[[usize; 2]],
+        nodes: &FoundNodes<'_>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let wavelengths = self.chip.sampling.wavelengths_nm.len();
+        let held = MOST_QUARTERS / (wavelengths * (self.spec.window * QUARTERS).pow(2));
+        let (mut rest, mut at_once) = (missing, FEWEST_NODES);
+        while !rest.is_empty() {
+            let begun = Instant::now();
+            let (now, later) = rest.split_at(at_once.min(held.max(1)).min(rest.len()));
+            let mut quarters = vec![Vec::with_capacity(wavelengths); now.len()];
+            for wavelength in 0..wavelengths {
+                let found = self.quarters_of(wavelength, now, unique, nodes, progress)?;
+                quarters
+                    .iter_mut()
+                    .zip(found)
+                    .for_each(|(node, found)| node.push(found));
+            }
+            now.par_iter()
+                .zip(quarters)
+                .try_for_each_init(FftScratch::default, |fft, (node, quarters)| {
+                    let id = NodeId {
+                        element: self.element,
+                        node: *node,
+                    };
+                    nodes.add(id, self.kernels(self.sines(unique[*node]), &quarters, fft), progress)
+                })?;
+            if begun.elapsed() < BETWEEN_PARTS / 3 {
+                at_once *= 2;
+            }
+            rest = later;
         }
+        Ok(())
+    }
+
+    /// Quarters of some nodes at a wavelength.
+    fn quarters_of(
+        &self,
+        wavelength: usize,
+        now: &[usize],
+        unique: &[[usize; 2]],
+        nodes: &FoundNodes<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Vec<f32>>> {
+        progress.check_stopped()?;
+        // All directions of the element decide its plan: figures are the same whichever are found together.
+        let seen: Vec<Option<Seen>> = unique
+            .iter()
+            .map(|node| self.seen(wavelength, self.sines(*node)))
+            .collect();
+        let all: Vec<(PlaneWave, Window)> = seen.iter().flatten().map(|seen| (seen.wave, seen.window)).collect();
+        let shared = match self.light.lit_from_all(wavelength).filter(|_| !all.is_empty()) {
+            Some(fields) => Some(SharedFields::new(fields, self.accuracy(), &all)?),
+            None => None,
+        };
+        now.par_iter()
+            .map_init(Scratch::default, |scratch, node| {
+                progress.check_stopped()?;
+                let side = self.spec.window * QUARTERS;
+                let quarters = match (&seen[*node], &shared) {
+                    (None, _) => vec![0.0; side * side],
+                    (Some(Seen { wave, window, .. }), Some(shared)) => {
+                        self.quarters(&shared.psf(*wave, *window, scratch)?, wavelength)
+                    }
+                    (Some(Seen { sines, window, .. }), None) => {
+                        let lit = self.light.lit(wavelength, *sines);
+                        self.quarters(&lit.psf(*window, self.accuracy(), &[], scratch)?, wavelength)
+                    }
+                };
+                nodes.advance(progress);
+                Ok(quarters)
+            })
+            .collect()
+    }
+
+    /// Kernels of a node by its quarters at each wavelength.
+    fn kernels(&self, sines: [f64; 2], quarters: &[Vec<f32>], fft: &mut FftScratch) -> NodeKernels {
+        let in_window = quarters
+            .iter()
+            .map(|all| all.iter().map(|v| f64::from(*v)).sum::<f64>() as f32);
+        let spectra: Vec<_> = quarters.iter().map(|all| self.plan.spectrum(all, fft)).collect();
         let mut values = Vec::new();
         for (channel, reference_um) in self.chip.sampling.channels.iter().zip(self.channel_um) {
             let parts = self.parts(sines, channel, *reference_um);
             let kernels = self.plan.kernels(&spectra, &parts, self.basis, fft);
             values.extend(kernels.into_iter().flatten());
         }
-        Ok(NodeKernels { values, in_window })
+        NodeKernels {
+            values,
+            in_window: in_window.collect(),
+        }
+    }
+
+    /// Direction that the light of a node arrives from.
+    fn sines(&self, node: [usize; 2]) -> [f64; 2] {
+        let place = [self.spec.node_um(node[1]), self.spec.node_um(node[0])];
+        self.view.sines_of_landing(place, self.view.wedge.wavelength_um)
+    }
+
+    fn accuracy(&self) -> Accuracy {
+        if self.spec.accurate || self.light.radius_um() < SMALL_UM {
+            Accuracy::Accurate
+        } else {
+            Accuracy::Fast
+        }
     }
 
     fn parts(&self, sines: [f64; 2], channel: &metalith_sensor::ChannelSampling, reference_um: f64) -> Vec<MovedPart> {
@@ -207,44 +296,52 @@ impl Builder<'_> {
         parts.collect()
     }
 
-    /// Share of the light of one wavelength in each quarter of the pixels about its chief ray; nothing where that does
-    /// not reach the sensor.
-    fn quarters(&self, wavelength: usize, um: f64, sines: [f64; 2], scratch: &mut Scratch) -> Result<Vec<f32>> {
-        let side = self.spec.window * QUARTERS;
+    /// Light of one wavelength from a direction, and the window about its chief ray; nothing where that does not reach the sensor.
+    fn seen(&self, wavelength: usize, sines: [f64; 2]) -> Option<Seen> {
         let view = self.view;
-        let mut quarters = vec![0.0f32; side * side];
+        let um = self.chip.sampling.wavelengths_nm[wavelength] * 1e-3;
         if sines[0].hypot(sines[1]) >= 1.0 {
-            return Ok(quarters);
+            return None;
         }
-        let Some(landing) = view.landing_um(sines, um) else {
-            return Ok(quarters);
-        };
-        let lit = self.light.lit(wavelength, sines);
+        let landing = view.landing_um(sines, um)?;
         // The PSF has no structure finer than wavelength / (2 NA).
-        let aperture = numerical_aperture(lit.radius_um(), view.sensor_um);
+        let aperture = numerical_aperture(self.light.radius_um(), view.sensor_um);
         let quarter = self.spec.pixel_um / QUARTERS as f64;
         let within = (quarter * 4.0 * aperture / um).ceil().max(1.0) as usize;
-        let window = Window {
-            centre_um: landing,
-            step_um: quarter / within as f64,
-            samples: side * within,
-            distance_um: view.distance_um(landing),
-        };
-        let accuracy = if self.spec.accurate || lit.radius_um() < SMALL_UM {
-            Accuracy::Accurate
-        } else {
-            Accuracy::Fast
-        };
-        let psf = lit.psf(window, accuracy, &[], scratch)?;
-        let share = window.step_um.powi(2) / self.light.arriving_um2(wavelength);
+        Some(Seen {
+            sines,
+            wave: self.light.arriving(wavelength, sines).plane,
+            window: Window {
+                centre_um: landing,
+                step_um: quarter / within as f64,
+                samples: self.spec.window * QUARTERS * within,
+                distance_um: view.distance_um(landing),
+            },
+        })
+    }
+
+    /// Share of the light of one wavelength in each quarter of the pixels of a PSF.
+    fn quarters(&self, psf: &Psf, wavelength: usize) -> Vec<f32> {
+        let side = self.spec.window * QUARTERS;
+        let within = psf.window.samples / side;
+        let mut quarters = vec![0.0f32; side * side];
+        let share = psf.window.step_um.powi(2) / self.light.arriving_um2(wavelength);
         for (iy, row) in psf.values.rows().into_iter().enumerate() {
             let out = &mut quarters[iy / within * side..][..side];
             for (ix, v) in row.iter().enumerate() {
                 out[ix / within] += (v * share) as f32;
             }
         }
-        Ok(quarters)
+        quarters
     }
+}
+
+/// Light of one wavelength that arrives at an element for a node.
+struct Seen {
+    sines: [f64; 2],
+    wave: PlaneWave,
+    /// Window about its chief ray.
+    window: Window,
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use super::bank::BankSpec;
 use crate::kernel_parts::{KernelParts, NodeId};
 
 /// Longest time between two parts that are stored.
-const BETWEEN_PARTS: Duration = Duration::from_secs(30);
+pub(super) const BETWEEN_PARTS: Duration = Duration::from_secs(30);
 /// CPU time of the first share of the work (s), from which the time of the whole is estimated: hundredths of a second are counted.
 const FIRST_SHARE_S: f64 = 3.0;
 /// Least CPU time of all kernels that is stated before (s).

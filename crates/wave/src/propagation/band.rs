@@ -75,33 +75,11 @@ impl FrequencyBand {
         window: &Window,
         accuracy: Accuracy,
     ) -> Result<Self> {
-        let half = window.half_width_um();
-        let edge = edge_um(window, wavelength_um, radius_um + half);
-        let gain = std::f64::consts::PI * radius_um * radius_um / (wavelength_um * window.distance_um);
-        let (full, width) = match accuracy {
-            Accuracy::Accurate => {
-                let corner = half * std::f64::consts::SQRT_2;
-                let wider = (FADE_GAIN / gain).cbrt().clamp(1.0, 2.0);
-                (radius_um + corner + FADE_MARGINS[0] * edge, FADE_WIDTHS * wider * edge)
-            }
-            Accuracy::Fast => (radius_um + half, FAST_FADE_WIDTHS * edge),
-        };
-        let period = match accuracy {
-            Accuracy::Accurate => full + width + FADE_MARGINS[1] * edge + radius_um + half,
-            Accuracy::Fast if gain * FAST_STRAY > 1.0 => FAST_PERIOD * (radius_um + half),
-            Accuracy::Fast => 2.0 * (radius_um + half) + FAST_MARGIN * edge,
-        };
+        let sizes = FadeSizes::new(radius_um, wavelength_um, window, accuracy);
         let steps = lattice.steps_um();
-        let bins = steps.map(|step| fft_size((period / step).ceil() as usize));
-        let zero = match accuracy {
-            // What rounding the period up leaves makes the fade wider; it costs nothing.
-            Accuracy::Accurate => {
-                let [x, y] = periods_um(bins, &lattice);
-                x.min(y) - radius_um - half - FADE_MARGINS[1] * edge
-            }
-            Accuracy::Fast => full + width,
-        };
-        Self::new(lattice, wavelength_um, window, bins, [full, zero])
+        let bins = steps.map(|step| fft_size((sizes.period_um / step).ceil() as usize));
+        let [x, y] = periods_um(bins, &lattice);
+        Self::new(lattice, wavelength_um, window, bins, sizes.ends_um(x.min(y)))
     }
 
     /// Band with a period and a fade of the caller's: `fade_um` is where it begins and where it ends.
@@ -119,33 +97,11 @@ impl FrequencyBand {
             return Err(WaveError::Fade { bins, full_um, zero_um });
         }
         let period_um = periods_um(bins, &lattice);
-        let z = window.distance_um;
-        // Bins per unit of sine.
-        let per_sine = period_um.map(|period| period / wavelength_um);
-        let samples = rim_samples(window, zero_um, per_sine[0].max(per_sine[1]));
-        let rim: Vec<[i64; 2]> = (0..samples)
-            .map(|i| {
-                let (sin, cos) = (std::f64::consts::TAU * i as f64 / samples as f64).sin_cos();
-                let x = window.centre_um[0] + zero_um * cos;
-                let y = window.centre_um[1] + zero_um * sin;
-                let ray = (x * x + y * y + z * z).sqrt();
-                [x / ray * per_sine[0], y / ray * per_sine[1]].map(|bin| bin.floor() as i64)
-            })
-            .collect();
-        let lowest = [0, 1].map(|a| rim.iter().map(|b| b[a]).min().unwrap_or(0));
-        let highest = [0, 1].map(|a| rim.iter().map(|b| b[a]).max().unwrap_or(0) + 1);
-        let count = [0, 1].map(|a| (highest[a] - lowest[a] + 1) as usize);
-        let mut rows = vec![Range::<usize>::default(); count[0]];
-        for b in &rim {
-            let [column, row] = [0, 1].map(|a| (b[a] - lowest[a]) as usize);
-            for r in &mut rows[column..=column + 1] {
-                let start = if r.end == 0 { row } else { r.start.min(row) };
-                *r = start..r.end.max(row + 2);
-            }
-        }
+        let RetainedBins { first, count, rows } =
+            RetainedBins::within(window, zero_um, wavelength_um, period_um, [0.0; 2]);
         let mut band = Self {
             bins,
-            first: lowest,
+            first,
             count,
             rows,
             fade: Fade {
@@ -173,6 +129,104 @@ impl FrequencyBand {
         }
         moved
     }
+}
+
+/// Sizes of a fade and of a period, for a lens and a window.
+pub(super) struct FadeSizes {
+    /// Distance from the window's middle where the fade begins, and its least width (um).
+    full_um: f64,
+    width_um: f64,
+    /// Shortest period that keeps images apart (um).
+    pub period_um: f64,
+    /// What a period has beside the fade, where rounding it up makes the fade wider (um).
+    beside_um: Option<f64>,
+}
+
+impl FadeSizes {
+    pub(super) fn new(radius_um: f64, wavelength_um: f64, window: &Window, accuracy: Accuracy) -> Self {
+        let half = window.half_width_um();
+        let edge = edge_um(window, wavelength_um, radius_um + half);
+        let gain = std::f64::consts::PI * radius_um * radius_um / (wavelength_um * window.distance_um);
+        let (full_um, width_um) = match accuracy {
+            Accuracy::Accurate => {
+                let corner = half * std::f64::consts::SQRT_2;
+                let wider = (FADE_GAIN / gain).cbrt().clamp(1.0, 2.0);
+                (radius_um + corner + FADE_MARGINS[0] * edge, FADE_WIDTHS * wider * edge)
+            }
+            Accuracy::Fast => (radius_um + half, FAST_FADE_WIDTHS * edge),
+        };
+        let period_um = match accuracy {
+            Accuracy::Accurate => full_um + width_um + FADE_MARGINS[1] * edge + radius_um + half,
+            Accuracy::Fast if gain * FAST_STRAY > 1.0 => FAST_PERIOD * (radius_um + half),
+            Accuracy::Fast => 2.0 * (radius_um + half) + FAST_MARGIN * edge,
+        };
+        Self {
+            full_um,
+            width_um,
+            period_um,
+            beside_um: (accuracy == Accuracy::Accurate).then(|| radius_um + half + FADE_MARGINS[1] * edge),
+        }
+    }
+
+    /// Begin and end of the fade in a period (um). What rounding an accurate one up leaves makes the fade wider; it costs nothing.
+    pub(super) fn ends_um(&self, period_um: f64) -> [f64; 2] {
+        let zero_um = self
+            .beside_um
+            .map_or(self.full_um + self.width_um, |beside| period_um - beside);
+        [self.full_um, zero_um]
+    }
+}
+
+/// Bins whose rays land within the end of a fade.
+pub(super) struct RetainedBins {
+    /// First one of each axis, counted from zero frequency.
+    pub first: [i64; 2],
+    /// Number of each axis.
+    pub count: [usize; 2],
+    /// Rows of each column, counted from `first`.
+    pub rows: Vec<Range<usize>>,
+}
+
+impl RetainedBins {
+    /// Bins of a period, `offset` of a bin beyond whole numbers, whose rays land within `zero_um` of a window's middle.
+    pub(super) fn within(
+        window: &Window,
+        zero_um: f64,
+        wavelength_um: f64,
+        period_um: [f64; 2],
+        offset: [f64; 2],
+    ) -> Self {
+        // Bins per unit of sine.
+        let per_sine = period_um.map(|period| period / wavelength_um);
+        let samples = rim_samples(window, zero_um, per_sine[0].max(per_sine[1]));
+        let rim: Vec<[i64; 2]> = (0..samples)
+            .map(|i| {
+                let sines = rim_sines(window, zero_um, i as f64 / samples as f64);
+                [0, 1].map(|a| (sines[a] * per_sine[a] - offset[a]).floor() as i64)
+            })
+            .collect();
+        let first = [0, 1].map(|a| rim.iter().map(|b| b[a]).min().unwrap_or(0));
+        let highest = [0, 1].map(|a| rim.iter().map(|b| b[a]).max().unwrap_or(0) + 1);
+        let count = [0, 1].map(|a| (highest[a] - first[a] + 1) as usize);
+        let mut rows = vec![Range::<usize>::default(); count[0]];
+        for b in &rim {
+            let [column, row] = [0, 1].map(|a| (b[a] - first[a]) as usize);
+            for r in &mut rows[column..=column + 1] {
+                let start = if r.end == 0 { row } else { r.start.min(row) };
+                *r = start..r.end.max(row + 2);
+            }
+        }
+        Self { first, count, rows }
+    }
+}
+
+/// Sines of the ray to a place on the rim of the disc of kept rays, by its turn about the window's middle.
+pub(super) fn rim_sines(window: &Window, zero_um: f64, turn: f64) -> [f64; 2] {
+    let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
+    let x = window.centre_um[0] + zero_um * cos;
+    let y = window.centre_um[1] + zero_um * sin;
+    let ray = (x * x + y * y + window.distance_um * window.distance_um).sqrt();
+    [x / ray, y / ray]
 }
 
 /// Samples along the rim of the disc of kept rays, of which neighbours are a quarter of a bin or less apart where there are

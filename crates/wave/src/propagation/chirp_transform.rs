@@ -23,12 +23,12 @@ pub(super) struct Zoom {
 
 impl Zoom {
     /// `cycles` is c above, the phase of neighbouring inputs at neighbouring outputs (turns).
-    pub(crate) fn new(planner: &mut FftPlanner<f32>, inputs: usize, first: i64, outputs: usize, cycles: f64) -> Self {
+    pub(crate) fn new(planner: &mut FftPlanner<f32>, inputs: usize, first: f64, outputs: usize, cycles: f64) -> Self {
         let size = fft_size(inputs + outputs - 1);
         let middle = 0.5 * (outputs as f64 - 1.0);
         let square = |n: f64| 0.5 * cycles * n * n;
         let before = |k: f64| single(cis64(square(k) - cycles * k * middle));
-        let after = |m: f64| single(cis64(square(m) + cycles * first as f64 * (m - middle)));
+        let after = |m: f64| single(cis64(square(m) + cycles * first * (m - middle)));
         // The tables are made in double precision: what they err by, every sample of a window errs by.
         let mut kernel = vec![Complex64::ZERO; size];
         let scale = 1.0 / size as f64;
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn is_the_sum_it_says_and_the_adjoint_is_its_own() {
         let (inputs, outputs, first, cycles) = (37, 21, -11, 0.0173);
-        let zoom = Zoom::new(&mut FftPlanner::new(), inputs, first, outputs, cycles);
+        let zoom = Zoom::new(&mut FftPlanner::new(), inputs, first as f64, outputs, cycles);
         let x: Vec<_> = (0..inputs).map(|k| cis(0.37 * (k * k) as f64)).collect();
         let g: Vec<_> = (0..outputs).map(|m| cis(0.11 * (m * m * m) as f64)).collect();
         let (mut padded, mut fft) = (Vec::new(), Vec::new());

@@ -7,6 +7,7 @@
 //! | where the field is wanted | `window` |
 //! | the Rayleigh-Sommerfeld sum itself | `direct_sum` |
 //! | through frequencies, on one window | `folded_propagator`, with `band`, `transfer`, `chirp_transform` |
+//! | in windows of many directions of arrival, from one spectrum | `shared_spectrum` |
 //! | by the rings of a round element | `hankel` |
 //! | at several distances at once | `distances` |
 //! | where all the light lands, coarsely | `sensor_irradiance`; for many directions of arrival `local_angular_spectrum` |
@@ -23,6 +24,7 @@ mod phase;
 mod plane_wave;
 mod propagator;
 mod sensor_irradiance;
+mod shared_spectrum;
 mod tiles;
 mod transfer;
 mod window;
@@ -40,4 +42,5 @@ pub use plane_wave::{PlaneWave, incident, landing_um, leaving};
 pub(crate) use propagator::check_shape;
 pub use propagator::{Field, Propagator, Scratch};
 pub use sensor_irradiance::{LandingGrid, SensorIrradiance};
+pub use shared_spectrum::{ApertureSpectrum, Direction, SharedSpectrumPlan};
 pub use window::Window;

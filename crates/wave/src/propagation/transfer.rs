@@ -24,7 +24,7 @@ pub(super) struct Transfer<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FrequencyColumn {
     /// Frequencies of the first [cycles a period].
-    pub first: [i64; 2],
+    pub first: [f64; 2],
     pub count: usize,
 }
 
@@ -45,7 +45,7 @@ impl Transfer<'_> {
     /// centre lands `distance_um` behind it: it fades from `full_um` to `zero_um` of the window's middle.
     pub(crate) fn fade(&self, distance_um: f64, column: FrequencyColumn, faded: &mut FadedColumn) {
         let df = self.fade.period_um.map(|period| 1.0 / period);
-        let [fx, first] = [0, 1].map(|a| column.first[a] as f64 * df[a]);
+        let [fx, first] = [0, 1].map(|a| column.first[a] * df[a]);
         let rest = self.wavelength_um.powi(-2) - fx * fx;
         let [cx, cy] = self.centre_um;
         let Fade { full_um, zero_um, .. } = *self.fade;
@@ -95,7 +95,7 @@ impl Transfer<'_> {
         out: &mut [Complex32],
     ) {
         let df = self.fade.period_um.map(|period| 1.0 / period);
-        let [fx, first] = [0, 1].map(|a| column.first[a] as f64 * df[a]);
+        let [fx, first] = [0, 1].map(|a| column.first[a] * df[a]);
         let along_x = fx * self.shift_um[0];
         let along_y = self.shift_um[1];
         pulp::Arch::new().dispatch(|| {

@@ -153,7 +153,7 @@ impl DistancesPlan {
             Zoom::new(
                 &mut FftPlanner::new(),
                 kept.count[1],
-                kept.first[1],
+                kept.first[1] as f64,
                 self.window,
                 cycles,
             )

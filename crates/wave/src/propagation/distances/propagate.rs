@@ -45,7 +45,7 @@ impl DistancesPlan {
         let steps: Vec<f64> = distances_um.windows(2).map(|z| z[1] - z[0]).collect();
         for k in 0..kx {
             let column = FrequencyColumn {
-                first: [kept.first[0] + k as i64, kept.first[1]],
+                first: [(kept.first[0] + k as i64) as f64, kept.first[1] as f64],
                 count: ky,
             };
             transfer.fade(middle, column, &mut scratch.column);

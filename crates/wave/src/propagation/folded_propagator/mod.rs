@@ -102,7 +102,13 @@ impl FoldedPropagator {
         let mut planner = FftPlanner::new();
         let zoom = [0, 1].map(|a| {
             let cycles = window.step_um / band.fade.period_um[a];
-            Zoom::new(&mut planner, band.count[a], band.first[a], window.samples, cycles)
+            Zoom::new(
+                &mut planner,
+                band.count[a],
+                band.first[a] as f64,
+                window.samples,
+                cycles,
+            )
         });
         Self {
             blocks_at_once: band.count[0].div_ceil(LANES),
@@ -242,8 +248,8 @@ impl FoldedPropagator {
         };
         let column = FrequencyColumn {
             first: [
-                self.band.first[0] + k as i64,
-                self.band.first[1] + self.band.rows[k].start as i64,
+                (self.band.first[0] + k as i64) as f64,
+                (self.band.first[1] + self.band.rows[k].start as i64) as f64,
             ],
             count: out.len(),
         };

@@ -195,14 +195,56 @@ mod tests {
         }
     }
 
+    fn formed(fold: &FoldedPropagator, lens: &dyn Aperture, wave: &PlaneWave) -> (Field, Otf) {
+        let (field, otf) = fold.field_and_otf(lens, wave, &LP_MM, &mut Scratch::default()).unwrap();
+        (field, otf.unwrap())
+    }
+
+    /// Two apertures whose rows are formed one after the other.
+    struct Pair<'a>([&'a dyn Aperture; 2]);
+
+    impl ApertureSet for Pair<'_> {
+        fn lattice(&self) -> Lattice {
+            self.0[0].lattice()
+        }
+
+        fn count(&self) -> usize {
+            2
+        }
+
+        fn fill_rows(&self, iy: usize, rows: &mut [Complex32]) {
+            let sites = self.lattice().sites();
+            let each = self.0.iter().zip(rows.chunks_exact_mut(sites));
+            each.for_each(|(aperture, row)| aperture.fill_row(iy, row));
+        }
+    }
+
+    #[test]
+    fn apertures_of_a_set_are_formed_as_each_alone_to_the_last_bit() {
+        let (strong, weak) = (lens(1.0), lens(0.8));
+        let wave = PlaneWave {
+            wavelength_um: WAVELENGTH_UM,
+            sin_x: 0.01,
+            sin_y: -0.02,
+        };
+        for fold in [fold(48), fold(48).within(0)] {
+            let pair = Pair([&strong, &weak]);
+            let both = fold
+                .fields_and_otfs(&pair, &wave, &LP_MM, &mut Scratch::default())
+                .unwrap();
+            for ((field, otf), lens) in both.into_iter().zip(pair.0) {
+                let alone = formed(&fold, lens, &wave);
+                assert!(field.values == alone.0.values && otf.unwrap() == alone.1);
+            }
+        }
+    }
+
     #[test]
     fn a_perfect_lens_has_the_contrast_of_its_pupil() {
         /// The pupil is made of sites, and its rim is seen at an angle whose cosine is 0.995.
         const SITES_AND_ANGLE: f64 = 0.01;
         let wave = PlaneWave::normal(WAVELENGTH_UM);
-        let (_, otf) = fold(64)
-            .with_otf(&lens(1.0), &wave, &LP_MM, &mut Scratch::default())
-            .unwrap();
+        let (_, otf) = formed(&fold(64), &lens(1.0), &wave);
         for (i, f) in LP_MM.iter().enumerate() {
             // Overlap of two circles (Goodman, eq. 6-30).
             let x = f * 1e-3 * WAVELENGTH_UM * FOCAL_UM / (2.0 * RADIUS_UM);
@@ -216,14 +258,10 @@ mod tests {
     #[test]
     fn a_field_in_parts_is_the_whole_to_the_last_bit() {
         let wave = PlaneWave::normal(WAVELENGTH_UM);
-        let formed = |fold: FoldedPropagator| {
-            fold.with_otf(&lens(0.8), &wave, &LP_MM, &mut Scratch::default())
-                .unwrap()
-        };
         let whole = fold(48);
         let bytes = whole.spectra_bytes();
         assert_eq!(whole.parts(), 1);
-        let whole = formed(whole);
+        let whole = formed(&whole, &lens(0.8), &wave);
         for (part, parts) in [(bytes, 1), (bytes / 2, 3), (0, 0)] {
             let fold = fold(48).within(part);
             assert!(
@@ -235,7 +273,7 @@ mod tests {
                 "{}",
                 fold.parts()
             );
-            let (field, otf) = formed(fold);
+            let (field, otf) = formed(&fold, &lens(0.8), &wave);
             assert!(field.values == whole.0.values && otf == whole.1);
         }
     }
@@ -247,9 +285,7 @@ mod tests {
         const WIDE_WINDOW: f64 = 3e-3;
         let wave = PlaneWave::normal(WAVELENGTH_UM);
         let blurred = lens(0.8);
-        let (field, otf) = fold(32)
-            .with_otf(&blurred, &wave, &LP_MM, &mut Scratch::default())
-            .unwrap();
+        let (field, otf) = formed(&fold(32), &blurred, &wave);
         let wide = Psf::of(&fold(600).field(&blurred, &wave, &mut Scratch::default()).unwrap());
         let narrow = Psf::of(&field);
         assert!(
