@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 
 use super::{metalith, refusal};
@@ -98,8 +99,8 @@ fn a_new_design_is_for_its_wavelength_and_material() {
     assert_eq!(report["mapping"]["digest"].as_str().unwrap().len(), 32);
     assert!(report["mapping"]["light"]["first"].as_f64().unwrap() > 0.7);
     let refused = |options: &[&str]| new(&[&["none.toml"][..], &lens, options].concat()).code(2);
-    refused(&["--pitch-nm", "500"]).stderr(contains("take a pitch of 434 nm"));
-    refused(&["--pillar-height-nm", "150"]).stderr(contains("take a pillar height of"));
+    refused(&["--pitch-nm", "500"]).stderr(contains(refusal("new/pitch-diffracts")).and(contains(" 434 ")));
+    refused(&["--pillar-height-nm", "150"]).stderr(contains(refusal("new/no-usable-height")));
     new(&["none.toml", "--material", "TiO3"])
         .code(2)
         .stderr(contains("use one of tio2"));

@@ -229,9 +229,9 @@ impl ElementInLight<'_> {
     ///
     /// # Panics
     /// As [`ElementInLight::lit`].
-    pub fn lit_from_all(&self, wavelength: usize) -> Option<IncoherentFields<'_>> {
+    pub fn lit_of_all_directions(&self, wavelength: usize) -> Option<IncoherentFields<'_>> {
         let made = &self.chip.distinct[self.distinct].made;
-        let fields = self.classes_at(wavelength).from_all()?;
+        let fields = self.classes_at(wavelength).of_all_directions()?;
         Some(fields.lit(made, self.arriving(wavelength, [0.0; 2])))
     }
 

@@ -66,7 +66,7 @@ impl<T> DirectionalCells<T> {
 
 impl DirectionalCells {
     /// Fields in light that arrives from anywhere, where cells are solved along the normal alone.
-    pub(crate) fn from_all(&self) -> Option<&ClassFields> {
+    pub(crate) fn of_all_directions(&self) -> Option<&ClassFields> {
         self.oblique.is_empty().then_some(&self.normal)
     }
 

@@ -7,9 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use metalith::schema::FileKind;
-use metalith::{AtomicFile, Design, Error, LatticeKind, NewDesign, PillarShape, Pitch, Result};
-
-use crate::new_design::pitch_of_nm;
+use metalith::{AtomicFile, Design, Error, LatticeKind, NewDesign, PillarShape, Pitch, Result, pitch_of_nm};
 
 use super::shipped_designs::ShippedDesign;
 use super::{Outcome, Terminal, print_line};

@@ -225,7 +225,7 @@ impl Builder<'_> {
             .map(|node| self.seen(wavelength, self.sines(*node)))
             .collect();
         let all: Vec<(PlaneWave, Window)> = seen.iter().flatten().map(|seen| (seen.wave, seen.window)).collect();
-        let shared = match self.light.lit_from_all(wavelength).filter(|_| !all.is_empty()) {
+        let shared = match self.light.lit_of_all_directions(wavelength).filter(|_| !all.is_empty()) {
             Some(fields) => Some(SharedFields::new(fields, self.accuracy(), &all)?),
             None => None,
         };

@@ -163,7 +163,7 @@ mod tests {
     use metalith_pillars::Lattice;
 
     use super::*;
-    use crate::propagation::{Accuracy, PhaseFunction, Propagator, Window};
+    use crate::propagation::{Accuracy, Aperture, PhaseFunction, Propagator, Window};
     use crate::psf::Psf;
 
     const WAVELENGTH_UM: f64 = 0.53;
