@@ -71,7 +71,10 @@ pub struct NewDesignText {
     pub mapping: Option<String>,
 }
 
-/// A pitch of so many nanometres, or what must be given instead.
+/// A pitch of so many nanometres.
+///
+/// # Errors
+/// If a design cannot have it, with what must be given instead.
 pub fn pitch_of_nm(nm: f64) -> Result<Pitch, String> {
     if !PITCHES_NM.contains(&nm) {
         return Err(format!("give 100 to 20000 nm, not {nm}"));
