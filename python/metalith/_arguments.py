@@ -78,9 +78,15 @@ def refuse(name: str, values: npt.NDArray[Any], wrong: npt.NDArray[np.bool_], re
 
 def real(name: str, value: object) -> float:
     """A positive finite number."""
-    if isinstance(value, bool) or not isinstance(value, numbers_.Real) or not 0 < value < float("inf"):
+    number = float(value) if isinstance(value, numbers_.Real) and not isinstance(value, bool) else 0.0
+    if not 0 < number < float("inf"):
         raise MetalithError(f"`{name}` = {value!r}\n  help: give a positive number")
-    return float(value)
+    return number
+
+
+def maybe_real(name: str, value: object) -> float | None:
+    """A positive finite number, or none."""
+    return None if value is None else real(name, value)
 
 
 def pair(name: str, given: npt.ArrayLike) -> tuple[float, float]:

@@ -72,13 +72,12 @@ class Design:
         narrowest and the widest pillar (nm); pillars are circles on a square lattice. Cells are solved for it, which takes
         seconds, and cached. :attr:`text` is the design file, each choice with its reason; the pillars are on layer 1/0.
         :class:`MetalithError` if no pillars make the lens, with the nearest values that do."""
-        positive = {"wavelength_nm": wavelength_nm, "focal_length_um": focal_length_um, "diameter_um": diameter_um}
-        optional = {"pitch_nm": pitch_nm, "pillar_height_nm": pillar_height_nm}
-        lens = tuple(_arguments.real(key, value) for key, value in positive.items())
-        cell = tuple(None if value is None else _arguments.real(key, value) for key, value in optional.items())
-        least, most = (None, None) if width_nm is None else (_arguments.whole("width_nm", nm, 1, _arguments.MOST_16) for nm in width_nm)
-        words = [pillar, substrate, shape, lattice]
-        native, text = _native.Design.lens(name, lens, words, (*cell, least, most), progress)
+        real, maybe = _arguments.real, _arguments.maybe_real
+        lens = (real("wavelength_nm", wavelength_nm), real("focal_length_um", focal_length_um), real("diameter_um", diameter_um))
+        least, most = (None, None) if width_nm is None else width_nm
+        widths = [_arguments.maybe_whole("width_nm", nm, 1, _arguments.MOST_16) for nm in (least, most)]
+        cell = (maybe("pitch_nm", pitch_nm), maybe("pillar_height_nm", pillar_height_nm), widths[0], widths[1])
+        native, text = _native.Design.lens(name, lens, [pillar, substrate, shape, lattice], cell, progress)
         return cls(native, text)
 
     def __copy__(self) -> Design:

@@ -117,7 +117,7 @@ class Calls:
         return {
             "Design.read": lambda: ml.Design.read(self.folder / "design.toml").digest,
             "Design.parse": lambda: ml.Design.parse(MINI.read_text(), MINI).digest,
-            "Design.lens": lambda: ml.Design.lens(wavelength_nm=660, focal_length_um=40, diameter_um=20, pillar_height_nm=900).digest,
+            "Design.lens": lambda: ml.Design.lens(wavelength_nm=660, focal_length_um=40, diameter_um=20, pitch_nm=380, pillar_height_nm=900).digest,
             "Design.array": lambda: self.design.array().pillars,
             "Array.widths": lambda: self.array.widths(0),
             "Array.write": lambda: self.array.write(self.new(".oas")),
