@@ -66,8 +66,10 @@ def test_a_database_unit_that_would_move_pillars_is_refused(design: ml.Design) -
         metalith.klayout.insert(coarse, MAP)  # type: ignore[arg-type]
 
 
-def test_parametrised_cells_are_what_their_designs_are(design: ml.Design, tmp_path: Path) -> None:
+def test_parametrised_cells_are_what_their_designs_are(tmp_path: Path) -> None:
     metalith.klayout.register()
+    # Of the same lattice as the other cell: elements of one file are read on one.
+    design = ml.Design.lens(wavelength_nm=660, focal_length_um=60, diameter_um=20, pitch_nm=350, width_nm=(100, 300))
     file = tmp_path / "own.toml"
     file.write_text(design.text)
     layout = kdb.Layout()
@@ -78,13 +80,13 @@ def test_parametrised_cells_are_what_their_designs_are(design: ml.Design, tmp_pa
         return top.insert(kdb.DCellInstArray(made.cell_index(), kdb.DTrans(kdb.DVector(x_um, 0))))
 
     placed("Array", -100, design=str(file))
-    lens = dict(wavelength_nm=660.0, focal_length_um=40.0, diameter_um=15.0, pitch_nm=380.0, width_min_nm=100, width_max_nm=300)
+    lens = dict(wavelength_nm=660.0, focal_length_um=40.0, diameter_um=15.0, pitch_nm=350.0, width_min_nm=100, width_max_nm=300)
     instance = placed("Metalens", 100, **lens)
     instance.change_pcell_parameter("diameter_um", 20.0)
     layout.write(str(tmp_path / "chip.gds"))
     found = ml.read_layout(tmp_path / "chip.gds")
     assert found.centres_nm == [(-100_000, 0), (100_000, 0)] and found.other_shapes == 0
-    wanted = ml.Design.lens(wavelength_nm=660, focal_length_um=40, diameter_um=20, pitch_nm=380, width_nm=(100, 300))
+    wanted = ml.Design.lens(wavelength_nm=660, focal_length_um=40, diameter_um=20, pitch_nm=350, width_nm=(100, 300))
     for widths, one in zip(found.widths, (design, wanted), strict=True):
         assert np.array_equal(widths, one.array().widths(0))
     # A library that is registered again reads changed files, also for cells that are there.
