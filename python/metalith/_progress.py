@@ -25,7 +25,7 @@ class ProgressLine:
         file, now = self._file or sys.stderr, time.monotonic()
         if what != self._work:
             self._work, self._begun, self._told = what, now, now
-        is_live = file.isatty() or "ipykernel" in sys.modules
+        is_live = file.isatty() or (self._file is None and "ipykernel" in sys.modules)
         if not what or now - self._begun < FIRST_S or now - self._told < (0.0 if is_live else BETWEEN_S):
             return
         self._told = now
