@@ -122,7 +122,7 @@ impl Barycentric {
     }
 }
 
-/// Where the middle of the nodes is put when poles are found, in halves of their range.
+/// Place of the middle of the nodes when poles are found, in halves of their range.
 const AWAY: f64 = 3.0;
 
 /// Steps after which singular vectors and poles are given up.

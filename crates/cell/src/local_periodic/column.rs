@@ -201,7 +201,7 @@ mod tests {
         }
     }
 
-    /// What is no rational function has cubics, and says how far it is off.
+    /// Cubics stand in for a function with a kink, with their error.
     #[test]
     fn a_kink_has_cubics() {
         let solve = |_: usize, um: f64| Ok(Complex64::from((200.0 * um).sin().abs()));

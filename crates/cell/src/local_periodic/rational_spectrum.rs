@@ -36,7 +36,7 @@ pub(super) struct Resonance {
     pub um: f64,
     /// Half of its width (um), at least [`NARROWEST_UM`].
     pub half_um: f64,
-    /// What it adds to t at its wavelength, as far as it is as wide as that.
+    /// Modulus of its part of t at its wavelength, for a width of at least [`NARROWEST_UM`].
     pub height: f64,
 }
 

@@ -132,7 +132,7 @@ impl TableInterpolation {
             cubic => format!(", cubics at {cubic}"),
         };
         format!(
-            "rational functions at {} widths{cubic}; error of t {:.4} rms, {:.4} at most, at {} wavelengths that were held out",
+            "rational functions at {} widths{cubic}; error of t {:.1e} rms, {:.1e} at most, at {} wavelengths that were held out",
             self.rational, self.rms, self.largest, self.held_out
         )
     }

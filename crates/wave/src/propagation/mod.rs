@@ -44,3 +44,6 @@ pub use propagator::{Field, Propagator, Scratch};
 pub use sensor_irradiance::{LandingGrid, SensorIrradiance};
 pub use shared_spectrum::{ApertureSpectrum, Direction, SharedSpectrumPlan};
 pub use window::Window;
+
+/// Columns that are transformed together: one cache line of samples.
+const LANES: usize = 8;

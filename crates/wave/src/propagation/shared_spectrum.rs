@@ -19,12 +19,10 @@ use super::band::{FadeSizes, RetainedBins, rim_sines};
 use super::chirp_transform::Zoom;
 use super::propagator::check_wave;
 use super::transfer::{FrequencyColumn, Transfer};
-use super::{Accuracy, Aperture, Fade, Field, PlaneWave, Scratch, Window};
+use super::{Accuracy, Aperture, Fade, Field, LANES, PlaneWave, Scratch, Window};
 use crate::error::{Result, WaveError};
 use crate::kernels::{cis, cis_all, fft_size, multiply_by, multiply_to, process, scatter};
 
-/// Columns that are transformed together: one cache line of samples.
-const LANES: usize = 8;
 /// Places along the rim of a disc of rays that tell which bins it needs, and bins beyond: between two places the rim of a
 /// disc of 10,000 bins is flat to 0.8 of one.
 const RIM_PLACES: usize = 256;
@@ -210,7 +208,7 @@ impl SharedSpectrumPlan {
             zero_um,
             relabelled: 0,
         };
-        // Bins that the wave shifts the spectrum by, and what is left of them.
+        // Shift of the spectrum by the wave: whole bins, and the rest.
         let shift = [wave.sin_x, wave.sin_y].map(|sine| sine / self.wavelength_um * self.period_um);
         let whole = shift.map(|bins| bins.round() as i64);
         let offset = [0, 1].map(|a| shift[a] - whole[a] as f64);

@@ -4,12 +4,9 @@ use num_complex::Complex32;
 
 use super::{DistancesPlan, DistancesScratch, RetainedFrequencies};
 use crate::kernels::{gather, multiply_by, multiply_to, process};
-use crate::propagation::Aperture;
 use crate::propagation::chirp_transform::Zoom;
 use crate::propagation::transfer::{FrequencyColumn, Transfer};
-
-/// Columns that go through one call of a transform: enough to fill cache lines.
-const LANES: usize = 8;
+use crate::propagation::{Aperture, LANES};
 
 /// Steps from one distance to the next that differ by less are equal (um): rounding.
 const EQUAL_UM: f64 = 1e-9;

@@ -27,15 +27,12 @@ use super::band::FrequencyBand;
 use super::chirp_transform::Zoom;
 use super::propagator::check_wave;
 use super::transfer::{FadedColumn, FrequencyColumn, Transfer};
-use super::{Accuracy, Aperture, ApertureSet, Fade, Field, PlaneWave, Propagator, Scratch, Window};
+use super::{Accuracy, Aperture, ApertureSet, Fade, Field, LANES, PlaneWave, Propagator, Scratch, Window};
 use crate::error::{Result, WaveError};
 use crate::kernels::cis_all;
 use planes::Plane;
 
 pub use otf::Otf;
-
-/// Columns that travel together between the two transforms: one cache line of samples.
-pub(super) const LANES: usize = 8;
 
 /// A plan for one lattice, wavelength and window; made once, used for any number of apertures and angles.
 pub struct FoldedPropagator {
