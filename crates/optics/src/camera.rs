@@ -2,11 +2,8 @@
 
 mod kernels;
 
-use std::sync::Arc;
-
 use ndarray::Array2;
 use num_complex::Complex64;
-use rustfft::{Fft, FftPlanner};
 
 pub use kernels::KernelFilter;
 
@@ -69,8 +66,10 @@ pub fn blur(values: &mut Array2<f64>, sigma: f64) {
 
 fn blur_rows(values: &mut Array2<f64>, sigma: f64) {
     let n = values.ncols();
-    let mut planner = FftPlanner::new();
-    let (forward, inverse): (Arc<dyn Fft<f64>>, _) = (planner.plan_fft_forward(2 * n), planner.plan_fft_inverse(2 * n));
+    let (forward, inverse) = (
+        metalith_fourier::forward::<f64>(2 * n),
+        metalith_fourier::inverse::<f64>(2 * n),
+    );
     let factor: Vec<f64> = (0..2 * n)
         .map(|k| {
             let frequency = k.min(2 * n - k) as f64 / (2 * n) as f64;

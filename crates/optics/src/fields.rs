@@ -9,8 +9,10 @@ use crate::{NeighbourPillars, NeighbourSites};
 use metalith_cell::{CellResponse, NeighbourTables, Orientation};
 use metalith_core::Result;
 use metalith_pillars::{Lattice, PillarRows};
-use metalith_wave::propagation::Direction;
-use metalith_wave::{Accuracy, Aperture, FoldedPropagator, Pillars, PlaneWave, Propagator, Psf, Scratch, Window};
+use metalith_wave::propagation::{Direction, Together};
+use metalith_wave::{
+    Accuracy, Aperture, FoldedPropagator, Pillars, PlaneWave, Propagator, Psf, Scratch, TransmissionMap, Window,
+};
 
 /// Fields of an element in light that arrives: the sum of the intensities of its fields, each times the weight.
 pub struct IncoherentFields<'e> {
@@ -42,6 +44,8 @@ pub enum Field<'e> {
         sines: [f64; 2],
         polarisation: usize,
     },
+    /// [`Field::Coupled`] whose rows have been formed.
+    Formed(Arc<TransmissionMap>),
     /// Sites transmit by their class.
     AsBuilt {
         element: &'e AsBuiltElement,
@@ -70,15 +74,41 @@ impl Field<'_> {
                 CellResponse::Neighbours(NeighbourTables::Band(band)) => NeighbourPillars::new(sites, [band], *sines),
                 CellResponse::Scalar(_) | CellResponse::Jones(_) => unreachable!("made of neighbours alone"),
             }),
+            Self::Formed(map) => Box::new(map.as_ref()),
             Self::AsBuilt { element, table } => Box::new(element.lit_aperture(table, light)),
         })
+    }
+
+    /// True if both are of the same pillars among neighbours, in light that is the same to them.
+    fn has_rows_of(&self, other: &Self) -> bool {
+        let (
+            Self::Coupled {
+                sites,
+                response,
+                sines,
+                polarisation,
+            },
+            Self::Coupled {
+                sites: other_sites,
+                response: other_response,
+                sines: other_sines,
+                polarisation: other_polarisation,
+            },
+        ) = (self, other)
+        else {
+            return false;
+        };
+        std::ptr::eq(*sites, *other_sites)
+            && Arc::ptr_eq(response, other_response)
+            && sines == other_sines
+            && polarisation == other_polarisation
     }
 
     /// |t|^2 summed over sites of what missing pillars scatter, each on its own.
     fn scattered(&self) -> f64 {
         match self {
             Self::AsBuilt { table, .. } => table.scattered,
-            Self::Drawn { .. } | Self::Coupled { .. } => 0.0,
+            Self::Drawn { .. } | Self::Coupled { .. } | Self::Formed(_) => 0.0,
         }
     }
 }
@@ -138,6 +168,57 @@ impl<'e> IncoherentFields<'e> {
             return None;
         };
         Some(NeighbourPillars::polarised(sites, &fitted.responses, *sines))
+    }
+
+    /// The fields of both polarisations as a set, where their rows have been formed.
+    fn both_formed(&self) -> Option<Together<'_>> {
+        match &self.fields[..] {
+            [Field::Formed(s), Field::Formed(p)] => Some(Together(vec![s.as_ref(), p.as_ref()])),
+            _ => None,
+        }
+    }
+
+    /// Forms the rows of pillars among their neighbours once for light from several directions that is the same to them, and
+    /// holds them: 8 bytes a site and polarisation. The fields stay the same to the last bit.
+    ///
+    /// # Errors
+    /// If a pillar is in no table.
+    pub fn share_rows(mut lit: Vec<&mut Self>) -> Result<()> {
+        while let Some(first) = lit.pop() {
+            let (mut equal, others): (Vec<_>, Vec<_>) = lit.into_iter().partition(|other| first.has_rows_of(other));
+            lit = others;
+            if equal.is_empty() {
+                continue;
+            }
+            equal.push(first);
+            let formed: Vec<_> = equal[0].formed()?.into_iter().map(Arc::new).collect();
+            for fields in equal {
+                fields.fields = formed.iter().map(|map| Field::Formed(Arc::clone(map))).collect();
+            }
+        }
+        Ok(())
+    }
+
+    /// True if both are of the same pillars among neighbours, in light that is the same to them.
+    fn has_rows_of(&self, other: &Self) -> bool {
+        let mut pairs = self.fields.iter().zip(&other.fields);
+        self.fields.len() == other.fields.len() && pairs.all(|(a, b)| a.has_rows_of(b))
+    }
+
+    /// The transmissions of the sites of each field.
+    fn formed(&self) -> Result<Vec<TransmissionMap>> {
+        if let Some(set) = self.both_polarised() {
+            return Ok(TransmissionMap::of_set(&set, self.radius_um));
+        }
+        let of = |field: &Field<'_>| {
+            let aperture = field.aperture(&self.light)?;
+            Ok(TransmissionMap::of_set(
+                &Together(vec![aperture.as_ref()]),
+                self.radius_um,
+            ))
+        };
+        let maps: Vec<_> = self.fields.iter().map(of).collect::<Result<_>>()?;
+        Ok(maps.into_iter().flatten().collect())
     }
 
     /// Radius of the circle that light passes (um).
@@ -236,12 +317,15 @@ impl<'e> IncoherentFields<'e> {
     /// # Errors
     /// As [`Propagator::field`].
     pub fn psf_by(&self, propagator: &dyn Propagator, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
+        let wave = &self.light.plane;
         let psfs = if let Some(set) = self.both_polarised() {
-            Psf::formed_of_set(propagator, &set, &self.light.plane, lp_mm, scratch)?
+            Psf::formed_of_set(propagator, &set, wave, lp_mm, scratch)?
+        } else if let Some(set) = self.both_formed() {
+            Psf::formed_of_set(propagator, &set, wave, lp_mm, scratch)?
         } else {
             let of = |field: &Field<'_>| {
                 let aperture = field.aperture(&self.light)?;
-                let mut psf = Psf::formed(propagator, aperture.as_ref(), &self.light.plane, lp_mm, scratch)?;
+                let mut psf = Psf::formed(propagator, aperture.as_ref(), wave, lp_mm, scratch)?;
                 self.add_scattered(field, &mut psf);
                 Ok(psf)
             };

@@ -6,7 +6,6 @@
 use metalith_core::part;
 use ndarray::Array2;
 use num_complex::Complex32;
-use rustfft::FftPlanner;
 
 use crate::Optic;
 use metalith_wave::kernels::{cis, fade};
@@ -60,8 +59,7 @@ impl PixelGrid {
                 fade(1.0 - depth as f32)
             })
             .collect();
-        let mut planner = FftPlanner::<f32>::new();
-        let fft = planner.plan_fft_forward(n);
+        let fft = metalith_fourier::forward::<f32>(n);
         let mut rows_of: Vec<Complex32> = intensity
             .iter()
             .enumerate()

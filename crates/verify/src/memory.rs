@@ -13,9 +13,9 @@ use super::{optics, polychromatic};
 const READ_BYTES: f64 = 2.0;
 /// Bytes of each site of the elements that are not copies: its width as designed.
 const DESIGNED_BYTES: f64 = 2.0;
-/// Bytes of each site of the element that is being simulated: its width, and single-precision fields of the propagation
-/// on all threads. From the peaks of 3 x 3 and 5 x 5 lenses of 1 mm, 438 and 851 MB.
-const SIMULATED_BYTES: f64 = 36.0;
+/// Bytes of each site of the element that is being simulated: its width, single-precision fields of the propagation
+/// on all threads, and what its sites transmit in two polarisations. From the peaks of 3 x 3 lenses of 1 mm, 568 to 607 MB.
+const SIMULATED_BYTES: f64 = 50.0;
 /// Memory of a run whatever its size (MB).
 const BASE_MB: f64 = 60.0;
 /// Memory of a thread other than spectra, as a share of all of them: rows of the window, columns for the contrast,

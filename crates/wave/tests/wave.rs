@@ -4,9 +4,10 @@ mod adjoint;
 
 use metalith_pillars::{Lattice, PillarMap};
 use metalith_sensor::{Optic, PixelGrid};
+use metalith_wave::propagation::Together;
 use metalith_wave::{
     Accuracy, Aperture, Direct, FoldedPropagator, Hankel, IdealPsf, PhaseFunction, Pillars, PlaneWave, Propagator, Psf,
-    Scratch, WaveError, Window,
+    Scratch, TransmissionMap, WaveError, Window,
 };
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
@@ -233,6 +234,21 @@ fn adjoints_are_adjoint() {
     for propagator in all {
         adjoint::checked(propagator, &lens, &wave);
     }
+}
+
+#[test]
+fn apertures_that_are_formed_once_are_those_that_are_formed_row_by_row() {
+    let (lens, other) = (small(0.3), small(-0.1));
+    let wave = PlaneWave::normal(0.5);
+    let window = Window::about([6.0, 4.0], 0.7, 12, 50.0);
+    let fold = FoldedPropagator::plan(lens.lattice, 20.0, 0.5, window, Accuracy::Accurate).unwrap();
+    let psf = |aperture: &dyn Aperture| Psf::formed(&fold, aperture, &wave, &[40.0], &mut Scratch::default()).unwrap();
+    let alone = [psf(&lens), psf(&other)];
+    let maps = TransmissionMap::of_set(&Together(vec![&lens, &other]), 20.0);
+    assert_eq!([psf(&maps[0]), psf(&maps[1])], alone);
+    let set = Together(vec![&maps[0], &maps[1]]);
+    let both = Psf::formed_of_set(&fold, &set, &wave, &[40.0], &mut Scratch::default()).unwrap();
+    assert_eq!(both, alone);
 }
 
 #[test]

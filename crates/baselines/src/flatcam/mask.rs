@@ -3,7 +3,6 @@
 use metalith_core::{Error, Result};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 /// A mask before a sensor, open where both of two sequences are.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -78,8 +77,7 @@ impl MaskSpec {
                 Complex64::new(f64::from(u8::from(open)), 0.0)
             })
             .collect();
-        let mut planner = FftPlanner::new();
-        planner.plan_fft_forward(count).process(&mut field);
+        metalith_fourier::forward(count).process(&mut field);
         let k = std::f64::consts::TAU / wavelength_um;
         for (i, v) in field.iter_mut().enumerate() {
             let turns = if 2 * i < count {
@@ -95,7 +93,7 @@ impl MaskSpec {
                 Complex64::ZERO
             };
         }
-        planner.plan_fft_inverse(count).process(&mut field);
+        metalith_fourier::inverse(count).process(&mut field);
         let mut sums = vec![0.0];
         for v in &field {
             sums.push(sums[sums.len() - 1] + v.norm_sqr() * step_um);

@@ -341,7 +341,8 @@ mod tests {
             let room_um = 0.5 * (n * step - window_um) - faded_um;
             let moved_um = PLACE_SIGMAS * set.camera.registration_sigma_px * pixel_um;
             assert!(room_um > moved_um - ROUNDING_UM, "{pixels} x {pixel_um}: {room_um}");
-            let inner = (window_um / step).ceil() as usize + 2 * usual;
+            let margin = (usual as f64 * BenchSampling::default().step_um / step - 1e-9).ceil() as usize;
+            let inner = (window_um / step).ceil() as usize + 2 * margin;
             assert_eq!(plan.window() == inner + inner % 2, is_usual, "{pixels} x {pixel_um}");
         }
     }

@@ -1,8 +1,8 @@
 //! Registration of a window to within a pixel, before anything is fitted: cross-correlation.
 
+use metalith_fourier::{Fft, forward, inverse};
 use ndarray::Array2;
 use num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 
 /// Largest shift that is searched, along each axis (pixels): of a lens of 1 mm, light tilted by 10 mrad.
 const REACH: i64 = 48;
@@ -13,14 +13,13 @@ const BETTER: f32 = 1.02;
 /// Whole pixels (x, y) by which a window is off: the shift at which `seen` and `expected` correlate best.
 pub(crate) fn whole_pixel_shift(seen: &Array2<f32>, expected: &Array2<f32>) -> [f64; 2] {
     let (rows, cols) = seen.dim();
-    let mut planner = FftPlanner::new();
-    let along_x = planner.plan_fft_forward(cols);
-    let along_y = planner.plan_fft_forward(rows);
+    let along_x = forward(cols);
+    let along_y = forward(rows);
     let a = spectrum(seen, &*along_x, &*along_y);
     let b = spectrum(expected, &*along_x, &*along_y);
     let product = Array2::from_shape_fn((rows, cols), |i| a[i].conj() * b[i]);
-    let back_x = planner.plan_fft_inverse(cols);
-    let back_y = planner.plan_fft_inverse(rows);
+    let back_x = inverse(cols);
+    let back_y = inverse(rows);
     let correlation = transformed(product, &*back_x, &*back_y);
     let at = |dy: i64, dx: i64| {
         let place = [dy.rem_euclid(rows as i64) as usize, dx.rem_euclid(cols as i64) as usize];

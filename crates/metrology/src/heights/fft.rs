@@ -2,27 +2,20 @@
 
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, Precision};
 use num_complex::Complex;
-use rustfft::{Fft, FftNum, FftPlanner};
 
 /// Transforms of arrays of one size, row by row.
-pub(crate) struct Fft2<T: FftNum> {
+pub(crate) struct Fft2<T: Precision> {
     pub(crate) rows: usize,
     pub(crate) cols: usize,
     along: [Arc<dyn Fft<T>>; 2],
 }
 
-impl<T: FftNum> Fft2<T> {
+impl<T: Precision> Fft2<T> {
     /// Transforms of `rows` x `cols` numbers, forward or inverse (not normalised).
     pub(crate) fn new(rows: usize, cols: usize, inverse: bool) -> Self {
-        let mut planner = FftPlanner::new();
-        let mut plan = |n| {
-            if inverse {
-                planner.plan_fft_inverse(n)
-            } else {
-                planner.plan_fft_forward(n)
-            }
-        };
+        let plan = if inverse { T::inverse } else { T::forward };
         Self {
             rows,
             cols,

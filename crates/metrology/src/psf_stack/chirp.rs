@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, forward, inverse};
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 use super::light::single;
 use super::sampling::fft_size;
@@ -28,13 +28,12 @@ pub(super) struct Chirp {
 impl ChirpSum {
     pub(super) fn new(samples: usize, points: usize) -> Self {
         let size = fft_size((samples + points).next_multiple_of(2));
-        let mut planner = FftPlanner::new();
         Self {
             samples,
             points,
             size,
-            forward: planner.plan_fft_forward(size),
-            inverse: planner.plan_fft_inverse(size),
+            forward: forward(size),
+            inverse: inverse(size),
         }
     }
 

@@ -2,7 +2,6 @@
 
 use ndarray::Array2;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use crate::declared::{CompiledTerm, DeclaredQuantity};
 use crate::expression::Input;
@@ -115,13 +114,12 @@ fn phases(samples: usize, part: f64) -> Vec<Complex64> {
 
 /// The Fourier transform over both axes, not scaled.
 fn transform(plane: &mut Array2<Complex64>, inverse: bool) {
-    let mut planner = FftPlanner::new();
     for _ in 0..2 {
         let n = plane.ncols();
         let fft = if inverse {
-            planner.plan_fft_inverse(n)
+            metalith_fourier::inverse::<f64>(n)
         } else {
-            planner.plan_fft_forward(n)
+            metalith_fourier::forward::<f64>(n)
         };
         if let Some(lines) = plane.as_slice_mut() {
             fft.process(lines);

@@ -9,8 +9,8 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, forward, inverse};
 use num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 
 use super::element::{CameraElement, TERMS, terms};
 
@@ -49,11 +49,10 @@ pub(super) struct Transform {
 impl Transform {
     pub(super) fn new(least: usize) -> Self {
         let size = (least..).find(|n| smooth(*n)).unwrap_or(least);
-        let mut planner = FftPlanner::new();
         Self {
             size,
-            forward: planner.plan_fft_forward(size),
-            inverse: planner.plan_fft_inverse(size),
+            forward: forward(size),
+            inverse: inverse(size),
         }
     }
 

@@ -165,7 +165,6 @@ impl<'a> ElementSimulator<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<PsfPair>> {
         let element = &one.element;
-        let (own, of_copies) = one.angles.split_at(self.design.verify.field_angles.len());
         // The phase before mapping and rounding, once for all colours and angles.
         let radius_um = self.design.lens_of(element).radius_um();
         let turns = |ix, iy| phase.turns(ix, iy);
@@ -181,33 +180,43 @@ impl<'a> ElementSimulator<'a> {
             };
             &computed
         };
-        let mut tasks = Vec::new();
-        for angles in [own, of_copies] {
-            for &wavelength_um in &self.design.verify.wavelengths_um {
-                for &(field, copy) in angles {
-                    let wave = arriving(element, wavelength_um, field)?;
-                    let all = |light: &Illumination<'_>| {
-                        let cases = read.cases.iter().map(|case| case.in_light(light, progress));
-                        cases.collect::<Result<_>>()
-                    };
-                    tasks.push(Task {
-                        field,
-                        copy,
-                        wave,
-                        cases: self.in_light(element, &wave, all)?,
-                    });
-                }
+        let task = |wavelength_um: f64, &(field, copy): &(FieldAngle, Option<CopyAngle>)| -> Result<Task<'_>> {
+            let wave = arriving(element, wavelength_um, field)?;
+            let all = |light: &Illumination<'_>| {
+                let cases = read.cases.iter().map(|case| case.in_light(light, progress));
+                cases.collect::<Result<_>>()
+            };
+            Ok(Task {
+                field,
+                copy,
+                wave,
+                cases: self.in_light(element, &wave, all)?,
+            })
+        };
+        let (mut of_design, mut of_others) = (Vec::new(), Vec::new());
+        // What sites transmit is held of a few colours at a time, so many that there is work for each thread.
+        let colours = rayon::current_num_threads().div_ceil(one.angles.len().max(1));
+        for colours in self.design.verify.wavelengths_um.chunks(colours) {
+            let tasks = colours
+                .iter()
+                .flat_map(|um| one.angles.iter().map(|angle| task(*um, angle)));
+            let mut tasks = tasks.collect::<Result<Vec<_>>>()?;
+            if self.part_bytes.is_none() {
+                IncoherentFields::share_rows(tasks.iter_mut().flat_map(|task| &mut task.cases).collect())?;
             }
-        }
-        tasks
-            .into_par_iter()
-            .map_init(Scratch::default, |scratch, task| {
+            let pairs = tasks.into_par_iter().map_init(Scratch::default, |scratch, task| {
                 progress.check_stopped()?;
                 let pair = self.pair(&task, (element, phase), designed, scratch);
                 progress.advance(1);
                 pair
-            })
-            .collect()
+            });
+            let pairs = pairs.collect::<Result<Vec<_>>>()?.into_iter();
+            let (own, copies): (Vec<_>, Vec<_>) = pairs.partition(|pair| pair.copy.is_none());
+            of_design.extend(own);
+            of_others.extend(copies);
+        }
+        of_design.append(&mut of_others);
+        Ok(of_design)
     }
 
     /// Through-focus series of an element in the middle of its field, in the case that judges, at each wavelength of the design.

@@ -1,23 +1,29 @@
 //! Sizes of transforms, and transforms of lines.
 
+use metalith_fourier::Fft;
 use num_complex::Complex32;
-use rustfft::Fft;
 
-/// The size of every transform of this program that must hold `n` values: the smallest even number from `n` on
-/// without prime factors above five. On average it is 2 % larger than `n`.
+/// The size of every transform of this program that must hold `n` values: the smallest multiple of four from `n` on that is
+/// made of twos, threes, at most one five and at most one eleven. On average it is 3.5 % larger than `n`.
+///
+/// More fives leave the vector code of the transforms with a part that has none: 900 values took 2.9 times as long as 960, and 750
+/// values 5 times as long as 768. Over sizes from 64 to 4000, transforms of squares by this rule take 0.89 of the time of sizes
+/// with any number of fives and no eleven.
 pub fn fft_size(n: usize) -> usize {
-    let smooth = |mut n: usize| {
-        for p in [2, 3, 5] {
-            while n.is_multiple_of(p) {
-                n /= p;
+    let without = |n: usize, p: usize| if n.is_multiple_of(p) { n / p } else { n };
+    let fits = |n: &usize| {
+        let mut rest = without(without(*n, 5), 11);
+        for p in [2, 3] {
+            while rest.is_multiple_of(p) {
+                rest /= p;
             }
         }
-        n == 1
+        rest == 1
     };
-    (n.max(LEAST).next_multiple_of(2)..)
-        .step_by(2)
-        .find(|&n| smooth(n))
-        .expect("powers of two are smooth")
+    (n.max(LEAST).next_multiple_of(4)..)
+        .step_by(4)
+        .find(fits)
+        .expect("powers of two fit")
 }
 
 /// Below it a transform costs less than its call.
@@ -65,14 +71,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_are_the_next_smooth_number() {
+    fn sizes_are_the_next_that_transforms_fast() {
         for (n, size) in [
             (1, 8),
             (4096, 4096),
-            (2435, 2500),
-            (4097, 4320),
+            (2435, 2560),
+            (4097, 4224),
             (751, 768),
-            (1161, 1200),
+            (1161, 1188),
+            (897, 960),
         ] {
             assert_eq!(fft_size(n), size);
         }

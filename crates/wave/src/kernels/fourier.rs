@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, forward, inverse};
 use ndarray::Array2;
 use num_complex::Complex64;
-use rustfft::{Fft, FftPlanner};
 
 /// The border rule: pixel of an axis of `n` pixels that stands for place `i`, which may be beyond its ends.
 pub fn mirrored(i: i64, n: usize) -> usize {
@@ -24,11 +24,10 @@ pub(crate) struct Fourier {
 impl Fourier {
     /// Transform for images of this shape.
     pub(crate) fn periodic(size: [usize; 2]) -> Self {
-        let mut planner = FftPlanner::new();
         Self {
             size,
-            forward: size.map(|n| planner.plan_fft_forward(n)),
-            inverse: size.map(|n| planner.plan_fft_inverse(n)),
+            forward: size.map(forward),
+            inverse: size.map(inverse),
         }
     }
 

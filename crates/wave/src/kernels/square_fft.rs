@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
+use metalith_fourier::{ComplexToReal, Fft, RealToComplex, forward, inverse, real_forward, real_inverse};
 use ndarray::Array2;
 use num_complex::Complex32;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use rustfft::{Fft, FftPlanner};
 
 /// Transforms of squares of `size` real values an axis. A spectrum holds the columns of half of the frequencies along x,
 /// each with all those along y: `size / 2 + 1` times `size` values.
@@ -27,14 +26,12 @@ pub struct FftScratch {
 impl SquareFft {
     /// Transform for squares of an even `size`.
     pub fn new(size: usize) -> Self {
-        let mut real = RealFftPlanner::new();
-        let mut complex = FftPlanner::new();
         Self {
             size,
-            rows: real.plan_fft_forward(size),
-            rows_back: real.plan_fft_inverse(size),
-            columns: complex.plan_fft_forward(size),
-            columns_back: complex.plan_fft_inverse(size),
+            rows: real_forward(size),
+            rows_back: real_inverse(size),
+            columns: forward(size),
+            columns_back: inverse(size),
         }
     }
 

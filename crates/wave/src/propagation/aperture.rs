@@ -1,8 +1,9 @@
 //! The transmission of an element, row by row.
 
 use metalith_pillars::{Lattice, PillarRows};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1, ArrayViewMut1};
 use num_complex::{Complex32, Complex64};
+use rayon::prelude::*;
 
 use crate::error::{Result, WaveError};
 
@@ -48,20 +49,23 @@ pub trait ApertureSet: Sync {
     fn fill_rows(&self, iy: usize, rows: &mut [Complex32]);
 }
 
-/// A set of one aperture.
-pub(crate) struct Single<'a>(pub &'a dyn Aperture);
+/// Apertures on one lattice as a set: rows are formed one by one, and what sends light to a window is worked out once.
+pub struct Together<'a>(pub Vec<&'a dyn Aperture>);
 
-impl ApertureSet for Single<'_> {
+impl ApertureSet for Together<'_> {
     fn lattice(&self) -> Lattice {
-        self.0.lattice()
+        self.0[0].lattice()
     }
 
     fn count(&self) -> usize {
-        1
+        self.0.len()
     }
 
     fn fill_rows(&self, iy: usize, rows: &mut [Complex32]) {
-        self.0.fill_row(iy, rows);
+        let sites = self.lattice().sites();
+        for (aperture, row) in self.0.iter().zip(rows.chunks_exact_mut(sites)) {
+            aperture.fill_row(iy, row);
+        }
     }
 }
 
@@ -123,9 +127,53 @@ impl TransmissionMap {
         })
     }
 
+    /// The transmissions of the apertures of a set, which pass nothing outside `radius_um` of their centre: formed on all threads.
+    pub fn of_set(set: &dyn ApertureSet, radius_um: f64) -> Vec<Self> {
+        let lattice = set.lattice();
+        let (sites, [_, reach]) = (lattice.sites(), lattice.reach());
+        let mut all = vec![Array2::zeros([sites; 2]); set.count()];
+        let mut by_row: Vec<Vec<ArrayViewMut1<'_, Complex32>>> = (0..sites).map(|_| Vec::new()).collect();
+        for values in &mut all {
+            by_row
+                .iter_mut()
+                .zip(values.rows_mut())
+                .for_each(|(of_row, row)| of_row.push(row));
+        }
+        let rows = by_row.into_par_iter().enumerate().filter(|(iy, _)| reach.contains(iy));
+        rows.for_each_init(
+            || vec![Complex32::ZERO; set.count() * sites],
+            |formed, (iy, to)| {
+                set.fill_rows(iy, formed);
+                for (mut to, from) in to.into_iter().zip(formed.chunks_exact(sites)) {
+                    to.assign(&ArrayView1::from(from));
+                }
+            },
+        );
+        let map = |values| Self {
+            lattice,
+            radius_um,
+            values,
+        };
+        all.into_iter().map(map).collect()
+    }
+
     /// Transmission of each site.
     pub fn values(&self) -> &Array2<Complex32> {
         &self.values
+    }
+}
+
+impl<A: Aperture + ?Sized> Aperture for &A {
+    fn lattice(&self) -> Lattice {
+        (**self).lattice()
+    }
+
+    fn radius_um(&self) -> f64 {
+        (**self).radius_um()
+    }
+
+    fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
+        (**self).fill_row(iy, row);
     }
 }
 
@@ -139,8 +187,12 @@ impl Aperture for TransmissionMap {
     }
 
     fn fill_row(&self, iy: usize, row: &mut [Complex32]) {
-        for (to, from) in row.iter_mut().zip(self.values.row(iy)) {
-            *to = *from;
+        match self.values.row(iy).to_slice() {
+            Some(values) => row.copy_from_slice(values),
+            None => row
+                .iter_mut()
+                .zip(self.values.row(iy))
+                .for_each(|(to, from)| *to = *from),
         }
     }
 }

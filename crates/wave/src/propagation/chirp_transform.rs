@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, forward, inverse};
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 use crate::kernels::{fft_size, multiply, multiply_conj, multiply_to, process};
 
@@ -23,7 +23,7 @@ pub(super) struct Zoom {
 
 impl Zoom {
     /// `cycles` is c above, the phase of neighbouring inputs at neighbouring outputs (turns).
-    pub(crate) fn new(planner: &mut FftPlanner<f32>, inputs: usize, first: f64, outputs: usize, cycles: f64) -> Self {
+    pub(crate) fn new(inputs: usize, first: f64, outputs: usize, cycles: f64) -> Self {
         let size = fft_size(inputs + outputs - 1);
         let middle = 0.5 * (outputs as f64 - 1.0);
         let square = |n: f64| 0.5 * cycles * n * n;
@@ -38,15 +38,15 @@ impl Zoom {
         for n in 1..inputs {
             kernel[size - n] = cis64(-square(n as f64)) * scale;
         }
-        FftPlanner::new().plan_fft_forward(size).process(&mut kernel);
+        forward(size).process(&mut kernel);
         Self {
             inputs,
             outputs,
             before: (0..inputs).map(|k| before(k as f64)).collect(),
             after: (0..outputs).map(|m| after(m as f64)).collect(),
             kernel: kernel.into_iter().map(single).collect(),
-            forward: planner.plan_fft_forward(size),
-            inverse: planner.plan_fft_inverse(size),
+            forward: forward(size),
+            inverse: inverse(size),
         }
     }
 
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn is_the_sum_it_says_and_the_adjoint_is_its_own() {
         let (inputs, outputs, first, cycles) = (37, 21, -11, 0.0173);
-        let zoom = Zoom::new(&mut FftPlanner::new(), inputs, first as f64, outputs, cycles);
+        let zoom = Zoom::new(inputs, first as f64, outputs, cycles);
         let x: Vec<_> = (0..inputs).map(|k| cis(0.37 * (k * k) as f64)).collect();
         let g: Vec<_> = (0..outputs).map(|m| cis(0.11 * (m * m * m) as f64)).collect();
         let (mut padded, mut fft) = (Vec::new(), Vec::new());

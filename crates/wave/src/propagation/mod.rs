@@ -29,7 +29,7 @@ mod tiles;
 mod transfer;
 mod window;
 
-pub use aperture::{Aperture, ApertureSet, PillarFunction, Pillars, TransmissionMap};
+pub use aperture::{Aperture, ApertureSet, PillarFunction, Pillars, Together, TransmissionMap};
 pub use band::{Accuracy, Fade};
 pub use direct_sum::Direct;
 pub use distances::{Distances, DistancesPlan, DistancesScratch};

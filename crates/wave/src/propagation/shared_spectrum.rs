@@ -9,11 +9,11 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, inverse};
 use metalith_pillars::Lattice;
 use ndarray::Array2;
 use num_complex::Complex32;
 use rayon::prelude::*;
-use rustfft::{Fft, FftPlanner};
 
 use super::band::{FadeSizes, RetainedBins, rim_sines};
 use super::chirp_transform::Zoom;
@@ -117,7 +117,7 @@ impl SharedSpectrumPlan {
             period_um,
             first,
             count: [0, 1].map(|a| (end[a] - first[a]) as usize),
-            inverse: FftPlanner::new().plan_fft_inverse(period),
+            inverse: inverse(period),
         })
     }
 
@@ -135,12 +135,11 @@ impl SharedSpectrumPlan {
         let [kx, ky] = self.count;
         let [_, rows] = self.lattice.reach();
         let columns = 0..self.lattice.sites();
-        let mut planner = FftPlanner::new();
         let [along_x, along_y] = [(0, &columns), (1, &rows)].map(|(axis, places)| {
             let step_um = self.lattice.steps_um()[axis];
             let first = self.lattice.place_um(axis, places.start) / step_um;
             let cycles = -step_um / self.period_um;
-            Zoom::new(&mut planner, places.len(), first, self.count[axis], cycles)
+            Zoom::new(places.len(), first, self.count[axis], cycles)
         });
         let [carrier_x, carrier_y] = [(0, columns), (1, rows.clone())].map(|(axis, places)| self.carrier(axis, places));
         let mut lines = vec![Complex32::ZERO; rows.len() * kx];

@@ -8,7 +8,6 @@ use std::f64::consts::PI;
 
 use metalith_pillars::Lattice;
 use num_complex::Complex32;
-use rustfft::FftPlanner;
 
 /// Tiling of an element: sine windows that overlap by half add up to one when squared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +99,7 @@ pub(super) fn for_tiles(
     let (side, hop) = (tiling.side, tiling.hop());
     let middle_um =
         |axis: usize, first: i64| lattice.place_um(axis, 0) + (first as f64 + 0.5 * (side as f64 - 1.0)) * steps[axis];
-    let fft = FftPlanner::<f32>::new().plan_fft_forward(side);
+    let fft = metalith_fourier::forward::<f32>(side);
     let mut work = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
     let windows = steps.map(|step| tiling.window(step));
     // Rows of the tiles of one strip; half of them serve the next strip as well.

@@ -1,7 +1,7 @@
 //! Width of a PSF, and the power near its peak.
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex64;
+use metalith_fourier::{forward, inverse};
+use num_complex::Complex64;
 
 use super::Psf;
 
@@ -53,9 +53,8 @@ impl Psf {
 /// The finite Fourier series through samples, at [`FINER`] points for each.
 fn finer(line: &[f64]) -> Vec<f64> {
     let (n, m) = (line.len(), FINER * line.len());
-    let mut planner = FftPlanner::new();
     let mut terms: Vec<Complex64> = line.iter().map(|&v| Complex64::new(v, 0.0)).collect();
-    planner.plan_fft_forward(n).process(&mut terms);
+    forward(n).process(&mut terms);
     let mut padded = vec![Complex64::ZERO; m];
     for (k, term) in terms.into_iter().enumerate() {
         match 2 * k {
@@ -68,7 +67,7 @@ fn finer(line: &[f64]) -> Vec<f64> {
             _ => padded[m - n + k] = term,
         }
     }
-    planner.plan_fft_inverse(m).process(&mut padded);
+    inverse(m).process(&mut padded);
     padded.into_iter().map(|v| v.re / n as f64).collect()
 }
 

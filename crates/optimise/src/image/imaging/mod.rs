@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, forward, inverse};
 use num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 
 use crate::PixelWindow;
 use crate::image::buffer_pool::Scratch;
@@ -32,11 +32,7 @@ impl<'p> Imaging<'p> {
         buffers
             .field
             .resize(pupil.size * (pupil.size / 2 + 1), Complex32::default());
-        let mut planner = FftPlanner::new();
-        let (forward, inverse) = (
-            planner.plan_fft_forward(pupil.size),
-            planner.plan_fft_inverse(pupil.size),
-        );
+        let (forward, inverse) = (forward(pupil.size), inverse(pupil.size));
         let scratch = forward.get_inplace_scratch_len().max(inverse.get_inplace_scratch_len());
         Self {
             pupil,

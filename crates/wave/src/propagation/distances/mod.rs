@@ -13,9 +13,9 @@ mod propagate;
 
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, forward, inverse};
 use metalith_pillars::Lattice;
 use num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 
 use super::chirp_transform::Zoom;
 use super::transfer::FadedColumn;
@@ -83,7 +83,7 @@ struct RetainedFrequencies {
 }
 
 impl DistancesPlan {
-    /// Plan for a window; `margin` more samples are kept on each side of it.
+    /// Plan for a window; as far as `margin` largest steps more is kept on each side of it.
     pub fn new(wanted: Distances, margin: usize) -> Self {
         // A period of whole steps must not gain one by rounding.
         const ROUNDING: f64 = 1e-9;
@@ -99,16 +99,16 @@ impl DistancesPlan {
         let (rows, period_y) = period(1, period_x * (1.0 - ROUNDING));
         let samples = fft_size((period_x / wanted.step_um - ROUNDING).ceil() as usize);
         let step = period_x / samples as f64;
+        let margin = (margin as f64 * wanted.step_um / step - ROUNDING).ceil() as usize;
         let inner = (2.0 * wanted.half_width_um / step).ceil() as usize + 2 * margin;
-        let mut planner = FftPlanner::new();
         Self {
             wanted,
             sites: [columns, rows],
             samples,
             window: (inner + inner % 2).min(samples),
             period_um: [period_x, period_y],
-            forward: [columns, rows].map(|sites| planner.plan_fft_forward(sites)),
-            inverse: planner.plan_fft_inverse(samples),
+            forward: [columns, rows].map(forward),
+            inverse: inverse(samples),
         }
     }
 
@@ -149,15 +149,7 @@ impl DistancesPlan {
     /// Chirp transform that forms the samples along y where a period holds no whole number of them.
     fn along_y(&self, kept: &RetainedFrequencies) -> Option<Zoom> {
         let cycles = self.step_um() / self.period_um[1];
-        let zoom = || {
-            Zoom::new(
-                &mut FftPlanner::new(),
-                kept.count[1],
-                kept.first[1] as f64,
-                self.window,
-                cycles,
-            )
-        };
+        let zoom = || Zoom::new(kept.count[1], kept.first[1] as f64, self.window, cycles);
         (!self.wanted.lattice.is_square()).then(zoom)
     }
 

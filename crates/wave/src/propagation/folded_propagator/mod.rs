@@ -17,12 +17,12 @@ mod planes;
 use std::ops::Range;
 use std::sync::Arc;
 
+use metalith_fourier::{Fft, forward, inverse};
 use metalith_pillars::Lattice;
 use ndarray::{Array2, ArrayViewMut2};
 use num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 
-use super::aperture::Single;
+use super::aperture::Together;
 use super::band::FrequencyBand;
 use super::chirp_transform::Zoom;
 use super::propagator::check_wave;
@@ -96,16 +96,9 @@ impl FoldedPropagator {
         accuracy: Accuracy,
         band: FrequencyBand,
     ) -> Self {
-        let mut planner = FftPlanner::new();
         let zoom = [0, 1].map(|a| {
             let cycles = window.step_um / band.fade.period_um[a];
-            Zoom::new(
-                &mut planner,
-                band.count[a],
-                band.first[a] as f64,
-                window.samples,
-                cycles,
-            )
+            Zoom::new(band.count[a], band.first[a] as f64, window.samples, cycles)
         });
         Self {
             blocks_at_once: band.count[0].div_ceil(LANES),
@@ -113,8 +106,8 @@ impl FoldedPropagator {
             wavelength_um,
             window,
             accuracy,
-            forward: band.bins.map(|bins| planner.plan_fft_forward(bins)),
-            inverse: band.bins.map(|bins| planner.plan_fft_inverse(bins)),
+            forward: band.bins.map(forward),
+            inverse: band.bins.map(inverse),
             zoom,
             band,
         }
@@ -167,7 +160,7 @@ impl FoldedPropagator {
             });
         }
         let planes = [Plane::field(self.window)];
-        self.spectra(&Single(aperture), wave, &planes, scratch, &mut |_, _| {})?;
+        self.spectra(&Together(vec![aperture]), wave, &planes, scratch, &mut |_, _| {})?;
         self.window_rows(0, scratch, &mut values);
         Ok(())
     }
@@ -289,7 +282,7 @@ impl Propagator for FoldedPropagator {
         lp_mm: &[f64],
         scratch: &mut Scratch,
     ) -> Result<(Field, Option<Otf>)> {
-        let one = self.fields_and_otfs(&Single(aperture), wave, lp_mm, scratch)?;
+        let one = self.fields_and_otfs(&Together(vec![aperture]), wave, lp_mm, scratch)?;
         Ok(one.into_iter().next().expect("a set of one"))
     }
 

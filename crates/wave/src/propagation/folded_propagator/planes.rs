@@ -5,7 +5,7 @@ use num_complex::Complex32;
 
 use super::FoldedPropagator;
 use crate::error::Result;
-use crate::propagation::aperture::Single;
+use crate::propagation::aperture::Together;
 use crate::propagation::propagator::{check_shape, check_wave};
 use crate::propagation::{Aperture, Field, PlaneWave, Scratch, Window};
 
@@ -130,7 +130,7 @@ impl FoldedPropagator {
         windows
             .clone()
             .try_for_each(|window| window.check(self.wavelength_um))?;
-        self.spectra(&Single(aperture), wave, planes, scratch, &mut |_, _| {})?;
+        self.spectra(&Together(vec![aperture]), wave, planes, scratch, &mut |_, _| {})?;
         let formed = |(k, window): (usize, Window)| {
             let mut values = Array2::zeros([window.samples; 2]);
             self.window_rows(k, scratch, &mut values.view_mut());
