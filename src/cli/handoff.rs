@@ -13,8 +13,9 @@ use metalith::handoff::{
     verify_handoff,
 };
 use metalith::report::{Verdict, counted};
-use metalith::{Accuracy, Design, Error, Result};
+use metalith::{Design, Error, Result};
 
+use super::accuracy_args::AccuracyArgs;
 use super::compensated::judged_as_made;
 use super::layout::FormatArg;
 use super::out_folder::OutFolder;
@@ -82,9 +83,8 @@ pub(crate) struct HandoffArgs {
     #[arg(long, value_enum)]
     format: Option<FormatArg>,
 
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
-    #[arg(long)]
-    fast: bool,
+    #[command(flatten)]
+    accuracy: AccuracyArgs,
 
     /// Simulation model of the pillars; `fidelity` in [verify] of the design if left out.
     #[arg(long, value_enum)]
@@ -152,7 +152,7 @@ fn make_of_design(design: &Path, args: &HandoffArgs, terminal: &Terminal) -> Res
         compensate: args.compensate.clone(),
         dose_classes: args.dose_classes.clone(),
         fidelity: args.fidelity.map(Into::into),
-        accuracy: if args.fast { Accuracy::Fast } else { Accuracy::Accurate },
+        accuracy: args.accuracy.accuracy(),
     });
     make(
         source,
@@ -168,7 +168,7 @@ fn make_of_layout(path: &Path, file: &Path, args: &HandoffArgs, terminal: &Termi
         ("--compensate", args.compensate.is_some()),
         ("--dose-classes", args.dose_classes.is_some()),
         ("--fidelity", args.fidelity.is_some()),
-        ("--fast", args.fast),
+        ("--fast", args.accuracy.fast),
     ];
     only(
         "a design",

@@ -1,5 +1,6 @@
 //! The program: arguments in, exit code out. Everything it does is a call of the library.
 
+mod accuracy_args;
 mod calibrate;
 mod camera_args;
 mod cells;

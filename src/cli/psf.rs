@@ -22,6 +22,7 @@ use metalith::{
 };
 
 use self::light::{PsfLight, USUAL_DISTANCE_UM};
+use super::accuracy_args::AccuracyArgs;
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::verify::FidelityArg;
@@ -106,9 +107,8 @@ pub(crate) struct PsfArgs {
     #[arg(long)]
     oblique: bool,
 
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
-    #[arg(long)]
-    fast: bool,
+    #[command(flatten)]
+    accuracy: AccuracyArgs,
 
     /// Simulate planes along z too, up to this distance from the sensor on each side (um): for each plane Strehl ratio, FWHM and
     /// focusing efficiency, and the focal length found through focus. Without a value two depths of focus, 2 lambda / NA^2.

@@ -9,12 +9,13 @@ use metalith::imaging::thumbnail;
 use metalith::report::{Figure, count, counted, sig};
 use metalith::sensor::Camera;
 use metalith::{
-    Accuracy, AsBuiltChip, CalibratedModel, Design, Error, Fidelity, FolderLock, PillarArray, PillarRows, Result,
+    AsBuiltChip, CalibratedModel, Design, Error, Fidelity, FolderLock, PillarArray, PillarRows, Result,
     SimulationCases, Verification, cell_models, verify,
     verify::{Simulation, lens_figures, verdict_words, verify_in_parts, verify_pillars},
     write_report,
 };
 
+use super::accuracy_args::AccuracyArgs;
 use super::compensated::{CompensatedFor, judged_as_made};
 use super::paths::{inputs_of, paths};
 use super::reading::ReadingArgs;
@@ -57,9 +58,8 @@ pub(crate) struct VerifyArgs {
 /// Settings of the simulation of a layout.
 #[derive(Args, Clone)]
 pub(crate) struct Judging {
-    /// Simulate with errors of 1e-3 instead of 1e-5 of the amplitude of an ideal lens, several times faster.
-    #[arg(long)]
-    fast: bool,
+    #[command(flatten)]
+    accuracy: AccuracyArgs,
 
     /// Simulation model of the pillars; `fidelity` in [verify] of the design if left out. If the design names none:
     /// `neighbours` for the published cell, else `rigorous`.
@@ -132,7 +132,7 @@ impl Judging {
             model.check_shape(design.cell.shape)?;
         }
         let by_site = self.model.is_some() || fidelity == Fidelity::Neighbours;
-        Simulation::choose(design, path, self.accuracy(), by_site, self.memory_mb)
+        Simulation::choose(design, path, self.accuracy.accuracy(), by_site, self.memory_mb)
     }
 
     /// Succeeds if the pillars of an array can be as the model says; called before anything is written.
@@ -168,10 +168,6 @@ impl Judging {
         }
     }
 
-    fn accuracy(&self) -> Accuracy {
-        if self.fast { Accuracy::Fast } else { Accuracy::Accurate }
-    }
-
     /// Read back, simulate, write the report into the folder of a turn, and say what came out.
     pub(crate) fn judge(
         &self,
@@ -202,7 +198,7 @@ impl Judging {
             Simulation::InParts { part_bytes, .. } => {
                 let models = cell_models(design, &[judge])?;
                 let cases = SimulationCases::of_cells(&models)?;
-                let accuracy = self.accuracy();
+                let accuracy = self.accuracy.accuracy();
                 let found = verify_in_parts(design, array, layout, &cases, accuracy, part_bytes, terminal)?;
                 return self.report(design, array, &found, None, turn, terminal);
             }
@@ -232,7 +228,7 @@ impl Judging {
             None => SimulationCases::of_cells(&models)?,
         }
         .with_through_focus();
-        let found = verify(design, array, layout, &cases, self.accuracy(), terminal)?;
+        let found = verify(design, array, layout, &cases, self.accuracy.accuracy(), terminal)?;
         let picture = match camera {
             Some(camera) => match thumbnail(design, layout, &camera, model.as_ref(), terminal) {
                 Ok(figure) => Some(figure),

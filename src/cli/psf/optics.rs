@@ -9,8 +9,8 @@ use metalith::rcwa::CellLattice;
 use metalith::report::{exact, sig};
 use metalith::verify::{FocusRequest, Lighting};
 use metalith::{
-    Accuracy, AsBuiltChip, CalibratedModel, CellModel, Error, Extraction, LatticeKind, PillarShape, Pitch,
-    PolarisationBasis, Result, Wedge,
+    AsBuiltChip, CalibratedModel, CellModel, Error, Extraction, LatticeKind, PillarShape, Pitch, PolarisationBasis,
+    Result, Wedge,
 };
 
 use super::{FidelityArg, PsfArgs, PsfLight};
@@ -261,7 +261,7 @@ impl PsfArgs {
             pixel_um: self.pixel_um(light),
             polarised: self.polarised_light(shape),
             aperture_radius_um: self.aperture_um.map(|d| 0.5 * d),
-            accuracy: if self.fast { Accuracy::Fast } else { Accuracy::Accurate },
+            accuracy: self.accuracy.accuracy(),
             through_focus: self.through_focus.map(|range_um| FocusRequest {
                 range_um,
                 planes: self.planes,
